@@ -1,0 +1,216 @@
+//! The edit: a brush in integers, which the world obeys.
+
+use glam::IVec3;
+use serde::{Deserialize, Serialize};
+
+use super::roughness::Grain;
+use super::solid::Solid;
+use super::{BAND, Brush, BrushError, Evaluator, Operation};
+use crate::lattice::{LatticeBox, ONE};
+
+/// A brush in integers: the same edit changes the same samples to the same bits on every machine.
+///
+/// An edit is always within the limits of [the room's table](super): [`quantize`](Self::quantize) checks, and so does
+/// deserialising, which fails with the message of the [`BrushError`].
+///
+/// # Format
+///
+/// Serialised edits are kept in journals and sent over networks, so their form is stable: names, order and meaning of
+/// fields and variants stay, and new variants come after the old. In JSON:
+///
+/// ```json
+/// {"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},
+///  "roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0}
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Unchecked")]
+pub struct Edit {
+    shape: Solid,
+    operation: Operation,
+    roughness: Option<Grain>,
+    tag: u64,
+}
+
+/// An edit as it comes from a file or a network; the same fields in the same order.
+#[derive(Deserialize)]
+#[serde(rename = "Edit", deny_unknown_fields)]
+struct Unchecked {
+    shape: Solid,
+    operation: Operation,
+    roughness: Option<Grain>,
+    tag: u64,
+}
+
+impl Edit {
+    /// Rounds a brush to integers, halves to even, and checks it.
+    ///
+    /// Roughness of amplitude 0 is dropped. A rotation and its negative give the same edit.
+    ///
+    /// # Errors
+    ///
+    /// A [`BrushError`] where a number is not finite or beyond the limits of [the room's table](super).
+    pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
+        let roughness = brush.roughness.as_ref().map(Grain::quantize).transpose()?;
+        Ok(Self {
+            shape: Solid::quantize(&brush.shape)?,
+            operation: brush.operation,
+            roughness: roughness.filter(|grain| grain.amplitude != 0),
+            tag: brush.tag,
+        })
+    }
+
+    /// Checks the edit against the same limits as [`quantize`](Self::quantize). Deserialising has done so already.
+    ///
+    /// # Errors
+    ///
+    /// A [`BrushError`] that says which limit is broken.
+    pub fn check(&self) -> Result<(), BrushError> {
+        self.shape.check()?;
+        self.roughness.map_or(Ok(()), |grain| grain.check())
+    }
+
+    /// What the edit does.
+    pub fn operation(&self) -> Operation {
+        self.operation
+    }
+
+    /// The number that the brush carried.
+    pub fn tag(&self) -> u64 {
+        self.tag
+    }
+
+    /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6).
+    ///
+    /// At the rim of the lattice the box reaches beyond [`LIMIT`](crate::lattice::LIMIT) by at most some thousand
+    /// voxels; the world cuts it.
+    pub fn reach(&self) -> LatticeBox {
+        // Two more units for the rounding of the distance.
+        let grow = BAND + self.roughness.map_or(0, |grain| grain.amplitude) + 2;
+        let (low, high) = self.shape.bounds();
+        LatticeBox { min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)), max: (high + grow) >> 8 }
+    }
+
+    /// The edit's signed distance function, ready to evaluate.
+    pub fn evaluator(&self) -> Evaluator {
+        Evaluator::new(&self.shape, self.roughness)
+    }
+}
+
+impl TryFrom<&Brush> for Edit {
+    type Error = BrushError;
+
+    fn try_from(brush: &Brush) -> Result<Self, BrushError> {
+        Self::quantize(brush)
+    }
+}
+
+impl TryFrom<Unchecked> for Edit {
+    type Error = BrushError;
+
+    fn try_from(Unchecked { shape, operation, roughness, tag }: Unchecked) -> Result<Self, BrushError> {
+        let edit = Self { shape, operation, roughness, tag };
+        edit.check()?;
+        Ok(edit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::super::{Roughness, Shape};
+    use super::*;
+    use crate::ground::MaterialId;
+    use crate::lattice::LIMIT;
+
+    fn error(shape: Shape) -> BrushError {
+        Edit::quantize(&Brush::dig(shape)).unwrap_err()
+    }
+
+    #[test]
+    fn every_limit_is_refused_by_its_name() {
+        let (at, up) = (Vec3::ZERO, Vec3::Y);
+        assert!(matches!(error(Shape::sphere(at, -3.0)), BrushError::TooSmall { value: -3.0, .. }));
+        for radius in [0.0, -0.0, f32::MIN_POSITIVE / 4.0, 0.24, -1e30] {
+            assert!(matches!(error(Shape::sphere(at, radius)), BrushError::TooSmall { what: "radius", .. }));
+        }
+        assert!(matches!(error(Shape::sphere(at, f32::NAN)), BrushError::NotFinite { what: "radius", .. }));
+        assert!(matches!(error(Shape::sphere(at * f32::NAN, 1.0)), BrushError::NotFinite { .. }));
+        assert!(matches!(error(Shape::sphere(at, 1e30)), BrushError::TooLarge { what: "radius", .. }));
+        assert!(matches!(error(Shape::sphere(at, 300.0)), BrushError::TooLarge { what: "volume", .. }));
+        assert!(matches!(
+            error(Shape::cuboid(at, Vec3::new(513.0, 1.0, 1.0))),
+            BrushError::TooLarge { what: "box", .. }
+        ));
+        assert!(matches!(
+            error(Shape::cuboid(at, Vec3::new(3.0, 0.0, 1.0))),
+            BrushError::TooSmall { what: "half", .. }
+        ));
+        let far = Vec3::new(0.0, LIMIT as f32 + 0.5, 0.0);
+        assert!(matches!(error(Shape::sphere(far, 1.0)), BrushError::OutOfRange { what: "center", .. }));
+        let rim = Vec3::new(0.0, LIMIT as f32, 0.0);
+        assert!(matches!(error(Shape::cone(rim, up, 1.0)), BrushError::OutOfRange { what: "end", .. }));
+        assert!(matches!(error(Shape::cone(at, up * 0.2, 1.0)), BrushError::ZeroAxis { .. }));
+        assert!(matches!(error(Shape::cylinder(at, at, 1.0)), BrushError::ZeroAxis { length: 0.0, .. }));
+        assert!(matches!(error(Shape::capsule(-rim, rim, 1.0)), BrushError::TooLarge { what: "box", .. }));
+        for length in [0.0, 0.98, 1.02, 1e30] {
+            let shape = Shape::turned_cuboid(at, Vec3::ONE, Quat::IDENTITY * length);
+            assert!(matches!(error(shape), BrushError::ZeroRotation { .. }));
+        }
+    }
+
+    #[test]
+    fn what_is_just_within_the_limits_is_accepted() {
+        let rim = Vec3::splat(LIMIT as f32);
+        for shape in [
+            Shape::sphere(rim, 0.25),
+            Shape::sphere(-rim, 200.0),
+            Shape::capsule(Vec3::ZERO, Vec3::ZERO, 1.0),
+            Shape::capsule(Vec3::ZERO, Vec3::splat(1000.0), 0.25),
+            Shape::cuboid(Vec3::ZERO, Vec3::new(511.9, 10.0, 10.0)),
+            Shape::turned_cuboid(Vec3::ZERO, Vec3::ONE, Quat::from_xyzw(0.0, 1.009, 0.0, 0.0)),
+        ] {
+            Edit::quantize(&Brush::dig(shape)).unwrap().check().unwrap();
+        }
+    }
+
+    #[test]
+    fn a_rotation_and_its_negative_are_one_edit() {
+        for q in [Quat::from_xyzw(0.5, -0.5, 0.5, -0.5), Quat::from_xyzw(0.0, 0.0, -1.0, 0.0)] {
+            let of = |q| Edit::quantize(&Brush::dig(Shape::turned_cuboid(Vec3::ZERO, Vec3::ONE, q))).unwrap();
+            assert_eq!(of(q), of(-q));
+        }
+    }
+
+    #[test]
+    fn the_documented_form_is_the_form() {
+        let brush = Brush::add(Shape::sphere(Vec3::new(1.0, 0.0, -2.0), 4.0), MaterialId(3));
+        let edit = Edit::quantize(&brush.with_roughness(Roughness::new(0.5, 4.0, 7))).unwrap();
+        let json = r#"{"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0}"#;
+        assert_eq!(serde_json::to_string(&edit).unwrap(), json);
+        assert_eq!(serde_json::from_str::<Edit>(json).unwrap(), edit);
+    }
+
+    #[test]
+    fn edits_from_outside_are_checked() {
+        let parse = |shape: &str| {
+            let json = format!(r#"{{"shape":{shape},"operation":"dig","roughness":null,"tag":1}}"#);
+            serde_json::from_str::<Edit>(&json).map_err(|error| error.to_string())
+        };
+        parse(r#"{"sphere":{"center":[0,0,0],"radius":64}}"#).unwrap();
+        for (shape, message) in [
+            (
+                r#"{"sphere":{"center":[0,0,0],"radius":-2147483648}}"#,
+                "`radius` is -8388608 voxels, but the least is 0.25",
+            ),
+            (r#"{"sphere":{"center":[0,-2147483648,0],"radius":64}}"#, "beyond +-32768 voxels"),
+            (r#"{"cone":{"base":[0,0,0],"axis":[-2147483648,0,0],"radius":64}}"#, "the most is 1024"),
+            (r#"{"cuboid":{"center":[0,0,0],"half":[64,64,64],"rotation":[0,0,0,0]}}"#, "length 0"),
+            (r#"{"cuboid":{"center":[0,0,0],"half":[64,64,64],"rotation":[0,0,0,-32767]}}"#, "wrong sign"),
+            (r#"{"ball":{}}"#, "unknown variant `ball`"),
+        ] {
+            let error = parse(shape).unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
+    }
+}

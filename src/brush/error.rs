@@ -1,0 +1,82 @@
+//! Why a brush was refused.
+
+use thiserror::Error;
+
+/// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic voxels.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum BrushError {
+    /// A number is infinite or not a number.
+    #[error("`{what}` must be finite, but it holds {value}")]
+    NotFinite {
+        /// The field.
+        what: &'static str,
+        /// The number.
+        value: f32,
+    },
+    /// A radius or half side is negative, zero or below the least.
+    #[error("`{what}` is {value} voxels, but the least is {least}")]
+    TooSmall {
+        /// The field.
+        what: &'static str,
+        /// The length given.
+        value: f32,
+        /// The least length.
+        least: f32,
+    },
+    /// A size, the box around the shape, or its volume is above the most.
+    #[error("`{what}` is {value} voxels, but the most is {most}")]
+    TooLarge {
+        /// The field, or `box` (its longest side), or `volume`.
+        what: &'static str,
+        /// The length or volume.
+        value: f32,
+        /// The largest length or volume.
+        most: f32,
+    },
+    /// A point lies beyond the lattice.
+    #[error("`{what}` has the coordinate {value}, beyond +-{most} voxels")]
+    OutOfRange {
+        /// The field, or `end` for the base plus the axis.
+        what: &'static str,
+        /// The coordinate.
+        value: f32,
+        /// The largest coordinate: [`LIMIT`](crate::lattice::LIMIT).
+        most: f32,
+    },
+    /// The axis of a cylinder or cone is too short to have a direction.
+    #[error("`axis` is {length} voxels long, but the least is {least}")]
+    ZeroAxis {
+        /// Length after quantisation.
+        length: f32,
+        /// The least length.
+        least: f32,
+    },
+    /// The quaternion is no rotation: its length is not within 1/100 of 1.
+    #[error("`rotation` is a quaternion of length {length}, but it must be 1 (within 0.01)")]
+    ZeroRotation {
+        /// Length of the quaternion.
+        length: f32,
+    },
+    /// The integer quaternion of a deserialised edit has another sign than [`Edit::quantize`](super::Edit::quantize)
+    /// gives: the first of w, x, y, z that is not zero must be positive.
+    #[error(
+        "`rotation` {rotation:?} (x, y, z, w) has the wrong sign: its first non-zero of w, x, y, z must be positive"
+    )]
+    RotationSign {
+        /// The components x, y, z, w.
+        rotation: [i16; 4],
+    },
+    /// The amplitude or scale of the roughness is out of its range.
+    #[error("roughness `{what}` is {value} voxels, but it must be {least} to {most}")]
+    Roughness {
+        /// `amplitude` or `scale`.
+        what: &'static str,
+        /// The value given.
+        value: f32,
+        /// The least value.
+        least: f32,
+        /// The largest value.
+        most: f32,
+    },
+}

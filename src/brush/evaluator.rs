@@ -1,0 +1,161 @@
+//! From lattice samples to signed distances.
+
+use glam::{I64Vec3, IVec3};
+
+use super::BAND;
+use super::distance::{Distance, Form, larger, smaller};
+use super::roughness::Grain;
+use super::solid::Solid;
+use crate::lattice::{LatticeBox, ONE};
+
+/// Samples evaluated together.
+const RUN: usize = 32;
+
+/// Farthest coordinate, in voxels from the shape: in 1/256 voxel, `f32` still holds it exactly.
+const FARTHEST: i64 = 65_535;
+
+/// Distances stop here: 16384 voxels.
+const HORIZON: f32 = (1 << 22) as f32;
+
+/// An edit's signed distance function, its constants derived once.
+///
+/// Equal edits give equal distances, bit for bit, on every machine.
+#[derive(Clone, Debug)]
+pub struct Evaluator {
+    /// The shape's origin is at `home` voxels and `rest` (0..256) of 1/256 voxel.
+    home: IVec3,
+    rest: IVec3,
+    form: Form,
+    grain: Option<Grain>,
+}
+
+impl Evaluator {
+    /// The evaluator of a checked edit.
+    pub(super) fn new(solid: &Solid, grain: Option<Grain>) -> Self {
+        let origin = solid.origin();
+        Self { home: origin >> 8, rest: origin & 0xff, form: Form::of(solid), grain }
+    }
+
+    /// Signed distance from a lattice point to the edit's shape in 1/256 voxel: negative inside, roughness included,
+    /// rounded to the nearest integer and halves to even.
+    ///
+    /// Any point may be asked about. Distances stop at +-16384 voxels, and a point more than 65535 voxels from the
+    /// shape along an axis counts as 65535 voxels away along it.
+    pub fn distance(&self, point: IVec3) -> i32 {
+        let mut distance = [0];
+        self.row(point, &mut distance);
+        distance[0]
+    }
+
+    /// The same as [`distance`](Self::distance), bit for bit, for the samples `start`, `start + (1, 0, 0)` and so on.
+    pub fn row(&self, start: IVec3, out: &mut [i32]) {
+        let mut x = i64::from(start.x);
+        for run in out.chunks_mut(RUN) {
+            let mut buffer = [0.0; RUN];
+            let distances = &mut buffer[..run.len()];
+            self.smooth(x, start, distances);
+            if let Some(grain) = &self.grain {
+                grain.add(x, start, distances);
+            }
+            for (out, &distance) in run.iter_mut().zip(&*distances) {
+                *out = round(distance);
+            }
+            x = x.saturating_add(run.len() as i64);
+        }
+    }
+
+    /// Is every sample of the box farther than [`BAND`] outside, so that the edit changes none of them (rule 6)?
+    ///
+    /// Cheap and conservative: `false` may also mean "not sure". It takes one distance, at the middle of the box, of
+    /// which no corner can be nearer by more than half the diagonal.
+    pub fn is_out_of_reach(&self, samples: LatticeBox) -> bool {
+        let (min, max) = (samples.min.as_i64vec3(), samples.max.as_i64vec3());
+        let middle: I64Vec3 = (min + max) >> 1;
+        let corner = (max - middle).as_dvec3() * f64::from(ONE);
+        let diagonal = (corner.x * corner.x + corner.y * corner.y + corner.z * corner.z).sqrt();
+
+        let mut distance = [0.0];
+        self.smooth(middle.x, middle.as_ivec3(), &mut distance);
+        let distance = round(distance[0]);
+        // What rounding to f32 may have cost at this distance, generously.
+        let rounding = 16 + (distance >> 14);
+        let amplitude = self.grain.map_or(0, |grain| grain.amplitude);
+        f64::from(distance - rounding) > f64::from(BAND + amplitude) + diagonal
+    }
+
+    /// Distances without roughness, not rounded, for a run from (`x`, `start.y`, `start.z`) along +x.
+    fn smooth(&self, x: i64, start: IVec3, out: &mut [f32]) {
+        match &self.form {
+            Form::Sphere(sphere) => self.fill(sphere, x, start, out),
+            Form::Cuboid(cuboid) => self.fill(cuboid, x, start, out),
+            Form::Cylinder(cylinder) => self.fill(cylinder, x, start, out),
+            Form::Capsule(capsule) => self.fill(capsule, x, start, out),
+            Form::Cone(cone) => self.fill(cone, x, start, out),
+        }
+    }
+
+    /// The loop that the compiler vectorises, one for each shape. `out` holds at most [`RUN`] distances.
+    fn fill(&self, shape: &impl Distance, x: i64, start: IVec3, out: &mut [f32]) {
+        let across = |v: i32, home: i32, rest: i32| {
+            let voxels = (i64::from(v) - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32;
+            (voxels * ONE - rest) as f32
+        };
+        let y = across(start.y, self.home.y, self.rest.y);
+        let z = across(start.z, self.home.z, self.rest.z);
+        let farthest = FARTHEST as i32;
+        // Clamped once more than needed, wide enough to leave the clamp in the loop its say.
+        let first = (x - i64::from(self.home.x)).clamp(-2 * FARTHEST, 2 * FARTHEST) as i32;
+        for (i, out) in (0..).zip(out) {
+            let voxels = (first + i).clamp(-farthest, farthest);
+            *out = shape.at((voxels * ONE - self.rest.x) as f32, y, z);
+        }
+    }
+}
+
+/// Rounds to the nearest integer, halves to even, with an addition: next to 1.5 * 2^23, floats are the integers.
+#[inline(always)]
+fn round(distance: f32) -> i32 {
+    const SHIFT: f32 = 12_582_912.0;
+    let near = smaller(larger(distance, -HORIZON), HORIZON);
+    (near + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_to_nearest_and_halves_to_even() {
+        for (distance, rounded) in [
+            (0.0, 0),
+            (-0.0, 0),
+            (0.5, 0),
+            (1.5, 2),
+            (2.5, 2),
+            (-0.5, 0),
+            (-1.5, -2),
+            (-2.500_001, -3),
+            (1e30, 1 << 22),
+            (-1e30, -(1 << 22)),
+            (4_194_303.5, 1 << 22),
+            (-4_194_302.5, -4_194_302),
+        ] {
+            assert_eq!(round(distance), rounded, "{distance}");
+        }
+    }
+
+    #[test]
+    fn a_row_across_the_farthest_coordinate_is_its_samples() {
+        let solid = Solid::Sphere { center: [-5, 300, 7], radius: 600 };
+        let evaluator = Evaluator::new(&solid, None);
+        let far = FARTHEST as i32;
+        for start in [far - 40, -far - 40, i32::MIN, i32::MAX - 79] {
+            let mut row = [0; 80];
+            evaluator.row(IVec3::new(start, 3, 0), &mut row);
+            for (x, distance) in (start..).zip(row) {
+                assert_eq!(distance, evaluator.distance(IVec3::new(x, 3, 0)));
+                assert_eq!(distance, HORIZON as i32);
+            }
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! Laws of edits, for any brush.
+
+use glam::{DQuat, DVec3, IVec3, Quat, Vec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::ground::MaterialId;
+use crate::lattice::{LatticeBox, hash::mix};
+
+fn vector(most: f32) -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-most..most).prop_map(Vec3::from_array)
+}
+
+fn rotation() -> impl Strategy<Value = Quat> {
+    (vector(1.0), -3.2f32..3.2)
+        .prop_map(|(axis, angle)| Quat::from_axis_angle(axis.normalize_or(Vec3::Y), angle))
+}
+
+/// Shapes up to `size` voxels around places up to `far` voxels out.
+fn shape(far: f32, size: f32) -> impl Strategy<Value = Shape> {
+    let axis = move || vector(size).prop_filter("too short", |axis| axis.length() > 0.3);
+    let radius = move || 0.25..size;
+    prop_oneof![
+        (vector(far), radius()).prop_map(|(center, radius)| Shape::sphere(center, radius)),
+        (vector(far), prop::array::uniform3(radius()), rotation())
+            .prop_map(|(center, half, turn)| Shape::turned_cuboid(center, Vec3::from_array(half), turn)),
+        (vector(far), axis(), radius()).prop_map(|(base, axis, radius)| Shape::cylinder(base, axis, radius)),
+        (vector(far), vector(size), radius()).prop_map(|(from, by, radius)| Shape::capsule(
+            from,
+            from + by,
+            radius
+        )),
+        (vector(far), axis(), radius()).prop_map(|(base, axis, radius)| Shape::cone(base, axis, radius)),
+    ]
+}
+
+fn roughness() -> impl Strategy<Value = Option<Roughness>> {
+    prop::option::of(
+        (0.0f32..8.0, 1.0f32..20.0, any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed)),
+    )
+}
+
+fn edit(shape: Shape, roughness: Option<Roughness>) -> Edit {
+    Edit::quantize(&Brush { roughness, ..Brush::dig(shape) }).unwrap()
+}
+
+/// Any bits at all, ordinary numbers among them.
+fn wild() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        any::<u32>().prop_map(f32::from_bits),
+        -10.0f32..10.0,
+        -40_000.0f32..40_000.0,
+        Just(0.0),
+        Just(1.0),
+        Just(32_768.0),
+        Just(1024.0),
+    ]
+}
+
+fn wild_brush() -> impl Strategy<Value = Brush> {
+    let vector = || prop::array::uniform3(wild()).prop_map(Vec3::from_array);
+    let turn = prop_oneof![rotation(), prop::array::uniform4(wild()).prop_map(Quat::from_array)];
+    let shape = (0..5, vector(), vector(), turn, wild()).prop_map(|(kind, a, b, turn, radius)| match kind {
+        0 => Shape::sphere(a, radius),
+        1 => Shape::turned_cuboid(a, b, turn),
+        2 => Shape::cylinder(a, b, radius),
+        3 => Shape::capsule(a, b, radius),
+        _ => Shape::cone(a, b, radius),
+    });
+    let roughness = (wild(), wild(), any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed));
+    (shape, prop::option::of(roughness), any::<u64>()).prop_map(|(shape, roughness, tag)| Brush {
+        roughness,
+        ..Brush::paint(shape, MaterialId(1)).with_tag(tag)
+    })
+}
+
+/// Distance by another road: f64, polygons instead of formulas, the brush's own numbers instead of the edit's.
+fn plain_distance(shape: &Shape, p: DVec3) -> f64 {
+    match *shape {
+        Shape::Sphere { center, radius } => p.distance(center.as_dvec3()) - f64::from(radius),
+        Shape::Capsule { from, to, radius } => {
+            to_segment(p, from.as_dvec3(), to.as_dvec3()) - f64::from(radius)
+        }
+        Shape::Cuboid { center, half, rotation } => {
+            let turn = DQuat::from_array(rotation.to_array().map(f64::from)).normalize();
+            let (own, half) = (turn.inverse() * (p - center.as_dvec3()), half.as_dvec3());
+            let nearest = own.clamp(-half, half);
+            if nearest == own { -(half - own.abs()).min_element() } else { own.distance(nearest) }
+        }
+        Shape::Cylinder { base, axis, radius } | Shape::Cone { base, axis, radius } => {
+            let (base, axis, radius) = (base.as_dvec3(), axis.as_dvec3(), f64::from(radius));
+            let (length, unit) = (axis.length(), axis.normalize());
+            let along = (p - base).dot(unit);
+            let off = (p - base).cross(unit).length();
+            // The outline in the half-plane (off, along), as far as it is surface.
+            let at = |x, y| DVec3::new(x, y, 0.0);
+            let is_cone = matches!(shape, Shape::Cone { .. });
+            let outline: &[DVec3] = if is_cone {
+                &[at(0.0, 0.0), at(radius, 0.0), at(0.0, length)]
+            } else {
+                &[at(0.0, 0.0), at(radius, 0.0), at(radius, length), at(0.0, length)]
+            };
+            let here = at(off, along);
+            let distance = outline.windows(2).map(|s| to_segment(here, s[0], s[1])).fold(f64::MAX, f64::min);
+            let width = if is_cone { radius * (1.0 - along / length) } else { radius };
+            if (0.0..=length).contains(&along) && off <= width { -distance } else { distance }
+        }
+    }
+}
+
+fn to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let t = if a == b { 0.0 } else { (p - a).dot(b - a) / (b - a).length_squared() };
+    p.distance(a.lerp(b, t.clamp(0.0, 1.0)))
+}
+
+proptest! {
+    #[test]
+    fn reach_encloses_every_sample_that_may_change(shape in shape(30.0, 7.0), roughness in roughness()) {
+        let edit = edit(shape, roughness);
+        let (reach, evaluator) = (edit.reach(), edit.evaluator());
+        let beyond = reach.grown(3);
+        let mut row = vec![0; beyond.size().x as usize];
+        for y in beyond.min.y..=beyond.max.y {
+            for z in beyond.min.z..=beyond.max.z {
+                evaluator.row(IVec3::new(beyond.min.x, y, z), &mut row);
+                for (x, &distance) in (beyond.min.x..).zip(&row) {
+                    prop_assert!(distance > BAND || reach.contains(IVec3::new(x, y, z)), "{x} {y} {z}: {distance}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn reach_is_tight_without_roughness(shape in shape(30.0, 20.0)) {
+        let edit = edit(shape, None);
+        let (reach, evaluator) = (edit.reach(), edit.evaluator());
+        // On every side, some sample of the outermost two layers is within the band or nearly so.
+        for axis in 0..3 {
+            for side in [reach.min[axis], reach.max[axis]] {
+                let mut face = reach;
+                face.min[axis] = side;
+                face.max[axis] = side;
+                let nearest = face.points().map(|p| evaluator.distance(p)).min().unwrap();
+                prop_assert!(nearest <= BAND + 256, "axis {axis} at {side}: {nearest}");
+            }
+        }
+    }
+
+    #[test]
+    fn out_of_reach_is_never_a_lie(
+        shape in shape(20.0, 8.0), roughness in roughness(), size in prop::array::uniform3(1..10),
+    ) {
+        let (edit, size) = (edit(shape, roughness), IVec3::from_array(size));
+        let (around, evaluator) = (edit.reach().grown(12), edit.evaluator());
+        // The surroundings, cut into boxes.
+        let counts = LatticeBox { min: IVec3::ZERO, max: around.size() / size };
+        for min in counts.points().map(|step| around.min + step * size) {
+            let samples = LatticeBox { min, max: min + size - 1 };
+            let nearest = samples.points().map(|p| evaluator.distance(p)).min().unwrap();
+            if evaluator.is_out_of_reach(samples) {
+                prop_assert!(nearest > BAND, "{samples:?} holds {nearest}");
+            } else {
+                // And it does see what is far away: a diagonal off, and the roughness twice.
+                let slack = 256.0 * (size.as_vec3().length() + 2.0 * 8.0) + 64.0;
+                prop_assert!((nearest as f32) < BAND as f32 + slack, "{samples:?}: {nearest}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_is_its_samples(
+        shape in shape(32_000.0, 60.0), roughness in roughness(), start in prop::array::uniform3(-90..90), length in 0usize..100,
+    ) {
+        let edit = edit(shape, roughness);
+        let start = edit.reach().min + IVec3::from_array(start);
+        let mut row = vec![0; length];
+        edit.evaluator().row(start, &mut row);
+        for (x, &distance) in (start.x..).zip(&row) {
+            prop_assert_eq!(distance, edit.evaluator().distance(IVec3::new(x, start.y, start.z)));
+        }
+    }
+
+    #[test]
+    fn distance_changes_no_faster_than_the_point(
+        shape in shape(100.0, 90.0), p in prop::array::uniform3(-300..300), by in prop::array::uniform3(-9..=9)
+    ) {
+        let evaluator = edit(shape, None).evaluator();
+        let (p, by) = (IVec3::from_array(p), IVec3::from_array(by));
+        let change = evaluator.distance(p + by) - evaluator.distance(p);
+        prop_assert!(f64::from(change).abs() <= by.as_dvec3().length() * 256.0 + 2.0);
+    }
+
+    #[test]
+    fn distance_is_the_euclidean_one(shape in shape(100.0, 150.0), p in prop::array::uniform3(-400..400)) {
+        prop_assume!(Edit::quantize(&Brush::dig(shape)).is_ok());
+        let p = IVec3::from_array(p);
+        let distance = f64::from(edit(shape, None).evaluator().distance(p));
+        let plain = plain_distance(&shape, p.as_dvec3()) * 256.0;
+        // Quantisation of position, axis and radius: about 1 unit each; of a rotation: 1/32767 of the box's size.
+        let turned = if let Shape::Cuboid { half, .. } = shape { f64::from(half.length()) * 256.0 / 32767.0 } else { 0.0 };
+        prop_assert!((distance - plain).abs() < 4.0 + turned, "{} instead of {}", distance, plain);
+    }
+
+    #[test]
+    fn roughness_stays_in_its_amplitude(shape in shape(30.0, 20.0), grain in roughness(), p in prop::array::uniform3(-60..60)) {
+        let p = IVec3::from_array(p);
+        let amplitude = grain.map_or(0.0, |grain| grain.amplitude * 256.0);
+        let change = edit(shape, grain).evaluator().distance(p) - edit(shape, None).evaluator().distance(p);
+        prop_assert!((change.abs() as f32) <= amplitude + 1.5);
+    }
+
+    #[test]
+    fn any_bits_are_refused_or_give_an_edit(brush in wild_brush(), p in prop::array::uniform3(any::<i32>()), length in 0usize..70) {
+        match Edit::quantize(&brush) {
+            Err(error) => prop_assert!(!error.to_string().is_empty()),
+            Ok(edit) => {
+                prop_assert_eq!(edit.check(), Ok(()));
+                let json = serde_json::to_string(&edit).unwrap();
+                prop_assert_eq!(&serde_json::from_str::<Edit>(&json).unwrap(), &edit);
+                let p = IVec3::from_array(p);
+                let evaluator = edit.evaluator();
+                let mut row = vec![0; length];
+                evaluator.row(p, &mut row);
+                prop_assert!(row.first().is_none_or(|&first| first == evaluator.distance(p)));
+                let _ = evaluator.is_out_of_reach(LatticeBox { min: p, max: IVec3::MAX });
+                let _ = evaluator.is_out_of_reach(LatticeBox { min: IVec3::MIN, max: p });
+                prop_assert!(!evaluator.is_out_of_reach(edit.reach()));
+            }
+        }
+        let _ = Edit::quantize(&brush.transformed(Quat::from_xyzw(0.6, 0.0, 0.0, 0.8), Vec3::ONE, 0.5));
+        let record = BrushRecord::from(&brush);
+        prop_assert_eq!(Brush::try_from(record).is_ok(), true);
+    }
+
+    #[test]
+    fn any_integers_are_checked(center: [i32; 3], half: [i32; 3], rotation: [i16; 4], kind in 0..3) {
+        let shape = match kind {
+            0 => serde_json::json!({"cuboid": {"center": center, "half": half, "rotation": rotation}}),
+            1 => serde_json::json!({"cone": {"base": center, "axis": half, "radius": 64}}),
+            _ => serde_json::json!({"capsule": {"from": center, "to": half, "radius": 64}}),
+        };
+        let grain = serde_json::json!({"amplitude": center[0], "scale": center[1], "seed": 0});
+        let json = serde_json::json!({"shape": shape, "operation": "dig", "roughness": grain, "tag": 0});
+        prop_assert!(serde_json::from_value::<Edit>(json).is_err());
+    }
+}
+
+#[test]
+fn distances_derived_by_hand() {
+    let (o, up) = (Vec3::ZERO, Vec3::new(0.0, 8.0, 0.0));
+    let quarter = Quat::from_rotation_y(std::f32::consts::FRAC_PI_4);
+    let (sphere, cube) = (Shape::sphere(o, 5.0), Shape::cuboid(o, Vec3::splat(2.0)));
+    let (cylinder, capsule) = (Shape::cylinder(o, up, 3.0), Shape::capsule(o, up, 3.0));
+    let (cone, turned) = (Shape::cone(o, up, 6.0), Shape::turned_cuboid(o, Vec3::splat(2.0), quarter));
+    for (name, shape, at, distance) in [
+        ("a sphere's centre is a radius deep", sphere, [0, 0, 0], -5 * 256),
+        ("3-4-5 on the sphere", sphere, [3, 4, 0], 0),
+        ("6-8-10 outside", sphere, [0, -6, 8], 5 * 256),
+        ("a box's centre", cube, [0, 0, 0], -2 * 256),
+        ("its corner", cube, [2, 2, 2], 0),
+        ("one step off the corner on each axis: sqrt(3)", cube, [3, 3, 3], 443),
+        ("off an edge: sqrt(2)", cube, [3, 3, 0], 362),
+        ("inside, the nearest face counts", cube, [1, 0, 0], -256),
+        ("turned by 45 degrees, an edge reaches 2 sqrt(2)", turned, [3, 0, 0], 44),
+        ("a cylinder's middle", cylinder, [0, 4, 0], -3 * 256),
+        ("nearer to its end", cylinder, [0, 7, 0], -256),
+        ("off its rim: 3-4-5", cylinder, [6, -4, 0], 5 * 256),
+        ("above it", cylinder, [1, 11, 1], 3 * 256),
+        ("a capsule's round end", capsule, [0, -3, 0], 0),
+        ("off its round end: 3-4-5", capsule, [3, 12, 0], 2 * 256),
+        ("beside it", capsule, [0, 5, 7], 4 * 256),
+        ("a cone's apex", cone, [0, 8, 0], 0),
+        ("above the apex", cone, [0, 11, 0], 3 * 256),
+        ("its rim", cone, [6, 0, 0], 0),
+        ("below the base", cone, [2, -3, 0], 3 * 256),
+        ("outside the rim: 3-4-5", cone, [9, -4, 0], 5 * 256),
+        ("on the axis, the base is nearer than the side", cone, [0, 3, 0], -3 * 256),
+        ("off the side along its normal by 5", cone, [7, 7, 0], 5 * 256),
+    ] {
+        let at = IVec3::from_array(at);
+        assert_eq!(edit(shape, None).evaluator().distance(at), distance, "{name}: {shape:?} at {at}");
+    }
+}
+
+#[test]
+fn overlapping_brushes_of_one_seed_fit_together() {
+    let roughness = Some(Roughness::new(2.0, 6.0, 42));
+    let smooth = |center| edit(Shape::sphere(center, 9.0), None).evaluator();
+    let rough = |center| edit(Shape::sphere(center, 9.0), roughness).evaluator();
+    let (a, b) = (Vec3::ZERO, Vec3::new(7.0, 3.0, 0.0));
+    for p in LatticeBox::point(IVec3::ZERO).grown(6).points() {
+        let bump = |center| rough(center).distance(p) - smooth(center).distance(p);
+        assert!((bump(a) - bump(b)).abs() <= 1);
+    }
+}
+
+#[test]
+fn distances_have_the_same_bits_everywhere() {
+    let turn = Quat::from_xyzw(0.36, -0.48, 0.64, 0.48);
+    let (base, axis) = (Vec3::new(-3.3, 100.7, 8.05), Vec3::new(5.5, -9.25, 17.125));
+    let mut hash = 0;
+    for (shape, amplitude) in [
+        Shape::sphere(base, 7.77),
+        Shape::turned_cuboid(base, Vec3::new(3.0, 9.1, 5.6), turn),
+        Shape::cylinder(base, axis, 4.4),
+        Shape::capsule(base, base + axis, 3.9),
+        Shape::cone(base, axis, 11.5),
+    ]
+    .into_iter()
+    .flat_map(|shape| [(shape, 0.0), (shape, 1.75)])
+    {
+        let edit = edit(shape, Some(Roughness::new(amplitude, 5.3, 1234)));
+        let evaluator = edit.evaluator();
+        for point in edit.reach().points() {
+            hash = mix(hash ^ u64::from(evaluator.distance(point) as u32));
+        }
+    }
+    assert_eq!(
+        hash, 0xbbb8_de26_8cf8_d229,
+        "Distances changed. On one machine only: find what is not exactly rounded. On all: saved journals will replay \
+         to another world, so raise the format's version, then put the new hash here: {hash:#018x}"
+    );
+}

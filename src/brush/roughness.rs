@@ -1,0 +1,175 @@
+//! Bumps on a brush's surface: value noise on an integer hash.
+
+use glam::IVec3;
+use serde::{Deserialize, Serialize};
+
+use super::BrushError;
+use crate::lattice::{ONE, hash::mix};
+
+/// Bumps added to a shape's signed distance: smooth noise in +-`amplitude`.
+///
+/// The noise is tied to the lattice, not to the shape, so overlapping brushes with one seed and scale fit together.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Roughness {
+    /// Height of the bumps in voxels, 0 to 8.
+    pub amplitude: f32,
+    /// Width of a bump in voxels, 1 to 256.
+    pub scale: f32,
+    /// Which of the patterns.
+    pub seed: u32,
+}
+
+impl Roughness {
+    /// Bumps of `amplitude` voxels (0 to 8), each about `scale` voxels wide (1 to 256).
+    pub const fn new(amplitude: f32, scale: f32, seed: u32) -> Self {
+        Self { amplitude, scale, seed }
+    }
+}
+
+/// Quantised roughness. Lengths in 1/256 voxel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Grain {
+    pub(super) amplitude: i32,
+    scale: i32,
+    seed: u32,
+}
+
+const AMPLITUDES: (i32, i32) = (0, 8 * ONE);
+const SCALES: (i32, i32) = (ONE, 256 * ONE);
+
+/// Noise is computed within this many voxels of the origin, far beyond every reach, and repeats its rim from there on.
+const RIM: i64 = 1 << 20;
+
+impl Grain {
+    pub(super) fn quantize(roughness: &Roughness) -> Result<Self, BrushError> {
+        Ok(Self {
+            amplitude: units("amplitude", roughness.amplitude, AMPLITUDES)?,
+            scale: units("scale", roughness.scale, SCALES)?,
+            seed: roughness.seed,
+        })
+    }
+
+    pub(super) fn check(&self) -> Result<(), BrushError> {
+        for (what, value, (least, most)) in
+            [("amplitude", self.amplitude, AMPLITUDES), ("scale", self.scale, SCALES)]
+        {
+            if value < least || value > most {
+                return Err(out_of_range(what, value as f32 / ONE as f32, (least, most)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the noise of a run of samples along +x, the first at (`x`, `start.y`, `start.z`), to `distances`.
+    ///
+    /// A sample's noise depends on its position only: interpolation goes y, z, x, and what neighbours on the run share
+    /// is computed once.
+    pub(super) fn add(&self, x: i64, start: IVec3, distances: &mut [f32]) {
+        let (y, z) = (self.locate(i64::from(start.y)), self.locate(i64::from(start.z)));
+        let mut near = self.locate(x).0;
+        let (mut low, mut high) = (self.face(near, y, z), self.face(near + 1, y, z));
+        for (i, distance) in distances.iter_mut().enumerate() {
+            let (cell, t) = self.locate(x.saturating_add(i as i64));
+            if cell != near {
+                low = if cell == near + 1 { high } else { self.face(cell, y, z) };
+                high = self.face(cell + 1, y, z);
+                near = cell;
+            }
+            *distance += lerp(low, high, t).clamp(-1.0, 1.0) * self.amplitude as f32;
+        }
+    }
+
+    /// The noise cell that a coordinate lies in, and the faded position between its ends.
+    fn locate(&self, voxel: i64) -> (i32, f32) {
+        let place = voxel.clamp(-RIM, RIM) as i32 * ONE;
+        let cell = place.div_euclid(self.scale);
+        let t = (place - cell * self.scale) as f32 / self.scale as f32;
+        (cell, t * t * (3.0 - 2.0 * t))
+    }
+
+    /// The noise on the plane of noise points with one x, at (y, z).
+    fn face(&self, x: i32, (y, ty): (i32, f32), (z, tz): (i32, f32)) -> f32 {
+        let near = lerp(self.corner(x, y, z), self.corner(x, y + 1, z), ty);
+        let far = lerp(self.corner(x, y, z + 1), self.corner(x, y + 1, z + 1), ty);
+        lerp(near, far, tz)
+    }
+
+    /// The value of a noise point: 24 bits of a hash, in [-1, 1).
+    fn corner(&self, x: i32, y: i32, z: i32) -> f32 {
+        let bits = |v: i32| u64::from(v as u32 & 0x1f_ffff);
+        let hash = mix((bits(x) << 42 | bits(y) << 21 | bits(z)) ^ mix(u64::from(self.seed)));
+        ((hash >> 40) as i32 - (1 << 23)) as f32 / (1 << 23) as f32
+    }
+}
+
+fn lerp(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}
+
+fn units(what: &'static str, value: f32, range: (i32, i32)) -> Result<i32, BrushError> {
+    if !value.is_finite() {
+        return Err(BrushError::NotFinite { what, value });
+    }
+    let units = value * ONE as f32;
+    if units < range.0 as f32 || units > range.1 as f32 {
+        return Err(out_of_range(what, value, range));
+    }
+    Ok(units.round_ties_even() as i32)
+}
+
+fn out_of_range(what: &'static str, value: f32, (least, most): (i32, i32)) -> BrushError {
+    let voxels = |units: i32| units as f32 / ONE as f32;
+    BrushError::Roughness { what, value, least: voxels(least), most: voxels(most) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(grain: &Grain, p: IVec3) -> f32 {
+        let mut out = [0.0];
+        grain.add(i64::from(p.x), p, &mut out);
+        out[0]
+    }
+
+    #[test]
+    fn noise_fills_its_range_and_stays_in_it() {
+        let grain = Grain::quantize(&Roughness::new(2.0, 3.5, 11)).unwrap();
+        let (mut low, mut high, mut sum) = (0.0f32, 0.0f32, 0.0f64);
+        for i in 0..20_000 {
+            let value = noise(&grain, IVec3::new(i % 41 - 20, i / 41 % 37 - 15, i / 1517 - 7));
+            (low, high, sum) = (low.min(value), high.max(value), sum + f64::from(value));
+        }
+        assert!((-512.0..-400.0).contains(&low) && high > 400.0 && high <= 512.0, "{low} {high}");
+        assert!((sum / 20_000.0).abs() < 30.0, "mean {}", sum / 20_000.0);
+    }
+
+    #[test]
+    fn noise_points_carry_their_hash_and_seeds_differ() {
+        let grain = Grain::quantize(&Roughness::new(1.0, 4.0, 1)).unwrap();
+        let other = Grain::quantize(&Roughness::new(1.0, 4.0, 2)).unwrap();
+        for (cell, point) in [(0, 0), (1, 4), (-1, -4)] {
+            let p = IVec3::new(point, 0, point);
+            assert_eq!(noise(&grain, p), grain.corner(cell, 0, cell) * 256.0);
+            assert_ne!(noise(&grain, p), noise(&other, p));
+        }
+    }
+
+    #[test]
+    fn amplitude_and_scale_have_ends() {
+        for (amplitude, scale, what) in [
+            (-0.01, 4.0, "amplitude"),
+            (8.01, 4.0, "amplitude"),
+            (f32::MAX, 4.0, "amplitude"),
+            (1.0, 0.99, "scale"),
+            (1.0, 256.5, "scale"),
+        ] {
+            let error = Grain::quantize(&Roughness::new(amplitude, scale, 0)).unwrap_err();
+            assert!(matches!(error, BrushError::Roughness { what: found, .. } if found == what), "{error}");
+        }
+        assert!(Grain::quantize(&Roughness::new(0.0, 1.0, 0)).is_ok());
+        assert!(Grain::quantize(&Roughness::new(8.0, 256.0, 0)).is_ok());
+    }
+}

@@ -1,0 +1,254 @@
+//! Material control: which column is made of what.
+
+use super::error::GroundError;
+use super::grey_image::GreyImage;
+use super::material::{ColumnMaterial, MaterialId};
+use super::rules::{MaterialRule, apply};
+use super::world::{Ground, Materials};
+use crate::lattice::{Column, ONE};
+
+/// Decides the materials of every column. Images are stretched over the world, their first sample at column (0, 0),
+/// their last at the far corner.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum MaterialControl {
+    /// The same for every column.
+    Uniform(ColumnMaterial),
+    /// By height and slope: `base` everywhere, and over it the rules like coats of paint, the first on top. A column
+    /// shows as overlay the rule that covers most of it, blended by how much all rules together cover.
+    Rules {
+        /// The material below all rules.
+        base: MaterialId,
+        /// The overlays, topmost first.
+        rules: Vec<MaterialRule>,
+    },
+    /// By a mask: black shows the base, white the overlay, samples are blended linearly.
+    Blend {
+        /// The mask.
+        mask: GreyImage,
+        /// The material of black, and of the deep.
+        base: MaterialId,
+        /// The material of white.
+        overlay: MaterialId,
+    },
+    /// By a map of ids: each column's overlay is the id in the nearest sample, and covers the base fully. An id is the
+    /// grey level of an 8-bit image, or the high byte of a 16-bit one.
+    Ids {
+        /// The map.
+        map: GreyImage,
+        /// The material of the deep.
+        base: MaterialId,
+    },
+}
+
+impl Default for MaterialControl {
+    /// Material 0 everywhere.
+    fn default() -> Self {
+        Self::Uniform(ColumnMaterial::default())
+    }
+}
+
+impl Ground {
+    /// The same heights, with materials as `control` decides.
+    ///
+    /// # Errors
+    /// [`GroundError::Rule`] for a rule with a parameter out of its range; [`GroundError::Memory`] if the machine has
+    /// too little.
+    pub fn with_materials(self, control: &MaterialControl) -> Result<Self, GroundError> {
+        let materials = match control {
+            MaterialControl::Uniform(material) => Materials::Uniform(*material),
+            MaterialControl::Rules { base, rules } => {
+                for (index, rule) in rules.iter().enumerate() {
+                    rule.check(index)?;
+                }
+                self.material_columns(|column| {
+                    let height = f64::from(self.height(column)) / f64::from(ONE);
+                    apply(*base, rules, height, self.slope(column))
+                })?
+            }
+            MaterialControl::Blend { mask, base, overlay } => self.material_columns(|column| {
+                let grey = self.stretched(mask, column).grey();
+                let blend = (grey / 65_535.0 * 255.0).round() as u8;
+                ColumnMaterial { base: *base, overlay: *overlay, blend }
+            })?,
+            MaterialControl::Ids { map, base } => self.material_columns(|column| {
+                let [id, _] = self.stretched(map, column).nearest().to_be_bytes();
+                ColumnMaterial { base: *base, overlay: MaterialId(id), blend: 255 }
+            })?,
+        };
+        Ok(self.replace_materials(materials))
+    }
+
+    /// Materials of each column on its own.
+    fn material_columns(
+        &self,
+        material: impl Fn(Column) -> ColumnMaterial + Sync,
+    ) -> Result<Materials, GroundError> {
+        let columns = self.extent().fill_rows(|z, row| {
+            for (x, place) in (0..).zip(row) {
+                *place = material(Column::new(x, z));
+            }
+            Ok(())
+        })?;
+        Ok(Materials::from_columns(columns))
+    }
+
+    /// Where a column of the world lies on an image stretched over it.
+    fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
+        ImagePoint {
+            image,
+            x: AxisPoint::new(column.x, self.width(), image.width()),
+            z: AxisPoint::new(column.z, self.depth(), image.height()),
+        }
+    }
+}
+
+/// A point on an image.
+struct ImagePoint<'a> {
+    image: &'a GreyImage,
+    x: AxisPoint,
+    z: AxisPoint,
+}
+
+impl ImagePoint<'_> {
+    /// Grey here, 0 to 65535, linear between the four samples around.
+    fn grey(&self) -> f64 {
+        let (x, z) = (self.x.sample, self.z.sample);
+        let row = |z| lerp(self.image.grey(x, z).into(), self.image.grey(x + 1, z).into(), self.x.fraction);
+        lerp(row(z), row(z + 1), self.z.fraction)
+    }
+
+    /// The sample nearest to here.
+    fn nearest(&self) -> u16 {
+        self.image.grey(self.x.nearest(), self.z.nearest())
+    }
+}
+
+/// A point along one axis of an image: so far from one sample towards the next.
+struct AxisPoint {
+    sample: u32,
+    /// 0 at the sample, 1 at the next.
+    fraction: f64,
+}
+
+impl AxisPoint {
+    /// Column `position` of `0..=cells` on a line of `samples` samples whose ends lie on the world's rims.
+    fn new(position: i32, cells: i32, samples: u32) -> Self {
+        let cells = cells.unsigned_abs();
+        // Both at most 16384, so their product fits.
+        let along = position.unsigned_abs() * (samples - 1);
+        Self { sample: along / cells, fraction: f64::from(along % cells) / f64::from(cells) }
+    }
+
+    fn nearest(&self) -> u32 {
+        if self.fraction < 0.5 { self.sample } else { self.sample + 1 }
+    }
+}
+
+fn lerp(from: f64, to: f64, t: f64) -> f64 {
+    from + (to - from) * t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::{GreyImage, MAX_SIZE};
+    use glam::IVec3;
+    use proptest::prelude::*;
+
+    const ROCK: MaterialId = MaterialId(1);
+    const GRASS: MaterialId = MaterialId(2);
+
+    fn grass_where_flat() -> MaterialControl {
+        let grass = MaterialRule { overlay: GRASS, slope: (0.0, 0.5), ..MaterialRule::default() };
+        MaterialControl::Rules { base: ROCK, rules: vec![grass] }
+    }
+
+    #[test]
+    fn grass_grows_where_it_is_flat_and_rock_lies_beneath() {
+        let terrace = Ground::from_fn(12, 2, |x, _| f64::from(x.clamp(4, 8) * 2)).unwrap();
+        let ground = terrace.with_materials(&grass_where_flat()).unwrap();
+        let skin = |x| ground.column_material(Column::new(x, 1)).skin();
+        assert_eq!([0, 3, 4, 6, 8, 9, 12].map(skin), [GRASS, GRASS, ROCK, ROCK, ROCK, GRASS, GRASS]);
+        assert_eq!(ground.material(IVec3::new(0, 7, 0)), GRASS);
+        assert_eq!(ground.material(IVec3::new(0, 6, 0)), ROCK);
+    }
+
+    #[test]
+    fn a_bad_rule_is_named() {
+        let rules =
+            vec![MaterialRule::default(), MaterialRule { slope_fade: f64::NAN, ..MaterialRule::default() }];
+        let made =
+            Ground::flat(2, 2, 0.0).unwrap().with_materials(&MaterialControl::Rules { base: ROCK, rules });
+        let message = made.unwrap_err().to_string();
+        assert_eq!(message, "the fade of slopes of material rule 1 is NaN: it must be finite and at least 0");
+    }
+
+    #[test]
+    fn a_mask_is_stretched_over_the_world() {
+        let mask = GreyImage::from_samples(2, 2, vec![0, 65_535, 0, 65_535]).unwrap();
+        let control = MaterialControl::Blend { mask, base: ROCK, overlay: GRASS };
+        let ground = Ground::flat(255, 9, 0.0).unwrap().with_materials(&control).unwrap();
+        for x in 0..=255 {
+            let expected = ColumnMaterial { base: ROCK, overlay: GRASS, blend: x as u8 };
+            assert_eq!(ground.column_material(Column::new(x, 5)), expected);
+        }
+    }
+
+    #[test]
+    fn a_map_gives_the_nearest_id() {
+        let map = GreyImage::from_samples(3, 1, [7, 8, 255].map(|id| id * 257).to_vec()).unwrap();
+        let control = MaterialControl::Ids { map, base: ROCK };
+        let ground = Ground::flat(8, 3, 0.0).unwrap().with_materials(&control).unwrap();
+        let overlay = |x| ground.column_material(Column::new(x, 2)).overlay.0;
+        assert_eq!([0, 1, 2, 4, 5, 6, 8].map(overlay), [7, 7, 8, 8, 8, 255, 255]);
+    }
+
+    #[test]
+    fn the_largest_image_stretches_over_the_largest_world() {
+        let side = MAX_SIZE as usize + 1;
+        let map = GreyImage::from_samples(MAX_SIZE + 1, 1, (0..side).map(|i| i as u16).collect()).unwrap();
+        let ground = Ground::flat(MAX_SIZE, 1, 0.0).unwrap();
+        let ground = ground.with_materials(&MaterialControl::Ids { map, base: ROCK }).unwrap();
+        assert_eq!(ground.column_material(Column::new(i32::MAX, 0)).overlay, MaterialId(64));
+    }
+
+    #[test]
+    fn materials_count_for_the_hash_however_they_are_stored() {
+        let flat = || Ground::flat(3, 3, 1.0).unwrap();
+        let uniform = |material| flat().with_materials(&MaterialControl::Uniform(material)).unwrap();
+        let rock = ColumnMaterial { base: ROCK, overlay: GRASS, blend: 255 };
+        let columns = flat().with_materials(&grass_where_flat()).unwrap();
+        assert_ne!(flat().hash(), uniform(rock).hash());
+        assert_eq!(columns.hash(), uniform(rock).hash());
+        assert_eq!(columns, uniform(rock));
+    }
+
+    proptest! {
+        #[test]
+        fn any_rule_makes_materials_or_an_error(
+            low: f64, high: f64, height_fade: f64, steep: (f64, f64), slope_fade: f64,
+        ) {
+            let rule = MaterialRule { overlay: GRASS, height: (low, high), height_fade, slope: steep, slope_fade };
+            let control = MaterialControl::Rules { base: ROCK, rules: vec![rule, rule] };
+            let ground = Ground::from_heights(1, 1, vec![-99, 1 << 23, 0, -(1 << 23)]).unwrap();
+            let _ = ground.with_materials(&control);
+        }
+
+        #[test]
+        fn any_image_stretches_over_any_world(
+            size in (1..9_u32, 1..9_u32), world in (1..9_u32, 1..9_u32), grey: u16,
+        ) {
+            let image = GreyImage::from_samples(size.0, size.1, vec![grey; (size.0 * size.1) as usize]).unwrap();
+            let flat = || Ground::flat(world.0, world.1, 0.0).unwrap();
+            let blend = MaterialControl::Blend { mask: image.clone(), base: ROCK, overlay: GRASS };
+            let ids = MaterialControl::Ids { map: image, base: ROCK };
+            let (blend, ids) = (flat().with_materials(&blend).unwrap(), flat().with_materials(&ids).unwrap());
+            for (x, z) in (0..9).flat_map(|z| (0..9).map(move |x| (x, z))) {
+                let expected = (f64::from(grey) / 257.0).round() as u8;
+                prop_assert_eq!(blend.column_material(Column::new(x, z)).blend, expected);
+                prop_assert_eq!(ids.column_material(Column::new(x, z)).overlay, MaterialId((grey >> 8) as u8));
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Why ground cannot be made, and why an image cannot be read.
+
+use thiserror::Error;
+
+use super::extent::MAX_SIZE;
+use crate::lattice::LIMIT;
+
+/// Why ground cannot be made from what was given.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum GroundError {
+    /// The world would be empty or too large.
+    #[error("a world of {width} x {depth} cells cannot be made: each side must be 1 to {MAX_SIZE} cells")]
+    Size {
+        /// Cells along x.
+        width: u32,
+        /// Cells along z.
+        depth: u32,
+    },
+    /// A height is no number, or too far from zero for the lattice.
+    #[error("the height at column ({x}, {z}) is {value} voxels: it must lie within -{LIMIT} to {LIMIT}")]
+    Height {
+        /// Column along x.
+        x: i32,
+        /// Column along z.
+        z: i32,
+        /// The height in voxels.
+        value: f64,
+    },
+    /// A list of heights is too short or too long for its world.
+    #[error("a world of {width} x {depth} cells has {expected} columns, but {actual} heights were given")]
+    Count {
+        /// Cells along x.
+        width: u32,
+        /// Cells along z.
+        depth: u32,
+        /// Columns of the world: (width + 1) (depth + 1).
+        expected: usize,
+        /// Heights given.
+        actual: usize,
+    },
+    /// An image has too few samples to span a cell.
+    #[error("an image of {width} x {height} samples spans no cell: ground needs at least 2 x 2")]
+    ImageTooSmall {
+        /// Samples in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// A parameter is out of its range.
+    #[error("{name} is {value}: it must be {allowed}")]
+    Parameter {
+        /// The parameter's name.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// A parameter of a material rule is out of its range.
+    #[error("{name} of material rule {index} is {value}: it must be {allowed}")]
+    Rule {
+        /// Position of the rule in its list, from 0.
+        index: usize,
+        /// The parameter's name.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// The machine has too little memory for the world.
+    #[error("the machine has no {bytes} bytes of memory left for the world")]
+    Memory {
+        /// Bytes asked for; `usize::MAX` where their number does not fit.
+        bytes: usize,
+    },
+    /// The image could not be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+}
+
+/// Why a [`GreyImage`](super::GreyImage) cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The file is larger than the limits allow.
+    #[error("the image file has {bytes} bytes: the limit is {limit}")]
+    FileSize {
+        /// Bytes of the file.
+        bytes: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// The file does not begin as a PNG does.
+    #[error("the file is no PNG: its signature is missing")]
+    NotPng,
+    /// The file ends too early.
+    #[error("the PNG is cut off: it ends after {bytes} bytes")]
+    Truncated {
+        /// Bytes that are there.
+        bytes: u64,
+    },
+    /// The image has no samples.
+    #[error("the image has no samples: it is {width} x {height}")]
+    Empty {
+        /// Samples in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The image has more columns or rows than the limits allow.
+    #[error("the image is {width} x {height} samples: the limit is {max_width} x {max_height}")]
+    Dimensions {
+        /// Samples in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Samples allowed in a row.
+        max_width: u32,
+        /// Rows allowed.
+        max_height: u32,
+    },
+    /// Decoding would take more memory than the limits allow.
+    #[error("decoding the image takes {bytes} bytes of memory: the limit is {limit}")]
+    Memory {
+        /// Bytes that decoding would take.
+        bytes: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// The image is not plain grey of 8 or 16 bits.
+    #[error("the image is {found} with {bits} bits per channel: heights need plain grey with 8 or 16 bits")]
+    ColorType {
+        /// The colour type found, in words.
+        found: &'static str,
+        /// Bits per channel; for a palette, bits per index.
+        bits: u8,
+    },
+    /// The data does not have as many bytes or samples as its dimensions say.
+    #[error("an image of {width} x {height} samples takes {expected} {unit}, but {actual} were given")]
+    Length {
+        /// Samples in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// What is counted: `"bytes"` or `"samples"`.
+        unit: &'static str,
+        /// How many the dimensions ask for.
+        expected: u64,
+        /// How many there are.
+        actual: u64,
+    },
+    /// The file is damaged, or uses something that the decoder does not know.
+    #[error("the image cannot be decoded: {reason}")]
+    Decode {
+        /// The decoder's own words.
+        reason: String,
+    },
+}

@@ -1,0 +1,37 @@
+//! The pristine world: heights, materials and normals of the ground before anybody digs.
+//!
+//! A [`Ground`] is a heightmap on the integer lattice: one height for every [`Column`](crate::lattice::Column), in
+//! 1/256 voxel, and one [`ColumnMaterial`]. It never changes; edits live elsewhere and only ask it what was there.
+//!
+//! | from | how |
+//! | --- | --- |
+//! | a number, a function, a list | [`Ground::flat`], [`Ground::from_fn`], [`Ground::from_heights`] |
+//! | a grey PNG or RAW image | [`GreyImage::decode_png`], [`GreyImage::decode_raw`], then [`Ground::from_image`] |
+//! | noise | [`Ground::from_noise`] |
+//! | materials by slope, height or image | [`Ground::with_materials`] |
+//!
+//! The same input gives the same bits on every machine: heights and materials are computed with additions,
+//! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
+//! Whatever comes from outside is checked, and what does not fit is refused with an error that names the value.
+
+mod control;
+mod error;
+mod extent;
+mod grey_image;
+mod image_heights;
+mod material;
+mod noise_heights;
+mod png;
+mod rules;
+mod sources;
+mod world;
+
+pub use control::MaterialControl;
+pub use error::{GroundError, ImageError};
+pub use extent::MAX_SIZE;
+pub use grey_image::{BitDepth, GreyImage, ImageLimits, RawFormat};
+pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
+pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
+pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
+pub use rules::MaterialRule;
+pub use world::Ground;

@@ -1,0 +1,192 @@
+//! Ground from fractal noise.
+
+use noise::{Fbm, MultiFractal, NoiseFn, Perlin, RidgedMulti};
+
+use super::error::GroundError;
+use super::world::Ground;
+use crate::lattice::LIMIT;
+
+/// Most octaves of a noise; each is about half as large as the one before.
+pub const MAX_OCTAVES: u32 = 16;
+
+/// Largest size of a noise's features, in voxels; the smallest is 1.
+pub const MAX_SCALE: f64 = 1_048_576.0;
+
+/// Which landscape the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
+/// from machine to machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum NoiseKind {
+    /// Rolling hills: fractal Brownian motion.
+    #[default]
+    Fractal,
+    /// Mountain ridges with wide valleys: ridged multifractal; a negative amplitude makes canyons of the ridges.
+    Ridged,
+}
+
+/// Heights from noise: `base + amplitude * noise(x / scale, z / scale)`, the noise within -1 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseHeights {
+    /// Which of the many worlds.
+    pub seed: u32,
+    /// Which landscape.
+    pub kind: NoiseKind,
+    /// Layers of ever smaller features: 1 to [`MAX_OCTAVES`].
+    pub octaves: u32,
+    /// Size of the largest features in voxels: 1 to [`MAX_SCALE`].
+    pub scale: f64,
+    /// How far heights rise above and fall below `base` at most, in voxels; may be negative.
+    pub amplitude: f64,
+    /// Middle height in voxels.
+    pub base: f64,
+}
+
+impl Default for NoiseHeights {
+    /// Hills 256 voxels apart, at most 32 voxels high and low, around 0.
+    fn default() -> Self {
+        Self { seed: 0, kind: NoiseKind::Fractal, octaves: 6, scale: 256.0, amplitude: 32.0, base: 0.0 }
+    }
+}
+
+impl Ground {
+    /// Ground of `width` x `depth` cells from noise. Rows are evaluated in parallel.
+    ///
+    /// # Errors
+    /// - [`GroundError::Size`] unless width and depth are 1 to [`MAX_SIZE`](super::MAX_SIZE).
+    /// - [`GroundError::Parameter`] for a parameter out of its range.
+    /// - [`GroundError::Height`] if base and amplitude together leave the lattice's limit.
+    /// - [`GroundError::Memory`] if the machine has too little.
+    pub fn from_noise(width: u32, depth: u32, noise: &NoiseHeights) -> Result<Self, GroundError> {
+        let &NoiseHeights { seed, kind, octaves, scale, amplitude, base } = noise;
+        check_voxels("noise base", base)?;
+        let noise = generator(kind, seed, octaves, scale, amplitude)?;
+        Self::from_fn(width, depth, |x, z| base + amplitude * noise(x, z))
+    }
+}
+
+/// Noise within -1 to 1 over the column (x, z), from checked parameters.
+pub(super) type ColumnNoise = Box<dyn Fn(i32, i32) -> f64 + Send + Sync>;
+
+/// Where column (0, 0) lies in the noise. Perlin noise is 0 at its own origin in every octave and for every seed, so
+/// all worlds would begin at the same height, and on a peak if they are ridged.
+const ORIGIN: [f64; 2] = [0.37, 0.71];
+
+/// Checks parameters and makes noise of them. The amplitude is only checked; the noise stays within -1 to 1.
+pub(super) fn generator(
+    kind: NoiseKind,
+    seed: u32,
+    octaves: u32,
+    scale: f64,
+    amplitude: f64,
+) -> Result<ColumnNoise, GroundError> {
+    if !(1..=MAX_OCTAVES).contains(&octaves) {
+        let value = f64::from(octaves);
+        return Err(GroundError::Parameter { name: "noise octaves", value, allowed: "1 to 16" });
+    }
+    // Also keeps coordinates small enough for the noise crate, which panics on infinite ones.
+    if !(1.0..=MAX_SCALE).contains(&scale) {
+        return Err(GroundError::Parameter {
+            name: "noise scale",
+            value: scale,
+            allowed: "1 to 1048576 voxels",
+        });
+    }
+    check_voxels("noise amplitude", amplitude)?;
+    let octaves = octaves as usize;
+    let point = move |x, z| [f64::from(x) / scale + ORIGIN[0], f64::from(z) / scale + ORIGIN[1]];
+    Ok(match kind {
+        NoiseKind::Fractal => {
+            let noise = Fbm::<Perlin>::new(seed).set_octaves(octaves);
+            Box::new(move |x, z| noise.get(point(x, z)))
+        }
+        NoiseKind::Ridged => {
+            let noise = RidgedMulti::<Perlin>::new(seed).set_octaves(octaves);
+            // It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every
+            // ridged noise has at its own origin.
+            let peak = noise.get([0.0, 0.0]) + 1.0;
+            Box::new(move |x, z| (noise.get(point(x, z)) + 1.0) / peak * 2.0 - 1.0)
+        }
+    })
+}
+
+/// Checks that a length in voxels is a number within the lattice's limit.
+pub(super) fn check_voxels(name: &'static str, value: f64) -> Result<(), GroundError> {
+    if value.abs() <= f64::from(LIMIT) {
+        Ok(())
+    } else {
+        Err(GroundError::Parameter { name, value, allowed: "-32768 to 32768 voxels" })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const KINDS: [NoiseKind; 2] = [NoiseKind::Fractal, NoiseKind::Ridged];
+
+    proptest! {
+        #[test]
+        fn any_parameters_make_ground_or_an_error(
+            seed: u32, ridged: bool, octaves: u32, scale: f64, amplitude: f64, base: f64,
+        ) {
+            let kind = KINDS[usize::from(ridged)];
+            let _ = Ground::from_noise(3, 3, &NoiseHeights { seed, kind, octaves, scale, amplitude, base });
+        }
+
+        #[test]
+        fn heights_stay_within_the_amplitude(
+            seed: u32, ridged: bool, octaves in 1..=16_u32, scale in 1.0..MAX_SCALE, amplitude in -99.0..99.0,
+        ) {
+            let kind = KINDS[usize::from(ridged)];
+            let noise = NoiseHeights { seed, kind, octaves, scale, amplitude, base: 7.0 };
+            let (low, high) = Ground::from_noise(40, 4, &noise).unwrap().height_range();
+            let reach = (f64::abs(amplitude) * 256.0).ceil() as i32;
+            prop_assert!(low >= 7 * 256 - reach && high <= 7 * 256 + reach);
+        }
+    }
+
+    #[test]
+    fn parameters_out_of_range_are_refused_by_name() {
+        let good = NoiseHeights::default();
+        for (bad, expected) in [
+            (NoiseHeights { octaves: 0, ..good }, "noise octaves"),
+            (NoiseHeights { octaves: 17, ..good }, "noise octaves"),
+            (NoiseHeights { scale: 0.0, ..good }, "noise scale"),
+            (NoiseHeights { scale: 1e-300, ..good }, "noise scale"),
+            (NoiseHeights { scale: f64::NAN, ..good }, "noise scale"),
+            (NoiseHeights { amplitude: f64::INFINITY, ..good }, "noise amplitude"),
+            (NoiseHeights { base: f64::NAN, ..good }, "noise base"),
+        ] {
+            match Ground::from_noise(2, 2, &bad) {
+                Err(GroundError::Parameter { name, .. }) => assert_eq!(name, expected),
+                other => panic!("{bad:?} gave {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn the_widest_world_and_finest_noise_are_in_reach() {
+        let finest = NoiseHeights { octaves: 16, scale: 1.0, ..NoiseHeights::default() };
+        assert!(Ground::from_noise(16_384, 1, &finest).is_ok());
+    }
+
+    #[test]
+    fn noise_is_the_same_on_every_machine() {
+        // If this fails, the noise or its parameters changed, and with them every world made of noise.
+        let hash = |kind| {
+            Ground::from_noise(64, 48, &NoiseHeights { kind, seed: 7, ..NoiseHeights::default() })
+                .unwrap()
+                .hash()
+        };
+        assert_eq!(KINDS.map(hash), [0x2537_92FB_3794_2188, 0x6992_FA54_53D8_F4F1]);
+    }
+
+    #[test]
+    fn seeds_make_different_worlds() {
+        let world =
+            |seed| Ground::from_noise(32, 32, &NoiseHeights { seed, ..NoiseHeights::default() }).unwrap();
+        assert_ne!(world(1), world(2));
+        assert_eq!(world(3), world(3));
+    }
+}

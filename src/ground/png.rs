@@ -1,0 +1,288 @@
+//! Reading grey images from PNG files.
+//!
+//! The `image` crate decodes. The header is read here first, so that errors can name what it declares and nothing is
+//! allocated for an image that will be refused.
+
+use std::io::{Cursor, ErrorKind};
+
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, Limits};
+
+use super::error::ImageError;
+use super::grey_image::{BitDepth, GreyImage, ImageLimits};
+
+/// First bytes of every PNG.
+const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+/// What a PNG says about itself in its first chunk, `IHDR`.
+struct Header {
+    width: u32,
+    height: u32,
+    bits: u8,
+    color_type: u8,
+}
+
+impl Header {
+    /// Reads the header: signature (8 bytes), chunk length and name (8), width (4), height (4), bits, colour type.
+    fn read(bytes: &[u8]) -> Result<Self, ImageError> {
+        let present = bytes.len().min(SIGNATURE.len());
+        if bytes.is_empty() || bytes[..present] != SIGNATURE[..present] {
+            return Err(ImageError::NotPng);
+        }
+        match bytes.get(12..26) {
+            None => Err(ImageError::Truncated { bytes: bytes.len() as u64 }),
+            Some(&[b'I', b'H', b'D', b'R', w0, w1, w2, w3, h0, h1, h2, h3, bits, color_type]) => Ok(Self {
+                width: u32::from_be_bytes([w0, w1, w2, w3]),
+                height: u32::from_be_bytes([h0, h1, h2, h3]),
+                bits,
+                color_type,
+            }),
+            Some(_) => Err(ImageError::Decode { reason: "its first chunk is not the header".into() }),
+        }
+    }
+
+    /// The bit depth, if the image is plain grey.
+    fn bit_depth(&self) -> Result<BitDepth, ImageError> {
+        match (self.color_type, self.bits) {
+            (0, 8) => Ok(BitDepth::Eight),
+            (0, 16) => Ok(BitDepth::Sixteen),
+            (color_type, bits) => {
+                let found = match color_type {
+                    0 => "grey",
+                    2 => "RGB colour",
+                    3 => "palette colour",
+                    4 => "grey with alpha",
+                    6 => "RGB colour with alpha",
+                    _ => "of an unknown colour type",
+                };
+                Err(ImageError::ColorType { found, bits })
+            }
+        }
+    }
+}
+
+impl GreyImage {
+    /// Decodes a PNG of plain grey with 8 or 16 bits a sample. Gamma and colour profiles are ignored: samples are
+    /// heights, not light.
+    ///
+    /// # Errors
+    /// - [`ImageError::NotPng`], [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file.
+    /// - [`ImageError::ColorType`] for colour, palettes, alpha or fewer than 8 bits.
+    /// - [`ImageError::Empty`] for an image without samples.
+    /// - [`ImageError::FileSize`], [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before
+    ///   memory is taken for it.
+    pub fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<Self, ImageError> {
+        limits.check_file(bytes)?;
+        let header = Header::read(bytes)?;
+        let depth = header.bit_depth()?;
+        // The finished samples take 2 bytes each; those of 8 bits are held as they were while they are widened.
+        let bytes_per_sample = match depth {
+            BitDepth::Eight => 3,
+            BitDepth::Sixteen => 2,
+        };
+        limits.check_image(header.width, header.height, bytes_per_sample)?;
+
+        let mut decoder_limits = Limits::no_limits();
+        decoder_limits.max_image_width = Some(header.width);
+        decoder_limits.max_image_height = Some(header.height);
+        decoder_limits.max_alloc = Some(limits.max_alloc_bytes);
+        let decoded = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits)
+            .and_then(DynamicImage::from_decoder)
+            .map_err(|error| decode_error(error, bytes.len() as u64))?;
+        let samples = match decoded {
+            DynamicImage::ImageLuma8(grey) => {
+                grey.into_raw().into_iter().map(|v| u16::from(v) * 257).collect()
+            }
+            DynamicImage::ImageLuma16(grey) => grey.into_raw(),
+            _ => {
+                let found = "grey with a transparent shade";
+                return Err(ImageError::ColorType { found, bits: header.bits });
+            }
+        };
+        Self::checked(header.width, header.height, depth, samples)
+    }
+}
+
+/// Our own error for the decoder's.
+fn decode_error(error: image::ImageError, bytes: u64) -> ImageError {
+    match error {
+        image::ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => {
+            ImageError::Truncated { bytes }
+        }
+        error => ImageError::Decode { reason: error.to_string() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::ExtendedColorType::{self, L8, L16, La8, Rgb8, Rgba16};
+    use image::ImageEncoder;
+    use image::codecs::png::PngEncoder;
+    use proptest::prelude::*;
+
+    fn encode(data: &[u8], width: u32, height: u32, color: ExtendedColorType) -> Vec<u8> {
+        let mut file = Vec::new();
+        PngEncoder::new(&mut file).write_image(data, width, height, color).unwrap();
+        file
+    }
+
+    /// A PNG of 5 x 4 samples of 16 bits and so many noisy bytes that it cannot be compressed to nothing.
+    fn noisy_png() -> Vec<u8> {
+        let samples: Vec<u8> =
+            (0..20_u32).flat_map(|i| (i * i * 40_503).to_ne_bytes()[..2].to_vec()).collect();
+        encode(&samples, 5, 4, L16)
+    }
+
+    fn decode(bytes: &[u8]) -> Result<GreyImage, ImageError> {
+        GreyImage::decode_png(bytes, &ImageLimits::default())
+    }
+
+    /// A PNG that declares these dimensions, bits and colour type and has nothing else.
+    fn header(width: u32, height: u32, bits: u8, color_type: u8) -> Vec<u8> {
+        let mut file = SIGNATURE.to_vec();
+        file.extend(b"\0\0\0\x0dIHDR");
+        file.extend(width.to_be_bytes());
+        file.extend(height.to_be_bytes());
+        file.extend([bits, color_type, 0, 0, 0]);
+        file
+    }
+
+    /// Where the compressed samples lie in [`noisy_png`]: after signature, header and a chunk's length and name.
+    const IDAT: usize = 41;
+
+    /// A chunk with the right length and checksum.
+    fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
+        let checked = [name, data].concat();
+        let crc = checked.iter().fold(u32::MAX, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 * (crc & 1)))
+        });
+        [&(data.len() as u32).to_be_bytes(), &*checked, &(!crc).to_be_bytes()].concat()
+    }
+
+    type Damage = Vec<(prop::sample::Index, u8)>;
+
+    fn damage() -> impl Strategy<Value = Damage> {
+        prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6)
+    }
+
+    fn inflict(damage: &Damage, file: &mut [u8]) {
+        for (place, byte) in damage {
+            *place.get_mut(file) = *byte;
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_an_image_or_an_error(bytes: Vec<u8>) {
+            let _ = decode(&bytes);
+            let _ = decode(&[&SIGNATURE, bytes.as_slice()].concat());
+            let _ = decode(&[header(4, 4, 8, 0), bytes].concat());
+        }
+
+        #[test]
+        fn a_damaged_png_is_an_image_or_an_error(damage in damage()) {
+            let mut file = noisy_png();
+            inflict(&damage, &mut file);
+            let _ = decode(&file);
+        }
+
+        #[test]
+        fn damage_under_a_right_checksum_is_an_image_or_an_error(
+            width in 1..9_u8, height in 1..9_u8, sixteen: bool, interlaced: bool, extra: [u8; 26], damage in damage(),
+        ) {
+            let mut samples = noisy_png().split_off(IDAT);
+            inflict(&damage, &mut samples);
+            let bits = if sixteen { 16 } else { 8 };
+            let header = [0, 0, 0, width, 0, 0, 0, height, bits, 0, 0, 0, u8::from(interlaced)];
+            let (header, samples) = (chunk(b"IHDR", &header), chunk(b"IDAT", &samples));
+            for (name, length) in [(b"tRNS", 2), (b"gAMA", 4), (b"acTL", 8), (b"fcTL", 26), (b"iCCP", 26)] {
+                let _ = decode(&[&SIGNATURE, &*header, &chunk(name, &extra[..length]), &samples].concat());
+            }
+        }
+
+        #[test]
+        fn sixteen_bits_come_back(samples in prop::collection::vec(any::<u16>(), 6)) {
+            let data: Vec<u8> = samples.iter().flat_map(|s| s.to_ne_bytes()).collect();
+            let image = decode(&encode(&data, 2, 3, L16)).unwrap();
+            prop_assert_eq!((image.width(), image.height(), image.bit_depth()), (2, 3, BitDepth::Sixteen));
+            prop_assert_eq!(image.samples(), samples);
+        }
+    }
+
+    #[test]
+    fn eight_bits_are_widened_to_full_scale() {
+        let data: Vec<u8> = (0..=255).collect();
+        let image = decode(&encode(&data, 16, 16, L8)).unwrap();
+        assert_eq!(image.bit_depth(), BitDepth::Eight);
+        for (v, &wide) in (0..).zip(image.samples()) {
+            assert_eq!(u32::from(wide) * 255, v * 65_535);
+        }
+    }
+
+    #[test]
+    fn a_png_cut_off_anywhere_is_truncated() {
+        let file = noisy_png();
+        assert!(decode(&file).is_ok());
+        // The last 16 bytes, a checksum and the end chunk, say nothing about the samples.
+        for length in 1..file.len() - 16 {
+            assert_eq!(decode(&file[..length]), Err(ImageError::Truncated { bytes: length as u64 }));
+        }
+    }
+
+    #[test]
+    fn other_files_are_no_png() {
+        for file in ["", "GIF89a", "PNG", "\u{89}PNG with the wrong line ends"] {
+            assert_eq!(decode(file.as_bytes()), Err(ImageError::NotPng));
+        }
+    }
+
+    #[test]
+    fn other_color_types_are_refused_by_name() {
+        let refused = |found, bits| Err(ImageError::ColorType { found, bits });
+        assert_eq!(decode(&encode(&[0; 12], 2, 2, Rgb8)), refused("RGB colour", 8));
+        assert_eq!(decode(&encode(&[0; 8], 2, 2, La8)), refused("grey with alpha", 8));
+        assert_eq!(decode(&encode(&[0; 32], 2, 2, Rgba16)), refused("RGB colour with alpha", 16));
+        assert_eq!(decode(&header(2, 2, 8, 3)), refused("palette colour", 8));
+        assert_eq!(decode(&header(2, 2, 1, 0)), refused("grey", 1));
+        assert_eq!(decode(&header(2, 2, 8, 9)), refused("of an unknown colour type", 8));
+    }
+
+    #[test]
+    fn a_transparent_shade_is_refused() {
+        let file = noisy_png();
+        let file = [&file[..33], &chunk(b"tRNS", &[0, 0]), &file[33..]].concat();
+        assert_eq!(
+            decode(&file),
+            Err(ImageError::ColorType { found: "grey with a transparent shade", bits: 16 })
+        );
+    }
+
+    #[test]
+    fn declared_dimensions_are_checked_before_decoding() {
+        assert_eq!(decode(&header(0, 9, 8, 0)), Err(ImageError::Empty { width: 0, height: 9 }));
+        let (max_width, max_height) = (16_385, 16_385);
+        let huge = ImageError::Dimensions { width: 1 << 31, height: 5, max_width, max_height };
+        assert_eq!(decode(&header(1 << 31, 5, 16, 0)), Err(huge));
+        let limits = ImageLimits { max_alloc_bytes: 1000, ..ImageLimits::default() };
+        let memory = ImageError::Memory { bytes: 4000 * 4000 * 3, limit: 1000 };
+        assert_eq!(GreyImage::decode_png(&header(4000, 4000, 8, 0), &limits), Err(memory));
+        let file = noisy_png();
+        let limits = ImageLimits { max_file_bytes: 20, ..ImageLimits::default() };
+        let size = ImageError::FileSize { bytes: file.len() as u64, limit: 20 };
+        assert_eq!(GreyImage::decode_png(&file, &limits), Err(size));
+    }
+
+    #[test]
+    fn unlimited_limits_still_refuse_what_no_world_can_use() {
+        let limits = ImageLimits {
+            max_file_bytes: u64::MAX,
+            max_width: u32::MAX,
+            max_height: u32::MAX,
+            max_alloc_bytes: u64::MAX,
+        };
+        let refused = GreyImage::decode_png(&header(u32::MAX, u32::MAX, 16, 0), &limits);
+        assert!(matches!(refused, Err(ImageError::Dimensions { max_width: 16_385, .. })));
+        assert!(GreyImage::decode_png(&noisy_png(), &limits).is_ok());
+    }
+}

@@ -1,0 +1,100 @@
+//! Boxes of lattice points, both ends included.
+
+use glam::IVec3;
+
+/// A non-empty box of lattice points; `min` and `max` belong to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LatticeBox {
+    /// Lowest point of the box.
+    pub min: IVec3,
+    /// Highest point of the box.
+    pub max: IVec3,
+}
+
+impl LatticeBox {
+    /// The box from `min` to `max`, `None` where it would hold no point.
+    pub fn new(min: IVec3, max: IVec3) -> Option<Self> {
+        min.cmple(max).all().then_some(Self { min, max })
+    }
+
+    /// The box of one point.
+    pub const fn point(point: IVec3) -> Self {
+        Self { min: point, max: point }
+    }
+
+    /// Is the point in the box?
+    pub fn contains(self, point: IVec3) -> bool {
+        self.min.cmple(point).all() && point.cmple(self.max).all()
+    }
+
+    /// Is all of `other` in the box?
+    pub fn encloses(self, other: Self) -> bool {
+        self.contains(other.min) && self.contains(other.max)
+    }
+
+    /// The points that both boxes hold.
+    pub fn intersection(self, other: Self) -> Option<Self> {
+        Self::new(self.min.max(other.min), self.max.min(other.max))
+    }
+
+    /// The smallest box around both.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Grows an optional box to hold `other` as well.
+    pub fn include(own: &mut Option<Self>, other: Self) {
+        *own = Some(own.map_or(other, |own| own.union(other)));
+    }
+
+    /// The box with `by` more points on every side.
+    pub fn grown(self, by: i32) -> Self {
+        Self { min: self.min - by, max: self.max + by }
+    }
+
+    /// Do the boxes share a point, or lie one step apart, so that a lattice cell touches both?
+    pub fn meets(self, other: Self) -> bool {
+        self.grown(1).intersection(other).is_some()
+    }
+
+    /// Points along each axis.
+    pub fn size(self) -> IVec3 {
+        self.max - self.min + 1
+    }
+
+    /// Points in the box.
+    pub fn volume(self) -> u64 {
+        let size = self.size().as_u64vec3();
+        size.x * size.y * size.z
+    }
+
+    /// Every point of the box, x fastest, then z, then y.
+    pub fn points(self) -> impl Iterator<Item = IVec3> {
+        (self.min.y..=self.max.y).flat_map(move |y| {
+            (self.min.z..=self.max.z)
+                .flat_map(move |z| (self.min.x..=self.max.x).map(move |x| IVec3::new(x, y, z)))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_one_step_apart_meet() {
+        let a = LatticeBox::new(IVec3::ZERO, IVec3::splat(3)).unwrap();
+        let beside = LatticeBox::point(IVec3::new(4, 0, 0));
+        let apart = LatticeBox::point(IVec3::new(5, 0, 0));
+        assert!(a.meets(beside) && beside.meets(a));
+        assert!(!a.meets(apart) && !apart.meets(a));
+        assert_eq!(a.intersection(beside), None);
+    }
+
+    #[test]
+    fn points_are_as_many_as_the_volume() {
+        let cube = LatticeBox::new(IVec3::new(-1, 2, 3), IVec3::new(1, 3, 6)).unwrap();
+        assert_eq!(cube.points().count() as u64, cube.volume());
+        assert!(cube.points().all(|p| cube.contains(p)));
+    }
+}

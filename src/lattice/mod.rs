@@ -1,0 +1,70 @@
+//! Integer coordinates: where things are, before anything is drawn.
+//!
+//! Everything that decides what is solid happens on an integer lattice. One lattice step is one **voxel**; y points up.
+//!
+//! | type | counts | unit |
+//! | --- | --- | --- |
+//! | [`IVec3`] as a *lattice point* | samples | voxel |
+//! | [`Column`] | vertical lines of samples | voxel |
+//! | [`Column`] as a *cell* | squares between four columns, named by their lowest one | voxel |
+//! | [`BrickPos`] | cubes of 8x8x8 samples | 8 voxels |
+//! | [`ChunkPos`], [`TilePos`] | cubes and columns of chunks | chunk size |
+//! | distance, height (`i32`) | densities and heights | [`ONE`] per voxel |
+//! | drawn position (`i32`) | mesh vertices, local to a chunk | [`SNAP`] per voxel |
+
+mod boxes;
+mod grid;
+pub(crate) mod hash;
+
+pub use boxes::LatticeBox;
+pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
+
+use glam::IVec3;
+
+/// Fixed-point units per voxel of densities and heights.
+pub const ONE: i32 = 256;
+
+/// Fixed-point units per voxel of drawn positions: vertices lie on multiples of 1/4096 voxel (rule 4).
+pub const SNAP: i32 = 4096;
+
+/// Lattice coordinates, heights included, stay within this many voxels of the origin.
+pub const LIMIT: i32 = 1 << 15;
+
+/// Samples along one side of a brick.
+pub const BRICK: i32 = 8;
+
+/// A vertical line of lattice points; also the cell (square of four columns) of which it is the lowest corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Column {
+    /// Voxels along +x.
+    pub x: i32,
+    /// Voxels along +z.
+    pub z: i32,
+}
+
+impl Column {
+    /// The column through (x, z).
+    pub const fn new(x: i32, z: i32) -> Self {
+        Self { x, z }
+    }
+
+    /// The column that a lattice point lies in.
+    pub const fn of(point: IVec3) -> Self {
+        Self::new(point.x, point.z)
+    }
+
+    /// The lattice point at height `y` of this column.
+    pub const fn at(self, y: i32) -> IVec3 {
+        IVec3::new(self.x, y, self.z)
+    }
+
+    /// The column `dx`, `dz` voxels away.
+    pub const fn offset(self, dx: i32, dz: i32) -> Self {
+        Self::new(self.x + dx, self.z + dz)
+    }
+
+    /// The four columns of the cell named by this one, counter-clockwise seen from above (x right, z down).
+    pub const fn corners(self) -> [Self; 4] {
+        [self, self.offset(0, 1), self.offset(1, 1), self.offset(1, 0)]
+    }
+}

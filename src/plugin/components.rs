@@ -1,0 +1,96 @@
+//! Components: what marks terrains, tiles, chunks and fields.
+
+use bevy::ecs::component::{Component, Mutable, StorageType};
+use bevy::prelude::*;
+
+use crate::lattice::{ChunkPos, TilePos};
+use crate::terrain::Terrain;
+use crate::volume;
+
+/// The model itself is the component; see [`Terrain`].
+impl Component for Terrain {
+    const STORAGE_TYPE: StorageType = StorageType::Table;
+    type Mutability = Mutable;
+}
+
+/// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+#[require(Transform, Visibility)]
+pub struct Tile {
+    /// Chunks along +x.
+    pub x: i32,
+    /// Chunks along +z.
+    pub z: i32,
+}
+
+/// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` where it draws something, even where it holds
+/// no field itself.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+#[require(Transform, Visibility)]
+pub struct Chunk {
+    /// Chunks along +x.
+    pub x: i32,
+    /// Chunks along +y.
+    pub y: i32,
+    /// Chunks along +z.
+    pub z: i32,
+}
+
+/// A region of edits: child of its [`Chunk`]. It is data; the chunk draws it.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct Field {
+    /// Its name in receipts.
+    pub id: u64,
+    /// Lowest edited lattice point, in voxels of the terrain.
+    pub min: IVec3,
+    /// Highest edited lattice point.
+    pub max: IVec3,
+    /// Counts the edits that changed it.
+    pub revision: u64,
+}
+
+impl From<TilePos> for Tile {
+    fn from(tile: TilePos) -> Self {
+        Self { x: tile.x, z: tile.z }
+    }
+}
+
+impl From<ChunkPos> for Chunk {
+    fn from(chunk: ChunkPos) -> Self {
+        Self { x: chunk.x, y: chunk.y, z: chunk.z }
+    }
+}
+
+impl From<&volume::Field> for Field {
+    fn from(field: &volume::Field) -> Self {
+        Self { id: field.id.0, min: field.bounds.min, max: field.bounds.max, revision: field.revision }
+    }
+}
+
+/// The colour of each material id, for the vertex colours of a terrain's meshes; put it on the terrain's entity. Ids past
+/// its end have the last colour. Materials that sample textures by id ignore it.
+///
+/// Meshes made after a change have the new colours.
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component)]
+pub struct MaterialColors(pub Vec<LinearRgba>);
+
+impl Default for MaterialColors {
+    /// Rock, grass, sand, snow, clay, concrete, coal, gold.
+    fn default() -> Self {
+        let colors = [
+            (0.36, 0.33, 0.30),
+            (0.24, 0.36, 0.13),
+            (0.71, 0.61, 0.42),
+            (0.90, 0.92, 0.95),
+            (0.55, 0.36, 0.24),
+            (0.62, 0.62, 0.64),
+            (0.11, 0.11, 0.12),
+            (0.83, 0.62, 0.17),
+        ];
+        Self(colors.map(|(r, g, b)| LinearRgba::from(Color::srgb(r, g, b))).to_vec())
+    }
+}

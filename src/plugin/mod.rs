@@ -1,0 +1,106 @@
+//! The Bevy plugin: brushes in, meshes and receipts out.
+//!
+//! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that digging
+//! touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become transactions
+//! that run on [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool); a finished one is committed in a single frame:
+//! meshes, entities, [`BrushApplied`] receipts and entity events. Without an `Assets<Mesh>`, on a server with
+//! `MinimalPlugins`, all of that happens but the meshes.
+//!
+//! Bevy's `multi_threaded` feature keeps transactions off the main thread; without it they run within the frame.
+
+mod commit;
+mod components;
+mod heightmap;
+mod intake;
+mod load;
+mod meshes;
+mod messages;
+mod query;
+mod settings;
+
+pub use commit::Transactions;
+pub use components::{Chunk, Field, MaterialColors, Tile};
+pub use heightmap::{HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings};
+pub use load::TerrainReady;
+pub use meshes::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+pub use messages::{
+    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, TargetedBrush,
+};
+pub use query::{TerrainHit, Terrains};
+pub use settings::{BurrowFigures, BurrowSettings};
+
+use bevy::app::PluginGroupBuilder;
+use bevy::prelude::*;
+
+use crate::brush::Brush;
+use crate::terrain::Terrain;
+
+/// Everything a game needs. Parts can be disabled, as in any plugin group.
+///
+/// | plugin | what it does |
+/// | --- | --- |
+/// | [`TerrainPlugin`] | transactions, entities, messages |
+/// | [`HeightmapPlugin`] | asset loader for heightmap images (needs `AssetPlugin`) |
+/// | `TerrainMaterialPlugin<StandardMaterial>` | dresses tiles and chunks (feature `render`) |
+#[derive(Default)]
+pub struct BurrowPlugins;
+
+impl PluginGroup for BurrowPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        let group = PluginGroupBuilder::start::<Self>().add(TerrainPlugin).add(HeightmapPlugin);
+        #[cfg(feature = "render")]
+        let group = group.add(crate::view::TerrainMaterialPlugin::<StandardMaterial>::default());
+        group
+    }
+}
+
+/// What the plugin does each frame in `Update`, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BurrowSystems {
+    /// New terrains are prepared; their tiles appear, all at once, when all are meshed.
+    Load,
+    /// Brush messages are checked and queued. Send them before, to have them in this frame's transaction.
+    Collect,
+    /// Transactions that are done are committed: meshes, entities, receipts, events.
+    Commit,
+    /// Queued brushes start as transactions.
+    Begin,
+    /// New tiles and chunks get their terrain's material.
+    Dress,
+}
+
+/// Transactions, entities and messages; works in `MinimalPlugins`.
+pub struct TerrainPlugin;
+
+impl Plugin for TerrainPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<BurrowSettings>()
+            .init_resource::<BurrowFigures>()
+            .add_message::<Brush>()
+            .add_message::<TargetedBrush>()
+            .add_message::<BrushApplied>()
+            .register_required_components::<Terrain, Transform>()
+            .register_required_components::<Terrain, Visibility>()
+            .register_required_components::<Terrain, MaterialColors>()
+            .configure_sets(
+                Update,
+                (
+                    BurrowSystems::Load,
+                    BurrowSystems::Collect,
+                    BurrowSystems::Commit,
+                    BurrowSystems::Begin,
+                    BurrowSystems::Dress,
+                )
+                    .chain(),
+            )
+            .add_systems(
+                Update,
+                (
+                    (load::start_loading, load::finish_loading).chain().in_set(BurrowSystems::Load),
+                    intake::collect_brushes.in_set(BurrowSystems::Collect),
+                    commit::commit_transactions.in_set(BurrowSystems::Commit),
+                    commit::begin_transactions.in_set(BurrowSystems::Begin),
+                ),
+            );
+    }
+}

@@ -1,0 +1,134 @@
+//! The volumetric mask M: cells whose sheet marching cubes draws (rule 2).
+
+use std::ops::Range;
+
+use rustc_hash::FxHashMap;
+
+use crate::ground::Ground;
+use crate::lattice::{Column, ONE};
+use crate::volume::SampleView;
+
+/// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
+/// lattice point counts below it.
+pub fn sheet(heights: impl IntoIterator<Item = i32>) -> Range<i32> {
+    let (low, high) = heights.into_iter().fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
+    let ceil = |height: i32| height.div_euclid(ONE) + i32::from(height.rem_euclid(ONE) != 0);
+    ceil(low) - 1..ceil(high)
+}
+
+/// The sheet of a cell.
+pub fn cell_sheet(ground: &Ground, cell: Column) -> Range<i32> {
+    sheet(cell.corners().map(|column| ground.height(column)))
+}
+
+/// Rule 2: is a corner of the cell's sheet edited?
+pub fn is_disturbed(view: &SampleView, cell: Column) -> bool {
+    let sheet = cell_sheet(view.ground(), cell);
+    cell.corners().iter().any(|column| (sheet.start..=sheet.end).any(|y| view.is_edited(column.at(y))))
+}
+
+/// A set of cells, one 64-bit word for each 8x8 of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Mask(FxHashMap<(i32, i32), u64>);
+
+impl Mask {
+    fn place(cell: Column) -> ((i32, i32), u64) {
+        ((cell.x >> 3, cell.z >> 3), 1 << ((cell.z & 7) << 3 | (cell.x & 7)))
+    }
+
+    /// Does marching cubes draw the sheet of this cell?
+    pub fn contains(&self, cell: Column) -> bool {
+        let (word, bit) = Self::place(cell);
+        self.0.get(&word).is_some_and(|bits| bits & bit != 0)
+    }
+
+    /// Puts a cell in; says whether it was not there before.
+    pub(crate) fn insert(&mut self, cell: Column) -> bool {
+        let (word, bit) = Self::place(cell);
+        let bits = self.0.entry(word).or_default();
+        let fresh = *bits & bit == 0;
+        *bits |= bit;
+        fresh
+    }
+
+    /// Takes in all cells of another mask.
+    pub(crate) fn extend(&mut self, other: &Self) {
+        for (&word, &bits) in &other.0 {
+            *self.0.entry(word).or_default() |= bits;
+        }
+    }
+
+    /// How many cells are in the mask.
+    pub fn len(&self) -> usize {
+        self.0.values().map(|bits| bits.count_ones() as usize).sum()
+    }
+
+    /// Is the whole world heightmap?
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Every cell of the mask, in no order.
+    pub fn iter(&self) -> impl Iterator<Item = Column> {
+        self.0.iter().flat_map(|(&(x, z), &bits)| {
+            (0..64).filter(move |bit| bits >> bit & 1 == 1).map(move |bit| Column::new(x << 3 | bit & 7, z << 3 | bit >> 3))
+        })
+    }
+
+    /// Bytes of the mask.
+    pub fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<((i32, i32), u64)>()
+    }
+}
+
+/// The mask of a world, and the cells that a running transaction adds to it.
+#[derive(Clone, Copy)]
+pub struct MaskView<'a> {
+    committed: &'a Mask,
+    added: Option<&'a Mask>,
+}
+
+impl<'a> MaskView<'a> {
+    /// The committed mask alone.
+    pub fn new(committed: &'a Mask) -> Self {
+        Self { committed, added: None }
+    }
+
+    /// The same mask with more cells in it.
+    pub fn with(self, added: &'a Mask) -> Self {
+        Self { added: Some(added), ..self }
+    }
+
+    /// Does marching cubes draw the sheet of this cell?
+    pub fn contains(&self, cell: Column) -> bool {
+        self.committed.contains(cell) || self.added.is_some_and(|added| added.contains(cell))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sheet_holds_every_cube_with_both_signs() {
+        let cases = [
+            ([0, 0], -1..0),            // on a lattice point: the cube below
+            ([1, 1], 0..1),
+            ([ONE, ONE + 1], 0..2),
+            ([-ONE, 2 * ONE], -2..2),
+            ([-1, 1], -1..1),
+        ];
+        for (heights, expected) in cases {
+            assert_eq!(sheet(heights), expected, "{heights:?}");
+        }
+    }
+
+    #[test]
+    fn a_cell_goes_in_once() {
+        let mut mask = Mask::default();
+        let cell = Column::new(-3, 17);
+        assert!(mask.insert(cell) && !mask.insert(cell));
+        assert!(mask.contains(cell) && mask.len() == 1);
+        assert_eq!(mask.iter().collect::<Vec<_>>(), [cell]);
+    }
+}

@@ -1,0 +1,149 @@
+//! Vertices and meshes, local to the chunk or tile that draws them.
+
+use glam::{IVec3, Vec3};
+
+use crate::ground::{ColumnMaterial, MaterialId};
+use crate::lattice::SNAP;
+
+/// Up to four materials with weights that sum up to 255.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MaterialMix {
+    /// Material ids; those without weight are 0.
+    pub ids: [u8; 4],
+    /// Weight of each, 0..=255.
+    pub weights: [u8; 4],
+}
+
+impl MaterialMix {
+    /// One material alone.
+    pub const fn pure(material: MaterialId) -> Self {
+        Self { ids: [material.0, 0, 0, 0], weights: [255, 0, 0, 0] }
+    }
+
+    /// The two materials of a column.
+    pub fn column(column: ColumnMaterial) -> Self {
+        if column.blend == 0 || column.base == column.overlay {
+            return Self::pure(column.base);
+        }
+        if column.blend == 255 {
+            return Self::pure(column.overlay);
+        }
+        Self {
+            ids: [column.base.0, column.overlay.0, 0, 0],
+            weights: [255 - column.blend, column.blend, 0, 0],
+        }
+    }
+
+    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves.
+    pub fn lerp(a: Self, b: Self, step: i32) -> Self {
+        if a == b {
+            return a;
+        }
+        let mut parts: [(u8, i32); 8] = [(0, 0); 8];
+        let mut count = 0;
+        for (mix, share) in [(a, SNAP - step), (b, step)] {
+            for (&id, &weight) in mix.ids.iter().zip(&mix.weights).filter(|(_, weight)| **weight > 0) {
+                let weight = i32::from(weight) * share;
+                match parts[..count].iter_mut().find(|part| part.0 == id) {
+                    Some(part) => part.1 += weight,
+                    None => {
+                        parts[count] = (id, weight);
+                        count += 1;
+                    }
+                }
+            }
+        }
+        let parts = &mut parts[..count];
+        parts.sort_unstable_by_key(|&(id, weight)| (-weight, id));
+        let kept = &parts[..count.min(4)];
+        let total: i32 = kept.iter().map(|part| part.1).sum::<i32>().max(1);
+        let mut result = Self::default();
+        let mut rest = 255;
+        for (slot, &(id, weight)) in kept.iter().enumerate().skip(1) {
+            result.ids[slot] = id;
+            result.weights[slot] = (weight * 255 / total) as u8;
+            rest -= weight * 255 / total;
+        }
+        (result.ids[0], result.weights[0]) = (kept[0].0, rest as u8);
+        result
+    }
+}
+
+/// A vertex of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    /// Position in 1/4096 voxel, local to the chunk or tile.
+    pub position: IVec3,
+    /// Unit normal, towards the air.
+    pub normal: Vec3,
+    /// Materials at the vertex.
+    pub materials: MaterialMix,
+}
+
+impl Vertex {
+    /// The position in voxels, exact in `f32`.
+    pub fn position_f32(&self) -> [f32; 3] {
+        self.position.to_array().map(|steps| steps as f32 / SNAP as f32)
+    }
+}
+
+/// An indexed triangle mesh; triangles are counter-clockwise seen from the air.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SurfaceMesh {
+    /// Vertices, shared by the triangles of a block or tile.
+    pub vertices: Vec<Vertex>,
+    /// Three for each triangle.
+    pub indices: Vec<u32>,
+}
+
+impl SurfaceMesh {
+    /// Is there nothing to draw?
+    pub fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
+    /// The triangles as vertices.
+    pub fn triangles(&self) -> impl Iterator<Item = [Vertex; 3]> {
+        self.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|index| self.vertices[index as usize]))
+    }
+
+    /// Lowest and highest corner in voxels, `None` without vertices.
+    pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
+        let first = self.vertices.first()?.position;
+        let (min, max) = self
+            .vertices
+            .iter()
+            .fold((first, first), |(min, max), vertex| (min.min(vertex.position), max.max(vertex.position)));
+        let voxels = |v: IVec3| v.to_array().map(|steps| steps as f32 / SNAP as f32);
+        Some((voxels(min), voxels(max)))
+    }
+
+    /// Adds a part after what is there.
+    pub fn append(&mut self, vertices: &[Vertex], indices: &[u16]) {
+        let base = self.vertices.len() as u32;
+        self.vertices.extend_from_slice(vertices);
+        self.indices.extend(indices.iter().map(|&index| base + u32::from(index)));
+    }
+
+    /// Bytes of the buffers.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.vertices.as_slice()) + size_of_val(self.indices.as_slice())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn weights_of_a_mix_sum_up(base in 0u8..4, overlay in 0u8..4, b2 in 0u8..8, o2 in 4u8..8, x: u8, y: u8, step in 0..=SNAP) {
+            let a = MaterialMix::column(ColumnMaterial { base: MaterialId(base), overlay: MaterialId(overlay), blend: x });
+            let b = MaterialMix::column(ColumnMaterial { base: MaterialId(b2), overlay: MaterialId(o2), blend: y });
+            let mix = MaterialMix::lerp(a, b, step);
+            prop_assert_eq!(mix.weights.iter().map(|&w| u32::from(w)).sum::<u32>(), 255);
+            prop_assert_eq!(MaterialMix::lerp(a, a, step), a);
+        }
+    }
+}

@@ -1,0 +1,21 @@
+//! What is drawn: marching cubes where edits are, heightmap elsewhere, and the ring where they meet.
+//!
+//! - [`cases`]: the marching-cubes case table, derived from one rule about cube faces.
+//! - [`mask`]: which cells marching cubes draws (rule 2), as bits.
+//! - [`vertex`]: the one vertex function of cubes and ring (rule 4), with normals and materials.
+//! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk.
+//! - [`tile`]: the heightmap's triangles outside the mask, rings included (rule 3).
+//! - [`mesh`]: vertex and index buffers, local to a chunk or tile.
+//! - [`seams`]: the validator: is everything drawn together closed?
+
+pub mod block;
+pub mod cases;
+pub mod mask;
+pub mod mesh;
+pub mod seams;
+pub mod tile;
+pub mod vertex;
+
+pub use mask::{Mask, MaskView};
+pub use mesh::{MaterialMix, SurfaceMesh, Vertex};
+pub use seams::{SeamFault, SeamReport, SeamSoup};

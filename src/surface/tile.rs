@@ -1,0 +1,116 @@
+//! Tiles: the heightmap's triangles outside the mask, with rings along its border (rule 3).
+//!
+//! A tile's vertices are its columns, in rows along x; digging never moves them. What a transaction rebuilds is the list
+//! of indices; the few vertices that rings need on the mask's border follow after the columns.
+
+use glam::IVec3;
+
+use super::mask::sheet;
+use super::mesh::{SurfaceMesh, Vertex};
+use super::vertex::{Lattice, WorldView, height_vertex, vertex};
+use crate::lattice::{Column, ONE, TilePos};
+
+/// The whole mesh of a tile, relative to its lowest column at y = 0. May be empty, when the mask covers all of it.
+pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
+    let mut mesh = SurfaceMesh { vertices: columns(world, tile), indices: Vec::new() };
+    let (indices, ring) = indices(world, tile);
+    mesh.vertices.extend_from_slice(&ring);
+    mesh.indices = indices;
+    mesh
+}
+
+/// The lowest column of a tile as lattice point: where its mesh is placed.
+pub fn origin(world: &WorldView, tile: TilePos) -> IVec3 {
+    world.grid.tile_cells(tile).0.at(0)
+}
+
+/// The vertices of a tile's columns, x fastest.
+pub fn columns(world: &WorldView, tile: TilePos) -> Vec<Vertex> {
+    let (low, high) = world.grid.tile_cells(tile);
+    let ground = world.samples.ground();
+    let row = move |z| (low.x..=high.x).map(move |x| height_vertex(ground, Column::new(x, z), low.at(0)));
+    (low.z..=high.z).flat_map(row).collect()
+}
+
+/// The triangles outside the mask, and the vertices of rings that they need after those of [`columns`].
+pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
+    let (low, high) = world.grid.tile_cells(tile);
+    let width = (high.x - low.x + 1) as u32;
+    let mut ring = Ring { world, origin: low.at(0), base: width * (high.z - low.z + 1) as u32, vertices: Vec::new() };
+    let mut indices = Vec::with_capacity(6 * ((high.x - low.x) * (high.z - low.z)) as usize);
+    for z in low.z..high.z {
+        for x in low.x..high.x {
+            let cell = Column::new(x, z);
+            if world.mask.contains(cell) {
+                continue;
+            }
+            let a = (z - low.z) as u32 * width + (x - low.x) as u32;
+            let [a, b, c, d] = [a, a + width, a + width + 1, a + 1];
+            let beside = |dx, dz| world.is_volumetric(cell.offset(dx, dz)) == Some(true);
+            let bordered = [beside(-1, 0), beside(0, 1), beside(1, 0), beside(0, -1)];
+            if bordered == [false; 4] {
+                indices.extend_from_slice(&[a, b, c, c, d, a]);
+                continue;
+            }
+            let [ca, cb, cc, cd] = cell.corners();
+            let ends = [(a, ca, b, cb), (b, cb, c, cc), (c, cc, d, cd), (d, cd, a, ca)];
+            let [ab, bc, cd, da] = std::array::from_fn(|side| {
+                let (start, from, end, to) = ends[side];
+                ring.side(start, from, end, to, bordered[side])
+            });
+            fan(&ab, &bc, &mut indices);
+            fan(&cd, &da, &mut indices);
+        }
+    }
+    (indices, ring.vertices)
+}
+
+/// The ring vertices of one tile.
+struct Ring<'a> {
+    world: &'a WorldView<'a>,
+    origin: IVec3,
+    base: u32,
+    vertices: Vec<Vertex>,
+}
+
+impl Ring<'_> {
+    /// One side of a heightmap cell as vertex numbers: straight, or the polyline that a volumetric cell draws there.
+    fn side(&mut self, start: u32, from: Column, end: u32, to: Column, bordered: bool) -> Vec<u32> {
+        let mut line = vec![start];
+        if bordered {
+            line.extend(self.chain(from, to));
+        }
+        line.push(end);
+        line
+    }
+
+    /// The vertices strictly between two heightmap vertices: one for each lattice y that separates their heights.
+    fn chain(&mut self, from: Column, to: Column) -> Vec<u32> {
+        let ground = self.world.samples.ground();
+        let (h_from, h_to) = (ground.height(from), ground.height(to));
+        let axis = if from.x != to.x { 0 } else { 2 };
+        let low = Column::new(from.x.min(to.x), from.z.min(to.z));
+        let separates = |y: &i32| (y * ONE < h_from) != (y * ONE < h_to);
+        let mut numbers = Vec::new();
+        for y in sheet([h_from, h_to]).filter(separates) {
+            numbers.push(self.base + self.vertices.len() as u32);
+            self.vertices.push(vertex(self.world, low.at(y), axis, self.origin));
+        }
+        if h_to < h_from {
+            numbers.reverse();
+        }
+        numbers
+    }
+}
+
+/// Rule 3: a triangle with legs P..R and R..Q, each straight or a polyline; Q-P is straight.
+fn fan(first: &[u32], second: &[u32], indices: &mut Vec<u32>) {
+    // Q when the second leg is straight; else its first inner vertex, and P fans the rest of it.
+    let apex = second[1];
+    for pair in first.windows(2) {
+        indices.extend_from_slice(&[pair[0], pair[1], apex]);
+    }
+    for pair in second[1..].windows(2) {
+        indices.extend_from_slice(&[first[0], pair[0], pair[1]]);
+    }
+}

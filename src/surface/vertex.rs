@@ -1,0 +1,169 @@
+//! The one vertex function of cubes and ring (rule 4).
+//!
+//! A vertex belongs to a lattice edge. Whoever asks, from whichever chunk, reads the same samples around that edge and so
+//! gets the same bits: position, normal and materials.
+
+use glam::{IVec3, Vec3};
+
+use super::mask::MaskView;
+use super::mesh::{MaterialMix, Vertex};
+use crate::ground::{Ground, MaterialId, OVERLAY_DEPTH};
+use crate::lattice::{ChunkGrid, Column, ONE, SNAP};
+use crate::volume::SampleView;
+
+/// What the vertex function reads of the world.
+pub trait Lattice {
+    /// Density at a lattice point, 1/256 voxel.
+    fn distance(&self, point: IVec3) -> i32;
+    /// Was the sample at a lattice point edited?
+    fn is_edited(&self, point: IVec3) -> bool;
+    /// The material stored there; [`MaterialId::GROUND`] where nobody changed it.
+    fn stored_material(&self, point: IVec3) -> MaterialId;
+    /// The pristine world.
+    fn ground(&self) -> &Ground;
+    /// Does marching cubes draw the sheet of a cell? `None` outside the world.
+    fn is_volumetric(&self, cell: Column) -> Option<bool>;
+}
+
+/// The world as the vertex function reads it: samples, mask and the world's rim.
+#[derive(Clone, Copy)]
+pub struct WorldView<'a> {
+    /// Samples and ground.
+    pub samples: SampleView<'a>,
+    /// Cells of marching cubes.
+    pub mask: MaskView<'a>,
+    /// Chunks and rim.
+    pub grid: ChunkGrid,
+}
+
+impl Lattice for WorldView<'_> {
+    fn distance(&self, point: IVec3) -> i32 {
+        self.samples.distance(point)
+    }
+    fn is_edited(&self, point: IVec3) -> bool {
+        self.samples.is_edited(point)
+    }
+    fn stored_material(&self, point: IVec3) -> MaterialId {
+        self.samples.stored_material(point)
+    }
+    fn ground(&self) -> &Ground {
+        self.samples.ground()
+    }
+    fn is_volumetric(&self, cell: Column) -> Option<bool> {
+        self.grid.has_cell(cell).then(|| self.mask.contains(cell))
+    }
+}
+
+const UNIT: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];
+
+/// Where the surface crosses the lattice edge from `p` along `axis`, in steps of 1/4096 voxel from `p`.
+///
+/// A pristine vertical edge is crossed exactly at h, its upper end included. Any other crossing is linear, rounded to the
+/// nearest step, and at least one step away from both ends. `d = 0` is air.
+pub fn crossing(lattice: &impl Lattice, p: IVec3, axis: usize) -> i32 {
+    let q = p + UNIT[axis];
+    if axis == 1 && !lattice.is_edited(p) && !lattice.is_edited(q) {
+        return (lattice.ground().height(Column::of(p)) - p.y * ONE) * (SNAP / ONE);
+    }
+    let (dp, dq) = (i64::from(lattice.distance(p)).abs(), i64::from(lattice.distance(q)).abs());
+    let sum = (dp + dq).max(1);
+    let steps = (2 * i64::from(SNAP) * dp + sum) / (2 * sum);
+    (steps as i32).clamp(1, SNAP - 1)
+}
+
+/// The position of the crossing on the edge from `p` along `axis`, in 1/4096 voxel from lattice point `origin`.
+pub fn position(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> IVec3 {
+    (p - origin) * SNAP + UNIT[axis] * crossing(lattice, p, axis)
+}
+
+/// The surface vertex on the lattice edge from `p` along `axis`, which must have one solid end.
+pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> Vertex {
+    let q = p + UNIT[axis];
+    let step = crossing(lattice, p, axis);
+    let pristine = !lattice.is_edited(p) && !lattice.is_edited(q);
+    let as_heightmap =
+        pristine && (is_stencil_pristine(lattice, p, q) || is_on_mask_border(lattice, Column::of(p), axis));
+    let normal = if as_heightmap {
+        heightmap_normal(lattice.ground(), Column::of(p), Column::of(q), step)
+    } else {
+        lerp_normal(gradient(lattice, p), gradient(lattice, q), step)
+    };
+    Vertex {
+        position: (p - origin) * SNAP + UNIT[axis] * step,
+        normal,
+        materials: materials(lattice, p, q, step),
+    }
+}
+
+/// The heightmap's own vertex over a column.
+pub fn height_vertex(ground: &Ground, column: Column, origin: IVec3) -> Vertex {
+    let base = (column.at(0) - origin) * SNAP;
+    Vertex {
+        position: base + IVec3::Y * (ground.height(column) * (SNAP / ONE)),
+        normal: ground.normal(column),
+        materials: MaterialMix::column(ground.column_material(column)),
+    }
+}
+
+/// No sample that the gradients at both ends of an edge look at is edited.
+fn is_stencil_pristine(lattice: &impl Lattice, p: IVec3, q: IVec3) -> bool {
+    [p, q].iter().all(|&end| UNIT.iter().all(|&u| !lattice.is_edited(end + u) && !lattice.is_edited(end - u)))
+}
+
+/// Does the edge lie in the border of the mask: between a volumetric cell and one that stays heightmap?
+fn is_on_mask_border(lattice: &impl Lattice, column: Column, axis: usize) -> bool {
+    let Column { x, z } = column;
+    let cells: &[Column] = match axis {
+        0 => &[Column::new(x, z - 1), Column::new(x, z)],
+        1 => &[Column::new(x - 1, z - 1), Column::new(x, z - 1), Column::new(x - 1, z), Column::new(x, z)],
+        _ => &[Column::new(x - 1, z), Column::new(x, z)],
+    };
+    let volumetric = |wanted| cells.iter().any(|&cell| lattice.is_volumetric(cell) == Some(wanted));
+    volumetric(true) && volumetric(false)
+}
+
+/// The tile's normal on the heightmap edge between two columns (or at one).
+fn heightmap_normal(ground: &Ground, a: Column, b: Column, step: i32) -> Vec3 {
+    if a == b { ground.normal(a) } else { lerp_normal(ground.normal(a), ground.normal(b), step) }
+}
+
+/// Central differences of the density, 1/512 voxel per voxel: they point to the air.
+fn gradient(lattice: &impl Lattice, p: IVec3) -> Vec3 {
+    let along = |u: IVec3| (lattice.distance(p + u) - lattice.distance(p - u)) as f32;
+    Vec3::new(along(IVec3::X), along(IVec3::Y), along(IVec3::Z))
+}
+
+/// Linear between `a` and `b`, of unit length; only + - * / sqrt, each in a fixed order, so all machines agree.
+fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
+    let t = step as f32 / SNAP as f32;
+    let [x, y, z] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
+    let length = (x * x + y * y + z * z).sqrt();
+    if length > 0.0 { Vec3::new(x / length, y / length, z / length) } else { Vec3::Y }
+}
+
+/// Materials at a crossing: what the solid end is made of. Where the ground shows its own materials, those of both
+/// columns are blended as the tile does.
+fn materials(lattice: &impl Lattice, p: IVec3, q: IVec3, step: i32) -> MaterialMix {
+    let solid = if lattice.distance(p) < 0 { p } else { q };
+    let stored = lattice.stored_material(solid);
+    if stored != MaterialId::GROUND {
+        return MaterialMix::pure(stored);
+    }
+    let ground = lattice.ground();
+    let own = |column: Column| {
+        let material = ground.column_material(column);
+        let depth = ground.height(column) - solid.y * ONE;
+        if depth <= OVERLAY_DEPTH { MaterialMix::column(material) } else { MaterialMix::pure(material.base) }
+    };
+    let pristine = !lattice.is_edited(p) && !lattice.is_edited(q);
+    let (a, b) = (Column::of(p), Column::of(q));
+    if pristine {
+        // A sheet vertex: the tile's own blend, however steep it is.
+        let skin = |column| MaterialMix::column(ground.column_material(column));
+        return if a == b { skin(a) } else { MaterialMix::lerp(skin(a), skin(b), step) };
+    }
+    if a == b || lattice.stored_material(if solid == p { q } else { p }) != MaterialId::GROUND {
+        return own(Column::of(solid));
+    }
+    MaterialMix::lerp(own(a), own(b), step)
+}

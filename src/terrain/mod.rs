@@ -1,0 +1,198 @@
+//! The model: a world that is edited by ordered transactions. It knows nothing of Bevy's ECS and runs in tests, servers
+//! and tools alike.
+//!
+//! ```
+//! use bevy_burrow::prelude::*;
+//! use glam::Vec3;
+//!
+//! let ground = Ground::flat(64, 64, 10.0)?;
+//! let mut terrain = Terrain::new(ground, &TerrainSettings::default())?;
+//! let receipts = terrain.apply([Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0))]);
+//! assert!(receipts[0].outcome.as_ref().is_ok_and(|applied| applied.removed.total() > 100));
+//! assert!(terrain.world().check_seams().is_flawless());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod query;
+mod receipt;
+mod transaction;
+mod world;
+
+pub use query::{RayHit, Span};
+pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
+pub use transaction::{Commit, FieldNews, MeshUpdates, Transaction};
+pub use world::{ChunkSurface, Drawn, Memory, World};
+
+use std::sync::Arc;
+
+use crate::brush::{Brush, BrushError, Edit};
+use crate::ground::Ground;
+use crate::lattice::LatticeBox;
+
+/// How a terrain is cut up and how large it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TerrainSettings {
+    /// Cells along a chunk's side, 8..=128. Small chunks redraw faster, large ones need fewer draws.
+    pub chunk_size: u32,
+    /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself counts
+    /// in voxels.
+    pub voxel_size: f32,
+}
+
+impl Default for TerrainSettings {
+    fn default() -> Self {
+        Self { chunk_size: 32, voxel_size: 1.0 }
+    }
+}
+
+/// Why a terrain can't be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TerrainError {
+    /// The chunk size is out of range.
+    #[error("chunk size {0} is not in 8..=128")]
+    ChunkSize(u32),
+    /// The voxel size is no power of two from 1/8 to 8.
+    #[error("voxel size {0} is not one of 1/8, 1/4, 1/2, 1, 2, 4, 8")]
+    VoxelSize(f32),
+}
+
+/// Why a commit is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the commit was computed from revision {base}, but the world is at revision {current}")]
+pub struct StaleCommit {
+    /// The revision that the transaction started from.
+    pub base: u64,
+    /// The revision of the world.
+    pub current: u64,
+}
+
+/// A brush on its way into the world.
+#[derive(Clone, Debug)]
+pub(crate) struct Submission {
+    tag: u64,
+    edit: Result<Edit, BrushError>,
+}
+
+/// A world, the edits that wait for it, and the one transaction that may be under way.
+pub struct Terrain {
+    world: Arc<World>,
+    voxel_size: f32,
+    queue: Vec<Submission>,
+    in_flight: Option<Arc<[Submission]>>,
+}
+
+impl Terrain {
+    /// A terrain that nobody has edited yet.
+    ///
+    /// # Errors
+    /// When the chunk size or the voxel size is out of range.
+    pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
+        if !(8..=128).contains(&settings.chunk_size) {
+            return Err(TerrainError::ChunkSize(settings.chunk_size));
+        }
+        if !(-3..=3).any(|power| settings.voxel_size == 2f32.powi(power)) {
+            return Err(TerrainError::VoxelSize(settings.voxel_size));
+        }
+        let world = World::new(ground.into(), settings.chunk_size as i32);
+        Ok(Self { world: Arc::new(world), voxel_size: settings.voxel_size, queue: Vec::new(), in_flight: None })
+    }
+
+    /// Metres along a voxel's side.
+    pub fn voxel_size(&self) -> f32 {
+        self.voxel_size
+    }
+
+    /// The world as last committed.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The world as last committed, to be read elsewhere. While a snapshot is held, the next commit copies the world's
+    /// index first, so let go of it soon.
+    pub fn snapshot(&self) -> Arc<World> {
+        Arc::clone(&self.world)
+    }
+
+    /// Queues a brush. One that is not valid is queued too: its receipt says why it was rejected.
+    pub fn submit(&mut self, brush: &Brush) {
+        self.queue.push(Submission { tag: brush.tag, edit: Edit::quantize(brush) });
+    }
+
+    /// Queues an edit, say from a file or the network. It is checked like a brush.
+    pub fn submit_edit(&mut self, edit: &Edit) {
+        self.queue.push(Submission { tag: edit.tag(), edit: edit.check().map(|()| edit.clone()) });
+    }
+
+    /// Would a brush reach some column of this world?
+    ///
+    /// # Errors
+    /// When the brush is not valid.
+    pub fn is_in_reach(&self, brush: &Brush) -> Result<bool, BrushError> {
+        let reach = Edit::quantize(brush)?.reach();
+        Ok(reach.intersection(self.world.grid.edit_bounds()).is_some())
+    }
+
+    /// Brushes that wait for their transaction.
+    pub fn queued(&self) -> usize {
+        self.queue.len()
+    }
+
+    /// Is a transaction under way?
+    pub fn is_busy(&self) -> bool {
+        self.in_flight.is_some()
+    }
+
+    /// Makes one transaction of everything queued; `None` when nothing is, or when one is under way already. Run it
+    /// anywhere, then hand its commit to [`commit`](Self::commit).
+    pub fn begin(&mut self) -> Option<Transaction> {
+        if self.queue.is_empty() || self.is_busy() {
+            return None;
+        }
+        let submissions: Arc<[Submission]> = std::mem::take(&mut self.queue).into();
+        self.in_flight = Some(Arc::clone(&submissions));
+        Some(Transaction::new(self.snapshot(), submissions))
+    }
+
+    /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
+    ///
+    /// # Errors
+    /// When the world changed since the transaction began; nothing is changed then.
+    pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
+        let current = self.world.revision();
+        if commit.base_revision() != current {
+            return Err(StaleCommit { base: commit.base_revision(), current });
+        }
+        self.in_flight = None;
+        Ok(commit.install(Arc::make_mut(&mut self.world)))
+    }
+
+    /// Gives up the transaction that is under way, whose task was lost; its edits are queued again, in front.
+    pub fn abandon(&mut self) {
+        if let Some(lost) = self.in_flight.take() {
+            self.queue.splice(0..0, lost.iter().cloned());
+        }
+    }
+
+    /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.
+    /// Returns the receipts of these brushes. Tools and tests want this; a game lets the plugin do it.
+    ///
+    /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
+    pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
+        self.abandon();
+        let waiting = self.queue.len();
+        for brush in brushes {
+            self.submit(brush.borrow());
+        }
+        let Some(transaction) = self.begin() else { return Vec::new() };
+        let mut receipts = self.commit(transaction.run()).unwrap_or_default();
+        receipts.split_off(waiting.min(receipts.len()))
+    }
+
+    /// Is no edit on its way to these samples?
+    pub fn is_ready(&self, bounds: LatticeBox) -> bool {
+        let in_flight = self.in_flight.iter().flat_map(|submissions| submissions.iter());
+        let mut coming = in_flight.chain(&self.queue).filter_map(|submission| submission.edit.as_ref().ok());
+        coming.all(|edit| edit.reach().intersection(bounds).is_none())
+    }
+}

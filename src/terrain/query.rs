@@ -1,0 +1,287 @@
+//! Questions about the ground, answered from the same triangles that are drawn, without a physics engine.
+
+use std::ops::Range;
+
+use glam::{DVec3, IVec3, Vec3};
+
+use super::world::World;
+use crate::ground::MaterialId;
+use crate::lattice::{BRICK, Column, ONE, SNAP};
+use crate::surface::cases;
+use crate::surface::mask::cell_sheet;
+use crate::surface::vertex::{Lattice, WorldView, position};
+
+/// Where a ray meets the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Voxels from the ray's origin.
+    pub distance: f64,
+    /// The place, in voxels.
+    pub position: DVec3,
+    /// Unit normal of the triangle, towards the air.
+    pub normal: Vec3,
+    /// What the ground is made of there.
+    pub material: MaterialId,
+    /// Did the ray come from inside the ground?
+    pub from_inside: bool,
+}
+
+/// A stretch of air over a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// The ground below it, in voxels.
+    pub floor: f64,
+    /// The ground above it, in voxels; `None` under the open sky.
+    pub ceiling: Option<f64>,
+}
+
+/// A drawn triangle, in voxels.
+type Triangle = [DVec3; 3];
+
+impl World {
+    /// The first triangle that a ray meets within `max_distance` voxels, from outside, inside a cave or inside the
+    /// ground. `None` for a ray that meets none, or whose numbers are not finite or whose direction is zero.
+    pub fn raycast(&self, origin: DVec3, direction: DVec3, max_distance: f64) -> Option<RayHit> {
+        let direction = direction.try_normalize()?;
+        if !origin.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
+            return None;
+        }
+        let view = self.view();
+        let (mut enter, leave) = self.clip(origin, direction, max_distance)?;
+        let start = origin + direction * enter;
+        let mut cell = Column::new(
+            (start.x.floor() as i32).clamp(0, self.grid.width() - 1),
+            (start.z.floor() as i32).clamp(0, self.grid.depth() - 1),
+        );
+        let step = |along: f64| if along > 0.0 { 1 } else { -1 };
+        // Distance along the ray at which it leaves the cell through its side in x or z.
+        let side = |at: i32, from: f64, along: f64| match along {
+            0.0 => f64::INFINITY,
+            _ => (f64::from(at + i32::from(along > 0.0)) - from) / along,
+        };
+        while self.grid.has_cell(cell) {
+            let (out_x, out_z) = (side(cell.x, origin.x, direction.x), side(cell.z, origin.z, direction.z));
+            let out = out_x.min(out_z).min(leave);
+            let (y0, y1) = (origin.y + direction.y * enter, origin.y + direction.y * out);
+            let mut best: Option<(f64, Triangle)> = None;
+            for_triangles(self, &view, cell, y0.min(y1), y0.max(y1), |triangle| {
+                if let Some(t) = intersect(origin, direction, &triangle)
+                    && (0.0..=max_distance).contains(&t)
+                    && best.is_none_or(|(nearest, _)| t < nearest)
+                {
+                    best = Some((t, triangle));
+                }
+            });
+            if let Some((distance, triangle)) = best {
+                return Some(self.hit(origin, direction, distance, &triangle));
+            }
+            if out >= leave {
+                return None;
+            }
+            enter = out;
+            if out_x <= out_z {
+                cell.x += step(direction.x);
+            } else {
+                cell.z += step(direction.z);
+            }
+        }
+        None
+    }
+
+    fn hit(&self, origin: DVec3, direction: DVec3, distance: f64, triangle: &Triangle) -> RayHit {
+        let [a, b, c] = triangle;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let position = origin + direction * distance;
+        RayHit {
+            distance,
+            position,
+            normal: normal.as_vec3(),
+            material: self.material_under(position),
+            from_inside: normal.dot(direction) > 0.0,
+        }
+    }
+
+    /// The stretch of a ray over the world's cells, as distances.
+    fn clip(&self, origin: DVec3, direction: DVec3, max_distance: f64) -> Option<(f64, f64)> {
+        let (mut enter, mut leave) = (0.0f64, max_distance);
+        for (from, along, end) in [
+            (origin.x, direction.x, f64::from(self.grid.width())),
+            (origin.z, direction.z, f64::from(self.grid.depth())),
+        ] {
+            if along == 0.0 {
+                if !(0.0..=end).contains(&from) {
+                    return None;
+                }
+            } else {
+                let (a, b) = ((0.0 - from) / along, (end - from) / along);
+                enter = enter.max(a.min(b));
+                leave = leave.min(a.max(b));
+            }
+        }
+        (enter <= leave).then_some((enter, leave))
+    }
+
+    /// The stretches of air over (x, z), lowest first; empty outside the world. Coordinates are taken to the nearest
+    /// 2^-20 voxel.
+    pub fn spans(&self, x: f64, z: f64) -> Vec<Span> {
+        let mut spans: Vec<Span> = Vec::new();
+        for (y, is_floor) in self.crossings(x, z) {
+            match spans.last_mut() {
+                _ if is_floor => spans.push(Span { floor: y, ceiling: None }),
+                Some(span) => span.ceiling = Some(y),
+                None => {}
+            }
+        }
+        spans
+    }
+
+    /// The topmost ground over (x, z) in voxels, `None` outside the world.
+    pub fn height(&self, x: f64, z: f64) -> Option<f64> {
+        self.spans(x, z).last().map(|span| span.floor)
+    }
+
+    /// Is the place inside the ground? Places outside the world are not.
+    pub fn is_solid(&self, place: DVec3) -> bool {
+        let spans = self.spans(place.x, place.z);
+        !spans.is_empty() && !spans.iter().any(|span| span.floor <= place.y && span.ceiling.is_none_or(|top| place.y <= top))
+    }
+
+    /// The surface's unit normal where it is nearest to `place` along y, `None` outside the world.
+    pub fn normal(&self, place: DVec3) -> Option<Vec3> {
+        let crossings = self.crossings(place.x, place.z);
+        let apart = |y: f64| (y - place.y).abs();
+        let (y, is_floor) = crossings.into_iter().min_by(|a, b| apart(a.0).total_cmp(&apart(b.0)))?;
+        let (from, towards) = if is_floor { (0.5, DVec3::NEG_Y) } else { (-0.5, DVec3::Y) };
+        self.raycast(DVec3::new(place.x, y + from, place.z), towards, 1.0).map(|hit| hit.normal)
+    }
+
+    /// The material of the solid lattice point nearest to a place on the surface.
+    pub fn material_under(&self, place: DVec3) -> MaterialId {
+        let samples = self.samples();
+        let low = place.floor().as_ivec3();
+        let corner = |i: usize| low + IVec3::from_array(cases::corner(i));
+        let apart = |point: &IVec3| point.as_dvec3().distance_squared(place);
+        let solid = (0..8).map(corner).filter(|&point| samples.is_solid(point));
+        let nearest = solid.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        nearest.map_or_else(|| self.ground.material(place.round().as_ivec3() - IVec3::Y), |point| samples.material(point))
+    }
+
+    /// Where the vertical line through (x, z) crosses the surface, lowest first: height, and whether it is a floor.
+    ///
+    /// Exact in integers, with the line moved by an infinitesimal step off every edge, so each crossing counts once.
+    fn crossings(&self, x: f64, z: f64) -> Vec<(f64, bool)> {
+        const FINE: i64 = 1 << 20;
+        let (width, depth) = (f64::from(self.grid.width()), f64::from(self.grid.depth()));
+        if !((0.0..=width).contains(&x) && (0.0..=depth).contains(&z)) {
+            return Vec::new();
+        }
+        let fine = |at: f64, end: f64| ((at * FINE as f64).round() as i64).min(end as i64 * FINE - 1);
+        let (px, pz) = (fine(x, width), fine(z, depth));
+        let cell = Column::new((px / FINE) as i32, (pz / FINE) as i32);
+        let mut found = Vec::new();
+        for_triangles(self, &self.view(), cell, f64::NEG_INFINITY, f64::INFINITY, |triangle| {
+            let [a, b, c] = triangle.map(|p| ((p.x * FINE as f64) as i64 - px, (p.z * FINE as f64) as i64 - pz));
+            let (ab, bc, ca) = (turn(a, b), turn(b, c), turn(c, a));
+            // Counter-clockwise from above is clockwise in (x, z): a floor has all turns negative.
+            if ab == bc && bc == ca {
+                let area = |p: (i64, i64), q: (i64, i64)| (p.0 * q.1 - p.1 * q.0) as f64;
+                let (wc, wa, wb) = (area(a, b), area(b, c), area(c, a));
+                let sum = wa + wb + wc;
+                let [ya, yb, yc] = triangle.map(|p| p.y);
+                if sum != 0.0 {
+                    found.push(((wa * ya + wb * yb + wc * yc) / sum, !ab));
+                }
+            }
+        });
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
+    }
+}
+
+/// On which side of the edge p-q does the origin lie, once it is moved by (e, e * e) for an infinitesimal e?
+fn turn(p: (i64, i64), q: (i64, i64)) -> bool {
+    let cross = p.0 * q.1 - p.1 * q.0;
+    let (dx, dz) = (q.0 - p.0, q.1 - p.1);
+    (cross, -dz, dx) > (0, 0, 0)
+}
+
+/// Hands out the drawn triangles of a cell whose cubes may reach into `low..=high`.
+fn for_triangles(
+    world: &World,
+    view: &WorldView,
+    cell: Column,
+    low: f64,
+    high: f64,
+    mut found: impl FnMut(Triangle),
+) {
+    let ground = view.ground();
+    let sheet = cell_sheet(ground, cell);
+    let is_volumetric = view.mask.contains(cell);
+    let meets = |rows: &Range<i32>| f64::from(rows.start) <= high && low <= f64::from(rows.end);
+    if !is_volumetric && meets(&sheet) {
+        let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
+        let [a, b, c, d] = cell.corners().map(corner);
+        found([a, b, c]);
+        found([c, d, a]);
+    }
+    let mut rows = edited_rows(world, cell);
+    if is_volumetric {
+        rows.push(sheet.clone());
+    }
+    rows.sort_unstable_by_key(|rows| rows.start);
+    let mut next = i32::MIN;
+    for rows in rows.into_iter().filter(meets) {
+        let bottom = rows.start.max(next).max((low.floor() - 1.0) as i32);
+        let top = rows.end.min((high.floor() + 2.0) as i32);
+        for y in bottom..top {
+            cube_triangles(view, cell.at(y), is_volumetric && sheet.contains(&y), &mut found);
+        }
+        next = next.max(rows.end);
+    }
+}
+
+/// Rows of cubes over a cell that may touch an edited sample.
+fn edited_rows(world: &World, cell: Column) -> Vec<Range<i32>> {
+    let mut rows = Vec::new();
+    for bx in cell.x >> 3..=(cell.x + 1) >> 3 {
+        for bz in cell.z >> 3..=(cell.z + 1) >> 3 {
+            for by in world.stacks.get(&(bx, bz)).into_iter().flatten() {
+                rows.push(by * BRICK - 1..by * BRICK + BRICK);
+            }
+        }
+    }
+    rows
+}
+
+/// The triangles of one cube, where it is drawn by marching cubes.
+fn cube_triangles(view: &WorldView, cube: IVec3, in_sheet: bool, found: &mut impl FnMut(Triangle)) {
+    let corners: [IVec3; 8] = std::array::from_fn(|i| cube + IVec3::from_array(cases::corner(i)));
+    if !in_sheet && !corners.iter().any(|&corner| view.is_edited(corner)) {
+        return;
+    }
+    let case = (0..8).fold(0, |case, i| case | usize::from(view.distance(corners[i]) < 0) << i);
+    for triangle in cases::table()[case].triangles() {
+        found(triangle.map(|edge| {
+            let (corner, axis) = cases::edge_corners(edge);
+            let local = position(view, corners[corner], axis, cube);
+            cube.as_dvec3() + local.as_dvec3() / f64::from(SNAP)
+        }));
+    }
+}
+
+/// Distance along a ray to a triangle, its edges included with a hair's breadth more, so no ray slips between two.
+fn intersect(origin: DVec3, direction: DVec3, [a, b, c]: &Triangle) -> Option<f64> {
+    const HAIR: f64 = 1e-9;
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant.abs() < 1e-18 {
+        return None;
+    }
+    let from = origin - a;
+    let u = from.dot(p) / determinant;
+    let q = from.cross(ab);
+    let v = direction.dot(q) / determinant;
+    let inside = u >= -HAIR && v >= -HAIR && u + v <= 1.0 + HAIR;
+    inside.then(|| ac.dot(q) / determinant)
+}

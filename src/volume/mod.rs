@@ -1,0 +1,17 @@
+//! What edits made of the world: samples in bricks, fields in chunks.
+//!
+//! Only edited samples are stored (rule 1); the rest of the world is computed from the [`Ground`](crate::ground::Ground)
+//! whenever it is asked for. Bricks lie on the world's own grid and hold each sample once, so chunks that share a face
+//! read the same numbers there, and the samples of a world do not depend on its chunk size.
+
+mod brick;
+mod draft;
+mod field;
+mod tally;
+mod view;
+
+pub use brick::{Brick, Sample};
+pub use draft::{ChunkEffect, Draft, EditEffect};
+pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
+pub use tally::Tally;
+pub use view::{Bricks, SampleView};

@@ -1,0 +1,63 @@
+//! Everything drawn is one closed surface, whatever was dug.
+//!
+//! `BURROW_WORLDS=10000 cargo test --release --no-default-features --test seams` runs more random worlds.
+
+mod worlds;
+
+use bevy_burrow::prelude::*;
+use fastrand::Rng;
+use glam::Vec3;
+use worlds::{random_world, real_ground, world_count};
+
+#[test]
+fn random_worlds_are_flawless() {
+    let worlds = world_count(300);
+    let threads = std::thread::available_parallelism().map_or(2, |n| n.get() as u64);
+    let (mut triangles, mut cells) = (0, 0);
+    std::thread::scope(|scope| {
+        let soak = |thread: u64| {
+            let (mut triangles, mut cells) = (0, 0);
+            for index in (thread..worlds).step_by(threads as usize) {
+                let terrain = random_world(&mut Rng::with_seed(index), index);
+                let report = terrain.world().check_seams();
+                assert!(report.is_flawless(), "world {index}: {report}");
+                assert_eq!(report.worst_normal_jump, 0.0, "world {index}: {report}");
+                triangles += report.triangles;
+                cells += terrain.world().mask().len();
+            }
+            (triangles, cells)
+        };
+        let runs: Vec<_> = (0..threads).map(|thread| scope.spawn(move || soak(thread))).collect();
+        for run in runs {
+            let (t, c) = run.join().expect("a world failed; see above");
+            triangles += t;
+            cells += c;
+        }
+    });
+    assert!(cells > 0, "no world was dug at its surface");
+    println!("{worlds} worlds, {triangles} triangles, {cells} cells drawn by marching cubes: all closed, all manifold");
+}
+
+#[test]
+fn a_brush_row_over_the_steepest_real_ground_leaves_no_open_edge() {
+    let ground = real_ground();
+    let steepness = |x: i32, z: i32| {
+        let h = |dx, dz| ground.height(bevy_burrow::lattice::Column::new(x + dx, z + dz));
+        (h(1, 0) - h(-1, 0)).abs().max((h(0, 1) - h(0, -1)).abs())
+    };
+    let columns = (32..ground.depth() - 32).flat_map(|z| (64..ground.width() - 64).map(move |x| (x, z)));
+    let (x, z) = columns.max_by_key(|&(x, z)| steepness(x, z)).expect("the landscape is large enough");
+    println!("steepest at ({x}, {z}): {:.2} voxels rise per voxel", f64::from(steepness(x, z)) / 512.0);
+    let row: Vec<Brush> = (-8..=8)
+        .map(|i| {
+            let column = bevy_burrow::lattice::Column::new(x + i * 4, z + i);
+            let height = ground.height(column) as f32 / 256.0;
+            Brush::dig(Shape::sphere(Vec3::new(column.x as f32, height, column.z as f32), 4.0))
+        })
+        .collect();
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    terrain.apply(&row);
+    let report = terrain.world().check_seams();
+    println!("{report}");
+    assert!(report.is_flawless() && report.worst_normal_jump == 0.0, "{report}");
+}

@@ -1,0 +1,155 @@
+//! Random worlds and edits for the tests: steep, flat, at integer heights, and cut from real elevation data.
+#![allow(dead_code)] // each test file uses its own part of this
+
+use bevy_burrow::ground::{GreyImage, Ground, ImageLimits, ImageScale};
+use bevy_burrow::prelude::*;
+use fastrand::Rng;
+use glam::{Quat, Vec3};
+
+/// Chunk sizes that the tests take turns with.
+pub const CHUNK_SIZES: [u32; 4] = [8, 25, 32, 100];
+
+/// How many random worlds to test: `BURROW_WORLDS`, or the given number.
+pub fn world_count(default: u64) -> u64 {
+    std::env::var("BURROW_WORLDS").ok().and_then(|count| count.parse().ok()).unwrap_or(default)
+}
+
+/// The elevation model that the crate ships.
+pub fn real_image() -> GreyImage {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/jacksboro_fault.png");
+    let bytes = std::fs::read(path).expect("the shipped elevation model can be read");
+    GreyImage::decode_png(&bytes, &ImageLimits::default()).expect("the shipped elevation model is a grey PNG")
+}
+
+/// The real landscape as the digger has it, at least 1024 x 1024 voxels.
+pub fn real_ground() -> Ground {
+    let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
+    Ground::from_image(&real_image(), &scale).expect("the real landscape is valid")
+}
+
+/// One voxel a sample, much steeper than nature, cut out at (x, z).
+pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) -> Ground {
+    let image = real_image();
+    let grey = |i: i32, k: i32| {
+        let at = |v: i32, end: u32| v.rem_euclid(end as i32) as u32;
+        f64::from(image.grey(at(i, image.width()), at(k, image.height()))) / 65535.0
+    };
+    Ground::from_fn(width, depth, |i, k| grey(x + i, z + k) * relief).expect("finite heights")
+}
+
+/// A random ground, from flat to steep, and the chunk size of its world.
+pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
+    let chunk_size = CHUNK_SIZES[(index % 4) as usize];
+    // Not only whole chunks: the last ones are cut at the rim.
+    let side = |rng: &mut Rng| match chunk_size {
+        8 => rng.u32(12..=26),
+        25 | 32 => rng.u32(chunk_size..=chunk_size + 36),
+        _ => rng.u32(104..=116),
+    };
+    let (width, depth) = (side(rng), side(rng));
+    if rng.u32(0..5) == 0 {
+        let relief = [60.0, 300.0, 1500.0][rng.usize(0..3)];
+        return (steep_real_ground(width, depth, rng.i32(0..400), rng.i32(0..340), relief), chunk_size);
+    }
+    let noise = [0.0, 0.5, 3.0, 12.0, 30.0][rng.usize(0..5)];
+    let slope_x = [-2.0, -0.3, 0.0, 1.0][rng.usize(0..4)];
+    let slope_z = [-2.0, -0.3, 0.0, 1.0][rng.usize(0..4)];
+    let rounding = [0.0, 0.25, 1.0, 4.0][rng.usize(0..4)];
+    let bumps: Vec<f64> = (0..=width * (depth + 2) + depth).map(|_| rng.f64() * noise).collect();
+    let height = |x: i32, z: i32| {
+        let h = bumps[(z as u32 * (width + 1) + x as u32) as usize] + slope_x * f64::from(x) + slope_z * f64::from(z);
+        if rounding == 0.0 { h } else { (h / rounding).round() * rounding }
+    };
+    (Ground::from_fn(width, depth, height).expect("finite heights"), chunk_size)
+}
+
+/// A place under the ground (dig) or over it (add): a brush there cuts into the surface, or leaves a gap to it.
+fn random_center(rng: &mut Rng, ground: &Ground, dig: bool, radius: f32) -> Vec3 {
+    let x = rng.f32() * (ground.width() + 4) as f32 - 2.0;
+    let z = rng.f32() * (ground.depth() + 4) as f32 - 2.0;
+    let gap = [-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 5.0, 40.0][rng.usize(0..10)];
+    let column = bevy_burrow::lattice::Column::new(x.round() as i32, z.round() as i32);
+    let height = ground.height(column) as f32 / 256.0;
+    let away = radius + gap;
+    let y = height + if dig { -away } else { away };
+    let place = Vec3::new(x, y, z);
+    if rng.bool() { place.round() } else { place }
+}
+
+/// A random brush of any shape and operation, at lattice points as often as between.
+pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
+    let radius = [2.0, 3.0, 3.7, 5.0][rng.usize(0..4)];
+    let dig = rng.bool();
+    let center = random_center(rng, ground, dig, radius);
+    let direction = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5).try_normalize().unwrap_or(Vec3::Y);
+    let shape = match rng.u32(0..8) {
+        0 => {
+            let half = Vec3::new(radius, radius * 0.6, radius * 1.3);
+            Shape::Cuboid { center, half, rotation: random_rotation(rng) }
+        }
+        1 => Shape::cylinder(center, direction * radius * 3.0, radius),
+        2 => Shape::cone(center, direction * radius * 3.0, radius),
+        3 => Shape::capsule(center, random_center(rng, ground, dig, radius), radius),
+        _ => Shape::sphere(center, radius),
+    };
+    let material = MaterialId(rng.u8(0..8));
+    let brush = match (rng.u32(0..8), dig) {
+        (0, _) => Brush::paint(shape, material),
+        (_, true) => Brush::dig(shape),
+        (_, false) => Brush::add(shape, material),
+    };
+    match rng.u32(0..6) {
+        0 => brush.with_roughness(Roughness { amplitude: rng.f32() * 2.0, scale: 1.0 + rng.f32() * 6.0, seed: rng.u32(..) }),
+        _ => brush,
+    }
+}
+
+fn random_rotation(rng: &mut Rng) -> Quat {
+    let angles = [rng.f32() * 6.3, rng.f32() * 6.3, rng.f32() * 6.3];
+    if rng.bool() { Quat::IDENTITY } else { Quat::from_euler(glam::EulerRot::XYZ, angles[0], angles[1], angles[2]) }
+}
+
+/// A brush that lies on chunk faces, edges or corners, or on the world's rim.
+pub fn random_brush_at_a_face(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
+    let size = chunk_size as i32;
+    let on = |rng: &mut Rng, end: i32| match rng.u32(0..3) {
+        0 => rng.i32(0..=end),
+        1 => (rng.i32(0..=end) / size * size).min(end),
+        _ => [0, end][rng.usize(0..2)],
+    };
+    let (x, z) = (on(rng, ground.width()), on(rng, ground.depth()));
+    let height = ground.height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
+    let y = if rng.bool() { (height / chunk_size as f32).round() * chunk_size as f32 } else { height };
+    let shape = Shape::sphere(Vec3::new(x as f32, y, z as f32), [1.5, 3.0, 4.5][rng.usize(0..3)]);
+    if rng.bool() { Brush::dig(shape) } else { Brush::add(shape, MaterialId(5)) }
+}
+
+/// A random, edited world.
+pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
+    let (ground, chunk_size) = random_ground(rng, index);
+    let mut brushes = Vec::new();
+    for _ in 0..rng.u32(1..6) {
+        if rng.u32(0..4) == 0 {
+            // A run of balls: a tunnel, a dam.
+            let first = random_brush(rng, &ground);
+            let (from, to) = (random_center(rng, &ground, true, 3.0), random_center(rng, &ground, true, 3.0));
+            for step in 0..12 {
+                let shape = Shape::sphere(from.lerp(to, step as f32 / 11.0), 3.0);
+                brushes.push(Brush { shape, ..first.clone() });
+            }
+        } else if rng.u32(0..4) == 0 {
+            brushes.push(random_brush_at_a_face(rng, &ground, chunk_size));
+        } else {
+            brushes.push(random_brush(rng, &ground));
+        }
+    }
+    let mut terrain =
+        Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
+    // Some at once, some in transactions of their own.
+    let cut = rng.usize(0..=brushes.len());
+    terrain.apply(&brushes[..cut]);
+    for brush in &brushes[cut..] {
+        terrain.apply([brush]);
+    }
+    terrain
+}
