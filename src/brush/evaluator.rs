@@ -11,11 +11,12 @@ use crate::lattice::{LatticeBox, ONE};
 /// Samples evaluated together.
 const RUN: usize = 32;
 
-/// Farthest coordinate, in voxels from the shape: in 1/256 voxel, `f32` still holds it exactly.
-const FARTHEST: i64 = 65_535;
-
 /// Distances stop here: 16384 voxels.
 const HORIZON: f32 = (1 << 22) as f32;
+
+/// Coordinates stop here, in voxels from the shape. It is far beyond the horizon, so no distance shows it, and a run
+/// farther still fits into 2^24 of 1/256 voxel, which `f32` holds exactly.
+const FARTHEST: i64 = 65_000;
 
 /// An edit's signed distance function, its constants derived once.
 ///
@@ -39,8 +40,7 @@ impl Evaluator {
     /// Signed distance from a lattice point to the edit's shape in 1/256 voxel: negative inside, roughness included,
     /// rounded to the nearest integer and halves to even.
     ///
-    /// Any point may be asked about. Distances stop at +-16384 voxels, and a point more than 65535 voxels from the
-    /// shape along an axis counts as 65535 voxels away along it.
+    /// Any point may be asked about; distances stop at 16384 voxels.
     pub fn distance(&self, point: IVec3) -> i32 {
         let mut distance = [0];
         self.row(point, &mut distance);
@@ -96,18 +96,12 @@ impl Evaluator {
 
     /// The loop that the compiler vectorises, one for each shape. `out` holds at most [`RUN`] distances.
     fn fill(&self, shape: &impl Distance, x: i64, start: IVec3, out: &mut [f32]) {
-        let across = |v: i32, home: i32, rest: i32| {
-            let voxels = (i64::from(v) - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32;
-            (voxels * ONE - rest) as f32
-        };
-        let y = across(start.y, self.home.y, self.rest.y);
-        let z = across(start.z, self.home.z, self.rest.z);
-        let farthest = FARTHEST as i32;
-        // Clamped once more than needed, wide enough to leave the clamp in the loop its say.
-        let first = (x - i64::from(self.home.x)).clamp(-2 * FARTHEST, 2 * FARTHEST) as i32;
+        let voxels = |v: i64, home: i32| (v - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32;
+        let first = voxels(x, self.home.x);
+        let y = (voxels(i64::from(start.y), self.home.y) * ONE - self.rest.y) as f32;
+        let z = (voxels(i64::from(start.z), self.home.z) * ONE - self.rest.z) as f32;
         for (i, out) in (0..).zip(out) {
-            let voxels = (first + i).clamp(-farthest, farthest);
-            *out = shape.at((voxels * ONE - self.rest.x) as f32, y, z);
+            *out = shape.at(((first + i) * ONE - self.rest.x) as f32, y, z);
         }
     }
 }
@@ -145,17 +139,30 @@ mod tests {
     }
 
     #[test]
-    fn a_row_across_the_farthest_coordinate_is_its_samples() {
-        let solid = Solid::Sphere { center: [-5, 300, 7], radius: 600 };
-        let evaluator = Evaluator::new(&solid, None);
-        let far = FARTHEST as i32;
-        for start in [far - 40, -far - 40, i32::MIN, i32::MAX - 79] {
-            let mut row = [0; 80];
-            evaluator.row(IVec3::new(start, 3, 0), &mut row);
-            for (x, distance) in (start..).zip(row) {
-                assert_eq!(distance, evaluator.distance(IVec3::new(x, 3, 0)));
-                assert_eq!(distance, HORIZON as i32);
+    fn beyond_the_horizon_all_distances_are_one() {
+        for solid in [
+            Solid::Sphere { center: [-5, 300, 7], radius: 600 },
+            Solid::Cone { base: [1 << 23, 9, -7], axis: [-99, 55_000, 999], radius: 9_000 },
+        ] {
+            let evaluator = Evaluator::new(&solid, None);
+            let far = FARTHEST as i32;
+            for x in [far - 40, far, -far - 40, -2 * far, i32::MIN, i32::MAX - 80] {
+                for start in [IVec3::new(x, 3, 0), IVec3::new(x, i32::MAX, i32::MIN)] {
+                    let mut row = [0; 80];
+                    evaluator.row(start, &mut row);
+                    assert_eq!(row, [HORIZON as i32; 80], "{start}");
+                }
             }
+        }
+    }
+
+    #[test]
+    fn up_to_the_horizon_distances_are_exact() {
+        let evaluator = Evaluator::new(&Solid::Sphere { center: [0; 3], radius: 256 }, None);
+        let mut row = [0; 33_000];
+        evaluator.row(IVec3::new(-16_500, 0, 0), &mut row);
+        for (x, distance) in (-16_500i32..).zip(row) {
+            assert_eq!(distance, ((x.abs() - 1) * ONE).min(HORIZON as i32));
         }
     }
 }

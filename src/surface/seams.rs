@@ -51,6 +51,8 @@ pub struct SeamReport {
     pub euler: i64,
     /// Largest angle between the normals of vertices at one place, degrees.
     pub worst_normal_jump: f64,
+    /// Where that is, in voxels.
+    pub worst_normal_at: Option<DVec3>,
     /// A place, in voxels, for each kind of fault that was found.
     pub first: BTreeMap<SeamFault, DVec3>,
 }
@@ -61,9 +63,9 @@ impl SeamReport {
         self.triangles > 0 && self.open == 0 && self.unbalanced == 0
     }
 
-    /// Closed, manifold and without degenerate triangles.
+    /// Closed, manifold, without degenerate triangles, and shaded without a jump.
     pub fn is_flawless(&self) -> bool {
-        self.is_closed() && self.first.is_empty()
+        self.is_closed() && self.first.is_empty() && self.worst_normal_at.is_none()
     }
 }
 
@@ -82,6 +84,9 @@ impl fmt::Display for SeamReport {
             self.euler,
             self.worst_normal_jump
         )?;
+        if let Some(place) = self.worst_normal_at {
+            write!(f, " at ({}, {}, {})", place.x, place.y, place.z)?;
+        }
         for (fault, place) in &self.first {
             write!(f, "; first {fault:?} at ({}, {}, {})", place.x, place.y, place.z)?;
         }
@@ -96,7 +101,7 @@ pub struct SeamSoup {
     places: Vec<I64Vec3>,
     normals: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
-    worst_cosine: Option<f64>,
+    worst_normal: Option<(f64, u32)>,
     degenerate: Vec<u32>,
 }
 
@@ -104,13 +109,16 @@ impl SeamSoup {
     /// Adds a mesh that is drawn at lattice point `origin`.
     pub fn add(&mut self, mesh: &SurfaceMesh, origin: IVec3) {
         let origin = origin.as_i64vec3() * i64::from(SNAP);
-        let numbers: Vec<u32> = mesh
-            .vertices
-            .iter()
-            .map(|vertex| self.weld(origin + vertex.position.as_i64vec3(), vertex.normal))
-            .collect();
+        // Only what is drawn: tiles keep the vertices of columns that the mask took from them.
+        let mut numbers = vec![None; mesh.vertices.len()];
         for triangle in mesh.indices.chunks_exact(3) {
-            let [a, b, c] = [0, 1, 2].map(|i| numbers[triangle[i] as usize]);
+            let [a, b, c] = [0, 1, 2].map(|i| {
+                let index = triangle[i] as usize;
+                *numbers[index].get_or_insert_with(|| {
+                    let vertex = mesh.vertices[index];
+                    self.weld(origin + vertex.position.as_i64vec3(), vertex.normal)
+                })
+            });
             let [pa, pb, pc] = [a, b, c].map(|n| self.places[n as usize]);
             if (pb - pa).cross(pc - pa) == I64Vec3::ZERO {
                 self.degenerate.push(a);
@@ -129,8 +137,11 @@ impl SeamSoup {
             self.places.push(place);
             self.normals.push(normal);
         } else if self.normals[number as usize] != normal {
-            let cosine = self.normals[number as usize].as_dvec3().normalize_or_zero().dot(normal.as_dvec3().normalize_or_zero());
-            self.worst_cosine = Some(self.worst_cosine.map_or(cosine, |worst| worst.min(cosine)));
+            let unit = |normal: Vec3| normal.as_dvec3().normalize_or_zero();
+            let cosine = unit(self.normals[number as usize]).dot(unit(normal));
+            if self.worst_normal.is_none_or(|(worst, _)| cosine < worst) {
+                self.worst_normal = Some((cosine, number));
+            }
         }
         number
     }
@@ -140,10 +151,13 @@ impl SeamSoup {
         let mut report = SeamReport {
             triangles: self.triangles.len(),
             degenerate: self.degenerate.len(),
-            worst_normal_jump: self.worst_cosine.map_or(0.0, |c| c.clamp(-1.0, 1.0).acos().to_degrees()),
             ..SeamReport::default()
         };
         let voxels = |number: u32| self.places[number as usize].as_dvec3() / f64::from(SNAP);
+        if let Some((cosine, number)) = self.worst_normal {
+            report.worst_normal_jump = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+            report.worst_normal_at = Some(voxels(number));
+        }
         if let Some(&number) = self.degenerate.first() {
             report.first.insert(SeamFault::Degenerate, voxels(number));
         }

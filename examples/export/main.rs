@@ -1,0 +1,158 @@
+//! Plays a script of edits over a heightmap and writes what is drawn, and a report about it. Needs no Bevy.
+//!
+//! ```text
+//! cargo run --release --no-default-features --example export -- \
+//!     --heights assets/jacksboro_fault.png --voxels-per-sample 4 --height-range 0 200 \
+//!     --edits edits.jsonl --chunk-size 32 --out out/export
+//! ```
+//!
+//! `edits.jsonl` holds one edit a line; blank lines and lines that start with `#` are skipped:
+//!
+//! ```json
+//! {"shape":"sphere","center":[64,40,64],"radius":6,"op":"dig"}
+//! {"shape":"capsule","from":[64,40,64],"to":[100,38,80],"radius":4,"op":"dig"}
+//! {"shape":"box","center":[90,50,90],"half":[6,1,3],"rotation":[0,0.383,0,0.924],"op":"add","material":5}
+//! {"shape":"cone","base":[20,60,20],"axis":[0,9,0],"radius":5,"op":"paint","material":3}
+//! ```
+//!
+//! `mesh.obj` holds every drawn triangle with exact positions: y up, one unit a voxel, a group for each tile and chunk,
+//! vertices of neighbours not welded. `report.json` tells hash, scenarios, counts, bytes, seams and timings.
+//!
+//! | exit code | when |
+//! | --- | --- |
+//! | 0 | both files were written; edits that lie outside the world are named in the report |
+//! | 1 | the files could not be written |
+//! | 2 | an argument, the image or a line of the edits is bad: the reason goes to stderr |
+//!
+//! Unless the exit code is 0, nothing is left behind.
+
+mod obj;
+mod play;
+mod report;
+mod script;
+mod staged;
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale};
+use bevy_burrow::terrain::{Terrain, TerrainError, TerrainSettings};
+use clap::Parser;
+
+use report::{Report, milliseconds};
+use staged::StagedFile;
+
+/// Plays a script of edits over a heightmap and writes mesh.obj and report.json.
+#[derive(Parser)]
+struct Args {
+    /// Grey PNG of 8 or 16 bits: columns run along +x, rows along +z, the first sample lies at (0, 0)
+    #[arg(long, value_name = "FILE")]
+    heights: PathBuf,
+    /// Voxels from one sample to the next, 1 to 64; with 1 lattice heights are the samples
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    voxels_per_sample: u32,
+    /// Heights of grey 0 and of full grey, in voxels
+    #[arg(long, num_args = 2, value_names = ["LO", "HI"], default_values_t = [0.0, 255.0], allow_negative_numbers = true)]
+    height_range: Vec<f64>,
+    /// Edits as JSON lines
+    #[arg(long, value_name = "FILE")]
+    edits: PathBuf,
+    /// Cells along a chunk's side, 8 to 128
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    chunk_size: u32,
+    /// Edits in one transaction; the result is the same, only the timings differ
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    batch: u32,
+    /// Folder for mesh.obj and report.json; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Why there is no export.
+#[derive(Debug, thiserror::Error)]
+enum ExportError {
+    #[error("{}: {reason}", path.display())]
+    Read { path: PathBuf, reason: io::Error },
+    #[error("{}: {reason}", path.display())]
+    Heights { path: PathBuf, reason: GroundError },
+    #[error(transparent)]
+    Terrain(#[from] TerrainError),
+    #[error(transparent)]
+    Script(#[from] script::BadLines),
+    #[error("{}: {reason}", path.display())]
+    Write { path: PathBuf, reason: io::Error },
+}
+
+impl ExportError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Write { .. } => 1,
+            _ => 2,
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match export(&Args::parse()) {
+        Ok(report) => {
+            println!("{report}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// The whole command: everything that may be wrong with the input is found before the first byte is written.
+fn export(args: &Args) -> Result<Report, ExportError> {
+    let start = Instant::now();
+    let edits = script::read(&args.edits)?;
+    let settings = TerrainSettings { chunk_size: args.chunk_size, ..TerrainSettings::default() };
+    let mut terrain = Terrain::new(read_ground(args)?, &settings)?;
+    let load_ms = milliseconds(start);
+
+    let played = play::play(&mut terrain, &edits, args.batch as usize);
+    let mut report = Report::new(terrain.world(), &played);
+    report.timings.load_ms = load_ms;
+
+    let failed = |name| move |reason| ExportError::Write { path: args.out.join(name), reason };
+    let start = Instant::now();
+    let mut mesh = StagedFile::create(&args.out, "mesh.obj").map_err(failed("mesh.obj"))?;
+    report.bytes.mesh_obj = obj::write(terrain.world(), &mut mesh).map_err(failed("mesh.obj"))?;
+    report.timings.write_ms = milliseconds(start);
+    let mut summary = StagedFile::create(&args.out, "report.json").map_err(failed("report.json"))?;
+    serde_json::to_writer_pretty(&mut summary, &report)
+        .map_err(|reason| failed("report.json")(reason.into()))?;
+    staged::publish([mesh, summary]).map_err(|reason| ExportError::Write { path: args.out.clone(), reason })?;
+    Ok(report)
+}
+
+fn read_ground(args: &Args) -> Result<Ground, ExportError> {
+    let limits = ImageLimits::default();
+    let bytes = read_at_most(&args.heights, limits.max_file_bytes + 1)
+        .map_err(|reason| ExportError::Read { path: args.heights.clone(), reason })?;
+    let scale = ImageScale {
+        voxels_per_sample: args.voxels_per_sample,
+        low: args.height_range[0],
+        high: args.height_range[1],
+        detail: None,
+    };
+    GreyImage::decode_png(&bytes, &limits)
+        .map_err(GroundError::from)
+        .and_then(|image| Ground::from_image(&image, &scale))
+        .map_err(|reason| ExportError::Heights { path: args.heights.clone(), reason })
+}
+
+/// Reads a file, but not without end: the decoder then says that it is too large.
+fn read_at_most(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(limit).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
