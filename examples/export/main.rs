@@ -30,22 +30,22 @@ mod obj;
 mod play;
 mod report;
 mod script;
-mod staged;
+mod staging;
 #[cfg(test)]
 mod tests;
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale};
-use bevy_burrow::terrain::{Terrain, TerrainError, TerrainSettings};
+use bevy_burrow::terrain::{Terrain, TerrainError, TerrainSettings, World};
 use clap::Parser;
 
 use report::{Report, milliseconds};
-use staged::StagedFile;
+use staging::Staging;
 
 /// Plays a script of edits over a heightmap and writes mesh.obj and report.json.
 #[derive(Parser)]
@@ -122,16 +122,21 @@ fn export(args: &Args) -> Result<Report, ExportError> {
     let mut report = Report::new(terrain.world(), &played);
     report.timings.load_ms = load_ms;
 
-    let failed = |name| move |reason| ExportError::Write { path: args.out.join(name), reason };
-    let start = Instant::now();
-    let mut mesh = StagedFile::create(&args.out, "mesh.obj").map_err(failed("mesh.obj"))?;
-    report.bytes.mesh_obj = obj::write(terrain.world(), &mut mesh).map_err(failed("mesh.obj"))?;
-    report.timings.write_ms = milliseconds(start);
-    let mut summary = StagedFile::create(&args.out, "report.json").map_err(failed("report.json"))?;
-    serde_json::to_writer_pretty(&mut summary, &report)
-        .map_err(|reason| failed("report.json")(reason.into()))?;
-    staged::publish([mesh, summary]).map_err(|reason| ExportError::Write { path: args.out.clone(), reason })?;
+    write(args, terrain.world(), &mut report)
+        .map_err(|reason| ExportError::Write { path: args.out.clone(), reason })?;
     Ok(report)
+}
+
+fn write(args: &Args, world: &World, report: &mut Report) -> io::Result<()> {
+    let start = Instant::now();
+    let mut staging = Staging::new(&args.out)?;
+    report.bytes.mesh_obj = staging.write("mesh.obj", |out| obj::write(world, out))?;
+    report.timings.write_ms = milliseconds(start);
+    staging.write("report.json", |out| {
+        serde_json::to_writer_pretty(&mut *out, report)?;
+        out.write_all(b"\n")
+    })?;
+    staging.publish()
 }
 
 fn read_ground(args: &Args) -> Result<Ground, ExportError> {

@@ -20,7 +20,8 @@ pub struct Played {
 /// Plays `edits` in transactions of `batch` edits. Shows a progress bar where stderr is a terminal.
 pub fn play(terrain: &mut Terrain, edits: &[ScriptedEdit], batch: usize) -> Played {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} edits, {elapsed}, {eta} left");
-    let bar = ProgressBar::new(edits.len() as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = ProgressBar::new(edits.len() as u64)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let mut played = Played { receipts: Vec::with_capacity(edits.len()), transactions: Vec::new(), batch };
     for edits in edits.chunks(batch) {
         let start = Instant::now();

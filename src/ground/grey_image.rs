@@ -18,7 +18,7 @@ pub enum BitDepth {
 }
 
 /// Byte order of a headerless file of unsigned 16-bit samples, as terrain editors export it ("RAW16", `.r16`).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum RawFormat {
     /// Low byte first, as on Windows.
     #[default]
@@ -28,7 +28,7 @@ pub enum RawFormat {
 }
 
 /// What an image may cost; checked against what the file declares, before memory is taken for it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ImageLimits {
     /// Most bytes of the file.
     pub max_file_bytes: u64,

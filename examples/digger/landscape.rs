@@ -1,0 +1,142 @@
+//! The landscape: a survey of the Jacksboro fault in Tennessee, shrunk and made steeper, as a diggable terrain.
+//!
+//! The picture of the heights travels inside the program and is loaded through the asset server like any other file.
+//! Everything slow happens in a task; meanwhile the app draws and answers.
+
+use std::path::Path;
+
+use bevy::asset::io::embedded::EmbeddedAssetRegistry;
+use bevy::asset::{AssetLoadFailedEvent, AssetPath};
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_burrow::prelude::*;
+
+use crate::places::Places;
+
+pub const ROCK: MaterialId = MaterialId(0);
+pub const GRASS: MaterialId = MaterialId(1);
+pub const SAND: MaterialId = MaterialId(2);
+pub const SNOW: MaterialId = MaterialId(3);
+pub const CLAY: MaterialId = MaterialId(4);
+pub const CONCRETE: MaterialId = MaterialId(5);
+pub const COAL: MaterialId = MaterialId(6);
+pub const GOLD: MaterialId = MaterialId(7);
+
+/// The materials in the order of their ids, which is also that of the default `MaterialColors`.
+pub const MATERIALS: [(MaterialId, &str); 8] = [
+    (ROCK, "rock"),
+    (GRASS, "grass"),
+    (SAND, "sand"),
+    (SNOW, "snow"),
+    (CLAY, "clay"),
+    (CONCRETE, "concrete"),
+    (COAL, "coal"),
+    (GOLD, "gold"),
+];
+
+/// Heights of 403 x 344 samples, 16 bit.
+const SURVEY: &[u8] = include_bytes!("../../assets/jacksboro_fault.png");
+const SURVEY_PATH: &str = "digger/jacksboro_fault.png";
+
+/// One sample every three voxels: 1206 x 1029 cells, and 150 voxels from the lowest to the highest.
+const SCALE: ImageScale = ImageScale {
+    voxels_per_sample: 3,
+    low: 0.0,
+    high: 150.0,
+    detail: Some(Detail { amplitude: 1.1, scale: 14.0, octaves: 4, seed: 17 }),
+};
+
+/// Loads the survey, makes ground of it and spawns the terrain; [`Places`] is a resource from then on.
+pub struct LandscapePlugin;
+
+impl Plugin for LandscapePlugin {
+    fn build(&self, app: &mut App) {
+        app.world()
+            .resource::<EmbeddedAssetRegistry>()
+            .insert_asset(SURVEY_PATH.into(), Path::new(SURVEY_PATH), SURVEY);
+        app.add_systems(Startup, open_survey).add_systems(Update, (shape_ground, spawn_terrain, give_up));
+    }
+}
+
+/// The picture on its way in.
+#[derive(Resource)]
+struct Survey(Handle<HeightmapImage>);
+
+/// The ground on its way.
+#[derive(Resource)]
+struct Shaping(Task<Result<(Terrain, Places), String>>);
+
+fn open_survey(mut commands: Commands, assets: Res<AssetServer>) {
+    let path = AssetPath::parse(SURVEY_PATH).with_source("embedded");
+    commands.insert_resource(Survey(assets.load(path)));
+}
+
+/// Hands the picture to a task as soon as it is there.
+fn shape_ground(mut commands: Commands, survey: Option<Res<Survey>>, images: Res<Assets<HeightmapImage>>) {
+    let Some(HeightmapImage(image)) = survey.and_then(|survey| images.get(&survey.0)) else { return };
+    let image = image.clone();
+    commands.insert_resource(Shaping(AsyncComputeTaskPool::get().spawn(async move { shape(&image) })));
+    commands.remove_resource::<Survey>();
+}
+
+/// Ground from the survey, a terrain of it, and the places worth digging at.
+fn shape(survey: &GreyImage) -> Result<(Terrain, Places), String> {
+    let ground = Ground::from_image(survey, &SCALE)
+        .and_then(|ground| ground.with_materials(&vegetation()))
+        .map_err(|error| error.to_string())?;
+    let places = Places::find(&ground)?;
+    let settings = TerrainSettings { chunk_size: 32, voxel_size: 1.0 };
+    let terrain = Terrain::new(ground, &settings).map_err(|error| error.to_string())?;
+    Ok((terrain, places))
+}
+
+/// Grass where it is flat enough, rock where it is steep, snow on the tops and sand in the valley.
+fn vegetation() -> MaterialControl {
+    let everywhere = MaterialRule::default();
+    let snow = MaterialRule {
+        overlay: SNOW,
+        height: (112.0, f64::INFINITY),
+        height_fade: 14.0,
+        slope: (0.0, 1.0),
+        slope_fade: 0.6,
+        ..everywhere
+    };
+    let sand = MaterialRule {
+        overlay: SAND,
+        height: (f64::NEG_INFINITY, 9.0),
+        height_fade: 5.0,
+        slope: (0.0, 0.35),
+        slope_fade: 0.3,
+    };
+    let grass = MaterialRule { overlay: GRASS, slope: (0.0, 0.75), slope_fade: 0.55, ..everywhere };
+    MaterialControl::Rules { base: ROCK, rules: vec![snow, sand, grass] }
+}
+
+fn spawn_terrain(
+    mut commands: Commands,
+    shaping: Option<ResMut<Shaping>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    let Some(shaped) = shaping.and_then(|mut shaping| check_ready(&mut shaping.0)) else { return };
+    commands.remove_resource::<Shaping>();
+    match shaped {
+        Ok((terrain, places)) => {
+            let earth = StandardMaterial { perceptual_roughness: 0.95, reflectance: 0.15, ..default() };
+            commands.insert_resource(places);
+            commands.spawn((Name::new("Jacksboro fault"), terrain, MeshMaterial3d(materials.add(earth))));
+        }
+        Err(reason) => {
+            error!("the landscape can't be made: {reason}");
+            exit.write(AppExit::error());
+        }
+    }
+}
+
+/// The survey is part of the program, so this means that the program is broken.
+fn give_up(mut failures: MessageReader<AssetLoadFailedEvent<HeightmapImage>>, mut exit: MessageWriter<AppExit>) {
+    for failure in failures.read() {
+        error!("the survey can't be read: {}", failure.error);
+        exit.write(AppExit::error());
+    }
+}

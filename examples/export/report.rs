@@ -1,0 +1,256 @@
+//! The report: what came of the edits, and what the world is like after them.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use bevy_burrow::lattice::ONE;
+use bevy_burrow::surface::SeamReport;
+use bevy_burrow::terrain::{ScenarioCounts, World};
+use bevy_burrow::volume::Tally;
+use serde::Serialize;
+
+use crate::play::Played;
+
+/// What `report.json` holds. All but `timings` is the same for the same input, on every machine.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Hash of the ground and every edited sample, in hexadecimal.
+    pub hash: String,
+    pub world: WorldFigures,
+    pub edits: EditFigures,
+    /// How often each of the paper's five scenarios took place.
+    pub scenarios: ScenarioCounts,
+    /// Regions of edits.
+    pub fields: usize,
+    /// Chunks that draw something.
+    pub chunks: usize,
+    /// Tiles of the heightmap.
+    pub tiles: usize,
+    /// Blocks of 8x8x8 samples that are stored.
+    pub bricks: usize,
+    /// Cells (x, z) whose ground marching cubes draws.
+    pub volumetric_cells: usize,
+    pub bytes: ByteFigures,
+    pub seams: SeamFigures,
+    pub timings: Timings,
+}
+
+#[derive(Debug, Serialize)]
+pub struct WorldFigures {
+    /// Cells along x.
+    pub width: i32,
+    /// Cells along z.
+    pub depth: i32,
+    /// Cells along a chunk's side.
+    pub chunk_size: i32,
+    /// Lowest and highest pristine height in voxels.
+    pub heights: [f64; 2],
+}
+
+#[derive(Debug, Serialize)]
+pub struct EditFigures {
+    /// Edits that were accepted.
+    pub applied: usize,
+    /// Edits that were not, with the line they stand on.
+    pub rejected: Vec<RejectedEdit>,
+    /// Voxels dug away, filled and repainted, by material.
+    pub removed: BTreeMap<u8, u64>,
+    pub added: BTreeMap<u8, u64>,
+    pub painted: BTreeMap<u8, u64>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct RejectedEdit {
+    pub line: usize,
+    pub reason: String,
+}
+
+#[derive(Debug, Serialize)]
+pub struct ByteFigures {
+    pub ground: usize,
+    pub bricks: usize,
+    pub index: usize,
+    pub surfaces: usize,
+    /// All but the ground.
+    pub edits: usize,
+    /// Length of `mesh.obj`.
+    pub mesh_obj: u64,
+}
+
+#[derive(Debug, Serialize)]
+pub struct SeamFigures {
+    pub closed: bool,
+    pub flawless: bool,
+    pub triangles: usize,
+    pub vertices: usize,
+    pub edges: usize,
+    pub open: usize,
+    pub unbalanced: usize,
+    pub nonmanifold_edges: usize,
+    pub nonmanifold_vertices: usize,
+    pub degenerate: usize,
+    pub euler: i64,
+    /// Largest angle between the normals of vertices at one place, degrees.
+    pub worst_normal_jump: f64,
+    /// A place, in voxels, for each kind of fault that was found.
+    pub first: BTreeMap<String, [f64; 3]>,
+}
+
+/// How long it all took, in milliseconds.
+#[derive(Debug, Default, Serialize)]
+pub struct Timings {
+    /// Reading the edits and the image.
+    pub load_ms: f64,
+    pub transactions: usize,
+    /// Most edits in a transaction.
+    pub batch: usize,
+    /// One transaction: half of them took at most this long, 99 of 100, and the longest.
+    pub transaction_p50_ms: f64,
+    pub transaction_p99_ms: f64,
+    pub transaction_max_ms: f64,
+    /// All transactions together.
+    pub play_ms: f64,
+    /// Looking at every seam of the world.
+    pub check_ms: f64,
+    /// Writing `mesh.obj`.
+    pub write_ms: f64,
+}
+
+impl Report {
+    /// Looks at the whole world. The length of `mesh.obj` and what happens outside are still to be filled in.
+    pub fn new(world: &World, played: &Played) -> Self {
+        let mut timings = Timings::transactions(played);
+        let start = Instant::now();
+        let seams = SeamFigures::from(world.check_seams());
+        timings.check_ms = milliseconds(start);
+
+        let mut scenarios = ScenarioCounts::default();
+        for (_, receipt) in &played.receipts {
+            scenarios.count(receipt);
+        }
+        let (memory, grid) = (world.memory(), world.grid());
+        let (low, high) = world.ground().height_range();
+        Self {
+            hash: format!("{:#018x}", world.hash()),
+            world: WorldFigures {
+                width: grid.width(),
+                depth: grid.depth(),
+                chunk_size: grid.size(),
+                heights: [low, high].map(|height| f64::from(height) / f64::from(ONE)),
+            },
+            edits: EditFigures::new(played),
+            scenarios,
+            fields: world.fields().map(|(_, fields)| fields.len()).sum(),
+            chunks: world.drawn_chunks().count(),
+            tiles: grid.tiles().count(),
+            bricks: world.bricks().count(),
+            volumetric_cells: world.mask().len(),
+            bytes: ByteFigures {
+                ground: memory.ground,
+                bricks: memory.bricks,
+                index: memory.index,
+                surfaces: memory.surfaces,
+                edits: memory.edits(),
+                mesh_obj: 0,
+            },
+            seams,
+            timings,
+        }
+    }
+}
+
+/// What the command says at its end.
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { edits, scenarios, seams, timings, .. } = self;
+        writeln!(f, "edits      {} applied, {} rejected", edits.applied, edits.rejected.len())?;
+        let ScenarioCounts { created, changed, extended, merged, split } = scenarios;
+        writeln!(
+            f,
+            "scenarios  {created} created, {changed} changed inside, {extended} extended, {merged} merged, {split} split"
+        )?;
+        writeln!(f, "world      {} fields, {} chunks, {} bricks", self.fields, self.chunks, self.bricks)?;
+        writeln!(
+            f,
+            "seams      {} triangles, {} open edges, {} unbalanced, {} non-manifold, {} degenerate",
+            seams.triangles, seams.open, seams.unbalanced, seams.nonmanifold_edges, seams.degenerate
+        )?;
+        let (p50, p99) = (timings.transaction_p50_ms, timings.transaction_p99_ms);
+        writeln!(f, "timing     {p50:.2} ms a transaction (p50), {p99:.2} ms (p99)")?;
+        write!(f, "hash       {}", self.hash)
+    }
+}
+
+impl EditFigures {
+    fn new(played: &Played) -> Self {
+        let mut rejected = Vec::new();
+        let (mut removed, mut added, mut painted) = (Tally::default(), Tally::default(), Tally::default());
+        for (line, receipt) in &played.receipts {
+            match &receipt.outcome {
+                Ok(applied) => {
+                    removed.add(&applied.removed);
+                    added.add(&applied.added);
+                    painted.add(&applied.painted);
+                }
+                Err(reason) => rejected.push(RejectedEdit { line: *line, reason: reason.to_string() }),
+            }
+        }
+        let by_material =
+            |tally: &Tally| tally.iter().map(|(material, voxels)| (material.0, voxels)).collect();
+        Self {
+            applied: played.receipts.len() - rejected.len(),
+            rejected,
+            removed: by_material(&removed),
+            added: by_material(&added),
+            painted: by_material(&painted),
+        }
+    }
+}
+
+impl From<SeamReport> for SeamFigures {
+    fn from(report: SeamReport) -> Self {
+        Self {
+            closed: report.is_closed(),
+            flawless: report.is_flawless(),
+            triangles: report.triangles,
+            vertices: report.vertices,
+            edges: report.edges,
+            open: report.open,
+            unbalanced: report.unbalanced,
+            nonmanifold_edges: report.nonmanifold_edges,
+            nonmanifold_vertices: report.nonmanifold_vertices,
+            degenerate: report.degenerate,
+            euler: report.euler,
+            worst_normal_jump: report.worst_normal_jump,
+            first: report.first.iter().map(|(fault, at)| (format!("{fault:?}"), at.to_array())).collect(),
+        }
+    }
+}
+
+impl Timings {
+    fn transactions(played: &Played) -> Self {
+        let mut times = played.transactions.clone();
+        times.sort_unstable();
+        Self {
+            transactions: times.len(),
+            batch: played.batch,
+            transaction_p50_ms: percentile(&times, 50),
+            transaction_p99_ms: percentile(&times, 99),
+            transaction_max_ms: percentile(&times, 100),
+            play_ms: times.iter().sum::<Duration>().as_secs_f64() * 1e3,
+            ..Self::default()
+        }
+    }
+}
+
+/// The time in milliseconds that `percent` of the sorted times do not exceed (nearest rank); 0 where there is none.
+fn percentile(sorted: &[Duration], percent: usize) -> f64 {
+    let rank = (sorted.len() * percent).div_ceil(100).max(1);
+    sorted.get(rank - 1).map_or(0.0, |time| time.as_secs_f64() * 1e3)
+}
+
+/// Milliseconds since an instant.
+pub fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}

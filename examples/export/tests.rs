@@ -1,0 +1,310 @@
+//! The command as its users meet it: files in, files and exit codes out. Meshes are checked by an own reader of OBJ
+//! files that knows nothing of the library's seam validator.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use clap::Parser;
+use serde_json::Value;
+
+use crate::obj::push_voxels;
+use crate::{Args, export};
+
+const DIG: &str = r#"{"shape":"sphere","center":[9,30,9],"radius":4,"op":"dig"}"#;
+
+/// An empty folder that goes when the test ends.
+struct Desk(PathBuf);
+
+impl Desk {
+    fn new() -> Self {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("bevy_burrow-export-{}-{count}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder for temporary files");
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    fn put(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        fs::write(self.path(name), content).expect("a writable folder");
+        self.path(name)
+    }
+
+    /// Writes an 8-bit image of `width` columns.
+    fn put_image(&self, samples: &[u8], width: u32) -> PathBuf {
+        let (path, height) = (self.path("heights.png"), samples.len() as u32 / width);
+        image::save_buffer(&path, samples, width, height, image::ExtendedColorType::L8).expect("an image");
+        path
+    }
+
+    /// A hilly world of 40 x 33 cells.
+    fn put_hills(&self) -> PathBuf {
+        let hill = |i: u32| 30.0 + 14.0 * (f64::from(i % 41) * 0.31).sin() * (f64::from(i / 41) * 0.23).cos();
+        self.put_image(&(0..41 * 34).map(|i| hill(i) as u8).collect::<Vec<_>>(), 41)
+    }
+
+    /// Runs the command; gives the exit code and what it says on stderr.
+    fn run(&self, edits: &Path, more: &[&str]) -> Result<Value, (u8, String)> {
+        let (heights, out) = (self.path("heights.png"), self.path("out"));
+        let mut line = vec!["export".as_ref(), "--heights".as_ref(), heights.as_os_str()];
+        line.extend(["--edits".as_ref(), edits.as_os_str(), "--out".as_ref(), out.as_os_str()]);
+        line.extend(more.iter().map(AsRef::<std::ffi::OsStr>::as_ref));
+        let args =
+            Args::try_parse_from(line).map_err(|error| (error.exit_code() as u8, error.to_string()))?;
+        export(&args).map_err(|error| (error.exit_code(), error.to_string()))?;
+        let report = fs::read(self.path("out/report.json")).expect("a report");
+        Ok(serde_json::from_slice(&report).expect("valid JSON"))
+    }
+
+    fn mesh(&self) -> Obj {
+        Obj::parse(&fs::read_to_string(self.path("out/mesh.obj")).expect("a mesh"))
+    }
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A mesh read back: places in voxels, triangles as indices from 0, names of groups.
+#[derive(Default)]
+struct Obj {
+    places: Vec<[f64; 3]>,
+    triangles: Vec<[usize; 3]>,
+    groups: Vec<String>,
+}
+
+impl Obj {
+    fn parse(text: &str) -> Self {
+        let mut obj = Self::default();
+        for line in text.lines() {
+            let mut words = line.split(' ');
+            let key = words.next().expect("no empty line");
+            let mut three = || [(); 3].map(|()| words.next().expect("three words"));
+            match key {
+                "#" => {}
+                "g" => obj.groups.push(line[2..].into()),
+                "v" => obj.places.push(three().map(|word| word.parse().expect("a number"))),
+                "f" => obj.triangles.push(three().map(|word| word.parse::<usize>().expect("a number") - 1)),
+                other => panic!("unexpected line: {other}"),
+            }
+        }
+        obj
+    }
+
+    /// Edges off the rim that are not run through exactly once each way, with equal places taken as one.
+    fn loose_edges(&self, width: f64, depth: f64) -> Vec<[[f64; 3]; 2]> {
+        let key = |place: [f64; 3]| place.map(|v| (v + 0.0).to_bits());
+        let mut balance: HashMap<_, (i32, i32, [[f64; 3]; 2])> = HashMap::new();
+        for triangle in &self.triangles {
+            let corners = triangle.map(|index| self.places[index]);
+            for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+                let (from, to) = (corners[from], corners[to]);
+                assert_ne!(from, to, "a triangle has no extent");
+                let (a, b) = (key(from), key(to));
+                let edge = balance.entry((a.min(b), a.max(b))).or_insert((0, 0, [from, to]));
+                if a < b { edge.0 += 1 } else { edge.1 += 1 }
+            }
+        }
+        let on_rim = |[a, b]: [[f64; 3]; 2]| {
+            [(0, 0.0), (0, width), (2, 0.0), (2, depth)]
+                .iter()
+                .any(|&(axis, at)| a[axis] == at && b[axis] == at)
+        };
+        let loose =
+            balance.into_values().filter(|&(one, other, ends)| (one, other) != (1, 1) && !on_rim(ends));
+        loose.map(|(.., ends)| ends).collect()
+    }
+}
+
+#[test]
+fn every_edge_of_the_mesh_joins_two_triangles() {
+    for (chunk_size, batch) in [("8", "1"), ("25", "3"), ("32", "100")] {
+        let desk = Desk::new();
+        desk.put_hills();
+        let edits = desk.put(
+            "edits.jsonl",
+            r#"# A pit over a chunk corner, a tunnel, a bridge, a turned box, a cone at the rim, paint, and a cave.
+{"shape":"sphere","center":[8,32,8],"radius":5,"op":"dig"}
+
+{"shape":"capsule","from":[2,28,20],"to":[38,31,22],"radius":3,"op":"dig"}
+{"shape":"cylinder","base":[20,36,10],"axis":[0,0,20],"radius":2.5,"op":"add","material":5}
+{"shape":"box","center":[30,36,30],"half":[6,2,3],"rotation":[0.5,0.5,0.5,0.5],"op":"add","material":4}
+{"shape":"cone","base":[40,40,16],"axis":[0,-20,1],"radius":6,"op":"dig"}
+{"shape":"sphere","center":[25,33,10],"radius":5,"op":"paint","material":3}
+{"shape":"sphere","center":[12,12,25],"radius":4,"op":"dig","roughness":{"amplitude":1,"scale":3,"seed":1},"tag":7}"#,
+        );
+        let report =
+            desk.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
+        let mesh = desk.mesh();
+        assert_eq!(mesh.loose_edges(40.0, 33.0), Vec::<[[f64; 3]; 2]>::new(), "chunk size {chunk_size}");
+        assert_eq!(report["seams"]["flawless"], true);
+        assert_eq!(report["seams"]["triangles"], mesh.triangles.len());
+        assert_eq!(report["edits"]["applied"], 7);
+        let groups = |kind: &str| mesh.groups.iter().filter(|name| name.starts_with(kind)).count();
+        assert_eq!(report["chunks"], groups("chunk_"));
+        assert!(groups("tile_") > 0 && mesh.groups.iter().any(|name| name == "tile_0_0"));
+        let corners = mesh.triangles.as_flattened();
+        assert!((0..mesh.places.len()).all(|index| corners.contains(&index)), "a vertex is in no triangle");
+    }
+}
+
+#[test]
+fn the_checker_finds_a_missing_triangle() {
+    let desk = Desk::new();
+    desk.put_hills();
+    desk.run(&desk.put("edits.jsonl", DIG), &[]).expect("a good script");
+    let mut mesh = desk.mesh();
+    let inner =
+        |triangle: &[usize; 3]| triangle.iter().all(|&index| (5.0..28.0).contains(&mesh.places[index][0]));
+    let at = mesh.triangles.iter().rposition(inner).expect("an inner triangle");
+    mesh.triangles.remove(at);
+    assert_eq!(mesh.loose_edges(40.0, 33.0).len(), 3);
+}
+
+#[test]
+fn image_columns_run_along_x_and_samples_are_lattice_heights() {
+    let desk = Desk::new();
+    desk.put_image(&[0, 51, 102, 153, 204, 255], 3);
+    let none = desk.put("edits.jsonl", "\n# nothing to do\n");
+    desk.run(&none, &["--chunk-size", "8"]).expect("an empty script");
+    let mut places = desk.mesh().places;
+    places.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+    let at = |x: f64, z: f64| [x, 51.0 * (x + 3.0 * z), z];
+    assert_eq!(places, [at(0., 0.), at(0., 1.), at(1., 0.), at(1., 1.), at(2., 0.), at(2., 1.)]);
+
+    let report =
+        desk.run(&none, &["--height-range", "-8", "16.5", "--voxels-per-sample", "4"]).expect("valid");
+    assert_eq!(report["world"]["heights"], serde_json::json!([-8.0, 16.5]));
+    assert_eq!((&report["world"]["width"], &report["world"]["depth"]), (&8.into(), &4.into()));
+}
+
+#[test]
+fn hash_and_samples_depend_on_neither_chunks_nor_batches() {
+    let hashes = [("8", "1"), ("100", "1"), ("25", "2")].map(|(chunk_size, batch)| {
+        let desk = Desk::new();
+        desk.put_hills();
+        let edits = desk.put("edits.jsonl", format!("{DIG}\n{}", DIG.replace("9,30,9", "12,30,11")));
+        let report =
+            desk.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
+        (report["hash"].clone(), report["bricks"].clone(), report["edits"]["removed"].clone())
+    });
+    assert!(hashes[0] == hashes[1] && hashes[1] == hashes[2], "{hashes:?}");
+}
+
+#[test]
+fn an_edit_outside_the_world_is_reported_with_its_line() {
+    let desk = Desk::new();
+    desk.put_hills();
+    let outside = DIG.replace("9,30,9", "-500,30,9");
+    let report =
+        desk.run(&desk.put("edits.jsonl", format!("{DIG}\n\n{outside}\n")), &[]).expect("a good script");
+    let rejected = serde_json::json!([{ "line": 3, "reason": "the brush lies outside the world" }]);
+    assert_eq!((&report["edits"]["applied"], &report["edits"]["rejected"]), (&1.into(), &rejected));
+}
+
+#[test]
+fn bad_lines_are_named_and_nothing_is_written() {
+    let desk = Desk::new();
+    desk.put_hills();
+    for (line, reason) in [
+        ("{", "EOF while parsing"),
+        ("[]", "invalid length 0"),
+        ("dig here", "expected value"),
+        (r#"{"shape":"ball","op":"dig"}"#, "unknown variant `ball`"),
+        (r#"{"shape":"sphere","center":[0,0,0],"op":"dig"}"#, "missing field `radius`"),
+        (r#"{"shape":"sphere","center":[0,0,0],"radius":-1,"op":"dig"}"#, "`radius` is -1 voxels"),
+        (r#"{"shape":"sphere","center":[0,0,0],"radius":1e300,"op":"dig"}"#, "must be finite"),
+        (r#"{"shape":"sphere","center":[0,0,0],"radius":1e999,"op":"dig"}"#, "number out of range"),
+        (r#"{"shape":"sphere","center":[1e9,0,0],"radius":1,"op":"dig"}"#, "beyond"),
+        (r#"{"shape":"sphere","center":[0,0,0],"radius":1,"op":"add"}"#, "missing field `material`"),
+        (
+            r#"{"shape":"cone","base":[0,0,0],"axis":[0,0,0],"radius":1,"op":"dig"}"#,
+            "`axis` is 0 voxels long",
+        ),
+        ("{\"shape\":\"\u{0}\"}", "control character"),
+    ] {
+        let (code, message) =
+            desk.run(&desk.put("edits.jsonl", format!("{DIG}\n{line}\n")), &[]).unwrap_err();
+        assert_eq!(code, 2, "{message}");
+        assert!(message.contains("edits.jsonl: line 2: ") && message.contains(reason), "{line}: {message}");
+        assert!(!desk.path("out").exists(), "{line}: something was written");
+    }
+    let (code, message) = desk.run(&desk.put("edits.jsonl", b"\xff\xfe\n{\n"), &[]).unwrap_err();
+    assert!(code == 2 && message.contains("line 1: the line is not UTF-8") && message.contains("line 2: "));
+    let (_, message) = desk.run(&desk.put("edits.jsonl", "{\n".repeat(30)), &[]).unwrap_err();
+    assert!(message.lines().count() == 21 && message.ends_with("10 more bad lines"), "{message}");
+}
+
+#[test]
+fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
+    let desk = Desk::new();
+    let edits = desk.put("edits.jsonl", DIG);
+    let refused = |edits: &Path, more: &[&str], reason: &str| {
+        let (code, message) = desk.run(edits, more).unwrap_err();
+        assert!(code == 2 && message.contains(reason), "{more:?}: {code} {message}");
+        assert!(!desk.path("out").exists(), "{more:?}: something was written");
+    };
+    refused(&edits, &[], "heights.png: No such file");
+    desk.put("heights.png", "no image at all");
+    refused(&edits, &[], "heights.png: the file is no PNG");
+    desk.put_image(&[1, 2, 3], 3);
+    refused(&edits, &[], "spans no cell");
+    image::save_buffer(desk.path("heights.png"), &[0; 12], 2, 2, image::ExtendedColorType::Rgb8)
+        .expect("an image");
+    refused(&edits, &[], "heights need plain grey");
+    desk.put_hills();
+    refused(&desk.path("none.jsonl"), &[], "none.jsonl: No such file");
+    refused(&desk.0, &[], "Is a directory");
+    for (more, reason) in [
+        (&["--chunk-size", "7"][..], "chunk size 7 is not in 8..=128"),
+        (&["--chunk-size", "129"], "chunk size 129"),
+        (&["--chunk-size", "-8"], "unexpected argument"),
+        (&["--voxels-per-sample", "0"], "voxels per sample is 0"),
+        (&["--voxels-per-sample", "65"], "voxels per sample is 65"),
+        (&["--height-range", "0", "nan"], "height of full grey is NaN"),
+        (&["--height-range", "-inf", "0"], "height of grey 0 is -inf"),
+        (&["--height-range", "0", "40000"], "height of full grey is 40000"),
+        (&["--height-range", "0"], "2 values required"),
+        (&["--batch", "0"], "--batch"),
+        (&["--heihgts", "x.png"], "unexpected argument"),
+    ] {
+        refused(&edits, more, reason);
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_another_matter_than_bad_input() {
+    let desk = Desk::new();
+    desk.put_hills();
+    let edits = desk.put("edits.jsonl", DIG);
+    desk.put("out", "a file where the folder should be");
+    assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
+    fs::remove_file(desk.path("out")).expect("the file");
+    // The report's name is taken, which is found only after the mesh was staged.
+    fs::create_dir_all(desk.path("out/report.json")).expect("a folder");
+    assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
+    assert_eq!(fs::read_dir(desk.path("out")).expect("the folder").count(), 1, "something was left behind");
+}
+
+#[test]
+fn positions_are_written_exactly() {
+    for (steps, text) in
+        [(0, "0"), (4096, "1"), (-4096, "-1"), (1, "0.000244140625"), (-1, "-0.000244140625"), (6144, "1.5")]
+    {
+        let mut written = String::new();
+        push_voxels(&mut written, steps);
+        assert_eq!(written, text);
+    }
+    for steps in (-(1i64 << 27)..1 << 27).step_by(4999) {
+        let mut written = String::new();
+        push_voxels(&mut written, steps);
+        assert_eq!(written.parse::<f64>(), Ok(steps as f64 / 4096.0));
+    }
+}

@@ -1,0 +1,56 @@
+//! Ground to dig in, and nothing else.
+//!
+//! ```text
+//! cargo run --release --features examples --example minimal
+//! ```
+//!
+//! | control | does |
+//! | --- | --- |
+//! | left mouse button | digs where the cursor points |
+//! | right mouse button, held | looks around |
+//! | W A S D, Q, E | moves, down, up; with Shift faster |
+
+use bevy::camera_controller::free_camera::{FreeCamera, FreeCameraPlugin};
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+fn main() -> AppExit {
+    App::new()
+        .add_plugins((DefaultPlugins, BurrowPlugins, FreeCameraPlugin))
+        .add_systems(Startup, set_up)
+        .add_systems(Update, dig.before(BurrowSystems::Collect))
+        .run()
+}
+
+fn set_up(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+    let ground = Ground::from_noise(512, 512, &NoiseHeights { amplitude: 60.0, ..default() })?;
+    let material = materials.add(StandardMaterial { perceptual_roughness: 1.0, ..default() });
+    commands.spawn((Terrain::new(ground, &TerrainSettings::default())?, MeshMaterial3d(material)));
+    commands.spawn((
+        DirectionalLight { shadow_maps_enabled: true, ..default() },
+        Transform::from_xyz(1.0, 1.0, 0.5).looking_at(Vec3::ZERO, Vec3::Y),
+    ));
+    commands.spawn((
+        Camera3d::default(),
+        FreeCamera { walk_speed: 20.0, run_speed: 60.0, ..default() },
+        Transform::from_xyz(256.0, 60.0, 330.0).looking_at(Vec3::new(256.0, 0.0, 256.0), Vec3::Y),
+    ));
+    Ok(())
+}
+
+fn dig(
+    mouse: Res<ButtonInput<MouseButton>>,
+    window: Single<&Window>,
+    camera: Single<(&Camera, &GlobalTransform)>,
+    terrains: Terrains,
+    mut brushes: MessageWriter<Brush>,
+) {
+    let (camera, place) = *camera;
+    if mouse.pressed(MouseButton::Left)
+        && let Some(cursor) = window.cursor_position()
+        && let Ok(ray) = camera.viewport_to_world(place, cursor)
+        && let Some(hit) = terrains.raycast(ray, 500.0)
+    {
+        brushes.write(Brush::dig(Shape::sphere(hit.position, 4.0)));
+    }
+}

@@ -1,0 +1,309 @@
+//! Negative controls: each rule of the seam, broken on purpose, tears the surface open. And the oracle: the same rules
+//! written down plainly, cell by cell, draw exactly what the crate draws.
+
+mod worlds;
+
+use std::collections::HashMap;
+
+use bevy_burrow::brush::BAND;
+use bevy_burrow::ground::Ground;
+use bevy_burrow::lattice::{Column, LatticeBox, ONE, SNAP};
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::mask::{cell_sheet, sheet};
+use bevy_burrow::surface::vertex::{Lattice, WorldView, position};
+use bevy_burrow::surface::{MaterialMix, SeamReport, SeamSoup, SurfaceMesh, Vertex, cases};
+use bevy_burrow::terrain::World;
+use fastrand::Rng;
+use glam::{IVec3, Vec3};
+
+/// What is broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    /// Nothing.
+    None,
+    /// Rule 1: pristine samples are stored, clamped to two voxels.
+    ClampedPristine,
+    /// Rule 2: cells with only one or two edited columns are left out of the mask.
+    ThinMask,
+    /// Rule 2: a column is judged at its own height, not in all cubes that a steep surface crosses beside it.
+    OwnHeights,
+    /// Rule 2: heightmap cells leave out the caves below and the rocks above them.
+    HeightmapOnly,
+    /// Rule 3: heightmap cells keep straight sides against volumetric ones.
+    StraightRing,
+    /// Rule 4: the ring interpolates the heights itself and rounds in its own way.
+    OwnRingVertices,
+    /// Rule 5: the y-range of a footprint ignores its pristine border columns.
+    ShortRange,
+    /// Case table: cases with more than four solid corners reuse their complement's triangles, reversed.
+    ComplementTable,
+}
+
+/// Samples as marching cubes sees them when rule 1 is broken.
+struct Clamped<'a>(WorldView<'a>);
+
+impl Lattice for Clamped<'_> {
+    fn distance(&self, point: IVec3) -> i32 {
+        self.0.distance(point).clamp(-2 * ONE, 2 * ONE)
+    }
+    fn is_edited(&self, _: IVec3) -> bool {
+        true
+    }
+    fn stored_material(&self, point: IVec3) -> MaterialId {
+        self.0.stored_material(point)
+    }
+    fn ground(&self) -> &Ground {
+        self.0.ground()
+    }
+    fn is_volumetric(&self, cell: Column) -> Option<bool> {
+        self.0.is_volumetric(cell)
+    }
+}
+
+/// Draws a world cell by cell, as plainly as the rules are written.
+struct Plain<'a> {
+    view: WorldView<'a>,
+    fault: Fault,
+    /// Lowest and highest edited y of each column that has any.
+    edited: HashMap<Column, (i32, i32)>,
+    triangles: Vec<[IVec3; 3]>,
+}
+
+impl<'a> Plain<'a> {
+    fn draw(world: &'a World, fault: Fault) -> Vec<[IVec3; 3]> {
+        let mut edited: HashMap<Column, (i32, i32)> = HashMap::new();
+        for (pos, brick) in world.bricks() {
+            for (point, ..) in brick.edited_samples(pos) {
+                let range = edited.entry(Column::of(point)).or_insert((point.y, point.y));
+                *range = (range.0.min(point.y), range.1.max(point.y));
+            }
+        }
+        let mut plain = Self { view: world.view(), fault, edited, triangles: Vec::new() };
+        let grid = world.grid();
+        for z in 0..grid.depth() {
+            for x in 0..grid.width() {
+                let cell = Column::new(x, z);
+                if plain.is_volumetric(cell) {
+                    plain.march(cell, |_| true);
+                } else {
+                    let sheet = cell_sheet(world.ground(), cell);
+                    if fault != Fault::HeightmapOnly {
+                        plain.march(cell, |y| !sheet.contains(&y));
+                    }
+                    plain.heightmap_cell(cell);
+                }
+            }
+        }
+        plain.triangles
+    }
+
+    fn is_sheet_edited(&self, columns: &[Column], of: &[Column]) -> bool {
+        let rows = sheet(of.iter().map(|&column| self.view.ground().height(column)));
+        columns.iter().any(|column| (rows.start..=rows.end).any(|y| self.view.is_edited(column.at(y))))
+    }
+
+    fn is_volumetric(&self, cell: Column) -> bool {
+        let corners = cell.corners();
+        match self.fault {
+            Fault::OwnHeights => corners.iter().any(|&column| self.is_sheet_edited(&[column], &[column])),
+            Fault::ThinMask => {
+                let edited = corners.iter().filter(|column| self.edited.contains_key(column)).count();
+                edited >= 3 && self.is_sheet_edited(&corners, &corners)
+            }
+            _ => self.is_sheet_edited(&corners, &corners),
+        }
+    }
+
+    fn march(&mut self, cell: Column, wanted: impl Fn(i32) -> bool) {
+        let corners = cell.corners();
+        let own: Vec<Column> = corners.iter().copied().filter(|c| self.edited.contains_key(c)).collect();
+        let columns = if self.fault == Fault::ShortRange && !own.is_empty() { own } else { corners.to_vec() };
+        let heights = columns.iter().map(|&c| self.view.ground().height(c).div_euclid(ONE));
+        let edits = columns.iter().filter_map(|c| self.edited.get(c)).flat_map(|&(low, high)| [low, high]);
+        let all: Vec<i32> = heights.chain(edits).collect();
+        let (low, high) = (*all.iter().min().unwrap() - 2, *all.iter().max().unwrap() + 3);
+        for y in (low..high).filter(|&y| wanted(y)) {
+            let cube = cell.at(y);
+            let solid = |i| self.view.distance(cube + IVec3::from_array(cases::corner(i))) < 0;
+            let case = (0..8).fold(0usize, |case, i| case | usize::from(solid(i)) << i);
+            let reversed = self.fault == Fault::ComplementTable && case.count_ones() > 4;
+            let entry = if reversed { 255 - case } else { case };
+            for mut triangle in cases::table()[entry].triangles() {
+                if reversed {
+                    triangle.reverse();
+                }
+                self.triangles.push(triangle.map(|edge| {
+                    let (corner, axis) = cases::edge_corners(edge);
+                    let p = cube + IVec3::from_array(cases::corner(corner));
+                    match self.fault {
+                        Fault::ClampedPristine => position(&Clamped(self.view), p, axis, IVec3::ZERO),
+                        _ => position(&self.view, p, axis, IVec3::ZERO),
+                    }
+                }));
+            }
+        }
+    }
+
+    fn heightmap_cell(&mut self, cell: Column) {
+        let [a, b, c, d] = cell.corners();
+        let sides = [(a, b, (-1, 0)), (b, c, (0, 1)), (c, d, (1, 0)), (d, a, (0, -1))];
+        let [ab, bc, cd, da] = sides.map(|(from, to, (dx, dz))| {
+            let beside = cell.offset(dx, dz);
+            let bent = self.fault != Fault::StraightRing
+                && self.view.grid.has_cell(beside)
+                && self.is_volumetric(beside);
+            let mut line = vec![self.height_vertex(from)];
+            if bent {
+                line.extend(self.chain(from, to));
+            }
+            line.push(self.height_vertex(to));
+            line
+        });
+        self.ring_triangle(&ab, &bc);
+        self.ring_triangle(&cd, &da);
+    }
+
+    fn height_vertex(&self, column: Column) -> IVec3 {
+        column.at(0) * SNAP + IVec3::Y * (self.view.ground().height(column) * (SNAP / ONE))
+    }
+
+    fn chain(&self, from: Column, to: Column) -> Vec<IVec3> {
+        let (h0, h1) = (self.view.ground().height(from), self.view.ground().height(to));
+        let axis = if from.x != to.x { 0 } else { 2 };
+        let low = Column::new(from.x.min(to.x), from.z.min(to.z));
+        let rungs = sheet([h0, h1]).filter(|y| (y * ONE < h0) != (y * ONE < h1));
+        let mut chain: Vec<IVec3> = rungs
+            .map(|y| {
+                let mut place = position(&self.view, low.at(y), axis, IVec3::ZERO);
+                if self.fault == Fault::OwnRingVertices {
+                    let share = f64::from(y * ONE - h0) / f64::from(h1 - h0);
+                    let along = |a: i32, b: i32| ((f64::from(a) + f64::from(b - a) * share) * f64::from(SNAP)) as i32;
+                    place = IVec3::new(along(from.x, to.x), y * SNAP, along(from.z, to.z));
+                }
+                place
+            })
+            .collect();
+        if h1 < h0 {
+            chain.reverse();
+        }
+        chain
+    }
+
+    fn ring_triangle(&mut self, first: &[IVec3], second: &[IVec3]) {
+        for pair in first.windows(2) {
+            self.triangles.push([pair[0], pair[1], second[1]]);
+        }
+        for pair in second[1..].windows(2) {
+            self.triangles.push([first[0], pair[0], pair[1]]);
+        }
+    }
+}
+
+fn check(world: &World, triangles: &[[IVec3; 3]]) -> SeamReport {
+    let corner = |position: IVec3| Vertex { position, normal: Vec3::Y, materials: MaterialMix::default() };
+    let vertices: Vec<Vertex> = triangles.iter().flatten().map(|&position| corner(position)).collect();
+    let indices = (0..vertices.len() as u32).collect();
+    let mut soup = SeamSoup::default();
+    soup.add(&SurfaceMesh { vertices, indices }, IVec3::ZERO);
+    soup.check(world.grid())
+}
+
+/// One steep world, edited across chunk faces.
+fn control_world() -> Terrain {
+    let mut rng = Rng::with_seed(3);
+    let heights: Vec<f64> = (0..33 * 33).map(|_| rng.f64() * 40.0).collect();
+    let ground = Ground::from_fn(32, 32, |x, z| heights[(z * 33 + x) as usize]).expect("finite heights");
+    let mut terrain =
+        Terrain::new(ground, &TerrainSettings { chunk_size: 16, ..Default::default() }).expect("valid settings");
+    let dig = |x: f32, y: f32, z: f32, radius| Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius));
+    let mut brushes = vec![dig(9.0, 20.0, 9.0, 4.0), dig(16.0, 10.0, 20.0, 4.0), dig(26.0, 15.0, 26.0, 3.0)];
+    brushes.push(Brush::add(Shape::sphere(Vec3::new(22.0, 30.0, 8.0), 4.0), MaterialId(1)));
+    brushes.extend((4..29).step_by(2).map(|x| dig(x as f32, -x as f32 / 2.0, 10.0, 3.0)));
+    terrain.apply(brushes);
+    terrain
+}
+
+#[test]
+fn unbroken_rules_draw_a_flawless_world() {
+    let terrain = control_world();
+    let report = check(terrain.world(), &Plain::draw(terrain.world(), Fault::None));
+    assert!(report.is_flawless(), "{report}");
+}
+
+fn expect_open(fault: Fault) {
+    let terrain = control_world();
+    let report = check(terrain.world(), &Plain::draw(terrain.world(), fault));
+    assert!(report.open > 0, "{fault:?} went unnoticed: {report}");
+}
+
+#[test]
+fn without_rule_1_the_border_line_bends() {
+    expect_open(Fault::ClampedPristine);
+}
+
+#[test]
+fn without_rule_2_the_mask_leaves_holes() {
+    expect_open(Fault::ThinMask);
+    expect_open(Fault::OwnHeights);
+    expect_open(Fault::HeightmapOnly);
+}
+
+#[test]
+fn without_rule_3_the_ring_gapes() {
+    expect_open(Fault::StraightRing);
+}
+
+#[test]
+fn without_rule_4_the_ring_misses_the_cubes_by_a_hair() {
+    expect_open(Fault::OwnRingVertices);
+}
+
+#[test]
+fn without_rule_5_steep_borders_are_cut_off() {
+    expect_open(Fault::ShortRange);
+}
+
+#[test]
+fn a_complement_symmetric_case_table_leaves_holes() {
+    expect_open(Fault::ComplementTable);
+}
+
+#[test]
+fn rule_6_a_dig_leaves_the_deep_rock_alone() {
+    let ground = Ground::flat(64, 64, 0.0).expect("valid ground");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    let (center, radius) = (Vec3::new(32.0, -20.0, 32.0), 5.0);
+    terrain.apply([Brush::dig(Shape::sphere(center, radius))]);
+    let edited = || terrain.world().bricks().flat_map(|(pos, brick)| brick.edited_samples(pos));
+    let band = BAND as f32 / ONE as f32;
+    assert!(edited().all(|(point, ..)| point.as_vec3().distance(center) <= radius + band + 1.0 / 256.0));
+    // Without the band, every sample whose density the dig could raise would be rewritten.
+    let brush = Brush::dig(Shape::sphere(center, radius));
+    let evaluator = Edit::quantize(&brush).expect("valid brush").evaluator();
+    let rock = LatticeBox::new(IVec3::new(0, -60, 0), IVec3::new(64, 0, 64)).expect("not empty");
+    let pristine = |point: IVec3| terrain.world().ground().distance(point);
+    let raised = rock.points().filter(|&point| -evaluator.distance(point) > pristine(point)).count();
+    assert!(raised > 20 * edited().count(), "{raised} raised, {} edited", edited().count());
+}
+
+#[test]
+fn the_crate_draws_what_the_plain_rules_draw() {
+    for index in 0..worlds::world_count(60) {
+        let terrain = worlds::random_world(&mut Rng::with_seed(1000 + index), index);
+        let world = terrain.world();
+        let canonical = |mut triangle: [IVec3; 3]| {
+            let first = (0..3).min_by_key(|&i| triangle[i].to_array()).unwrap_or(0);
+            triangle.rotate_left(first);
+            triangle.map(|place| place.to_array())
+        };
+        let mut plain: Vec<_> = Plain::draw(world, Fault::None).into_iter().map(canonical).collect();
+        let mut drawn = Vec::new();
+        for (what, mesh) in world.drawn() {
+            let origin = world.origin(what) * SNAP;
+            drawn.extend(mesh.triangles().map(|t| canonical(t.map(|vertex| vertex.position + origin))));
+        }
+        plain.sort_unstable();
+        drawn.sort_unstable();
+        assert!(plain == drawn, "world {index}: {} plain triangles, {} drawn", plain.len(), drawn.len());
+    }
+}
