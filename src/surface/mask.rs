@@ -103,6 +103,64 @@ impl<'a> MaskView<'a> {
     pub fn contains(&self, cell: Column) -> bool {
         self.committed.contains(cell) || self.added.is_some_and(|added| added.contains(cell))
     }
+
+    /// The word of 8x8 cells that starts at (8 x, 8 z): bit `z * 8 + x`.
+    fn word(&self, word: (i32, i32)) -> u64 {
+        let of = |mask: &Mask| mask.0.get(&word).copied().unwrap_or_default();
+        of(self.committed) | self.added.map_or(0, of)
+    }
+
+    /// Looks at every cell from `low` up to and without `high`, and at those beside them.
+    pub fn borders(&self, low: Column, high: Column) -> Borders {
+        let (width, depth) = ((high.x - low.x).max(0) as usize, (high.z - low.z).max(0) as usize);
+        let mut borders = Borders { low, width, cells: vec![0; width * depth] };
+        for z in low.z - 1 >> 3..=high.z >> 3 {
+            for x in low.x - 1 >> 3..=high.x >> 3 {
+                let mut bits = self.word((x, z));
+                while bits != 0 {
+                    let bit = bits.trailing_zeros() as i32;
+                    bits &= bits - 1;
+                    let cell = Column::new(x << 3 | bit & 7, z << 3 | bit >> 3);
+                    borders.mark(cell, Borders::VOLUMETRIC);
+                    for (side, (dx, dz)) in Borders::SIDES.into_iter().enumerate() {
+                        borders.mark(cell.offset(-dx, -dz), 1 << side);
+                    }
+                }
+            }
+        }
+        borders
+    }
+}
+
+/// For each cell of a rectangle: is it in the mask, and which of its sides border on a cell that is?
+pub struct Borders {
+    low: Column,
+    width: usize,
+    cells: Vec<u8>,
+}
+
+impl Borders {
+    /// Set for a cell that is in the mask itself.
+    pub const VOLUMETRIC: u8 = 16;
+
+    /// Steps to the neighbour at each side, in the order of the lower four bits: counter-clockwise seen from above, as
+    /// [`Column::corners`] runs.
+    pub const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
+
+    fn mark(&mut self, cell: Column, bits: u8) {
+        let (x, z) = ((cell.x - self.low.x) as usize, (cell.z - self.low.z) as usize);
+        if x < self.width
+            && let Some(flags) = self.cells.get_mut(z.wrapping_mul(self.width).wrapping_add(x))
+        {
+            *flags |= bits;
+        }
+    }
+
+    /// The flags of the cells with this z, along x.
+    pub fn row(&self, z: i32) -> &[u8] {
+        let start = (z - self.low.z) as usize * self.width;
+        &self.cells[start..start + self.width]
+    }
 }
 
 #[cfg(test)]

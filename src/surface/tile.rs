@@ -5,9 +5,9 @@
 
 use glam::IVec3;
 
-use super::mask::sheet;
+use super::mask::{Borders, sheet};
 use super::mesh::{SurfaceMesh, Vertex};
-use super::vertex::{Lattice, WorldView, height_vertex, vertex};
+use super::vertex::{WorldView, height_vertex, vertex};
 use crate::lattice::{Column, ONE, TilePos};
 
 /// The whole mesh of a tile, relative to its lowest column at y = 0. May be empty, when the mask covers all of it.
@@ -38,25 +38,24 @@ pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
     let width = (high.x - low.x + 1) as u32;
     let mut ring = Ring { world, origin: low.at(0), base: width * (high.z - low.z + 1) as u32, vertices: Vec::new() };
     let mut indices = Vec::with_capacity(6 * ((high.x - low.x) * (high.z - low.z)) as usize);
+    let borders = world.mask.borders(low, high);
     for z in low.z..high.z {
-        for x in low.x..high.x {
-            let cell = Column::new(x, z);
-            if world.mask.contains(cell) {
-                continue;
-            }
-            let a = (z - low.z) as u32 * width + (x - low.x) as u32;
+        let row = (z - low.z) as u32 * width;
+        for (x, &flags) in (low.x..high.x).zip(borders.row(z)) {
+            let a = row + (x - low.x) as u32;
             let [a, b, c, d] = [a, a + width, a + width + 1, a + 1];
-            let beside = |dx, dz| world.is_volumetric(cell.offset(dx, dz)) == Some(true);
-            let bordered = [beside(-1, 0), beside(0, 1), beside(1, 0), beside(0, -1)];
-            if bordered == [false; 4] {
+            if flags == 0 {
                 indices.extend_from_slice(&[a, b, c, c, d, a]);
                 continue;
             }
-            let [ca, cb, cc, cd] = cell.corners();
+            if flags & Borders::VOLUMETRIC != 0 {
+                continue;
+            }
+            let [ca, cb, cc, cd] = Column::new(x, z).corners();
             let ends = [(a, ca, b, cb), (b, cb, c, cc), (c, cc, d, cd), (d, cd, a, ca)];
             let [ab, bc, cd, da] = std::array::from_fn(|side| {
                 let (start, from, end, to) = ends[side];
-                ring.side(start, from, end, to, bordered[side])
+                ring.side(start, from, end, to, flags >> side & 1 == 1)
             });
             fan(&ab, &bc, &mut indices);
             fan(&cd, &da, &mut indices);
