@@ -137,10 +137,23 @@ fn flat_diagonals(triangles: &[[Edge; 3]], polygon: &[Edge]) -> usize {
     triangles.iter().flat_map(sides).filter(|&(a, b)| !neighbours(a, b) && share_face(a, b)).count()
 }
 
+/// How little a triangulation is like a tile's, which splits its cells along (x, z)-(x + 1, z + 1): first without that
+/// diagonal, then by triangles that touch none of its ends. Where the ground is gentle, cubes so draw the very triangles
+/// of the tile.
+fn unlike_tile(triangles: &[[Edge; 3]]) -> (bool, usize) {
+    const OVER_LOW_COLUMN: Edge = 4;
+    const OVER_HIGH_COLUMN: Edge = 7;
+    let touches = |triangle: &[Edge; 3]| [OVER_LOW_COLUMN, OVER_HIGH_COLUMN].map(|edge| triangle.contains(&edge));
+    let has_diagonal = triangles.iter().any(|triangle| touches(triangle) == [true; 2]);
+    (!has_diagonal, triangles.iter().filter(|triangle| touches(triangle) == [false; 2]).count())
+}
+
 fn derive(case: usize) -> Case {
     let mut result = Case { edges: [0; 15], count: 0 };
     for polygon in loops(case) {
-        let best = triangulations(&polygon).into_iter().min_by_key(|triangles| flat_diagonals(triangles, &polygon));
+        let best = triangulations(&polygon)
+            .into_iter()
+            .min_by_key(|triangles| (flat_diagonals(triangles, &polygon), unlike_tile(triangles)));
         for triangle in best.unwrap_or_default() {
             let at = usize::from(result.count) * 3;
             result.edges[at..at + 3].copy_from_slice(&triangle);
@@ -179,6 +192,14 @@ mod tests {
                 assert_eq!(flat, Some(0), "case {case}");
             }
         }
+    }
+
+    #[test]
+    fn level_ground_is_split_like_a_tile() {
+        let bottom = 1 << 0 | 1 << 1 | 1 << 4 | 1 << 5;
+        assert_eq!(edge_corners(4), (0, 1));
+        assert_eq!(edge_corners(7), (5, 1));
+        assert!(table()[bottom].triangles().all(|triangle| triangle.contains(&4) && triangle.contains(&7)));
     }
 
     #[test]

@@ -142,7 +142,7 @@ fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
 }
 
 /// Materials at a crossing: what the solid end is made of. Where the ground shows its own materials, those of both
-/// columns are blended as the tile does.
+/// columns are blended as the tile does: the overlay within its depth below the pristine surface, the base below.
 fn materials(lattice: &impl Lattice, p: IVec3, q: IVec3, step: i32) -> MaterialMix {
     let solid = if lattice.distance(p) < 0 { p } else { q };
     let stored = lattice.stored_material(solid);
@@ -150,20 +150,12 @@ fn materials(lattice: &impl Lattice, p: IVec3, q: IVec3, step: i32) -> MaterialM
         return MaterialMix::pure(stored);
     }
     let ground = lattice.ground();
-    let own = |column: Column| {
+    let (a, b) = (Column::of(p), Column::of(q));
+    let between = |low: i32, high: i32| low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32;
+    let depth = between(ground.height(a), ground.height(b)) - between(p.y * ONE, q.y * ONE);
+    let own = |column| {
         let material = ground.column_material(column);
-        let depth = ground.height(column) - solid.y * ONE;
         if depth <= OVERLAY_DEPTH { MaterialMix::column(material) } else { MaterialMix::pure(material.base) }
     };
-    let pristine = !lattice.is_edited(p) && !lattice.is_edited(q);
-    let (a, b) = (Column::of(p), Column::of(q));
-    if pristine {
-        // A sheet vertex: the tile's own blend, however steep it is.
-        let skin = |column| MaterialMix::column(ground.column_material(column));
-        return if a == b { skin(a) } else { MaterialMix::lerp(skin(a), skin(b), step) };
-    }
-    if a == b || lattice.stored_material(if solid == p { q } else { p }) != MaterialId::GROUND {
-        return own(Column::of(solid));
-    }
     MaterialMix::lerp(own(a), own(b), step)
 }
