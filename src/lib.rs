@@ -1,6 +1,107 @@
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
-//! Diggable ground for Bevy.
+//! # bevy_burrow
+//!
+//! Ground that players can dig, for [Bevy](https://bevy.org).
+//!
+//! The world is a heightmap: cheap, huge, familiar to every artist. Where gameplay digs or builds, marching cubes take
+//! over, and nothing shows where one ends and the other begins: both sides compute the same bits, so there is no open
+//! edge and no jump in shading, on any slope.
+//!
+//! # Quick start
+//!
+//! ```no_run
+//! # #[cfg(feature = "render")] {
+//! use bevy::prelude::*;
+//! use bevy_burrow::prelude::*;
+//!
+//! fn main() -> AppExit {
+//!     App::new()
+//!         .add_plugins((DefaultPlugins, BurrowPlugins))
+//!         .add_systems(Startup, landscape)
+//!         .add_systems(Update, dig)
+//!         .run()
+//! }
+//!
+//! fn landscape(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+//!     let ground = Ground::from_noise(512, 512, &NoiseHeights::default())?;
+//!     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
+//!     commands.spawn((terrain, MeshMaterial3d(materials.add(StandardMaterial::default()))));
+//!     Ok(())
+//! }
+//!
+//! fn dig(mut brushes: MessageWriter<Brush>, mouse: Res<ButtonInput<MouseButton>>) {
+//!     if mouse.just_pressed(MouseButton::Left) {
+//!         brushes.write(Brush::dig(Shape::sphere(Vec3::new(256.0, 0.0, 256.0), 6.0)));
+//!     }
+//! }
+//! # }
+//! ```
+//!
+//! # What is where
+//!
+//! | a game wants | it uses |
+//! | --- | --- |
+//! | a landscape | [`Ground`](ground::Ground) from an image, noise or a function; [`MaterialControl`](ground::MaterialControl) |
+//! | to put it into the world | the [`Terrain`](terrain::Terrain) component; `BurrowPlugins` |
+//! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
+//! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
+//! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
+//! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
+//! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
+//!
+//! Rooms, from the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
+//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`terrain`], `plugin`, `view`.
+//!
+//! # How the seam closes
+//!
+//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never rounded.
+//! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*, the cubes
+//!    that the pristine surface crosses over it, is edited. All samples of the sheet beside the mask are pristine then.
+//! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex.
+//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers.
+//! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes.
+//! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes.
+//!
+//! What was not chosen, and why: *snapping* border vertices to the nearest point of the other surface tears on steep
+//! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep caves
+//! pay for the meadow above; *transition cells* need a second case table and still leave the heightmap out.
+//!
+//! The method is that of P. Andersson and S. Johansson, *Rendering with Marching Cubes, looking at Hybrid Solutions*
+//! (2012): heightmap, fields in chunks, five scenarios of an edit. They ended with cuts and holes on steep ground and with
+//! an index buffer that took 15 seconds to rebuild; the six rules and the transaction are what it took to finish that.
+//!
+//! # An edit is a transaction
+//!
+//! ```text
+//! Brush -> Edit (integers only) -> queue
+//!   -> transaction in a task, from a snapshot: bricks, fields, receipts, dirty blocks, meshes
+//!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
+//! ```
+//!
+//! Edits apply in the order in which they were sent, those of one frame together. Integers decide what is solid, and
+//! floats are only drawn, so the same edits give the same [`hash`](terrain::World::hash) on every machine.
+//!
+//! # System sets
+//!
+//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Dress`. A brush that is sent before `Collect`
+//! starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
+//!
+//! # Features
+//!
+//! | feature | what it adds | default |
+//! | --- | --- | --- |
+//! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
+//! | `render` | materials on tiles and chunks | yes |
+//! | `examples` | what the examples need: window, UI, PNG | |
+//!
+//! Without any feature the model alone is built, with no Bevy at all. Bevy's own `multi_threaded` feature, part of its
+//! default ones, lets transactions run beside the frame.
+//!
+//! # Limits
+//!
+//! Lattice coordinates stay within 32768 voxels, a world's sides within 16384 cells. Chunks are all drawn at full detail.
+//! A terrain may be moved and scaled by powers of two; rotated or stretched, its seams lose their equal bits.
 
 pub mod brush;
 pub mod ground;

@@ -15,20 +15,32 @@ use super::{
     FieldCreated, FieldMerged, MaterialColors,
 };
 use crate::lattice::{ChunkPos, TilePos};
-use crate::terrain::{Commit, Drawn, FieldNews, Terrain, World};
+use crate::terrain::{Commit, Drawn, FieldNews, Terrain, Version, World};
 use crate::volume::{self, FieldId};
 
-/// The entities below a terrain. Its presence says that the terrain has loaded.
-#[derive(Component, Default)]
+/// The entities below a terrain, and the world that they show. Its presence says that the terrain has loaded.
+#[derive(Component)]
 pub struct TerrainEntities {
+    pub(super) shown: Version,
     pub(super) tiles: HashMap<TilePos, Entity>,
     pub(super) chunks: HashMap<ChunkPos, Entity>,
     pub(super) fields: HashMap<FieldId, Entity>,
 }
 
+impl TerrainEntities {
+    pub(super) fn new(shown: Version) -> Self {
+        Self { shown, tiles: HashMap::default(), chunks: HashMap::default(), fields: HashMap::default() }
+    }
+
+    /// Tiles and chunks; fields lie below these.
+    pub(super) fn drawn(&self) -> impl Iterator<Item = Entity> {
+        self.tiles.values().chain(self.chunks.values()).copied()
+    }
+}
+
 /// The transaction that a terrain waits for.
 #[derive(Component)]
-pub struct Transactions {
+pub(super) struct InFlight {
     task: Task<Prepared>,
     done: Option<Prepared>,
 }
@@ -44,14 +56,17 @@ struct Prepared {
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &MaterialColors),
-        (With<TerrainEntities>, Without<Loading>, Without<Transactions>),
+        (Entity, &mut Terrain, &TerrainEntities, &MaterialColors),
+        (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
+    mut figures: ResMut<BurrowFigures>,
 ) {
+    let start = Instant::now();
     let draws = assets.is_some();
-    for (entity, mut terrain, colors) in &mut terrains {
-        if terrain.queued() == 0 {
+    for (entity, mut terrain, entities, colors) in &mut terrains {
+        // A world that the game changed by itself is loaded again first.
+        if terrain.queued() == 0 || terrain.world().version() != entities.shown {
             continue;
         }
         let Some(transaction) = terrain.begin() else { continue };
@@ -66,8 +81,9 @@ pub(super) fn begin_transactions(
             let meshes = tiles.chain(chunks).map(build).collect();
             Prepared { commit, meshes, took: start.elapsed() }
         });
-        commands.entity(entity).insert(Transactions { task, done: None });
+        commands.entity(entity).insert(InFlight { task, done: None });
     }
+    figures.main_thread += start.elapsed();
 }
 
 /// Commits what is done: each commit whole, as many of them as the frame's budget of swaps allows, and at least one.
@@ -76,7 +92,7 @@ pub(super) fn commit_transactions(
     settings: Res<BurrowSettings>,
     mut figures: ResMut<BurrowFigures>,
     mut assets: Option<ResMut<Assets<Mesh>>>,
-    mut terrains: Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut Transactions)>,
+    mut terrains: Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
     shown: Query<&Mesh3d>,
     mut receipts: MessageWriter<BrushApplied>,
 ) {
@@ -90,20 +106,17 @@ pub(super) fn commit_transactions(
             continue;
         }
         let Some(Prepared { commit, meshes, took }) = transaction.done.take() else { continue };
-        commands.entity(entity).remove::<Transactions>();
+        commands.entity(entity).remove::<InFlight>();
         let start = Instant::now();
         let news = commit.field_news().to_vec();
         let committed = match terrain.commit(commit) {
             Ok(committed) => committed,
-            Err(stale) => {
-                // The game committed behind the plugin's back: the same edits go through once more.
-                warn!("{stale}; its edits are queued again");
-                terrain.abandon();
-                continue;
-            }
+            // The game gave the transaction up, and with it has taken its edits back.
+            Err(_) => continue,
         };
         swapped += swaps;
         let world = terrain.world();
+        entities.shown = world.version();
         for (drawn, ready) in meshes {
             let child = match drawn {
                 Drawn::Tile(tile) => entities.tiles.get(&tile).copied(),
@@ -127,16 +140,18 @@ pub(super) fn commit_transactions(
         figures.last_transaction = took;
         let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
         receipts.write_batch(committed.into_iter().map(applied));
-        figures.last_commit = start.elapsed();
+        let took = start.elapsed();
+        figures.last_commit = took;
+        figures.main_thread += took;
     }
 }
 
 /// Puts a mesh in place of an entity's old one, under the same handle.
 fn swap(commands: &mut Commands, assets: &mut Assets<Mesh>, child: Entity, shown: Option<&Mesh3d>, ready: Ready) {
-    let mut child = commands.entity(child);
+    let Ok(mut child) = commands.get_entity(child) else { return };
     match (ready, shown) {
         (None, _) => {
-            child.remove::<Mesh3d>();
+            child.try_remove::<Mesh3d>();
         }
         (Some((mesh, bounds)), shown) => {
             let mut fresh = Some(mesh);
@@ -147,9 +162,9 @@ fn swap(commands: &mut Commands, assets: &mut Assets<Mesh>, child: Entity, shown
                 warn!("a mesh could not be swapped: {error}");
             }
             if let Some(mesh) = fresh {
-                child.insert(Mesh3d(assets.add(mesh)));
+                child.try_insert(Mesh3d(assets.add(mesh)));
             }
-            child.insert((bounds, NoAutoAabb));
+            child.try_insert((bounds, NoAutoAabb));
         }
     }
 }
@@ -175,7 +190,7 @@ fn tell_fields(
             }
             FieldNews::Changed(id) => {
                 if let (Some(field), Some(&child)) = (field(id), entities.fields.get(&id)) {
-                    commands.entity(child).insert(Field::from(field));
+                    commands.entity(child).try_insert(Field::from(field));
                     commands.trigger(FieldChanged { entity: child });
                 }
             }
@@ -183,7 +198,7 @@ fn tell_fields(
                 let into = entities.fields.get(&into).copied();
                 if let (Some(child), Some(into)) = (entities.fields.remove(&gone), into) {
                     commands.trigger(FieldMerged { entity: child, into });
-                    commands.entity(child).despawn();
+                    commands.entity(child).try_despawn();
                 }
             }
         }

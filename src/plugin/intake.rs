@@ -1,8 +1,9 @@
 //! Brush messages on their way into the queues of terrains.
 
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::{BrushApplied, TargetedBrush};
+use super::{BrushApplied, BurrowFigures, TargetedBrush};
 use crate::brush::Brush;
 use crate::terrain::{Receipt, Rejection, Terrain};
 
@@ -10,17 +11,21 @@ use crate::terrain::{Receipt, Rejection, Terrain};
 pub(super) fn collect_brushes(
     mut brushes: MessageReader<Brush>,
     mut targeted: MessageReader<TargetedBrush>,
-    mut terrains: Query<(Entity, &mut Terrain, &GlobalTransform)>,
+    mut terrains: Query<(Entity, &mut Terrain)>,
+    places: TransformHelper,
     mut receipts: MessageWriter<BrushApplied>,
+    mut figures: ResMut<BurrowFigures>,
 ) {
+    let start = Instant::now();
     let mut reject = |brush: &Brush, terrain, rejection| {
         receipts.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
     };
     for brush in brushes.read() {
         let mut taken = false;
         let mut rejection = Rejection::OutsideWorld;
-        for (_, mut terrain, place) in &mut terrains {
-            let local = to_terrain(brush, place);
+        for (entity, mut terrain) in &mut terrains {
+            let Ok(place) = places.compute_global_transform(entity) else { continue };
+            let local = to_terrain(brush, &place);
             match terrain.is_in_reach(&local) {
                 Ok(true) => {
                     terrain.submit(&local);
@@ -35,11 +40,12 @@ pub(super) fn collect_brushes(
         }
     }
     for TargetedBrush { terrain, brush } in targeted.read() {
-        match terrains.get_mut(*terrain) {
-            Ok((_, mut terrain, place)) => terrain.submit(&to_terrain(brush, place)),
-            Err(_) => reject(brush, Some(*terrain), Rejection::OutsideWorld),
+        match (terrains.get_mut(*terrain), places.compute_global_transform(*terrain)) {
+            (Ok((_, mut terrain)), Ok(place)) => terrain.submit(&to_terrain(brush, &place)),
+            _ => reject(brush, Some(*terrain), Rejection::OutsideWorld),
         }
     }
+    figures.main_thread = start.elapsed();
 }
 
 /// A brush in world space as its terrain sees it, in voxels.

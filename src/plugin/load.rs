@@ -8,10 +8,10 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
-use super::commit::{TerrainEntities, spawn_chunk, spawn_field};
+use super::commit::{InFlight, TerrainEntities, spawn_chunk, spawn_field};
 use super::meshes::{self, Ready};
 use super::{BurrowSettings, MaterialColors, Tile};
-use crate::terrain::{Drawn, Terrain, World};
+use crate::terrain::{Drawn, Terrain, Version, World};
 
 /// A terrain's tiles are all shown, and it takes transactions.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,21 +23,34 @@ pub struct TerrainReady {
 /// Meshes on their way to a terrain's first frame.
 #[derive(Component)]
 pub(super) struct Loading {
+    world: Version,
     task: Option<Task<Vec<(Drawn, Ready)>>>,
     waiting: Vec<(Drawn, Ready)>,
     uploaded: HashMap<Drawn, (Handle<Mesh>, Aabb)>,
 }
 
-/// Starts the task of each terrain that is new, and scales its entity to the voxel size.
+/// Terrains that no task works for.
+type Idle = (Without<Loading>, Without<InFlight>);
+
+/// Starts the task of each terrain that is new, or whose world the game changed by itself, and scales its entity to the
+/// voxel size.
 pub(super) fn start_loading(
     mut commands: Commands,
-    mut terrains: Query<(Entity, &Terrain, &MaterialColors, &mut Transform), Added<Terrain>>,
+    mut terrains: Query<(Entity, &Terrain, &MaterialColors, &mut Transform, Option<&TerrainEntities>), Idle>,
 ) {
-    for (entity, terrain, colors, mut transform) in &mut terrains {
-        transform.scale = Vec3::splat(terrain.voxel_size());
+    for (entity, terrain, colors, mut transform, entities) in &mut terrains {
+        let version = terrain.world().version();
+        if entities.is_some_and(|entities| entities.shown == version) {
+            continue;
+        }
+        if entities.is_none() {
+            transform.scale = Vec3::splat(terrain.voxel_size());
+            warn_about_placement(&transform);
+        }
         let (world, colors) = (terrain.snapshot(), colors.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move { mesh_all(&world, &colors) });
-        let loading = Loading { task: Some(task), waiting: Vec::new(), uploaded: HashMap::default() };
+        let loading =
+            Loading { world: version, task: Some(task), waiting: Vec::new(), uploaded: HashMap::default() };
         commands.entity(entity).insert(loading);
     }
 }
@@ -61,9 +74,9 @@ pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
     mut assets: Option<ResMut<Assets<Mesh>>>,
-    mut terrains: Query<(Entity, &Terrain, &Transform, &mut Loading)>,
+    mut terrains: Query<(Entity, &Terrain, &mut Loading, Option<&TerrainEntities>)>,
 ) {
-    for (entity, terrain, transform, mut loading) in &mut terrains {
+    for (entity, terrain, mut loading, old) in &mut terrains {
         if let Some(task) = &mut loading.task {
             let Some(meshes) = check_ready(task) else { continue };
             (loading.task, loading.waiting) = (None, meshes);
@@ -79,9 +92,15 @@ pub(super) fn finish_loading(
                 continue;
             }
         }
-        warn_about_placement(transform);
+        commands.entity(entity).remove::<Loading>();
         let world = terrain.world();
-        let mut entities = TerrainEntities::default();
+        if world.version() != loading.world {
+            continue; // changed meanwhile: once more, from the start
+        }
+        for child in old.into_iter().flat_map(TerrainEntities::drawn) {
+            commands.entity(child).try_despawn();
+        }
+        let mut entities = TerrainEntities::new(loading.world);
         let mut dress = |commands: &mut Commands, drawn, child| {
             if let Some((handle, bounds)) = loading.uploaded.remove(&drawn) {
                 let shown = (Mesh3d(handle), bounds, bevy::camera::visibility::NoAutoAabb);
@@ -106,7 +125,7 @@ pub(super) fn finish_loading(
                 spawn_field(&mut commands, &mut entities, chunk, field);
             }
         }
-        commands.entity(entity).insert(entities).remove::<Loading>();
+        commands.entity(entity).insert(entities);
         commands.trigger(TerrainReady { entity });
     }
 }

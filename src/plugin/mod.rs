@@ -18,7 +18,6 @@ mod messages;
 mod query;
 mod settings;
 
-pub use commit::Transactions;
 pub use components::{Chunk, Field, MaterialColors, Tile};
 pub use heightmap::{HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings};
 pub use load::TerrainReady;

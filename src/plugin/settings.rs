@@ -35,4 +35,6 @@ pub struct BurrowFigures {
     pub last_transaction: Duration,
     /// How long the last commit took on the main thread.
     pub last_commit: Duration,
+    /// What this frame's intake, commits and starts of transactions took together on the main thread.
+    pub main_thread: Duration,
 }

@@ -21,9 +21,10 @@ mod world;
 pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use transaction::{Commit, FieldNews, MeshUpdates, Transaction};
-pub use world::{ChunkSurface, Drawn, Memory, World};
+pub use world::{ChunkSurface, Drawn, Memory, Version, World};
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::brush::{Brush, BrushError, Edit};
 use crate::ground::Ground;
@@ -57,14 +58,15 @@ pub enum TerrainError {
     VoxelSize(f32),
 }
 
-/// Why a commit is refused.
+/// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the commit was computed from revision {base}, but the world is at revision {current}")]
-pub struct StaleCommit {
-    /// The revision that the transaction started from.
-    pub base: u64,
-    /// The revision of the world.
-    pub current: u64,
+#[error("this terrain does not wait for that commit; its transaction was given up, or belongs to another terrain")]
+pub struct StaleCommit;
+
+/// A number that no other transaction or world of this process has.
+fn unique() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// A brush on its way into the world.
@@ -75,11 +77,20 @@ pub(crate) struct Submission {
 }
 
 /// A world, the edits that wait for it, and the one transaction that may be under way.
+///
+/// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
+/// to it. Committing by oneself, with [`apply`](Self::apply) say, works too, but then all of its meshes are made again.
 pub struct Terrain {
     world: Arc<World>,
     voxel_size: f32,
     queue: Vec<Submission>,
-    in_flight: Option<Arc<[Submission]>>,
+    in_flight: Option<InFlight>,
+}
+
+/// The transaction under way, as far as its terrain keeps it.
+struct InFlight {
+    ticket: u64,
+    submissions: Arc<[Submission]>,
 }
 
 impl Terrain {
@@ -150,27 +161,24 @@ impl Terrain {
             return None;
         }
         let submissions: Arc<[Submission]> = std::mem::take(&mut self.queue).into();
-        self.in_flight = Some(Arc::clone(&submissions));
-        Some(Transaction::new(self.snapshot(), submissions))
+        let ticket = unique();
+        self.in_flight = Some(InFlight { ticket, submissions: Arc::clone(&submissions) });
+        Some(Transaction::new(ticket, self.snapshot(), submissions))
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
     ///
     /// # Errors
-    /// When the world changed since the transaction began; nothing is changed then.
+    /// When the commit is not that of the transaction under way; nothing is changed then.
     pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
-        let current = self.world.revision();
-        if commit.base_revision() != current {
-            return Err(StaleCommit { base: commit.base_revision(), current });
-        }
-        self.in_flight = None;
+        self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket()).ok_or(StaleCommit)?;
         Ok(commit.install(Arc::make_mut(&mut self.world)))
     }
 
     /// Gives up the transaction that is under way, whose task was lost; its edits are queued again, in front.
     pub fn abandon(&mut self) {
         if let Some(lost) = self.in_flight.take() {
-            self.queue.splice(0..0, lost.iter().cloned());
+            self.queue.splice(0..0, lost.submissions.iter().cloned());
         }
     }
 
@@ -191,7 +199,7 @@ impl Terrain {
 
     /// Is no edit on its way to these samples?
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
-        let in_flight = self.in_flight.iter().flat_map(|submissions| submissions.iter());
+        let in_flight = self.in_flight.iter().flat_map(|waiting| waiting.submissions.iter());
         let mut coming = in_flight.chain(&self.queue).filter_map(|submission| submission.edit.as_ref().ok());
         coming.all(|edit| edit.reach().intersection(bounds).is_none())
     }

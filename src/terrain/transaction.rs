@@ -48,13 +48,14 @@ pub enum FieldNews {
 
 /// Edits on their way, with the snapshot that they apply to.
 pub struct Transaction {
+    ticket: u64,
     world: Arc<World>,
     submissions: Arc<[Submission]>,
 }
 
 /// The result of a transaction: only what changed.
 pub struct Commit {
-    base_revision: u64,
+    ticket: u64,
     bricks: Bricks,
     mask: Mask,
     fields: BTreeMap<ChunkPos, Fields>,
@@ -79,8 +80,8 @@ struct Block {
 const PARALLEL_BLOCKS: usize = 48;
 
 impl Transaction {
-    pub(super) fn new(world: Arc<World>, submissions: Arc<[Submission]>) -> Self {
-        Self { world, submissions }
+    pub(super) fn new(ticket: u64, world: Arc<World>, submissions: Arc<[Submission]>) -> Self {
+        Self { ticket, world, submissions }
     }
 
     /// How many edits it holds.
@@ -119,7 +120,7 @@ impl Transaction {
         let chunks = surfaces.iter().map(|(&chunk, surface)| (chunk, surface.mesh())).collect();
         let tiles = touched_tiles(&view, &mask).into_iter().map(|tile| (tile, tile::mesh(&view, tile))).collect();
         Commit {
-            base_revision: world.revision,
+            ticket: self.ticket,
             mask,
             surfaces,
             sample_hash,
@@ -276,8 +277,8 @@ fn touched_tiles(view: &WorldView, added: &Mask) -> BTreeSet<TilePos> {
 }
 
 impl Commit {
-    pub(super) fn base_revision(&self) -> u64 {
-        self.base_revision
+    pub(super) fn ticket(&self) -> u64 {
+        self.ticket
     }
 
     /// What happens to fields when this is committed, by chunk.

@@ -92,7 +92,16 @@ pub struct World {
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,
+    /// Tells worlds of one process apart.
+    lineage: u64,
     pub(super) revision: u64,
+}
+
+/// Which world, and how many commits old.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Version {
+    lineage: u64,
+    revision: u64,
 }
 
 impl World {
@@ -108,6 +117,7 @@ impl World {
             surfaces: FxHashMap::default(),
             sample_hash: 0,
             next_field: 0,
+            lineage: super::unique(),
             revision: 0,
         }
     }
@@ -130,6 +140,11 @@ impl World {
     /// Counts the commits.
     pub fn revision(&self) -> u64 {
         self.revision
+    }
+
+    /// Changes with each commit, and differs from that of every other world of this process.
+    pub fn version(&self) -> Version {
+        Version { lineage: self.lineage, revision: self.revision }
     }
 
     /// The samples, edited or not.
