@@ -20,7 +20,10 @@ fn percentile(sorted: &[Duration], share: f64) -> f64 {
 fn report(what: &str, mut durations: Vec<Duration>) {
     durations.sort_unstable();
     let [median, high, most] = [0.5, 0.99, 1.0].map(|share| percentile(&durations, share));
-    println!("{what:<58} median {median:9.1} us   p99 {high:9.1} us   max {most:9.1} us   n {}", durations.len());
+    println!(
+        "{what:<58} median {median:9.1} us   p99 {high:9.1} us   max {most:9.1} us   n {}",
+        durations.len()
+    );
 }
 
 fn main() {
@@ -49,7 +52,8 @@ fn main() {
                     receipts.extend(terrain.commit(commit).expect("nothing else commits"));
                     commits.push(start.elapsed());
                 }
-                let dug: u64 = receipts.iter().flat_map(|r| &r.outcome).map(|applied| applied.removed.total()).sum();
+                let dug: u64 =
+                    receipts.iter().flat_map(|r| &r.outcome).map(|applied| applied.removed.total()).sum();
                 report(name, transactions);
                 report("  commit to the model", commits);
                 println!("  {:.0} voxels removed per dig", dug as f64 / receipts.len() as f64);

@@ -40,7 +40,8 @@ fn main() {
         app.update();
         (start.elapsed(), app.world().resource::<BurrowFigures>().clone())
     };
-    let (mut idle, mut busy, mut systems, mut transactions) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut idle, mut busy, mut systems, mut transactions) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (x, y, z) in heights {
         for _ in 0..3 {
             idle.push(frame(&mut app).0);

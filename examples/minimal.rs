@@ -17,23 +17,27 @@ use bevy_burrow::prelude::*;
 fn main() -> AppExit {
     App::new()
         .add_plugins((DefaultPlugins, BurrowPlugins, FreeCameraPlugin))
+        .insert_resource(ClearColor(Color::srgb(0.6, 0.75, 0.95)))
+        .insert_resource(GlobalAmbientLight { brightness: 600.0, ..default() })
         .add_systems(Startup, set_up)
         .add_systems(Update, dig.before(BurrowSystems::Collect))
         .run()
 }
 
 fn set_up(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
-    let ground = Ground::from_noise(512, 512, &NoiseHeights { amplitude: 60.0, ..default() })?;
+    let grass_on_rock = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
+    let ground = Ground::from_noise(512, 512, &NoiseHeights { amplitude: 40.0, scale: 300.0, ..default() })?
+        .with_materials(&MaterialControl::Uniform(grass_on_rock))?;
     let material = materials.add(StandardMaterial { perceptual_roughness: 1.0, ..default() });
     commands.spawn((Terrain::new(ground, &TerrainSettings::default())?, MeshMaterial3d(material)));
     commands.spawn((
         DirectionalLight { shadow_maps_enabled: true, ..default() },
-        Transform::from_xyz(1.0, 1.0, 0.5).looking_at(Vec3::ZERO, Vec3::Y),
+        Transform::from_xyz(1.0, 0.8, 0.3).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     commands.spawn((
         Camera3d::default(),
         FreeCamera { walk_speed: 20.0, run_speed: 60.0, ..default() },
-        Transform::from_xyz(256.0, 60.0, 330.0).looking_at(Vec3::new(256.0, 0.0, 256.0), Vec3::Y),
+        Transform::from_xyz(256.0, 40.0, 400.0).looking_at(Vec3::new(256.0, 0.0, 256.0), Vec3::Y),
     ));
     Ok(())
 }
@@ -46,11 +50,11 @@ fn dig(
     mut brushes: MessageWriter<Brush>,
 ) {
     let (camera, place) = *camera;
-    if mouse.pressed(MouseButton::Left)
+    if mouse.just_pressed(MouseButton::Left)
         && let Some(cursor) = window.cursor_position()
         && let Ok(ray) = camera.viewport_to_world(place, cursor)
         && let Some(hit) = terrains.raycast(ray, 500.0)
     {
-        brushes.write(Brush::dig(Shape::sphere(hit.position, 4.0)));
+        brushes.write(Brush::dig(Shape::sphere(hit.position, 6.0)));
     }
 }

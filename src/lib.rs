@@ -123,8 +123,8 @@ pub mod prelude {
     };
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
-        BrushApplied, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk, Field, HeightmapImage,
-        MaterialColors, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile,
+        BrushApplied, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk, Field,
+        HeightmapImage, MaterialColors, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile,
     };
     pub use crate::terrain::{Applied, Receipt, Rejection, ScenarioCounts, Span, Terrain, TerrainSettings};
     #[cfg(feature = "render")]

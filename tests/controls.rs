@@ -177,7 +177,8 @@ impl<'a> Plain<'a> {
                 let mut place = position(&self.view, low.at(y), axis, IVec3::ZERO);
                 if self.fault == Fault::OwnRingVertices {
                     let share = f64::from(y * ONE - h0) / f64::from(h1 - h0);
-                    let along = |a: i32, b: i32| ((f64::from(a) + f64::from(b - a) * share) * f64::from(SNAP)) as i32;
+                    let along =
+                        |a: i32, b: i32| ((f64::from(a) + f64::from(b - a) * share) * f64::from(SNAP)) as i32;
                     place = IVec3::new(along(from.x, to.x), y * SNAP, along(from.z, to.z));
                 }
                 place
@@ -213,8 +214,8 @@ fn control_world() -> Terrain {
     let mut rng = Rng::with_seed(3);
     let heights: Vec<f64> = (0..33 * 33).map(|_| rng.f64() * 40.0).collect();
     let ground = Ground::from_fn(32, 32, |x, z| heights[(z * 33 + x) as usize]).expect("finite heights");
-    let mut terrain =
-        Terrain::new(ground, &TerrainSettings { chunk_size: 16, ..Default::default() }).expect("valid settings");
+    let mut terrain = Terrain::new(ground, &TerrainSettings { chunk_size: 16, ..Default::default() })
+        .expect("valid settings");
     let dig = |x: f32, y: f32, z: f32, radius| Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius));
     let mut brushes = vec![dig(9.0, 20.0, 9.0, 4.0), dig(16.0, 10.0, 20.0, 4.0), dig(26.0, 15.0, 26.0, 3.0)];
     brushes.push(Brush::add(Shape::sphere(Vec3::new(22.0, 30.0, 8.0), 4.0), MaterialId(1)));

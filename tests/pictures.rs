@@ -32,7 +32,11 @@ impl Studio {
         let mut app = App::new();
         app.add_plugins(
             DefaultPlugins
-                .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+                .set(WindowPlugin {
+                    primary_window: None,
+                    exit_condition: ExitCondition::DontExit,
+                    ..default()
+                })
                 .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
                 .disable::<WinitPlugin>(),
         )
@@ -45,10 +49,10 @@ impl Studio {
         app.cleanup();
         let image = Image::new_target_texture(SIZE.0, SIZE.1, TextureFormat::Rgba8UnormSrgb, None);
         let target = app.world_mut().resource_mut::<Assets<Image>>().add(image);
-        let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial {
-            perceptual_roughness: 0.9,
-            ..default()
-        });
+        let material = app
+            .world_mut()
+            .resource_mut::<Assets<StandardMaterial>>()
+            .add(StandardMaterial { perceptual_roughness: 0.9, ..default() });
         let height = ground.height(bevy_burrow::lattice::Column::new(64, 64)) as f32 / 256.0;
         let middle = MIDDLE + Vec3::Y * height;
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
@@ -126,7 +130,8 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, u8, f64) {
 /// Leaves a picture where one can look at it.
 fn keep(name: &str, pixels: &[u8]) {
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    image::save_buffer(&path, pixels, SIZE.0, SIZE.1, image::ColorType::Rgba8).expect("a picture can be written");
+    image::save_buffer(&path, pixels, SIZE.0, SIZE.1, image::ColorType::Rgba8)
+        .expect("a picture can be written");
 }
 
 #[test]
@@ -141,10 +146,12 @@ fn freshly_converted_ground_looks_untouched() {
     let middle = MIDDLE.with_y(ground.height(bevy_burrow::lattice::Column::new(64, 64)) as f32 / 256.0);
     let mut studio = Studio::new(ground);
     let suns = [Vec3::new(1.0, 0.8, 0.3), Vec3::new(-0.4, 0.5, 1.0), Vec3::new(0.2, 2.0, -0.6)];
-    let photograph = |studio: &mut Studio| suns.map(|sun| {
-        studio.sun(sun);
-        studio.picture()
-    });
+    let photograph = |studio: &mut Studio| {
+        suns.map(|sun| {
+            studio.sun(sun);
+            studio.picture()
+        })
+    };
     let before = photograph(&mut studio);
     // Painting with the ground's own material changes nothing, but hands the cells over to marching cubes.
     studio.apply(Brush::paint(Shape::sphere(middle, 9.0), MaterialId::GROUND));

@@ -12,7 +12,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{Drawn, RayHit, World};
 use fastrand::Rng;
 use glam::{DVec3, IVec3, Vec3};
-use worlds::{random_brush, random_world, real_ground};
+use worlds::{random_brush, random_world, real_ground, world_count};
 
 /// How far answers may be from the drawn triangles, in voxels.
 const TOLERANCE: f64 = 1.0 / 256.0;
@@ -101,8 +101,9 @@ impl Soup {
         hits.filter(|(t, _)| (0.0..=max_distance).contains(t)).min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Heights at which the vertical through (x, z) crosses triangles, and whether they face up; lowest first.
-    fn column(&self, x: f64, z: f64) -> Vec<(f64, bool)> {
+    /// Heights at which the vertical through (x, z) crosses triangles, whether they face up, and which they are; lowest
+    /// first.
+    fn crossings(&self, x: f64, z: f64) -> Vec<(f64, bool, u32)> {
         let square = self.square(z, self.depth) * self.width + self.square(x, self.width);
         let mut found = Vec::new();
         for &number in &self.squares[square as usize] {
@@ -111,11 +112,15 @@ impl Soup {
             let (wa, wb, wc) = (side(b, c), side(c, a), side(a, b));
             let area = wa + wb + wc;
             if area != 0.0 && (wa / area).min(wb / area).min(wc / area) >= 0.0 {
-                found.push(((wa * a.y + wb * b.y + wc * c.y) / area, area < 0.0));
+                found.push(((wa * a.y + wb * b.y + wc * c.y) / area, area < 0.0, number));
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found
+    }
+
+    fn column(&self, x: f64, z: f64) -> Vec<(f64, bool)> {
+        self.crossings(x, z).into_iter().map(|(y, is_floor, _)| (y, is_floor)).collect()
     }
 
     fn normal(&self, number: u32) -> DVec3 {
@@ -306,9 +311,9 @@ fn random_ray(rng: &mut Rng, world: &World, soup: &Soup) -> (DVec3, DVec3) {
     }
 }
 
-/// The worlds that are asked: random ones with patchy materials, dug some more.
+/// The worlds that are asked.
 fn dug_worlds() -> impl Iterator<Item = (String, Terrain)> {
-    (0..24).map(|index| {
+    (0..world_count(24)).map(|index| {
         let mut rng = Rng::with_seed(31_000 + index);
         (format!("world {index}"), random_world(&mut rng, index))
     })
@@ -387,18 +392,17 @@ fn as_crossings(spans: &[Span]) -> Vec<(f64, bool)> {
     spans.iter().flat_map(|span| [Some((span.floor, true)), span.ceiling.map(|y| (y, false))]).flatten().collect()
 }
 
-/// Small steps off a vertical line, none of them along a lattice line.
-const STEPS: [(f64, f64); 9] = [
-    (NUDGE, NUDGE / 1000.0),
-    (NUDGE, NUDGE / 3.0),
-    (NUDGE, -NUDGE / 3.0),
-    (-NUDGE, NUDGE / 3.0),
-    (-NUDGE, -NUDGE / 3.0),
-    (NUDGE / 3.0, NUDGE),
-    (NUDGE / 3.0, -NUDGE),
-    (-NUDGE / 3.0, NUDGE),
-    (-NUDGE / 3.0, -NUDGE),
-];
+/// Small steps off a vertical line, none of them along a lattice line: far from all, and close to each.
+fn steps() -> impl Iterator<Item = (f64, f64)> {
+    let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+    let shapes = [(1.0, 0.3), (0.3, 1.0), (1.0, 1e-5), (1e-5, 1.0)];
+    signs.into_iter().flat_map(move |(sx, sz)| shapes.map(|(dx, dz)| (NUDGE * sx * dx, NUDGE * sz * dz)))
+}
+
+/// A coordinate a little inside the world.
+fn inside(at: f64, end: f64) -> f64 {
+    at.clamp(NUDGE / 10.0, end - NUDGE / 10.0)
+}
 
 #[test]
 fn columns_cross_what_is_drawn() {
@@ -417,9 +421,10 @@ fn columns_cross_what_is_drawn() {
 
             // Air and ground take turns, and the sky is open.
             for (i, span) in spans.iter().enumerate() {
-                assert!(span.ceiling.is_none_or(|top| top >= span.floor), "{what}: {spans:?}");
+                // Along an edge a span may be a gap of no height, up to rounding.
+                assert!(span.ceiling.is_none_or(|top| top >= span.floor - 1e-9), "{what}: {spans:?}");
                 assert_eq!(span.ceiling.is_none(), i + 1 == spans.len(), "{what}: {spans:?}");
-                assert!(i == 0 || spans[i - 1].ceiling.is_some_and(|top| top <= span.floor), "{what}: {spans:?}");
+                assert!(i == 0 || spans[i - 1].ceiling.is_some_and(|top| top <= span.floor + 1e-9), "{what}: {spans:?}");
             }
             assert_eq!(world.height(x, z), spans.last().map(|span| span.floor), "{what}");
 
@@ -436,8 +441,8 @@ fn columns_cross_what_is_drawn() {
                 continue;
             }
             close_calls += 1;
-            let inside = |at: f64, end: f64| at.clamp(NUDGE / 10.0, end - NUDGE / 10.0);
-            let beside = STEPS.map(|(dx, dz)| soup.column(inside(x + dx, width), inside(z + dz, depth)));
+            let beside: Vec<Vec<(f64, bool)>> =
+                steps().map(|(dx, dz)| soup.column(inside(x + dx, width), inside(z + dz, depth))).collect();
             assert!(
                 beside.iter().any(|expected| agrees(expected)),
                 "{what}: {answer:?}, but brute force {expected:?}, and beside the column {beside:?}"
@@ -494,22 +499,21 @@ fn the_normal_of_a_place_is_that_of_the_triangle_over_or_below_it() {
     for (name, terrain) in dug_worlds() {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(81));
         let soup = Soup::of(world);
+        let (width, depth) = (f64::from(world.grid().width()), f64::from(world.grid().depth()));
         for _ in 0..400 {
             let (x, z) = random_column(&mut rng, world, &soup);
-            let near = soup.near(DVec3::new(x, 0.0, z), DVec3::Y);
-            let from = DVec3::new(x, -1e5, z);
-            let crossings: Vec<(f64, u32)> = near
-                .into_iter()
-                .filter_map(|number| Some((meet(from, DVec3::Y, &soup.triangles[number as usize], 1e-6)? - 1e5, number)))
-                .collect();
-            let Some(&(y, _)) = crossings.get(rng.usize(0..crossings.len().max(1))) else { continue };
+            let crossings = soup.crossings(x, z);
+            let Some(&(y, ..)) = crossings.get(rng.usize(0..crossings.len().max(1))) else { continue };
             let place = DVec3::new(x, y + (rng.f64() - 0.5) * 0.01, z);
-            let nearest = crossings.iter().map(|crossing| (crossing.0 - place.y).abs()).fold(f64::INFINITY, f64::min);
-            let candidates: Vec<DVec3> = crossings
-                .iter()
-                .filter(|crossing| (crossing.0 - place.y).abs() < nearest + 1e-3)
-                .map(|crossing| soup.normal(crossing.1))
-                .collect();
+            let mut candidates = Vec::new();
+            for (dx, dz) in steps() {
+                let crossings = soup.crossings(inside(x + dx, width), inside(z + dz, depth));
+                let apart = |crossing: &(f64, bool, u32)| (crossing.0 - place.y).abs();
+                let nearest = crossings.iter().map(apart).fold(f64::INFINITY, f64::min);
+                // A step of a millionth is a long way down a steep triangle.
+                let nearest = crossings.iter().filter(|crossing| apart(crossing) < nearest + 0.02);
+                candidates.extend(nearest.map(|crossing| soup.normal(crossing.2)));
+            }
             let normal = world.normal(place).map(|normal| normal.as_dvec3());
             let alike = |candidate: &DVec3| normal.is_some_and(|normal| normal.dot(*candidate) > 1.0 - 1e-6);
             assert!(
@@ -520,4 +524,168 @@ fn the_normal_of_a_place_is_that_of_the_triangle_over_or_below_it() {
         }
     }
     assert!(asked > 5000, "{asked}");
+}
+
+/// Level ground with hills, a tunnel and a bridge.
+fn small_terrain() -> Terrain {
+    let height = |x: i32, z: i32| 10.0 + f64::from((x * 5 + z * 3) % 7) / 2.0;
+    let ground = Ground::from_fn(40, 30, height).expect("finite heights");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    terrain.apply([
+        Brush::dig(Shape::capsule(Vec3::new(5.0, 5.0, 15.0), Vec3::new(35.0, 5.0, 15.0), 2.5)),
+        Brush::add(Shape::capsule(Vec3::new(5.0, 20.0, 5.0), Vec3::new(35.0, 20.0, 25.0), 2.0), MaterialId(4)),
+    ]);
+    terrain
+}
+
+#[test]
+fn numbers_that_mean_nothing_have_no_answer() {
+    let terrain = small_terrain();
+    let world = terrain.world();
+    let (place, down) = (DVec3::new(20.5, 40.0, 15.2), DVec3::NEG_Y);
+    assert!(world.raycast(place, down, 100.0).is_some());
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for broken in [DVec3::new(bad, 1.0, 1.0), DVec3::new(1.0, bad, 1.0), DVec3::new(1.0, 1.0, bad), DVec3::splat(bad)] {
+            assert_eq!(world.raycast(broken, down, 100.0), None, "{broken}");
+            assert_eq!(world.raycast(place, broken, 100.0), None, "{broken}");
+            // Only x and z matter to columns.
+            if !broken.x.is_finite() || !broken.z.is_finite() {
+                assert_eq!(world.normal(broken), None, "{broken}");
+                assert!(!world.is_solid(broken), "{broken}");
+            } else {
+                let _ = (world.normal(broken), world.is_solid(broken));
+            }
+            let _ = world.material_under(broken);
+        }
+        for (x, z) in [(bad, 3.0), (3.0, bad), (bad, bad)] {
+            assert_eq!(world.spans(x, z), [], "{x}, {z}");
+            assert_eq!(world.height(x, z), None, "{x}, {z}");
+        }
+    }
+    assert_eq!(world.raycast(place, DVec3::ZERO, 100.0), None);
+    assert_eq!(world.raycast(place, down, f64::NAN), None);
+    assert_eq!(world.raycast(place, down, -1.0), None);
+    assert_eq!(world.raycast(place, down, f64::NEG_INFINITY), None);
+    assert_eq!(world.raycast(place, down, 0.0), None);
+}
+
+#[test]
+fn outside_the_world_there_is_nothing() {
+    let terrain = small_terrain();
+    let world = terrain.world();
+    for (x, z) in [(-0.001, 5.0), (40.001, 5.0), (5.0, -0.001), (5.0, 30.001), (-1e300, 5.0), (5.0, 1e300), (f64::MAX, f64::MIN)] {
+        assert_eq!(world.spans(x, z), [], "{x}, {z}");
+        assert_eq!(world.height(x, z), None, "{x}, {z}");
+        assert_eq!(world.normal(DVec3::new(x, 10.0, z)), None, "{x}, {z}");
+        assert!(!world.is_solid(DVec3::new(x, -50.0, z)), "{x}, {z}");
+        assert_eq!(world.raycast(DVec3::new(x, 50.0, z), DVec3::NEG_Y, f64::INFINITY), None, "{x}, {z}");
+    }
+    // The rim belongs to the world.
+    for (x, z) in [(0.0, 0.0), (40.0, 0.0), (0.0, 30.0), (40.0, 30.0), (-0.0, 12.5)] {
+        assert!(world.height(x, z).is_some(), "{x}, {z}");
+        assert!(world.is_solid(DVec3::new(x, 0.0, z)), "{x}, {z}");
+        assert!(world.raycast(DVec3::new(x, 50.0, z), DVec3::NEG_Y, f64::INFINITY).is_some(), "{x}, {z}");
+    }
+}
+
+#[test]
+fn numbers_of_any_size_end_in_an_answer() {
+    let terrain = small_terrain();
+    let world = terrain.world();
+    let tiny = f64::from_bits(1);
+    let sizes = [0.0, -0.0, tiny, -tiny, 1e-300, 1e-160, -1e-9, 1.0, -1.0, 15.0, 1e9, -1e15, 1e160, 1e300, -1e300, f64::MAX];
+    let mut rng = Rng::with_seed(6);
+    for _ in 0..4000 {
+        let mut pick = || sizes[rng.usize(0..sizes.len())];
+        let (origin, direction) = (DVec3::new(pick(), pick(), pick()), DVec3::new(pick(), pick(), pick()));
+        let max = [0.0, 1.0, 1e9, f64::MAX, f64::INFINITY, tiny][rng.usize(0..6)];
+        if let Some(hit) = world.raycast(origin, direction, max) {
+            assert!(hit.distance >= 0.0 && hit.distance <= max, "{origin} {direction} {max}: {hit:?}");
+            assert!(hit.position.is_finite() && hit.normal.is_finite(), "{origin} {direction} {max}: {hit:?}");
+        }
+        let _ = (world.spans(origin.x, origin.z), world.is_solid(origin), world.normal(origin), world.material_under(origin));
+    }
+}
+
+#[test]
+fn only_the_direction_of_a_direction_counts() {
+    let terrain = small_terrain();
+    let world = terrain.world();
+    let mut rng = Rng::with_seed(9);
+    for _ in 0..300 {
+        let origin = DVec3::new(rng.f64() * 40.0, 12.0 + rng.f64() * 20.0, rng.f64() * 30.0);
+        let direction = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.8, rng.f64() - 0.5).normalize();
+        let expected = world.raycast(origin, direction, 1e3).map(|hit| hit.distance);
+        for length in [1e-300, 1e-160, 1e-30, 1e30, 1e160, 1e300] {
+            let found = world.raycast(origin, direction * length, 1e3).map(|hit| hit.distance);
+            let agree = match (expected, found) {
+                (Some(a), Some(b)) => (a - b).abs() <= TOLERANCE,
+                (a, b) => a == b,
+            };
+            assert!(agree, "from {origin:?} along {direction:?} {expected:?}, but {found:?} at length {length:e}");
+        }
+    }
+}
+
+#[test]
+fn rays_from_far_away_slip_through_no_edge() {
+    let terrain = small_terrain();
+    let world = terrain.world();
+    let soup = Soup::of(world);
+    let mut rng = Rng::with_seed(12);
+    // Everything is ground below y = 0, so a ray that comes from the sky and goes below it has hit something.
+    for _ in 0..5000 {
+        let [a, b, _] = soup.triangles[rng.usize(0..soup.triangles.len())];
+        let target = [a, (a + b) / 2.0, a.lerp(b, rng.f64()), a.lerp(b, 0.25)][rng.usize(0..4)];
+        if !(1.0..39.0).contains(&target.x) || !(1.0..29.0).contains(&target.z) {
+            continue;
+        }
+        let away = match rng.u32(0..3) {
+            0 => DVec3::new(rng.f64() - 0.5, 4.0, rng.f64() - 0.5),
+            1 => DVec3::new(f64::from(rng.i32(-2..=2)) * 0.125, 4.0, f64::from(rng.i32(-2..=2)) * 0.125),
+            _ => DVec3::new(0.0, 1.0, 0.0),
+        };
+        let origin = target + away * [10.0, 1e3, 1e5, 1e7, 1e9][rng.usize(0..5)];
+        let hit = world.raycast(origin, target - origin, f64::INFINITY);
+        let y = hit.map(|hit| hit.position.y);
+        assert!(y.is_some_and(|y| y > 2.0), "from {origin:?} to {target:?}: {hit:?}");
+    }
+}
+
+#[test]
+fn a_place_is_ready_unless_an_edit_is_on_its_way_to_it() {
+    let mut terrain = small_terrain();
+    let around = |x: i32, y: i32, z: i32, by: i32| LatticeBox::point(IVec3::new(x, y, z)).grown(by);
+    let (here, there) = (around(10, 10, 10, 3), around(35, 10, 25, 3));
+    let dig = Brush::dig(Shape::sphere(Vec3::new(10.0, 10.0, 10.0), 2.0));
+    assert!(terrain.is_ready(here) && terrain.is_ready(there));
+
+    // Queued.
+    terrain.submit(&dig);
+    assert!(!terrain.is_ready(here) && terrain.is_ready(there));
+    // The reach is 4 voxels: the radius and two more.
+    assert!(!terrain.is_ready(around(14, 10, 10, 0)) && terrain.is_ready(around(15, 10, 10, 0)));
+    assert!(!terrain.is_ready(around(15, 10, 10, 1)));
+
+    // Under way, with another one queued elsewhere.
+    let transaction = terrain.begin().expect("an edit waits");
+    assert!(!terrain.is_ready(here) && terrain.is_ready(there));
+    terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(35.0, 10.0, 25.0), 2.0)));
+    assert!(!terrain.is_ready(here) && !terrain.is_ready(there));
+    let commit = transaction.run();
+    assert!(!terrain.is_ready(here), "computed, but not committed");
+    terrain.commit(commit).expect("nothing came in between");
+    assert!(terrain.is_ready(here) && !terrain.is_ready(there));
+
+    // Given up, and so queued again.
+    let lost = terrain.begin().expect("an edit waits");
+    drop(lost);
+    terrain.abandon();
+    assert!(terrain.is_ready(here) && !terrain.is_ready(there));
+    terrain.apply(std::iter::empty::<Brush>());
+    assert!(terrain.is_ready(here) && terrain.is_ready(there));
+
+    // A brush that will be rejected is no edit.
+    terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(10.0, f32::NAN, 10.0), 2.0)));
+    assert!(terrain.is_ready(here));
 }

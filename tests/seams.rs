@@ -34,7 +34,9 @@ fn random_worlds_are_flawless() {
         }
     });
     assert!(cells > 0, "no world was dug at its surface");
-    println!("{worlds} worlds, {triangles} triangles, {cells} cells drawn by marching cubes: all closed, all manifold");
+    println!(
+        "{worlds} worlds, {triangles} triangles, {cells} cells drawn by marching cubes: all closed, all manifold"
+    );
 }
 
 #[test]

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
-use bevy::asset::{AssetLoadFailedEvent, AssetPath};
+use bevy::asset::AssetLoadFailedEvent;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_burrow::prelude::*;
@@ -37,13 +37,14 @@ pub const MATERIALS: [(MaterialId, &str); 8] = [
 /// Heights of 403 x 344 samples, 16 bit.
 const SURVEY: &[u8] = include_bytes!("../../assets/jacksboro_fault.png");
 const SURVEY_PATH: &str = "digger/jacksboro_fault.png";
+const SURVEY_ASSET: &str = "embedded://digger/jacksboro_fault.png";
 
-/// One sample every three voxels: 1206 x 1029 cells, and 150 voxels from the lowest to the highest.
+/// One sample every three voxels: 1206 x 1029 cells, and 120 voxels from the lowest to the highest.
 const SCALE: ImageScale = ImageScale {
     voxels_per_sample: 3,
     low: 0.0,
-    high: 150.0,
-    detail: Some(Detail { amplitude: 1.1, scale: 14.0, octaves: 4, seed: 17 }),
+    high: 120.0,
+    detail: Some(Detail { amplitude: 1.2, scale: 9.0, octaves: 4, seed: 17 }),
 };
 
 /// Loads the survey, makes ground of it and spawns the terrain; [`Places`] is a resource from then on.
@@ -67,8 +68,7 @@ struct Survey(Handle<HeightmapImage>);
 struct Shaping(Task<Result<(Terrain, Places), String>>);
 
 fn open_survey(mut commands: Commands, assets: Res<AssetServer>) {
-    let path = AssetPath::parse(SURVEY_PATH).with_source("embedded");
-    commands.insert_resource(Survey(assets.load(path)));
+    commands.insert_resource(Survey(assets.load(SURVEY_ASSET)));
 }
 
 /// Hands the picture to a task as soon as it is there.
@@ -95,20 +95,20 @@ fn vegetation() -> MaterialControl {
     let everywhere = MaterialRule::default();
     let snow = MaterialRule {
         overlay: SNOW,
-        height: (112.0, f64::INFINITY),
-        height_fade: 14.0,
+        height: (92.0, f64::INFINITY),
+        height_fade: 12.0,
         slope: (0.0, 1.0),
         slope_fade: 0.6,
         ..everywhere
     };
     let sand = MaterialRule {
         overlay: SAND,
-        height: (f64::NEG_INFINITY, 9.0),
-        height_fade: 5.0,
+        height: (f64::NEG_INFINITY, 7.0),
+        height_fade: 4.0,
         slope: (0.0, 0.35),
         slope_fade: 0.3,
     };
-    let grass = MaterialRule { overlay: GRASS, slope: (0.0, 0.75), slope_fade: 0.55, ..everywhere };
+    let grass = MaterialRule { overlay: GRASS, slope: (0.0, 0.95), slope_fade: 0.5, ..everywhere };
     MaterialControl::Rules { base: ROCK, rules: vec![snow, sand, grass] }
 }
 

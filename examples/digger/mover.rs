@@ -26,6 +26,8 @@ const FASTEST_FALL: f32 = 50.0;
 const JUMP: f32 = 1.4;
 /// The highest step that is walked up without a jump.
 const STEP: f32 = 0.6;
+/// Rise over run from which on nobody can stand.
+const STEEP: f32 = 2.0;
 /// How far below the soles the ground may sink for the body to stay on it, on its way downhill.
 const CLING: f32 = 0.3;
 /// The longest way that is taken without looking, however long a frame is.
@@ -78,7 +80,7 @@ pub struct Body {
 struct Room {
     low: f32,
     high: f32,
-    /// Towards where the floor rises, not normalised.
+    /// Towards where the floor rises, as long as its rise over run.
     uphill: Vec2,
 }
 
@@ -119,6 +121,8 @@ fn room(ground: &impl Air, feet: Vec3) -> Result<Room, Vec2> {
     if walled {
         return Err(-walls.normalize_or_zero());
     }
+    // The least-squares plane through all floors: a ring of n lines gives n/2 times its radius squared.
+    room.uphill /= (4.0 / 8.0 + 8.0 / 2.0) * RADIUS * RADIUS;
     if room.low > room.high { Err(-room.uphill.normalize_or_zero()) } else { Ok(room) }
 }
 
@@ -166,10 +170,15 @@ impl Body {
         let Ok(room) = room(ground, self.feet) else { return };
         let y = self.feet.y + self.velocity.y * dt;
         let clings = self.grounded && self.velocity.y <= 0.0 && y - room.low <= CLING;
-        self.grounded = y <= room.low || clings;
-        if self.grounded {
+        self.grounded = (y <= room.low || clings) && room.uphill.length() < STEEP;
+        if y <= room.low || clings {
             self.feet.y = room.low;
             self.velocity.y = 0.0;
+            if !self.grounded {
+                // Too steep to stand: slide down.
+                let downhill = -room.uphill.normalize() * GRAVITY * dt;
+                self.velocity += Vec3::new(downhill.x, 0.0, downhill.y);
+            }
         } else if y > room.high {
             self.feet.y = room.high;
             self.velocity.y = self.velocity.y.min(0.0);
@@ -206,16 +215,16 @@ impl Body {
         let feet = self.feet + Vec3::new(way.x, 0.0, way.y);
         let room = room(ground, feet)?;
         let y = feet.y.clamp(room.low, room.high);
-        let downhill = || if room.uphill == Vec2::ZERO { -way.normalize_or_zero() } else { -room.uphill.normalize() };
+        let uphill = room.uphill.try_normalize().unwrap_or(way.normalize_or_zero());
         if (y - feet.y).abs() > STEP {
-            return Err(downhill());
+            return Err(-uphill);
         }
         if y > feet.y + HAIR {
-            // Uphill. The ground just before the toes says whether this is a step or the foot of a wall.
-            let toes = feet.xz() + way.normalize_or_zero() * (RADIUS + 0.1);
+            // The ground just before the toes says whether this is a step or the foot of a wall.
+            let toes = feet.xz() + uphill * (RADIUS + 0.1);
             let floor = air_around(ground, toes, feet.y + HEIGHT / 2.0).map(|air| air.0);
             if floor.is_none_or(|floor| floor > self.feet.y + STEP) {
-                return Err(downhill());
+                return Err(-uphill);
             }
         }
         Ok(feet.with_y(y))

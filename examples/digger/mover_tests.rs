@@ -6,20 +6,12 @@ use bevy_burrow::terrain::{Terrain, TerrainSettings};
 
 use super::*;
 
-/// Numbers that look random and are the same in every run (xorshift).
-struct Dice(u64);
+/// Chance, the same in every run.
+struct Dice(fastrand::Rng);
 
 impl Dice {
-    /// From 0 to 1.
-    fn roll(&mut self) -> f32 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
-
     fn between(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.roll()
+        low + (high - low) * self.0.f32()
     }
 
     fn place(&mut self) -> Vec3 {
@@ -63,7 +55,7 @@ fn assert_in_the_air(body: &Body, ground: &terrain::World, when: &str) {
 
 #[test]
 fn nobody_ever_gets_into_solid_ground() {
-    let mut dice = Dice(0x9E37_79B9_7F4A_7C15);
+    let mut dice = Dice(fastrand::Rng::with_seed(17));
     for walk in 0..4 {
         let mut terrain = rough_country(&mut dice);
         let mut body = Body::at(Vec3::new(32.0, 60.0, 32.0));
@@ -71,7 +63,7 @@ fn nobody_ever_gets_into_solid_ground() {
         for step in 0..2_500 {
             if step % 25 == 0 {
                 let direction = Vec2::from_angle(dice.between(0.0, TAU));
-                steering = Steering { direction, run: dice.roll() < 0.5, jump: dice.roll() < 0.4 };
+                steering = Steering { direction, run: dice.0.bool(), jump: dice.0.u8(..) < 100 };
             }
             if step % 250 == 249 {
                 // Someone digs under him, or builds over him.
@@ -112,6 +104,17 @@ fn gentle_slopes_are_walked_and_walls_are_not() {
             }
             assert_eq!(body.feet.x > 28.0, climbs, "slope {slope} at {fps} fps: {body:?}");
         }
+    }
+}
+
+#[test]
+fn nobody_jumps_up_a_cliff() {
+    let terrain = terrain(|x, _| 5.0 + 6.0 * f64::from((x - 30).clamp(0, 4)));
+    let mut body = Body::at(Vec3::new(26.0, 5.0, 20.0));
+    for step in 0..3_600 {
+        let steering = Steering { direction: Vec2::X, run: step % 2 == 0, jump: true };
+        body.advance(terrain.world(), &steering, 1.0 / 60.0);
+        assert!(body.feet.y < 12.0, "step {step}: {body:?}");
     }
 }
 

@@ -50,6 +50,8 @@ pub struct Ravine {
     pub from: Vec3,
     /// The ground of the other, along +x or +z.
     pub to: Vec3,
+    /// The ground some steps behind each bank.
+    pub behind: [Vec3; 2],
     /// The lowest ground between.
     pub bottom: f32,
 }
@@ -130,6 +132,15 @@ impl Relief<'_> {
                 if steep <= 10.0 || hill < 30.0 || roughness > 1.6 || uneven > 8.0 {
                     return None;
                 }
+                let open = [-28.0, 28.0].into_iter().all(|aside| {
+                    [12.0, 26.0].into_iter().all(|back| {
+                        self.height(foot - inward * back + inward.perp() * aside) < mouth.y + 12.0
+                    })
+                });
+                let sunny = (0..5).all(|i| self.is_sunny(self.at(foot - inward * (8 * i - 4) as f32)));
+                if !(open && sunny) {
+                    return None;
+                }
                 let bends = [-0.75, 0.75].map(|angle| Hillside { mouth, inward, onward: Vec2::from_angle(angle).rotate(inward) });
                 let covered = bends.into_iter().find(|hillside| self.covers(hillside))?;
                 let sun = -inward.dot(SUN.xz().normalize());
@@ -138,6 +149,11 @@ impl Relief<'_> {
             })
         });
         found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, hillside)| hillside)
+    }
+
+    /// Does the sun reach the ground there?
+    fn is_sunny(&self, place: Vec3) -> bool {
+        (2..=60).map(|i| place + Vec3::Y + SUN * 3.0 * i as f32).all(|high| self.height(high.xz()) < high.y)
     }
 
     /// Is there rock over all of the tunnel but its first metres, and around its room?
@@ -164,15 +180,16 @@ impl Relief<'_> {
                 let bottom = between.iter().copied().fold(f32::INFINITY, f32::min);
                 let middle = between[5..14].iter().copied().fold(f32::NEG_INFINITY, f32::max);
                 let top = between.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                let behind = [(from, -axis), (to, axis)].map(|(bank, out)| self.at(bank.xz() + out * 12.0));
                 let banks = [(from, -axis), (to, axis)].into_iter().all(|(bank, out)| {
-                    let beside = [out * 6.0, axis.perp() * 4.0, axis.perp() * -4.0];
+                    let beside = [out * 6.0, out * 12.0, axis.perp() * 4.0, axis.perp() * -4.0];
                     beside.into_iter().all(|offset| (self.height(bank.xz() + offset) - bank.y).abs() < 3.0)
                 });
                 let depth = low - bottom;
                 let fits = (from.y - to.y).abs() <= 1.5 && (8.0..=20.0).contains(&depth) && low - middle > 4.0 && top <= low + 0.5;
                 let apart = place.distance(hillside.mouth.xz());
                 let score = depth - 2.0 * (from.y - to.y).abs() - 0.1 * length - 0.015 * apart;
-                (fits && banks).then_some((score, Ravine { from, to, bottom }))
+                (fits && banks).then_some((score, Ravine { from, to, behind, bottom }))
             })
         });
         found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, ravine)| ravine)

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! cargo run --release --no-default-features --example export -- \
-//!     --heights assets/jacksboro_fault.png --voxels-per-sample 4 --height-range 0 200 \
-//!     --edits edits.jsonl --chunk-size 32 --out out/export
+//!     --heights assets/jacksboro_fault.png --voxels-per-sample 3 --height-range 0 150 \
+//!     --edits examples/export/edits.jsonl --chunk-size 32 --out out/export
 //! ```
 //!
-//! `edits.jsonl` holds one edit a line; blank lines and lines that start with `#` are skipped:
+//! `--edits` holds one edit a line; blank lines and lines that start with `#` are skipped:
 //!
 //! ```json
 //! {"shape":"sphere","center":[64,40,64],"radius":6,"op":"dig"}

@@ -269,7 +269,6 @@ fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
         (&["--voxels-per-sample", "0"], "voxels per sample is 0"),
         (&["--voxels-per-sample", "65"], "voxels per sample is 65"),
         (&["--height-range", "0", "nan"], "height of full grey is NaN"),
-        (&["--height-range", "-inf", "0"], "height of grey 0 is -inf"),
         (&["--height-range", "0", "40000"], "height of full grey is 40000"),
         (&["--height-range", "0"], "2 values required"),
         (&["--batch", "0"], "--batch"),

@@ -6,8 +6,8 @@ use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
 use super::extent::Extent;
-use crate::lattice::hash::hash_words;
 use super::material::{ColumnMaterial, MaterialId};
+use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, ONE};
 
 /// The pristine world: a height and materials for each column (x, z) with x in `0..=width` and z in `0..=depth`.

@@ -199,7 +199,9 @@ mod tests {
             for point in world.points() {
                 let chunk = grid.chunk_of(point);
                 assert!(grid.chunk_samples(chunk).contains(point));
-                let owners = grid.chunks_of(LatticeBox::point(point).grown(1)).filter(|&c| grid.chunk_samples(c).contains(point));
+                let owners = grid
+                    .chunks_of(LatticeBox::point(point).grown(1))
+                    .filter(|&c| grid.chunk_samples(c).contains(point));
                 assert_eq!(owners.count(), 1);
             }
         }

@@ -77,7 +77,8 @@ pub(super) fn begin_transactions(
             let updates = std::mem::take(&mut commit.meshes);
             let tiles = updates.tiles.iter().map(|(tile, surface)| (Drawn::Tile(*tile), surface));
             let chunks = updates.chunks.iter().map(|(chunk, surface)| (Drawn::Chunk(*chunk), surface));
-            let build = |(drawn, surface)| (drawn, if draws { meshes::build(surface, &colors) } else { None });
+            let build =
+                |(drawn, surface)| (drawn, if draws { meshes::build(surface, &colors) } else { None });
             let meshes = tiles.chain(chunks).map(build).collect();
             Prepared { commit, meshes, took: start.elapsed() }
         });
@@ -125,7 +126,9 @@ pub(super) fn commit_transactions(
                         commands.trigger(ChunkChanged { entity: child });
                         child
                     }
-                    None if ready.is_some() => spawn_chunk(&mut commands, &mut entities, entity, world, chunk),
+                    None if ready.is_some() => {
+                        spawn_chunk(&mut commands, &mut entities, entity, world, chunk)
+                    }
                     None => continue,
                 }),
             };
@@ -147,7 +150,13 @@ pub(super) fn commit_transactions(
 }
 
 /// Puts a mesh in place of an entity's old one, under the same handle.
-fn swap(commands: &mut Commands, assets: &mut Assets<Mesh>, child: Entity, shown: Option<&Mesh3d>, ready: Ready) {
+fn swap(
+    commands: &mut Commands,
+    assets: &mut Assets<Mesh>,
+    child: Entity,
+    shown: Option<&Mesh3d>,
+    ready: Ready,
+) {
     let Ok(mut child) = commands.get_entity(child) else { return };
     match (ready, shown) {
         (None, _) => {

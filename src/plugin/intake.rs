@@ -18,7 +18,8 @@ pub(super) fn collect_brushes(
 ) {
     let start = Instant::now();
     let mut reject = |brush: &Brush, terrain, rejection| {
-        receipts.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
+        receipts
+            .write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
     };
     for brush in brushes.read() {
         let mut taken = false;

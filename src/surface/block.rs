@@ -59,7 +59,8 @@ impl<'a> Apron<'a> {
                 let stack = ((z + 7) / 8 * 3 + (x + 7) / 8) as usize;
                 for y in 0..SIDE {
                     let point = column.at(low.y + y);
-                    let sample = bricks[(y + 7) as usize / 8 * 9 + stack].map_or(Sample::PRISTINE, |b| b.sample(point));
+                    let sample = bricks[(y + 7) as usize / 8 * 9 + stack]
+                        .map_or(Sample::PRISTINE, |b| b.sample(point));
                     let at = ((y * SIDE + z) * SIDE + x) as usize;
                     apron.edited[at] = sample != Sample::PRISTINE;
                     apron.distances[at] =

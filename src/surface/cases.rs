@@ -143,7 +143,8 @@ fn flat_diagonals(triangles: &[[Edge; 3]], polygon: &[Edge]) -> usize {
 fn unlike_tile(triangles: &[[Edge; 3]]) -> (bool, usize) {
     const OVER_LOW_COLUMN: Edge = 4;
     const OVER_HIGH_COLUMN: Edge = 7;
-    let touches = |triangle: &[Edge; 3]| [OVER_LOW_COLUMN, OVER_HIGH_COLUMN].map(|edge| triangle.contains(&edge));
+    let touches =
+        |triangle: &[Edge; 3]| [OVER_LOW_COLUMN, OVER_HIGH_COLUMN].map(|edge| triangle.contains(&edge));
     let has_diagonal = triangles.iter().any(|triangle| touches(triangle) == [true; 2]);
     (!has_diagonal, triangles.iter().filter(|triangle| touches(triangle) == [false; 2]).count())
 }
@@ -218,7 +219,10 @@ mod tests {
             for pattern in 0..16 {
                 let cases = (0..256).filter(|case| (0..4).all(|i| case >> ring[i] & 1 == pattern >> i & 1));
                 let drawn: Vec<_> = cases.map(|case| sides(case, &ring)).collect();
-                assert!(drawn.windows(2).all(|pair| pair[0] == pair[1]), "face {ring:?} pattern {pattern:04b}");
+                assert!(
+                    drawn.windows(2).all(|pair| pair[0] == pair[1]),
+                    "face {ring:?} pattern {pattern:04b}"
+                );
             }
         }
     }

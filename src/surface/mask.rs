@@ -11,7 +11,8 @@ use crate::volume::SampleView;
 /// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
 /// lattice point counts below it.
 pub fn sheet(heights: impl IntoIterator<Item = i32>) -> Range<i32> {
-    let (low, high) = heights.into_iter().fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
+    let (low, high) =
+        heights.into_iter().fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
     let ceil = |height: i32| height.div_euclid(ONE) + i32::from(height.rem_euclid(ONE) != 0);
     ceil(low) - 1..ceil(high)
 }
@@ -71,7 +72,9 @@ impl Mask {
     /// Every cell of the mask, in no order.
     pub fn iter(&self) -> impl Iterator<Item = Column> {
         self.0.iter().flat_map(|(&(x, z), &bits)| {
-            (0..64).filter(move |bit| bits >> bit & 1 == 1).map(move |bit| Column::new(x << 3 | bit & 7, z << 3 | bit >> 3))
+            (0..64)
+                .filter(move |bit| bits >> bit & 1 == 1)
+                .map(move |bit| Column::new(x << 3 | bit & 7, z << 3 | bit >> 3))
         })
     }
 
@@ -114,8 +117,8 @@ impl<'a> MaskView<'a> {
     pub fn borders(&self, low: Column, high: Column) -> Borders {
         let (width, depth) = ((high.x - low.x).max(0) as usize, (high.z - low.z).max(0) as usize);
         let mut borders = Borders { low, width, cells: vec![0; width * depth] };
-        for z in low.z - 1 >> 3..=high.z >> 3 {
-            for x in low.x - 1 >> 3..=high.x >> 3 {
+        for z in (low.z - 1) >> 3..=high.z >> 3 {
+            for x in (low.x - 1) >> 3..=high.x >> 3 {
                 let mut bits = self.word((x, z));
                 while bits != 0 {
                     let bit = bits.trailing_zeros() as i32;
@@ -170,7 +173,7 @@ mod tests {
     #[test]
     fn the_sheet_holds_every_cube_with_both_signs() {
         let cases = [
-            ([0, 0], -1..0),            // on a lattice point: the cube below
+            ([0, 0], -1..0), // on a lattice point: the cube below
             ([1, 1], 0..1),
             ([ONE, ONE + 1], 0..2),
             ([-ONE, 2 * ONE], -2..2),

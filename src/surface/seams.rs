@@ -202,7 +202,8 @@ impl SeamSoup {
     /// An edge is on the rim when both its ends lie on the same outer side of the world.
     fn on_rim(&self, u: u32, v: u32, grid: ChunkGrid) -> bool {
         let (u, v) = (self.places[u as usize], self.places[v as usize]);
-        let (width, depth) = (i64::from(grid.width()) * i64::from(SNAP), i64::from(grid.depth()) * i64::from(SNAP));
+        let (width, depth) =
+            (i64::from(grid.width()) * i64::from(SNAP), i64::from(grid.depth()) * i64::from(SNAP));
         let both = |at: i64, u: i64, v: i64| u == at && v == at;
         both(0, u.x, v.x) || both(width, u.x, v.x) || both(0, u.z, v.z) || both(depth, u.z, v.z)
     }

@@ -36,7 +36,8 @@ pub fn columns(world: &WorldView, tile: TilePos) -> Vec<Vertex> {
 pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
     let (low, high) = world.grid.tile_cells(tile);
     let width = (high.x - low.x + 1) as u32;
-    let mut ring = Ring { world, origin: low.at(0), base: width * (high.z - low.z + 1) as u32, vertices: Vec::new() };
+    let mut ring =
+        Ring { world, origin: low.at(0), base: width * (high.z - low.z + 1) as u32, vertices: Vec::new() };
     let mut indices = Vec::with_capacity(6 * ((high.x - low.x) * (high.z - low.z)) as usize);
     let borders = world.mask.borders(low, high);
     for z in low.z..high.z {

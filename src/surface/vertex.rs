@@ -151,7 +151,9 @@ fn materials(lattice: &impl Lattice, p: IVec3, q: IVec3, step: i32) -> MaterialM
     }
     let ground = lattice.ground();
     let (a, b) = (Column::of(p), Column::of(q));
-    let between = |low: i32, high: i32| low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32;
+    let between = |low: i32, high: i32| {
+        low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
+    };
     let depth = between(ground.height(a), ground.height(b)) - between(p.y * ONE, q.y * ONE);
     let own = |column| {
         let material = ground.column_material(column);

@@ -60,7 +60,9 @@ pub enum TerrainError {
 
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("this terrain does not wait for that commit; its transaction was given up, or belongs to another terrain")]
+#[error(
+    "this terrain does not wait for that commit; its transaction was given up, or belongs to another terrain"
+)]
 pub struct StaleCommit;
 
 /// A number that no other transaction or world of this process has.
@@ -106,7 +108,12 @@ impl Terrain {
             return Err(TerrainError::VoxelSize(settings.voxel_size));
         }
         let world = World::new(ground.into(), settings.chunk_size as i32);
-        Ok(Self { world: Arc::new(world), voxel_size: settings.voxel_size, queue: Vec::new(), in_flight: None })
+        Ok(Self {
+            world: Arc::new(world),
+            voxel_size: settings.voxel_size,
+            queue: Vec::new(),
+            in_flight: None,
+        })
     }
 
     /// Metres along a voxel's side.
@@ -186,7 +193,10 @@ impl Terrain {
     /// Returns the receipts of these brushes. Tools and tests want this; a game lets the plugin do it.
     ///
     /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
-    pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
+    pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(
+        &mut self,
+        brushes: impl IntoIterator<Item = B>,
+    ) -> Vec<Receipt> {
         self.abandon();
         let waiting = self.queue.len();
         for brush in brushes {

@@ -143,7 +143,10 @@ impl World {
     /// Is the place inside the ground? Places outside the world are not.
     pub fn is_solid(&self, place: DVec3) -> bool {
         let spans = self.spans(place.x, place.z);
-        !spans.is_empty() && !spans.iter().any(|span| span.floor <= place.y && span.ceiling.is_none_or(|top| place.y <= top))
+        !spans.is_empty()
+            && !spans
+                .iter()
+                .any(|span| span.floor <= place.y && span.ceiling.is_none_or(|top| place.y <= top))
     }
 
     /// The surface's unit normal where it is nearest to `place` along y, `None` outside the world.
@@ -163,7 +166,10 @@ impl World {
         let apart = |point: &IVec3| point.as_dvec3().distance_squared(place);
         let solid = (0..8).map(corner).filter(|&point| samples.is_solid(point));
         let nearest = solid.min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        nearest.map_or_else(|| self.ground.material(place.round().as_ivec3() - IVec3::Y), |point| samples.material(point))
+        nearest.map_or_else(
+            || self.ground.material(place.round().as_ivec3() - IVec3::Y),
+            |point| samples.material(point),
+        )
     }
 
     /// Where the vertical line through (x, z) crosses the surface, lowest first: height, and whether it is a floor.
@@ -180,7 +186,8 @@ impl World {
         let cell = Column::new((px / FINE) as i32, (pz / FINE) as i32);
         let mut found = Vec::new();
         for_triangles(self, &self.view(), cell, f64::NEG_INFINITY, f64::INFINITY, |triangle| {
-            let [a, b, c] = triangle.map(|p| ((p.x * FINE as f64) as i64 - px, (p.z * FINE as f64) as i64 - pz));
+            let [a, b, c] =
+                triangle.map(|p| ((p.x * FINE as f64) as i64 - px, (p.z * FINE as f64) as i64 - pz));
             let (ab, bc, ca) = (turn(a, b), turn(b, c), turn(c, a));
             // Counter-clockwise from above is clockwise in (x, z): a floor has all turns negative.
             if ab == bc && bc == ca {
@@ -219,7 +226,8 @@ fn for_triangles(
     let is_volumetric = view.mask.contains(cell);
     let meets = |rows: &Range<i32>| f64::from(rows.start) <= high && low <= f64::from(rows.end);
     if !is_volumetric && meets(&sheet) {
-        let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
+        let corner =
+            |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
         let [a, b, c, d] = cell.corners().map(corner);
         found([a, b, c]);
         found([c, d, a]);

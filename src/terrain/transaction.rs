@@ -11,9 +11,9 @@ use std::sync::Arc;
 use glam::IVec3;
 use rayon::prelude::*;
 
+use super::Submission;
 use super::receipt::{Applied, ChunkScenario, Receipt, Rejection};
 use super::world::{ChunkSurface, World};
-use super::Submission;
 use crate::brush::Edit;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, TilePos};
 use crate::surface::mask::{cell_sheet, is_disturbed};
@@ -104,7 +104,7 @@ impl Transaction {
         for submission in self.submissions.iter() {
             let outcome = match &submission.edit {
                 Ok(edit) => apply(&mut draft, &mut log, edit),
-                Err(error) => Err(error.clone().into()),
+                Err(error) => Err((*error).into()),
             };
             receipts.push(Receipt { tag: submission.tag, outcome });
         }
@@ -118,7 +118,8 @@ impl Transaction {
         let blocks = dirty_blocks(&view, &dirty, &mask);
         let surfaces = mesh_blocks(world, &view, &blocks);
         let chunks = surfaces.iter().map(|(&chunk, surface)| (chunk, surface.mesh())).collect();
-        let tiles = touched_tiles(&view, &mask).into_iter().map(|tile| (tile, tile::mesh(&view, tile))).collect();
+        let tiles =
+            touched_tiles(&view, &mask).into_iter().map(|tile| (tile, tile::mesh(&view, tile))).collect();
         Commit {
             ticket: self.ticket,
             mask,
@@ -219,7 +220,8 @@ fn added_cells(view: &WorldView, dirty: &[LatticeBox]) -> Mask {
 fn dirty_blocks(view: &WorldView, dirty: &[LatticeBox], added: &Mask) -> Vec<Block> {
     let mut blocks = BTreeSet::new();
     let mut insert = |low: IVec3, high: IVec3| {
-        let world = (IVec3::new(0, i32::MIN, 0), IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1));
+        let world =
+            (IVec3::new(0, i32::MIN, 0), IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1));
         let Some(cells) = LatticeBox::new(low.max(world.0), high.min(world.1)) else { return };
         for brick in BrickPos::covering(cells) {
             let Some(cells) = brick.samples().intersection(cells) else { continue };
@@ -271,7 +273,8 @@ fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> BTreeMap<Ch
 
 /// Tiles that lose a cell to the mask, or border on one that does.
 fn touched_tiles(view: &WorldView, added: &Mask) -> BTreeSet<TilePos> {
-    let around = |cell: Column| [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)].map(|(dx, dz)| cell.offset(dx, dz));
+    let around =
+        |cell: Column| [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)].map(|(dx, dz)| cell.offset(dx, dz));
     let cells = added.iter().flat_map(around).filter(|&cell| view.grid.has_cell(cell));
     cells.map(|cell| view.grid.tile_of_cell(cell)).collect()
 }

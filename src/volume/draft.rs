@@ -71,12 +71,15 @@ impl<'a> Draft<'a> {
             }
             for chunk in self.grid.chunks_of(samples) {
                 let Some(part) = self.grid.chunk_samples(chunk).intersection(samples) else { continue };
-                if let Some(changed) = self.apply_to_brick(pos, part, edit.operation(), &evaluator, &mut effect) {
+                if let Some(changed) =
+                    self.apply_to_brick(pos, part, edit.operation(), &evaluator, &mut effect)
+                {
                     LatticeBox::include(chunks.entry(chunk).or_default(), changed);
                 }
             }
         }
-        let with_bounds = |(chunk, bounds): (ChunkPos, Option<LatticeBox>)| Some(ChunkEffect { chunk, bounds: bounds? });
+        let with_bounds =
+            |(chunk, bounds): (ChunkPos, Option<LatticeBox>)| Some(ChunkEffect { chunk, bounds: bounds? });
         effect.chunks = chunks.into_iter().filter_map(with_bounds).collect();
         effect
     }
@@ -198,6 +201,11 @@ impl State {
     fn hash(self, point: IVec3) -> u64 {
         let Some(distance) = self.sample.distance() else { return 0 };
         let place = hash::mix(point.x as u32 as u64 | (point.z as u32 as u64) << 32);
-        hash::mix(place ^ (point.y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(self.material.0))
+        hash::mix(
+            place
+                ^ (point.y as u32 as u64) << 32
+                ^ (distance as u16 as u64) << 8
+                ^ u64::from(self.material.0),
+        )
     }
 }

@@ -57,7 +57,9 @@ pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let rounding = [0.0, 0.25, 1.0, 4.0][rng.usize(0..4)];
     let bumps: Vec<f64> = (0..=width * (depth + 2) + depth).map(|_| rng.f64() * noise).collect();
     let height = |x: i32, z: i32| {
-        let h = bumps[(z as u32 * (width + 1) + x as u32) as usize] + slope_x * f64::from(x) + slope_z * f64::from(z);
+        let h = bumps[(z as u32 * (width + 1) + x as u32) as usize]
+            + slope_x * f64::from(x)
+            + slope_z * f64::from(z);
         if rounding == 0.0 { h } else { (h / rounding).round() * rounding }
     };
     (Ground::from_fn(width, depth, height).expect("finite heights"), chunk_size)
@@ -81,7 +83,8 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let radius = [2.0, 3.0, 3.7, 5.0][rng.usize(0..4)];
     let dig = rng.bool();
     let center = random_center(rng, ground, dig, radius);
-    let direction = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5).try_normalize().unwrap_or(Vec3::Y);
+    let direction =
+        Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5).try_normalize().unwrap_or(Vec3::Y);
     let shape = match rng.u32(0..8) {
         0 => {
             let half = Vec3::new(radius, radius * 0.6, radius * 1.3);
@@ -99,14 +102,22 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
         (_, false) => Brush::add(shape, material),
     };
     match rng.u32(0..6) {
-        0 => brush.with_roughness(Roughness { amplitude: rng.f32() * 2.0, scale: 1.0 + rng.f32() * 6.0, seed: rng.u32(..) }),
+        0 => brush.with_roughness(Roughness {
+            amplitude: rng.f32() * 2.0,
+            scale: 1.0 + rng.f32() * 6.0,
+            seed: rng.u32(..),
+        }),
         _ => brush,
     }
 }
 
 fn random_rotation(rng: &mut Rng) -> Quat {
     let angles = [rng.f32() * 6.3, rng.f32() * 6.3, rng.f32() * 6.3];
-    if rng.bool() { Quat::IDENTITY } else { Quat::from_euler(glam::EulerRot::XYZ, angles[0], angles[1], angles[2]) }
+    if rng.bool() {
+        Quat::IDENTITY
+    } else {
+        Quat::from_euler(glam::EulerRot::XYZ, angles[0], angles[1], angles[2])
+    }
 }
 
 /// A brush that lies on chunk faces, edges or corners, or on the world's rim.

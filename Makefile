@@ -1,0 +1,64 @@
+# bevy_burrow: diggable ground for Bevy. `make help` lists what can be done.
+#
+# One feature set and one profile for everything that compiles Bevy, so that it is compiled once:
+#   without Bevy   cargo ... --no-default-features           the model: tests, soak
+#   with Bevy      cargo ... --release --features examples   the plugin and the examples
+#
+# What is built goes to CARGO_TARGET_DIR, outside the clone unless set otherwise.
+
+SHELL := /bin/sh
+export PATH := $(HOME)/.cargo/bin:$(PATH)
+export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
+
+WITHOUT_BEVY := --no-default-features
+WITH_BEVY := --release --features examples
+
+# Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice.
+PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
+	$(shell grep -ls '^.!.cfg.feature' tests/*.rs tests/*/main.rs))))
+
+# Random worlds of `make soak`.
+WORLDS ?= 10000
+# Where `make test` leaves pictures and meshes.
+PROOF := $(CARGO_TARGET_DIR)/proof
+
+.PHONY: help setup run test test-model test-plugin test-examples soak pictures
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only)
+	@tools/setup.sh run
+	cargo run $(WITH_BEVY) --example digger -- $(ARGS)
+
+test: setup test-model test-plugin test-examples ## Install what is missing, then run every test
+
+setup: ## Install what is missing
+	@tools/setup.sh run
+
+# Model tests, in the dev profile: optimised, with overflow checks.
+test-model:
+	cargo test $(WITHOUT_BEVY) --lib --tests --example export
+	cargo test $(WITHOUT_BEVY) --doc
+
+test-plugin:
+	cargo test $(WITH_BEVY) --lib -- plugin:: view::
+	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal
+	cargo test $(WITH_BEVY) --doc
+
+# The examples as a user starts them; whatever an earlier run left is not taken for theirs.
+test-examples:
+	rm -rf '$(PROOF)'
+	cargo run $(WITH_BEVY) --example digger -- --headless --out '$(PROOF)/digger'
+	@pictures=$$(ls '$(PROOF)/digger' | grep -c '\.png$$'); echo "digger: $$pictures pictures"; [ "$$pictures" -ge 6 ]
+	cargo run $(WITH_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
+		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
+	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
+
+soak: ## Dig WORLDS (10000) random worlds and look at every seam
+	@tools/setup.sh build
+	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams -- --nocapture
+
+pictures: ## Make the pictures of the README again
+	@tools/setup.sh run
+	cargo run $(WITH_BEVY) --example digger -- --headless --out docs/pictures

@@ -1,0 +1,327 @@
+//! The studio: the game without a window, run frame by frame by a script that walks, digs and takes pictures.
+//!
+//! The script is an ordinary player: it steers the same body with the same [`Steering`] and sends the same [`Brush`]
+//! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
+
+use std::panic;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use bevy::app::PluginsState;
+use bevy::camera::RenderTarget;
+use bevy::log::{Level, LogPlugin};
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::{PollType, TextureFormat};
+use bevy::render::renderer::{RenderAdapterInfo, RenderDevice, initialize_renderer};
+use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use bevy_burrow::prelude::*;
+
+use crate::Options;
+use crate::light::{Eyes, LampSwitch};
+use crate::mover::{Body, Steering};
+use crate::player::{Drone, Player};
+use crate::report::{EditTime, FrameTimes, Logbook};
+
+/// The script's time from frame to frame.
+const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
+/// Longest wait for the landscape.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// A renderer without a window, if there is an adapter for one, be it in software.
+pub fn find_renderer() -> Option<RenderResources> {
+    let settings = WgpuSettings::default();
+    let backends = settings.backends?;
+    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
+    panic::set_hook(hook);
+    found.ok()
+}
+
+/// Pictures that lie on the disk, as far as the renderer told.
+#[derive(Resource, Default)]
+struct Developed(usize);
+
+/// An app without a window, and what came of its edits and pictures.
+pub struct Studio {
+    app: App,
+    eyes: Entity,
+    player: Entity,
+    /// Where pictures are drawn; `None` without a renderer.
+    film: Option<Handle<Image>>,
+    folder: PathBuf,
+    is_warm: bool,
+    /// Frames without a picture.
+    pub frames: FrameTimes,
+    /// Frames that were drawn.
+    pub drawn: FrameTimes,
+    /// How long each edit took.
+    pub times: Vec<EditTime>,
+    /// Pictures that were written.
+    pub pictures: Vec<PathBuf>,
+}
+
+impl Studio {
+    /// Builds the app and waits for the landscape.
+    ///
+    /// # Errors
+    /// When the folder can't be made or the landscape doesn't load.
+    pub fn open(options: &Options, renderer: Option<RenderResources>) -> Result<Self> {
+        std::fs::create_dir_all(&options.out)?;
+        let renders = renderer.is_some();
+        let mut app = build_app(renderer);
+        // One frame, for the systems that spawn the camera.
+        app.update();
+        let eyes = app.world_mut().query_filtered::<Entity, With<Eyes>>().single(app.world())?;
+        let image = Image::new_target_texture(options.width, options.height, TextureFormat::Rgba8UnormSrgb, None);
+        let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
+        let player = wait_for_player(&mut app)?;
+        let film = renders.then_some(film);
+        let mut studio = Self {
+            app,
+            eyes,
+            player,
+            film,
+            folder: options.out.clone(),
+            is_warm: false,
+            frames: FrameTimes::default(),
+            drawn: FrameTimes::default(),
+            times: Vec::new(),
+            pictures: Vec::new(),
+        };
+        studio.film_runs(false);
+        Ok(studio)
+    }
+
+    /// What draws the pictures.
+    pub fn renderer(&self) -> Option<String> {
+        self.app.world().get_resource::<RenderAdapterInfo>().map(|info| info.name.clone())
+    }
+
+    /// A copy of a resource.
+    pub fn resource<R: Resource + Clone>(&self) -> R {
+        self.app.world().resource::<R>().clone()
+    }
+
+    /// The app's world, for questions that few ask.
+    pub fn world(&mut self) -> &mut World {
+        self.app.world_mut()
+    }
+
+    /// The terrain's model.
+    ///
+    /// # Errors
+    /// When there is not exactly one.
+    pub fn terrain(&mut self) -> Result<&Terrain> {
+        let world = self.app.world_mut();
+        let mut terrains = world.query::<&Terrain>();
+        Ok(terrains.single(world)?)
+    }
+
+    /// One frame.
+    fn step(&mut self) {
+        let start = Instant::now();
+        self.app.update();
+        self.frames.count(start.elapsed());
+    }
+
+    /// Lets some time pass.
+    pub fn wait(&mut self, frames: u32) {
+        for _ in 0..frames {
+            self.step();
+        }
+    }
+
+    /// Switches the headlamp.
+    pub fn lamp(&mut self, on: bool) {
+        self.app.world_mut().resource_mut::<LampSwitch>().0 = on;
+    }
+
+    fn body(&self) -> Result<Body> {
+        Ok(*self.app.world().get_entity(self.player)?.get::<Body>().ok_or("the player has lost its body")?)
+    }
+
+    fn put<C: Component>(&mut self, component: C) -> Result {
+        self.app.world_mut().get_entity_mut(self.player)?.insert(component);
+        Ok(())
+    }
+
+    /// Takes the player to the ground over a place, as only a script can.
+    pub fn carry_to(&mut self, place: Vec2) -> Result {
+        let at = place.as_dvec2();
+        let height = self.terrain()?.world().height(at.x, at.y).ok_or("the script left the world")?;
+        self.put(Body::at(Vec3::new(place.x, height as f32, place.y)))?;
+        self.wait(10);
+        Ok(())
+    }
+
+    /// Turns the player's head.
+    pub fn look_at(&mut self, place: Vec3) -> Result {
+        let eye = self.body()?.eye();
+        self.put(Player::looking(eye, place))
+    }
+
+    /// Walks straight to a place.
+    ///
+    /// # Errors
+    /// When something is in the way.
+    pub fn walk_to(&mut self, place: Vec2, run: bool) -> Result {
+        const NEAR: f32 = 0.6;
+        let start = self.body()?.feet.xz();
+        // Twice as long as it should take, and some more.
+        let frames = 120 + (24.0 * start.distance(place)) as u32;
+        for _ in 0..frames {
+            let body = self.body()?;
+            let way = place - body.feet.xz();
+            if way.length() < NEAR {
+                self.put(Steering::default())?;
+                self.wait(15);
+                return Ok(());
+            }
+            self.look_at(Vec3::new(place.x, body.eye().y, place.y))?;
+            self.put(Steering { direction: way.normalize(), run, jump: false })?;
+            self.step();
+        }
+        let body = self.body()?;
+        Err(format!("the walk from {start} to {place} ended at {}", body.feet).into())
+    }
+
+    /// Sends a brush and waits for its receipt.
+    ///
+    /// # Errors
+    /// When there is none after many frames, or it says that the brush was rejected.
+    pub fn edit(&mut self, brush: Brush) -> Result {
+        let answered = self.app.world().resource::<Logbook>().answered();
+        let start = Instant::now();
+        self.app.world_mut().write_message(brush.with_tag(answered as u64 + 1));
+        while self.app.world().resource::<Logbook>().answered() == answered {
+            self.step();
+            if start.elapsed() > PATIENCE {
+                return Err("a brush got no receipt".into());
+            }
+        }
+        let receipt = start.elapsed();
+        let logbook = self.app.world().resource::<Logbook>();
+        if let Some(rejection) = &logbook.rejection {
+            return Err(format!("a brush was rejected: {rejection}").into());
+        }
+        let transaction = self.app.world().resource::<BurrowFigures>().last_transaction;
+        self.times.push(EditTime { receipt, transaction });
+        Ok(())
+    }
+
+    /// Takes a picture through the player's eyes.
+    pub fn shoot(&mut self, name: &str) -> Result {
+        // Eyes get used to the light.
+        self.wait(90);
+        let Some(film) = self.film.clone() else { return Ok(()) };
+        let path = self.folder.join(name).with_extension("png");
+        if path.exists() {
+            std::fs::remove_file(&path)?;
+        }
+        self.film_runs(true);
+        // Shaders and the sky come in over some frames; later on, one is enough.
+        let frames = if self.is_warm { 1 } else { 4 };
+        self.is_warm = true;
+        for _ in 0..frames {
+            self.step_and_draw();
+        }
+        let before = self.app.world().resource::<Developed>().0;
+        let mut save = save_to_disk(path.clone());
+        let develop = move |picture: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| {
+            save(picture);
+            developed.0 += 1;
+        };
+        self.app.world_mut().spawn(Screenshot::image(film)).observe(develop);
+        self.step_and_draw();
+        self.film_runs(false);
+        let start = Instant::now();
+        while self.app.world().resource::<Developed>().0 == before && start.elapsed() < PATIENCE {
+            self.step_and_draw();
+        }
+        if !is_picture(&path) {
+            return Err(format!("{} was not written, or shows nothing", path.display()).into());
+        }
+        self.pictures.push(path);
+        Ok(())
+    }
+
+    /// Takes a picture from anywhere.
+    pub fn shoot_from(&mut self, name: &str, eye: Vec3, at: Vec3) -> Result {
+        let place = Transform::from_translation(eye).looking_at(at, Vec3::Y);
+        self.app.world_mut().entity_mut(self.eyes).insert((Drone, place));
+        let shot = self.shoot(name);
+        self.app.world_mut().entity_mut(self.eyes).remove::<Drone>();
+        shot
+    }
+
+    fn film_runs(&mut self, runs: bool) {
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.eyes) {
+            camera.is_active = runs;
+        }
+    }
+
+    fn step_and_draw(&mut self) {
+        let start = Instant::now();
+        self.app.update();
+        if let Some(device) = self.app.world().get_resource::<RenderDevice>() {
+            // An error here is the device's end, and shows as a missing picture.
+            let _ = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
+        }
+        self.drawn.count(start.elapsed());
+    }
+}
+
+fn build_app(renderer: Option<RenderResources>) -> App {
+    let render_creation = match renderer {
+        Some(renderer) => RenderCreation::Manual(renderer),
+        None => WgpuSettings { backends: None, ..default() }.into(),
+    };
+    let mut app = App::new();
+    app.add_plugins(
+        DefaultPlugins
+            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+            .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
+            .set(LogPlugin { level: Level::WARN, ..default() })
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>(),
+    )
+    .init_resource::<Developed>()
+    .insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
+    crate::game(&mut app);
+    while app.plugins_state() == PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    app.finish();
+    app.cleanup();
+    app
+}
+
+fn wait_for_player(app: &mut App) -> Result<Entity> {
+    let start = Instant::now();
+    while start.elapsed() < PATIENCE {
+        app.update();
+        if let Ok(player) = app.world_mut().query_filtered::<Entity, With<Player>>().single(app.world()) {
+            return Ok(player);
+        }
+        if app.should_exit().is_some() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Err("the landscape did not load".into())
+}
+
+/// Is there a picture that shows more than one colour?
+fn is_picture(path: &Path) -> bool {
+    // A frame of one colour is compressed to next to nothing.
+    std::fs::metadata(path).is_ok_and(|file| file.len() > 20_000)
+}

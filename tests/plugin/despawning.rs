@@ -1,0 +1,180 @@
+//! Terrains that go while they load or are dug.
+
+use bevy::ecs::system::RunSystemOnce;
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{Stage, dig, random_brushes, steep};
+
+/// Fails when something of a terrain is left.
+fn assert_clean(stage: &mut Stage, when: &str) {
+    stage.frames(4);
+    let left = (stage.count::<Terrain>(), stage.count::<Tile>(), stage.count::<Chunk>(), stage.count::<Field>());
+    assert_eq!(left, (0, 0, 0, 0), "{when}: terrains, tiles, chunks, fields");
+    assert_eq!((stage.count::<Mesh3d>(), stage.meshes()), (0, 0), "{when}: entities with meshes, meshes");
+}
+
+/// Fails unless a new terrain works as if nothing had been.
+fn assert_works(stage: &mut Stage) {
+    let terrain = stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.settle();
+    stage.assert_whole(terrain, "the next terrain");
+}
+
+#[test]
+fn nothing_is_left_of_a_terrain_that_goes_with_a_transaction_under_way() {
+    let mut stage = Stage::drawing();
+    for frames in 0..6 {
+        let terrain = stage.show(steep());
+        for brush in random_brushes(11, 80) {
+            stage.send(brush);
+        }
+        stage.frame();
+        assert!(stage.terrain(terrain).is_busy());
+        stage.frames(frames);
+        stage.app.world_mut().despawn(terrain);
+        assert_clean(&mut stage, &format!("{frames} frames into a transaction"));
+    }
+    assert_works(&mut stage);
+}
+
+#[test]
+fn nothing_is_left_of_a_terrain_that_goes_while_it_loads() {
+    let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 2, ..default() });
+    for frames in 0..24 {
+        let mut model = steep();
+        model.apply(random_brushes(12, 20));
+        let terrain = stage.spawn(model);
+        stage.send(dig(30.0, 4.0, 30.0, 6.0));
+        stage.frames(frames);
+        stage.app.world_mut().despawn(terrain);
+        assert_clean(&mut stage, &format!("{frames} frames into loading"));
+    }
+    assert_works(&mut stage);
+}
+
+/// Says to [`leave`] that it is time.
+#[derive(Resource, Default)]
+struct Leaving(bool);
+
+/// A game's own system, which lets go of all terrains.
+fn leave(mut commands: Commands, mut leaving: ResMut<Leaving>, terrains: Query<Entity, With<Terrain>>) {
+    if std::mem::take(&mut leaving.0) {
+        for terrain in &terrains {
+            commands.entity(terrain).despawn();
+        }
+    }
+}
+
+/// A stage whose game lets go of terrains in the same stretch of the schedule as the plugin works on them: its command
+/// is applied just before the plugin's own. Systems without an order may fall like that.
+fn stage_that_leaves<M>(leave: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>) -> Stage {
+    let mut stage = Stage::drawing();
+    stage.app.init_resource::<Leaving>().add_systems(Update, leave);
+    stage
+}
+
+#[test]
+fn a_terrain_may_go_in_the_frame_of_its_commit() {
+    let leave = leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
+    let mut stage = stage_that_leaves(leave);
+    let mut met = 0;
+    for _ in 0..20 {
+        stage.show(steep());
+        let commits = stage.figures().commits;
+        for brush in random_brushes(13, 6) {
+            stage.send(brush);
+        }
+        stage.frame();
+        stage.rest();
+        stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+        stage.frame();
+        met += u32::from(stage.figures().commits > commits);
+        assert_clean(&mut stage, "in the frame of a commit");
+        if met > 2 {
+            break;
+        }
+    }
+    assert!(met > 0, "no terrain went in the frame of its commit");
+    assert_works(&mut stage);
+}
+
+#[test]
+fn a_terrain_may_go_in_the_frame_that_would_show_it() {
+    let mut stage = stage_that_leaves(leave.before_ignore_deferred(BurrowSystems::Load));
+    for rest in [false, true] {
+        stage.spawn(steep());
+        stage.frame();
+        if rest {
+            stage.rest();
+        }
+        stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+        stage.frame();
+        assert_clean(&mut stage, "in the frame that would show it");
+    }
+    assert_works(&mut stage);
+}
+
+#[test]
+fn a_terrain_may_go_in_the_frame_that_spawned_it() {
+    let mut stage = stage_that_leaves(leave.before_ignore_deferred(BurrowSystems::Load));
+    stage.frame();
+    stage.spawn(steep());
+    stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+    stage.frame();
+    assert_clean(&mut stage, "in its first frame");
+    assert_works(&mut stage);
+}
+
+#[test]
+fn a_terrain_may_go_in_the_frame_of_a_brush() {
+    // The first of the two comes after all commands of the commit, and has none itself.
+    let leave = (|| (), leave).chain().after(BurrowSystems::Commit).before_ignore_deferred(BurrowSystems::Begin);
+    let mut stage = stage_that_leaves(leave);
+    stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+    stage.frame();
+    assert_clean(&mut stage, "in the frame of a brush");
+    assert_works(&mut stage);
+}
+
+#[test]
+fn each_brush_of_a_terrain_that_goes_still_gets_its_receipt() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
+    stage.frame();
+    stage.send(dig(34.0, 4.0, 30.0, 6.0).with_tag(2));
+    stage.app.world_mut().despawn(terrain);
+    stage.frames(4);
+    assert_eq!(stage.tags().len(), 2, "a brush was dropped silently: {:?}", stage.receipts());
+}
+
+#[test]
+fn a_tile_or_chunk_that_a_game_despawns_is_not_missed() {
+    let mut stage = Stage::drawing();
+    stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.settle();
+    for entity in stage.with_component::<Chunk>().into_iter().chain(stage.with_component::<Tile>()) {
+        stage.app.world_mut().despawn(entity);
+    }
+    for brush in random_brushes(13, 40) {
+        stage.send(brush);
+    }
+    stage.settle();
+    assert_eq!(stage.receipts().len(), 41);
+}
+
+#[test]
+fn a_terrain_goes_with_all_its_children_when_a_system_despawns_it() {
+    let mut stage = Stage::drawing();
+    stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.settle();
+    let despawn = |mut commands: Commands, terrain: Single<Entity, With<Terrain>>| commands.entity(*terrain).despawn();
+    stage.app.world_mut().run_system_once(despawn).expect("one terrain");
+    assert_clean(&mut stage, "after a command");
+}

@@ -1,0 +1,110 @@
+//! Heightmap files through the asset server.
+
+use std::path::{Path, PathBuf};
+
+use bevy::asset::{AssetLoadFailedEvent, LoadState};
+use bevy::prelude::*;
+use bevy_burrow::ground::ImageLimits;
+use bevy_burrow::plugin::HeightmapSettings;
+use bevy_burrow::prelude::*;
+
+use crate::stage::Stage;
+use crate::worlds;
+
+/// Every failure so far: path and reason.
+#[derive(Resource, Default)]
+struct Failures(Vec<(String, String)>);
+
+fn stage_in(folder: &Path) -> Stage {
+    let assets = AssetPlugin { file_path: folder.to_string_lossy().into_owned(), ..default() };
+    let mut stage = Stage::with((MinimalPlugins, assets));
+    stage.app.init_resource::<Failures>().add_systems(
+        Update,
+        |mut failed: MessageReader<AssetLoadFailedEvent<HeightmapImage>>, mut kept: ResMut<Failures>| {
+            kept.0.extend(failed.read().map(|failure| (failure.path.to_string(), failure.error.to_string())));
+        },
+    );
+    stage
+}
+
+/// A folder that goes when the test ends.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("bevy_burrow_{name}_{}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.0.join(name), bytes).expect("a temporary file");
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn png(image: image::DynamicImage) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::Png).expect("a PNG");
+    bytes.into_inner()
+}
+
+#[test]
+fn the_shipped_elevation_model_loads_as_an_asset_and_becomes_a_terrain() {
+    let mut stage = stage_in(Path::new("assets"));
+    let handle: Handle<HeightmapImage> = stage.app.world().resource::<AssetServer>().load("jacksboro_fault.png");
+    stage.frames_until("the image is loaded", |stage| {
+        let state = stage.app.world().resource::<AssetServer>().load_state(&handle);
+        assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
+        stage.app.world().resource::<Assets<HeightmapImage>>().contains(&handle)
+    });
+    let HeightmapImage(image) = stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
+    let expected = worlds::real_image();
+    assert_eq!((image.width(), image.height(), image.samples()), (expected.width(), expected.height(), expected.samples()));
+    let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
+    let ground = Ground::from_image(image, &scale).expect("a valid landscape");
+    assert!(ground.width() >= 1024 && ground.depth() >= 1024);
+    assert!(stage.app.world().resource::<Failures>().0.is_empty());
+}
+
+#[test]
+fn files_that_are_no_heightmap_fail_with_their_reason() {
+    let folder = Folder::new("bad_heightmaps");
+    let grey = png(image::DynamicImage::ImageLuma16(image::ImageBuffer::from_fn(32, 32, |x, y| image::Luma([(x * y) as u16]))));
+    let color = png(image::DynamicImage::ImageRgb8(image::ImageBuffer::new(8, 8)));
+    folder.put("good.png", &grey);
+    let files: [(&str, &[u8], &str); 6] = [
+        ("cut.png", &grey[..grey.len() / 2], "cut off"),
+        ("color.png", &color, "plain grey"),
+        ("empty.png", b"", ""),
+        ("words.png", b"this is no image at all, but text", "signature"),
+        ("heights.raw", &[0; 128], "no header"),
+        ("heights.r16", &[0; 128], "no header"),
+    ];
+    for (name, bytes, _) in files {
+        folder.put(name, bytes);
+    }
+    let mut stage = stage_in(&folder.0);
+    let server = stage.app.world().resource::<AssetServer>().clone();
+    let good: Handle<HeightmapImage> = server.load("good.png");
+    let mut handles: Vec<Handle<HeightmapImage>> = files.iter().map(|(name, _, _)| server.load(*name)).collect();
+    handles.push(server.load("missing.png"));
+    let small = HeightmapSettings { limits: ImageLimits { max_file_bytes: 100, ..default() }, ..default() };
+    folder.put("large.png", &grey);
+    handles.push(server.load_builder().with_settings(move |settings: &mut HeightmapSettings| *settings = small.clone()).load("large.png"));
+    stage.frames_until("all loads are done", |stage| {
+        let failed = stage.app.world().resource::<Failures>().0.len() == handles.len();
+        failed && stage.app.world().resource::<Assets<HeightmapImage>>().contains(&good)
+    });
+    let failures = &stage.app.world().resource::<Failures>().0;
+    for (name, _, reason) in files.into_iter().chain([("missing.png", &[] as &[u8], ""), ("large.png", &[], "limit is 100")]) {
+        let (_, error) = failures.iter().find(|(path, _)| path == name).unwrap_or_else(|| panic!("{name}: {failures:?}"));
+        assert!(error.contains(reason), "{name}: {error}");
+    }
+    assert!(handles.iter().all(|handle| matches!(server.load_state(handle), LoadState::Failed(_))));
+}

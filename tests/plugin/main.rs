@@ -1,0 +1,20 @@
+//! The Bevy plugin from outside: brushes go in as messages, and what is shown, told and kept is looked at frame by frame.
+#![cfg(feature = "plugin")]
+
+mod despawning;
+mod entities;
+mod heightmaps;
+mod holes;
+mod loading;
+#[cfg(feature = "render")]
+mod materials;
+mod queries;
+mod receipts;
+mod replacing;
+mod server;
+mod several_terrains;
+mod shown;
+mod stage;
+mod swap_budget;
+#[path = "../worlds/mod.rs"]
+mod worlds;

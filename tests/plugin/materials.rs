@@ -1,0 +1,127 @@
+//! Any material on a terrain's entity is handed on to its tiles and chunks.
+
+use bevy::mesh::MeshPlugin;
+use bevy::prelude::*;
+use bevy::render::render_resource::AsBindGroup;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{Stage, dig, level, random_brushes, steep};
+
+/// A material of the game's own.
+#[derive(Asset, TypePath, AsBindGroup, Clone, Debug, Default)]
+struct Glow {}
+
+impl Material for Glow {}
+
+/// A stage with the standard material and one of the game's own.
+fn stage() -> Stage {
+    let glow = TerrainMaterialPlugin::<Glow>::default();
+    let mut stage = Stage::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, glow));
+    stage.app.init_asset::<StandardMaterial>().init_asset::<Glow>();
+    stage
+}
+
+/// Do all tiles and chunks of a terrain have this material, and no other one?
+fn wears<M: Material>(stage: &mut Stage, terrain: Entity, material: &Handle<M>) -> bool {
+    let world = stage.app.world_mut();
+    let mut drawn = world.query_filtered::<(Option<&MeshMaterial3d<M>>, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
+    let mut all = drawn.iter(world).filter(|(_, parent)| parent.parent() == terrain);
+    all.all(|(worn, _)| worn.is_some_and(|worn| worn.0 == *material))
+}
+
+fn is_bare<M: Material>(stage: &mut Stage) -> bool {
+    let world = stage.app.world_mut();
+    let mut worn = world.query_filtered::<&MeshMaterial3d<M>, Or<(With<Tile>, With<Chunk>)>>();
+    worn.iter(world).count() == 0
+}
+
+fn add<M: Material>(stage: &mut Stage, material: M) -> Handle<M> {
+    stage.app.world_mut().resource_mut::<Assets<M>>().add(material)
+}
+
+/// What holds for every type of material.
+fn is_handed_on<M: Material + Default>(mut stage: Stage) {
+    let (first, second) = (add(&mut stage, M::default()), add(&mut stage, M::default()));
+    let mut model = steep();
+    model.apply(random_brushes(19, 10));
+    let terrain = stage.spawn(model);
+    stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(first.clone()));
+    stage.frames_until("the terrain is shown", |stage| stage.count::<Mesh3d>() > 0);
+    assert!(wears(&mut stage, terrain, &first), "in the first frame that shows it");
+
+    let chunks = stage.count::<Chunk>();
+    for brush in random_brushes(20, 20) {
+        stage.send(brush);
+        stage.frame();
+        assert!(wears(&mut stage, terrain, &first), "in every frame, new chunks too");
+    }
+    stage.settle();
+    assert!(stage.count::<Chunk>() > chunks && wears(&mut stage, terrain, &first));
+
+    stage.app.world_mut().get_mut::<MeshMaterial3d<M>>(terrain).expect("a material").0 = second.clone();
+    stage.frame();
+    assert!(wears(&mut stage, terrain, &second), "in the frame after a change");
+    stage.send(dig(30.0, -20.0, 30.0, 6.0));
+    stage.settle();
+    assert!(wears(&mut stage, terrain, &second));
+
+    // A terrain may get its material late, and another terrain has its own.
+    let other = stage.spawn_at(level(1.0), Vec3::new(200.0, 0.0, 0.0));
+    stage.settle();
+    assert!(!wears(&mut stage, other, &first) && wears(&mut stage, terrain, &second));
+    stage.app.world_mut().entity_mut(other).insert(MeshMaterial3d(first.clone()));
+    stage.frame();
+    assert!(wears(&mut stage, other, &first) && wears(&mut stage, terrain, &second));
+}
+
+#[test]
+fn the_standard_material_is_handed_on() {
+    is_handed_on::<StandardMaterial>(stage());
+}
+
+#[test]
+fn a_material_of_the_games_own_is_handed_on() {
+    is_handed_on::<Glow>(stage());
+}
+
+#[test]
+fn a_material_that_is_taken_off_a_terrain_is_taken_off_its_tiles() {
+    let mut stage = stage();
+    let terrain = stage.show(level(1.0));
+    let standard = add(&mut stage, StandardMaterial::default());
+    let glow = add(&mut stage, Glow::default());
+    stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(standard.clone()));
+    stage.frame();
+    assert!(wears(&mut stage, terrain, &standard));
+    // Both at once would be drawn both.
+    stage.app.world_mut().entity_mut(terrain).remove::<MeshMaterial3d<StandardMaterial>>().insert(MeshMaterial3d(glow.clone()));
+    stage.frame();
+    assert!(wears(&mut stage, terrain, &glow));
+    assert!(is_bare::<StandardMaterial>(&mut stage), "tiles wear both materials");
+}
+
+#[test]
+fn vertex_colours_are_those_of_the_terrain() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.spawn(level(1.0));
+    let red = LinearRgba::rgb(1.0, 0.0, 0.0);
+    let mut colors = vec![LinearRgba::BLACK; 8];
+    colors[5] = red;
+    stage.app.world_mut().entity_mut(terrain).insert(MaterialColors(colors));
+    stage.settle();
+    stage.send(Brush::add(Shape::sphere(Vec3::new(24.0, 20.0, 24.0), 5.0), MaterialId(5)));
+    stage.settle();
+    let world = stage.app.world_mut();
+    let mut chunks = world.query_filtered::<&Mesh3d, With<Chunk>>();
+    let handles: Vec<_> = chunks.iter(world).map(|mesh| mesh.0.clone()).collect();
+    let meshes = world.resource::<Assets<Mesh>>();
+    let colors: Vec<[f32; 4]> = handles
+        .iter()
+        .filter_map(|handle| match meshes.get(handle)?.attribute(Mesh::ATTRIBUTE_COLOR)? {
+            bevy::mesh::VertexAttributeValues::Float32x4(colors) => Some(colors.clone()),
+            _ => None,
+        })
+        .flatten()
+        .collect();
+    assert!(!colors.is_empty() && colors.iter().all(|&color| color == red.to_f32_array()));
+}

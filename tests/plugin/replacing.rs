@@ -1,0 +1,118 @@
+//! A game that changes the model itself, or puts another one in its place.
+
+use bevy::ecs::system::RunSystemOnce;
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{Stage, dig, level, random_brushes, steep};
+
+#[test]
+fn a_model_that_the_game_edits_itself_is_shown_whole() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+    model.apply(random_brushes(14, 10));
+    stage.settle();
+    stage.frames(20);
+    stage.assert_whole(terrain, "edited by the game");
+    for brush in random_brushes(15, 10) {
+        stage.send(brush);
+    }
+    stage.settle();
+    stage.assert_whole(terrain, "dug after that");
+}
+
+#[test]
+fn while_a_world_is_loaded_again_the_old_one_is_shown_whole_and_ground_is_not_ready() {
+    let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 4, ..default() });
+    let terrain = stage.show(steep());
+    let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+    model.apply(random_brushes(14, 10));
+    let triangles = model.world().drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum::<usize>();
+    let is_ready = |terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0));
+    stage.frames_until("the new world is shown", |stage| {
+        let shown = stage.shown(terrain);
+        assert!(shown.is_closed(), "{shown:?}");
+        let is_ready = stage.app.world_mut().run_system_once(is_ready).expect("it runs");
+        assert_eq!(is_ready, shown.triangles == triangles, "ready when it is shown");
+        is_ready
+    });
+}
+
+#[test]
+fn a_model_that_the_game_edits_while_it_loads_is_shown_whole() {
+    let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 1, ..default() });
+    let terrain = stage.spawn(steep());
+    stage.frames(3);
+    let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+    model.apply(random_brushes(14, 10));
+    stage.settle();
+    stage.frames(20);
+    stage.assert_whole(terrain, "edited while it loaded");
+}
+
+#[test]
+fn brushes_under_way_keep_their_receipts_when_the_game_edits_the_model() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    for brush in random_brushes(16, 10) {
+        stage.send(brush);
+    }
+    stage.frame();
+    let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
+    assert!(model.is_busy());
+    model.apply(random_brushes(17, 1));
+    stage.settle();
+    stage.frames(20);
+    assert_eq!(stage.tags(), (0..10).collect::<Vec<_>>());
+}
+
+#[test]
+fn another_terrain_on_the_same_entity_takes_the_place_of_the_first() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.settle();
+    stage.app.world_mut().entity_mut(terrain).insert(level(1.0));
+    stage.settle();
+    stage.frames(40);
+    assert_eq!(stage.count::<Tile>(), 16);
+    stage.assert_whole(terrain, "replaced");
+}
+
+#[test]
+fn another_terrain_with_another_voxel_size_is_shown_in_its_own() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(level(1.0));
+    stage.app.world_mut().entity_mut(terrain).insert(level(0.5));
+    stage.frames(100);
+    let place: &Transform = stage.app.world().get(terrain).expect("a place");
+    assert_eq!(place.scale, Vec3::splat(0.5));
+    stage.send(dig(16.0, 4.0, 16.0, 2.0));
+    stage.settle();
+    let mut model = level(0.5);
+    model.apply([dig(32.0, 8.0, 32.0, 4.0)]);
+    assert_eq!(stage.hash(terrain), model.world().hash());
+}
+
+#[test]
+fn a_commit_does_not_go_into_another_terrain_on_the_same_entity() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.frame();
+    assert!(stage.terrain(terrain).is_busy());
+    let pristine = level(1.0).world().hash();
+    stage.app.world_mut().entity_mut(terrain).insert(level(1.0));
+    stage.frames(80);
+    assert_eq!(stage.hash(terrain), pristine, "the edit of the old world is in the new one");
+}
+
+#[test]
+fn nothing_is_left_of_a_terrain_whose_component_is_removed() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
+    stage.frames(4);
+    assert_eq!((stage.count::<Tile>(), stage.count::<Mesh3d>()), (0, 0));
+}

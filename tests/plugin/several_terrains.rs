@@ -1,0 +1,125 @@
+//! Several terrains in one app.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{Stage, dig, level};
+
+/// One terrain of 64 x 64 metres, and beside it, four metres away and two metres lower, one of 32 x 32 metres in half
+/// voxels. Both have their ground at height 8 (voxels), at 8 and 2 metres.
+fn pair() -> (Stage, Entity, Entity) {
+    let mut stage = Stage::drawing();
+    let first = stage.spawn(level(1.0));
+    let second = stage.spawn_at(level(0.5), SECOND);
+    stage.settle();
+    (stage, first, second)
+}
+
+const SECOND: Vec3 = Vec3::new(68.0, -2.0, 10.0);
+
+/// What a world-space brush makes of a fresh second terrain.
+fn second_after(brushes: &[Brush]) -> u64 {
+    let mut model = level(0.5);
+    model.apply(brushes.iter().map(|brush| brush.transformed(Quat::IDENTITY, SECOND * -2.0, 2.0)));
+    model.world().hash()
+}
+
+fn first_after(brushes: &[Brush]) -> u64 {
+    let mut model = level(1.0);
+    model.apply(brushes);
+    model.world().hash()
+}
+
+/// Terrain and success of each receipt.
+fn answers(stage: &Stage) -> Vec<(Option<Entity>, bool)> {
+    stage.receipts().iter().map(|applied| (applied.terrain, applied.receipt.outcome.is_ok())).collect()
+}
+
+#[test]
+fn a_brush_changes_the_terrain_that_it_reaches_and_no_other() {
+    let (mut stage, first, second) = pair();
+    let (a, b) = (dig(30.0, 8.0, 30.0, 4.0), dig(80.0, 2.0, 20.0, 3.0));
+    stage.send(a.clone());
+    stage.settle();
+    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[a.clone()]), second_after(&[])));
+    stage.send(b.clone());
+    stage.settle();
+    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[a]), second_after(&[b])));
+    assert_eq!(answers(&stage), [(Some(first), true), (Some(second), true)]);
+    stage.assert_whole(first, "both dug");
+    stage.assert_whole(second, "both dug");
+    let removed = |index: usize| stage.receipts()[index].receipt.outcome.as_ref().expect("dug").removed.total();
+    assert!(removed(1) > 2 * removed(0), "half voxels are smaller: a ball of 3 metres has radius 6 there");
+}
+
+#[test]
+fn a_brush_across_two_terrains_changes_both() {
+    let (mut stage, first, second) = pair();
+    let tunnel = Brush::dig(Shape::capsule(Vec3::new(58.0, 5.0, 24.0), Vec3::new(76.0, 1.0, 24.0), 3.0)).with_tag(3);
+    stage.send(tunnel.clone());
+    stage.settle();
+    assert_ne!(first_after(&[]), first_after(&[tunnel.clone()]));
+    assert_ne!(second_after(&[]), second_after(&[tunnel.clone()]));
+    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[tunnel.clone()]), second_after(&[tunnel])));
+    let mut answers = answers(&stage);
+    answers.sort();
+    let mut both = [(Some(first), true), (Some(second), true)];
+    both.sort();
+    assert_eq!(answers, both, "one receipt from each");
+    assert_eq!(stage.tags(), [3, 3]);
+    stage.assert_whole(first, "tunnel");
+    stage.assert_whole(second, "tunnel");
+}
+
+#[test]
+fn a_targeted_brush_changes_its_target_alone() {
+    let (mut stage, first, second) = pair();
+    let tunnel = Brush::dig(Shape::capsule(Vec3::new(58.0, 5.0, 24.0), Vec3::new(76.0, 1.0, 24.0), 3.0));
+    stage.send_to(second, tunnel.clone());
+    stage.settle();
+    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[]), second_after(&[tunnel])));
+    // One that lies beside its target is refused, though another terrain is there.
+    stage.send_to(second, dig(20.0, 8.0, 20.0, 4.0));
+    stage.settle();
+    assert_eq!(stage.hash(first), first_after(&[]));
+    assert_eq!(answers(&stage), [(Some(second), true), (Some(second), false)]);
+}
+
+#[test]
+fn a_brush_for_a_terrain_that_is_gone_is_refused() {
+    let (mut stage, first, second) = pair();
+    stage.app.world_mut().despawn(second);
+    let no_terrain = stage.app.world_mut().spawn_empty().id();
+    for (tag, target) in [second, no_terrain, first].into_iter().enumerate() {
+        stage.send_to(target, dig(30.0, 8.0, 30.0, 4.0).with_tag(tag as u64));
+    }
+    stage.settle();
+    assert_eq!(answers(&stage), [(Some(second), false), (Some(no_terrain), false), (Some(first), true)]);
+    assert_eq!(stage.tags(), [0, 1, 2]);
+}
+
+#[test]
+fn a_terrain_is_dug_where_it_was_moved_to() {
+    let (mut stage, first, _) = pair();
+    stage.app.world_mut().get_mut::<Transform>(first).expect("a place").translation = Vec3::new(0.0, 0.0, -512.0);
+    stage.frame();
+    stage.send(dig(30.0, 8.0, 30.0 - 512.0, 4.0));
+    stage.settle();
+    assert_eq!(stage.hash(first), first_after(&[dig(30.0, 8.0, 30.0, 4.0)]));
+    stage.assert_whole(first, "moved");
+}
+
+#[test]
+fn a_terrain_below_another_entity_is_dug_where_that_one_puts_it() {
+    let mut stage = Stage::drawing();
+    let island = (Transform::from_xyz(500.0, -16.0, 0.0), Visibility::default());
+    let island = stage.app.world_mut().spawn(island).id();
+    let terrain = stage.spawn_at(level(0.5), Vec3::new(0.0, 0.0, 32.0));
+    stage.app.world_mut().entity_mut(terrain).insert(ChildOf(island));
+    stage.send(dig(500.0 + 16.0, -16.0 + 4.0, 32.0 + 8.0, 2.0));
+    stage.settle();
+    let mut model = level(0.5);
+    model.apply([dig(32.0, 8.0, 16.0, 4.0)]);
+    assert_eq!(stage.hash(terrain), model.world().hash());
+    stage.assert_whole(terrain, "below another entity");
+}

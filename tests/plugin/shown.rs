@@ -1,0 +1,110 @@
+//! What a frame shows: the meshes of tiles and chunks as a GPU places them, welded where all bits agree.
+
+use std::collections::HashMap;
+
+use bevy::mesh::{Indices, VertexAttributeValues};
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::Stage;
+
+/// How well the triangles of one terrain close.
+#[derive(Debug, Default)]
+pub struct Shown {
+    /// Triangles, those that floats make flat included.
+    pub triangles: usize,
+    /// Edges with one triangle only, off the rim.
+    pub open: usize,
+    /// Edges run through more often one way than the other, off the rim.
+    pub unbalanced: usize,
+    /// The first of these.
+    pub first: Option<(Vec3, Vec3)>,
+}
+
+impl Shown {
+    /// Is something shown, and all of it closed?
+    pub fn is_closed(&self) -> bool {
+        self.triangles > 0 && self.open == 0 && self.unbalanced == 0
+    }
+}
+
+/// Triangles in world space.
+#[derive(Default)]
+struct Soup {
+    numbers: HashMap<[u32; 3], u32>,
+    places: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Soup {
+    fn add(&mut self, mesh: &Mesh, place: &GlobalTransform) {
+        let Some(VertexAttributeValues::Float32x3(positions)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else {
+            panic!("a mesh has no positions");
+        };
+        let Some(Indices::U32(indices)) = mesh.indices() else { panic!("a mesh has no indices") };
+        let mut number = |index: &u32| self.weld(place.transform_point(Vec3::from(positions[*index as usize])));
+        let triangles: Vec<[u32; 3]> =
+            indices.chunks_exact(3).map(|t| [number(&t[0]), number(&t[1]), number(&t[2])]).collect();
+        self.triangles.extend(triangles);
+    }
+
+    fn weld(&mut self, place: Vec3) -> u32 {
+        // Adding zero makes one of the two zeros.
+        let bits = (place + Vec3::ZERO).to_array().map(f32::to_bits);
+        *self.numbers.entry(bits).or_insert_with(|| {
+            self.places.push(place);
+            self.places.len() as u32 - 1
+        })
+    }
+
+    fn check(&self, low: Vec3, high: Vec3) -> Shown {
+        let mut shown = Shown { triangles: self.triangles.len(), ..Shown::default() };
+        // A triangle with a repeated corner covers nothing.
+        let solid = self.triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
+        let sides = solid.flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let mut sides: Vec<(u32, u32, bool)> = sides.map(|(u, v)| (u.min(v), u.max(v), u < v)).collect();
+        sides.sort_unstable();
+        for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (u, v) = (self.places[edge[0].0 as usize], self.places[edge[0].1 as usize]);
+            let both = |at: f32, u: f32, v: f32| u == at && v == at;
+            if both(low.x, u.x, v.x) || both(high.x, u.x, v.x) || both(low.z, u.z, v.z) || both(high.z, u.z, v.z) {
+                continue;
+            }
+            let forward = edge.iter().filter(|side| side.2).count();
+            shown.open += usize::from(edge.len() == 1);
+            shown.unbalanced += usize::from(forward * 2 != edge.len());
+            if edge.len() == 1 || forward * 2 != edge.len() {
+                shown.first.get_or_insert((u, v));
+            }
+        }
+        shown
+    }
+}
+
+impl Stage {
+    /// What this frame shows of a terrain.
+    pub fn shown(&mut self, terrain: Entity) -> Shown {
+        let world = self.app.world_mut();
+        let mut drawn = world.query_filtered::<(&Mesh3d, &GlobalTransform, &Visibility, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
+        let meshes = world.resource::<Assets<Mesh>>();
+        let mut soup = Soup::default();
+        for (mesh, place, visibility, parent) in drawn.iter(world) {
+            if parent.parent() == terrain && *visibility != Visibility::Hidden {
+                soup.add(meshes.get(&mesh.0).expect("a shown mesh is there"), place);
+            }
+        }
+        let ground = self.terrain(terrain).world().ground();
+        let (width, depth) = (ground.width() as f32, ground.depth() as f32);
+        let place: &GlobalTransform = self.app.world().get(terrain).expect("the terrain has a place");
+        soup.check(place.transform_point(Vec3::ZERO), place.transform_point(Vec3::new(width, 0.0, depth)))
+    }
+
+    /// Fails unless this frame shows all of a terrain's world, and no hole.
+    pub fn assert_whole(&mut self, terrain: Entity, when: &str) {
+        let shown = self.shown(terrain);
+        assert!(shown.is_closed(), "{when}: {shown:?}");
+        let world = self.terrain(terrain).world();
+        let triangles: usize = world.drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
+        assert_eq!(shown.triangles, triangles, "{when}: the frame shows another world than the committed one");
+    }
+}

@@ -1,0 +1,218 @@
+//! The app that the tests play on: terrains go in, brushes too, and receipts are kept.
+
+use std::time::Duration;
+
+use bevy::mesh::MeshPlugin;
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+use fastrand::Rng;
+
+use crate::worlds;
+
+/// Frames that a stage waits for something before it gives up; each of them sleeps for [`NAP`].
+const PATIENCE: usize = 60_000;
+
+/// How long a stage sleeps between two frames, so that tasks get on.
+const NAP: Duration = Duration::from_micros(500);
+
+/// Longer than small transactions take.
+const REST: Duration = Duration::from_millis(60);
+
+/// Every receipt so far.
+#[derive(Resource, Default)]
+struct Receipts(Vec<BrushApplied>);
+
+/// The terrains that said they are ready.
+#[derive(Resource, Default)]
+struct ReadyTerrains(Vec<Entity>);
+
+/// An app with the plugin.
+pub struct Stage {
+    /// The app itself.
+    pub app: App,
+}
+
+impl Stage {
+    /// An app that has meshes and transforms, but no renderer that would take the meshes away.
+    pub fn drawing() -> Self {
+        Self::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
+    }
+
+    /// A dedicated server: `MinimalPlugins` and nothing else.
+    pub fn server() -> Self {
+        Self::with(MinimalPlugins)
+    }
+
+    /// An app with these plugins under those of the crate.
+    pub fn with<M>(plugins: impl bevy::app::Plugins<M>) -> Self {
+        let mut app = App::new();
+        app.add_plugins(plugins)
+            .add_plugins(BurrowPlugins)
+            .init_resource::<Receipts>()
+            .init_resource::<ReadyTerrains>()
+            .add_observer(|ready: On<TerrainReady>, mut terrains: ResMut<ReadyTerrains>| terrains.0.push(ready.entity))
+            .add_systems(Last, |mut new: MessageReader<BrushApplied>, mut kept: ResMut<Receipts>| {
+                kept.0.extend(new.read().cloned());
+            });
+        app.finish();
+        app.cleanup();
+        Self { app }
+    }
+
+    /// The same app with other settings.
+    pub fn with_settings(mut self, settings: BurrowSettings) -> Self {
+        self.app.insert_resource(settings);
+        self
+    }
+
+    /// Spawns a terrain where it counts from the world's origin.
+    pub fn spawn(&mut self, terrain: Terrain) -> Entity {
+        self.spawn_at(terrain, Vec3::ZERO)
+    }
+
+    /// Spawns a terrain elsewhere.
+    pub fn spawn_at(&mut self, terrain: Terrain, place: Vec3) -> Entity {
+        self.app.world_mut().spawn((terrain, Transform::from_translation(place))).id()
+    }
+
+    /// Spawns a terrain and waits until it is shown.
+    pub fn show(&mut self, terrain: Terrain) -> Entity {
+        let entity = self.spawn(terrain);
+        self.settle();
+        entity
+    }
+
+    /// Writes a brush message, to be read in the next frame.
+    pub fn send(&mut self, brush: Brush) {
+        self.app.world_mut().write_message(brush).expect("the plugin added the message");
+    }
+
+    /// Writes a brush message for one terrain alone.
+    pub fn send_to(&mut self, terrain: Entity, brush: Brush) {
+        self.app.world_mut().write_message(TargetedBrush { terrain, brush }).expect("the plugin added the message");
+    }
+
+    /// One frame.
+    pub fn frame(&mut self) {
+        self.app.update();
+    }
+
+    /// Some frames more, with time for tasks.
+    pub fn frames(&mut self, count: usize) {
+        for _ in 0..count {
+            self.frame();
+            std::thread::sleep(NAP);
+        }
+    }
+
+    /// Sleeps, so that small transactions under way are done before the next frame.
+    pub fn rest(&self) {
+        std::thread::sleep(REST);
+    }
+
+    /// Frames until something is so; at least one. Panics when it never comes.
+    pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
+        for _ in 0..PATIENCE {
+            self.frame();
+            if is_so(self) {
+                return;
+            }
+            std::thread::sleep(NAP);
+        }
+        panic!("waited in vain: {what}");
+    }
+
+    /// Frames until every terrain is shown and no brush is on its way.
+    pub fn settle(&mut self) {
+        self.frames_until("all terrains settle", |stage| stage.is_settled());
+    }
+
+    /// Is every terrain shown, and no brush on its way?
+    pub fn is_settled(&mut self) -> bool {
+        let terrains: Vec<Entity> = self.with_component::<Terrain>();
+        let ready = &self.app.world().resource::<ReadyTerrains>().0;
+        terrains.iter().all(|&entity| {
+            let terrain = self.terrain(entity);
+            ready.contains(&entity) && terrain.queued() == 0 && !terrain.is_busy()
+        })
+    }
+
+    /// A terrain's model.
+    pub fn terrain(&self, entity: Entity) -> &Terrain {
+        self.app.world().get(entity).expect("the terrain is there")
+    }
+
+    /// Hash of a terrain's world.
+    pub fn hash(&self, entity: Entity) -> u64 {
+        self.terrain(entity).world().hash()
+    }
+
+    /// Every receipt so far.
+    pub fn receipts(&self) -> &[BrushApplied] {
+        &self.app.world().resource::<Receipts>().0
+    }
+
+    /// The tags of all receipts so far.
+    pub fn tags(&self) -> Vec<u64> {
+        self.receipts().iter().map(|applied| applied.receipt.tag).collect()
+    }
+
+    /// What the plugin did so far.
+    pub fn figures(&self) -> &BurrowFigures {
+        self.app.world().resource()
+    }
+
+    /// All entities with a component.
+    pub fn with_component<C: Component>(&mut self) -> Vec<Entity> {
+        let world = self.app.world_mut();
+        world.query_filtered::<Entity, With<C>>().iter(world).collect()
+    }
+
+    /// How many entities have a component.
+    pub fn count<C: Component>(&mut self) -> usize {
+        self.with_component::<C>().len()
+    }
+
+    /// How many meshes are kept as assets.
+    pub fn meshes(&self) -> usize {
+        self.app.world().resource::<Assets<Mesh>>().len()
+    }
+}
+
+/// Steep hills of 64 x 64 voxels.
+pub fn hills() -> Ground {
+    let noise = NoiseHeights { seed: 5, kind: NoiseKind::Ridged, octaves: 4, scale: 24.0, amplitude: 24.0, base: 3.0 };
+    Ground::from_noise(64, 64, &noise).expect("valid hills")
+}
+
+/// Steep hills that nobody dug yet, in 4 x 4 tiles.
+pub fn steep() -> Terrain {
+    terrain(hills(), 1.0)
+}
+
+/// Level ground of 64 x 64 voxels at height 8, in 4 x 4 tiles.
+pub fn level(voxel_size: f32) -> Terrain {
+    terrain(Ground::flat(64, 64, 8.0).expect("valid ground"), voxel_size)
+}
+
+fn terrain(ground: Ground, voxel_size: f32) -> Terrain {
+    Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size }).expect("valid settings")
+}
+
+/// A ball that is dug out.
+pub fn dig(x: f32, y: f32, z: f32, radius: f32) -> Brush {
+    Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius))
+}
+
+/// Brushes of all kinds for the [`hills`], every other one on chunk faces or at the rim. Tags count from 0.
+pub fn random_brushes(seed: u64, count: u64) -> Vec<Brush> {
+    let (mut rng, ground) = (Rng::with_seed(seed), hills());
+    let brush = |tag: u64| {
+        let brush = match tag % 2 {
+            0 => worlds::random_brush(&mut rng, &ground),
+            _ => worlds::random_brush_at_a_face(&mut rng, &ground, 16),
+        };
+        brush.with_tag(tag)
+    };
+    (0..count).map(brush).collect()
+}

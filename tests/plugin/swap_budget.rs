@@ -1,0 +1,78 @@
+//! The budget of mesh swaps per frame: commits wait for each other, and none is cut.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{Stage, dig, level};
+
+const SECOND: Vec3 = Vec3::new(100.0, 0.0, 0.0);
+
+fn pair(swaps_per_frame: usize) -> (Stage, [Entity; 2]) {
+    let mut stage = Stage::drawing().with_settings(BurrowSettings { swaps_per_frame, ..default() });
+    let terrains = [stage.spawn(level(1.0)), stage.spawn_at(level(1.0), SECOND)];
+    stage.settle();
+    (stage, terrains)
+}
+
+/// Digs both terrains over a corner of four chunks, so that each commit has several swaps, and looks at every frame;
+/// returns the most commits that a frame had.
+fn dig_both(stage: &mut Stage, terrains: [Entity; 2], x: f32) -> u64 {
+    for offset in [Vec3::ZERO, SECOND] {
+        stage.send(dig(x + offset.x, 8.0, 16.0, 4.0));
+    }
+    let mut before = stage.figures().commits;
+    let end = before + 2;
+    let mut most = 0;
+    stage.frame();
+    stage.rest();
+    stage.frames_until("both are dug", |stage| {
+        let commits = stage.figures().commits;
+        most = most.max(commits - before);
+        before = commits;
+        for terrain in terrains {
+            stage.assert_whole(terrain, "one of two commits");
+        }
+        commits == end
+    });
+    most
+}
+
+#[test]
+fn commits_over_the_budget_land_in_different_frames_each_whole() {
+    let (mut stage, terrains) = pair(1);
+    for round in 0..5 {
+        assert_eq!(dig_both(&mut stage, terrains, 8.0 + 8.0 * round as f32), 1);
+    }
+    assert!(stage.figures().swaps > 2 * stage.figures().commits, "a commit has more swaps than the budget");
+}
+
+#[test]
+fn commits_within_the_budget_land_in_one_frame() {
+    let (mut stage, terrains) = pair(256);
+    // Both are done in time in most rounds.
+    assert!((0..5).any(|round| dig_both(&mut stage, terrains, 8.0 + 8.0 * round as f32) == 2));
+}
+
+#[test]
+fn terrains_that_are_dug_all_the_time_do_not_keep_another_one_waiting() {
+    for waiting in 0..3 {
+        let mut stage = Stage::drawing().with_settings(BurrowSettings { swaps_per_frame: 1, ..default() });
+        let terrains = [0.0, 1.0, 2.0].map(|index| stage.spawn_at(level(1.0), SECOND * index));
+        stage.settle();
+        let at = |index: usize, x: f32| dig(x + SECOND.x * index as f32, 8.0, 30.0, 4.0);
+        let before = stage.hash(terrains[waiting]);
+        stage.send(at(waiting, 30.0));
+        let mut frames = 0;
+        while stage.hash(terrains[waiting]) == before {
+            for busy in (0..3).filter(|&index| index != waiting) {
+                stage.send(at(busy, 20.0 + 0.5 * frames as f32));
+            }
+            stage.frame();
+            stage.rest();
+            frames += 1;
+            let who: Vec<_> = stage.receipts().iter().map(|r| terrains.iter().position(|t| Some(*t) == r.terrain)).collect();
+            println!("waiting {waiting} frame {frames}: commits {} {who:?}", stage.figures().commits);
+            assert!(frames < 20, "terrain {waiting} waits for ever while the others are dug");
+        }
+    }
+}

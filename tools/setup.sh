@@ -1,0 +1,96 @@
+#!/bin/sh
+# Installs what this machine lacks for building and running bevy_burrow; with nothing missing it only looks.
+#
+#   tools/setup.sh build     compiler, linker, Rust
+#   tools/setup.sh run       the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
+#   tools/setup.sh lint      the same as build, and rustfmt and clippy
+#
+# Debian and its kin: uses apt-get, as root or with sudo, and the official Rust installer. Elsewhere it says what to
+# install. Compiling needs no -dev packages.
+set -eu
+
+wanted_rust=1.95
+goal=${1:-build}
+PATH="$HOME/.cargo/bin:$PATH:/usr/sbin:/sbin"
+packages=
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+die() { say "$*"; exit 1; }
+has() { command -v "$1" >/dev/null 2>&1; }
+want() { case " $packages " in *" $1 "*) ;; *) packages="$packages $1" ;; esac; }
+
+# want_library FILE PACKAGE: the package, unless the linker knows the library.
+want_library() { ldconfig -p 2>/dev/null | grep -q "$1" || want "$2"; }
+
+# Where it may not install, it says what is missing and goes on: the machine may have it under another name.
+install_packages() {
+    [ -n "$packages" ] || return 0
+    root=
+    [ "$(id -u)" -eq 0 ] || root=sudo
+    if ! has apt-get || { [ -n "$root" ] && ! has "$root"; }; then
+        say "please install (names as in Debian):$packages"
+        return 0
+    fi
+    say "installing$packages"
+    $root apt-get update -qq
+    # The names are words of this script.
+    # shellcheck disable=SC2086
+    $root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $packages >/dev/null </dev/null
+}
+
+rust_version() { rustc --version 2>/dev/null | sed -n 's/^rustc \([0-9]*\.[0-9]*\).*/\1/p'; }
+
+# rust_is_new_enough: is rustc there, and at least the wanted version?
+rust_is_new_enough() {
+    have=$(rust_version)
+    if [ -z "$have" ] || ! has cargo; then return 1; fi
+    [ "${have%.*}" -gt "${wanted_rust%.*}" ] ||
+        { [ "${have%.*}" -eq "${wanted_rust%.*}" ] && [ "${have#*.}" -ge "${wanted_rust#*.}" ]; }
+}
+
+install_rust() {
+    rust_is_new_enough && return 0
+    if has rustup; then
+        die "rustc is $(rust_version), but $wanted_rust is the least: run 'rustup update stable'"
+    fi
+    say "installing Rust for $(id -un) with its official installer"
+    installer=$(mktemp)
+    trap 'rm -f "$installer"' EXIT
+    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs -o "$installer" || die "the Rust installer cannot be had"
+    RUSTUP_INIT_SKIP_PATH_CHECK=yes sh "$installer" -y --quiet --profile minimal --component rustfmt \
+        --component clippy </dev/null
+    rust_is_new_enough || die "rustc is '$(rust_version)' after installing, but $wanted_rust is the least"
+}
+
+case $goal in build | run | lint) ;; *) die "unknown goal '$goal': build, run or lint" ;; esac
+
+has make || want make
+if ! has cc; then
+    want gcc
+    want libc6-dev
+fi
+if ! rust_is_new_enough && ! has rustup; then
+    has curl || want curl
+    [ -e /etc/ssl/certs/ca-certificates.crt ] || want ca-certificates
+fi
+if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
+    want_library libvulkan.so.1 libvulkan1
+    # Any driver will do; without one, Mesa brings a software renderer too.
+    ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json >/dev/null 2>&1 || want mesa-vulkan-drivers
+    if [ -n "${DISPLAY:-}" ]; then
+        want_library libX11.so.6 libx11-6
+        want_library libX11-xcb.so.1 libx11-xcb1
+        want_library libXcursor.so.1 libxcursor1
+        want_library libXi.so.6 libxi6
+        want_library libxcb.so.1 libxcb1
+        want_library libxkbcommon.so.0 libxkbcommon0
+        want_library libxkbcommon-x11.so.0 libxkbcommon-x11-0
+    fi
+fi
+install_packages
+has cc || die "a C compiler and linker is missing"
+install_rust
+if [ "$goal" = lint ]; then
+    cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
+    cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+fi
