@@ -33,7 +33,9 @@ impl Difference {
             let solid = [old.is_solid(point), new.is_solid(point)];
             found.solid[0] += u64::from(solid[0]);
             found.solid[1] += u64::from(solid[1]);
-            if old.sample(point) == new.sample(point) && old.stored_material(point) == new.stored_material(point) {
+            if old.sample(point) == new.sample(point)
+                && old.stored_material(point) == new.stored_material(point)
+            {
                 assert_eq!(solid[0], solid[1], "the same sample at {point} changed sides");
                 continue;
             }
@@ -65,7 +67,12 @@ fn edited_samples(world: &World) -> u64 {
 fn with_materials(ground: Ground) -> Ground {
     let rules = vec![
         MaterialRule { overlay: MaterialId(11), slope: (0.8, f64::INFINITY), ..Default::default() },
-        MaterialRule { overlay: MaterialId(12), height: (-5.0, 20.0), height_fade: 6.0, ..Default::default() },
+        MaterialRule {
+            overlay: MaterialId(12),
+            height: (-5.0, 20.0),
+            height_fade: 6.0,
+            ..Default::default()
+        },
     ];
     ground.with_materials(&MaterialControl::Rules { base: MaterialId(10), rules }).expect("valid rules")
 }
@@ -90,7 +97,9 @@ fn a_thousand_receipts_balance_with_the_world() {
                 _ => random_brush(&mut rng, ground),
             };
             let Ok(edit) = Edit::quantize(&brush) else { continue };
-            let Some(place) = edit.reach().grown(3).intersection(terrain.world().grid().edit_bounds()) else { continue };
+            let Some(place) = edit.reach().grown(3).intersection(terrain.world().grid().edit_bounds()) else {
+                continue;
+            };
             if place.volume() > 200_000 {
                 continue;
             }
@@ -123,12 +132,17 @@ fn a_thousand_receipts_balance_with_the_world() {
             assert_eq!(applied.chunks.is_empty(), applied.bounds.is_none(), "{what}");
             for part in &applied.chunks {
                 let field = after.fields_of(part.chunk).and_then(|fields| fields.get(part.field));
-                let field = field.unwrap_or_else(|| panic!("the receipt names a field that is not there; {what}"));
-                assert!(applied.bounds.is_some_and(|bounds| bounds.intersection(field.bounds).is_some()), "{what}");
+                let field =
+                    field.unwrap_or_else(|| panic!("the receipt names a field that is not there; {what}"));
+                assert!(
+                    applied.bounds.is_some_and(|bounds| bounds.intersection(field.bounds).is_some()),
+                    "{what}"
+                );
             }
             edits += 1;
             split += usize::from(applied.is_split());
-            for (total, tally) in totals.iter_mut().zip([&applied.removed, &applied.added, &applied.painted]) {
+            for (total, tally) in totals.iter_mut().zip([&applied.removed, &applied.added, &applied.painted])
+            {
                 *total += tally.total();
             }
         }
@@ -156,11 +170,18 @@ fn the_sum_of_receipts_is_the_change_of_the_whole_world() {
             if let Ok(applied) = receipt.outcome {
                 removed.add(&applied.removed);
                 added.add(&applied.added);
-                assert!(applied.bounds.is_none_or(|bounds| whole.encloses(bounds)), "the test's box is too small");
+                assert!(
+                    applied.bounds.is_none_or(|bounds| whole.encloses(bounds)),
+                    "the test's box is too small"
+                );
             }
         }
         let after = terrain.world().samples().solid_count(whole);
-        assert_eq!(removed.total() as i64 - added.total() as i64, before as i64 - after as i64, "world {seed}");
+        assert_eq!(
+            removed.total() as i64 - added.total() as i64,
+            before as i64 - after as i64,
+            "world {seed}"
+        );
     }
 }
 
@@ -175,7 +196,9 @@ fn samples_farther_than_two_voxels_outside_a_shape_stay_as_they_are() {
         let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
         for brush in &brushes {
             let Ok(edit) = Edit::quantize(brush) else { continue };
-            let Some(place) = edit.reach().grown(3).intersection(terrain.world().grid().edit_bounds()) else { continue };
+            let Some(place) = edit.reach().grown(3).intersection(terrain.world().grid().edit_bounds()) else {
+                continue;
+            };
             if place.volume() > 200_000 {
                 continue;
             }
@@ -187,9 +210,15 @@ fn samples_farther_than_two_voxels_outside_a_shape_stay_as_they_are() {
                 let outside = evaluator.distance(point);
                 let same = old.sample(point) == new.sample(point)
                     && old.stored_material(point) == new.stored_material(point);
-                assert!(edit.reach().contains(point) || outside > BAND, "the reach leaves out {point} of {brush:?}");
+                assert!(
+                    edit.reach().contains(point) || outside > BAND,
+                    "the reach leaves out {point} of {brush:?}"
+                );
                 if outside > BAND {
-                    assert!(same, "world {seed}: {point} is {outside}/256 voxel outside {brush:?} and yet changed");
+                    assert!(
+                        same,
+                        "world {seed}: {point} is {outside}/256 voxel outside {brush:?} and yet changed"
+                    );
                     far += 1;
                     continue;
                 }
@@ -203,7 +232,9 @@ fn samples_farther_than_two_voxels_outside_a_shape_stay_as_they_are() {
             }
         }
     }
-    println!("{near} samples near a shape, {untouched} of them unchanged; {far} farther off, all of them unchanged");
+    println!(
+        "{near} samples near a shape, {untouched} of them unchanged; {far} farther off, all of them unchanged"
+    );
     assert!(near > 100_000 && far > 100_000);
 }
 
@@ -231,7 +262,10 @@ fn every_brush_gets_its_receipt_in_order_and_under_its_tag() {
         match brush.shape {
             shape if shape == outside => assert_eq!(*outcome, Err(Rejection::OutsideWorld)),
             shape if shape == valid || shape == air => assert!(outcome.is_ok(), "{outcome:?}"),
-            _ => assert!(matches!(outcome, Err(Rejection::Brush(BrushError::NotFinite { what: "center", .. })))),
+            _ => assert!(matches!(
+                outcome,
+                Err(Rejection::Brush(BrushError::NotFinite { what: "center", .. }))
+            )),
         }
     }
 }
@@ -278,9 +312,13 @@ fn a_rejected_brush_changes_nothing() {
         Shape::turned_cuboid(at, Vec3::ONE, glam::Quat::from_xyzw(0.0, 0.0, 0.0, 0.0)),
         Shape::cuboid(at, Vec3::new(1.0, 0.0, 1.0)),
     ] {
-        for brush in [Brush::dig(shape), Brush::add(shape, MaterialId(1)), Brush::paint(shape, MaterialId(1))] {
+        for brush in [Brush::dig(shape), Brush::add(shape, MaterialId(1)), Brush::paint(shape, MaterialId(1))]
+        {
             let receipts = terrain.apply([&brush]);
-            assert!(matches!(receipts.as_slice(), [Receipt { outcome: Err(_), .. }]), "{brush:?}: {receipts:?}");
+            assert!(
+                matches!(receipts.as_slice(), [Receipt { outcome: Err(_), .. }]),
+                "{brush:?}: {receipts:?}"
+            );
             assert_eq!(terrain.world().hash(), before.hash(), "{brush:?}");
             assert_eq!(terrain.world().bricks().count(), before.bricks().count(), "{brush:?}");
             assert!(terrain.world().fields().all(|(chunk, fields)| before.fields_of(chunk) == Some(fields)));

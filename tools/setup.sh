@@ -22,6 +22,13 @@ want() { case " $packages " in *" $1 "*) ;; *) packages="$packages $1" ;; esac; 
 # want_library FILE PACKAGE: the package, unless the linker knows the library.
 want_library() { ldconfig -p 2>/dev/null | grep -q "$1" || want "$2"; }
 
+has_vulkan_driver() {
+    for driver in /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json; do
+        [ -e "$driver" ] && return 0
+    done
+    return 1
+}
+
 # Where it may not install, it says what is missing and goes on: the machine may have it under another name.
 install_packages() {
     [ -n "$packages" ] || return 0
@@ -35,7 +42,8 @@ install_packages() {
     $root apt-get update -qq
     # The names are words of this script.
     # shellcheck disable=SC2086
-    $root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $packages >/dev/null </dev/null
+    $root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y -o Dpkg::Use-Pty=0 --no-install-recommends \
+        $packages >/dev/null </dev/null
 }
 
 rust_version() { rustc --version 2>/dev/null | sed -n 's/^rustc \([0-9]*\.[0-9]*\).*/\1/p'; }
@@ -76,7 +84,7 @@ fi
 if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
     want_library libvulkan.so.1 libvulkan1
     # Any driver will do; without one, Mesa brings a software renderer too.
-    ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json >/dev/null 2>&1 || want mesa-vulkan-drivers
+    has_vulkan_driver || want mesa-vulkan-drivers
     if [ -n "${DISPLAY:-}" ]; then
         want_library libX11.so.6 libx11-6
         want_library libX11-xcb.so.1 libx11-xcb1

@@ -1,8 +1,10 @@
 //! Eyes and light: the camera, the sun and its shadows, haze, the dark of caves and the headlamp.
 
+use bevy::anti_alias::smaa::Smaa;
 use bevy::core_pipeline::{prepass::DepthPrepass, tonemapping::Tonemapping};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, light_consts::lux};
 use bevy::prelude::*;
+use bevy::render::renderer::RenderAdapterInfo;
 use bevy_burrow::prelude::*;
 
 use crate::sky::HAZE;
@@ -11,7 +13,7 @@ use crate::sky::HAZE;
 pub const SUN: Vec3 = Vec3::new(-0.58, 0.64, 0.504);
 
 /// Brightness of the sky's light on everything, out of doors and deep in a cave.
-const SKYLIGHT: (f32, f32) = (1700.0, 110.0);
+const SKYLIGHT: (f32, f32) = (2100.0, 130.0);
 /// Luminous power of the headlamp in lumens, as a game needs it and not as a shop sells it.
 const LAMP: f32 = 14_000_000.0;
 /// Metres to the far end of what is seen.
@@ -47,7 +49,12 @@ fn haze() -> Color {
     Color::linear_rgb(HAZE.x, HAZE.y, HAZE.z)
 }
 
-fn open_eyes(mut commands: Commands) {
+/// Is there no graphics card, so that the processor draws? (Bevy does not re-export the type that tells.)
+fn draws_in_software(adapter: &RenderAdapterInfo) -> bool {
+    format!("{:?}", adapter.device_type) == "Cpu"
+}
+
+fn open_eyes(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
     let fog = DistanceFog {
         color: haze(),
         directional_light_color: Color::linear_rgba(1.0, 0.82, 0.58, 0.35),
@@ -64,20 +71,25 @@ fn open_eyes(mut commands: Commands) {
         shadow_maps_enabled: true,
         ..default()
     };
-    commands.spawn((
+    // Four samples for each pixel cost a software renderer three times the time of one.
+    let msaa = if adapter.is_some_and(|adapter| draws_in_software(&adapter)) { Msaa::Off } else { Msaa::Sample4 };
+    let mut eyes = commands.spawn((
         Name::new("eyes"),
         Eyes,
         Camera3d::default(),
         Projection::Perspective(PerspectiveProjection { fov: 70f32.to_radians(), near: 0.08, far: FAR, ..default() }),
         Transform::from_xyz(0.0, 400.0, 0.0),
-        Tonemapping::AcesFitted,
-        Msaa::Sample4,
+        Tonemapping::TonyMcMapface,
+        msaa,
         // Ridge lies behind ridge: only what is seen in the end is shaded.
         DepthPrepass,
         fog,
         // A little to the side of the eyes, so that its shadows are seen.
         children![(Headlamp, lamp, Transform::from_xyz(0.25, 0.12, 0.0))],
     ));
+    if msaa == Msaa::Off {
+        eyes.insert(Smaa::default());
+    }
 }
 
 fn let_there_be_sun(mut commands: Commands) {
@@ -85,7 +97,7 @@ fn let_there_be_sun(mut commands: Commands) {
         Name::new("sun"),
         DirectionalLight {
             color: Color::srgb(1.0, 0.94, 0.84),
-            illuminance: lux::AMBIENT_DAYLIGHT * 0.8,
+            illuminance: lux::AMBIENT_DAYLIGHT * 1.05,
             shadow_maps_enabled: true,
             ..default()
         },

@@ -175,7 +175,7 @@ impl Stage {
         for brush in works::pit(corner) {
             self.edit(brush)?;
         }
-        let eye = self.above(corner + Vec3::new(-23.0, 0.0, 20.0), 21.0)?;
+        let eye = self.above(corner + Vec3::new(-24.0, 0.0, 20.0), 18.0)?;
         self.shoot_from("8_pit", eye, corner - Vec3::Y * 4.0)
     }
 

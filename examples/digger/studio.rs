@@ -228,8 +228,8 @@ impl Studio {
             std::fs::remove_file(&path)?;
         }
         self.film_runs(true);
-        // Shaders and the sky come in over some frames; later on, one is enough.
-        let frames = if self.is_warm { 1 } else { 4 };
+        // Shaders and the sky come in over some frames; later on, lights need a few to find what they shine on.
+        let frames = if self.is_warm { 3 } else { 6 };
         self.is_warm = true;
         for _ in 0..frames {
             self.step_and_draw();

@@ -57,7 +57,8 @@ struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     voxels_per_sample: u32,
     /// Heights of grey 0 and of full grey, in voxels
-    #[arg(long, num_args = 2, value_names = ["LO", "HI"], default_values_t = [0.0, 255.0], allow_negative_numbers = true)]
+    #[arg(long, num_args = 2, value_names = ["LO", "HI"], default_values_t = [0.0, 255.0])]
+    #[arg(allow_negative_numbers = true)]
     height_range: Vec<f64>,
     /// Edits as JSON lines
     #[arg(long, value_name = "FILE")]

@@ -168,7 +168,8 @@ impl fmt::Display for Report {
         let ScenarioCounts { created, changed, extended, merged, split } = scenarios;
         writeln!(
             f,
-            "scenarios  {created} created, {changed} changed inside, {extended} extended, {merged} merged, {split} split"
+            "scenarios  {created} created, {changed} changed inside, {extended} extended, {merged} merged, \
+             {split} split"
         )?;
         writeln!(f, "world      {} fields, {} chunks, {} bricks", self.fields, self.chunks, self.bricks)?;
         writeln!(

@@ -3,44 +3,21 @@
 use std::time::Duration;
 
 use bevy::camera::visibility::NoAutoAabb;
-use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
+use super::entities::TerrainEntities;
 use super::load::Loading;
 use super::meshes::{self, Ready};
-use super::{
-    BrushApplied, BurrowFigures, BurrowSettings, Chunk, ChunkChanged, ChunkCreated, Field, FieldChanged,
-    FieldCreated, FieldMerged, MaterialColors,
-};
-use crate::lattice::{ChunkPos, TilePos};
-use crate::terrain::{Commit, Drawn, FieldNews, Terrain, Version, World};
-use crate::volume::{self, FieldId};
-
-/// The entities below a terrain, and the world that they show. Its presence says that the terrain has loaded.
-#[derive(Component)]
-pub struct TerrainEntities {
-    pub(super) shown: Version,
-    pub(super) tiles: HashMap<TilePos, Entity>,
-    pub(super) chunks: HashMap<ChunkPos, Entity>,
-    pub(super) fields: HashMap<FieldId, Entity>,
-}
-
-impl TerrainEntities {
-    pub(super) fn new(shown: Version) -> Self {
-        Self { shown, tiles: HashMap::default(), chunks: HashMap::default(), fields: HashMap::default() }
-    }
-
-    /// Tiles and chunks; fields lie below these.
-    pub(super) fn drawn(&self) -> impl Iterator<Item = Entity> {
-        self.tiles.values().chain(self.chunks.values()).copied()
-    }
-}
+use super::{BrushApplied, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, MaterialColors};
+use crate::terrain::{Commit, Drawn, Terrain};
 
 /// The transaction that a terrain waits for.
 #[derive(Component)]
 pub(super) struct InFlight {
+    /// Counts transactions, over all terrains.
+    number: u64,
     task: Task<Prepared>,
     done: Option<Prepared>,
 }
@@ -61,6 +38,7 @@ pub(super) fn begin_transactions(
     >,
     assets: Option<Res<Assets<Mesh>>>,
     mut figures: ResMut<BurrowFigures>,
+    mut number: Local<u64>,
 ) {
     let start = Instant::now();
     let draws = assets.is_some();
@@ -82,7 +60,8 @@ pub(super) fn begin_transactions(
             let meshes = tiles.chain(chunks).map(build).collect();
             Prepared { commit, meshes, took: start.elapsed() }
         });
-        commands.entity(entity).insert(InFlight { task, done: None });
+        *number += 1;
+        commands.entity(entity).try_insert(InFlight { number: *number, task, done: None });
     }
     figures.main_thread += start.elapsed();
 }
@@ -97,49 +76,56 @@ pub(super) fn commit_transactions(
     shown: Query<&Mesh3d>,
     mut receipts: MessageWriter<BrushApplied>,
 ) {
-    let mut swapped = 0;
-    for (entity, mut terrain, mut entities, mut transaction) in &mut terrains {
+    let mut done = Vec::new();
+    for (entity, _, _, mut transaction) in &mut terrains {
         if transaction.done.is_none() {
             transaction.done = check_ready(&mut transaction.task);
         }
+        if transaction.done.is_some() {
+            done.push((transaction.number, entity));
+        }
+    }
+    // The oldest first: whoever had to wait for the budget is next.
+    done.sort_unstable();
+    let mut swapped = 0;
+    for (_, entity) in done {
+        let Ok((_, mut terrain, mut entities, mut transaction)) = terrains.get_mut(entity) else { continue };
         let swaps = transaction.done.as_ref().map_or(0, |prepared| prepared.meshes.len());
         if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
             continue;
         }
         let Some(Prepared { commit, meshes, took }) = transaction.done.take() else { continue };
-        commands.entity(entity).remove::<InFlight>();
+        commands.entity(entity).try_remove::<InFlight>();
         let start = Instant::now();
         let news = commit.field_news().to_vec();
-        let committed = match terrain.commit(commit) {
-            Ok(committed) => committed,
-            // The game gave the transaction up, and with it has taken its edits back.
-            Err(_) => continue,
-        };
+        // A transaction that the game gave up is refused; its edits wait in the queue again.
+        let Ok(committed) = terrain.commit(commit) else { continue };
         swapped += swaps;
         let world = terrain.world();
         entities.shown = world.version();
-        for (drawn, ready) in meshes {
-            let child = match drawn {
-                Drawn::Tile(tile) => entities.tiles.get(&tile).copied(),
-                Drawn::Chunk(chunk) => Some(match entities.chunks.get(&chunk) {
-                    Some(&child) => {
-                        commands.trigger(ChunkChanged { entity: child });
-                        child
-                    }
-                    None if ready.is_some() => {
-                        spawn_chunk(&mut commands, &mut entities, entity, world, chunk)
-                    }
-                    None => continue,
-                }),
-            };
-            if let (Some(child), Some(assets)) = (child, &mut assets) {
+        let with_fields = news.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
+        let with_meshes = meshes.into_iter().map(|(drawn, ready)| (drawn, Some(ready)));
+        for (drawn, ready) in with_meshes.chain(with_fields) {
+            let child = entities.get(&mut commands, drawn);
+            let is_new = child.is_none();
+            if is_new && matches!(ready, Some(None)) {
+                continue;
+            }
+            let child = child.unwrap_or_else(|| entities.spawn(&mut commands, entity, world, drawn));
+            if let (Some(ready), Some(assets)) = (ready, &mut assets) {
                 swap(&mut commands, assets, child, shown.get(child).ok(), ready);
+                figures.swaps += 1;
+                if let (Drawn::Chunk(_), false) = (drawn, is_new) {
+                    commands.trigger(ChunkChanged { entity: child });
+                }
+            }
+            if let (Drawn::Chunk(_), true) = (drawn, is_new) {
+                commands.trigger(ChunkCreated { entity: child });
             }
         }
-        tell_fields(&mut commands, &mut entities, entity, world, &news);
+        entities.tell_fields(&mut commands, world, &news);
         figures.commits += 1;
         figures.brushes += committed.len() as u64;
-        figures.swaps += swaps as u64;
         figures.last_transaction = took;
         let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
         receipts.write_batch(committed.into_iter().map(applied));
@@ -176,68 +162,4 @@ fn swap(
             child.try_insert((bounds, NoAutoAabb));
         }
     }
-}
-
-/// Entities and events of fields that changed.
-fn tell_fields(
-    commands: &mut Commands,
-    entities: &mut TerrainEntities,
-    terrain: Entity,
-    world: &World,
-    news: &[(ChunkPos, FieldNews)],
-) {
-    for &(chunk, news) in news {
-        let field = |id| world.fields_of(chunk).and_then(|fields| fields.get(id));
-        match news {
-            FieldNews::Created(id) => {
-                if !entities.chunks.contains_key(&chunk) {
-                    spawn_chunk(commands, entities, terrain, world, chunk);
-                }
-                if let Some(field) = field(id) {
-                    spawn_field(commands, entities, chunk, field);
-                }
-            }
-            FieldNews::Changed(id) => {
-                if let (Some(field), Some(&child)) = (field(id), entities.fields.get(&id)) {
-                    commands.entity(child).try_insert(Field::from(field));
-                    commands.trigger(FieldChanged { entity: child });
-                }
-            }
-            FieldNews::Merged { gone, into } => {
-                let into = entities.fields.get(&into).copied();
-                if let (Some(child), Some(into)) = (entities.fields.remove(&gone), into) {
-                    commands.trigger(FieldMerged { entity: child, into });
-                    commands.entity(child).try_despawn();
-                }
-            }
-        }
-    }
-}
-
-/// Spawns the entity of a chunk below its terrain.
-pub(super) fn spawn_chunk(
-    commands: &mut Commands,
-    entities: &mut TerrainEntities,
-    terrain: Entity,
-    world: &World,
-    chunk: ChunkPos,
-) -> Entity {
-    let place = Transform::from_translation(world.origin(Drawn::Chunk(chunk)).as_vec3());
-    let child = commands.spawn((Chunk::from(chunk), place, ChildOf(terrain))).id();
-    entities.chunks.insert(chunk, child);
-    commands.trigger(ChunkCreated { entity: child });
-    child
-}
-
-/// Spawns the entity of a field below its chunk, which must have one.
-pub(super) fn spawn_field(
-    commands: &mut Commands,
-    entities: &mut TerrainEntities,
-    chunk: ChunkPos,
-    field: &volume::Field,
-) {
-    let Some(&parent) = entities.chunks.get(&chunk) else { return };
-    let child = commands.spawn((Field::from(field), ChildOf(parent))).id();
-    entities.fields.insert(field.id, child);
-    commands.trigger(FieldCreated { entity: child });
 }

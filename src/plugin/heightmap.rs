@@ -91,7 +91,10 @@ async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, st
 pub struct HeightmapPlugin;
 
 impl Plugin for HeightmapPlugin {
-    fn build(&self, app: &mut App) {
+    fn build(&self, _: &mut App) {}
+
+    // Once all plugins are there, in whatever order they were added.
+    fn finish(&self, app: &mut App) {
         if app.world().contains_resource::<AssetServer>() {
             app.init_asset::<HeightmapImage>().init_asset_loader::<HeightmapLoader>();
         }

@@ -10,6 +10,7 @@
 
 mod commit;
 mod components;
+mod entities;
 mod heightmap;
 mod intake;
 mod load;
@@ -39,7 +40,7 @@ use crate::terrain::Terrain;
 /// | plugin | what it does |
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
-/// | [`HeightmapPlugin`] | asset loader for heightmap images (needs `AssetPlugin`) |
+/// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
 /// | `TerrainMaterialPlugin<StandardMaterial>` | dresses tiles and chunks (feature `render`) |
 #[derive(Default)]
 pub struct BurrowPlugins;
@@ -81,6 +82,8 @@ impl Plugin for TerrainPlugin {
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
+            .add_observer(intake::answer_with_terrain)
+            .add_observer(entities::remove_with_terrain)
             .configure_sets(
                 Update,
                 (
@@ -95,7 +98,9 @@ impl Plugin for TerrainPlugin {
             .add_systems(
                 Update,
                 (
-                    (load::start_loading, load::finish_loading).chain().in_set(BurrowSystems::Load),
+                    (load::start_loading, load::place_terrains, load::finish_loading)
+                        .chain()
+                        .in_set(BurrowSystems::Load),
                     intake::collect_brushes.in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
                     commit::begin_transactions.in_set(BurrowSystems::Begin),

@@ -3,7 +3,7 @@
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
-use super::commit::TerrainEntities;
+use super::entities::TerrainEntities;
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 use crate::terrain::{Span, Terrain};
@@ -26,7 +26,8 @@ use crate::terrain::{Span, Terrain};
 /// ```
 #[derive(SystemParam)]
 pub struct Terrains<'w, 's> {
-    terrains: Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform, Has<TerrainEntities>)>,
+    terrains:
+        Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform, Option<&'static TerrainEntities>)>,
 }
 
 /// Where a ray meets the ground, in world space.
@@ -90,6 +91,23 @@ impl Terrains<'_, '_> {
         over.into_iter().find(|spans| !spans.is_empty()).unwrap_or_default()
     }
 
+    /// The unit normal of the surface that is nearest to `place` along y; `None` where no terrain is.
+    pub fn normal(&self, place: Vec3) -> Option<Vec3> {
+        self.terrains.iter().find_map(|(_, terrain, at, _)| {
+            let affine = at.affine();
+            let normal = terrain.world().normal(affine.inverse().transform_point3(place).as_dvec3())?;
+            Some(affine.transform_vector3(normal).normalize_or_zero())
+        })
+    }
+
+    /// What the ground is made of at a place on or in it; `None` where no terrain is.
+    pub fn material(&self, place: Vec3) -> Option<MaterialId> {
+        self.terrains.iter().find_map(|(_, terrain, at, _)| {
+            let local = at.affine().inverse().transform_point3(place).as_dvec3();
+            terrain.world().height(local.x, local.z).map(|_| terrain.world().material_under(local))
+        })
+    }
+
     /// Is the place inside the ground?
     pub fn is_solid(&self, place: Vec3) -> bool {
         self.terrains.iter().any(|(_, terrain, at, _)| {
@@ -99,7 +117,8 @@ impl Terrains<'_, '_> {
 
     /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there?
     pub fn is_ready(&self, min: Vec3, max: Vec3) -> bool {
-        self.terrains.iter().all(|(_, terrain, place, loaded)| {
+        self.terrains.iter().all(|(_, terrain, place, entities)| {
+            let loaded = entities.is_some_and(|entities| entities.shown == terrain.world().version());
             let inverse = place.affine().inverse();
             let (a, b) = (inverse.transform_point3(min), inverse.transform_point3(max));
             let bounds = LatticeBox::new(a.min(b).floor().as_ivec3(), a.max(b).ceil().as_ivec3());

@@ -8,6 +8,7 @@ use glam::IVec3;
 use super::mask::{Borders, sheet};
 use super::mesh::{SurfaceMesh, Vertex};
 use super::vertex::{WorldView, height_vertex, vertex};
+use crate::ground::Ground;
 use crate::lattice::{Column, ONE, TilePos};
 
 /// The whole mesh of a tile, relative to its lowest column at y = 0. May be empty, when the mask covers all of it.
@@ -58,8 +59,8 @@ pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
                 let (start, from, end, to) = ends[side];
                 ring.side(start, from, end, to, flags >> side & 1 == 1)
             });
-            fan(&ab, &bc, &mut indices);
-            fan(&cd, &da, &mut indices);
+            fan(&ab, &bc, |triangle| indices.extend_from_slice(&triangle));
+            fan(&cd, &da, |triangle| indices.extend_from_slice(&triangle));
         }
     }
     (indices, ring.vertices)
@@ -84,33 +85,38 @@ impl Ring<'_> {
         line
     }
 
-    /// The vertices strictly between two heightmap vertices: one for each lattice y that separates their heights.
+    /// The vertices strictly between two heightmap vertices.
     fn chain(&mut self, from: Column, to: Column) -> Vec<u32> {
-        let ground = self.world.samples.ground();
-        let (h_from, h_to) = (ground.height(from), ground.height(to));
-        let axis = if from.x != to.x { 0 } else { 2 };
-        let low = Column::new(from.x.min(to.x), from.z.min(to.z));
-        let separates = |y: &i32| (y * ONE < h_from) != (y * ONE < h_to);
-        let mut numbers = Vec::new();
-        for y in sheet([h_from, h_to]).filter(separates) {
-            numbers.push(self.base + self.vertices.len() as u32);
-            self.vertices.push(vertex(self.world, low.at(y), axis, self.origin));
-        }
-        if h_to < h_from {
-            numbers.reverse();
-        }
-        numbers
+        let number = |(p, axis)| {
+            self.vertices.push(vertex(self.world, p, axis, self.origin));
+            self.base + self.vertices.len() as u32 - 1
+        };
+        chain(self.world.samples.ground(), from, to).into_iter().map(number).collect()
     }
 }
 
+/// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, in order: one for each
+/// lattice y that separates their heights, as lower end and axis.
+pub fn chain(ground: &Ground, from: Column, to: Column) -> Vec<(IVec3, usize)> {
+    let (h_from, h_to) = (ground.height(from), ground.height(to));
+    let axis = if from.x != to.x { 0 } else { 2 };
+    let low = Column::new(from.x.min(to.x), from.z.min(to.z));
+    let separates = |y: &i32| (y * ONE < h_from) != (y * ONE < h_to);
+    let mut edges: Vec<_> = sheet([h_from, h_to]).filter(separates).map(|y| (low.at(y), axis)).collect();
+    if h_to < h_from {
+        edges.reverse();
+    }
+    edges
+}
+
 /// Rule 3: a triangle with legs P..R and R..Q, each straight or a polyline; Q-P is straight.
-fn fan(first: &[u32], second: &[u32], indices: &mut Vec<u32>) {
+pub fn fan<T: Copy>(first: &[T], second: &[T], mut emit: impl FnMut([T; 3])) {
     // Q when the second leg is straight; else its first inner vertex, and P fans the rest of it.
     let apex = second[1];
     for pair in first.windows(2) {
-        indices.extend_from_slice(&[pair[0], pair[1], apex]);
+        emit([pair[0], pair[1], apex]);
     }
     for pair in second[1..].windows(2) {
-        indices.extend_from_slice(&[first[0], pair[0], pair[1]]);
+        emit([first[0], pair[0], pair[1]]);
     }
 }

@@ -87,6 +87,7 @@ pub struct Terrain {
     voxel_size: f32,
     queue: Vec<Submission>,
     in_flight: Option<InFlight>,
+    answered: Vec<Receipt>,
 }
 
 /// The transaction under way, as far as its terrain keeps it.
@@ -113,6 +114,7 @@ impl Terrain {
             voxel_size: settings.voxel_size,
             queue: Vec::new(),
             in_flight: None,
+            answered: Vec::new(),
         })
     }
 
@@ -142,13 +144,17 @@ impl Terrain {
         self.queue.push(Submission { tag: edit.tag(), edit: edit.check().map(|()| edit.clone()) });
     }
 
-    /// Would a brush reach some column of this world?
+    /// Queues a brush if it reaches some column of this world; says whether it does.
     ///
     /// # Errors
-    /// When the brush is not valid.
-    pub fn is_in_reach(&self, brush: &Brush) -> Result<bool, BrushError> {
-        let reach = Edit::quantize(brush)?.reach();
-        Ok(reach.intersection(self.world.grid.edit_bounds()).is_some())
+    /// When the brush is not valid; it is not queued then.
+    pub fn offer(&mut self, brush: &Brush) -> Result<bool, BrushError> {
+        let edit = Edit::quantize(brush)?;
+        let is_in_reach = edit.reach().intersection(self.world.grid.edit_bounds()).is_some();
+        if is_in_reach {
+            self.queue.push(Submission { tag: brush.tag, edit: Ok(edit) });
+        }
+        Ok(is_in_reach)
     }
 
     /// Brushes that wait for their transaction.
@@ -190,7 +196,7 @@ impl Terrain {
     }
 
     /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.
-    /// Returns the receipts of these brushes. Tools and tests want this; a game lets the plugin do it.
+    /// Returns the receipts of these brushes; those of brushes that waited are kept for [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
     /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
     pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(
@@ -204,7 +210,26 @@ impl Terrain {
         }
         let Some(transaction) = self.begin() else { return Vec::new() };
         let mut receipts = self.commit(transaction.run()).unwrap_or_default();
-        receipts.split_off(waiting.min(receipts.len()))
+        let own = receipts.split_off(waiting.min(receipts.len()));
+        self.answered.append(&mut receipts);
+        own
+    }
+
+    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, in order; each is handed out once.
+    pub fn take_answered(&mut self) -> Vec<Receipt> {
+        std::mem::take(&mut self.answered)
+    }
+
+    /// Is there any receipt to [take](Self::take_answered)?
+    pub fn has_answered(&self) -> bool {
+        !self.answered.is_empty()
+    }
+
+    /// Tags of all brushes without a receipt, in order.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn unanswered(&self) -> impl Iterator<Item = u64> {
+        let in_flight = self.in_flight.iter().flat_map(|waiting| waiting.submissions.iter());
+        in_flight.chain(&self.queue).map(|submission| submission.tag)
     }
 
     /// Is no edit on its way to these samples?

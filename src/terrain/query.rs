@@ -6,9 +6,10 @@ use glam::{DVec3, IVec3, Vec3};
 
 use super::world::World;
 use crate::ground::MaterialId;
-use crate::lattice::{BRICK, Column, ONE, SNAP};
+use crate::lattice::{BRICK, Column, LIMIT, LatticeBox, ONE, SNAP};
 use crate::surface::cases;
-use crate::surface::mask::cell_sheet;
+use crate::surface::mask::{Borders, cell_sheet};
+use crate::surface::tile;
 use crate::surface::vertex::{Lattice, WorldView, position};
 
 /// Where a ray meets the ground.
@@ -26,13 +27,19 @@ pub struct RayHit {
     pub from_inside: bool,
 }
 
-/// A stretch of air over a point.
+/// A stretch of air over a point: in voxels when a `World` is asked, in metres when a game asks `Terrains`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    /// The ground below it, in voxels.
+    /// The ground below it.
     pub floor: f64,
-    /// The ground above it, in voxels; `None` under the open sky.
+    /// The ground above it; `None` under the open sky.
     pub ceiling: Option<f64>,
+}
+
+/// Where a vertical line crosses the surface.
+struct Crossing {
+    y: f64,
+    normal: Vec3,
 }
 
 /// A drawn triangle, in voxels.
@@ -40,15 +47,20 @@ type Triangle = [DVec3; 3];
 
 impl World {
     /// The first triangle that a ray meets within `max_distance` voxels, from outside, inside a cave or inside the
-    /// ground. `None` for a ray that meets none, or whose numbers are not finite or whose direction is zero.
+    /// ground. `None` for a ray that meets none, and for one whose numbers are not finite or whose direction is
+    /// zero.
     pub fn raycast(&self, origin: DVec3, direction: DVec3, max_distance: f64) -> Option<RayHit> {
-        let direction = direction.try_normalize()?;
+        // Scaled first: only its direction counts, not whether its length fits a number.
+        let direction = (direction / direction.abs().max_element()).try_normalize()?;
         if !origin.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
             return None;
         }
         let view = self.view();
-        let (mut enter, leave) = self.clip(origin, direction, max_distance)?;
-        let start = origin + direction * enter;
+        // From where the ray enters the world on: small numbers keep their digits.
+        let (skipped, end) = self.clip(origin, direction, max_distance)?;
+        let (origin, leave) = (origin + direction * skipped, end - skipped);
+        let limit = max_distance - skipped;
+        let (start, mut enter) = (origin, 0.0);
         let mut cell = Column::new(
             (start.x.floor() as i32).clamp(0, self.grid.width() - 1),
             (start.z.floor() as i32).clamp(0, self.grid.depth() - 1),
@@ -66,14 +78,16 @@ impl World {
             let mut best: Option<(f64, Triangle)> = None;
             for_triangles(self, &view, cell, y0.min(y1), y0.max(y1), |triangle| {
                 if let Some(t) = intersect(origin, direction, &triangle)
-                    && (0.0..=max_distance).contains(&t)
+                    && (0.0..=limit).contains(&t)
                     && best.is_none_or(|(nearest, _)| t < nearest)
                 {
                     best = Some((t, triangle));
                 }
             });
             if let Some((distance, triangle)) = best {
-                return Some(self.hit(origin, direction, distance, &triangle));
+                let mut hit = self.hit(origin, direction, distance, &triangle);
+                hit.distance += skipped;
+                return Some(hit);
             }
             if out >= leave {
                 return None;
@@ -124,15 +138,11 @@ impl World {
     /// The stretches of air over (x, z), lowest first; empty outside the world. Coordinates are taken to the nearest
     /// 2^-20 voxel.
     pub fn spans(&self, x: f64, z: f64) -> Vec<Span> {
-        let mut spans: Vec<Span> = Vec::new();
-        for (y, is_floor) in self.crossings(x, z) {
-            match spans.last_mut() {
-                _ if is_floor => spans.push(Span { floor: y, ceiling: None }),
-                Some(span) => span.ceiling = Some(y),
-                None => {}
-            }
-        }
-        spans
+        // The deep is solid and the surface closed: floors and ceilings take turns, whatever rounding does to equal heights.
+        let crossings = self.crossings(x, z);
+        let span =
+            |pair: &[Crossing]| Span { floor: pair[0].y, ceiling: pair.get(1).map(|ceiling| ceiling.y) };
+        crossings.chunks(2).map(span).collect()
     }
 
     /// The topmost ground over (x, z) in voxels, `None` outside the world.
@@ -151,20 +161,21 @@ impl World {
 
     /// The surface's unit normal where it is nearest to `place` along y, `None` outside the world.
     pub fn normal(&self, place: DVec3) -> Option<Vec3> {
-        let crossings = self.crossings(place.x, place.z);
-        let apart = |y: f64| (y - place.y).abs();
-        let (y, is_floor) = crossings.into_iter().min_by(|a, b| apart(a.0).total_cmp(&apart(b.0)))?;
-        let (from, towards) = if is_floor { (0.5, DVec3::NEG_Y) } else { (-0.5, DVec3::Y) };
-        self.raycast(DVec3::new(place.x, y + from, place.z), towards, 1.0).map(|hit| hit.normal)
+        let apart = |crossing: &Crossing| (crossing.y - place.y).abs();
+        let crossings = self.crossings(place.x, place.z).into_iter();
+        crossings.min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|crossing| crossing.normal)
     }
 
     /// The material of the solid lattice point nearest to a place on the surface.
     pub fn material_under(&self, place: DVec3) -> MaterialId {
         let samples = self.samples();
-        let low = place.floor().as_ivec3();
-        let corner = |i: usize| low + IVec3::from_array(cases::corner(i));
+        let far = DVec3::splat(2.0 * f64::from(LIMIT));
+        let place = place.clamp(-far, far);
+        // The corners of the cell around it; of all cells around it, where it lies between them.
+        let (low, high) = (place.ceil().as_ivec3() - 1, place.floor().as_ivec3() + 1);
+        let around = LatticeBox { min: low, max: high };
         let apart = |point: &IVec3| point.as_dvec3().distance_squared(place);
-        let solid = (0..8).map(corner).filter(|&point| samples.is_solid(point));
+        let solid = around.points().filter(|&point| samples.is_solid(point));
         let nearest = solid.min_by(|a, b| apart(a).total_cmp(&apart(b)));
         nearest.map_or_else(
             || self.ground.material(place.round().as_ivec3() - IVec3::Y),
@@ -172,10 +183,10 @@ impl World {
         )
     }
 
-    /// Where the vertical line through (x, z) crosses the surface, lowest first: height, and whether it is a floor.
+    /// Where the vertical line through (x, z) crosses the surface, lowest first.
     ///
     /// Exact in integers, with the line moved by an infinitesimal step off every edge, so each crossing counts once.
-    fn crossings(&self, x: f64, z: f64) -> Vec<(f64, bool)> {
+    fn crossings(&self, x: f64, z: f64) -> Vec<Crossing> {
         const FINE: i64 = 1 << 20;
         let (width, depth) = (f64::from(self.grid.width()), f64::from(self.grid.depth()));
         if !((0.0..=width).contains(&x) && (0.0..=depth).contains(&z)) {
@@ -189,18 +200,19 @@ impl World {
             let [a, b, c] =
                 triangle.map(|p| ((p.x * FINE as f64) as i64 - px, (p.z * FINE as f64) as i64 - pz));
             let (ab, bc, ca) = (turn(a, b), turn(b, c), turn(c, a));
-            // Counter-clockwise from above is clockwise in (x, z): a floor has all turns negative.
             if ab == bc && bc == ca {
                 let area = |p: (i64, i64), q: (i64, i64)| (p.0 * q.1 - p.1 * q.0) as f64;
                 let (wc, wa, wb) = (area(a, b), area(b, c), area(c, a));
                 let sum = wa + wb + wc;
                 let [ya, yb, yc] = triangle.map(|p| p.y);
                 if sum != 0.0 {
-                    found.push(((wa * ya + wb * yb + wc * yc) / sum, !ab));
+                    let [p, q, r] = triangle;
+                    let normal = (q - p).cross(r - p).normalize_or_zero().as_vec3();
+                    found.push(Crossing { y: (wa * ya + wb * yb + wc * yc) / sum, normal });
                 }
             }
         });
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.sort_by(|a: &Crossing, b| a.y.total_cmp(&b.y));
         found
     }
 }
@@ -226,11 +238,7 @@ fn for_triangles(
     let is_volumetric = view.mask.contains(cell);
     let meets = |rows: &Range<i32>| f64::from(rows.start) <= high && low <= f64::from(rows.end);
     if !is_volumetric && meets(&sheet) {
-        let corner =
-            |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
-        let [a, b, c, d] = cell.corners().map(corner);
-        found([a, b, c]);
-        found([c, d, a]);
+        heightmap_triangles(view, cell, &mut found);
     }
     let mut rows = edited_rows(world, cell);
     if is_volumetric {
@@ -246,6 +254,32 @@ fn for_triangles(
         }
         next = next.max(rows.end);
     }
+}
+
+/// The triangles that a tile draws for a cell.
+fn heightmap_triangles(view: &WorldView, cell: Column, found: &mut impl FnMut(Triangle)) {
+    let ground = view.ground();
+    let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
+    let columns = cell.corners();
+    let bordered = Borders::SIDES.map(|(dx, dz)| view.mask.contains(cell.offset(dx, dz)));
+    if bordered == [false; 4] {
+        let [a, b, c, d] = columns.map(corner);
+        found([a, b, c]);
+        found([c, d, a]);
+        return;
+    }
+    let leg = |side: usize| -> Vec<DVec3> {
+        let (from, to) = (columns[side], columns[(side + 1) % 4]);
+        let mut line = vec![corner(from)];
+        if bordered[side] {
+            let crossing = |(p, axis)| position(view, p, axis, IVec3::ZERO).as_dvec3() / f64::from(SNAP);
+            line.extend(tile::chain(ground, from, to).into_iter().map(crossing));
+        }
+        line.push(corner(to));
+        line
+    };
+    tile::fan(&leg(0), &leg(1), &mut *found);
+    tile::fan(&leg(2), &leg(3), &mut *found);
 }
 
 /// Rows of cubes over a cell that may touch an edited sample.

@@ -53,6 +53,9 @@ pub enum Rejection {
     /// The brush itself is not valid.
     #[error(transparent)]
     Brush(#[from] BrushError),
+    /// The terrain was removed before its turn came, or the entity never had one.
+    #[error("the terrain is gone")]
+    TerrainGone,
     /// The brush reaches no column of the world.
     #[error("the brush lies outside the world")]
     OutsideWorld,

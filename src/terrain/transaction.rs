@@ -172,6 +172,14 @@ impl<'a> FieldLog<'a> {
         });
         let existed = |id| committed.is_some_and(|fields| fields.get(id).is_some());
         let into = absorbed.field;
+        // What went into a field that goes now as well is in the last one.
+        for (_, news) in self.merged.iter_mut().filter(|(at, _)| *at == chunk) {
+            if let FieldNews::Merged { into: earlier, .. } = news
+                && absorbed.gone.contains(earlier)
+            {
+                *earlier = into;
+            }
+        }
         let gone = absorbed.gone.iter().filter(|&&id| existed(id));
         self.merged.extend(gone.map(|&gone| (chunk, FieldNews::Merged { gone, into })));
         ChunkScenario { chunk, scenario: absorbed.scenario, field: absorbed.field }
@@ -247,7 +255,7 @@ fn dirty_blocks(view: &WorldView, dirty: &[LatticeBox], added: &Mask) -> Vec<Blo
     blocks.into_iter().collect()
 }
 
-/// Meshes blocks and puts their parts among those of their chunks that stay.
+/// Meshes blocks and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
 fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> BTreeMap<ChunkPos, ChunkSurface> {
     let mesh = |block: &Block| {
         let [y, z, x] = block.brick;
@@ -262,13 +270,17 @@ fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> BTreeMap<Ch
     } else {
         blocks.par_iter().map(mesh).collect()
     };
-    let mut surfaces: BTreeMap<ChunkPos, ChunkSurface> = BTreeMap::new();
+    let mut surfaces: BTreeMap<ChunkPos, (ChunkSurface, bool)> = BTreeMap::new();
     for (chunk, brick, part) in parts {
         let committed = || world.surfaces.get(&chunk).map(|surface| (**surface).clone()).unwrap_or_default();
-        surfaces.entry(chunk).or_insert_with(committed).replace(brick, part);
+        let (surface, changed) = surfaces.entry(chunk).or_insert_with(|| (committed(), false));
+        *changed |= surface.replace(brick, part);
     }
-    surfaces.retain(|chunk, surface| !surface.is_empty() || world.surfaces.contains_key(chunk));
     surfaces
+        .into_iter()
+        .filter(|(_, (_, changed))| *changed)
+        .map(|(chunk, (surface, _))| (chunk, surface))
+        .collect()
 }
 
 /// Tiles that lose a cell to the mask, or border on one that does.

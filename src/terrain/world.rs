@@ -18,14 +18,17 @@ use crate::volume::{Brick, Bricks, Fields, SampleView};
 pub struct ChunkSurface(BTreeMap<[i32; 3], Arc<Part>>);
 
 impl ChunkSurface {
-    /// Puts the part of a block in place of its old one.
-    pub(super) fn replace(&mut self, brick: BrickPos, part: Part) {
+    /// Puts the part of a block in place of its old one; says whether that is another one.
+    pub(super) fn replace(&mut self, brick: BrickPos, part: Part) -> bool {
         let key = [brick.0.y, brick.0.z, brick.0.x];
         if part.indices.is_empty() {
-            self.0.remove(&key);
-        } else {
-            self.0.insert(key, Arc::new(part));
+            return self.0.remove(&key).is_some();
         }
+        if self.0.get(&key).is_some_and(|old| **old == part) {
+            return false;
+        }
+        self.0.insert(key, Arc::new(part));
+        true
     }
 
     /// Does the chunk draw nothing?

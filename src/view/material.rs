@@ -23,12 +23,28 @@ impl<M: Material> Default for TerrainMaterialPlugin<M> {
 
 impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
-        app.add_systems(Update, (dress_new::<M>, dress_all::<M>).chain().in_set(BurrowSystems::Dress));
+        app.add_systems(
+            Update,
+            (undress::<M>, dress_new::<M>, dress_all::<M>).chain().in_set(BurrowSystems::Dress),
+        );
     }
 }
 
 /// A tile or chunk that just came.
 type New = (Or<(With<Tile>, With<Chunk>)>, Or<(Added<Tile>, Added<Chunk>)>);
+
+fn undress<M: Material>(
+    mut commands: Commands,
+    mut removed: RemovedComponents<MeshMaterial3d<M>>,
+    terrains: Query<&Children, (With<Terrain>, Without<MeshMaterial3d<M>>)>,
+    drawn: Query<(), Or<(With<Tile>, With<Chunk>)>>,
+) {
+    for children in removed.read().filter_map(|entity| terrains.get(entity).ok()) {
+        for child in children.iter().filter(|&child| drawn.contains(child)) {
+            commands.entity(child).try_remove::<MeshMaterial3d<M>>();
+        }
+    }
+}
 
 fn dress_new<M: Material>(
     mut commands: Commands,
@@ -37,7 +53,7 @@ fn dress_new<M: Material>(
 ) {
     for (entity, parent) in &new {
         if let Ok(material) = terrains.get(parent.parent()) {
-            commands.entity(entity).insert(material.clone());
+            commands.entity(entity).try_insert(material.clone());
         }
     }
 }
@@ -49,7 +65,7 @@ fn dress_all<M: Material>(
 ) {
     for (material, children) in &terrains {
         for child in children.iter().filter(|&child| drawn.contains(child)) {
-            commands.entity(child).insert(material.clone());
+            commands.entity(child).try_insert(material.clone());
         }
     }
 }

@@ -1,0 +1,128 @@
+//! The entities below a terrain: which one shows what.
+
+use bevy::platform::collections::HashMap;
+use bevy::prelude::*;
+
+use super::{Chunk, Field, FieldChanged, FieldCreated, FieldMerged, Tile};
+use crate::lattice::ChunkPos;
+use crate::terrain::{Drawn, FieldNews, Terrain, Version, World};
+use crate::volume::{self, FieldId};
+
+/// The entities below a terrain, and the world that they show. Its presence says that the terrain has loaded.
+#[derive(Component)]
+pub struct TerrainEntities {
+    pub(super) shown: Version,
+    drawn: HashMap<Drawn, Entity>,
+    fields: HashMap<FieldId, Entity>,
+}
+
+impl TerrainEntities {
+    pub(super) fn new(shown: Version) -> Self {
+        Self { shown, drawn: HashMap::default(), fields: HashMap::default() }
+    }
+
+    /// Tiles and chunks; fields lie below these.
+    pub(super) fn drawn(&self) -> impl Iterator<Item = Entity> {
+        self.drawn.values().copied()
+    }
+
+    /// The entity of a tile or chunk, if it has one and the game did not despawn it.
+    pub(super) fn get(&self, commands: &mut Commands, drawn: Drawn) -> Option<Entity> {
+        self.drawn.get(&drawn).copied().filter(|&child| commands.get_entity(child).is_ok())
+    }
+
+    /// Spawns the entity of a tile or chunk below its terrain.
+    pub(super) fn spawn(
+        &mut self,
+        commands: &mut Commands,
+        terrain: Entity,
+        world: &World,
+        drawn: Drawn,
+    ) -> Entity {
+        let place = Transform::from_translation(world.origin(drawn).as_vec3());
+        let child = match drawn {
+            Drawn::Tile(tile) => spawn_below(commands, terrain, (Tile::from(tile), place)),
+            Drawn::Chunk(chunk) => spawn_below(commands, terrain, (Chunk::from(chunk), place)),
+        };
+        self.drawn.insert(drawn, child);
+        child
+    }
+
+    /// Spawns the entity of a field below its chunk, which must have one.
+    pub(super) fn spawn_field(&mut self, commands: &mut Commands, chunk: ChunkPos, field: &volume::Field) {
+        let Some(parent) = self.get(commands, Drawn::Chunk(chunk)) else { return };
+        let child = spawn_below(commands, parent, Field::from(field));
+        self.fields.insert(field.id, child);
+        commands.trigger(FieldCreated { entity: child });
+    }
+
+    /// Entities and events of fields that a commit changed.
+    pub(super) fn tell_fields(
+        &mut self,
+        commands: &mut Commands,
+        world: &World,
+        news: &[(ChunkPos, FieldNews)],
+    ) {
+        for &(chunk, news) in news {
+            let field = |id| world.fields_of(chunk).and_then(|fields| fields.get(id));
+            match news {
+                FieldNews::Created(id) => {
+                    if let Some(field) = field(id) {
+                        self.spawn_field(commands, chunk, field);
+                    }
+                }
+                FieldNews::Changed(id) => {
+                    let Some(field) = field(id) else { continue };
+                    match self.living_field(commands, id) {
+                        Some(child) => {
+                            commands.entity(child).try_insert(Field::from(field));
+                            commands.trigger(FieldChanged { entity: child });
+                        }
+                        None => self.spawn_field(commands, chunk, field),
+                    }
+                }
+                FieldNews::Merged { gone, into } => {
+                    let child = self.living_field(commands, gone);
+                    let into = self.living_field(commands, into);
+                    self.fields.remove(&gone);
+                    let Some(child) = child else { continue };
+                    if let Some(into) = into {
+                        commands.trigger(FieldMerged { entity: child, into });
+                    }
+                    commands.entity(child).try_despawn();
+                }
+            }
+        }
+    }
+
+    fn living_field(&self, commands: &mut Commands, id: FieldId) -> Option<Entity> {
+        self.fields.get(&id).copied().filter(|&child| commands.get_entity(child).is_ok())
+    }
+}
+
+/// Spawns a child, unless its parent is gone by the time the command runs.
+fn spawn_below(commands: &mut Commands, parent: Entity, bundle: impl Bundle) -> Entity {
+    let child = commands.spawn(bundle).id();
+    commands.queue(move |world: &mut bevy::ecs::world::World| {
+        if let Ok(mut parent) = world.get_entity_mut(parent) {
+            parent.add_child(child);
+        } else {
+            world.despawn(child);
+        }
+    });
+    child
+}
+
+/// Takes a terrain's entities along when only its component goes.
+pub(super) fn remove_with_terrain(
+    gone: On<Remove, Terrain>,
+    entities: Query<&TerrainEntities>,
+    mut commands: Commands,
+) {
+    for child in entities.get(gone.entity).into_iter().flat_map(TerrainEntities::drawn) {
+        commands.entity(child).try_despawn();
+    }
+    commands
+        .entity(gone.entity)
+        .try_remove::<(TerrainEntities, super::load::Loading, super::commit::InFlight)>();
+}
