@@ -84,7 +84,10 @@ fn wipe_loading(
 }
 
 /// Who has not taken the mouse does not dig, and needs no preview.
-fn tools_follow_mouse(mut tools: ResMut<Tools>, cursors: Query<&bevy::window::CursorOptions, With<bevy::window::PrimaryWindow>>) {
+fn tools_follow_mouse(
+    mut tools: ResMut<Tools>,
+    cursors: Query<&bevy::window::CursorOptions, With<bevy::window::PrimaryWindow>>,
+) {
     tools.preview = mouse_is_captured(cursors);
 }
 

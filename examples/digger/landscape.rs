@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::asset::AssetLoadFailedEvent;
+use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_burrow::prelude::*;
@@ -52,9 +52,11 @@ pub struct LandscapePlugin;
 
 impl Plugin for LandscapePlugin {
     fn build(&self, app: &mut App) {
-        app.world()
-            .resource::<EmbeddedAssetRegistry>()
-            .insert_asset(SURVEY_PATH.into(), Path::new(SURVEY_PATH), SURVEY);
+        app.world().resource::<EmbeddedAssetRegistry>().insert_asset(
+            SURVEY_PATH.into(),
+            Path::new(SURVEY_PATH),
+            SURVEY,
+        );
         app.add_systems(Startup, open_survey).add_systems(Update, (shape_ground, spawn_terrain, give_up));
     }
 }
@@ -134,7 +136,10 @@ fn spawn_terrain(
 }
 
 /// The survey is part of the program, so this means that the program is broken.
-fn give_up(mut failures: MessageReader<AssetLoadFailedEvent<HeightmapImage>>, mut exit: MessageWriter<AppExit>) {
+fn give_up(
+    mut failures: MessageReader<AssetLoadFailedEvent<HeightmapImage>>,
+    mut exit: MessageWriter<AppExit>,
+) {
     for failure in failures.read() {
         error!("the survey can't be read: {}", failure.error);
         exit.write(AppExit::error());

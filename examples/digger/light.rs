@@ -1,6 +1,7 @@
 //! Eyes and light: the camera, the sun and its shadows, haze, the dark of caves and the headlamp.
 
 use bevy::anti_alias::smaa::Smaa;
+use bevy::camera::ShadowLodOrigin;
 use bevy::core_pipeline::{prepass::DepthPrepass, tonemapping::Tonemapping};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, light_consts::lux};
 use bevy::prelude::*;
@@ -13,9 +14,9 @@ use crate::sky::HAZE;
 pub const SUN: Vec3 = Vec3::new(-0.58, 0.64, 0.504);
 
 /// Brightness of the sky's light on everything, out of doors and deep in a cave.
-const SKYLIGHT: (f32, f32) = (2100.0, 130.0);
+const SKYLIGHT: (f32, f32) = (1250.0, 30.0);
 /// Luminous power of the headlamp in lumens, as a game needs it and not as a shop sells it.
-const LAMP: f32 = 14_000_000.0;
+const LAMP: f32 = 18_000_000.0;
 /// Metres to the far end of what is seen.
 const FAR: f32 = 3000.0;
 
@@ -38,7 +39,11 @@ impl Plugin for LightPlugin {
     fn build(&self, app: &mut App) {
         app.insert_resource(ClearColor(haze()))
             .insert_resource(DirectionalLightShadowMap { size: 2048 })
-            .insert_resource(GlobalAmbientLight { color: Color::srgb(0.78, 0.88, 1.0), brightness: SKYLIGHT.0, ..default() })
+            .insert_resource(GlobalAmbientLight {
+                color: Color::srgb(0.78, 0.88, 1.0),
+                brightness: SKYLIGHT.0,
+                ..default()
+            })
             .init_resource::<LampSwitch>()
             .add_systems(Startup, (open_eyes, let_there_be_sun))
             .add_systems(Update, (switch_lamp, darken_caves));
@@ -66,18 +71,25 @@ fn open_eyes(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
         intensity: 0.0,
         range: 70.0,
         radius: 0.05,
-        inner_angle: 0.30,
-        outer_angle: 1.05,
+        inner_angle: 0.15,
+        outer_angle: 1.0,
         shadow_maps_enabled: true,
         ..default()
     };
     // Four samples for each pixel cost a software renderer three times the time of one.
-    let msaa = if adapter.is_some_and(|adapter| draws_in_software(&adapter)) { Msaa::Off } else { Msaa::Sample4 };
+    let msaa =
+        if adapter.is_some_and(|adapter| draws_in_software(&adapter)) { Msaa::Off } else { Msaa::Sample4 };
     let mut eyes = commands.spawn((
         Name::new("eyes"),
         Eyes,
         Camera3d::default(),
-        Projection::Perspective(PerspectiveProjection { fov: 70f32.to_radians(), near: 0.08, far: FAR, ..default() }),
+        ShadowLodOrigin,
+        Projection::Perspective(PerspectiveProjection {
+            fov: 70f32.to_radians(),
+            near: 0.08,
+            far: FAR,
+            ..default()
+        }),
         Transform::from_xyz(0.0, 400.0, 0.0),
         Tonemapping::TonyMcMapface,
         msaa,

@@ -29,9 +29,10 @@
 //! | `mover.rs`, `player.rs` | the walker's body; keys, mouse and eyes |
 //! | `tools.rs`, `hud.rs` | dig, build, paint; what is written on the window |
 //! | `places.rs`, `works.rs` | where the script digs, and what |
-//! | `script.rs`, `studio.rs` | the story; the app without a window that plays it |
+//! | `script.rs`, `studio.rs`, `headless.rs` | the story; who plays it; the app without a window |
 //! | `wires.rs`, `report.rs` | lines of a seam; receipts, times and the summary |
 
+mod headless;
 mod hud;
 mod landscape;
 mod light;
@@ -72,7 +73,7 @@ pub struct Options {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    let renderer = studio::find_renderer();
+    let renderer = headless::find_renderer();
     if options.headless || !has_display() || renderer.is_none() {
         return script::run(&options, renderer);
     }

@@ -97,7 +97,8 @@ fn lines() -> impl Iterator<Item = (Vec2, f32)> {
 /// The air of a line that holds the point at height `y`: its floor and ceiling.
 fn air_around(ground: &impl Air, place: Vec2, y: f32) -> Option<(f32, f32)> {
     let spans = ground.air(place.x, place.y);
-    let ends = spans.iter().map(|span| (span.floor as f32, span.ceiling.map_or(f32::INFINITY, |top| top as f32)));
+    let ends =
+        spans.iter().map(|span| (span.floor as f32, span.ceiling.map_or(f32::INFINITY, |top| top as f32)));
     ends.into_iter().find(|&(floor, ceiling)| floor <= y && y <= ceiling)
 }
 
@@ -139,7 +140,8 @@ impl Body {
 
     /// Is all of the body in the air?
     pub fn is_free(&self, ground: &impl Air) -> bool {
-        room(ground, self.feet).is_ok_and(|room| room.low <= self.feet.y + HAIR && self.feet.y <= room.high + HAIR)
+        room(ground, self.feet)
+            .is_ok_and(|room| room.low <= self.feet.y + HAIR && self.feet.y <= room.high + HAIR)
     }
 
     /// Lets `dt` seconds pass; at most a quarter of one, so that nobody falls through a hiccup of the machine.
@@ -232,14 +234,13 @@ impl Body {
 
     /// Out of ground that was built over the body: to the nearest free place, in the end on top of everything.
     fn escape(&mut self, ground: &impl Air) {
-        let around = [0.3, 0.6, 1.0, 1.5, 2.0, 3.0].into_iter().flat_map(|radius| {
-            (0..8).map(move |i| Vec2::from_angle(TAU * i as f32 / 8.0) * radius)
-        });
+        let around = [0.3, 0.6, 1.0, 1.5, 2.0, 3.0]
+            .into_iter()
+            .flat_map(|radius| (0..8).map(move |i| Vec2::from_angle(TAU * i as f32 / 8.0) * radius));
         let places = std::iter::once(Vec2::ZERO).chain(around);
         let free = places.flat_map(|offset| self.free_places(ground, self.feet.xz() + offset));
-        let nearest = free.min_by(|a, b| {
-            a.distance_squared(self.feet).total_cmp(&b.distance_squared(self.feet))
-        });
+        let nearest =
+            free.min_by(|a, b| a.distance_squared(self.feet).total_cmp(&b.distance_squared(self.feet)));
         let over_all = || {
             let tops = lines().filter_map(|(offset, bottom)| {
                 let place = self.feet.xz() + offset;

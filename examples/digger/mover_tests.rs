@@ -68,7 +68,8 @@ fn nobody_ever_gets_into_solid_ground() {
             if step % 250 == 249 {
                 // Someone digs under him, or builds over him.
                 let ball = Shape::sphere(body.feet, dice.between(1.0, 4.0));
-                let brush = if step % 500 == 249 { Brush::dig(ball) } else { Brush::add(ball, MaterialId(1)) };
+                let brush =
+                    if step % 500 == 249 { Brush::dig(ball) } else { Brush::add(ball, MaterialId(1)) };
                 terrain.apply([brush]);
             }
             let dt = [1.0 / 120.0, 1.0 / 60.0, 1.0 / 15.0, 0.25][step % 4];

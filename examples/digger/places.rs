@@ -65,7 +65,9 @@ impl Places {
         let relief = Relief { ground };
         let hillside = relief.hillside().ok_or("no hillside is steep and high enough for the tunnel")?;
         let far_from_tunnel = |place: Vec2| place.distance(hillside.mouth.xz()) > 110.0;
-        let ravine = relief.ravine(&hillside, far_from_tunnel).ok_or("no ravine is deep and narrow enough for the bridge")?;
+        let ravine = relief
+            .ravine(&hillside, far_from_tunnel)
+            .ok_or("no ravine is deep and narrow enough for the bridge")?;
         let free = |place: Vec2| far_from_tunnel(place) && place.distance(ravine.from.xz()) > 110.0;
         let corner = relief.corner(&hillside, free).ok_or("no chunk corner lies on level ground")?;
         Ok(Self { hillside, ravine, corner })
@@ -90,7 +92,8 @@ impl Hillside {
     /// The middle of the room.
     pub fn room(&self) -> Vec3 {
         let [_, _, end] = self.floor();
-        end + Vec3::new(self.onward.x, 0.0, self.onward.y) * (ROOM_RADIUS - 2.0) + Vec3::Y * (ROOM_RADIUS - 2.0)
+        end + Vec3::new(self.onward.x, 0.0, self.onward.y) * (ROOM_RADIUS - 2.0)
+            + Vec3::Y * (ROOM_RADIUS - 2.0)
     }
 }
 
@@ -113,7 +116,8 @@ impl Relief<'_> {
     fn places(&self, step: i32) -> impl Iterator<Item = Vec2> {
         let along = move |cells: i32| (MARGIN + step - 1) / step..=(cells - MARGIN) / step;
         let (width, depth) = (self.ground.width(), self.ground.depth());
-        along(depth).flat_map(move |z| along(width).map(move |x| Vec2::new((x * step) as f32, (z * step) as f32)))
+        along(depth)
+            .flat_map(move |z| along(width).map(move |x| Vec2::new((x * step) as f32, (z * step) as f32)))
     }
 
     /// Where the ground rises by more than 10 within 12 voxels and by 30 behind, with a level way to it and rock enough
@@ -141,7 +145,11 @@ impl Relief<'_> {
                 if !(open && sunny) {
                     return None;
                 }
-                let bends = [-0.75, 0.75].map(|angle| Hillside { mouth, inward, onward: Vec2::from_angle(angle).rotate(inward) });
+                let bends = [-0.75, 0.75].map(|angle| Hillside {
+                    mouth,
+                    inward,
+                    onward: Vec2::from_angle(angle).rotate(inward),
+                });
                 let covered = bends.into_iter().find(|hillside| self.covers(hillside))?;
                 let sun = -inward.dot(SUN.xz().normalize());
                 let score = steep.min(18.0) + 0.1 * hill.min(70.0) + 12.0 * sun - uneven - 4.0 * roughness;
@@ -165,17 +173,21 @@ impl Relief<'_> {
         let tunnel = along(mouth, bend).skip(4).chain(along(bend, end)).all(|place| under(place, roof));
         let room = hillside.room();
         let around = (0..8).map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 8.0) * ROOM_RADIUS);
-        tunnel && around.into_iter().all(|offset| under(room + Vec3::new(offset.x, 0.0, offset.y), ROOM_RADIUS))
+        tunnel
+            && around.into_iter().all(|offset| under(room + Vec3::new(offset.x, 0.0, offset.y), ROOM_RADIUS))
     }
 
     /// Two banks of one height, along an axis so that a bridge has straight edges, over ground at least 7 lower.
     fn ravine(&self, hillside: &Hillside, allowed: impl Fn(Vec2) -> bool) -> Option<Ravine> {
         let allowed = &allowed;
-        let spans = [Vec2::X, Vec2::Y].into_iter().flat_map(|axis| (24..=40).step_by(4).map(move |length| (axis, length as f32)));
+        let spans = [Vec2::X, Vec2::Y]
+            .into_iter()
+            .flat_map(|axis| (24..=40).step_by(4).map(move |length| (axis, length as f32)));
         let found = self.places(6).filter(|&place| allowed(place)).flat_map(|place| {
             spans.clone().filter_map(move |(axis, length)| {
                 let (from, to) = (self.at(place), self.at(place + axis * length));
-                let between: Vec<f32> = (1..20).map(|i| self.height(place + axis * length * i as f32 / 20.0)).collect();
+                let between: Vec<f32> =
+                    (1..20).map(|i| self.height(place + axis * length * i as f32 / 20.0)).collect();
                 let low = from.y.min(to.y);
                 let bottom = between.iter().copied().fold(f32::INFINITY, f32::min);
                 let middle = between[5..14].iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -186,7 +198,10 @@ impl Relief<'_> {
                     beside.into_iter().all(|offset| (self.height(bank.xz() + offset) - bank.y).abs() < 3.0)
                 });
                 let depth = low - bottom;
-                let fits = (from.y - to.y).abs() <= 1.5 && (8.0..=20.0).contains(&depth) && low - middle > 4.0 && top <= low + 0.5;
+                let fits = (from.y - to.y).abs() <= 1.5
+                    && (8.0..=20.0).contains(&depth)
+                    && low - middle > 4.0
+                    && top <= low + 0.5;
                 let apart = place.distance(hillside.mouth.xz());
                 let score = depth - 2.0 * (from.y - to.y).abs() - 0.1 * length - 0.015 * apart;
                 (fits && banks).then_some((score, Ravine { from, to, behind, bottom }))
@@ -197,10 +212,14 @@ impl Relief<'_> {
 
     /// A place where four chunks meet, x and z both multiples of the chunk's side, with level ground around.
     fn corner(&self, hillside: &Hillside, allowed: impl Fn(Vec2) -> bool) -> Option<Vec3> {
-        let offsets = (0..24).map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 8.0) * (6 + i / 8 * 8) as f32);
+        let offsets = (0..24)
+            .map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 8.0) * (6 + i / 8 * 8) as f32);
         let found = self.places(CHUNK).filter(|&place| allowed(place)).map(|place| {
             let here = self.at(place);
-            let uneven = offsets.clone().map(|offset| (self.height(place + offset) - here.y).abs()).fold(0.0, f32::max);
+            let uneven = offsets
+                .clone()
+                .map(|offset| (self.height(place + offset) - here.y).abs())
+                .fold(0.0, f32::max);
             (uneven + 0.01 * place.distance(hillside.mouth.xz()), here)
         });
         found.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(score, _)| *score < 20.0).map(|(_, corner)| corner)

@@ -37,15 +37,17 @@ pub struct PlayerPlugin;
 
 impl Plugin for PlayerPlugin {
     fn build(&self, app: &mut App) {
-        app.configure_sets(Update, UsesMouse.before(BurrowSystems::Collect)).add_observer(arrive).add_systems(
-            Update,
-            (
-                capture_mouse.before(UsesMouse),
-                (look, steer, press_keys).run_if(mouse_is_captured).in_set(UsesMouse),
-                // After a commit, so that who was built over gets out in the same frame.
-                (walk, see).chain().after(BurrowSystems::Commit),
-            ),
-        );
+        app.configure_sets(Update, UsesMouse.before(BurrowSystems::Collect))
+            .add_observer(arrive)
+            .add_systems(
+                Update,
+                (
+                    capture_mouse.before(UsesMouse),
+                    (look, steer, press_keys).run_if(mouse_is_captured).in_set(UsesMouse),
+                    // After a commit, so that who was built over gets out in the same frame.
+                    (walk, see).chain().after(BurrowSystems::Commit),
+                ),
+            );
     }
 }
 
@@ -114,7 +116,11 @@ fn steer(keys: Res<ButtonInput<KeyCode>>, mut players: Query<(&Player, &mut Stee
     }
 }
 
-fn press_keys(keys: Res<ButtonInput<KeyCode>>, mut lamp: ResMut<LampSwitch>, mut exit: MessageWriter<AppExit>) {
+fn press_keys(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut lamp: ResMut<LampSwitch>,
+    mut exit: MessageWriter<AppExit>,
+) {
     if keys.just_pressed(KeyCode::KeyF) {
         lamp.0 = !lamp.0;
     }

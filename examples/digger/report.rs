@@ -117,7 +117,13 @@ impl fmt::Display for Report {
         let Self { logbook, seams, memory, .. } = self;
         let scenarios = logbook.scenarios;
         let renderer = self.renderer.as_deref().unwrap_or("no renderer, hence no pictures");
-        writeln!(f, "digger: {} x {} voxels, {renderer}, {:.0} s", self.size.0, self.size.1, self.took.as_secs_f64())?;
+        writeln!(
+            f,
+            "digger: {} x {} voxels, {renderer}, {:.0} s",
+            self.size.0,
+            self.size.1,
+            self.took.as_secs_f64()
+        )?;
         writeln!(f, "  edits         {} applied, {} rejected", logbook.applied, logbook.rejected)?;
         writeln!(
             f,
@@ -125,7 +131,11 @@ impl fmt::Display for Report {
             scenarios.created, scenarios.changed, scenarios.extended, scenarios.merged, scenarios.split
         )?;
         let (dug, filled) = logbook.moved;
-        writeln!(f, "  ground        {dug} voxels dug, {filled} filled; the tunnel is {:.0} long", self.tunnel)?;
+        writeln!(
+            f,
+            "  ground        {dug} voxels dug, {filled} filled; the tunnel is {:.0} long",
+            self.tunnel
+        )?;
         writeln!(f, "  fields        {} in {} drawn chunks", self.fields, self.chunks)?;
         writeln!(
             f,
@@ -171,7 +181,8 @@ impl Percentiles {
         let mut sorted: Vec<Duration> = times.collect();
         sorted.sort_unstable();
         // Nearest rank: the least time that so many percent do not exceed.
-        let rank = |percent: usize| sorted.get((sorted.len() * percent).div_ceil(100).saturating_sub(1)).copied();
+        let rank =
+            |percent: usize| sorted.get((sorted.len() * percent).div_ceil(100).saturating_sub(1)).copied();
         Self { p50: rank(50).unwrap_or_default(), p99: rank(99).unwrap_or_default() }
     }
 }

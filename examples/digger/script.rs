@@ -22,7 +22,9 @@ const PICTURES: usize = 9;
 /// Plays the script and prints the summary. The exit code tells whether all seams are closed and all pictures there.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     if renderer.is_none() {
-        eprintln!("There is no graphics adapter, not even in software: the script is played without pictures.");
+        eprintln!(
+            "There is no graphics adapter, not even in software: the script is played without pictures."
+        );
     }
     let report = match play(options, renderer) {
         Ok(report) => report,
@@ -105,7 +107,10 @@ impl Stage {
     fn landscape(&mut self, places: &Places) -> Result {
         self.bar.set_message("the landscape");
         let mouth = places.hillside.mouth;
-        let eye = self.above(mouth - flat(places.hillside.inward) * 170.0 + flat(places.hillside.inward.perp()) * 60.0, 46.0)?;
+        let eye = self.above(
+            mouth - flat(places.hillside.inward) * 170.0 + flat(places.hillside.inward.perp()) * 60.0,
+            46.0,
+        )?;
         self.shoot_from("1_landscape", eye, mouth + flat(places.hillside.inward) * 60.0)
     }
 

@@ -3,47 +3,26 @@
 //! The script is an ordinary player: it steers the same body with the same [`Steering`] and sends the same [`Brush`]
 //! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
 
-use std::panic;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use bevy::app::PluginsState;
 use bevy::camera::RenderTarget;
-use bevy::log::{Level, LogPlugin};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::{PollType, TextureFormat};
-use bevy::render::renderer::{RenderAdapterInfo, RenderDevice, initialize_renderer};
-use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
+use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
+use bevy::render::settings::RenderResources;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
-use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_burrow::prelude::*;
 
 use crate::Options;
+use crate::headless::build_app;
 use crate::light::{Eyes, LampSwitch};
 use crate::mover::{Body, Steering};
 use crate::player::{Drone, Player};
 use crate::report::{EditTime, FrameTimes, Logbook};
 
-/// The script's time from frame to frame.
-const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 /// Longest wait for the landscape.
 const PATIENCE: Duration = Duration::from_secs(300);
-
-/// A renderer without a window, if there is an adapter for one, be it in software.
-pub fn find_renderer() -> Option<RenderResources> {
-    let settings = WgpuSettings::default();
-    let backends = settings.backends?;
-    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
-    panic::set_hook(hook);
-    found.ok()
-}
 
 /// Pictures that lie on the disk, as far as the renderer told.
 #[derive(Resource, Default)]
@@ -77,10 +56,12 @@ impl Studio {
         std::fs::create_dir_all(&options.out)?;
         let renders = renderer.is_some();
         let mut app = build_app(renderer);
+        app.init_resource::<Developed>();
         // One frame, for the systems that spawn the camera.
         app.update();
         let eyes = app.world_mut().query_filtered::<Entity, With<Eyes>>().single(app.world())?;
-        let image = Image::new_target_texture(options.width, options.height, TextureFormat::Rgba8UnormSrgb, None);
+        let image =
+            Image::new_target_texture(options.width, options.height, TextureFormat::Rgba8UnormSrgb, None);
         let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
         let player = wait_for_player(&mut app)?;
@@ -278,31 +259,6 @@ impl Studio {
         }
         self.drawn.count(start.elapsed());
     }
-}
-
-fn build_app(renderer: Option<RenderResources>) -> App {
-    let render_creation = match renderer {
-        Some(renderer) => RenderCreation::Manual(renderer),
-        None => WgpuSettings { backends: None, ..default() }.into(),
-    };
-    let mut app = App::new();
-    app.add_plugins(
-        DefaultPlugins
-            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
-            .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
-            .set(LogPlugin { level: Level::WARN, ..default() })
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>(),
-    )
-    .init_resource::<Developed>()
-    .insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-    crate::game(&mut app);
-    while app.plugins_state() == PluginsState::Adding {
-        bevy::tasks::tick_global_task_pools_on_main_thread();
-    }
-    app.finish();
-    app.cleanup();
-    app
 }
 
 fn wait_for_player(app: &mut App) -> Result<Entity> {

@@ -70,7 +70,15 @@ pub struct Tools {
 impl Default for Tools {
     fn default() -> Self {
         let cooldown = Timer::new(PERIOD, TimerMode::Once);
-        Self { form: Form::Sphere, radius: 3.0, material: GRASS, aim: None, preview: false, cooldown, uses: 0 }
+        Self {
+            form: Form::Sphere,
+            radius: 3.0,
+            material: GRASS,
+            aim: None,
+            preview: false,
+            cooldown,
+            uses: 0,
+        }
     }
 }
 
@@ -81,9 +89,7 @@ impl Plugin for ToolsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Tools>().add_systems(Startup, show_gizmos_through_ground).add_systems(
             Update,
-            (aim, (choose, work).chain().run_if(mouse_is_captured), show_preview)
-                .chain()
-                .in_set(UsesMouse),
+            (aim, (choose, work).chain().run_if(mouse_is_captured), show_preview).chain().in_set(UsesMouse),
         );
     }
 }
@@ -161,7 +167,9 @@ fn show_preview(tools: Res<Tools>, mut gizmos: Gizmos) {
         Form::Sphere => {
             gizmos.sphere(aim.place, radius, colour).resolution(48);
         }
-        Form::Cube => gizmos.cube(Transform::from_translation(aim.place).with_scale(Vec3::splat(2.0 * radius)), colour),
+        Form::Cube => {
+            gizmos.cube(Transform::from_translation(aim.place).with_scale(Vec3::splat(2.0 * radius)), colour)
+        }
         Form::Capsule => {
             let end = aim.place + aim.along * 2.0 * radius;
             gizmos.sphere(aim.place, radius, colour).resolution(32);

@@ -27,9 +27,10 @@ impl Wires {
                 Drawn::Chunk(_) => &mut wires.chunks,
             };
             let origin = terrain.world().origin(drawn) * SNAP;
-            edges.extend(edges_of(&mesh, origin).filter(|edge| {
-                edge.iter().all(|&end| voxels(end).distance(place) < radius)
-            }));
+            edges.extend(
+                edges_of(&mesh, origin)
+                    .filter(|edge| edge.iter().all(|&end| voxels(end).distance(place) < radius)),
+            );
         }
         wires
     }

@@ -24,7 +24,7 @@ pub fn tunnel(hillside: &Hillside) -> Vec<(Brush, Vec2)> {
         .enumerate()
         .map(|(round, ends)| {
             let shape = Shape::capsule(ends[0], ends[1], TUNNEL_RADIUS);
-            let brush = Brush::dig(shape).with_roughness(Roughness::new(0.8, 3.0, 11));
+            let brush = Brush::dig(shape).with_roughness(Roughness::new(1.0, 2.6, 11));
             let stand = if round == 0 { ends[0] } else { ends[0].lerp(ends[1], 0.5) };
             (brush, stand.xz())
         })
@@ -55,7 +55,9 @@ pub fn room(hillside: &Hillside) -> Vec<Brush> {
         Brush::paint(Shape::sphere(place, radius), material).with_roughness(Roughness::new(1.2, 2.5, 5))
     };
     // Paint on a wall of the hollow, as parts of its radius.
-    let wall = |along: f32, across: f32, up: f32| middle + (onward * along + aside * across + Vec3::Y * up) * ROOM_RADIUS;
+    let wall = |along: f32, across: f32, up: f32| {
+        middle + (onward * along + aside * across + Vec3::Y * up) * ROOM_RADIUS
+    };
     let base = middle - Vec3::Y * (ROOM_RADIUS + 1.0) + (onward * 0.35 + aside * 0.35) * ROOM_RADIUS;
     vec![
         dig(middle, ROOM_RADIUS),
@@ -117,14 +119,20 @@ pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
         let slope = Quat::from_rotation_arc(along, way.normalize());
         let place = top.midpoint(foot) - slope * Vec3::Y * thickness;
         let half = Vec3::new(way.length() / 2.0 + 1.0, thickness, WIDTH);
-        Brush::add(Shape::turned_cuboid(place, half, slope * Quat::from_rotation_arc(Vec3::X, along)), CONCRETE)
+        Brush::add(
+            Shape::turned_cuboid(place, half, slope * Quat::from_rotation_arc(Vec3::X, along)),
+            CONCRETE,
+        )
     });
     arch.chain(posts).chain([slab]).chain(ramps).chain(parapets).collect()
 }
 
-/// Three terraces around a corner of four chunks, a ramp down, and the spoil beside.
+/// Two trial holes, three terraces around a corner of four chunks, a ramp down, and the spoil beside.
 pub fn pit(corner: Vec3) -> Vec<Brush> {
     let rough = |brush: Brush| brush.with_roughness(Roughness::new(0.35, 3.0, 23));
+    // Both in one chunk and apart: two fields, until the first terrace merges them.
+    let trials = [Vec3::new(2.0, -1.0, 3.0), Vec3::new(14.0, -1.0, 4.0)]
+        .map(|offset| rough(Brush::dig(Shape::sphere(corner + offset, 2.0))));
     let terraces = [(13.0, 4.0), (9.0, 8.5), (5.0, 13.0)].map(|(radius, depth)| {
         let base = corner - Vec3::Y * depth;
         rough(Brush::dig(Shape::cylinder(base, Vec3::Y * (depth + 12.0), radius)))
@@ -144,5 +152,5 @@ pub fn pit(corner: Vec3) -> Vec<Brush> {
         Brush::add(Shape::sphere(place, radius), material).with_roughness(Roughness::new(0.8, 3.0, 29))
     };
     let heaps = [heap(2.6, 5.0, CLAY), heap(3.3, 4.0, ROCK), heap(1.9, 3.5, ROCK)];
-    terraces.into_iter().chain(ramp).chain(heaps).collect()
+    trials.into_iter().chain(terraces).chain(ramp).chain(heaps).collect()
 }

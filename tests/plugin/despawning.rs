@@ -2,6 +2,7 @@
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
+use bevy_burrow::plugin::{ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged};
 use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, random_brushes, steep};
@@ -9,7 +10,8 @@ use crate::stage::{Stage, dig, random_brushes, steep};
 /// Fails when something of a terrain is left.
 fn assert_clean(stage: &mut Stage, when: &str) {
     stage.frames(4);
-    let left = (stage.count::<Terrain>(), stage.count::<Tile>(), stage.count::<Chunk>(), stage.count::<Field>());
+    let left =
+        (stage.count::<Terrain>(), stage.count::<Tile>(), stage.count::<Chunk>(), stage.count::<Field>());
     assert_eq!(left, (0, 0, 0, 0), "{when}: terrains, tiles, chunks, fields");
     assert_eq!((stage.count::<Mesh3d>(), stage.meshes()), (0, 0), "{when}: entities with meshes, meshes");
 }
@@ -77,7 +79,8 @@ fn stage_that_leaves<M>(leave: impl IntoScheduleConfigs<bevy::ecs::system::Sched
 
 #[test]
 fn a_terrain_may_go_in_the_frame_of_its_commit() {
-    let leave = leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
+    let leave =
+        leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
     let mut stage = stage_that_leaves(leave);
     let mut met = 0;
     for _ in 0..20 {
@@ -98,6 +101,44 @@ fn a_terrain_may_go_in_the_frame_of_its_commit() {
     }
     assert!(met > 0, "no terrain went in the frame of its commit");
     assert_works(&mut stage);
+}
+
+#[test]
+fn no_news_is_told_of_what_went_with_its_terrain() {
+    let leave =
+        leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
+    let mut stage = stage_that_leaves(leave);
+    stage.app.add_observer(|on: On<ChunkCreated>, all: Query<&Chunk>| {
+        assert!(all.contains(on.entity), "no such chunk")
+    });
+    stage.app.add_observer(|on: On<ChunkChanged>, all: Query<&Chunk>| {
+        assert!(all.contains(on.entity), "no such chunk")
+    });
+    stage.app.add_observer(|on: On<FieldCreated>, all: Query<&Field>| {
+        assert!(all.contains(on.entity), "no such field")
+    });
+    stage.app.add_observer(|on: On<FieldChanged>, all: Query<&Field>| {
+        assert!(all.contains(on.entity), "no such field")
+    });
+    stage.app.add_observer(|on: On<FieldMerged>, all: Query<&Field>| {
+        assert!(all.contains(on.entity), "no such field")
+    });
+    for round in 0..6 {
+        stage.show(steep());
+        // In some rounds there are chunks and fields that change, in others all are new.
+        for brush in random_brushes(13, 40).into_iter().take(10 * round) {
+            stage.send(brush);
+        }
+        stage.settle();
+        for brush in random_brushes(14, 20) {
+            stage.send(brush);
+        }
+        stage.frame();
+        stage.rest();
+        stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+        stage.frame();
+        assert_clean(&mut stage, "in the frame of a commit");
+    }
 }
 
 #[test]
@@ -130,7 +171,8 @@ fn a_terrain_may_go_in_the_frame_that_spawned_it() {
 #[test]
 fn a_terrain_may_go_in_the_frame_of_a_brush() {
     // The first of the two comes after all commands of the commit, and has none itself.
-    let leave = (|| (), leave).chain().after(BurrowSystems::Commit).before_ignore_deferred(BurrowSystems::Begin);
+    let leave =
+        (|| (), leave).chain().after(BurrowSystems::Commit).before_ignore_deferred(BurrowSystems::Begin);
     let mut stage = stage_that_leaves(leave);
     stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
@@ -165,7 +207,7 @@ fn a_tile_or_chunk_that_a_game_despawns_is_not_missed() {
         stage.send(brush);
     }
     stage.settle();
-    assert_eq!(stage.receipts().len(), 41);
+    assert_eq!(stage.receipts().len(), 41, "no brush is lost over it");
 }
 
 #[test]
@@ -174,7 +216,8 @@ fn a_terrain_goes_with_all_its_children_when_a_system_despawns_it() {
     stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
     stage.settle();
-    let despawn = |mut commands: Commands, terrain: Single<Entity, With<Terrain>>| commands.entity(*terrain).despawn();
+    let despawn =
+        |mut commands: Commands, terrain: Single<Entity, With<Terrain>>| commands.entity(*terrain).despawn();
     stage.app.world_mut().run_system_once(despawn).expect("one terrain");
     assert_clean(&mut stage, "after a command");
 }

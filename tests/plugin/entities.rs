@@ -40,10 +40,15 @@ fn listening(mut stage: Stage) -> Stage {
             told.0.push(News::FieldChanged(on.entity, *fields.get(on.entity).expect("a field")));
         })
         .add_observer(|on: On<FieldMerged>, fields: Query<&Field>, mut told: ResMut<Told>| {
-            assert!(fields.contains(on.entity) && fields.contains(on.into), "both fields are there when it is told");
+            assert!(
+                fields.contains(on.entity) && fields.contains(on.into),
+                "both fields are there when it is told"
+            );
             told.0.push(News::FieldMerged { gone: on.entity, into: on.into });
         })
-        .add_observer(|on: On<Remove, Field>, mut told: ResMut<Told>| told.0.push(News::FieldRemoved(on.entity)));
+        .add_observer(|on: On<Remove, Field>, mut told: ResMut<Told>| {
+            told.0.push(News::FieldRemoved(on.entity))
+        });
     stage
 }
 
@@ -74,7 +79,8 @@ fn assert_entities(stage: &mut Stage, terrain: Entity) {
             expected.insert(field.id.0, (Field::from(field), Chunk::from(chunk)));
         }
     }
-    let shown: BTreeMap<_, _> = shown.into_iter().map(|(id, (_, field, chunk))| (id, (field, chunk))).collect();
+    let shown: BTreeMap<_, _> =
+        shown.into_iter().map(|(id, (_, field, chunk))| (id, (field, chunk))).collect();
     assert_eq!(shown, expected);
 
     let size = world.grid().size();
@@ -152,8 +158,12 @@ fn news_tell_what_happened_to_every_chunk_and_field() {
                 }
                 News::FieldMerged { gone, into } => {
                     kinds[4] += 1;
-                    let (_, (_, old, chunk)) = before.iter().find(|(_, field)| field.0 == gone).expect("it was there");
-                    let survivor = rest.values().find(|field| field.0 == into).expect("it goes into a field that is there");
+                    let (_, (_, old, chunk)) =
+                        before.iter().find(|(_, field)| field.0 == gone).expect("it was there");
+                    let survivor = rest
+                        .values()
+                        .find(|field| field.0 == into)
+                        .expect("it goes into a field that is there");
                     assert_eq!(survivor.2, *chunk, "a field never leaves its chunk");
                     rest.remove(&old.id);
                     assert!(stage.app.world().get_entity(gone).is_err(), "its entity is gone");
@@ -178,7 +188,11 @@ fn two_pits_that_meet_become_one_field() {
     for mut stage in [listening(Stage::drawing()), listening(Stage::server())] {
         let mut model = level(1.0);
         let receipts = model.apply([dig(24.0, 8.0, 21.0, 1.0), dig(24.0, 8.0, 27.0, 1.0)]);
-        assert!(receipts.iter().all(|receipt| receipt.outcome.as_ref().is_ok_and(|applied| applied.chunks.len() == 1)));
+        assert!(
+            receipts
+                .iter()
+                .all(|receipt| receipt.outcome.as_ref().is_ok_and(|applied| applied.chunks.len() == 1))
+        );
 
         let terrain = stage.show(level(1.0));
         stage.send(dig(24.0, 8.0, 21.0, 1.0));
@@ -197,7 +211,10 @@ fn two_pits_that_meet_become_one_field() {
         let Ok(applied) = &stage.receipts()[2].receipt.outcome else { panic!("refused") };
         assert_eq!(applied.chunks[0].scenario, Scenario::Merged { fields: 2 });
         let (_, in_chunk) = stage.terrain(terrain).world().fields().next().expect("a chunk with fields");
-        assert_eq!(in_chunk.iter().map(|field| field.id.0).collect::<Vec<_>>(), fields(&mut stage).into_keys().collect::<Vec<_>>());
+        assert_eq!(
+            in_chunk.iter().map(|field| field.id.0).collect::<Vec<_>>(),
+            fields(&mut stage).into_keys().collect::<Vec<_>>()
+        );
     }
 }
 
@@ -231,12 +248,22 @@ fn a_chunk_has_its_new_mesh_when_its_news_is_told() {
         seen.0 += 1;
     };
     stage.app.init_resource::<Seen>();
-    stage.app.add_observer(move |on: On<ChunkCreated>, drawn: Query<&Mesh3d>, meshes: Res<Assets<Mesh>>, mut seen: ResMut<Seen>| {
-        see(on.entity, &drawn, &meshes, &mut seen);
-    });
-    stage.app.add_observer(move |on: On<ChunkChanged>, drawn: Query<&Mesh3d>, meshes: Res<Assets<Mesh>>, mut seen: ResMut<Seen>| {
-        see(on.entity, &drawn, &meshes, &mut seen);
-    });
+    stage.app.add_observer(
+        move |on: On<ChunkCreated>,
+              drawn: Query<&Mesh3d>,
+              meshes: Res<Assets<Mesh>>,
+              mut seen: ResMut<Seen>| {
+            see(on.entity, &drawn, &meshes, &mut seen);
+        },
+    );
+    stage.app.add_observer(
+        move |on: On<ChunkChanged>,
+              drawn: Query<&Mesh3d>,
+              meshes: Res<Assets<Mesh>>,
+              mut seen: ResMut<Seen>| {
+            see(on.entity, &drawn, &meshes, &mut seen);
+        },
+    );
     stage.show(level(1.0));
     stage.send(dig(24.0, 8.0, 24.0, 3.0));
     stage.settle();

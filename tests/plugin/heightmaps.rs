@@ -57,15 +57,20 @@ fn png(image: image::DynamicImage) -> Vec<u8> {
 #[test]
 fn the_shipped_elevation_model_loads_as_an_asset_and_becomes_a_terrain() {
     let mut stage = stage_in(Path::new("assets"));
-    let handle: Handle<HeightmapImage> = stage.app.world().resource::<AssetServer>().load("jacksboro_fault.png");
+    let handle: Handle<HeightmapImage> =
+        stage.app.world().resource::<AssetServer>().load("jacksboro_fault.png");
     stage.frames_until("the image is loaded", |stage| {
         let state = stage.app.world().resource::<AssetServer>().load_state(&handle);
         assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
         stage.app.world().resource::<Assets<HeightmapImage>>().contains(&handle)
     });
-    let HeightmapImage(image) = stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
+    let HeightmapImage(image) =
+        stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
     let expected = worlds::real_image();
-    assert_eq!((image.width(), image.height(), image.samples()), (expected.width(), expected.height(), expected.samples()));
+    assert_eq!(
+        (image.width(), image.height(), image.samples()),
+        (expected.width(), expected.height(), expected.samples())
+    );
     let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
     let ground = Ground::from_image(image, &scale).expect("a valid landscape");
     assert!(ground.width() >= 1024 && ground.depth() >= 1024);
@@ -75,7 +80,9 @@ fn the_shipped_elevation_model_loads_as_an_asset_and_becomes_a_terrain() {
 #[test]
 fn files_that_are_no_heightmap_fail_with_their_reason() {
     let folder = Folder::new("bad_heightmaps");
-    let grey = png(image::DynamicImage::ImageLuma16(image::ImageBuffer::from_fn(32, 32, |x, y| image::Luma([(x * y) as u16]))));
+    let grey = png(image::DynamicImage::ImageLuma16(image::ImageBuffer::from_fn(32, 32, |x, y| {
+        image::Luma([(x * y) as u16])
+    })));
     let color = png(image::DynamicImage::ImageRgb8(image::ImageBuffer::new(8, 8)));
     folder.put("good.png", &grey);
     let files: [(&str, &[u8], &str); 6] = [
@@ -92,19 +99,58 @@ fn files_that_are_no_heightmap_fail_with_their_reason() {
     let mut stage = stage_in(&folder.0);
     let server = stage.app.world().resource::<AssetServer>().clone();
     let good: Handle<HeightmapImage> = server.load("good.png");
-    let mut handles: Vec<Handle<HeightmapImage>> = files.iter().map(|(name, _, _)| server.load(*name)).collect();
+    let mut handles: Vec<Handle<HeightmapImage>> =
+        files.iter().map(|(name, _, _)| server.load(*name)).collect();
     handles.push(server.load("missing.png"));
     let small = HeightmapSettings { limits: ImageLimits { max_file_bytes: 100, ..default() }, ..default() };
     folder.put("large.png", &grey);
-    handles.push(server.load_builder().with_settings(move |settings: &mut HeightmapSettings| *settings = small.clone()).load("large.png"));
+    handles.push(
+        server
+            .load_builder()
+            .with_settings(move |settings: &mut HeightmapSettings| *settings = small.clone())
+            .load("large.png"),
+    );
     stage.frames_until("all loads are done", |stage| {
         let failed = stage.app.world().resource::<Failures>().0.len() == handles.len();
         failed && stage.app.world().resource::<Assets<HeightmapImage>>().contains(&good)
     });
     let failures = &stage.app.world().resource::<Failures>().0;
-    for (name, _, reason) in files.into_iter().chain([("missing.png", &[] as &[u8], ""), ("large.png", &[], "limit is 100")]) {
-        let (_, error) = failures.iter().find(|(path, _)| path == name).unwrap_or_else(|| panic!("{name}: {failures:?}"));
+    for (name, _, reason) in
+        files.into_iter().chain([("missing.png", &[] as &[u8], ""), ("large.png", &[], "limit is 100")])
+    {
+        let (_, error) =
+            failures.iter().find(|(path, _)| path == name).unwrap_or_else(|| panic!("{name}: {failures:?}"));
         assert!(error.contains(reason), "{name}: {error}");
     }
     assert!(handles.iter().all(|handle| matches!(server.load_state(handle), LoadState::Failed(_))));
+}
+
+#[test]
+fn a_raw_file_loads_with_the_settings_of_its_meta_file() {
+    let folder = Folder::new("raw_heightmap");
+    let samples: Vec<u16> = (0..12).map(|index| index * 1000 + 7).collect();
+    folder.put("heights.raw", &samples.iter().flat_map(|sample| sample.to_be_bytes()).collect::<Vec<u8>>());
+    folder.put(
+        "heights.raw.meta",
+        br#"(
+            meta_format_version: "1.0",
+            asset: Load(
+                loader: "bevy_burrow::plugin::heightmap::HeightmapLoader",
+                settings: (
+                    raw: Some((width: 4, height: 3, format: BigEndian)),
+                    limits: (max_file_bytes: 1000, max_width: 64, max_height: 64, max_alloc_bytes: 10000),
+                ),
+            ),
+        )"#,
+    );
+    let mut stage = stage_in(&folder.0);
+    let handle: Handle<HeightmapImage> = stage.app.world().resource::<AssetServer>().load("heights.raw");
+    stage.frames_until("the image is loaded", |stage| {
+        let state = stage.app.world().resource::<AssetServer>().load_state(&handle);
+        assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
+        stage.app.world().resource::<Assets<HeightmapImage>>().contains(&handle)
+    });
+    let HeightmapImage(image) =
+        stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
+    assert_eq!((image.width(), image.height(), image.samples()), (4, 3, &samples[..]));
 }

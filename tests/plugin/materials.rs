@@ -24,7 +24,8 @@ fn stage() -> Stage {
 /// Do all tiles and chunks of a terrain have this material, and no other one?
 fn wears<M: Material>(stage: &mut Stage, terrain: Entity, material: &Handle<M>) -> bool {
     let world = stage.app.world_mut();
-    let mut drawn = world.query_filtered::<(Option<&MeshMaterial3d<M>>, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
+    let mut drawn =
+        world.query_filtered::<(Option<&MeshMaterial3d<M>>, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
     let mut all = drawn.iter(world).filter(|(_, parent)| parent.parent() == terrain);
     all.all(|(worn, _)| worn.is_some_and(|worn| worn.0 == *material))
 }
@@ -94,7 +95,12 @@ fn a_material_that_is_taken_off_a_terrain_is_taken_off_its_tiles() {
     stage.frame();
     assert!(wears(&mut stage, terrain, &standard));
     // Both at once would be drawn both.
-    stage.app.world_mut().entity_mut(terrain).remove::<MeshMaterial3d<StandardMaterial>>().insert(MeshMaterial3d(glow.clone()));
+    stage
+        .app
+        .world_mut()
+        .entity_mut(terrain)
+        .remove::<MeshMaterial3d<StandardMaterial>>()
+        .insert(MeshMaterial3d(glow.clone()));
     stage.frame();
     assert!(wears(&mut stage, terrain, &glow));
     assert!(is_bare::<StandardMaterial>(&mut stage), "tiles wear both materials");

@@ -11,7 +11,11 @@ const PLACE: Vec3 = Vec3::new(-20.0, 12.0, 300.0);
 const VOXEL: f32 = 0.5;
 
 fn ask<T: 'static>(stage: &mut Stage, question: impl Fn(&Terrains) -> T + Send + Sync + 'static) -> T {
-    stage.app.world_mut().run_system_once(move |terrains: Terrains| question(&terrains)).expect("the system runs")
+    stage
+        .app
+        .world_mut()
+        .run_system_once(move |terrains: Terrains| question(&terrains))
+        .expect("the system runs")
 }
 
 /// A moved and scaled terrain that was dug through the app, and a model with the same edits.
@@ -40,7 +44,9 @@ fn rays_in_world_space_meet_what_the_model_says() {
     let mut rng = Rng::with_seed(3);
     let (mut hits, mut inside) = (0, 0);
     for index in 0..400 {
-        let place = |rng: &mut Rng| Vec3::new(rng.f32() * 68.0 - 2.0, rng.f32() * 70.0 - 30.0, rng.f32() * 68.0 - 2.0);
+        let place = |rng: &mut Rng| {
+            Vec3::new(rng.f32() * 68.0 - 2.0, rng.f32() * 70.0 - 30.0, rng.f32() * 68.0 - 2.0)
+        };
         // Coordinates that a float holds exactly, in either space.
         let (from, to) = ((place(&mut rng) * 8.0).round() / 8.0, (place(&mut rng) * 8.0).round() / 8.0);
         let direction = (to - from).normalize_or(Vec3::NEG_Y);
@@ -54,7 +60,10 @@ fn rays_in_world_space_meet_what_the_model_says() {
         };
         hits += 1;
         inside += usize::from(found.from_inside);
-        assert_eq!((found.terrain, found.from_inside, found.material), (terrain, expected.from_inside, expected.material));
+        assert_eq!(
+            (found.terrain, found.from_inside, found.material),
+            (terrain, expected.from_inside, expected.material)
+        );
         let apart = found.position.distance(to_world(expected.position));
         assert!(apart < 1e-3, "{apart} metres apart");
         assert!((f64::from(found.distance) - expected.distance * f64::from(VOXEL)).abs() < 1e-3);
@@ -86,8 +95,9 @@ fn heights_and_spans_in_world_space_are_those_of_the_model() {
         if let (Some(height), Some(below)) = (height, model.world().height(f64::from(x), f64::from(z))) {
             assert!((f64::from(height) - world(below)).abs() < 1e-4);
             let solid = move |y: f32| Vec3::new(wx, y, wz);
-            let (under, over) =
-                ask(&mut stage, move |terrains| (terrains.is_solid(solid(height - 0.01)), terrains.is_solid(solid(height + 0.01))));
+            let (under, over) = ask(&mut stage, move |terrains| {
+                (terrains.is_solid(solid(height - 0.01)), terrains.is_solid(solid(height + 0.01)))
+            });
             assert!(!over);
             assert!(under || spans.iter().any(|span| span.ceiling.is_some()), "a thin roof at most");
         }

@@ -97,7 +97,13 @@ fn refused_brushes_say_why_and_change_nothing() {
         stage.send(dig(20.0, 8.0, 20.0, 4.0).with_tag(99));
         stage.settle();
         let entities = |stage: &mut Stage| {
-            (stage.count::<Tile>(), stage.count::<Chunk>(), stage.count::<Field>(), stage.meshes(), stage.hash(terrain))
+            (
+                stage.count::<Tile>(),
+                stage.count::<Chunk>(),
+                stage.count::<Field>(),
+                stage.meshes(),
+                stage.hash(terrain),
+            )
         };
         let before = entities(&mut stage);
         let count = refused().len();

@@ -6,14 +6,20 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
 
+/// Is a terrain at the origin shown as it is?
+fn is_ready(stage: &mut Stage) -> bool {
+    let is_ready = |terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0));
+    stage.app.world_mut().run_system_once(is_ready).expect("it runs")
+}
+
 #[test]
 fn a_model_that_the_game_edits_itself_is_shown_whole() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(steep());
     let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
     model.apply(random_brushes(14, 10));
-    stage.settle();
     stage.frames(20);
+    stage.frames_until("the edited world is shown", is_ready);
     stage.assert_whole(terrain, "edited by the game");
     for brush in random_brushes(15, 10) {
         stage.send(brush);
@@ -29,11 +35,10 @@ fn while_a_world_is_loaded_again_the_old_one_is_shown_whole_and_ground_is_not_re
     let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
     model.apply(random_brushes(14, 10));
     let triangles = model.world().drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum::<usize>();
-    let is_ready = |terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0));
     stage.frames_until("the new world is shown", |stage| {
         let shown = stage.shown(terrain);
         assert!(shown.is_closed(), "{shown:?}");
-        let is_ready = stage.app.world_mut().run_system_once(is_ready).expect("it runs");
+        let is_ready = is_ready(stage);
         assert_eq!(is_ready, shown.triangles == triangles, "ready when it is shown");
         is_ready
     });
@@ -46,7 +51,12 @@ fn a_model_that_the_game_edits_while_it_loads_is_shown_whole() {
     stage.frames(3);
     let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
     model.apply(random_brushes(14, 10));
-    stage.settle();
+    let triangles: usize = model.world().drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
+    stage.frames_until("the edited world is shown", |stage| {
+        let shown = stage.shown(terrain);
+        assert!(shown.triangles == 0 || shown.is_closed(), "{shown:?}");
+        shown.triangles == triangles
+    });
     stage.frames(20);
     stage.assert_whole(terrain, "edited while it loaded");
 }
@@ -74,8 +84,7 @@ fn another_terrain_on_the_same_entity_takes_the_place_of_the_first() {
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
     stage.settle();
     stage.app.world_mut().entity_mut(terrain).insert(level(1.0));
-    stage.settle();
-    stage.frames(40);
+    stage.frames_until("the other terrain is shown", is_ready);
     assert_eq!(stage.count::<Tile>(), 16);
     stage.assert_whole(terrain, "replaced");
 }
@@ -85,7 +94,7 @@ fn another_terrain_with_another_voxel_size_is_shown_in_its_own() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(level(1.0));
     stage.app.world_mut().entity_mut(terrain).insert(level(0.5));
-    stage.frames(100);
+    stage.frames_until("the other terrain is shown", is_ready);
     let place: &Transform = stage.app.world().get(terrain).expect("a place");
     assert_eq!(place.scale, Vec3::splat(0.5));
     stage.send(dig(16.0, 4.0, 16.0, 2.0));

@@ -1,5 +1,7 @@
 //! Several terrains in one app.
 
+use std::slice::from_ref;
+
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
@@ -41,26 +43,31 @@ fn a_brush_changes_the_terrain_that_it_reaches_and_no_other() {
     let (a, b) = (dig(30.0, 8.0, 30.0, 4.0), dig(80.0, 2.0, 20.0, 3.0));
     stage.send(a.clone());
     stage.settle();
-    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[a.clone()]), second_after(&[])));
+    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(from_ref(&a)), second_after(&[])));
     stage.send(b.clone());
     stage.settle();
     assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[a]), second_after(&[b])));
     assert_eq!(answers(&stage), [(Some(first), true), (Some(second), true)]);
     stage.assert_whole(first, "both dug");
     stage.assert_whole(second, "both dug");
-    let removed = |index: usize| stage.receipts()[index].receipt.outcome.as_ref().expect("dug").removed.total();
+    let removed =
+        |index: usize| stage.receipts()[index].receipt.outcome.as_ref().expect("dug").removed.total();
     assert!(removed(1) > 2 * removed(0), "half voxels are smaller: a ball of 3 metres has radius 6 there");
 }
 
 #[test]
 fn a_brush_across_two_terrains_changes_both() {
     let (mut stage, first, second) = pair();
-    let tunnel = Brush::dig(Shape::capsule(Vec3::new(58.0, 5.0, 24.0), Vec3::new(76.0, 1.0, 24.0), 3.0)).with_tag(3);
+    let tunnel =
+        Brush::dig(Shape::capsule(Vec3::new(58.0, 5.0, 24.0), Vec3::new(76.0, 1.0, 24.0), 3.0)).with_tag(3);
     stage.send(tunnel.clone());
     stage.settle();
-    assert_ne!(first_after(&[]), first_after(&[tunnel.clone()]));
-    assert_ne!(second_after(&[]), second_after(&[tunnel.clone()]));
-    assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[tunnel.clone()]), second_after(&[tunnel])));
+    assert_ne!(first_after(&[]), first_after(from_ref(&tunnel)));
+    assert_ne!(second_after(&[]), second_after(from_ref(&tunnel)));
+    assert_eq!(
+        (stage.hash(first), stage.hash(second)),
+        (first_after(from_ref(&tunnel)), second_after(&[tunnel]))
+    );
     let mut answers = answers(&stage);
     answers.sort();
     let mut both = [(Some(first), true), (Some(second), true)];
@@ -101,7 +108,8 @@ fn a_brush_for_a_terrain_that_is_gone_is_refused() {
 #[test]
 fn a_terrain_is_dug_where_it_was_moved_to() {
     let (mut stage, first, _) = pair();
-    stage.app.world_mut().get_mut::<Transform>(first).expect("a place").translation = Vec3::new(0.0, 0.0, -512.0);
+    stage.app.world_mut().get_mut::<Transform>(first).expect("a place").translation =
+        Vec3::new(0.0, 0.0, -512.0);
     stage.frame();
     stage.send(dig(30.0, 8.0, 30.0 - 512.0, 4.0));
     stage.settle();

@@ -38,11 +38,13 @@ struct Soup {
 
 impl Soup {
     fn add(&mut self, mesh: &Mesh, place: &GlobalTransform) {
-        let Some(VertexAttributeValues::Float32x3(positions)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else {
+        let Some(VertexAttributeValues::Float32x3(positions)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION)
+        else {
             panic!("a mesh has no positions");
         };
         let Some(Indices::U32(indices)) = mesh.indices() else { panic!("a mesh has no indices") };
-        let mut number = |index: &u32| self.weld(place.transform_point(Vec3::from(positions[*index as usize])));
+        let mut number =
+            |index: &u32| self.weld(place.transform_point(Vec3::from(positions[*index as usize])));
         let triangles: Vec<[u32; 3]> =
             indices.chunks_exact(3).map(|t| [number(&t[0]), number(&t[1]), number(&t[2])]).collect();
         self.triangles.extend(triangles);
@@ -67,7 +69,11 @@ impl Soup {
         for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (u, v) = (self.places[edge[0].0 as usize], self.places[edge[0].1 as usize]);
             let both = |at: f32, u: f32, v: f32| u == at && v == at;
-            if both(low.x, u.x, v.x) || both(high.x, u.x, v.x) || both(low.z, u.z, v.z) || both(high.z, u.z, v.z) {
+            if both(low.x, u.x, v.x)
+                || both(high.x, u.x, v.x)
+                || both(low.z, u.z, v.z)
+                || both(high.z, u.z, v.z)
+            {
                 continue;
             }
             let forward = edge.iter().filter(|side| side.2).count();
@@ -105,6 +111,9 @@ impl Stage {
         assert!(shown.is_closed(), "{when}: {shown:?}");
         let world = self.terrain(terrain).world();
         let triangles: usize = world.drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
-        assert_eq!(shown.triangles, triangles, "{when}: the frame shows another world than the committed one");
+        assert_eq!(
+            shown.triangles, triangles,
+            "{when}: the frame shows another world than the committed one"
+        );
     }
 }

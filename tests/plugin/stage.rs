@@ -50,7 +50,9 @@ impl Stage {
             .add_plugins(BurrowPlugins)
             .init_resource::<Receipts>()
             .init_resource::<ReadyTerrains>()
-            .add_observer(|ready: On<TerrainReady>, mut terrains: ResMut<ReadyTerrains>| terrains.0.push(ready.entity))
+            .add_observer(|ready: On<TerrainReady>, mut terrains: ResMut<ReadyTerrains>| {
+                terrains.0.push(ready.entity)
+            })
             .add_systems(Last, |mut new: MessageReader<BrushApplied>, mut kept: ResMut<Receipts>| {
                 kept.0.extend(new.read().cloned());
             });
@@ -89,7 +91,10 @@ impl Stage {
 
     /// Writes a brush message for one terrain alone.
     pub fn send_to(&mut self, terrain: Entity, brush: Brush) {
-        self.app.world_mut().write_message(TargetedBrush { terrain, brush }).expect("the plugin added the message");
+        self.app
+            .world_mut()
+            .write_message(TargetedBrush { terrain, brush })
+            .expect("the plugin added the message");
     }
 
     /// One frame.
@@ -181,7 +186,14 @@ impl Stage {
 
 /// Steep hills of 64 x 64 voxels.
 pub fn hills() -> Ground {
-    let noise = NoiseHeights { seed: 5, kind: NoiseKind::Ridged, octaves: 4, scale: 24.0, amplitude: 24.0, base: 3.0 };
+    let noise = NoiseHeights {
+        seed: 5,
+        kind: NoiseKind::Ridged,
+        octaves: 4,
+        scale: 24.0,
+        amplitude: 24.0,
+        base: 3.0,
+    };
     Ground::from_noise(64, 64, &noise).expect("valid hills")
 }
 
