@@ -209,10 +209,17 @@ fn check_ray(
         let touches = |hit: RayHit| {
             soup.near(origin, unit).into_iter().any(|number| {
                 let [a, b, c] = soup.triangles[number as usize];
-                [(a, b), (b, c), (c, a)].into_iter().any(|(p, q)| {
+                let on_edge = [(a, b), (b, c), (c, a)].into_iter().any(|(p, q)| {
                     let along = ((hit.position - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
                     hit.position.distance(p.lerp(q, along)) <= NUDGE
-                })
+                });
+                // A ray in the plane of a triangle meets it anywhere.
+                let normal = soup.normal(number);
+                let is_around = |p: DVec3| {
+                    (p + NUDGE).cmpge(a.min(b).min(c)).all() && (p - NUDGE).cmple(a.max(b).max(c)).all()
+                };
+                let in_plane = normal.dot(unit).abs() <= 1e-9 && normal.dot(hit.position - a).abs() <= NUDGE;
+                on_edge || (in_plane && is_around(hit.position))
             })
         };
         assert!(

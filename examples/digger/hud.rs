@@ -115,7 +115,7 @@ fn write_figures(
 fn toggle_help(keys: Res<ButtonInput<KeyCode>>, mut help: Query<&mut Visibility, With<Help>>) {
     if keys.just_pressed(KeyCode::KeyH) {
         for mut visibility in &mut help {
-            visibility.toggle_visible_hidden();
+            visibility.toggle_inherited_hidden();
         }
     }
 }

@@ -101,7 +101,6 @@ fn vegetation() -> MaterialControl {
         height_fade: 12.0,
         slope: (0.0, 1.0),
         slope_fade: 0.6,
-        ..everywhere
     };
     let sand = MaterialRule {
         overlay: SAND,

@@ -7,7 +7,7 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
-use super::entities::TerrainEntities;
+use super::entities::{TerrainEntities, tell};
 use super::load::Loading;
 use super::meshes::{self, Ready};
 use super::{BrushApplied, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, MaterialColors};
@@ -116,11 +116,11 @@ pub(super) fn commit_transactions(
                 swap(&mut commands, assets, child, shown.get(child).ok(), ready);
                 figures.swaps += 1;
                 if let (Drawn::Chunk(_), false) = (drawn, is_new) {
-                    commands.trigger(ChunkChanged { entity: child });
+                    tell(&mut commands, ChunkChanged { entity: child });
                 }
             }
             if let (Drawn::Chunk(_), true) = (drawn, is_new) {
-                commands.trigger(ChunkCreated { entity: child });
+                tell(&mut commands, ChunkCreated { entity: child });
             }
         }
         entities.tell_fields(&mut commands, world, &news);

@@ -53,7 +53,7 @@ impl TerrainEntities {
         let Some(parent) = self.get(commands, Drawn::Chunk(chunk)) else { return };
         let child = spawn_below(commands, parent, Field::from(field));
         self.fields.insert(field.id, child);
-        commands.trigger(FieldCreated { entity: child });
+        tell(commands, FieldCreated { entity: child });
     }
 
     /// Entities and events of fields that a commit changed.
@@ -76,7 +76,7 @@ impl TerrainEntities {
                     match self.living_field(commands, id) {
                         Some(child) => {
                             commands.entity(child).try_insert(Field::from(field));
-                            commands.trigger(FieldChanged { entity: child });
+                            tell(commands, FieldChanged { entity: child });
                         }
                         None => self.spawn_field(commands, chunk, field),
                     }
@@ -87,7 +87,7 @@ impl TerrainEntities {
                     self.fields.remove(&gone);
                     let Some(child) = child else { continue };
                     if let Some(into) = into {
-                        commands.trigger(FieldMerged { entity: child, into });
+                        tell(commands, FieldMerged { entity: child, into });
                     }
                     commands.entity(child).try_despawn();
                 }
@@ -111,6 +111,15 @@ fn spawn_below(commands: &mut Commands, parent: Entity, bundle: impl Bundle) -> 
         }
     });
     child
+}
+
+/// Triggers an event, unless its entity is gone by the time the command runs.
+pub(super) fn tell<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Commands, event: E) {
+    commands.queue(move |world: &mut bevy::ecs::world::World| {
+        if world.get_entity(event.event_target()).is_ok() {
+            world.trigger(event);
+        }
+    });
 }
 
 /// Takes a terrain's entities along when only its component goes.

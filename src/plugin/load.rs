@@ -11,7 +11,7 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
 use super::commit::InFlight;
-use super::entities::TerrainEntities;
+use super::entities::{TerrainEntities, tell};
 use super::meshes::{self, Ready};
 use super::{BurrowSettings, ChunkCreated, MaterialColors};
 use crate::lattice::ChunkPos;
@@ -118,7 +118,7 @@ pub(super) fn finish_loading(
         }
         let entities = show(&mut commands, entity, &mut loading);
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
-        commands.trigger(TerrainReady { entity });
+        tell(&mut commands, TerrainReady { entity });
     }
 }
 
@@ -138,7 +138,7 @@ fn show(commands: &mut Commands, terrain: Entity, loading: &mut Loading) -> Terr
             commands.entity(child).try_insert((Mesh3d(handle), bounds, NoAutoAabb));
         }
         if let Drawn::Chunk(_) = drawn {
-            commands.trigger(ChunkCreated { entity: child });
+            tell(commands, ChunkCreated { entity: child });
         }
     }
     for (chunk, fields) in world.fields() {

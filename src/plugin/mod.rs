@@ -20,7 +20,9 @@ mod query;
 mod settings;
 
 pub use components::{Chunk, Field, MaterialColors, Tile};
-pub use heightmap::{HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings};
+pub use heightmap::{
+    HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
+};
 pub use load::TerrainReady;
 pub use meshes::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
