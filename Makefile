@@ -61,4 +61,6 @@ soak: ## Dig WORLDS (10000) random worlds and look at every seam
 
 pictures: ## Make the pictures of the README again
 	@tools/setup.sh run
-	cargo run $(WITH_BEVY) --example digger -- --headless --out docs/pictures
+	cargo run $(WITH_BEVY) --example digger -- --headless --out out/pictures
+	mkdir -p docs/pictures
+	cd out/pictures && cp 1_landscape.png 3_tunnel_outside.png 4_tunnel_inside.png 7_bridge.png 9_seam.png ../../docs/pictures/
