@@ -39,7 +39,9 @@ pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
     let width = (high.x - low.x + 1) as u32;
     let mut ring =
         Ring { world, origin: low.at(0), base: width * (high.z - low.z + 1) as u32, vertices: Vec::new() };
-    let mut indices = Vec::with_capacity(6 * ((high.x - low.x) * (high.z - low.z)) as usize);
+    let cells = ((high.x - low.x) * (high.z - low.z)) as usize;
+    let mut whole: Vec<[u32; 6]> = Vec::with_capacity(cells);
+    let mut fans: Vec<u32> = Vec::new();
     let borders = world.mask.borders(low, high);
     for z in low.z..high.z {
         let row = (z - low.z) as u32 * width;
@@ -47,7 +49,7 @@ pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
             let a = row + (x - low.x) as u32;
             let [a, b, c, d] = [a, a + width, a + width + 1, a + 1];
             if flags == 0 {
-                indices.extend_from_slice(&[a, b, c, c, d, a]);
+                whole.push([a, b, c, c, d, a]);
                 continue;
             }
             if flags & Borders::VOLUMETRIC != 0 {
@@ -59,10 +61,12 @@ pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
                 let (start, from, end, to) = ends[side];
                 ring.side(start, from, end, to, flags >> side & 1 == 1)
             });
-            fan(&ab, &bc, |triangle| indices.extend_from_slice(&triangle));
-            fan(&cd, &da, |triangle| indices.extend_from_slice(&triangle));
+            fan(&ab, &bc, |triangle| fans.extend_from_slice(&triangle));
+            fan(&cd, &da, |triangle| fans.extend_from_slice(&triangle));
         }
     }
+    let mut indices = whole.into_flattened();
+    indices.extend_from_slice(&fans);
     (indices, ring.vertices)
 }
 

@@ -82,7 +82,7 @@ pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> V
     let step = crossing(lattice, p, axis);
     let pristine = !lattice.is_edited(p) && !lattice.is_edited(q);
     let as_heightmap =
-        pristine && (is_stencil_pristine(lattice, p, q) || is_on_mask_border(lattice, Column::of(p), axis));
+        pristine && (is_on_mask_border(lattice, Column::of(p), axis) || is_stencil_pristine(lattice, p, q));
     let normal = if as_heightmap {
         heightmap_normal(lattice.ground(), Column::of(p), Column::of(q), step)
     } else {
