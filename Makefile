@@ -42,7 +42,6 @@ test-model:
 	cargo test $(WITHOUT_BEVY) --doc
 
 test-plugin:
-	cargo test $(WITH_BEVY) --lib -- plugin:: view::
 	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal
 	cargo test $(WITH_BEVY) --doc
 

@@ -443,11 +443,15 @@ fn as_crossings(spans: &[Span]) -> Vec<(f64, bool)> {
         .collect()
 }
 
-/// Small steps off a vertical line, none of them along a lattice line: far from all, and close to each.
+/// Small steps off a vertical line, none of them along a lattice line: far from all and close to each, and all that
+/// again much smaller.
 fn steps() -> impl Iterator<Item = (f64, f64)> {
     let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-    let shapes = [(1.0, 0.3), (0.3, 1.0), (1.0, 1e-5), (1e-5, 1.0)];
-    signs.into_iter().flat_map(move |(sx, sz)| shapes.map(|(dx, dz)| (NUDGE * sx * dx, NUDGE * sz * dz)))
+    let shapes = [(1.0, 0.99999), (0.99999, 1.0), (1.0, 0.3), (0.3, 1.0), (1.0, 1e-5), (1e-5, 1.0)];
+    let around = move |by: f64| {
+        signs.into_iter().flat_map(move |(sx, sz)| shapes.map(|(dx, dz)| (by * sx * dx, by * sz * dz)))
+    };
+    around(NUDGE).chain(around(NUDGE * 1e-3))
 }
 
 /// A coordinate a little inside the world.
