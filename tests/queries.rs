@@ -784,6 +784,46 @@ fn rays_slip_through_no_edge() {
     assert!(rays > 10_000, "{rays}");
 }
 
+/// How far a place is from a triangle.
+fn distance_to(place: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a).normalize();
+    let sides = [(a, b), (b, c), (c, a)];
+    if sides.into_iter().all(|(p, q)| (q - p).cross(place - p).dot(normal) >= 0.0) {
+        return (place - a).dot(normal).abs();
+    }
+    let to_side = |(p, q): (DVec3, DVec3)| {
+        let along = ((place - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
+        place.distance(p.lerp(q, along))
+    };
+    sides.into_iter().map(to_side).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn rays_in_the_plane_of_a_triangle_end_on_the_surface() {
+    // Stairs of level and slanting ground: rays in the plane of one triangle run on over others.
+    let height = |x: i32, z: i32| if (x / 3 + z / 3) % 2 == 0 { 0.0 } else { f64::from((x * 7 + z * 5) % 4) };
+    let ground = Ground::from_fn(40, 40, height).expect("finite heights");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    let mut rng = Rng::with_seed(3);
+    for _ in 0..20 {
+        let place = Vec3::new(rng.f32() * 40.0, 1.0, rng.f32() * 40.0);
+        terrain.apply([Brush::dig(Shape::sphere(place, 2.0))]);
+    }
+    let world = terrain.world();
+    let soup = Soup::of(world);
+    for _ in 0..20_000 {
+        let [a, b, c] = soup.triangles[rng.usize(0..soup.triangles.len())];
+        let (p, q) = (a.lerp(b, rng.f64()), b.lerp(c, rng.f64()));
+        let Some(direction) = (q - p).try_normalize() else { continue };
+        let origin = p - direction * rng.f64() * 50.0;
+        let Some(hit) = world.raycast(origin, direction, 1e3) else { continue };
+        let near = soup.near(hit.position, DVec3::Y).into_iter();
+        let apart = near.map(|number| distance_to(hit.position, soup.triangles[number as usize]));
+        let apart = apart.fold(f64::INFINITY, f64::min);
+        assert!(apart <= TOLERANCE, "ray from {origin:?} along {direction:?}: {hit:?} is {apart} voxels off");
+    }
+}
+
 #[test]
 fn a_place_is_ready_unless_an_edit_is_on_its_way_to_it() {
     let mut terrain = small_terrain();

@@ -16,6 +16,9 @@ pub enum Operation {
         material: MaterialId,
     },
     /// Changes the material of ground that is there, and no density.
+    ///
+    /// It stores the density of what it paints: exactly within 127 voxels of the surface. On taller cliffs, between
+    /// neighbouring columns, painting may move the surface by less than a voxel.
     Paint {
         /// The new material.
         material: MaterialId,

@@ -14,6 +14,7 @@
 //! ```
 
 mod query;
+mod ray;
 mod receipt;
 mod transaction;
 mod world;

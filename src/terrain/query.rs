@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec3, IVec3, Vec3};
 
+use super::ray::{NEAR, Ray, Triangle};
 use super::world::World;
 use crate::ground::MaterialId;
 use crate::lattice::{BRICK, Column, LIMIT, LatticeBox, ONE, SNAP};
@@ -42,9 +43,6 @@ struct Crossing {
     normal: Vec3,
 }
 
-/// A drawn triangle, in voxels.
-type Triangle = [DVec3; 3];
-
 impl World {
     /// The first triangle that a ray meets within `max_distance` voxels, from outside, inside a cave or inside the
     /// ground. `None` for a ray that meets none, and for one whose numbers are not finite or whose direction is
@@ -61,11 +59,13 @@ impl World {
         let (origin, leave) = (origin + direction * skipped, end - skipped);
         let limit = max_distance - skipped;
         let (start, mut enter) = (origin, 0.0);
+        let ray = Ray::new(origin, direction);
         let mut cell = Column::new(
             (start.x.floor() as i32).clamp(0, self.grid.width() - 1),
             (start.z.floor() as i32).clamp(0, self.grid.depth() - 1),
         );
         let step = |along: f64| if along > 0.0 { 1 } else { -1 };
+        let (step_x, step_z) = (step(direction.x), step(direction.z));
         // Distance along the ray at which it leaves the cell through its side in x or z.
         let side = |at: i32, from: f64, along: f64| match along {
             0.0 => f64::INFINITY,
@@ -75,15 +75,21 @@ impl World {
             let (out_x, out_z) = (side(cell.x, origin.x, direction.x), side(cell.z, origin.z, direction.z));
             let out = out_x.min(out_z).min(leave);
             let (y0, y1) = (origin.y + direction.y * enter, origin.y + direction.y * out);
+            // Through a corner of cells, rounding decides which way round it the ray goes: look at both.
+            let is_at_corner = (out_x - out_z).abs() <= NEAR;
+            let beside = [cell.offset(step_x, 0), cell.offset(0, step_z)];
+            let beside = beside.into_iter().filter(|&cell| is_at_corner && self.grid.has_cell(cell));
             let mut best: Option<(f64, Triangle)> = None;
-            for_triangles(self, &view, cell, y0.min(y1), y0.max(y1), |triangle| {
-                if let Some(t) = intersect(origin, direction, &triangle)
-                    && (0.0..=limit).contains(&t)
-                    && best.is_none_or(|(nearest, _)| t < nearest)
-                {
-                    best = Some((t, triangle));
-                }
-            });
+            for cell in std::iter::once(cell).chain(beside) {
+                for_triangles(self, &view, cell, y0.min(y1) - NEAR, y0.max(y1) + NEAR, |triangle| {
+                    if let Some(t) = ray.meet(&triangle)
+                        && (0.0..=limit).contains(&t)
+                        && best.is_none_or(|(nearest, _)| t < nearest)
+                    {
+                        best = Some((t, triangle));
+                    }
+                });
+            }
             if let Some((distance, triangle)) = best {
                 let mut hit = self.hit(origin, direction, distance, &triangle);
                 hit.distance += skipped;
@@ -93,11 +99,11 @@ impl World {
                 return None;
             }
             enter = out;
-            if out_x <= out_z {
-                cell.x += step(direction.x);
-            } else {
-                cell.z += step(direction.z);
-            }
+            cell = match (is_at_corner, out_x <= out_z) {
+                (true, _) => cell.offset(step_x, step_z),
+                (false, true) => cell.offset(step_x, 0),
+                (false, false) => cell.offset(0, step_z),
+            };
         }
         None
     }
@@ -115,19 +121,21 @@ impl World {
         }
     }
 
-    /// The stretch of a ray over the world's cells, as distances.
+    /// The stretch of a ray that may meet ground, as distances.
     fn clip(&self, origin: DVec3, direction: DVec3, max_distance: f64) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (0.0f64, max_distance);
-        for (from, along, end) in [
-            (origin.x, direction.x, f64::from(self.grid.width())),
-            (origin.z, direction.z, f64::from(self.grid.depth())),
+        let rim = f64::from(LIMIT + 2);
+        for (from, along, low, high) in [
+            (origin.x, direction.x, 0.0, f64::from(self.grid.width())),
+            (origin.y, direction.y, -rim, rim),
+            (origin.z, direction.z, 0.0, f64::from(self.grid.depth())),
         ] {
             if along == 0.0 {
-                if !(0.0..=end).contains(&from) {
+                if !(low..=high).contains(&from) {
                     return None;
                 }
             } else {
-                let (a, b) = ((0.0 - from) / along, (end - from) / along);
+                let (a, b) = ((low - from) / along, (high - from) / along);
                 enter = enter.max(a.min(b));
                 leave = leave.min(a.max(b));
             }
@@ -172,7 +180,7 @@ impl World {
         let far = DVec3::splat(2.0 * f64::from(LIMIT));
         let place = place.clamp(-far, far);
         // The corners of the cell around it; of all cells around it, where it lies between them.
-        let (low, high) = (place.ceil().as_ivec3() - 1, place.floor().as_ivec3() + 1);
+        let (low, high) = ((place - NEAR).ceil().as_ivec3() - 1, (place + NEAR).floor().as_ivec3() + 1);
         let around = LatticeBox { min: low, max: high };
         let apart = |point: &IVec3| point.as_dvec3().distance_squared(place);
         let solid = around.points().filter(|&point| samples.is_solid(point));
@@ -309,21 +317,4 @@ fn cube_triangles(view: &WorldView, cube: IVec3, in_sheet: bool, found: &mut imp
             cube.as_dvec3() + local.as_dvec3() / f64::from(SNAP)
         }));
     }
-}
-
-/// Distance along a ray to a triangle, its edges included with a hair's breadth more, so no ray slips between two.
-fn intersect(origin: DVec3, direction: DVec3, [a, b, c]: &Triangle) -> Option<f64> {
-    const HAIR: f64 = 1e-9;
-    let (ab, ac) = (b - a, c - a);
-    let p = direction.cross(ac);
-    let determinant = ab.dot(p);
-    if determinant.abs() < 1e-18 {
-        return None;
-    }
-    let from = origin - a;
-    let u = from.dot(p) / determinant;
-    let q = from.cross(ab);
-    let v = direction.dot(q) / determinant;
-    let inside = u >= -HAIR && v >= -HAIR && u + v <= 1.0 + HAIR;
-    inside.then(|| ac.dot(q) / determinant)
 }
