@@ -79,7 +79,7 @@
 //!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
 //! ```
 //!
-//! Edits apply in the order in which they were sent, those of one frame together. Integers decide what is solid, and
+//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others. Integers decide what is solid, and
 //! floats are only drawn, so the same edits give the same [`hash`](terrain::World::hash) on every machine.
 //!
 //! # System sets
@@ -101,7 +101,8 @@
 //! # Limits
 //!
 //! Lattice coordinates stay within 32768 voxels, a world's sides within 16384 cells. Chunks are all drawn at full detail.
-//! A terrain may be moved and scaled by powers of two; rotated or stretched, its seams lose their equal bits.
+//! A terrain may be moved by whole voxels and scaled by powers of two; rotated, stretched or moved by a part of a voxel,
+//! its seams lose their equal bits.
 
 pub mod brush;
 pub mod ground;

@@ -111,11 +111,6 @@ impl ChunkGrid {
         (0..self.width).contains(&cell.x) && (0..self.depth).contains(&cell.z)
     }
 
-    /// Is the column inside the world or on its rim?
-    pub fn has_column(self, column: Column) -> bool {
-        (0..=self.width).contains(&column.x) && (0..=self.depth).contains(&column.z)
-    }
-
     /// The tile that draws a cell. The cell must lie in the world.
     pub fn tile_of_cell(self, cell: Column) -> TilePos {
         TilePos { x: cell.x / self.size, z: cell.z / self.size }

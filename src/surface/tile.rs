@@ -20,11 +20,6 @@ pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
     mesh
 }
 
-/// The lowest column of a tile as lattice point: where its mesh is placed.
-pub fn origin(world: &WorldView, tile: TilePos) -> IVec3 {
-    world.grid.tile_cells(tile).0.at(0)
-}
-
 /// The vertices of a tile's columns, x fastest.
 pub fn columns(world: &WorldView, tile: TilePos) -> Vec<Vertex> {
     let (low, high) = world.grid.tile_cells(tile);

@@ -3,7 +3,7 @@
 use glam::IVec3;
 
 use crate::ground::MaterialId;
-use crate::lattice::{BRICK, BrickPos, LatticeBox};
+use crate::lattice::{BRICK, BrickPos};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -33,13 +33,11 @@ impl Sample {
 pub struct Brick {
     samples: [Sample; LEN],
     materials: [MaterialId; LEN],
-    /// One word per y layer, bit `z * 8 + x`: is the sample edited?
-    edited: [u64; BRICK as usize],
 }
 
 impl Default for Brick {
     fn default() -> Self {
-        Self { samples: [Sample::PRISTINE; LEN], materials: [MaterialId::GROUND; LEN], edited: [0; 8] }
+        Self { samples: [Sample::PRISTINE; LEN], materials: [MaterialId::GROUND; LEN] }
     }
 }
 
@@ -62,23 +60,16 @@ impl Brick {
         let index = BrickPos::index(point);
         self.samples[index] = sample;
         self.materials[index] = material;
-        self.edited[index >> 6] |= 1 << (index & 63);
-    }
-
-    /// Edited samples of layer `y & 7`: bit `z * 8 + x`.
-    pub fn edited_layer(&self, y: i32) -> u64 {
-        self.edited[(y & 7) as usize]
     }
 
     /// How many samples are edited.
     pub fn edited_count(&self) -> u32 {
-        self.edited.iter().map(|layer| layer.count_ones()).sum()
+        self.samples.iter().filter(|&&sample| sample != Sample::PRISTINE).count() as u32
     }
 
     /// Every edited sample of the brick at `pos`: point, density, material.
     pub fn edited_samples(&self, pos: BrickPos) -> impl Iterator<Item = (IVec3, i32, MaterialId)> {
-        let LatticeBox { min, max } = pos.samples();
-        LatticeBox { min, max }
+        pos.samples()
             .points()
             .filter_map(|point| Some((point, self.sample(point).distance()?, self.material(point))))
     }
@@ -105,6 +96,5 @@ mod tests {
         brick.set(point, Sample::edited(-7), MaterialId(4));
         assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, -7, MaterialId(4))]);
         assert_eq!(brick.edited_count(), 1);
-        assert_eq!(brick.edited_layer(point.y), 1 << (7 * 8 + 3));
     }
 }
