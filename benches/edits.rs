@@ -62,8 +62,9 @@ fn main() {
             for cell in terrain.world().mask().iter().step_by(37) {
                 let view = terrain.world().view();
                 let touched = terrain.world().grid().tile_of_cell(cell);
+                let rings = tile::Rings::new(&view, touched, &tile::borders(&view, touched));
                 let start = Instant::now();
-                let (indices, _) = tile::indices(&view, touched);
+                let indices = tile::indices(view.grid, touched, &tile::borders(&view, touched), &rings);
                 lists.push(start.elapsed());
                 assert!(!indices.is_empty());
             }

@@ -154,11 +154,11 @@ impl fmt::Display for Report {
         let (all, kib) = (memory.ground + memory.edits(), |bytes: usize| bytes as f64 / 1024.0);
         writeln!(
             f,
-            "  terrain data  {all} bytes: ground {:.0} KiB, edits {:.0} KiB ({:.0} samples, {:.0} surface, {:.0} index)",
+            "  terrain data  {all} bytes: ground {:.0} KiB, edits {:.0} KiB ({:.0} samples and materials, {:.0} surface, {:.0} index)",
             kib(memory.ground),
             kib(memory.edits()),
-            kib(memory.bricks),
-            kib(memory.surfaces),
+            kib(memory.samples + memory.materials),
+            kib(memory.meshes + memory.parts),
             kib(memory.index)
         )?;
         writeln!(f, "  frames        {} walked and dug, {} drawn", self.frames, self.drawn)?;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bevy_burrow::lattice::ONE;
 use bevy_burrow::surface::SeamReport;
-use bevy_burrow::terrain::{ScenarioCounts, World};
+use bevy_burrow::terrain::{Memory, ScenarioCounts, World};
 use bevy_burrow::volume::Tally;
 use serde::Serialize;
 
@@ -68,10 +68,8 @@ pub struct RejectedEdit {
 
 #[derive(Debug, Serialize)]
 pub struct ByteFigures {
-    pub ground: usize,
-    pub bricks: usize,
-    pub index: usize,
-    pub surfaces: usize,
+    #[serde(flatten)]
+    pub world: Memory,
     /// All but the ground.
     pub edits: usize,
     /// Length of `mesh.obj`.
@@ -147,10 +145,7 @@ impl Report {
             bricks: world.bricks().count(),
             volumetric_cells: world.mask().len(),
             bytes: ByteFigures {
-                ground: memory.ground,
-                bricks: memory.bricks,
-                index: memory.index,
-                surfaces: memory.surfaces,
+                world: memory,
                 edits: memory.edits(),
                 mesh_obj: 0,
             },

@@ -1,5 +1,7 @@
 //! From lattice samples to signed distances.
 
+use std::ops::Range;
+
 use glam::{I64Vec3, IVec3};
 
 use super::BAND;
@@ -64,6 +66,40 @@ impl Evaluator {
         }
     }
 
+    /// The same for the rows of 8 samples along x from `origin` on: those with `y` and `z` in these ranges, counted from
+    /// `origin`, go to `out[y * 8 + z]`; other rows stay as they are.
+    pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [[i32; 8]; 64]) {
+        match &self.form {
+            Form::Sphere(sphere) => self.fill_rows(sphere, origin, y, z, out),
+            Form::Cuboid(cuboid) => self.fill_rows(cuboid, origin, y, z, out),
+            Form::Cylinder(cylinder) => self.fill_rows(cylinder, origin, y, z, out),
+            Form::Capsule(capsule) => self.fill_rows(capsule, origin, y, z, out),
+            Form::Cone(cone) => self.fill_rows(cone, origin, y, z, out),
+        }
+    }
+
+    /// Kept apart for each shape, so that the compiler vectorises its rows.
+    fn fill_rows(
+        &self,
+        shape: &impl Distance,
+        origin: IVec3,
+        y: Range<i32>,
+        z: Range<i32>,
+        out: &mut [[i32; 8]; 64],
+    ) {
+        for y in y {
+            for z in z.clone() {
+                let start = origin + IVec3::new(0, y, z);
+                let mut distances = [0.0; 8];
+                self.fill(shape, i64::from(start.x), start, &mut distances);
+                if let Some(grain) = &self.grain {
+                    grain.add(i64::from(start.x), start, &mut distances);
+                }
+                out[(y * 8 + z) as usize] = distances.map(round);
+            }
+        }
+    }
+
     /// Is every sample of the box farther than [`BAND`] outside, so that the edit changes none of them (rule 6)?
     ///
     /// Cheap and conservative: `false` may also mean "not sure". It takes one distance, at the middle of the box, of
@@ -95,6 +131,7 @@ impl Evaluator {
     }
 
     /// The loop that the compiler vectorises, one for each shape. `out` holds at most [`RUN`] distances.
+    #[inline(always)]
     fn fill(&self, shape: &impl Distance, x: i64, start: IVec3, out: &mut [f32]) {
         let voxels = |v: i64, home: i32| (v - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32;
         let first = voxels(x, self.home.x);
@@ -117,6 +154,7 @@ fn round(distance: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brush::Roughness;
 
     #[test]
     fn rounding_is_to_nearest_and_halves_to_even() {
@@ -135,6 +173,30 @@ mod tests {
             (-4_194_302.5, -4_194_302),
         ] {
             assert_eq!(round(distance), rounded, "{distance}");
+        }
+    }
+
+    #[test]
+    fn rows_of_a_brick_are_rows() {
+        for (seed, solid) in [
+            (None, Solid::Sphere { center: [900, 300, 700], radius: 600 }),
+            (Some(3), Solid::Cone { base: [1 << 10, 9, -7], axis: [-99, 5_000, 999], radius: 900 }),
+            (Some(9), Solid::Cuboid { center: [0, 0, 0], half: [900, 80, 700], rotation: [3, 5, 7, 90] }),
+        ] {
+            let grain = seed.map(|seed| Grain::quantize(&Roughness::new(1.5, 3.0, seed)).unwrap());
+            let evaluator = Evaluator::new(&solid, grain);
+            for origin in [IVec3::new(-3, -4, 0), IVec3::new(8, 0, -8), IVec3::new(1 << 14, 0, 0)] {
+                let mut rows = [[i32::MIN; 8]; 64];
+                evaluator.rows(origin, 1..7, 2..8, &mut rows);
+                for (i, row) in (0..).zip(rows) {
+                    let (y, z) = (i / 8, i % 8);
+                    let mut expected = [i32::MIN; 8];
+                    if (1..7).contains(&y) && (2..8).contains(&z) {
+                        evaluator.row(origin + IVec3::new(0, y, z), &mut expected);
+                    }
+                    assert_eq!(row, expected, "{solid:?} at {origin}, row {y} {z}");
+                }
+            }
         }
     }
 

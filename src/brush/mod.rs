@@ -69,3 +69,7 @@ use crate::lattice::ONE;
 
 /// How far outside its shape an edit still changes samples, in 1/256 voxel (rule 6).
 pub const BAND: i32 = 2 * ONE;
+
+/// How deep inside its shape an edit's distances are told apart, in 1/256 voxel. Two voxels are what surface and normals
+/// look at; the rest is for rough shapes, whose distances change faster than the point moves.
+pub const DEPTH: i32 = 4 * ONE;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::DEPTH;
 use crate::ground::MaterialId;
 
 /// What happens inside the shape.
@@ -29,11 +30,14 @@ impl Operation {
     /// The density of a sample after the operation, from its density `before` and its signed distance to the shape,
     /// `outside`. All in 1/256 voxel, negative is solid, and inside for the distance.
     ///
-    /// Applying an operation twice is the same as once, and neither a dig ever adds ground nor an add removes it.
+    /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
+    /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds
+    /// ground nor an add removes it.
     #[inline]
     pub fn apply(self, before: i32, outside: i32) -> i32 {
+        let outside = outside.max(-DEPTH);
         match self {
-            Self::Dig => before.max(outside.saturating_neg()),
+            Self::Dig => before.max(-outside),
             Self::Add { .. } => before.min(outside),
             Self::Paint { .. } => before,
         }
@@ -63,7 +67,8 @@ mod tests {
             (-50, 100, -50, -50),    // already nearer the surface than the shape is
             (300, -100, 300, -100),  // air, inside
             (300, 100, 300, 100),    // air, near
-            (0, i32::MIN, i32::MAX, i32::MIN),
+            (0, i32::MIN, DEPTH, -DEPTH),
+            (2 * DEPTH, -3 * DEPTH, 2 * DEPTH, -DEPTH), // deep inside: less than what was there
         ] {
             assert_eq!(Operation::Dig.apply(before, outside), dug);
             assert_eq!(add.apply(before, outside), added);

@@ -115,6 +115,18 @@ impl Ground {
         self.heights[self.extent.index(column)]
     }
 
+    /// Heights of `N` x `N` columns from `low` on, rows along x: what [`Self::height`] gives for each.
+    pub(crate) fn heights<const N: usize>(&self, low: Column) -> [[i32; N]; N] {
+        let last = low.offset(N as i32 - 1, N as i32 - 1);
+        if self.extent.clamp(low) != low || self.extent.clamp(last) != last {
+            let height = |x: usize, z: usize| self.height(low.offset(x as i32, z as i32));
+            return std::array::from_fn(|z| std::array::from_fn(|x| height(x, z)));
+        }
+        let start = self.extent.index(low);
+        let row = |z| self.heights[start + z * self.extent.row_len()..].first_chunk().copied();
+        std::array::from_fn(|z| row(z).unwrap_or([0; N]))
+    }
+
     /// Pristine density of a lattice point: how far it lies above the surface of its column, in 1/256 voxel, negative
     /// below. Exact wherever it fits an `i32`, which is everywhere within the lattice's limit; saturated beyond.
     pub fn distance(&self, point: IVec3) -> i32 {
@@ -228,6 +240,18 @@ mod tests {
                 let normal = ground.normal(Column::new(x, z));
                 prop_assert!((normal.length() - 1.0).abs() < 1e-5 && normal.y > 0.0, "{normal}");
             }
+        }
+    }
+
+    #[test]
+    fn windows_of_heights_are_the_heights() {
+        let ground = Ground::from_heights(9, 7, (0..80).collect()).unwrap();
+        for (x, z) in (-6..12).flat_map(|z| (-6..12).map(move |x| (x, z))) {
+            let low = Column::new(x, z);
+            let expected: [[i32; 5]; 5] = std::array::from_fn(|dz| {
+                std::array::from_fn(|dx| ground.height(low.offset(dx as i32, dz as i32)))
+            });
+            assert_eq!(ground.heights::<5>(low), expected, "from ({x}, {z})");
         }
     }
 

@@ -11,6 +11,7 @@ use super::entities::{TerrainEntities, tell};
 use super::load::Loading;
 use super::meshes::{self, Ready};
 use super::{BrushApplied, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, MaterialColors};
+use crate::surface::SurfaceMesh;
 use crate::terrain::{Commit, Drawn, Terrain};
 
 /// The transaction that a terrain waits for.
@@ -51,13 +52,14 @@ pub(super) fn begin_transactions(
         let colors = colors.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let start = Instant::now();
-            let mut commit = transaction.run();
-            let updates = std::mem::take(&mut commit.meshes);
-            let tiles = updates.tiles.iter().map(|(tile, surface)| (Drawn::Tile(*tile), surface));
-            let chunks = updates.chunks.iter().map(|(chunk, surface)| (Drawn::Chunk(*chunk), surface));
-            let build =
-                |(drawn, surface)| (drawn, if draws { meshes::build(surface, &colors) } else { None });
-            let meshes = tiles.chain(chunks).map(build).collect();
+            let commit = transaction.run();
+            let build = |surface: &SurfaceMesh| if draws { meshes::build(surface, &colors) } else { None };
+            let updates = &commit.meshes;
+            let tiles = updates.tiles.iter().map(|(tile, update)| {
+                (Drawn::Tile(*tile), if draws { build(&update.mesh(*tile)) } else { None })
+            });
+            let chunks = updates.chunks.iter().map(|(at, chunk)| (Drawn::Chunk(*at), build(chunk.mesh())));
+            let meshes = tiles.chain(chunks).collect();
             Prepared { commit, meshes, took: start.elapsed() }
         });
         *number += 1;

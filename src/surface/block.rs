@@ -1,167 +1,342 @@
-//! Marching cubes over a block: the cells of one brick that lie in one chunk.
+//! Marching cubes over blocks: the cells of one brick that lie in one chunk.
 //!
 //! A block draws every cube that touches an edited sample and, in the mask, every cube of the sheet. All other cubes of
-//! the world are the tile's, or hold no surface.
+//! the world are the tile's, or hold no surface. [`plain`](super::plain) says the same cube by cube and sample by
+//! sample; this is the fast way, with the same bits:
+//!
+//! 1. Bricks keep the signs of their samples as bits. A few operations on 81-bit layers find the cubes to draw, and the
+//!    lattice edges that their vertices lie on.
+//! 2. Only then, samples are copied out of the bricks, and only the layers that those edges look at.
+//! 3. Edges are listed by axis; vertices are made from the lists, several at a time, and so each just once.
+//! 4. Triangles look their vertices' numbers up by lattice edge.
 
-use glam::IVec3;
+use std::ops::Range;
+use std::sync::LazyLock;
 
-use super::cases::{self, Edge};
-use super::mask::cell_sheet;
+use super::apron::{Apron, Neighbours};
+use super::cases::{self, Case};
+use super::corners::{self, Corners, X, Z};
+use super::crossings::{Crossings, EdgeList};
+use super::mask::sheet;
 use super::mesh::Vertex;
-use super::vertex::{Lattice, WorldView, vertex};
-use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BRICK, BrickPos, Column, LatticeBox};
-use crate::volume::{Brick, Sample};
+use super::stack::{Stack, world_cells};
+use super::vertex::WorldView;
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
+use crate::volume::Brick;
 
-/// The surface of one block. Vertices are shared by its triangles; those on its faces stand in its neighbour as well,
-/// with the same bits.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A block to be meshed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Whose cells.
+    pub brick: BrickPos,
+    /// The chunk that draws them.
+    pub chunk: ChunkPos,
+}
+
+/// The surface of one block, as ranges of a [`Parts`]. It may be empty.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Vertices, local to the chunk.
+    /// Which block.
+    pub block: Block,
+    /// Where its vertices end; they begin where those of the part before end.
+    pub vertices: usize,
+    /// Where its indices end.
+    pub indices: usize,
+}
+
+/// Surfaces of blocks, one after the other. Vertices are shared by the triangles of a block; those on its faces stand in
+/// its neighbour as well, with the same bits.
+#[derive(Clone, Debug, Default)]
+pub struct Parts {
+    /// One for each block, in order.
+    pub list: Vec<Part>,
+    /// Vertices, local to their chunks.
     pub vertices: Vec<Vertex>,
-    /// Three for each triangle.
+    /// Three for each triangle, counted within the part.
     pub indices: Vec<u16>,
 }
 
-impl Part {
-    /// Bytes of the buffers.
-    pub fn bytes(&self) -> usize {
-        size_of_val(self.vertices.as_slice()) + size_of_val(self.indices.as_slice())
+impl Parts {
+    /// Forgets all parts and keeps the memory.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.vertices.clear();
+        self.indices.clear();
+    }
+
+    /// Each part with its vertices and its indices.
+    pub fn iter(&self) -> impl Iterator<Item = (Block, &[Vertex], &[u16])> {
+        let (mut vertex, mut index) = (0, 0);
+        self.list.iter().map(move |part| {
+            let found = (part.block, &self.vertices[vertex..part.vertices], &self.indices[index..part.indices]);
+            (vertex, index) = (part.vertices, part.indices);
+            found
+        })
     }
 }
 
-/// Samples along one side of the apron: 9 corners, one more below and above for the gradients.
-const SIDE: i32 = BRICK + 3;
-const AREA: usize = (SIDE * SIDE) as usize;
-const VOLUME: usize = AREA * SIDE as usize;
-
-/// The samples around a block, copied out of their bricks.
-struct Apron<'a> {
-    world: &'a WorldView<'a>,
-    low: IVec3,
-    distances: [i32; VOLUME],
-    edited: [bool; VOLUME],
+/// Meshes blocks; keeps its working memory from one call to the next.
+#[derive(Default)]
+pub struct Mesher {
+    apron: Apron,
+    crossings: Crossings,
+    numbers: Numbers,
 }
 
-impl<'a> Apron<'a> {
-    fn gather(world: &'a WorldView<'a>, brick: BrickPos) -> Self {
-        let low = brick.origin() - 1;
-        let mut apron = Self { world, low, distances: [0; VOLUME], edited: [false; VOLUME] };
-        let ground = world.samples.ground();
-        let bricks: [Option<&Brick>; 27] = std::array::from_fn(|i| {
-            let i = i as i32;
-            world.samples.brick(BrickPos(brick.0 + IVec3::new(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1)))
-        });
-        for z in 0..SIDE {
-            for x in 0..SIDE {
-                let column = Column::new(low.x + x, low.z + z);
-                let surface = ground.distance(column.at(0));
-                let stack = ((z + 7) / 8 * 3 + (x + 7) / 8) as usize;
-                for y in 0..SIDE {
-                    let point = column.at(low.y + y);
-                    let sample = bricks[(y + 7) as usize / 8 * 9 + stack]
-                        .map_or(Sample::PRISTINE, |b| b.sample(point));
-                    let at = ((y * SIDE + z) * SIDE + x) as usize;
-                    apron.edited[at] = sample != Sample::PRISTINE;
-                    apron.distances[at] =
-                        sample.distance().unwrap_or_else(|| surface + point.y * crate::lattice::ONE);
+impl Mesher {
+    /// Meshes blocks and adds their parts to `out`, in the same order. Blocks of one stack of bricks should follow each
+    /// other, from below.
+    pub fn mesh(&mut self, view: &WorldView, blocks: &[Block], out: &mut Parts) {
+        for stack in blocks.chunk_by(|a, b| stack_of(a.brick) == stack_of(b.brick)) {
+            self.mesh_stack(view, stack, out);
+        }
+    }
+
+    fn mesh_stack(&mut self, view: &WorldView, blocks: &[Block], out: &mut Parts) {
+        let Some(first) = blocks.first() else { return };
+        let mut stack = Stack::new(view, stack_of(first.brick));
+        let mut around = Neighbours::new(&view.samples, first.brick);
+        for brick in blocks.chunk_by(|a, b| a.brick == b.brick) {
+            around.go(&view.samples, brick[0].brick);
+            let cubes = Cubes::find(&stack, &around, brick[0].brick);
+            for &block in brick {
+                let cells = block.brick.samples().intersection(view.grid.chunk_cells(block.chunk));
+                if let (Some(cubes), Some(cells)) = (&cubes, cells) {
+                    let origin = view.grid.origin(block.chunk);
+                    self.mesh_block(&mut stack, &around, cubes, block.brick, cells, origin, out);
                 }
+                out.list.push(Part { block, vertices: out.vertices.len(), indices: out.indices.len() });
             }
         }
-        apron
     }
 
-    fn index(&self, point: IVec3) -> usize {
-        let at = point - self.low;
-        ((at.y * SIDE + at.z) * SIDE + at.x) as usize
+    fn mesh_block(
+        &mut self,
+        stack: &mut Stack,
+        around: &Neighbours,
+        cubes: &Cubes,
+        brick: BrickPos,
+        cells: LatticeBox,
+        origin: glam::IVec3,
+        out: &mut Parts,
+    ) {
+        let drawn = cubes.within(cells, brick);
+        let filled = |y: &usize| drawn[*y] != 0;
+        let (Some(bottom), Some(top)) = ((0..8).find(filled), (0..8).rfind(filled)) else { return };
+        // Layers of the apron start one below; the gradients at the upper corners look one further.
+        self.apron.fill(around, &stack.heights, bottom, top + 3);
+        self.list_edges(&cubes.solid, &drawn, bottom, top);
+        self.crossings.make(&self.apron, stack, around, brick.origin(), origin, &mut out.vertices);
+        self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
     }
 
-    /// The case of a cube, and whether one of its corners is edited.
-    fn cube(&self, low: IVec3) -> (usize, bool) {
-        let at = self.index(low);
-        let (mut case, mut edited) = (0, false);
-        for corner in 0..8 {
-            let [x, y, z] = cases::corner(corner).map(|step| step as usize);
-            let at = at + (y * SIDE as usize + z) * SIDE as usize + x;
-            case |= usize::from(self.distances[at] < 0) << corner;
-            edited |= self.edited[at];
+    /// Lists and numbers every lattice edge that a drawn cube's vertex lies on.
+    fn list_edges(&mut self, solid: &[Corners; 9], drawn: &[Corners; 8], bottom: usize, top: usize) {
+        self.crossings.clear();
+        let mut number = 0;
+        for axis in 0..3 {
+            for y in bottom..=top + usize::from(axis != 1) {
+                let here = if y < 8 { drawn[y] } else { 0 };
+                let below = if y > bottom { drawn[y - 1] } else { 0 };
+                let level = solid[y];
+                let edges = match axis {
+                    0 => (level ^ level >> X) & beside(here | below, Z),
+                    1 => (level ^ solid[y + 1]) & beside(beside(here, X), Z),
+                    _ => (level ^ level >> Z) & beside(here | below, X),
+                };
+                number = self.numbers.count(axis, y, edges, number, self.crossings.list(axis));
+            }
         }
-        (case, edited)
+    }
+
+    fn triangulate(
+        &self,
+        solid: &[Corners; 9],
+        drawn: &[Corners; 8],
+        bottom: usize,
+        top: usize,
+        out: &mut Vec<u16>,
+    ) {
+        let table = &*SLOTS;
+        for y in bottom..=top {
+            for cell in corners::ones(drawn[y]) {
+                let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
+                let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
+                let base = y * 81 + cell;
+                let entry = &table[case];
+                out.extend(entry.slots[..entry.len].iter().map(|&slot| self.numbers.at(base + usize::from(slot))));
+            }
+        }
     }
 }
 
-impl Lattice for Apron<'_> {
-    fn distance(&self, point: IVec3) -> i32 {
-        self.distances[self.index(point)]
-    }
-    fn is_edited(&self, point: IVec3) -> bool {
-        self.edited[self.index(point)]
-    }
-    fn stored_material(&self, point: IVec3) -> MaterialId {
-        self.world.stored_material(point)
-    }
-    fn ground(&self) -> &Ground {
-        self.world.samples.ground()
-    }
-    fn is_volumetric(&self, cell: Column) -> Option<bool> {
-        self.world.is_volumetric(cell)
+fn stack_of(brick: BrickPos) -> (i32, i32) {
+    (brick.0.x, brick.0.z)
+}
+
+/// Cells, and those one step further.
+fn beside(cells: Corners, step: u32) -> Corners {
+    cells | cells << step
+}
+
+/// The numbers of vertices, by lattice edge: three axes, in each nine layers of corners.
+struct Numbers(Box<[u16; 3 * 9 * 81]>);
+
+impl Default for Numbers {
+    fn default() -> Self {
+        Self(Box::new([0; 3 * 9 * 81]))
     }
 }
 
-/// Vertices already made in a block, by lattice edge.
-struct VertexCache {
-    part: Part,
-    numbers: Vec<u16>,
-    low: IVec3,
-    origin: IVec3,
+impl Numbers {
+    /// Numbers edges from `first` on and lists them; returns the next number.
+    #[inline]
+    fn count(&mut self, axis: usize, y: usize, edges: Corners, first: u16, list: &mut EdgeList) -> u16 {
+        let (mut number, base) = (first, axis * 729 + y * 81);
+        for corner in corners::ones(edges) {
+            self.0[base + corner] = number;
+            number += 1;
+            list.push(y, corner);
+        }
+        number
+    }
+
+    #[inline]
+    fn at(&self, slot: usize) -> u16 {
+        self.0[slot]
+    }
 }
 
-impl VertexCache {
-    const SIDE: i32 = BRICK + 1;
-    const NONE: u16 = u16::MAX;
+/// A case's triangles as places of edges in [`Numbers`], counted from the cube's lowest corner.
+struct Slots {
+    slots: [u16; 15],
+    len: usize,
+}
 
-    fn number(&mut self, apron: &Apron, cube: IVec3, edge: Edge) -> u16 {
+static SLOTS: LazyLock<[Slots; 256]> = LazyLock::new(|| {
+    let slot = |edge| {
         let (corner, axis) = cases::edge_corners(edge);
-        let p = cube + IVec3::from_array(cases::corner(corner));
-        let at = p - self.low;
-        let slot = &mut self.numbers[(((at.y * Self::SIDE + at.z) * Self::SIDE + at.x) * 3) as usize + axis];
-        if *slot == Self::NONE {
-            *slot = self.part.vertices.len() as u16;
-            self.part.vertices.push(vertex(apron, p, axis, self.origin));
+        let [x, y, z] = cases::corner(corner).map(|step| step as u16);
+        axis as u16 * 729 + y * 81 + z * 9 + x
+    };
+    let of = |case: &Case| {
+        let mut slots = [0; 15];
+        let mut len = 0;
+        for (place, edge) in slots.iter_mut().zip(case.triangles().flatten()) {
+            *place = slot(edge);
+            len += 1;
         }
-        *slot
+        Slots { slots, len }
+    };
+    std::array::from_fn(|case| of(&cases::table()[case]))
+});
+
+/// The cubes of a brick that marching cubes draws.
+struct Cubes {
+    /// Solid corners, layer by layer.
+    solid: [Corners; 9],
+    /// Cells to draw between a layer and the next.
+    drawn: [Corners; 8],
+}
+
+impl Cubes {
+    /// `None` where nothing is drawn.
+    fn find(stack: &Stack, around: &Neighbours, brick: BrickPos) -> Option<Self> {
+        let low = brick.origin().y;
+        let near = [around.corners(0), around.corners(1)];
+        if is_one_side(&near, stack.pristine_side(low)) {
+            return None;
+        }
+        let is_whole = near.iter().flatten().all(Option::is_some);
+        let pristine = if is_whole && stack.mask == 0 { [0; 9] } else { stack.pristine(low) };
+        let mut layers = Layers::new(&near, &pristine);
+        let mut drawn = [0; 8];
+        for (y, drawn) in drawn.iter_mut().enumerate() {
+            let sheet = if stack.mask == 0 { 0 } else { corners::mixed(pristine[y], pristine[y + 1]) };
+            let touched = corners::any(layers.edited[y] | layers.edited[y + 1]);
+            *drawn = corners::mixed(layers.solid[y], layers.solid[y + 1]) & (touched | sheet & stack.mask);
+        }
+        (drawn != [0; 8]).then_some(Self { solid: std::mem::take(&mut layers.solid), drawn })
+    }
+
+    /// The cubes among these cells of the brick.
+    fn within(&self, cells: LatticeBox, brick: BrickPos) -> [Corners; 8] {
+        let (low, high) = (cells.min - brick.origin(), cells.max - brick.origin());
+        let area = corners::rectangle(Column::of(low), Column::of(high));
+        std::array::from_fn(|y| {
+            if (low.y..=high.y).contains(&(y as i32)) { self.drawn[y] & area } else { 0 }
+        })
     }
 }
 
-/// Meshes the cells `cells` of a brick, relative to the chunk's lowest lattice point `origin`.
-pub fn mesh(world: &WorldView, brick: BrickPos, cells: LatticeBox, origin: IVec3) -> Part {
-    debug_assert!(brick.samples().encloses(cells));
-    let apron = Apron::gather(world, brick);
-    let side = VertexCache::SIDE as usize;
-    let mut cache = VertexCache {
-        part: Part::default(),
-        numbers: vec![VertexCache::NONE; side * side * side * 3],
-        low: brick.origin(),
-        origin,
-    };
-    let table = cases::table();
-    for z in cells.min.z..=cells.max.z {
-        for x in cells.min.x..=cells.max.x {
-            let cell = Column::new(x, z);
-            let sheet =
-                if world.mask.contains(cell) { cell_sheet(apron.ground(), cell) } else { i32::MAX..i32::MAX };
-            for y in cells.min.y..=cells.max.y {
-                let cube = cell.at(y);
-                let (case, edited) = apron.cube(cube);
-                if case == 0 || case == 255 || !(edited || sheet.contains(&y)) {
-                    continue;
-                }
-                for triangle in table[case].triangles() {
-                    let numbers = triangle.map(|edge| cache.number(&apron, cube, edge));
-                    cache.part.indices.extend_from_slice(&numbers);
-                }
-            }
+/// Are all corners of a brick's cells solid, or all air?
+fn is_one_side(near: &[[Option<&Brick>; 4]; 2], pristine: Option<bool>) -> bool {
+    let mut sides = near.iter().flatten().map(|brick| match brick {
+        None => pristine,
+        Some(brick) => match (brick.solid(), brick.solid().iter().all(|&layer| layer == u64::MAX)) {
+            (_, true) => Some(true),
+            (solid, _) => solid.iter().all(|&layer| layer == 0).then_some(false),
+        },
+    });
+    sides.next().flatten().is_some_and(|first| sides.all(|side| side == Some(first)))
+}
+
+/// The corners of a brick's cells, layer by layer.
+struct Layers {
+    solid: [Corners; 9],
+    edited: [Corners; 9],
+}
+
+impl Layers {
+    /// From the bricks that hold them; `pristine` stands in for bricks that are not there.
+    fn new(near: &[[Option<&Brick>; 4]; 2], pristine: &[Corners; 9]) -> Self {
+        // The corners that each of the four bricks holds.
+        let quarters = [corners::join([u64::MAX, 0, 0, 0]), corners::join([0, u64::MAX, 0, 0])]
+            .into_iter()
+            .chain([corners::join([0, 0, u64::MAX, 0]), corners::join([0, 0, 0, u64::MAX])]);
+        let absent = |bricks: &[Option<&Brick>; 4]| {
+            let missing = quarters.clone().zip(bricks).filter(|(_, brick)| brick.is_none());
+            missing.fold(0, |all, (quarter, _)| all | quarter)
+        };
+        let missing = [absent(&near[0]), absent(&near[1])];
+        let mut layers = Self { solid: [0; 9], edited: [0; 9] };
+        for y in 0..9 {
+            let (bricks, missing) = (&near[y / 8], missing[y / 8]);
+            let solid = bricks.map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8]));
+            layers.solid[y] = corners::join(solid) | pristine[y] & missing;
+            let edited = bricks.map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8]));
+            layers.edited[y] = corners::join(edited);
         }
+        layers
     }
-    cache.part
+}
+
+/// Cells of the brick's stack that belong to the mask because of samples around this brick (rule 2): a corner of a cube
+/// of their sheet is edited. As 8x8 cells, bit `z * 8 + x`.
+pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {
+    let stack = (brick.0.x, brick.0.z);
+    let low = brick.origin();
+    let heights = corners::heights(view.samples.ground(), Column::of(low));
+    let range = corners::corner_heights(&heights)
+        .fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
+    if super::stack::pristine_side(range, low.y).is_some() {
+        return 0;
+    }
+    let around = Neighbours::new(&view.samples, brick);
+    let near = [around.corners(0), around.corners(1)];
+    let pristine = corners::pristine(corners::corner_heights(&heights), low.y);
+    let layers = Layers::new(&near, &pristine);
+    let mut cells = 0;
+    for y in 0..8 {
+        let touched = corners::any(layers.edited[y] | layers.edited[y + 1]);
+        cells |= corners::mixed(pristine[y], pristine[y + 1]) & touched;
+    }
+    let cells = cells & world_cells(view, stack);
+    (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))
+}
+
+/// Lattice y of the cubes that the pristine surface crosses over the 8x8 cells from `low` on.
+pub(crate) fn sheet_rows(ground: &Ground, low: Column) -> Range<i32> {
+    sheet(corners::corner_heights(&corners::heights(ground, low)))
 }

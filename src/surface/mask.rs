@@ -6,7 +6,6 @@ use rustc_hash::FxHashMap;
 
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE};
-use crate::volume::SampleView;
 
 /// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
 /// lattice point counts below it.
@@ -20,12 +19,6 @@ pub fn sheet(heights: impl IntoIterator<Item = i32>) -> Range<i32> {
 /// The sheet of a cell.
 pub fn cell_sheet(ground: &Ground, cell: Column) -> Range<i32> {
     sheet(cell.corners().map(|column| ground.height(column)))
-}
-
-/// Rule 2: is a corner of the cell's sheet edited?
-pub fn is_disturbed(view: &SampleView, cell: Column) -> bool {
-    let sheet = cell_sheet(view.ground(), cell);
-    cell.corners().iter().any(|column| (sheet.start..=sheet.end).any(|y| view.is_edited(column.at(y))))
 }
 
 /// A set of cells, one 64-bit word for each 8x8 of them.
@@ -43,13 +36,16 @@ impl Mask {
         self.0.get(&word).is_some_and(|bits| bits & bit != 0)
     }
 
-    /// Puts a cell in; says whether it was not there before.
-    pub(crate) fn insert(&mut self, cell: Column) -> bool {
-        let (word, bit) = Self::place(cell);
-        let bits = self.0.entry(word).or_default();
-        let fresh = *bits & bit == 0;
-        *bits |= bit;
-        fresh
+    /// Puts in 8x8 cells at once: bit `z * 8 + x` is the cell (8 `word.0` + x, 8 `word.1` + z).
+    pub(crate) fn insert_word(&mut self, word: (i32, i32), cells: u64) {
+        if cells != 0 {
+            *self.0.entry(word).or_default() |= cells;
+        }
+    }
+
+    /// Every word that is not empty, in no order.
+    pub(crate) fn words(&self) -> impl Iterator<Item = ((i32, i32), u64)> {
+        self.0.iter().map(|(&word, &cells)| (word, cells))
     }
 
     /// Takes in all cells of another mask.
@@ -108,7 +104,7 @@ impl<'a> MaskView<'a> {
     }
 
     /// The word of 8x8 cells that starts at (8 x, 8 z): bit `z * 8 + x`.
-    fn word(&self, word: (i32, i32)) -> u64 {
+    pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
         let of = |mask: &Mask| mask.0.get(&word).copied().unwrap_or_default();
         of(self.committed) | self.added.map_or(0, of)
     }
@@ -188,8 +184,11 @@ mod tests {
     fn a_cell_goes_in_once() {
         let mut mask = Mask::default();
         let cell = Column::new(-3, 17);
-        assert!(mask.insert(cell) && !mask.insert(cell));
+        mask.insert_word((-1, 2), 1 << (1 * 8 + 5));
+        mask.insert_word((-1, 2), 1 << (1 * 8 + 5));
+        mask.insert_word((4, 4), 0);
         assert!(mask.contains(cell) && mask.len() == 1);
         assert_eq!(mask.iter().collect::<Vec<_>>(), [cell]);
+        assert_eq!(mask.words().count(), 1);
     }
 }

@@ -1,7 +1,10 @@
 //! Tiles: the heightmap's triangles outside the mask, with rings along its border (rule 3).
 //!
-//! A tile's vertices are its columns, in rows along x; digging never moves them. What a transaction rebuilds is the list
-//! of indices; the few vertices that rings need on the mask's border follow after the columns.
+//! A tile's vertices are its columns, in rows along x; digging never moves them. The few vertices that rings need on the
+//! mask's border follow after the columns. What a transaction makes anew is the list of indices: whole cells first, then
+//! the rings, of which it computes those near its edits and copies the others.
+
+use std::cmp::Ordering;
 
 use glam::IVec3;
 
@@ -9,103 +12,222 @@ use super::mask::{Borders, sheet};
 use super::mesh::{SurfaceMesh, Vertex};
 use super::vertex::{WorldView, height_vertex, vertex};
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE, TilePos};
+use crate::lattice::{ChunkGrid, Column, ONE, TilePos};
 
 /// The whole mesh of a tile, relative to its lowest column at y = 0. May be empty, when the mask covers all of it.
 pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
-    let mut mesh = SurfaceMesh { vertices: columns(world, tile), indices: Vec::new() };
-    let (indices, ring) = indices(world, tile);
-    mesh.vertices.extend_from_slice(&ring);
-    mesh.indices = indices;
-    mesh
+    let borders = borders(world, tile);
+    let rings = Rings::new(world, tile, &borders);
+    let mut vertices = columns(world.samples.ground(), world.grid, tile);
+    vertices.extend_from_slice(&rings.vertices);
+    SurfaceMesh { vertices, indices: indices(world.grid, tile, &borders, &rings) }
 }
 
 /// The vertices of a tile's columns, x fastest.
-pub fn columns(world: &WorldView, tile: TilePos) -> Vec<Vertex> {
-    let (low, high) = world.grid.tile_cells(tile);
-    let ground = world.samples.ground();
-    let row = move |z| (low.x..=high.x).map(move |x| height_vertex(ground, Column::new(x, z), low.at(0)));
-    (low.z..=high.z).flat_map(row).collect()
+pub fn columns(ground: &Ground, grid: ChunkGrid, tile: TilePos) -> Vec<Vertex> {
+    let (low, high) = grid.tile_cells(tile);
+    let mut vertices = Vec::with_capacity(column_count(low, high) as usize);
+    for z in low.z..=high.z {
+        vertices.extend((low.x..=high.x).map(|x| height_vertex(ground, Column::new(x, z), low.at(0))));
+    }
+    vertices
 }
 
-/// The triangles outside the mask, and the vertices of rings that they need after those of [`columns`].
-pub fn indices(world: &WorldView, tile: TilePos) -> (Vec<u32>, Vec<Vertex>) {
+fn column_count(low: Column, high: Column) -> u32 {
+    ((high.x - low.x + 1) * (high.z - low.z + 1)) as u32
+}
+
+/// Which of a tile's cells are in the mask, or border on it.
+pub fn borders(world: &WorldView, tile: TilePos) -> Borders {
     let (low, high) = world.grid.tile_cells(tile);
-    let width = (high.x - low.x + 1) as u32;
-    let mut ring =
-        Ring { world, origin: low.at(0), base: width * (high.z - low.z + 1) as u32, vertices: Vec::new() };
-    let cells = ((high.x - low.x) * (high.z - low.z)) as usize;
-    let mut whole: Vec<[u32; 6]> = Vec::with_capacity(cells);
-    let mut fans: Vec<u32> = Vec::new();
-    let borders = world.mask.borders(low, high);
+    world.mask.borders(low, high)
+}
+
+/// The triangles outside the mask: two for each whole cell, row by row, then the rings.
+pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings) -> Vec<u32> {
+    let (low, high) = grid.tile_cells(tile);
+    let cells = (high.x - low.x) as u32;
+    let width = cells + 1;
+    let corners = |a: u32| [a, a + width, a + width + 1, a + width + 1, a + 1, a];
+    let first: Vec<u32> = (0..cells).flat_map(corners).collect();
+    let mut indices = Vec::with_capacity(first.len() * (high.z - low.z) as usize + rings.fans.len());
     for z in low.z..high.z {
-        let row = (z - low.z) as u32 * width;
-        for (x, &flags) in (low.x..high.x).zip(borders.row(z)) {
-            let a = row + (x - low.x) as u32;
-            let [a, b, c, d] = [a, a + width, a + width + 1, a + 1];
-            if flags == 0 {
-                whole.push([a, b, c, c, d, a]);
-                continue;
-            }
-            if flags & Borders::VOLUMETRIC != 0 {
-                continue;
-            }
-            let [ca, cb, cc, cd] = Column::new(x, z).corners();
-            let ends = [(a, ca, b, cb), (b, cb, c, cc), (c, cc, d, cd), (d, cd, a, ca)];
-            let [ab, bc, cd, da] = std::array::from_fn(|side| {
-                let (start, from, end, to) = ends[side];
-                ring.side(start, from, end, to, flags >> side & 1 == 1)
-            });
-            fan(&ab, &bc, |triangle| fans.extend_from_slice(&triangle));
-            fan(&cd, &da, |triangle| fans.extend_from_slice(&triangle));
+        let (row, base) = (borders.row(z), (z - low.z) as u32 * width);
+        if row.iter().all(|&flags| flags == 0) {
+            indices.extend(first.iter().map(|&index| index + base));
+            continue;
+        }
+        for (a, _) in (base..).zip(row).filter(|(_, flags)| **flags == 0) {
+            indices.extend_from_slice(&corners(a));
         }
     }
-    let mut indices = whole.into_flattened();
-    indices.extend_from_slice(&fans);
-    (indices, ring.vertices)
+    indices.extend_from_slice(&rings.fans);
+    indices
 }
 
-/// The ring vertices of one tile.
-struct Ring<'a> {
-    world: &'a WorldView<'a>,
-    origin: IVec3,
-    base: u32,
+/// The rings of one tile: triangles of cells that border on the mask, and the vertices they have there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rings {
     vertices: Vec<Vertex>,
+    /// Three for each triangle; columns count first, then the rings' own vertices.
+    fans: Vec<u32>,
+    patches: Vec<Patch>,
 }
 
-impl Ring<'_> {
-    /// One side of a heightmap cell as vertex numbers: straight, or the polyline that a volumetric cell draws there.
-    fn side(&mut self, start: u32, from: Column, end: u32, to: Column, bordered: bool) -> Vec<u32> {
-        let mut line = vec![start];
-        if bordered {
-            line.extend(self.chain(from, to));
+/// The rings of 8x8 cells of the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Patch {
+    /// Where, as (z, x).
+    at: (i32, i32),
+    /// Where its vertices end.
+    vertices: usize,
+    /// Where its triangles end.
+    fans: usize,
+}
+
+impl Rings {
+    /// All rings of a tile.
+    pub fn new(world: &WorldView, tile: TilePos, borders: &Borders) -> Self {
+        let (low, high) = world.grid.tile_cells(tile);
+        let mut drawing = Drawing::new(world, tile, borders);
+        for z in low.z >> 3..=(high.z - 1) >> 3 {
+            for x in low.x >> 3..=(high.x - 1) >> 3 {
+                drawing.patch((z, x));
+            }
         }
-        line.push(end);
-        line
+        drawing.rings
     }
 
-    /// The vertices strictly between two heightmap vertices.
-    fn chain(&mut self, from: Column, to: Column) -> Vec<u32> {
-        let number = |(p, axis)| {
-            self.vertices.push(vertex(self.world, p, axis, self.origin));
-            self.base + self.vertices.len() as u32 - 1
+    /// The same rings, but with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells, ascending.
+    pub fn updated(&self, world: &WorldView, tile: TilePos, borders: &Borders, patches: &[(i32, i32)]) -> Self {
+        let mut drawing = Drawing::new(world, tile, borders);
+        let (mut own, mut fresh) = (0, 0);
+        loop {
+            let next = match (self.patches.get(own), patches.get(fresh)) {
+                (None, None) => return drawing.rings,
+                (Some(_), None) => Ordering::Less,
+                (None, Some(_)) => Ordering::Greater,
+                (Some(patch), Some(at)) => patch.at.cmp(at),
+            };
+            if next == Ordering::Less {
+                drawing.copy(self, own);
+            } else {
+                drawing.patch(patches[fresh]);
+                fresh += 1;
+            }
+            own += usize::from(next != Ordering::Greater);
+        }
+    }
+
+    /// The vertices that follow after the tile's columns.
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.vertices
+    }
+
+    /// Bytes of the buffers.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.vertices.as_slice())
+            + size_of_val(self.fans.as_slice())
+            + size_of_val(self.patches.as_slice())
+    }
+}
+
+/// Rings in the making.
+struct Drawing<'a> {
+    world: &'a WorldView<'a>,
+    borders: &'a Borders,
+    low: Column,
+    high: Column,
+    /// The number of the first vertex after the columns.
+    base: u32,
+    rings: Rings,
+    /// The four sides of the cell under work, as vertex numbers.
+    sides: [Vec<u32>; 4],
+}
+
+impl<'a> Drawing<'a> {
+    fn new(world: &'a WorldView<'a>, tile: TilePos, borders: &'a Borders) -> Self {
+        let (low, high) = world.grid.tile_cells(tile);
+        let base = column_count(low, high);
+        Self { world, borders, low, high, base, rings: Rings::default(), sides: Default::default() }
+    }
+
+    /// Takes a patch over as it was.
+    fn copy(&mut self, from: &Rings, number: usize) {
+        let end = &from.patches[number];
+        let (vertex, fan) = match number.checked_sub(1) {
+            Some(before) => (from.patches[before].vertices, from.patches[before].fans),
+            None => (0, 0),
         };
-        chain(self.world.samples.ground(), from, to).into_iter().map(number).collect()
+        let moved = (self.rings.vertices.len() as u32).wrapping_sub(vertex as u32);
+        let shift =
+            |&index: &u32| if index < self.base { index } else { index.wrapping_add(moved) };
+        self.rings.fans.extend(from.fans[fan..end.fans].iter().map(shift));
+        self.rings.vertices.extend_from_slice(&from.vertices[vertex..end.vertices]);
+        self.close(end.at);
+    }
+
+    /// Draws the rings of 8x8 cells.
+    fn patch(&mut self, at: (i32, i32)) {
+        let (rows, cells) = (at.0 * 8..at.0 * 8 + 8, at.1 * 8..at.1 * 8 + 8);
+        let from = cells.start.max(self.low.x);
+        for z in rows.start.max(self.low.z)..rows.end.min(self.high.z) {
+            let row = &self.borders.row(z)[(from - self.low.x) as usize..];
+            for (x, &flags) in (from..cells.end.min(self.high.x)).zip(row) {
+                if flags != 0 && flags & Borders::VOLUMETRIC == 0 {
+                    self.cell(Column::new(x, z), flags);
+                }
+            }
+        }
+        self.close(at);
+    }
+
+    fn close(&mut self, at: (i32, i32)) {
+        let fans = self.rings.fans.len();
+        if self.rings.patches.last().map_or(0, |patch| patch.fans) != fans {
+            self.rings.patches.push(Patch { at, vertices: self.rings.vertices.len(), fans });
+        }
+    }
+
+    /// Fans a cell's two triangles over the sides where it borders on the mask.
+    fn cell(&mut self, cell: Column, flags: u8) {
+        let width = (self.high.x - self.low.x + 1) as u32;
+        let number =
+            |column: Column| (column.z - self.low.z) as u32 * width + (column.x - self.low.x) as u32;
+        let corners = cell.corners();
+        let mut sides = std::mem::take(&mut self.sides);
+        for (side, line) in sides.iter_mut().enumerate() {
+            let (from, to) = (corners[side], corners[(side + 1) % 4]);
+            line.clear();
+            line.push(number(from));
+            if flags >> side & 1 == 1 {
+                for (p, axis) in chain(self.world.samples.ground(), from, to) {
+                    line.push(self.base + self.rings.vertices.len() as u32);
+                    self.rings.vertices.push(vertex(self.world, p, axis, self.low.at(0)));
+                }
+            }
+            line.push(number(to));
+        }
+        let [ab, bc, cd, da] = &sides;
+        fan(ab, bc, |triangle| self.rings.fans.extend_from_slice(&triangle));
+        fan(cd, da, |triangle| self.rings.fans.extend_from_slice(&triangle));
+        self.sides = sides;
     }
 }
 
 /// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, in order: one for each
 /// lattice y that separates their heights, as lower end and axis.
-pub fn chain(ground: &Ground, from: Column, to: Column) -> Vec<(IVec3, usize)> {
+pub fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = (IVec3, usize)> {
     let (h_from, h_to) = (ground.height(from), ground.height(to));
     let axis = if from.x != to.x { 0 } else { 2 };
     let low = Column::new(from.x.min(to.x), from.z.min(to.z));
-    let separates = |y: &i32| (y * ONE < h_from) != (y * ONE < h_to);
-    let mut edges: Vec<_> = sheet([h_from, h_to]).filter(separates).map(|y| (low.at(y), axis)).collect();
-    if h_to < h_from {
-        edges.reverse();
-    }
-    edges
+    let rungs = sheet([h_from, h_to]);
+    let (first, last) = (rungs.start, rungs.end - 1);
+    let is_falling = h_to < h_from;
+    rungs
+        .map(move |y| if is_falling { last - (y - first) } else { y })
+        .filter(move |y| (y * ONE < h_from) != (y * ONE < h_to))
+        .map(move |y| (low.at(y), axis))
 }
 
 /// Rule 3: a triangle with legs P..R and R..Q, each straight or a polyline; Q-P is straight.

@@ -134,7 +134,7 @@ fn gradient(lattice: &impl Lattice, p: IVec3) -> Vec3 {
 }
 
 /// Linear between `a` and `b`, of unit length; only + - * / sqrt, each in a fixed order, so all machines agree.
-fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
+pub(super) fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
     let t = step as f32 / SNAP as f32;
     let [x, y, z] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
     let length = (x * x + y * y + z * z).sqrt();

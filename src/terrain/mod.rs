@@ -16,13 +16,17 @@
 mod query;
 mod ray;
 mod receipt;
+mod redraw;
+mod surface;
 mod transaction;
 mod world;
 
 pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
-pub use transaction::{Commit, FieldNews, MeshUpdates, Transaction};
-pub use world::{ChunkSurface, Drawn, Memory, Version, World};
+pub use redraw::{MeshUpdates, TileUpdate};
+pub use surface::ChunkSurface;
+pub use transaction::{Commit, FieldNews, Transaction};
+pub use world::{Drawn, Memory, Version, World};
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -281,7 +281,7 @@ fn heightmap_triangles(view: &WorldView, cell: Column, found: &mut impl FnMut(Tr
         let mut line = vec![corner(from)];
         if bordered[side] {
             let crossing = |(p, axis)| position(view, p, axis, IVec3::ZERO).as_dvec3() / f64::from(SNAP);
-            line.extend(tile::chain(ground, from, to).into_iter().map(crossing));
+            line.extend(tile::chain(ground, from, to).map(crossing));
         }
         line.push(corner(to));
         line

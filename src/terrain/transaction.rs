@@ -5,30 +5,18 @@
 //!                                         \-> touched tiles -> index lists
 //! ```
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
-
-use glam::IVec3;
-use rayon::prelude::*;
 
 use super::Submission;
 use super::receipt::{Applied, ChunkScenario, Receipt, Rejection};
-use super::world::{ChunkSurface, World};
+use super::redraw::{self, MeshUpdates};
+use super::world::World;
 use crate::brush::Edit;
-use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, TilePos};
-use crate::surface::mask::{cell_sheet, is_disturbed};
+use crate::lattice::{ChunkPos, LatticeBox};
 use crate::surface::vertex::WorldView;
-use crate::surface::{Mask, MaskView, SurfaceMesh, block, tile};
-use crate::volume::{Bricks, Draft, FieldId, Fields};
-
-/// Meshes that a commit puts in place of old ones. An empty one means that nothing is drawn there any more.
-#[derive(Clone, Debug, Default)]
-pub struct MeshUpdates {
-    /// Tiles whose index lists changed.
-    pub tiles: Vec<(TilePos, SurfaceMesh)>,
-    /// Chunks whose surface changed.
-    pub chunks: Vec<(ChunkPos, SurfaceMesh)>,
-}
+use crate::surface::{Mask, MaskView};
+use crate::volume::{Bricks, Draft, EditEffect, FieldId, Fields, UniformBricks, reach};
 
 /// Something that happened to a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,9 +45,9 @@ pub struct Transaction {
 pub struct Commit {
     ticket: u64,
     bricks: Bricks,
+    uniform: UniformBricks,
     mask: Mask,
     fields: BTreeMap<ChunkPos, Fields>,
-    surfaces: BTreeMap<ChunkPos, ChunkSurface>,
     sample_hash: u64,
     next_field: u64,
     receipts: Vec<Receipt>,
@@ -67,17 +55,6 @@ pub struct Commit {
     /// Meshes to be swapped together with this commit.
     pub meshes: MeshUpdates,
 }
-
-/// A block to be meshed: the cells of a brick that lie in a chunk.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Block {
-    chunk: ChunkPos,
-    /// The brick's position as (y, z, x).
-    brick: [i32; 3],
-}
-
-/// From how many blocks on meshing is spread over threads; below, handing out costs more than it saves.
-const PARALLEL_BLOCKS: usize = 48;
 
 impl Transaction {
     pub(super) fn new(ticket: u64, world: Arc<World>, submissions: Arc<[Submission]>) -> Self {
@@ -98,56 +75,38 @@ impl Transaction {
     /// result does not depend on how many those are.
     pub fn run(self) -> Commit {
         let world = &*self.world;
-        let mut log = FieldLog::new(world);
-        let mut draft = Draft::new(world.samples(), world.grid, world.sample_hash);
-        let mut receipts = Vec::with_capacity(self.submissions.len());
-        for submission in self.submissions.iter() {
-            let outcome = match &submission.edit {
-                Ok(edit) => apply(&mut draft, &mut log, edit),
-                Err(error) => Err((*error).into()),
-            };
-            receipts.push(Receipt { tag: submission.tag, outcome });
-        }
-        let sample_hash = draft.hash();
-        let (bricks, dirty) = draft.finish();
+        let edits: Vec<&Edit> = self.submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
+        let draft = Draft::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &edits);
+        let bricks: Bricks = draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         let samples = world.samples().over(&bricks);
 
-        let mask = added_cells(&WorldView { samples, ..world.view() }, &dirty);
+        let mask = redraw::added_cells(&WorldView { samples, ..world.view() }, &draft.bricks);
         let view = WorldView { samples, mask: MaskView::new(&world.mask).with(&mask), ..world.view() };
+        let meshes = redraw::updates(world, &view, &draft.bricks, &mask);
 
-        let blocks = dirty_blocks(&view, &dirty, &mask);
-        let surfaces = mesh_blocks(world, &view, &blocks);
-        let chunks = surfaces.iter().map(|(&chunk, surface)| (chunk, surface.mesh())).collect();
-        let tiles =
-            touched_tiles(&view, &mask).into_iter().map(|tile| (tile, tile::mesh(&view, tile))).collect();
+        let mut log = FieldLog::new(world);
+        let mut effects = draft.effects.into_iter();
+        let receipts = self.submissions.iter().map(|submission| {
+            let outcome = match &submission.edit {
+                Err(error) => Err((*error).into()),
+                Ok(edit) => log.enter(edit, effects.next().unwrap_or_default()),
+            };
+            Receipt { tag: submission.tag, outcome }
+        });
+        let receipts = receipts.collect();
         Commit {
             ticket: self.ticket,
+            bricks,
+            uniform: draft.uniform,
             mask,
-            surfaces,
-            sample_hash,
+            sample_hash: draft.hash,
             receipts,
-            meshes: MeshUpdates { tiles, chunks },
+            meshes,
             next_field: log.next,
             news: log.news(),
             fields: log.fields,
-            bricks,
         }
     }
-}
-
-/// Applies one edit to bricks and fields.
-fn apply(draft: &mut Draft, log: &mut FieldLog, edit: &Edit) -> Result<Applied, Rejection> {
-    if draft.reach(edit).is_none() {
-        return Err(Rejection::OutsideWorld);
-    }
-    let effect = draft.apply(edit);
-    let mut bounds = None;
-    let mut chunks = Vec::with_capacity(effect.chunks.len());
-    for part in &effect.chunks {
-        LatticeBox::include(&mut bounds, part.bounds);
-        chunks.push(log.absorb(part.chunk, part.bounds));
-    }
-    Ok(Applied { chunks, bounds, removed: effect.removed, added: effect.added, painted: effect.painted })
 }
 
 /// The fields that a transaction touches, and what happened to them.
@@ -161,6 +120,20 @@ struct FieldLog<'a> {
 impl<'a> FieldLog<'a> {
     fn new(world: &'a World) -> Self {
         Self { world, fields: BTreeMap::new(), merged: Vec::new(), next: world.next_field }
+    }
+
+    /// Enters what an edit changed; returns what its receipt says.
+    fn enter(&mut self, edit: &Edit, effect: EditEffect) -> Result<Applied, Rejection> {
+        if reach(self.world.grid, edit).is_none() {
+            return Err(Rejection::OutsideWorld);
+        }
+        let mut bounds = None;
+        let mut chunks = Vec::with_capacity(effect.chunks.len());
+        for part in &effect.chunks {
+            LatticeBox::include(&mut bounds, part.bounds);
+            chunks.push(self.absorb(part.chunk, part.bounds));
+        }
+        Ok(Applied { chunks, bounds, removed: effect.removed, added: effect.added, painted: effect.painted })
     }
 
     fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {
@@ -203,94 +176,6 @@ impl<'a> FieldLog<'a> {
     }
 }
 
-/// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
-fn added_cells(view: &WorldView, dirty: &[LatticeBox]) -> Mask {
-    let mut added = Mask::default();
-    for samples in dirty {
-        for z in samples.min.z - 1..=samples.max.z {
-            for x in samples.min.x - 1..=samples.max.x {
-                let cell = Column::new(x, z);
-                if !view.grid.has_cell(cell) || view.mask.contains(cell) || added.contains(cell) {
-                    continue;
-                }
-                let sheet = cell_sheet(view.samples.ground(), cell);
-                let may_touch = sheet.start <= samples.max.y && samples.min.y <= sheet.end;
-                if may_touch && is_disturbed(&view.samples, cell) {
-                    added.insert(cell);
-                }
-            }
-        }
-    }
-    added
-}
-
-/// Every block that may draw something else than before.
-fn dirty_blocks(view: &WorldView, dirty: &[LatticeBox], added: &Mask) -> Vec<Block> {
-    let mut blocks = BTreeSet::new();
-    let mut insert = |low: IVec3, high: IVec3| {
-        let world =
-            (IVec3::new(0, i32::MIN, 0), IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1));
-        let Some(cells) = LatticeBox::new(low.max(world.0), high.min(world.1)) else { return };
-        for brick in BrickPos::covering(cells) {
-            let Some(cells) = brick.samples().intersection(cells) else { continue };
-            for chunk in view.grid.chunks_of(cells) {
-                blocks.insert(Block { chunk, brick: [brick.0.y, brick.0.z, brick.0.x] });
-            }
-        }
-    };
-    // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
-    for samples in dirty {
-        insert(samples.min - 2, samples.max + 1);
-    }
-    // A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border.
-    for cell in added.iter() {
-        for (dx, dz) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dz| (dx, dz))) {
-            let near = cell.offset(dx, dz);
-            if view.grid.has_cell(near) && view.mask.contains(near) {
-                let sheet = cell_sheet(view.samples.ground(), near);
-                insert(near.at(sheet.start), near.at(sheet.end - 1));
-            }
-        }
-    }
-    blocks.into_iter().collect()
-}
-
-/// Meshes blocks and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
-fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> BTreeMap<ChunkPos, ChunkSurface> {
-    let mesh = |block: &Block| {
-        let [y, z, x] = block.brick;
-        let brick = BrickPos(IVec3::new(x, y, z));
-        let cells = brick.samples().intersection(view.grid.chunk_cells(block.chunk));
-        let origin = view.grid.origin(block.chunk);
-        let part = cells.map(|cells| block::mesh(view, brick, cells, origin)).unwrap_or_default();
-        (block.chunk, brick, part)
-    };
-    let parts: Vec<_> = if blocks.len() < PARALLEL_BLOCKS {
-        blocks.iter().map(mesh).collect()
-    } else {
-        blocks.par_iter().map(mesh).collect()
-    };
-    let mut surfaces: BTreeMap<ChunkPos, (ChunkSurface, bool)> = BTreeMap::new();
-    for (chunk, brick, part) in parts {
-        let committed = || world.surfaces.get(&chunk).map(|surface| (**surface).clone()).unwrap_or_default();
-        let (surface, changed) = surfaces.entry(chunk).or_insert_with(|| (committed(), false));
-        *changed |= surface.replace(brick, part);
-    }
-    surfaces
-        .into_iter()
-        .filter(|(_, (_, changed))| *changed)
-        .map(|(chunk, (surface, _))| (chunk, surface))
-        .collect()
-}
-
-/// Tiles that lose a cell to the mask, or border on one that does.
-fn touched_tiles(view: &WorldView, added: &Mask) -> BTreeSet<TilePos> {
-    let around =
-        |cell: Column| [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)].map(|(dx, dz)| cell.offset(dx, dz));
-    let cells = added.iter().flat_map(around).filter(|&cell| view.grid.has_cell(cell));
-    cells.map(|cell| view.grid.tile_of_cell(cell)).collect()
-}
-
 impl Commit {
     pub(super) fn ticket(&self) -> u64 {
         self.ticket
@@ -312,12 +197,16 @@ impl Commit {
         world.bricks.extend(self.bricks);
         world.mask.extend(&self.mask);
         world.fields.extend(self.fields);
-        for (chunk, surface) in self.surfaces {
+        world.uniform.extend(self.uniform);
+        for (chunk, surface) in self.meshes.chunks {
             if surface.is_empty() {
                 world.surfaces.remove(&chunk);
             } else {
-                world.surfaces.insert(chunk, Arc::new(surface));
+                world.surfaces.insert(chunk, surface);
             }
+        }
+        for (tile, update) in self.meshes.tiles {
+            world.rings.insert(tile, update.rings);
         }
         world.sample_hash = self.sample_hash;
         world.next_field = self.next_field;

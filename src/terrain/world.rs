@@ -1,6 +1,5 @@
 //! The committed world: ground, bricks, fields, mask and the surface parts that were meshed from them.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::IVec3;
@@ -8,50 +7,11 @@ use rustc_hash::FxHashMap;
 
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash};
-use crate::surface::block::Part;
+use super::surface::ChunkSurface;
+use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
-use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh, tile};
-use crate::volume::{Brick, Bricks, Fields, SampleView};
-
-/// The surface parts of one chunk, one for each block that shows something, in order of their bricks (y, z, x).
-#[derive(Clone, Debug, Default)]
-pub struct ChunkSurface(BTreeMap<[i32; 3], Arc<Part>>);
-
-impl ChunkSurface {
-    /// Puts the part of a block in place of its old one; says whether that is another one.
-    pub(super) fn replace(&mut self, brick: BrickPos, part: Part) -> bool {
-        let key = [brick.0.y, brick.0.z, brick.0.x];
-        if part.indices.is_empty() {
-            return self.0.remove(&key).is_some();
-        }
-        if self.0.get(&key).is_some_and(|old| **old == part) {
-            return false;
-        }
-        self.0.insert(key, Arc::new(part));
-        true
-    }
-
-    /// Does the chunk draw nothing?
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// The chunk's mesh: its parts one after the other.
-    pub fn mesh(&self) -> SurfaceMesh {
-        let mut mesh = SurfaceMesh {
-            vertices: Vec::with_capacity(self.0.values().map(|part| part.vertices.len()).sum()),
-            indices: Vec::with_capacity(self.0.values().map(|part| part.indices.len()).sum()),
-        };
-        for part in self.0.values() {
-            mesh.append(&part.vertices, &part.indices);
-        }
-        mesh
-    }
-
-    fn bytes(&self) -> usize {
-        self.0.values().map(|part| part.bytes() + size_of::<Part>()).sum()
-    }
-}
+use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
+use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
 /// Something that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -63,22 +23,26 @@ pub enum Drawn {
 }
 
 /// Bytes that a world takes, Bevy's meshes not counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Memory {
     /// Heights and material control.
     pub ground: usize,
-    /// Samples and materials of bricks.
-    pub bricks: usize,
-    /// Mask, fields and indices.
+    /// Samples of bricks, with their bits; bricks that are all alike count once.
+    pub samples: usize,
+    /// Materials of bricks.
+    pub materials: usize,
+    /// Meshes of chunks, from whose unchanged parts the next ones are copied.
+    pub meshes: usize,
+    /// Where parts are in meshes, and rings of tiles.
+    pub parts: usize,
+    /// Mask, fields and where bricks are.
     pub index: usize,
-    /// Surface parts kept for assembly.
-    pub surfaces: usize,
 }
 
 impl Memory {
     /// What edits cost: all but the ground.
     pub fn edits(&self) -> usize {
-        self.bricks + self.index + self.surfaces
+        self.samples + self.materials + self.meshes + self.parts + self.index
     }
 }
 
@@ -93,6 +57,9 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
+    /// Of tiles that have any.
+    pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
+    pub(super) uniform: UniformBricks,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,
     /// Tells worlds of one process apart.
@@ -118,6 +85,8 @@ impl World {
             fields: FxHashMap::default(),
             mask: Mask::default(),
             surfaces: FxHashMap::default(),
+            rings: FxHashMap::default(),
+            uniform: UniformBricks::default(),
             sample_hash: 0,
             next_field: 0,
             lineage: super::unique(),
@@ -193,7 +162,7 @@ impl World {
 
     /// The mesh of a chunk, relative to its lowest lattice point; empty where it draws nothing.
     pub fn chunk_mesh(&self, chunk: ChunkPos) -> SurfaceMesh {
-        self.surfaces.get(&chunk).map(|surface| surface.mesh()).unwrap_or_default()
+        self.surfaces.get(&chunk).map(|surface| surface.mesh().clone()).unwrap_or_default()
     }
 
     /// Where a mesh is placed: the lattice point that its positions count from.
@@ -223,13 +192,28 @@ impl World {
 
     /// Bytes that the world takes.
     pub fn memory(&self) -> Memory {
-        let stacks: usize = self.stacks.values().map(|stack| stack.capacity() * 4 + 32).sum();
-        let fields: usize = self.fields.values().map(|fields| fields.len() * 48 + 32).sum();
-        Memory {
-            ground: self.ground.bytes(),
-            bricks: self.bricks.len() * Brick::BYTES,
-            index: stacks + fields + self.mask.bytes() + self.bricks.capacity() * 24,
-            surfaces: self.surfaces.values().map(|surface| surface.bytes()).sum(),
+        let mut memory = Memory { ground: self.ground.bytes(), index: self.mask.bytes(), ..Memory::default() };
+        // Bricks that are all alike are one brick.
+        let single = self.bricks.values().filter(|brick| brick.uniform().is_none());
+        for brick in single.chain(self.uniform.values()) {
+            memory.samples += Brick::BYTES;
+            memory.materials += brick.material_bytes();
         }
+        for surface in self.surfaces.values() {
+            let (mesh, parts) = surface.bytes();
+            memory.meshes += mesh;
+            memory.parts += parts;
+        }
+        memory.parts += self.rings.values().map(|rings| rings.bytes()).sum::<usize>();
+        memory.index += table_bytes(&self.bricks) + table_bytes(&self.surfaces) + table_bytes(&self.rings);
+        memory.index += table_bytes(&self.fields) + table_bytes(&self.stacks) + table_bytes(&self.uniform);
+        memory.index += self.fields.values().map(Fields::bytes).sum::<usize>();
+        memory.index += self.stacks.values().map(|stack| stack.capacity() * size_of::<i32>()).sum::<usize>();
+        memory
     }
+}
+
+/// Bytes of a hash table: its entries, and one byte for each to find them by.
+fn table_bytes<K, V>(table: &FxHashMap<K, V>) -> usize {
+    table.capacity() * 8 / 7 * (size_of::<(K, V)>() + 1)
 }

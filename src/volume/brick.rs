@@ -1,16 +1,19 @@
 //! Samples and the bricks that store them.
 
+use std::sync::Arc;
+
 use glam::IVec3;
+use rustc_hash::FxHashMap;
 
 use crate::ground::MaterialId;
-use crate::lattice::{BRICK, BrickPos};
+use crate::lattice::{BRICK, BrickPos, ONE};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
 
 /// The density stored at a lattice point: 1/256 voxel, negative is solid. A pristine sample is no number at all, it has
 /// to be computed from the ground (rule 1).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Sample(i16);
 
 impl Sample {
@@ -26,24 +29,55 @@ impl Sample {
     pub fn distance(self) -> Option<i32> {
         (self != Self::PRISTINE).then_some(i32::from(self.0))
     }
-}
 
-/// 8x8x8 samples with their materials.
-#[derive(Clone, Debug)]
-pub struct Brick {
-    samples: [Sample; LEN],
-    materials: [MaterialId; LEN],
-}
-
-impl Default for Brick {
-    fn default() -> Self {
-        Self { samples: [Sample::PRISTINE; LEN], materials: [MaterialId::GROUND; LEN] }
+    /// The stored density, or that of the pristine sample.
+    #[inline]
+    pub(crate) fn or(self, pristine: i32) -> i32 {
+        if self == Self::PRISTINE { pristine } else { i32::from(self.0) }
     }
 }
 
+/// One bit for each sample of a brick: a word for each y, in it bit `z * 8 + x`.
+pub type Layers = [u64; BRICK as usize];
+
+/// Which pristine samples of a brick are solid, whose lowest samples lie at `y`, under columns of these heights.
+pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
+    // In each column the lowest samples are solid, as many as lie below its height.
+    let solid = |height: i32| (height.div_euclid(ONE) + i32::from(height.rem_euclid(ONE) != 0) - y).clamp(0, 8);
+    let mut rising = [0u64; 9];
+    for (bit, &height) in heights.iter().flatten().enumerate() {
+        rising[solid(height) as usize] |= 1 << bit;
+    }
+    let mut layers = [0; 8];
+    let mut above = 0;
+    for y in (0..8).rev() {
+        above |= rising[y + 1];
+        layers[y] = above;
+    }
+    layers
+}
+
+/// 8x8x8 samples with their materials.
+///
+/// Beside them the brick keeps two bits a sample, so that whole rows are judged at once: is it solid, pristine samples
+/// included, and is it edited?
+#[derive(Clone, Debug)]
+pub struct Brick {
+    samples: [Sample; LEN],
+    solid: Layers,
+    edited: Layers,
+    /// `None` where all are [`MaterialId::GROUND`].
+    materials: Option<Box<[MaterialId; LEN]>>,
+}
+
 impl Brick {
-    /// Bytes that a brick takes.
+    /// Bytes that the samples of a brick take, with their bits.
     pub const BYTES: usize = size_of::<Self>();
+
+    /// A brick without an edited sample, of which these pristine ones are solid.
+    pub(crate) fn pristine(solid: Layers) -> Self {
+        Self { samples: [Sample::PRISTINE; LEN], solid, edited: [0; 8], materials: None }
+    }
 
     /// The sample at a lattice point that lies in this brick.
     pub fn sample(&self, point: IVec3) -> Sample {
@@ -52,19 +86,70 @@ impl Brick {
 
     /// The material at a lattice point that lies in this brick; [`MaterialId::GROUND`] where nobody changed it.
     pub fn material(&self, point: IVec3) -> MaterialId {
-        self.materials[BrickPos::index(point)]
+        self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[BrickPos::index(point)])
     }
 
-    /// Stores an edited sample.
-    pub(crate) fn set(&mut self, point: IVec3, sample: Sample, material: MaterialId) {
-        let index = BrickPos::index(point);
-        self.samples[index] = sample;
-        self.materials[index] = material;
+    /// Which samples are solid: below zero, or pristine and below the ground's surface.
+    pub fn solid(&self) -> &Layers {
+        &self.solid
+    }
+
+    /// Which samples are edited.
+    pub fn edited(&self) -> &Layers {
+        &self.edited
+    }
+
+    /// Samples in order: x fastest, then z, then y.
+    pub(crate) fn samples(&self) -> &[Sample; LEN] {
+        &self.samples
+    }
+
+    /// The samples of a row along x; both counted from the brick's lowest sample.
+    pub(crate) fn row(&self, y: usize, z: usize) -> [i16; 8] {
+        let row = self.samples[y * 64 + z * 8..].first_chunk::<8>();
+        row.map_or([0; 8], |row| row.map(|sample| sample.0))
+    }
+
+    /// Stores edited samples in a row along x: those of the lanes `changed`, of which those in `solid` are.
+    pub(crate) fn set_row(&mut self, y: usize, z: usize, row: [i16; 8], changed: u8, solid: u8) {
+        if let Some(samples) = self.samples[y * 64 + z * 8..].first_chunk_mut::<8>() {
+            *samples = row.map(Sample);
+        }
+        let lanes = |bits: u8| u64::from(bits) << (z * 8);
+        self.edited[y] |= lanes(changed);
+        self.solid[y] = self.solid[y] & !lanes(changed) | lanes(solid & changed);
+    }
+
+    /// Changes the material of the sample with this index.
+    pub(crate) fn set_material(&mut self, index: usize, material: MaterialId) {
+        if self.materials.is_none() && material == MaterialId::GROUND {
+            return;
+        }
+        self.materials.get_or_insert_with(|| Box::new([MaterialId::GROUND; LEN]))[index] = material;
+    }
+
+    /// The material of the sample with this index.
+    pub(crate) fn material_at(&self, index: usize) -> MaterialId {
+        self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[index])
+    }
+
+    /// Bytes that materials take beside the brick itself.
+    pub fn material_bytes(&self) -> usize {
+        self.materials.as_deref().map_or(0, size_of_val)
+    }
+
+    /// The density and material that every sample of the brick was edited to, if it is the same for all.
+    pub(crate) fn uniform(&self) -> Option<(Sample, MaterialId)> {
+        let (sample, material) = (self.samples[0], self.material_at(0));
+        let is_uniform = self.edited == [u64::MAX; 8]
+            && self.samples.iter().all(|&other| other == sample)
+            && self.materials.iter().all(|all| all.iter().all(|&other| other == material));
+        is_uniform.then_some((sample, material))
     }
 
     /// How many samples are edited.
     pub fn edited_count(&self) -> u32 {
-        self.samples.iter().filter(|&&sample| sample != Sample::PRISTINE).count() as u32
+        self.edited.iter().map(|layer| layer.count_ones()).sum()
     }
 
     /// Every edited sample of the brick at `pos`: point, density, material.
@@ -74,6 +159,9 @@ impl Brick {
             .filter_map(|point| Some((point, self.sample(point).distance()?, self.material(point))))
     }
 }
+
+/// Bricks all of whose samples are alike, one of each kind: the middle of every large cave is the same brick.
+pub type UniformBricks = FxHashMap<(Sample, MaterialId), Arc<Brick>>;
 
 #[cfg(test)]
 mod tests {
@@ -90,11 +178,39 @@ mod tests {
 
     #[test]
     fn bricks_know_what_was_edited() {
-        let mut brick = Brick::default();
+        let mut brick = Brick::pristine([u64::MAX; 8]);
         let pos = BrickPos(IVec3::new(-1, 0, 2));
         let point = pos.origin() + IVec3::new(3, 5, 7);
-        brick.set(point, Sample::edited(-7), MaterialId(4));
-        assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, -7, MaterialId(4))]);
+        let mut row = brick.row(5, 7);
+        row[3] = 7;
+        brick.set_row(5, 7, row, 1 << 3, 0);
+        brick.set_material(BrickPos::index(point), MaterialId(4));
+        assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, 7, MaterialId(4))]);
         assert_eq!(brick.edited_count(), 1);
+        assert_eq!(brick.solid()[5], !(1 << 59));
+        assert_eq!(brick.uniform(), None);
+    }
+
+    #[test]
+    fn layers_hold_the_sign_of_every_pristine_sample() {
+        let heights = std::array::from_fn(|z| std::array::from_fn(|x| (x as i32 * 37 - z as i32 * 300) * 3));
+        for low in [-9, -8, -1, 0, 1, 7] {
+            let layers = solid_layers(&heights, low);
+            for (y, (z, x)) in (0..8).flat_map(|y| (0..64).map(move |i| (y, (i / 8, i % 8)))) {
+                let solid = (low + y) * ONE < heights[z][x];
+                assert_eq!(layers[y as usize] >> (z * 8 + x) & 1 == 1, solid, "{x} {y} {z} from {low}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_brick_of_one_number_is_uniform() {
+        let mut brick = Brick::pristine([0; 8]);
+        for row in 0..64 {
+            brick.set_row(row / 8, row % 8, [-5; 8], 0xff, 0xff);
+        }
+        assert_eq!(brick.uniform(), Some((Sample(-5), MaterialId::GROUND)));
+        brick.set_material(77, MaterialId(2));
+        assert_eq!(brick.uniform(), None);
     }
 }

@@ -1,16 +1,20 @@
 //! Edits applied to copies of bricks, before anything is committed.
+//!
+//! Edits are sorted by the bricks they reach. Then each brick takes its edits in their order, on its own: bricks share
+//! no samples, so threads share no work, and whatever an edit changed is added up afterwards.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::IVec3;
-use rustc_hash::FxHashMap;
+use rayon::prelude::*;
+use wide::{i16x8, i32x8};
 
+use super::brick::{UniformBricks, solid_layers};
 use super::view::resolve;
-use super::{Brick, Bricks, Sample, SampleView, Tally};
-use crate::brush::{BAND, Edit, Evaluator, Operation};
+use super::{Brick, Sample, SampleView, Tally};
+use crate::brush::{BAND, DEPTH, Edit, Evaluator, Operation};
 use crate::ground::MaterialId;
-use crate::lattice::{BRICK, BrickPos, ChunkGrid, ChunkPos, LatticeBox, hash};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, ONE, hash};
 
 /// What one edit changed in one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,178 +38,396 @@ pub struct EditEffect {
     pub painted: Tally,
 }
 
-/// Bricks in the making: a transaction's edits in order, over the bricks of its snapshot.
-pub struct Draft<'a> {
-    base: SampleView<'a>,
-    grid: ChunkGrid,
-    bricks: FxHashMap<BrickPos, BrickDraft>,
+impl EditEffect {
+    /// Adds what the edit did in one chunk's part of one brick.
+    fn add(&mut self, part: &PartEffect) {
+        let changed = ChunkEffect { chunk: part.chunk, bounds: part.bounds };
+        match self.chunks.binary_search_by_key(&part.chunk, |effect| effect.chunk) {
+            Ok(at) => self.chunks[at].bounds = self.chunks[at].bounds.union(part.bounds),
+            Err(at) => self.chunks.insert(at, changed),
+        }
+        self.removed.add(&part.counts.removed);
+        self.added.add(&part.counts.added);
+        self.painted.add(&part.counts.painted);
+    }
+}
+
+/// A brick that edits changed.
+#[derive(Clone, Debug)]
+pub struct DraftedBrick {
+    /// Which.
+    pub pos: BrickPos,
+    /// What it holds now.
+    pub brick: Arc<Brick>,
+    /// Box around the samples that changed.
+    pub changed: LatticeBox,
+    /// Is a sample among them that had never been edited?
+    pub is_extended: bool,
+}
+
+/// What a list of edits makes of a world.
+#[derive(Clone, Debug, Default)]
+pub struct Draft {
+    /// The bricks that changed, by position (x, z, y).
+    pub bricks: Vec<DraftedBrick>,
+    /// What each edit changed, in order of the edits.
+    pub effects: Vec<EditEffect>,
+    /// Order-independent hash of every edited sample: point, density, material.
+    pub hash: u64,
+    /// Kinds of uniform bricks that the world had none of.
+    pub uniform: UniformBricks,
+}
+
+/// From how many bricks on they are spread over threads.
+const PARALLEL_BRICKS: usize = 64;
+
+/// One edit's work on one brick; sorted by brick, then by edit.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Job {
+    /// The brick's position as (x, z, y).
+    brick: [i32; 3],
+    edit: u32,
+}
+
+impl Job {
+    fn pos(self) -> BrickPos {
+        let [x, z, y] = self.brick;
+        BrickPos(IVec3::new(x, y, z))
+    }
+}
+
+/// An edit with what is derived from it once.
+struct Tool {
+    /// The part of the edit's reach that lies in the world.
+    reach: Option<LatticeBox>,
+    operation: Operation,
+    evaluator: Evaluator,
+}
+
+/// The part of an edit's reach that lies in the world; `None` when it lies outside.
+pub fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
+    edit.reach().intersection(grid.edit_bounds())
+}
+
+impl Draft {
+    /// Applies edits in order to a snapshot whose edited samples have the given hash. Samples farther than [`BAND`]
+    /// outside a shape stay as they are (rule 6). The result does not depend on how many threads there are.
+    pub fn new(
+        base: SampleView,
+        grid: ChunkGrid,
+        hash: u64,
+        uniform: &UniformBricks,
+        edits: &[&Edit],
+    ) -> Self {
+        let tool = |edit: &&Edit| Tool {
+            reach: reach(grid, edit),
+            operation: edit.operation(),
+            evaluator: edit.evaluator(),
+        };
+        let tools: Vec<Tool> = edits.iter().map(tool).collect();
+        let jobs = jobs(&tools);
+        let bricks: Vec<&[Job]> = jobs.chunk_by(|a, b| a.brick == b.brick).collect();
+        let work = |jobs: &&[Job]| Workpiece::new(base, grid, jobs[0].pos()).take(&tools, jobs);
+        let finished: Vec<Finished> = if bricks.len() < PARALLEL_BRICKS {
+            bricks.iter().filter_map(work).collect()
+        } else {
+            bricks.par_iter().filter_map(work).collect()
+        };
+
+        let mut draft = Self { hash, ..Self::default() };
+        draft.effects.resize_with(edits.len(), EditEffect::default);
+        draft.bricks.reserve_exact(finished.len());
+        for mut brick in finished {
+            draft.hash = draft.hash.wrapping_add(brick.hash);
+            for part in &brick.parts {
+                draft.effects[part.edit].add(part);
+            }
+            if let Some(kind) = brick.drafted.brick.uniform() {
+                let known = uniform.get(&kind);
+                let fresh = || Arc::clone(draft.uniform.entry(kind).or_insert(brick.drafted.brick));
+                brick.drafted.brick = known.cloned().unwrap_or_else(fresh);
+            }
+            draft.bricks.push(brick.drafted);
+        }
+        draft
+    }
+}
+
+/// Which edit reaches which brick.
+fn jobs(tools: &[Tool]) -> Vec<Job> {
+    let mut jobs = Vec::new();
+    for (edit, tool) in (0..).zip(tools) {
+        let Some(reach) = tool.reach else { continue };
+        let (low, high): (IVec3, IVec3) = (reach.min >> 3, reach.max >> 3);
+        for x in low.x..=high.x {
+            for z in low.z..=high.z {
+                for y in low.y..=high.y {
+                    let job = Job { brick: [x, z, y], edit };
+                    let samples = job.pos().samples().intersection(reach);
+                    if samples.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples)) {
+                        jobs.push(job);
+                    }
+                }
+            }
+        }
+    }
+    jobs.sort_unstable();
+    jobs
+}
+
+/// What one edit changed in one chunk's part of one brick.
+struct PartEffect {
+    edit: usize,
+    chunk: ChunkPos,
+    bounds: LatticeBox,
+    counts: Counts,
+}
+
+#[derive(Default)]
+struct Counts {
+    removed: Tally,
+    added: Tally,
+    painted: Tally,
+}
+
+/// A brick after all of its edits.
+struct Finished {
+    drafted: DraftedBrick,
+    parts: Vec<PartEffect>,
+    /// By how much the hash of the world's samples changes.
     hash: u64,
 }
 
-struct BrickDraft {
-    brick: Box<Brick>,
-    dirty: LatticeBox,
+/// A brick under work.
+struct Workpiece<'a> {
+    view: SampleView<'a>,
+    grid: ChunkGrid,
+    pos: BrickPos,
+    /// What it was before.
+    base: Option<&'a Brick>,
+    brick: Brick,
+    /// Heights of its columns, and the density of its lowest pristine samples.
+    floor: [i32x8; 8],
+    /// Samples that changed.
+    changed: [u64; 8],
 }
 
-impl<'a> Draft<'a> {
-    /// Starts from a snapshot whose edited samples have the given [`hash`](Self::hash).
-    pub fn new(base: SampleView<'a>, grid: ChunkGrid, hash: u64) -> Self {
-        Self { base, grid, bricks: FxHashMap::default(), hash }
+/// Samples of a row that changed sides: one bit each.
+#[derive(Clone, Copy, Default)]
+struct Moved {
+    /// Solid before, and air now.
+    removed: u8,
+    /// Air before, and solid now.
+    added: u8,
+}
+
+impl<'a> Workpiece<'a> {
+    fn new(view: SampleView<'a>, grid: ChunkGrid, pos: BrickPos) -> Self {
+        let low = pos.origin();
+        let heights = view.ground().heights::<8>(Column::of(low));
+        let base = view.brick(pos);
+        let brick = base.cloned().unwrap_or_else(|| Brick::pristine(solid_layers(&heights, low.y)));
+        let floor = heights.map(|row| i32x8::splat(low.y * ONE) - i32x8::new(row));
+        Self { view, grid, pos, base, brick, floor, changed: [0; 8] }
     }
 
-    /// The part of an edit's reach that lies in the world; `None` when it lies outside.
-    pub fn reach(&self, edit: &Edit) -> Option<LatticeBox> {
-        edit.reach().intersection(self.grid.edit_bounds())
+    /// Applies all jobs; `None` when nothing changed.
+    fn take(mut self, tools: &[Tool], jobs: &[Job]) -> Option<Finished> {
+        let mut distances = [[0; 8]; 64];
+        let mut parts = Vec::new();
+        let low = self.pos.origin();
+        for job in jobs {
+            let tool = &tools[job.edit as usize];
+            let Some(reached) = tool.reach.and_then(|reach| reach.intersection(self.pos.samples())) else {
+                continue;
+            };
+            let (from, to) = (reached.min - low, reached.max - low);
+            tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
+            for chunk in self.grid.chunks_of(reached) {
+                let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
+                let mut counts = Counts::default();
+                if let Some(bounds) = self.apply(tool.operation, samples, &distances, &mut counts) {
+                    parts.push(PartEffect { edit: job.edit as usize, chunk, bounds, counts });
+                }
+            }
+        }
+        let changed = bounds(&self.changed, low)?;
+        let hash = self.hash_change();
+        let before = self.base.map_or([0; 8], |brick| *brick.edited());
+        let is_extended = before != *self.brick.edited();
+        let drafted = DraftedBrick { pos: self.pos, brick: Arc::new(self.brick), changed, is_extended };
+        Some(Finished { drafted, parts, hash })
     }
 
-    /// Applies one edit. Samples farther than [`BAND`] outside its shape stay as they are (rule 6).
-    pub fn apply(&mut self, edit: &Edit) -> EditEffect {
-        let mut effect = EditEffect::default();
-        let Some(reach) = self.reach(edit) else { return effect };
-        let evaluator = edit.evaluator();
-        let mut chunks = BTreeMap::new();
-        for pos in BrickPos::covering(reach) {
-            let Some(samples) = pos.samples().intersection(reach) else { continue };
-            if evaluator.is_out_of_reach(samples) {
+    /// Applies an operation to some samples; returns the box of those that changed.
+    fn apply(
+        &mut self,
+        operation: Operation,
+        samples: LatticeBox,
+        distances: &[[i32; 8]; 64],
+        counts: &mut Counts,
+    ) -> Option<LatticeBox> {
+        let low = self.pos.origin();
+        let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
+        let lanes = (0xff << from.x & 0xff >> (7 - to.x)) as u8;
+        let mut changed = [0; 8];
+        for (y, layer) in (from.y..=to.y).zip(&mut changed[from.y..]) {
+            for z in from.z..=to.z {
+                let outside = i32x8::new(distances[y * 8 + z]);
+                let row = match operation {
+                    Operation::Paint { material } => self.paint(y, z, outside, lanes, material, counts),
+                    _ => self.carve(y, z, outside, lanes, operation, counts),
+                };
+                *layer |= u64::from(row) << (z * 8);
+            }
+        }
+        self.changed.iter_mut().zip(&changed).for_each(|(all, layer)| *all |= layer);
+        bounds(&changed, low)
+    }
+
+    /// Digs or adds in a row; returns the lanes that changed.
+    fn carve(
+        &mut self,
+        y: usize,
+        z: usize,
+        outside: i32x8,
+        lanes: u8,
+        operation: Operation,
+        counts: &mut Counts,
+    ) -> u8 {
+        let raw = i32x8::from_i16x8(i16x8::new(self.brick.row(y, z)));
+        let pristine = self.floor[z] + i32x8::splat(y as i32 * ONE);
+        let before = raw.simd_eq(i32x8::splat(i16::MIN.into())).select(pristine, raw);
+        let depth = outside.max(i32x8::splat(-DEPTH));
+        let after = if operation == Operation::Dig { before.max(-depth) } else { before.min(depth) };
+        let most = i32x8::splat(i16::MAX.into());
+        let stored = after.max(-most).min(most);
+        let kept = outside.simd_gt(i32x8::splat(BAND)) | after.simd_eq(before) | stored.simd_eq(raw);
+        let changed = !bits(kept) & lanes;
+        if changed == 0 {
+            return 0;
+        }
+        let (stored, raw) = (stored.to_array(), raw.to_array());
+        let row = std::array::from_fn(|x| if changed >> x & 1 == 1 { stored[x] } else { raw[x] } as i16);
+        let (was, is) = (negative(before), negative(after));
+        self.brick.set_row(y, z, row, changed, is);
+        let moved = Moved { removed: changed & was & !is, added: changed & is & !was };
+        self.count(y, z, moved, operation, counts);
+        changed
+    }
+
+    /// Counts voxels that changed sides, and gives new ones their material.
+    fn count(&mut self, y: usize, z: usize, moved: Moved, operation: Operation, counts: &mut Counts) {
+        let ground = self.view.ground();
+        for x in ones(moved.removed | moved.added) {
+            let index = y * 64 + z * 8 + x;
+            let point = self.pos.origin() + IVec3::new(x as i32, y as i32, z as i32);
+            if moved.removed >> x & 1 == 1 {
+                counts.removed.count(resolve(ground, point, self.brick.material_at(index)));
                 continue;
             }
-            for chunk in self.grid.chunks_of(samples) {
-                let Some(part) = self.grid.chunk_samples(chunk).intersection(samples) else { continue };
-                if let Some(changed) =
-                    self.apply_to_brick(pos, part, edit.operation(), &evaluator, &mut effect)
-                {
-                    LatticeBox::include(chunks.entry(chunk).or_default(), changed);
-                }
+            if let Operation::Add { material } = operation {
+                self.brick.set_material(index, material);
             }
+            counts.added.count(resolve(ground, point, self.brick.material_at(index)));
         }
-        let with_bounds =
-            |(chunk, bounds): (ChunkPos, Option<LatticeBox>)| Some(ChunkEffect { chunk, bounds: bounds? });
-        effect.chunks = chunks.into_iter().filter_map(with_bounds).collect();
-        effect
     }
 
-    /// Applies an operation to the samples `part` of one brick; returns the box of those that changed.
-    fn apply_to_brick(
+    /// Paints the solid samples of a row inside the shape; returns the lanes that changed.
+    fn paint(
         &mut self,
-        pos: BrickPos,
-        part: LatticeBox,
-        operation: Operation,
-        evaluator: &Evaluator,
-        effect: &mut EditEffect,
-    ) -> Option<LatticeBox> {
-        let base = self.base.brick(pos);
-        let mut draft = self.bricks.remove(&pos);
-        let mut changed = None;
-        let mut row = [0; BRICK as usize];
-        let row = &mut row[..part.size().x as usize];
-        for y in part.min.y..=part.max.y {
-            for z in part.min.z..=part.max.z {
-                let start = IVec3::new(part.min.x, y, z);
-                evaluator.row(start, row);
-                for (x, &outside) in (part.min.x..).zip(row.iter()) {
-                    if outside > BAND {
-                        continue;
-                    }
-                    let point = IVec3::new(x, y, z);
-                    let brick = draft.as_ref().map_or(base, |draft| Some(&*draft.brick));
-                    let old = State::read(brick, point);
-                    let Some(new) = self.edited(point, old, operation, outside, effect) else { continue };
-                    self.hash = self.hash.wrapping_sub(old.hash(point)).wrapping_add(new.hash(point));
-                    let at = LatticeBox::point(point);
-                    LatticeBox::include(&mut changed, at);
-                    let draft = draft.get_or_insert_with(|| BrickDraft {
-                        brick: Box::new(base.cloned().unwrap_or_default()),
-                        dirty: at,
-                    });
-                    draft.dirty = draft.dirty.union(at);
-                    draft.brick.set(point, new.sample, new.material);
-                }
+        y: usize,
+        z: usize,
+        outside: i32x8,
+        lanes: u8,
+        material: MaterialId,
+        counts: &mut Counts,
+    ) -> u8 {
+        let mut row = self.brick.row(y, z);
+        let pristine = (self.floor[z] + i32x8::splat(y as i32 * ONE)).to_array();
+        let inside = !bits(outside.simd_gt(i32x8::splat(0))) & lanes;
+        let mut changed = 0;
+        for x in ones(inside) {
+            let index = y * 64 + z * 8 + x;
+            let (sample, old) = (self.brick.samples()[index], self.brick.material_at(index));
+            let before = sample.or(pristine[x]);
+            if before >= 0 || sample != Sample::PRISTINE && material == old {
+                continue;
             }
+            let point = self.pos.origin() + IVec3::new(x as i32, y as i32, z as i32);
+            let (ground, is_pristine) = (self.view.ground(), sample == Sample::PRISTINE);
+            if resolve(ground, point, material) != resolve(ground, point, old) {
+                counts.painted.count(resolve(ground, point, material));
+            }
+            if is_pristine {
+                row[x] = Sample::edited(before).distance().unwrap_or_default() as i16;
+            }
+            self.brick.set_material(index, material);
+            changed |= 1 << x;
         }
-        if let Some(draft) = draft {
-            self.bricks.insert(pos, draft);
+        if changed != 0 {
+            self.brick.set_row(y, z, row, changed, changed);
         }
         changed
     }
 
-    /// What a sample becomes, `None` when it stays as it is; voxels that change sides are counted.
-    fn edited(
-        &self,
-        point: IVec3,
-        old: State,
-        operation: Operation,
-        outside: i32,
-        effect: &mut EditEffect,
-    ) -> Option<State> {
-        let ground = self.base.ground();
-        let stored = old.sample.distance();
-        let before = stored.unwrap_or_else(|| ground.distance(point));
-        if let Operation::Paint { material } = operation {
-            let unchanged = stored.is_some() && material == old.material;
-            if outside > 0 || before >= 0 || unchanged {
-                return None;
+    /// By how much the brick changes the hash of the world's samples.
+    fn hash_change(&self) -> u64 {
+        let low = self.pos.origin();
+        let mut change = 0u64;
+        for (y, &layer) in self.changed.iter().enumerate() {
+            let mut layer = layer;
+            while layer != 0 {
+                let bit = layer.trailing_zeros() as usize;
+                layer &= layer - 1;
+                let point = low + IVec3::new((bit & 7) as i32, y as i32, (bit >> 3) as i32);
+                let index = y * 64 + bit;
+                let of = |brick: &Brick| sample_hash(point, brick.samples()[index], brick.material_at(index));
+                change = change.wrapping_add(of(&self.brick)).wrapping_sub(self.base.map_or(0, of));
             }
-            if resolve(ground, point, material) != resolve(ground, point, old.material) {
-                effect.painted.count(resolve(ground, point, material));
-            }
-            return Some(State { sample: Sample::edited(before), material });
         }
-        let after = operation.apply(before, outside);
-        let sample = Sample::edited(after);
-        if after == before || sample == old.sample {
-            return None;
-        }
-        let mut material = old.material;
-        match (before < 0, after < 0) {
-            (true, false) => effect.removed.count(resolve(ground, point, material)),
-            (false, true) => {
-                if let Operation::Add { material: new } = operation {
-                    material = new;
-                }
-                effect.added.count(resolve(ground, point, material));
-            }
-            _ => {}
-        }
-        Some(State { sample, material })
-    }
-
-    /// Order-independent hash of every edited sample: point, density, material.
-    pub fn hash(&self) -> u64 {
-        self.hash
-    }
-
-    /// The changed bricks, and per brick the box of its changed samples.
-    pub fn finish(self) -> (Bricks, Vec<LatticeBox>) {
-        let dirty = self.bricks.values().map(|draft| draft.dirty).collect();
-        let shared = |(pos, draft): (BrickPos, BrickDraft)| (pos, Arc::from(draft.brick));
-        (self.bricks.into_iter().map(shared).collect(), dirty)
+        change
     }
 }
 
-/// One sample with its material.
-#[derive(Clone, Copy)]
-struct State {
-    sample: Sample,
-    material: MaterialId,
+/// What a sample adds to the world's hash; a pristine one adds nothing.
+fn sample_hash(point: IVec3, sample: Sample, material: MaterialId) -> u64 {
+    let Some(distance) = sample.distance() else { return 0 };
+    let place = hash::mix(point.x as u32 as u64 | (point.z as u32 as u64) << 32);
+    hash::mix(
+        place ^ (point.y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0),
+    )
 }
 
-impl State {
-    fn read(brick: Option<&Brick>, point: IVec3) -> Self {
-        match brick {
-            Some(brick) => Self { sample: brick.sample(point), material: brick.material(point) },
-            None => Self { sample: Sample::PRISTINE, material: MaterialId::GROUND },
-        }
-    }
+/// Lanes whose mask is set.
+fn bits(mask: i32x8) -> u8 {
+    mask.to_bitmask() as u8
+}
 
-    /// A pristine sample adds nothing to the world's hash.
-    fn hash(self, point: IVec3) -> u64 {
-        let Some(distance) = self.sample.distance() else { return 0 };
-        let place = hash::mix(point.x as u32 as u64 | (point.z as u32 as u64) << 32);
-        hash::mix(
-            place
-                ^ (point.y as u32 as u64) << 32
-                ^ (distance as u16 as u64) << 8
-                ^ u64::from(self.material.0),
-        )
+/// Lanes below zero.
+fn negative(values: i32x8) -> u8 {
+    bits(values.simd_lt(i32x8::splat(0)))
+}
+
+/// Positions of the bits that are set, lowest first.
+fn ones(mut bits: u8) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (bit < 8).then_some(bit)
+    })
+}
+
+/// The box around the samples of some layers, which lie from `low` on.
+fn bounds(layers: &[u64; 8], low: IVec3) -> Option<LatticeBox> {
+    let all = layers.iter().fold(0, |all, layer| all | layer);
+    if all == 0 {
+        return None;
     }
+    let row = all.to_le_bytes().iter().fold(0, |row, byte| row | byte);
+    let filled = |y: &usize| layers[*y] != 0;
+    let (bottom, top) = ((0..8).find(filled).unwrap_or(0), (0..8).rfind(filled).unwrap_or(7));
+    let min = IVec3::new(row.trailing_zeros() as i32, bottom as i32, (all.trailing_zeros() >> 3) as i32);
+    let max = IVec3::new(7 - row.leading_zeros() as i32, top as i32, 7 - (all.leading_zeros() >> 3) as i32);
+    LatticeBox::new(low + min, low + max)
 }

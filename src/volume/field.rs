@@ -70,6 +70,11 @@ impl Fields {
         self.0.iter().find(|field| field.id == id)
     }
 
+    /// Bytes of the list.
+    pub(crate) fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<Field>()
+    }
+
     /// Takes in the box of an edit's changed samples. Of fields that merge the oldest goes on; `fresh` names a new one.
     pub(crate) fn absorb(&mut self, edit: LatticeBox, fresh: impl FnOnce() -> FieldId) -> Absorbed {
         if let Some(field) = self.0.iter_mut().find(|field| field.bounds.encloses(edit)) {

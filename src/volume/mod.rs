@@ -10,8 +10,8 @@ mod field;
 mod tally;
 mod view;
 
-pub use brick::{Brick, Sample};
-pub use draft::{ChunkEffect, Draft, EditEffect};
+pub use brick::{Brick, Layers, Sample, UniformBricks};
+pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, reach};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};

@@ -1,7 +1,7 @@
 //! Random worlds and edits for the tests: steep, flat, at integer heights, and cut from real elevation data.
 #![allow(dead_code)] // each test file uses its own part of this
 
-use bevy_burrow::ground::{GreyImage, Ground, ImageLimits, ImageScale};
+use bevy_burrow::ground::{GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialRule};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::{Quat, Vec3};
@@ -37,8 +37,27 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
     Ground::from_fn(width, depth, |i, k| grey(x + i, z + k) * relief).expect("finite heights")
 }
 
-/// A random ground, from flat to steep, and the chunk size of its world.
+/// A random ground, from flat to steep, and the chunk size of its world. Every third one has materials that change from
+/// column to column.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
+    let (ground, chunk_size) = random_heights(rng, index);
+    if index % 3 != 0 {
+        return (ground, chunk_size);
+    }
+    let (low, high) = ground.height_range();
+    let share = |part: f64| (f64::from(low) + f64::from(high - low) * part) / 256.0;
+    let rule = |overlay, from, to, fade| MaterialRule {
+        overlay: MaterialId(overlay),
+        height: (share(from), share(to)),
+        height_fade: fade,
+        ..Default::default()
+    };
+    let rules = vec![rule(1, 0.7, 1.0, 2.0), rule(2, 0.3, 0.5, 5.0), rule(3, 0.0, 0.1, 30.0)];
+    let control = MaterialControl::Rules { base: MaterialId(index as u8 % 5), rules };
+    (ground.with_materials(&control).expect("valid rules"), chunk_size)
+}
+
+fn random_heights(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let chunk_size = CHUNK_SIZES[(index % 4) as usize];
     // Not only whole chunks: the last ones are cut at the rim.
     let side = |rng: &mut Rng| match chunk_size {

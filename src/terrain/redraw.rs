@@ -1,0 +1,229 @@
+//! What a transaction draws anew: cells that join the mask, dirty blocks, touched tiles.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use glam::IVec3;
+use rayon::prelude::*;
+
+use super::surface::{ChunkSurface, Fresh, key};
+use super::world::World;
+use crate::ground::Ground;
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos};
+use crate::surface::block::{self, Block, Mesher, Parts};
+use crate::surface::tile::{self, Rings};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Mask, SurfaceMesh};
+use crate::volume::DraftedBrick;
+
+/// Meshes that a commit puts in place of old ones. An empty one means that nothing is drawn there any more.
+#[derive(Clone, Debug, Default)]
+pub struct MeshUpdates {
+    /// Tiles whose index lists changed.
+    pub tiles: Vec<(TilePos, TileUpdate)>,
+    /// Chunks whose surface changed.
+    pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
+}
+
+/// What changes in a tile's mesh. Its columns stay as they are.
+#[derive(Clone, Debug)]
+pub struct TileUpdate {
+    /// The whole list of indices.
+    pub indices: Vec<u32>,
+    /// The rings; their vertices follow after those of the columns.
+    pub rings: Arc<Rings>,
+    ground: Arc<Ground>,
+    grid: ChunkGrid,
+}
+
+impl TileUpdate {
+    /// The tile's whole mesh, its columns included.
+    pub fn mesh(&self, tile: TilePos) -> SurfaceMesh {
+        let mut vertices = tile::columns(&self.ground, self.grid, tile);
+        vertices.extend_from_slice(self.rings.vertices());
+        SurfaceMesh { vertices, indices: self.indices.clone() }
+    }
+}
+
+/// From how many blocks on meshing is spread over threads; below, handing out costs more than it saves.
+const PARALLEL_BLOCKS: usize = 48;
+
+/// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
+pub(super) fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
+    let mut near = Vec::new();
+    for drafted in changed.iter().filter(|drafted| drafted.is_extended) {
+        // A sample is a corner of the cells one below it.
+        let cells = LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
+        near.extend(BrickPos::covering(cells).map(|brick| [brick.0.x, brick.0.z, brick.0.y]));
+    }
+    near.sort_unstable();
+    near.dedup();
+    let disturbed = |&[x, z, y]: &[i32; 3]| {
+        let cells = block::disturbed(view, BrickPos(IVec3::new(x, y, z)));
+        ((x, z), cells & !view.mask.word((x, z)))
+    };
+    let cells: Vec<_> = if near.len() < PARALLEL_BLOCKS {
+        near.iter().map(disturbed).collect()
+    } else {
+        near.par_iter().map(disturbed).collect()
+    };
+    let mut added = Mask::default();
+    for (word, cells) in cells {
+        added.insert_word(word, cells);
+    }
+    added
+}
+
+/// Every mesh that these bricks and cells change.
+pub(super) fn updates(world: &World, view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> MeshUpdates {
+    let blocks = dirty_blocks(view, changed, added);
+    MeshUpdates { chunks: mesh_blocks(world, view, &blocks), tiles: touched_tiles(world, view, added) }
+}
+
+/// Every block that may draw something else than before, by stacks of bricks, each from below.
+fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let last = IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1);
+    let mut insert = |low: IVec3, high: IVec3| {
+        let Some(cells) = LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last)) else { return };
+        for brick in BrickPos::covering(cells) {
+            let Some(cells) = brick.samples().intersection(cells) else { continue };
+            let key = [brick.0.x, brick.0.z, brick.0.y];
+            blocks.extend(view.grid.chunks_of(cells).map(|chunk| (key, chunk)));
+        }
+    };
+    // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
+    for drafted in changed {
+        insert(drafted.changed.min - 2, drafted.changed.max + 1);
+    }
+    // A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border.
+    for ((x, z), cells) in added.words() {
+        for (dx, dz) in (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz))) {
+            let stack = (x + dx, z + dz);
+            if grown_into(cells, dx, dz) & view.mask.word(stack) != 0 {
+                let low = Column::new(stack.0 * 8, stack.1 * 8);
+                let rows = block::sheet_rows(view.samples.ground(), low);
+                insert(low.at(rows.start), low.offset(7, 7).at(rows.end - 1));
+            }
+        }
+    }
+    blocks.sort_unstable();
+    blocks.dedup();
+    let block = |([x, z, y], chunk): ([i32; 3], ChunkPos)| Block { brick: BrickPos(IVec3::new(x, y, z)), chunk };
+    blocks.into_iter().map(block).collect()
+}
+
+/// 8x8 cells and the cells beside and diagonally beside them, as far as they lie in the word (dx, dz) further.
+fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
+    const FIRST: u64 = 0x0101_0101_0101_0101;
+    let along = match dx {
+        -1 => (cells & FIRST) << 7,
+        0 => cells | (cells & !(FIRST << 7)) << 1 | (cells & !FIRST) >> 1,
+        _ => (cells & FIRST << 7) >> 7,
+    };
+    match dz {
+        -1 => along << 56,
+        0 => along | along << 8 | along >> 8,
+        _ => along >> 56,
+    }
+}
+
+thread_local! {
+    /// Working memory of the mesher, and parts that wait for assembly.
+    static MESHER: RefCell<(Mesher, Parts)> = RefCell::default();
+}
+
+/// Most vertices whose memory a thread keeps for its next transaction.
+const KEPT_VERTICES: usize = 1 << 16;
+
+/// Meshes blocks and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
+fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
+    if blocks.len() < PARALLEL_BLOCKS {
+        let mut parts = MESHER.with_borrow_mut(|(mesher, parts)| {
+            parts.clear();
+            mesher.mesh(view, blocks, parts);
+            std::mem::take(parts)
+        });
+        let chunks = assemble(world, &[&parts]);
+        if parts.vertices.capacity() <= KEPT_VERTICES {
+            MESHER.with_borrow_mut(|(_, kept)| std::mem::swap(kept, &mut parts));
+        }
+        return chunks;
+    }
+    let stacks: Vec<&[Block]> =
+        blocks.chunk_by(|a, b| (a.brick.0.x, a.brick.0.z) == (b.brick.0.x, b.brick.0.z)).collect();
+    let mesh = |blocks: &&[Block]| {
+        let mut parts = Parts::default();
+        MESHER.with_borrow_mut(|(mesher, _)| mesher.mesh(view, blocks, &mut parts));
+        parts
+    };
+    let parts: Vec<Parts> = stacks.par_iter().map(mesh).collect();
+    assemble(world, &parts.iter().collect::<Vec<_>>())
+}
+
+/// The surfaces of chunks with these parts in place of old ones.
+fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
+    let fresh = |(block, vertices, indices): (Block, _, _)| {
+        (block.chunk, Fresh { key: key(block.brick), vertices, indices })
+    };
+    let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
+    all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
+    let chunks: Vec<&[(ChunkPos, Fresh)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
+    let update = |parts: &&[(ChunkPos, Fresh)]| {
+        let chunk = parts[0].0;
+        let fresh: Vec<Fresh> = parts.iter().map(|part| part.1).collect();
+        let nothing = ChunkSurface::default();
+        let surface = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref).updated(&fresh)?;
+        Some((chunk, Arc::new(surface)))
+    };
+    if all.len() < PARALLEL_BLOCKS {
+        chunks.iter().filter_map(update).collect()
+    } else {
+        chunks.par_iter().filter_map(update).collect()
+    }
+}
+
+/// Tiles that lose a cell to the mask, or border on one that does, in order.
+fn touched_tiles(world: &World, view: &WorldView, added: &Mask) -> Vec<(TilePos, TileUpdate)> {
+    let mut touched = Vec::new();
+    for ((x, z), cells) in added.words() {
+        for (dx, dz) in [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)] {
+            let patch = (x + dx, z + dz);
+            let near = grown_into(cells, dx, dz);
+            if near != 0 {
+                touched.extend(tiles_of(view.grid, patch).map(|tile| (tile, (patch.1, patch.0))));
+            }
+        }
+    }
+    touched.sort_unstable();
+    touched.dedup();
+    let tiles: Vec<_> = touched.chunk_by(|a, b| a.0 == b.0).collect();
+    let update = |touched: &&[(TilePos, (i32, i32))]| {
+        let tile = touched[0].0;
+        let patches: Vec<(i32, i32)> = touched.iter().map(|&(_, patch)| patch).collect();
+        let borders = tile::borders(view, tile);
+        let nothing = Rings::default();
+        let old = world.rings.get(&tile).map_or(&nothing, Arc::as_ref);
+        let rings = Arc::new(old.updated(view, tile, &borders, &patches));
+        let indices = tile::indices(view.grid, tile, &borders, &rings);
+        (tile, TileUpdate { indices, rings, ground: Arc::clone(&world.ground), grid: view.grid })
+    };
+    if tiles.len() < 8 {
+        tiles.iter().map(update).collect()
+    } else {
+        tiles.par_iter().map(update).collect()
+    }
+}
+
+/// The tiles that draw some of the 8x8 cells of a word.
+fn tiles_of(grid: ChunkGrid, (x, z): (i32, i32)) -> impl Iterator<Item = TilePos> {
+    let last = |at: i32, cells: i32| (at * 8 + 7).min(cells - 1);
+    let cells = LatticeBox::new(
+        IVec3::new((x * 8).max(0), 0, (z * 8).max(0)),
+        IVec3::new(last(x, grid.width()), 0, last(z, grid.depth())),
+    );
+    cells.into_iter().flat_map(move |cells| {
+        let (low, high) = (grid.tile_of_cell(Column::of(cells.min)), grid.tile_of_cell(Column::of(cells.max)));
+        (low.z..=high.z).flat_map(move |z| (low.x..=high.x).map(move |x| TilePos { x, z }))
+    })
+}

@@ -1,0 +1,130 @@
+//! The surface of one chunk: the parts of its blocks, assembled to one mesh.
+
+use std::cmp::Ordering;
+
+use crate::lattice::BrickPos;
+use crate::surface::{SurfaceMesh, Vertex};
+
+/// What marching cubes draws in one chunk: one mesh, which remembers where each block's part of it is.
+#[derive(Clone, Debug, Default)]
+pub struct ChunkSurface {
+    mesh: SurfaceMesh,
+    /// In order of their bricks.
+    parts: Vec<Part>,
+}
+
+/// A block's part of the mesh.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    key: Key,
+    /// Where its vertices end; they begin where those of the part before end.
+    vertices: usize,
+    /// Where its indices end.
+    indices: usize,
+}
+
+/// A brick's position as (y, z, x): the order of parts.
+pub(super) type Key = [i32; 3];
+
+/// A brick's place in the order of parts.
+pub(super) fn key(brick: BrickPos) -> Key {
+    [brick.0.y, brick.0.z, brick.0.x]
+}
+
+/// A part that was meshed anew. Without indices it is no part.
+#[derive(Clone, Copy)]
+pub(super) struct Fresh<'a> {
+    pub key: Key,
+    pub vertices: &'a [Vertex],
+    pub indices: &'a [u16],
+}
+
+/// Where the data of a part begins: vertices, indices.
+type Start = (usize, usize);
+
+impl ChunkSurface {
+    /// The chunk's mesh, relative to its lowest lattice point.
+    pub fn mesh(&self) -> &SurfaceMesh {
+        &self.mesh
+    }
+
+    /// Does the chunk draw nothing?
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    fn start(&self, part: usize) -> Start {
+        part.checked_sub(1).map_or((0, 0), |before| (self.parts[before].vertices, self.parts[before].indices))
+    }
+
+    /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes nothing.
+    pub(super) fn updated(&self, fresh: &[Fresh]) -> Option<Self> {
+        let changes: Vec<Fresh> = fresh.iter().copied().filter(|part| self.differs(part)).collect();
+        if changes.is_empty() {
+            return None;
+        }
+        let count = |of: fn(&Fresh) -> usize| changes.iter().map(of).sum::<usize>();
+        let mut new = Self::default();
+        new.parts.reserve_exact(self.parts.len() + changes.len());
+        // A little too much where parts are replaced; it is the next edit's to make use of.
+        new.mesh.vertices.reserve_exact(self.mesh.vertices.len() + count(|part| part.vertices.len()));
+        new.mesh.indices.reserve_exact(self.mesh.indices.len() + count(|part| part.indices.len()));
+        let mut kept = 0;
+        for change in &changes {
+            let upto = kept + self.parts[kept..].partition_point(|part| part.key < change.key);
+            new.copy(self, kept, upto);
+            new.add(change);
+            let is_replaced = self.parts.get(upto).is_some_and(|part| part.key == change.key);
+            kept = upto + usize::from(is_replaced);
+        }
+        new.copy(self, kept, self.parts.len());
+        Some(new)
+    }
+
+    /// Is a part other than the one with its key, or without it?
+    fn differs(&self, fresh: &Fresh) -> bool {
+        let Ok(at) = self.parts.binary_search_by(|part| part.key.cmp(&fresh.key)) else {
+            return !fresh.indices.is_empty();
+        };
+        let ((vertex, index), part) = (self.start(at), self.parts[at]);
+        let rebased = fresh.indices.iter().map(|&i| vertex as u32 + u32::from(i));
+        self.mesh.vertices[vertex..part.vertices] != *fresh.vertices
+            || rebased.cmp(self.mesh.indices[index..part.indices].iter().copied()) != Ordering::Equal
+    }
+
+    /// Appends parts of another surface as they are.
+    fn copy(&mut self, from: &Self, first: usize, end: usize) {
+        if first == end {
+            return;
+        }
+        let ((vertex, index), (vertex_end, index_end)) = (from.start(first), from.start(end));
+        let vertices = |at: usize, by: usize| at - vertex + by;
+        let (v, i) = (self.mesh.vertices.len(), self.mesh.indices.len());
+        self.mesh.vertices.extend_from_slice(&from.mesh.vertices[vertex..vertex_end]);
+        let moved = (v as u32).wrapping_sub(vertex as u32);
+        self.mesh.indices.extend(from.mesh.indices[index..index_end].iter().map(|at| at.wrapping_add(moved)));
+        let shift = |part: &Part| Part {
+            key: part.key,
+            vertices: vertices(part.vertices, v),
+            indices: part.indices - index + i,
+        };
+        self.parts.extend(from.parts[first..end].iter().map(shift));
+    }
+
+    fn add(&mut self, fresh: &Fresh) {
+        if fresh.indices.is_empty() {
+            return;
+        }
+        let base = self.mesh.vertices.len() as u32;
+        self.mesh.vertices.extend_from_slice(fresh.vertices);
+        self.mesh.indices.extend(fresh.indices.iter().map(|&index| base + u32::from(index)));
+        let (vertices, indices) = (self.mesh.vertices.len(), self.mesh.indices.len());
+        self.parts.push(Part { key: fresh.key, vertices, indices });
+    }
+
+    /// Bytes of the mesh, and of what is kept to assemble the next one.
+    pub(super) fn bytes(&self) -> (usize, usize) {
+        let mesh = self.mesh.vertices.capacity() * size_of::<Vertex>() + self.mesh.indices.capacity() * 4;
+        (mesh, self.parts.capacity() * size_of::<Part>() + size_of::<Self>())
+    }
+}
