@@ -174,6 +174,14 @@ impl Ground {
         self.materials.get(self.extent.index(column))
     }
 
+    /// What all ground is made of, if it is the same from every surface down.
+    pub(crate) fn single_material(&self) -> Option<MaterialId> {
+        match self.materials {
+            Materials::Uniform(all) if all.blend == 0 || all.base == all.overlay => Some(all.base),
+            _ => None,
+        }
+    }
+
     /// Material of a pristine voxel: down to [`OVERLAY_DEPTH`](super::OVERLAY_DEPTH) below the surface the overlay if
     /// it covers at least half (`blend >= 128`), else the base; deeper down the base.
     pub fn material(&self, point: IVec3) -> MaterialId {

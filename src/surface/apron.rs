@@ -20,58 +20,63 @@ pub(super) type Marked = i32;
 pub(super) struct Neighbours<'a> {
     bricks: [[Option<&'a Brick>; 9]; 3],
     at: BrickPos,
+    /// Were all bricks looked up, or only those that hold corners?
+    is_whole: bool,
 }
 
 impl<'a> Neighbours<'a> {
-    /// Looks around a brick.
-    pub fn new(view: &SampleView<'a>, at: BrickPos) -> Self {
-        Self { bricks: [-1, 0, 1].map(|dy| level(view, at, dy)), at }
+    /// Looks up the bricks that hold corners of a brick's cells.
+    pub fn corners_of(view: &SampleView<'a>, at: BrickPos) -> Self {
+        let mut own = Self { bricks: [[None; 9]; 3], at, is_whole: false };
+        for dy in 1..3 {
+            for i in CORNER_STACKS {
+                own.bricks[dy][i] = view.brick(own.pos(dy, i));
+            }
+        }
+        own
     }
 
-    /// Looks around another brick; one step up, most is known already.
-    pub fn go(&mut self, view: &SampleView<'a>, to: BrickPos) {
-        if to.0 == self.at.0 + IVec3::Y {
-            self.bricks = [self.bricks[1], self.bricks[2], level(view, to, 1)];
-            self.at = to;
-        } else {
-            *self = Self::new(view, to);
+    /// Looks up the others as well.
+    pub fn complete(&mut self, view: &SampleView<'a>) {
+        if !self.is_whole {
+            self.is_whole = true;
+            for (dy, i) in (0..3).flat_map(|dy| (0..9).map(move |i| (dy, i))) {
+                if dy == 0 || !CORNER_STACKS.contains(&i) {
+                    self.bricks[dy][i] = view.brick(self.pos(dy, i));
+                }
+            }
         }
+    }
+
+    fn pos(&self, dy: usize, i: usize) -> BrickPos {
+        BrickPos(self.at.0 + IVec3::new((i % 3) as i32, dy as i32, (i / 3) as i32) - 1)
     }
 
     /// The bricks that hold corners of the own brick's cells at its own height (`up` = 0) or at the next (1): the own
     /// one, those beyond x, beyond z and beyond both.
     #[inline]
     pub fn corners(&self, up: usize) -> [Option<&'a Brick>; 4] {
-        [4, 5, 7, 8].map(|at| self.bricks[up + 1][at])
+        CORNER_STACKS.map(|i| self.bricks[up + 1][i])
     }
 }
 
-fn level<'a>(view: &SampleView<'a>, at: BrickPos, dy: i32) -> [Option<&'a Brick>; 9] {
-    std::array::from_fn(|i| {
-        let (dx, dz) = (i as i32 % 3 - 1, i as i32 / 3 - 1);
-        view.brick(BrickPos(at.0 + IVec3::new(dx, dy, dz)))
-    })
-}
+/// Of nine stacks, those that hold corners of the middle one's cells: itself, beyond x, beyond z, beyond both.
+const CORNER_STACKS: [usize; 4] = [4, 5, 7, 8];
 
-/// Samples from one before the brick's first to two after its last, x fastest, then z, then y.
-pub(super) struct Apron(Box<[Marked; AREA * SIDE]>);
+/// Samples from one before the brick's first to two after its last, x fastest, then z, then y. A layer of no meaning
+/// follows, so that what is near an edge can be read as one piece.
+pub(super) struct Apron(Box<[Marked; AREA * (SIDE + 1)]>);
 
 impl Default for Apron {
     fn default() -> Self {
-        Self(Box::new([0; AREA * SIDE]))
+        Self(Box::new([0; AREA * (SIDE + 1)]))
     }
 }
 
 impl Apron {
-    /// Place of a corner of the brick's cells.
-    #[inline]
-    pub fn place(y: usize, corner: usize) -> usize {
-        (y + 1) * AREA + (corner / 9 + 1) * SIDE + corner % 9 + 1
-    }
-
     /// All samples; those of layers that were not filled are old ones.
-    pub fn samples(&self) -> &[Marked; AREA * SIDE] {
-        &self.0
+    pub fn samples(&self) -> &[Marked] {
+        &*self.0
     }
 
     /// Copies the layers `first..=last`, counted from the one before the brick's first.

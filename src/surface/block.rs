@@ -16,7 +16,7 @@ use std::sync::LazyLock;
 use super::apron::{Apron, Neighbours};
 use super::cases::{self, Case};
 use super::corners::{self, Corners, X, Z};
-use super::crossings::{Crossings, EdgeList};
+use super::crossings::{Crossings, Edge};
 use super::mask::sheet;
 use super::mesh::Vertex;
 use super::stack::{Stack, world_cells};
@@ -96,10 +96,12 @@ impl Mesher {
     fn mesh_stack(&mut self, view: &WorldView, blocks: &[Block], out: &mut Parts) {
         let Some(first) = blocks.first() else { return };
         let mut stack = Stack::new(view, stack_of(first.brick));
-        let mut around = Neighbours::new(&view.samples, first.brick);
         for brick in blocks.chunk_by(|a, b| a.brick == b.brick) {
-            around.go(&view.samples, brick[0].brick);
+            let mut around = Neighbours::corners_of(&view.samples, brick[0].brick);
             let cubes = Cubes::find(&stack, &around, brick[0].brick);
+            if cubes.is_some() {
+                around.complete(&view.samples);
+            }
             for &block in brick {
                 let cells = block.brick.samples().intersection(view.grid.chunk_cells(block.chunk));
                 if let (Some(cubes), Some(cells)) = (&cubes, cells) {
@@ -133,9 +135,10 @@ impl Mesher {
 
     /// Lists and numbers every lattice edge that a drawn cube's vertex lies on.
     fn list_edges(&mut self, solid: &[Corners; 9], drawn: &[Corners; 8], bottom: usize, top: usize) {
-        self.crossings.clear();
         let mut number = 0;
         for axis in 0..3 {
+            let edges_of_axis = &mut self.crossings.lists[axis];
+            edges_of_axis.clear();
             for y in bottom..=top + usize::from(axis != 1) {
                 let here = if y < 8 { drawn[y] } else { 0 };
                 let below = if y > bottom { drawn[y - 1] } else { 0 };
@@ -145,7 +148,7 @@ impl Mesher {
                     1 => (level ^ solid[y + 1]) & beside(beside(here, X), Z),
                     _ => (level ^ level >> Z) & beside(here | below, X),
                 };
-                number = self.numbers.count(axis, y, edges, number, self.crossings.list(axis));
+                number = self.numbers.count(axis, y, edges, number, edges_of_axis);
             }
         }
     }
@@ -160,13 +163,13 @@ impl Mesher {
     ) {
         let table = &*SLOTS;
         for y in bottom..=top {
-            for cell in corners::ones(drawn[y]) {
+            corners::for_ones(drawn[y], |cell| {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
                 let entry = &table[case];
                 out.extend(entry.slots[..entry.len].iter().map(|&slot| self.numbers.at(base + usize::from(slot))));
-            }
+            });
         }
     }
 }
@@ -192,13 +195,14 @@ impl Default for Numbers {
 impl Numbers {
     /// Numbers edges from `first` on and lists them; returns the next number.
     #[inline]
-    fn count(&mut self, axis: usize, y: usize, edges: Corners, first: u16, list: &mut EdgeList) -> u16 {
+    fn count(&mut self, axis: usize, y: usize, edges: Corners, first: u16, list: &mut Vec<Edge>) -> u16 {
         let (mut number, base) = (first, axis * 729 + y * 81);
-        for corner in corners::ones(edges) {
-            self.0[base + corner] = number;
+        let numbers = &mut self.0[base..base + 81];
+        corners::for_ones(edges, |corner| {
+            numbers[corner] = number;
             number += 1;
-            list.push(y, corner);
-        }
+            list.push(Edge { y: y as u8, corner: corner as u8 });
+        });
         number
     }
 
@@ -248,16 +252,16 @@ impl Cubes {
         if is_one_side(&near, stack.pristine_side(low)) {
             return None;
         }
-        let is_whole = near.iter().flatten().all(Option::is_some);
-        let pristine = if is_whole && stack.mask == 0 { [0; 9] } else { stack.pristine(low) };
-        let mut layers = Layers::new(&near, &pristine);
+        let solid = solid_layers(&near, || stack.pristine(low));
         let mut drawn = [0; 8];
         for (y, drawn) in drawn.iter_mut().enumerate() {
-            let sheet = if stack.mask == 0 { 0 } else { corners::mixed(pristine[y], pristine[y + 1]) };
-            let touched = corners::any(layers.edited[y] | layers.edited[y + 1]);
-            *drawn = corners::mixed(layers.solid[y], layers.solid[y + 1]) & (touched | sheet & stack.mask);
+            // A cube without an edited corner that both signs meet in is one of the pristine sheet.
+            *drawn = corners::mixed(solid[y], solid[y + 1]);
+            if *drawn & !stack.mask != 0 {
+                *drawn &= corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1)) | stack.mask;
+            }
         }
-        (drawn != [0; 8]).then_some(Self { solid: std::mem::take(&mut layers.solid), drawn })
+        (drawn != [0; 8]).then_some(Self { solid, drawn })
     }
 
     /// The cubes among these cells of the brick.
@@ -271,7 +275,7 @@ impl Cubes {
 }
 
 /// Are all corners of a brick's cells solid, or all air?
-fn is_one_side(near: &[[Option<&Brick>; 4]; 2], pristine: Option<bool>) -> bool {
+fn is_one_side(near: &Near, pristine: Option<bool>) -> bool {
     let mut sides = near.iter().flatten().map(|brick| match brick {
         None => pristine,
         Some(brick) => match (brick.solid(), brick.solid().iter().all(|&layer| layer == u64::MAX)) {
@@ -282,34 +286,29 @@ fn is_one_side(near: &[[Option<&Brick>; 4]; 2], pristine: Option<bool>) -> bool 
     sides.next().flatten().is_some_and(|first| sides.all(|side| side == Some(first)))
 }
 
-/// The corners of a brick's cells, layer by layer.
-struct Layers {
-    solid: [Corners; 9],
-    edited: [Corners; 9],
+/// The bricks that hold corners of a brick's cells: at its own height, and at the next.
+type Near<'a> = [[Option<&'a Brick>; 4]; 2];
+
+/// Solid corners, layer by layer; `pristine` tells those of bricks that are not there.
+fn solid_layers(near: &Near, pristine: impl Fn() -> [Corners; 9]) -> [Corners; 9] {
+    let mut layers = std::array::from_fn(|y| {
+        corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))
+    });
+    let missing = near.map(|bricks| {
+        corners::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 }))
+    });
+    if missing != [0; 2] {
+        let pristine = pristine();
+        for (y, layer) in layers.iter_mut().enumerate() {
+            *layer |= pristine[y] & missing[y / 8];
+        }
+    }
+    layers
 }
 
-impl Layers {
-    /// From the bricks that hold them; `pristine` stands in for bricks that are not there.
-    fn new(near: &[[Option<&Brick>; 4]; 2], pristine: &[Corners; 9]) -> Self {
-        // The corners that each of the four bricks holds.
-        let quarters = [corners::join([u64::MAX, 0, 0, 0]), corners::join([0, u64::MAX, 0, 0])]
-            .into_iter()
-            .chain([corners::join([0, 0, u64::MAX, 0]), corners::join([0, 0, 0, u64::MAX])]);
-        let absent = |bricks: &[Option<&Brick>; 4]| {
-            let missing = quarters.clone().zip(bricks).filter(|(_, brick)| brick.is_none());
-            missing.fold(0, |all, (quarter, _)| all | quarter)
-        };
-        let missing = [absent(&near[0]), absent(&near[1])];
-        let mut layers = Self { solid: [0; 9], edited: [0; 9] };
-        for y in 0..9 {
-            let (bricks, missing) = (&near[y / 8], missing[y / 8]);
-            let solid = bricks.map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8]));
-            layers.solid[y] = corners::join(solid) | pristine[y] & missing;
-            let edited = bricks.map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8]));
-            layers.edited[y] = corners::join(edited);
-        }
-        layers
-    }
+/// Edited corners of one layer.
+fn edited_layer(near: &Near, y: usize) -> Corners {
+    corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8])))
 }
 
 /// Cells of the brick's stack that belong to the mask because of samples around this brick (rule 2): a corner of a cube
@@ -323,14 +322,15 @@ pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {
     if super::stack::pristine_side(range, low.y).is_some() {
         return 0;
     }
-    let around = Neighbours::new(&view.samples, brick);
+    let around = Neighbours::corners_of(&view.samples, brick);
     let near = [around.corners(0), around.corners(1)];
-    let pristine = corners::pristine(corners::corner_heights(&heights), low.y);
-    let layers = Layers::new(&near, &pristine);
+    let pristine = corners::pristine(&heights, low.y);
     let mut cells = 0;
     for y in 0..8 {
-        let touched = corners::any(layers.edited[y] | layers.edited[y + 1]);
-        cells |= corners::mixed(pristine[y], pristine[y + 1]) & touched;
+        let sheet = corners::mixed(pristine[y], pristine[y + 1]);
+        if sheet & !cells != 0 {
+            cells |= sheet & corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1));
+        }
     }
     let cells = cells & world_cells(view, stack);
     (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))

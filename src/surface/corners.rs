@@ -3,6 +3,7 @@
 //! Bit `z * 9 + x` stands for the corner (x, z), and also for the cell whose lowest corner that is. So the corner one
 //! step along x is one bit further, the one along z nine bits, and a whole layer is judged by a few operations.
 
+use super::apron::SIDE;
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE};
 
@@ -36,6 +37,13 @@ pub const fn spread(word: u64) -> Corners {
 #[inline]
 pub fn join([own, x, z, xz]: [u64; 4]) -> Corners {
     const FIRST_OF_ROWS: u64 = 0x0101_0101_0101_0101;
+    // Most layers are all air or all solid.
+    if own | x | z | xz == 0 {
+        return 0;
+    }
+    if own & x & z & xz == u64::MAX {
+        return ALL;
+    }
     spread(own) | spread(x & FIRST_OF_ROWS) << 8 | (z as u128 & 0xff) << 72 | (xz as u128 & 1) << 80
 }
 
@@ -65,33 +73,55 @@ pub fn rectangle(low: Column, high: Column) -> Corners {
     (low.z..=high.z).fold(0, |bits, z| bits | row << (z * 9))
 }
 
-/// Positions of the bits that are set, lowest first.
-#[inline]
-pub fn ones(corners: Corners) -> impl Iterator<Item = usize> {
-    let half = |mut bits: u64, base: usize| {
-        std::iter::from_fn(move || {
-            (bits != 0).then(|| {
-                let bit = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                base + bit
-            })
-        })
-    };
-    half(corners as u64, 0).chain(half((corners >> 64) as u64, 64))
+/// Calls `each` with the positions of the bits that are set, lowest first.
+#[inline(always)]
+pub fn for_ones(corners: Corners, mut each: impl FnMut(usize)) {
+    for (mut bits, base) in [(corners as u64, 0), ((corners >> 64) as u64, 64)] {
+        while bits != 0 {
+            each(base + bits.trailing_zeros() as usize);
+            bits &= bits - 1;
+        }
+    }
 }
 
+/// Where a corner is: from the brick's lowest column in voxels, and in a layer of the apron.
+pub struct Place {
+    /// Voxels along x.
+    pub x: i32,
+    /// Voxels along z.
+    pub z: i32,
+    /// Index in a layer of the apron.
+    pub apron: usize,
+}
+
+/// The place of each corner.
+pub static PLACES: [Place; 81] = {
+    let mut places = [const { Place { x: 0, z: 0, apron: 0 } }; 81];
+    let mut corner = 0;
+    while corner < 81 {
+        let (x, z) = (corner % 9, corner / 9);
+        places[corner] = Place { x: x as i32, z: z as i32, apron: (z + 1) * SIDE + x + 1 };
+        corner += 1;
+    }
+    places
+};
+
 /// Which corners of the 9 layers from `y` on are solid in the pristine world, under columns of these heights.
-pub fn pristine(heights: impl Iterator<Item = i32>, y: i32) -> [Corners; 9] {
-    let solid = |height: i32| (height.div_euclid(ONE) + i32::from(height.rem_euclid(ONE) != 0) - y).clamp(0, 9);
-    let mut rising = [0; 10];
-    for (bit, height) in heights.enumerate() {
-        rising[solid(height) as usize] |= 1 << bit;
+pub fn pristine(heights: &Heights, y: i32) -> [Corners; 9] {
+    // In each column the lowest samples are solid, as many as lie below its height; the rest of rows is done by words.
+    let count = |height: i32| ((height + (ONE - 1) >> ONE.trailing_zeros()) - y).clamp(0, 9) as usize;
+    let mut rising = [[0u64; 2]; 10];
+    for z in 0..9 {
+        let (word, shift) = (z / 5, z % 5 * 9);
+        for x in 0..9 {
+            rising[count(heights[z + 1][x + 1])][word] |= 1 << (shift + x);
+        }
     }
     let mut layers = [0; 9];
-    let mut above = 0;
+    let mut above = [0; 2];
     for y in (0..9).rev() {
-        above |= rising[y + 1];
-        layers[y] = above;
+        above = [above[0] | rising[y + 1][0], above[1] | rising[y + 1][1]];
+        layers[y] = u128::from(above[0]) | u128::from(above[1]) << 45;
     }
     layers
 }
@@ -127,7 +157,8 @@ mod tests {
                 prop_assert_eq!(at(joined, x, z), word >> (z % 8 * 8 + x % 8) & 1 == 1, "{} {}", x, z);
             }
             prop_assert_eq!(joined & !ALL, 0);
-            let found: Vec<usize> = ones(joined).collect();
+            let mut found = Vec::new();
+            for_ones(joined, |bit| found.push(bit));
             prop_assert!(found.windows(2).all(|pair| pair[0] < pair[1]));
             prop_assert_eq!(found.iter().fold(0, |bits: u128, bit| bits | 1 << bit), joined);
         }
@@ -157,10 +188,11 @@ mod tests {
 
     #[test]
     fn pristine_corners_are_those_below_the_ground() {
-        let heights: Vec<i32> = (0..81).map(|i| i * i * 41 % 3001 - 900).collect();
-        let layers = pristine(heights.iter().copied(), -3);
+        let heights: Heights =
+            std::array::from_fn(|z| std::array::from_fn(|x| (z * 11 + x) as i32 * 4051 % 3001 - 900));
+        let layers = pristine(&heights, -3);
         for (y, layer) in (-3..).zip(layers) {
-            for (bit, &height) in heights.iter().enumerate() {
+            for (bit, height) in corner_heights(&heights).enumerate() {
                 assert_eq!(layer >> bit & 1 == 1, y * ONE < height);
             }
         }

@@ -1,12 +1,14 @@
 //! Vertices of a block, made from lists of lattice edges: the vertex function (rule 4) for many edges at once.
 //!
 //! What it computes, and in which order of operations, is what [`vertex`](super::vertex::vertex) says; the results have
-//! the same bits. Here the edges of one axis are taken eight at a time, their samples gathered into arrays, and each
-//! step is a loop over an array, so that the compiler uses vectors.
+//! the same bits. Here the edges of one axis are taken eight at a time: their samples are gathered into vectors, one for
+//! each place around an edge, and every step is done for all eight.
 
 use glam::{IVec3, Vec3};
+use wide::{f32x8, i32x8};
 
-use super::apron::{AREA, Apron, Marked, Neighbours, SIDE};
+use super::apron::{AREA, Apron, Neighbours, SIDE};
+use super::corners::PLACES;
 use super::mesh::{MaterialMix, Vertex};
 use super::stack::Stack;
 use super::vertex::lerp_normal;
@@ -17,38 +19,21 @@ use crate::volume::Brick;
 /// Edges taken together.
 const LANES: usize = 8;
 
-/// Lattice edges along one axis, by their lower ends: layer and corner of a brick's cells.
-#[derive(Default)]
-pub(super) struct EdgeList(Vec<u16>);
-
-impl EdgeList {
-    #[inline]
-    pub fn push(&mut self, y: usize, corner: usize) {
-        self.0.push((y << 7 | corner) as u16);
-    }
+/// A lattice edge, by its lower end: layer and corner of a brick's cells.
+#[derive(Clone, Copy)]
+pub(super) struct Edge {
+    pub y: u8,
+    pub corner: u8,
 }
 
 /// The edges of a block, one list for each axis.
 #[derive(Default)]
 pub(super) struct Crossings {
-    lists: [EdgeList; 3],
+    /// Along x, y and z.
+    pub lists: [Vec<Edge>; 3],
 }
 
-/// From an end of an edge to the next sample along the edge, and along both other axes.
-const STEPS: [[usize; 3]; 3] = [[1, AREA, SIDE], [AREA, 1, SIDE], [SIDE, 1, AREA]];
-
-/// Which of the three steps of an axis runs along x, along y, along z.
-const AXES: [[usize; 3]; 3] = [[0, 1, 2], [1, 0, 2], [1, 2, 0]];
-
 impl Crossings {
-    pub fn clear(&mut self) {
-        self.lists.iter_mut().for_each(|list| list.0.clear());
-    }
-
-    pub fn list(&mut self, axis: usize) -> &mut EdgeList {
-        &mut self.lists[axis]
-    }
-
     /// Adds the vertex of each listed edge of the brick whose lowest sample is `low`, relative to `origin`: all along x,
     /// then along y, then along z.
     pub fn make(
@@ -60,166 +45,181 @@ impl Crossings {
         origin: IVec3,
         out: &mut Vec<Vertex>,
     ) {
-        let materials = StoredMaterials::new(around);
-        for (axis, list) in self.lists.iter().enumerate() {
-            for edges in list.0.chunks(LANES) {
-                let batch = Batch::new(apron, axis, edges);
-                for (lane, &edge) in edges.iter().enumerate() {
-                    let (y, corner) = (usize::from(edge >> 7), usize::from(edge & 0x7f));
-                    let place = Place { axis, y, corner };
-                    let p = IVec3::new((corner % 9) as i32, y as i32, (corner / 9) as i32);
-                    out.push(batch.vertex(lane, place, p + low, stack, &materials, origin));
-                }
-            }
-        }
+        let mut site = Site { apron, stack, materials: StoredMaterials::new(around), low, base: low - origin };
+        let [x, y, z] = &self.lists;
+        out.reserve(x.len() + y.len() + z.len());
+        site.make::<0>(x, out);
+        site.make::<1>(y, out);
+        site.make::<2>(z, out);
     }
 }
 
-/// A lattice edge within a block.
-#[derive(Clone, Copy)]
-struct Place {
-    axis: usize,
-    y: usize,
-    corner: usize,
+/// What the vertices of a block are made from.
+struct Site<'a, 'b> {
+    apron: &'a Apron,
+    stack: &'a mut Stack<'b>,
+    materials: StoredMaterials<'a>,
+    /// The brick's lowest sample.
+    low: IVec3,
+    /// The same, from where positions count.
+    base: IVec3,
 }
 
-impl Place {
-    /// The corner over the edge's upper end.
-    fn other_corner(self) -> usize {
-        self.corner + [1, 0, 9][self.axis]
-    }
-}
+/// From an end of an edge to the next sample along the edge, and along both other axes.
+const STEPS: [[usize; 3]; 3] = [[1, AREA, SIDE], [AREA, 1, SIDE], [SIDE, 1, AREA]];
 
-/// Crossings of up to eight edges along one axis.
-struct Batch {
-    /// Steps of 1/4096 voxel from the lower end.
-    steps: [i32; LANES],
-    normals: [[f32; LANES]; 3],
-    is_pristine: [bool; LANES],
-    is_stencil_pristine: [bool; LANES],
-    is_lower_solid: [bool; LANES],
-}
+/// Which of the three steps of an axis runs along x, along y, along z.
+const AXES: [[usize; 3]; 3] = [[0, 1, 2], [1, 0, 2], [1, 2, 0]];
 
-impl Batch {
-    #[inline]
-    fn new(apron: &Apron, axis: usize, edges: &[u16]) -> Self {
-        let samples = apron.samples();
-        let [along, b, c] = STEPS[axis];
-        // Twelve samples of each edge: both ends, one before and one after them along the edge, and around both ends
-        // along the other two axes.
-        let mut ends = [[0; LANES]; 4];
-        let mut sides = [[[0; LANES]; 4]; 2];
-        for (lane, &edge) in edges.iter().enumerate() {
-            let p = Apron::place(usize::from(edge >> 7), usize::from(edge & 0x7f));
-            let q = p + along;
-            for (end, at) in ends.iter_mut().zip([p - along, p, q, q + along]) {
-                end[lane] = samples[at];
-            }
-            for (side, step) in sides.iter_mut().zip([b, c]) {
-                for (side, at) in side.iter_mut().zip([p - step, p + step, q - step, q + step]) {
-                    side[lane] = samples[at];
-                }
-            }
-        }
-        let [before, p, q, after] = &ends;
-        let each = |lane| p[lane] | q[lane];
-        let is_edited: [Marked; LANES] = std::array::from_fn(each);
-        let stencil: [Marked; LANES] = std::array::from_fn(|lane| {
-            let around = |side: &[[Marked; LANES]; 4]| side[0][lane] | side[1][lane] | side[2][lane] | side[3][lane];
-            is_edited[lane] | before[lane] | after[lane] | around(&sides[0]) | around(&sides[1])
-        });
-        let mut steps = steps(p, q);
-        if axis == 1 {
-            // A pristine vertical edge is crossed at the height itself, its upper end included.
-            let exact = |lane: usize| -(p[lane] >> 1) * (SNAP / ONE);
-            steps = std::array::from_fn(|i| if is_edited[i] & 1 == 0 { exact(i) } else { steps[i] });
-        }
+/// From a corner to the next along an axis, in the numbering of corners.
+const NEXT_CORNER: [usize; 3] = [1, 0, 9];
 
-        let rise = |low: &[Marked; LANES], high: &[Marked; LANES]| -> [f32; LANES] {
-            std::array::from_fn(|lane| ((high[lane] >> 1) - (low[lane] >> 1)) as f32)
-        };
-        let t: [f32; LANES] = std::array::from_fn(|lane| steps[lane] as f32 / SNAP as f32);
-        let blend = |a: [f32; LANES], b: [f32; LANES]| -> [f32; LANES] {
-            std::array::from_fn(|lane| a[lane] + (b[lane] - a[lane]) * t[lane])
-        };
-        let along = blend(rise(before, q), rise(p, after));
-        let [b, c] = [&sides[0], &sides[1]].map(|side| blend(rise(&side[0], &side[1]), rise(&side[2], &side[3])));
-        let own = [along, b, c];
-        let [x, y, z] = AXES[axis].map(|component| own[component]);
-        let length: [f32; LANES] =
-            std::array::from_fn(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt());
-        let unit = |v: [f32; LANES], flat: f32| -> [f32; LANES] {
-            std::array::from_fn(|i| if length[i] > 0.0 { v[i] / length[i] } else { flat })
-        };
-        Self {
-            steps,
-            normals: [unit(x, 0.0), unit(y, 1.0), unit(z, 0.0)],
-            is_pristine: is_edited.map(|marked| marked & 1 == 0),
-            is_stencil_pristine: stencil.map(|marked| marked & 1 == 0),
-            is_lower_solid: p.map(|marked| marked < 0),
+impl Site<'_, '_> {
+    fn make<const AXIS: usize>(&mut self, edges: &[Edge], out: &mut Vec<Vertex>) {
+        for edges in edges.chunks(LANES) {
+            let batch = Batch::new::<AXIS>(self.apron, edges);
+            let vertices = edges.iter().enumerate();
+            out.extend(vertices.map(|(lane, &edge)| self.vertex::<AXIS>(&batch, lane, edge)));
         }
     }
 
-    #[inline]
-    fn vertex(
-        &self,
-        lane: usize,
-        place: Place,
-        p: IVec3,
-        stack: &mut Stack,
-        materials: &StoredMaterials,
-        origin: IVec3,
-    ) -> Vertex {
-        let Place { axis, corner, .. } = place;
-        let (other, is_pristine) = (place.other_corner(), self.is_pristine[lane]);
-        let step = self.steps[lane];
-        let normal = if is_pristine && (self.is_stencil_pristine[lane] || stack.is_border(corner, axis)) {
-            if axis == 1 {
-                stack.normal(corner)
-            } else {
-                lerp_normal(stack.normal(corner), stack.normal(other), step)
+    #[inline(always)]
+    fn vertex<const AXIS: usize>(&mut self, batch: &Batch, lane: usize, edge: Edge) -> Vertex {
+        let (corner, y) = (usize::from(edge.corner), i32::from(edge.y));
+        let place = &PLACES[corner];
+        let other = corner + NEXT_CORNER[AXIS];
+        let step = batch.steps[lane];
+        let flags = 1 << lane;
+        let is_pristine = batch.edited & flags == 0;
+        let normal = if is_pristine
+            && (batch.stencil_edited & flags == 0 || self.stack.is_border(corner, AXIS))
+        {
+            match AXIS {
+                1 => self.stack.normal(corner),
+                _ => lerp_normal(self.stack.normal(corner), self.stack.normal(other), step),
             }
         } else {
-            Vec3::from_array(self.normals.map(|component| component[lane]))
+            Vec3::new(batch.normals[0][lane], batch.normals[1][lane], batch.normals[2][lane])
         };
-        let mut position = (p - origin) * SNAP;
-        position[axis] += step;
-        let stored = materials.at(place, self.is_lower_solid[lane]);
-        let materials = if stored == MaterialId::GROUND {
-            own_materials(stack, place, p.y, step)
+        let mut position = (self.base + IVec3::new(place.x, y, place.z)) * SNAP;
+        position[AXIS] += step;
+        let stored = if self.materials.is_any {
+            let is_lower = batch.lower_solid & flags != 0;
+            self.materials.at::<AXIS>(edge, is_lower)
         } else {
-            MaterialMix::pure(stored)
+            MaterialId::GROUND
+        };
+        let materials = match (stored, self.stack.single_mix()) {
+            (MaterialId::GROUND, Some(mix)) => mix,
+            (MaterialId::GROUND, None) => self.own_materials::<AXIS>(corner, self.low.y + y, step),
+            _ => MaterialMix::pure(stored),
         };
         Vertex { position, normal, materials }
     }
-}
 
-/// Where the surface crosses edges between samples `p` and `q`: linear, to the nearest step, and not at the ends.
-#[inline]
-fn steps(p: &[Marked; LANES], q: &[Marked; LANES]) -> [i32; LANES] {
-    std::array::from_fn(|lane| {
-        let (p, q) = (f64::from((p[lane] >> 1).abs()), f64::from((q[lane] >> 1).abs()));
-        let sum = (p + q).max(1.0);
-        // Whole numbers below 2^38: a quotient that is none is farther from one than f64 rounds.
-        let steps = (f64::from(2 * SNAP) * p + sum) / (2.0 * sum);
-        (steps as i32).clamp(1, SNAP - 1)
-    })
-}
-
-/// Materials where the ground shows its own, those of both columns blended as the tile does.
-fn own_materials(stack: &mut Stack, place: Place, y: i32, step: i32) -> MaterialMix {
-    let (corner, other) = (place.corner, place.other_corner());
-    let between = |low: i32, high: i32| {
-        low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
-    };
-    let top = if place.axis == 1 { y + 1 } else { y };
-    let depth = between(stack.height(corner), stack.height(other)) - between(y * ONE, top * ONE);
-    let variant = usize::from(depth > OVERLAY_DEPTH);
-    let a = stack.mixes(corner)[variant];
-    if corner == other {
-        return a;
+    /// Materials where the ground shows its own, those of both columns blended as the tile does.
+    fn own_materials<const AXIS: usize>(&mut self, corner: usize, y: i32, step: i32) -> MaterialMix {
+        let between = |low: i32, high: i32| {
+            low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
+        };
+        let other = corner + NEXT_CORNER[AXIS];
+        let depth = match AXIS {
+            1 => self.stack.height(corner) - between(y * ONE, (y + 1) * ONE),
+            _ => between(self.stack.height(corner), self.stack.height(other)) - y * ONE,
+        };
+        let variant = usize::from(depth > OVERLAY_DEPTH);
+        let own = self.stack.mixes(corner)[variant];
+        match AXIS {
+            1 => own,
+            _ => MaterialMix::lerp(own, self.stack.mixes(other)[variant], step),
+        }
     }
-    MaterialMix::lerp(a, stack.mixes(other)[variant], step)
+}
+
+/// Crossings of up to eight edges along one axis. Of flags, each edge has one bit.
+struct Batch {
+    /// Steps of 1/4096 voxel from the lower end.
+    steps: [i32; LANES],
+    /// Unit gradients at the crossings: x, y, z.
+    normals: [[f32; LANES]; 3],
+    /// Is an end edited?
+    edited: u32,
+    /// Is any sample edited that the gradients at both ends look at?
+    stencil_edited: u32,
+    lower_solid: u32,
+}
+
+/// Samples from one layer before an edge's lower end to two after it.
+const NEAR: usize = 3 * AREA + 1;
+
+impl Batch {
+    #[inline(always)]
+    fn new<const AXIS: usize>(apron: &Apron, edges: &[Edge]) -> Self {
+        let [along, b, c] = STEPS[AXIS];
+        let (p, q) = (AREA, AREA + along);
+        // Both ends, one before and one after them along the edge, and around both ends along the other two axes.
+        let places: [usize; 12] =
+            [p - along, p, q, q + along, p - b, p + b, q - b, q + b, p - c, p + c, q - c, q + c];
+        let mut gathered = [[0; LANES]; 12];
+        for (lane, &edge) in edges.iter().enumerate() {
+            let corner = &PLACES[usize::from(edge.corner)];
+            let first = usize::from(edge.y) * AREA + corner.apron;
+            let Some(near) = apron.samples()[first..].first_chunk::<NEAR>() else { continue };
+            for (samples, &place) in gathered.iter_mut().zip(&places) {
+                samples[lane] = near[place];
+            }
+        }
+        let [before, p, q, after, pb, pb2, qb, qb2, pc, pc2, qc, qc2] = gathered.map(i32x8::new);
+        let is_edited = p | q;
+        let stencil = is_edited | before | after | pb | pb2 | qb | qb2 | pc | pc2 | qc | qc2;
+        let flags = |marked: i32x8| (marked << 31u32).to_bitmask() as u32;
+
+        let mut steps = linear_steps(p >> 1u32, q >> 1u32);
+        if AXIS == 1 {
+            // A pristine vertical edge is crossed at the height itself, its upper end included.
+            let exact = -(p >> 1u32) * i32x8::splat(SNAP / ONE);
+            steps = ((is_edited << 31u32) >> 31u32).select(steps, exact);
+        }
+        let t = steps.round_float() / f32x8::splat(SNAP as f32);
+        let rise = |low: i32x8, high: i32x8| ((high >> 1u32) - (low >> 1u32)).round_float();
+        // a + (b - a) * t, in this order; no fused operation.
+        let blend = |a: f32x8, b: f32x8| a + (b - a) * t;
+        let own = [
+            blend(rise(before, q), rise(p, after)),
+            blend(rise(pb, pb2), rise(qb, qb2)),
+            blend(rise(pc, pc2), rise(qc, qc2)),
+        ];
+        let [x, y, z] = AXES[AXIS].map(|component| own[component]);
+        let length = (x * x + y * y + z * z).sqrt();
+        // Where the gradient vanishes, up.
+        let is_sloped = length.simd_gt(f32x8::splat(0.0));
+        let unit = |v: f32x8, flat: f32| is_sloped.select(v / length, f32x8::splat(flat)).to_array();
+        Self {
+            steps: steps.to_array(),
+            normals: [unit(x, 0.0), unit(y, 1.0), unit(z, 0.0)],
+            edited: flags(is_edited),
+            stencil_edited: flags(stencil),
+            lower_solid: p.to_bitmask() as u32,
+        }
+    }
+}
+
+/// Where the surface crosses edges between densities `p` and `q`, one of them negative: linear, to the nearest step of
+/// 1/4096, halves up, and not at the ends.
+#[inline(always)]
+fn linear_steps(p: i32x8, q: i32x8) -> i32x8 {
+    // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, as its
+    // divisor is below 2^25; so the bias decides halves and nothing else.
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    const BIAS: f64 = 1.0 / (1 << 28) as f64;
+    let (p, sum) = (p.abs(), p.abs() + q.abs());
+    let (p, sum) = (p.to_array(), sum.to_array());
+    let mut steps = [0; LANES];
+    for lane in 0..LANES {
+        let share = f64::from(SNAP) * f64::from(p[lane]) / f64::from(sum[lane]);
+        steps[lane] = (share + BIAS + SHIFT).to_bits() as i32;
+    }
+    i32x8::new(steps).max(i32x8::splat(1)).min(i32x8::splat(SNAP - 1))
 }
 
 /// The stored materials around a block's corners.
@@ -237,14 +237,10 @@ impl<'a> StoredMaterials<'a> {
     }
 
     /// What is stored at the solid end of an edge.
-    #[inline]
-    fn at(&self, place: Place, is_lower: bool) -> MaterialId {
-        if !self.is_any {
-            return MaterialId::GROUND;
-        }
-        let corner = if is_lower { place.corner } else { place.other_corner() };
-        let y = place.y + usize::from(place.axis == 1 && !is_lower);
+    fn at<const AXIS: usize>(&self, edge: Edge, is_lower: bool) -> MaterialId {
+        let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
         let (x, z) = (corner % 9, corner / 9);
+        let y = usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower);
         let brick = self.bricks[y / 8][x / 8 + z / 8 * 2];
         brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + z % 8 * 8 + x % 8))
     }

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::corners::{self, CELLS, Corners, Heights};
+use super::corners::{self, CELLS, Corners, Heights, PLACES};
 use super::mesh::MaterialMix;
 use super::vertex::WorldView;
 use crate::ground::Ground;
@@ -23,10 +23,12 @@ pub(super) struct Stack<'a> {
     /// Lattice edges along x, y and z on the mask's border; see [`Self::is_border`].
     borders: [u128; 3],
     normals: [Vec3; 81],
-    has_normal: Corners,
+    has_normal: [bool; 81],
     /// Near the surface, and deeper than the overlay.
     mixes: [[MaterialMix; 2]; 81],
-    has_mix: Corners,
+    has_mix: [bool; 81],
+    /// Where all columns of the world are of one material.
+    single: Option<MaterialMix>,
 }
 
 /// Cells along a side of the window in which the mask's border is found: one more on each side.
@@ -48,9 +50,10 @@ impl<'a> Stack<'a> {
             mask: corners::spread(own),
             borders: borders(view, (x, z), own),
             normals: [Vec3::ZERO; 81],
-            has_normal: 0,
-            mixes: [[MaterialMix::pure(crate::ground::MaterialId(0)); 2]; 81],
-            has_mix: 0,
+            has_normal: [false; 81],
+            mixes: [[MaterialMix::default(); 2]; 81],
+            has_mix: [false; 81],
+            single: ground.single_material().map(MaterialMix::pure),
         }
     }
 
@@ -64,31 +67,34 @@ impl<'a> Stack<'a> {
         match self.pristine_side(y) {
             Some(true) => [corners::ALL; 9],
             Some(false) => [0; 9],
-            None => corners::pristine(corners::corner_heights(&self.heights), y),
+            None => corners::pristine(&self.heights, y),
         }
     }
 
     /// Does the lattice edge from a corner along an axis lie between a volumetric cell and one that stays heightmap?
     pub fn is_border(&self, corner: usize, axis: usize) -> bool {
-        self.borders[axis] != 0 && {
-            let (x, z) = (corner % 9, corner / 9);
-            self.borders[axis] >> ((z + 1) * WINDOW as usize + x + 1) & 1 == 1
-        }
+        let place = &PLACES[corner];
+        self.borders[axis] >> ((place.z + 1) * WINDOW + place.x + 1) & 1 == 1
     }
 
     /// The height over a corner.
     pub fn height(&self, corner: usize) -> i32 {
-        self.heights[corner / 9 + 1][corner % 9 + 1]
+        self.heights.as_flattened()[PLACES[corner].apron]
     }
 
     fn column(&self, corner: usize) -> Column {
-        self.low.offset((corner % 9) as i32, (corner / 9) as i32)
+        self.low.offset(PLACES[corner].x, PLACES[corner].z)
+    }
+
+    /// What all ground is made of, if it is the same everywhere.
+    pub fn single_mix(&self) -> Option<MaterialMix> {
+        self.single
     }
 
     /// The tile's normal over a corner.
     pub fn normal(&mut self, corner: usize) -> Vec3 {
-        if self.has_normal >> corner & 1 == 0 {
-            self.has_normal |= 1 << corner;
+        if !self.has_normal[corner] {
+            self.has_normal[corner] = true;
             self.normals[corner] = self.ground.normal(self.column(corner));
         }
         self.normals[corner]
@@ -96,8 +102,8 @@ impl<'a> Stack<'a> {
 
     /// What a corner's column is made of: near the surface, and deeper than the overlay.
     pub fn mixes(&mut self, corner: usize) -> [MaterialMix; 2] {
-        if self.has_mix >> corner & 1 == 0 {
-            self.has_mix |= 1 << corner;
+        if !self.has_mix[corner] {
+            self.has_mix[corner] = true;
             let material = self.ground.column_material(self.column(corner));
             self.mixes[corner] = [MaterialMix::column(material), MaterialMix::pure(material.base)];
         }
