@@ -85,46 +85,33 @@ impl Apron {
         for layer in first..=last {
             let height = (low + layer as i32) * ONE;
             let (level, y) = ((layer + 7) / 8, (layer + 7) % 8);
-            for z in 0..SIDE {
-                let stack = (z + 7) / 8 * 3;
-                let bricks = &neighbours.bricks[level][stack..stack + 3];
-                let at = layer * AREA + z * SIDE;
-                fill_row(&mut self.0[at..at + SIDE], bricks, &heights[z], height, y, (z + 7) % 8);
+            let rows = self.0[layer * AREA..].chunks_exact_mut(SIDE);
+            for ((z, row), heights) in (7..).zip(rows).zip(heights) {
+                let bricks = &neighbours.bricks[level][z / 8 * 3..][..3];
+                fill_row(row, bricks, heights, height, y * 64 + z % 8 * 8);
             }
         }
     }
 }
 
-/// One row: a sample of the brick before, eight of the middle one, two of the one after.
-#[inline]
-fn fill_row(
-    row: &mut [Marked],
-    bricks: &[Option<&Brick>],
-    heights: &[i32; SIDE],
-    height: i32,
-    y: usize,
-    z: usize,
-) {
-    for (marked, pristine) in row.iter_mut().zip(heights) {
-        *marked = (height - pristine) * 2;
-    }
-    if let Some(brick) = bricks[1]
-        && let Some(row) = row[1..].first_chunk_mut::<8>()
-    {
-        let samples = i32x8::from_i16x8(i16x8::new(brick.row(y, z)));
+/// One row: a sample of the brick before, eight of the middle one, two of the one after. `at` is where the row begins in
+/// the bricks.
+#[inline(always)]
+fn fill_row(row: &mut [Marked], bricks: &[Option<&Brick>], heights: &[i32; SIDE], height: i32, at: usize) {
+    let (Some(row), Some(inner)) = (row.first_chunk_mut::<SIDE>(), heights[1..].first_chunk::<8>()) else { return };
+    let pristine = i32x8::splat(height) - i32x8::new(*inner);
+    let mut marked = pristine + pristine;
+    if let Some(brick) = bricks[1] {
+        let samples = i32x8::from_i16x8(i16x8::new(brick.row(at)));
         let is_pristine = samples.simd_eq(i32x8::splat(i16::MIN.into()));
-        let edited = samples + samples + i32x8::splat(1);
-        *row = is_pristine.select(i32x8::new(*row), edited).to_array();
+        marked = is_pristine.select(marked, samples + samples + i32x8::splat(1));
     }
-    let mut put = |at: usize, brick: Option<&Brick>, x: usize| {
-        if let Some(brick) = brick
-            && let sample = brick.samples()[y * 64 + z * 8 + x]
-            && sample != Sample::PRISTINE
-        {
-            row[at] = sample.or(0) * 2 + 1;
-        }
+    row[1..9].copy_from_slice(&marked.to_array());
+    let beside = |brick: Option<&Brick>, x: usize, pristine: i32| {
+        let stored = brick.map_or(Sample::PRISTINE, |brick| brick.samples()[at + x]);
+        stored.distance().map_or((height - pristine) * 2, |distance| distance * 2 + 1)
     };
-    put(0, bricks[0], 7);
-    put(9, bricks[2], 0);
-    put(10, bricks[2], 1);
+    row[0] = beside(bricks[0], 7, heights[0]);
+    row[9] = beside(bricks[2], 0, heights[9]);
+    row[10] = beside(bricks[2], 1, heights[10]);
 }

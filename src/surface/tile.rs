@@ -10,7 +10,7 @@ use glam::IVec3;
 
 use super::mask::{Borders, sheet};
 use super::mesh::{SurfaceMesh, Vertex};
-use super::vertex::{WorldView, height_vertex, vertex};
+use super::vertex::{WorldView, height_vertex, sheet_vertex};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, Column, ONE, TilePos};
 
@@ -49,16 +49,19 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     let cells = (high.x - low.x) as u32;
     let width = cells + 1;
     let corners = |a: u32| [a, a + width, a + width + 1, a + width + 1, a + 1, a];
-    let first: Vec<u32> = (0..cells).flat_map(corners).collect();
+    let mut first = Vec::with_capacity(cells as usize * 6);
+    (0..cells).for_each(|a| first.extend_from_slice(&corners(a)));
     let mut indices = Vec::with_capacity(first.len() * (high.z - low.z) as usize + rings.fans.len());
     for z in low.z..high.z {
         let (row, base) = (borders.row(z), (z - low.z) as u32 * width);
-        if row.iter().all(|&flags| flags == 0) {
-            indices.extend(first.iter().map(|&index| index + base));
-            continue;
-        }
-        for (a, _) in (base..).zip(row).filter(|(_, flags)| **flags == 0) {
-            indices.extend_from_slice(&corners(a));
+        // Runs of whole cells are the first row's, moved.
+        let mut rest = row;
+        while !rest.is_empty() {
+            let whole = rest.iter().position(|&flags| flags != 0).unwrap_or(rest.len());
+            let from = row.len() - rest.len();
+            indices.extend(first[from * 6..(from + whole) * 6].iter().map(|&index| index + base));
+            let cut = rest[whole..].iter().position(|&flags| flags == 0).unwrap_or(rest.len() - whole);
+            rest = &rest[whole + cut..];
         }
     }
     indices.extend_from_slice(&rings.fans);
@@ -134,7 +137,7 @@ impl Rings {
 
 /// Rings in the making.
 struct Drawing<'a> {
-    world: &'a WorldView<'a>,
+    ground: &'a Ground,
     borders: &'a Borders,
     low: Column,
     high: Column,
@@ -146,10 +149,10 @@ struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    fn new(world: &'a WorldView<'a>, tile: TilePos, borders: &'a Borders) -> Self {
+    fn new(world: &WorldView<'a>, tile: TilePos, borders: &'a Borders) -> Self {
         let (low, high) = world.grid.tile_cells(tile);
-        let base = column_count(low, high);
-        Self { world, borders, low, high, base, rings: Rings::default(), sides: Default::default() }
+        let (base, ground) = (column_count(low, high), world.samples.ground());
+        Self { ground, borders, low, high, base, rings: Rings::default(), sides: Default::default() }
     }
 
     /// Takes a patch over as it was.
@@ -194,16 +197,16 @@ impl<'a> Drawing<'a> {
         let width = (self.high.x - self.low.x + 1) as u32;
         let number =
             |column: Column| (column.z - self.low.z) as u32 * width + (column.x - self.low.x) as u32;
-        let corners = cell.corners();
+        let (corners, ground) = (cell.corners(), self.ground);
         let mut sides = std::mem::take(&mut self.sides);
         for (side, line) in sides.iter_mut().enumerate() {
             let (from, to) = (corners[side], corners[(side + 1) % 4]);
             line.clear();
             line.push(number(from));
             if flags >> side & 1 == 1 {
-                for (p, axis) in chain(self.world.samples.ground(), from, to) {
+                for (p, axis) in chain(ground, from, to) {
                     line.push(self.base + self.rings.vertices.len() as u32);
-                    self.rings.vertices.push(vertex(self.world, p, axis, self.low.at(0)));
+                    self.rings.vertices.push(sheet_vertex(ground, p, axis, self.low.at(0)));
                 }
             }
             line.push(number(to));

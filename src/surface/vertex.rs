@@ -65,7 +65,12 @@ pub fn crossing(lattice: &impl Lattice, p: IVec3, axis: usize) -> i32 {
     if axis == 1 && !lattice.is_edited(p) && !lattice.is_edited(q) {
         return (lattice.ground().height(Column::of(p)) - p.y * ONE) * (SNAP / ONE);
     }
-    let (dp, dq) = (i64::from(lattice.distance(p)).abs(), i64::from(lattice.distance(q)).abs());
+    linear(lattice.distance(p), lattice.distance(q))
+}
+
+/// The crossing between densities `dp` and `dq`, in steps from the first.
+fn linear(dp: i32, dq: i32) -> i32 {
+    let (dp, dq) = (i64::from(dp).abs(), i64::from(dq).abs());
     let sum = (dp + dq).max(1);
     let steps = (2 * i64::from(SNAP) * dp + sum) / (2 * sum);
     (steps as i32).clamp(1, SNAP - 1)
@@ -79,19 +84,33 @@ pub fn position(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) ->
 /// The surface vertex on the lattice edge from `p` along `axis`, which must have one solid end.
 pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> Vertex {
     let q = p + UNIT[axis];
-    let step = crossing(lattice, p, axis);
     let pristine = !lattice.is_edited(p) && !lattice.is_edited(q);
-    let as_heightmap =
-        pristine && (is_on_mask_border(lattice, Column::of(p), axis) || is_stencil_pristine(lattice, p, q));
-    let normal = if as_heightmap {
-        heightmap_normal(lattice.ground(), Column::of(p), Column::of(q), step)
-    } else {
-        lerp_normal(gradient(lattice, p), gradient(lattice, q), step)
+    if pristine && (is_on_mask_border(lattice, Column::of(p), axis) || is_stencil_pristine(lattice, p, q)) {
+        return sheet_vertex(lattice.ground(), p, axis, origin);
+    }
+    let step = crossing(lattice, p, axis);
+    let solid = if lattice.distance(p) < 0 { p } else { q };
+    Vertex {
+        position: (p - origin) * SNAP + UNIT[axis] * step,
+        normal: lerp_normal(gradient(lattice, p), gradient(lattice, q), step),
+        materials: match lattice.stored_material(solid) {
+            MaterialId::GROUND => own_materials(lattice.ground(), p, q, step),
+            stored => MaterialMix::pure(stored),
+        },
+    }
+}
+
+/// The vertex where the sheet has no edited sample near, or meets the heightmap: the tile's own normals and materials.
+pub fn sheet_vertex(ground: &Ground, p: IVec3, axis: usize, origin: IVec3) -> Vertex {
+    let q = p + UNIT[axis];
+    let step = match axis {
+        1 => (ground.height(Column::of(p)) - p.y * ONE) * (SNAP / ONE),
+        _ => linear(ground.distance(p), ground.distance(q)),
     };
     Vertex {
         position: (p - origin) * SNAP + UNIT[axis] * step,
-        normal,
-        materials: materials(lattice, p, q, step),
+        normal: heightmap_normal(ground, Column::of(p), Column::of(q), step),
+        materials: own_materials(ground, p, q, step),
     }
 }
 
@@ -141,15 +160,9 @@ pub(super) fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
     if length > 0.0 { Vec3::new(x / length, y / length, z / length) } else { Vec3::Y }
 }
 
-/// Materials at a crossing: what the solid end is made of. Where the ground shows its own materials, those of both
-/// columns are blended as the tile does: the overlay within its depth below the pristine surface, the base below.
-fn materials(lattice: &impl Lattice, p: IVec3, q: IVec3, step: i32) -> MaterialMix {
-    let solid = if lattice.distance(p) < 0 { p } else { q };
-    let stored = lattice.stored_material(solid);
-    if stored != MaterialId::GROUND {
-        return MaterialMix::pure(stored);
-    }
-    let ground = lattice.ground();
+/// Materials at a crossing where the ground shows its own: those of both columns, blended as the tile does. The overlay
+/// within its depth below the pristine surface, the base below.
+fn own_materials(ground: &Ground, p: IVec3, q: IVec3, step: i32) -> MaterialMix {
     let (a, b) = (Column::of(p), Column::of(q));
     let between = |low: i32, high: i32| {
         low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32

@@ -25,7 +25,7 @@ pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use redraw::{MeshUpdates, TileUpdate};
 pub use surface::ChunkSurface;
-pub use transaction::{Commit, FieldNews, Transaction};
+pub use transaction::{Commit, FieldNews, Stages, Transaction};
 pub use world::{Drawn, Memory, Version, World};
 
 use std::sync::Arc;

@@ -7,6 +7,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 
 use super::surface::{ChunkSurface, Fresh, key};
+use super::transaction::Stages;
 use super::world::World;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos};
@@ -75,21 +76,32 @@ pub(super) fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
 }
 
 /// Every mesh that these bricks and cells change.
-pub(super) fn updates(world: &World, view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> MeshUpdates {
-    let blocks = dirty_blocks(view, changed, added);
-    MeshUpdates { chunks: mesh_blocks(world, view, &blocks), tiles: touched_tiles(world, view, added) }
+pub(super) fn updates(
+    world: &World,
+    view: &WorldView,
+    changed: &[DraftedBrick],
+    added: &Mask,
+    stages: &mut Stages,
+) -> MeshUpdates {
+    let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, changed, added));
+    let chunks = mesh_blocks(world, view, &blocks, stages);
+    let tiles = Stages::time(&mut stages.ring, || touched_tiles(world, view, added));
+    MeshUpdates { tiles, chunks }
 }
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
 fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec<Block> {
-    let mut blocks = Vec::new();
+    let mut dirty: Vec<([i32; 3], LatticeBox)> = Vec::with_capacity(changed.len() * 8);
     let last = IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1);
     let mut insert = |low: IVec3, high: IVec3| {
         let Some(cells) = LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last)) else { return };
-        for brick in BrickPos::covering(cells) {
-            let Some(cells) = brick.samples().intersection(cells) else { continue };
-            let key = [brick.0.x, brick.0.z, brick.0.y];
-            blocks.extend(view.grid.chunks_of(cells).map(|chunk| (key, chunk)));
+        let (first, last): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
+        for x in first.x..=last.x {
+            for z in first.z..=last.z {
+                for y in first.y..=last.y {
+                    dirty.push(([x, z, y], cells));
+                }
+            }
         }
     };
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
@@ -107,10 +119,19 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
             }
         }
     }
-    blocks.sort_unstable();
-    blocks.dedup();
-    let block = |([x, z, y], chunk): ([i32; 3], ChunkPos)| Block { brick: BrickPos(IVec3::new(x, y, z)), chunk };
-    blocks.into_iter().map(block).collect()
+    dirty.sort_unstable_by_key(|&(brick, _)| brick);
+    let mut blocks = Vec::with_capacity(dirty.len());
+    for same in dirty.chunk_by(|a, b| a.0 == b.0) {
+        let [x, z, y] = same[0].0;
+        let brick = BrickPos(IVec3::new(x, y, z));
+        let mut cells = None;
+        for part in same.iter().filter_map(|(_, cells)| cells.intersection(brick.samples())) {
+            LatticeBox::include(&mut cells, part);
+        }
+        let chunks = cells.into_iter().flat_map(|cells| view.grid.chunks_of(cells));
+        blocks.extend(chunks.map(|chunk| Block { brick, chunk }));
+    }
+    blocks
 }
 
 /// 8x8 cells and the cells beside and diagonally beside them, as far as they lie in the word (dx, dz) further.
@@ -137,14 +158,21 @@ thread_local! {
 const KEPT_VERTICES: usize = 1 << 16;
 
 /// Meshes blocks and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
-fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
+fn mesh_blocks(
+    world: &World,
+    view: &WorldView,
+    blocks: &[Block],
+    stages: &mut Stages,
+) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
     if blocks.len() < PARALLEL_BLOCKS {
-        let mut parts = MESHER.with_borrow_mut(|(mesher, parts)| {
-            parts.clear();
-            mesher.mesh(view, blocks, parts);
-            std::mem::take(parts)
+        let mut parts = Stages::time(&mut stages.meshing, || {
+            MESHER.with_borrow_mut(|(mesher, parts)| {
+                parts.clear();
+                mesher.mesh(view, blocks, parts);
+                std::mem::take(parts)
+            })
         });
-        let chunks = assemble(world, &[&parts]);
+        let chunks = Stages::time(&mut stages.assembly, || assemble(world, &[&parts]));
         if parts.vertices.capacity() <= KEPT_VERTICES {
             MESHER.with_borrow_mut(|(_, kept)| std::mem::swap(kept, &mut parts));
         }
@@ -157,8 +185,8 @@ fn mesh_blocks(world: &World, view: &WorldView, blocks: &[Block]) -> Vec<(ChunkP
         MESHER.with_borrow_mut(|(mesher, _)| mesher.mesh(view, blocks, &mut parts));
         parts
     };
-    let parts: Vec<Parts> = stacks.par_iter().map(mesh).collect();
-    assemble(world, &parts.iter().collect::<Vec<_>>())
+    let parts: Vec<Parts> = Stages::time(&mut stages.meshing, || stacks.par_iter().map(mesh).collect());
+    Stages::time(&mut stages.assembly, || assemble(world, &parts.iter().collect::<Vec<_>>()))
 }
 
 /// The surfaces of chunks with these parts in place of old ones.

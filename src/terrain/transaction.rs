@@ -7,6 +7,9 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
+
+use web_time::Instant;
 
 use super::Submission;
 use super::receipt::{Applied, ChunkScenario, Receipt, Rejection};
@@ -54,6 +57,33 @@ pub struct Commit {
     news: Vec<(ChunkPos, FieldNews)>,
     /// Meshes to be swapped together with this commit.
     pub meshes: MeshUpdates,
+    /// Where the time went.
+    pub stages: Stages,
+}
+
+/// How long the stages of a transaction took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stages {
+    /// Edits, from distances to new bricks.
+    pub edit: Duration,
+    /// Marching cubes over dirty blocks, and finding these.
+    pub meshing: Duration,
+    /// Putting parts among those that stay.
+    pub assembly: Duration,
+    /// The mask, rings and index lists.
+    pub ring: Duration,
+    /// The whole transaction: the above, fields and receipts.
+    pub whole: Duration,
+}
+
+impl Stages {
+    /// Calls `work`, and adds the time it takes to what `stage` names.
+    pub(super) fn time<T>(stage: &mut Duration, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        *stage += start.elapsed();
+        result
+    }
 }
 
 impl Transaction {
@@ -74,15 +104,19 @@ impl Transaction {
     /// Computes the commit. Runs on any thread; large transactions use the threads of the current rayon pool, and the
     /// result does not depend on how many those are.
     pub fn run(self) -> Commit {
-        let world = &*self.world;
+        let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = self.submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
-        let draft = Draft::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &edits);
+        let draft = Stages::time(&mut stages.edit, || {
+            Draft::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &edits)
+        });
         let bricks: Bricks = draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         let samples = world.samples().over(&bricks);
 
-        let mask = redraw::added_cells(&WorldView { samples, ..world.view() }, &draft.bricks);
+        let mask = Stages::time(&mut stages.ring, || {
+            redraw::added_cells(&WorldView { samples, ..world.view() }, &draft.bricks)
+        });
         let view = WorldView { samples, mask: MaskView::new(&world.mask).with(&mask), ..world.view() };
-        let meshes = redraw::updates(world, &view, &draft.bricks, &mask);
+        let meshes = redraw::updates(world, &view, &draft.bricks, &mask, &mut stages);
 
         let mut log = FieldLog::new(world);
         let mut effects = draft.effects.into_iter();
@@ -94,6 +128,8 @@ impl Transaction {
             Receipt { tag: submission.tag, outcome }
         });
         let receipts = receipts.collect();
+        let news = log.news();
+        stages.whole = start.elapsed();
         Commit {
             ticket: self.ticket,
             bricks,
@@ -103,7 +139,8 @@ impl Transaction {
             receipts,
             meshes,
             next_field: log.next,
-            news: log.news(),
+            news,
+            stages,
             fields: log.fields,
         }
     }

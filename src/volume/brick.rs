@@ -43,7 +43,7 @@ pub type Layers = [u64; BRICK as usize];
 /// Which pristine samples of a brick are solid, whose lowest samples lie at `y`, under columns of these heights.
 pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     // In each column the lowest samples are solid, as many as lie below its height.
-    let solid = |height: i32| (height.div_euclid(ONE) + i32::from(height.rem_euclid(ONE) != 0) - y).clamp(0, 8);
+    let solid = |height: i32| ((height + (ONE - 1) >> ONE.trailing_zeros()) - y).clamp(0, 8);
     let mut rising = [0u64; 9];
     for (bit, &height) in heights.iter().flatten().enumerate() {
         rising[solid(height) as usize] |= 1 << bit;
@@ -104,18 +104,22 @@ impl Brick {
         &self.samples
     }
 
-    /// The samples of a row along x; both counted from the brick's lowest sample.
-    pub(crate) fn row(&self, y: usize, z: usize) -> [i16; 8] {
-        let row = self.samples[y * 64 + z * 8..].first_chunk::<8>();
+    /// The eight samples of a row along x, which begins at index `at`.
+    #[inline]
+    pub(crate) fn row(&self, at: usize) -> [i16; 8] {
+        let row = self.samples[at..].first_chunk::<8>();
         row.map_or([0; 8], |row| row.map(|sample| sample.0))
     }
 
-    /// Stores edited samples in a row along x: those of the lanes `changed`, of which those in `solid` are.
-    pub(crate) fn set_row(&mut self, y: usize, z: usize, row: [i16; 8], changed: u8, solid: u8) {
-        if let Some(samples) = self.samples[y * 64 + z * 8..].first_chunk_mut::<8>() {
+    /// Stores edited samples in the row that begins at index `at`: those of the lanes `changed`, of which those in
+    /// `solid` are.
+    #[inline]
+    pub(crate) fn set_row(&mut self, at: usize, row: [i16; 8], changed: u8, solid: u8) {
+        if let Some(samples) = self.samples[at..].first_chunk_mut::<8>() {
             *samples = row.map(Sample);
         }
-        let lanes = |bits: u8| u64::from(bits) << (z * 8);
+        let (y, shift) = (at / 64, at % 64);
+        let lanes = |bits: u8| u64::from(bits) << shift;
         self.edited[y] |= lanes(changed);
         self.solid[y] = self.solid[y] & !lanes(changed) | lanes(solid & changed);
     }
@@ -181,9 +185,9 @@ mod tests {
         let mut brick = Brick::pristine([u64::MAX; 8]);
         let pos = BrickPos(IVec3::new(-1, 0, 2));
         let point = pos.origin() + IVec3::new(3, 5, 7);
-        let mut row = brick.row(5, 7);
+        let mut row = brick.row(5 * 64 + 7 * 8);
         row[3] = 7;
-        brick.set_row(5, 7, row, 1 << 3, 0);
+        brick.set_row(5 * 64 + 7 * 8, row, 1 << 3, 0);
         brick.set_material(BrickPos::index(point), MaterialId(4));
         assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, 7, MaterialId(4))]);
         assert_eq!(brick.edited_count(), 1);
@@ -207,7 +211,7 @@ mod tests {
     fn a_brick_of_one_number_is_uniform() {
         let mut brick = Brick::pristine([0; 8]);
         for row in 0..64 {
-            brick.set_row(row / 8, row % 8, [-5; 8], 0xff, 0xff);
+            brick.set_row(row * 8, [-5; 8], 0xff, 0xff);
         }
         assert_eq!(brick.uniform(), Some((Sample(-5), MaterialId::GROUND)));
         brick.set_material(77, MaterialId(2));

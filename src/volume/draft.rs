@@ -269,14 +269,14 @@ impl<'a> Workpiece<'a> {
     ) -> Option<LatticeBox> {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
-        let lanes = (0xff << from.x & 0xff >> (7 - to.x)) as u8;
+        let lanes = i32x8::new(std::array::from_fn(|x| -i32::from((from.x..=to.x).contains(&x))));
         let mut changed = [0; 8];
         for (y, layer) in (from.y..=to.y).zip(&mut changed[from.y..]) {
             for z in from.z..=to.z {
                 let outside = i32x8::new(distances[y * 8 + z]);
                 let row = match operation {
-                    Operation::Paint { material } => self.paint(y, z, outside, lanes, material, counts),
-                    _ => self.carve(y, z, outside, lanes, operation, counts),
+                    Operation::Paint { material } => self.paint((y, z), outside, lanes, material, counts),
+                    _ => self.carve((y, z), outside, lanes, operation, counts),
                 };
                 *layer |= u64::from(row) << (z * 8);
             }
@@ -286,16 +286,18 @@ impl<'a> Workpiece<'a> {
     }
 
     /// Digs or adds in a row; returns the lanes that changed.
+    #[inline(always)]
     fn carve(
         &mut self,
-        y: usize,
-        z: usize,
+        (y, z): (usize, usize),
         outside: i32x8,
-        lanes: u8,
+        lanes: i32x8,
         operation: Operation,
         counts: &mut Counts,
     ) -> u8 {
-        let raw = i32x8::from_i16x8(i16x8::new(self.brick.row(y, z)));
+        let at = y * 64 + z * 8;
+        let row = i16x8::new(self.brick.row(at));
+        let raw = i32x8::from_i16x8(row);
         let pristine = self.floor[z] + i32x8::splat(y as i32 * ONE);
         let before = raw.simd_eq(i32x8::splat(i16::MIN.into())).select(pristine, raw);
         let depth = outside.max(i32x8::splat(-DEPTH));
@@ -303,25 +305,27 @@ impl<'a> Workpiece<'a> {
         let most = i32x8::splat(i16::MAX.into());
         let stored = after.max(-most).min(most);
         let kept = outside.simd_gt(i32x8::splat(BAND)) | after.simd_eq(before) | stored.simd_eq(raw);
-        let changed = !bits(kept) & lanes;
+        let changes = lanes & !kept;
+        let changed = bits(changes);
         if changed == 0 {
             return 0;
         }
-        let (stored, raw) = (stored.to_array(), raw.to_array());
-        let row = std::array::from_fn(|x| if changed >> x & 1 == 1 { stored[x] } else { raw[x] } as i16);
+        let row = i16x8::from_i32x8_saturate(changes.select(stored, raw));
         let (was, is) = (negative(before), negative(after));
-        self.brick.set_row(y, z, row, changed, is);
+        self.brick.set_row(at, row.to_array(), changed, is);
         let moved = Moved { removed: changed & was & !is, added: changed & is & !was };
-        self.count(y, z, moved, operation, counts);
+        if moved.removed | moved.added != 0 {
+            self.count(at, moved, operation, counts);
+        }
         changed
     }
 
     /// Counts voxels that changed sides, and gives new ones their material.
-    fn count(&mut self, y: usize, z: usize, moved: Moved, operation: Operation, counts: &mut Counts) {
+    fn count(&mut self, at: usize, moved: Moved, operation: Operation, counts: &mut Counts) {
         let ground = self.view.ground();
         for x in ones(moved.removed | moved.added) {
-            let index = y * 64 + z * 8 + x;
-            let point = self.pos.origin() + IVec3::new(x as i32, y as i32, z as i32);
+            let index = at + x;
+            let point = self.pos.origin() + offset(index);
             if moved.removed >> x & 1 == 1 {
                 counts.removed.count(resolve(ground, point, self.brick.material_at(index)));
                 continue;
@@ -336,25 +340,25 @@ impl<'a> Workpiece<'a> {
     /// Paints the solid samples of a row inside the shape; returns the lanes that changed.
     fn paint(
         &mut self,
-        y: usize,
-        z: usize,
+        (y, z): (usize, usize),
         outside: i32x8,
-        lanes: u8,
+        lanes: i32x8,
         material: MaterialId,
         counts: &mut Counts,
     ) -> u8 {
-        let mut row = self.brick.row(y, z);
+        let at = y * 64 + z * 8;
+        let mut row = self.brick.row(at);
         let pristine = (self.floor[z] + i32x8::splat(y as i32 * ONE)).to_array();
-        let inside = !bits(outside.simd_gt(i32x8::splat(0))) & lanes;
+        let inside = bits(lanes & !outside.simd_gt(i32x8::splat(0)));
         let mut changed = 0;
         for x in ones(inside) {
-            let index = y * 64 + z * 8 + x;
+            let index = at + x;
             let (sample, old) = (self.brick.samples()[index], self.brick.material_at(index));
             let before = sample.or(pristine[x]);
             if before >= 0 || sample != Sample::PRISTINE && material == old {
                 continue;
             }
-            let point = self.pos.origin() + IVec3::new(x as i32, y as i32, z as i32);
+            let point = self.pos.origin() + offset(index);
             let (ground, is_pristine) = (self.view.ground(), sample == Sample::PRISTINE);
             if resolve(ground, point, material) != resolve(ground, point, old) {
                 counts.painted.count(resolve(ground, point, material));
@@ -366,7 +370,7 @@ impl<'a> Workpiece<'a> {
             changed |= 1 << x;
         }
         if changed != 0 {
-            self.brick.set_row(y, z, row, changed, changed);
+            self.brick.set_row(at, row, changed, changed);
         }
         changed
     }
@@ -374,15 +378,17 @@ impl<'a> Workpiece<'a> {
     /// By how much the brick changes the hash of the world's samples.
     fn hash_change(&self) -> u64 {
         let low = self.pos.origin();
+        let mut columns = self.changed.iter().fold(0, |all, layer| all | layer);
         let mut change = 0u64;
-        for (y, &layer) in self.changed.iter().enumerate() {
-            let mut layer = layer;
-            while layer != 0 {
-                let bit = layer.trailing_zeros() as usize;
-                layer &= layer - 1;
-                let point = low + IVec3::new((bit & 7) as i32, y as i32, (bit >> 3) as i32);
+        while columns != 0 {
+            let bit = columns.trailing_zeros() as usize;
+            columns &= columns - 1;
+            let place = place_hash(Column::of(low + offset(bit)));
+            for y in (0..8).filter(|&y| self.changed[y] >> bit & 1 == 1) {
                 let index = y * 64 + bit;
-                let of = |brick: &Brick| sample_hash(point, brick.samples()[index], brick.material_at(index));
+                let height = low.y + y as i32;
+                let of =
+                    |brick: &Brick| sample_hash(place, height, brick.samples()[index], brick.material_at(index));
                 change = change.wrapping_add(of(&self.brick)).wrapping_sub(self.base.map_or(0, of));
             }
         }
@@ -390,13 +396,20 @@ impl<'a> Workpiece<'a> {
     }
 }
 
+/// From a brick's lowest sample to the one with this index.
+fn offset(index: usize) -> IVec3 {
+    IVec3::new((index & 7) as i32, (index >> 6) as i32, (index >> 3 & 7) as i32)
+}
+
+/// What all samples of a column have in common.
+fn place_hash(column: Column) -> u64 {
+    hash::mix(column.x as u32 as u64 | (column.z as u32 as u64) << 32)
+}
+
 /// What a sample adds to the world's hash; a pristine one adds nothing.
-fn sample_hash(point: IVec3, sample: Sample, material: MaterialId) -> u64 {
+fn sample_hash(place: u64, y: i32, sample: Sample, material: MaterialId) -> u64 {
     let Some(distance) = sample.distance() else { return 0 };
-    let place = hash::mix(point.x as u32 as u64 | (point.z as u32 as u64) << 32);
-    hash::mix(
-        place ^ (point.y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0),
-    )
+    hash::mix(place ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))
 }
 
 /// Lanes whose mask is set.
