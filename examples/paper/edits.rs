@@ -47,9 +47,9 @@ impl Scene {
         let height = f64::from(side);
         let hills = NoiseHeights {
             seed: seed as u32,
-            octaves: 5,
-            scale: 90.0,
-            amplitude: height * 0.3,
+            octaves: 4,
+            scale: height * 0.45,
+            amplitude: height * 0.15,
             base: height * 0.5,
             ..NoiseHeights::default()
         };

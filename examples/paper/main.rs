@@ -15,6 +15,7 @@
 //! | `RESULTS.md` | all tables beside the paper's figures |
 //! | `plots/*.svg` | the plots that the page shows |
 //!
+//! It fails when a check does: seams, equal worlds in all chunk sizes, the full field's ground against the hybrid's.
 //! With `--results` the page goes there as well, and the plots into `plots/` beside it.
 
 mod backend;
@@ -106,6 +107,8 @@ enum PaperError {
     Plot(String),
     #[error(transparent)]
     Json(#[from] serde_json::Error),
+    #[error("{0}")]
+    Faults(String),
     #[error("{}: {reason}", path.display())]
     Write { path: PathBuf, reason: io::Error },
 }
@@ -147,7 +150,10 @@ fn run(args: &Args) -> Result<(), PaperError> {
     if let Some(results) = &args.results {
         publish(&args.out, results)?;
     }
-    Ok(())
+    match measurements.faults() {
+        faults if faults.is_empty() => Ok(()),
+        faults => Err(PaperError::Faults(faults.join("\n"))),
+    }
 }
 
 /// A bar of runs, drawn between them and never during one.

@@ -25,18 +25,20 @@ pub const PLOTS: [(&str, &str); 6] = [
 ];
 
 const SIZE: (u32, u32) = (820, 460);
-const COLORS: [RGBColor; 6] = [
-    RGBColor(150, 150, 150),
-    RGBColor(90, 90, 90),
-    RGBColor(31, 119, 180),
-    RGBColor(44, 160, 44),
-    RGBColor(255, 127, 14),
-    RGBColor(148, 103, 189),
-];
+
+/// Paper's CPU and GPU, then ours.
+const WHO: [RGBColor; 4] =
+    [RGBColor(165, 165, 165), RGBColor(100, 100, 100), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
+/// The full field, then the hybrid's chunk sizes.
+const FULL: RGBColor = RGBColor(60, 60, 60);
+const CHUNKS: [RGBColor; 4] =
+    [RGBColor(31, 119, 180), RGBColor(44, 160, 44), RGBColor(255, 127, 14), RGBColor(148, 103, 189)];
 
 /// A named row of values; those that are missing are not drawn.
+#[derive(Clone)]
 struct Row {
     name: String,
+    color: RGBColor,
     values: Vec<Option<f64>>,
 }
 
@@ -51,12 +53,11 @@ pub fn draw(measurements: &Measurements, folder: &Path) -> Result<(), PaperError
         bars(&full, &["hybrid, chunk size 25".into(), "full field".into()], &chunked_and_full(measurements))?;
         let latencies = latencies(measurements);
         lines(&edits, "edit", &latencies)?;
-        let sort = |row: &Row| {
-            let mut values = row.values.clone();
-            values.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
-            Row { name: row.name.clone(), values }
-        };
-        lines(&sorted, "edits that took no longer", &latencies.iter().map(sort).collect::<Vec<_>>())?;
+        let mut in_order = latencies;
+        for row in &mut in_order {
+            row.values.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+        }
+        lines(&sorted, "edits that took no longer", &in_order)?;
         Ok(())
     };
     draw().map_err(|reason| PaperError::Plot(reason.to_string()))
@@ -73,15 +74,18 @@ fn rows(
     paper: impl Fn(&published::Column) -> f64,
     here: impl Fn(&Measured) -> f64,
 ) -> Vec<Row> {
-    let published = Backend::ALL.map(|backend| Row {
+    let with_color = |first: usize| Backend::ALL.into_iter().zip(WHO.into_iter().skip(first));
+    let published = with_color(0).map(|(backend, color)| Row {
         name: format!("paper, {}", backend.title()),
+        color,
         values: published::hybrid(backend, run).iter().map(|column| Some(paper(column))).collect(),
     });
-    let ours = Backend::ALL.map(|backend| Row {
+    let ours = with_color(2).map(|(backend, color)| Row {
         name: format!("here, {}", backend.title()),
+        color,
         values: measurements.hybrid(backend, run).into_iter().map(|measured| Some(here(measured))).collect(),
     });
-    published.into_iter().chain(ours).filter(|row| !row.values.is_empty()).collect()
+    published.chain(ours).filter(|row| !row.values.is_empty()).collect()
 }
 
 fn totals(measurements: &Measurements, run: Run) -> Vec<Row> {
@@ -105,35 +109,34 @@ fn chunked_and_full(measurements: &Measurements) -> Vec<Row> {
     let here = |subject| measurements.get(subject, run).map(total);
     let paper = [published::hybrid(Backend::Cpu, run)[0].total, published::full(run).total];
     vec![
-        Row { name: "paper, CPU".into(), values: paper.map(Some).into() },
-        Row { name: "here, CPU".into(), values: vec![here(hybrid), here(Subject::Full)] },
+        Row { name: "paper, CPU".into(), color: WHO[0], values: paper.map(Some).into() },
+        Row { name: "here, CPU".into(), color: WHO[2], values: vec![here(hybrid), here(Subject::Full)] },
     ]
 }
 
 /// Each edit's median over the repeats in milliseconds.
 fn latencies(measurements: &Measurements) -> Vec<Row> {
-    let row = |name: String, measured: &Measured| Row {
-        name,
-        values: stats::by_edit(&measured.repeats).into_iter().map(|seconds| Some(seconds * 1e3)).collect(),
-    };
-    let mut rows = Vec::new();
-    for measured in measurements.measured.iter().filter(|measured| measured.run == Run::Second) {
-        rows.push(match measured.subject {
+    let second = measurements.measured.iter().filter(|measured| measured.run == Run::Second);
+    let mut chunk_colors = CHUNKS.into_iter().cycle();
+    let mut row = |measured: &Measured| {
+        let (name, color) = match measured.subject {
             Subject::Hybrid { backend, chunk_size } => {
-                row(format!("{}, chunk size {chunk_size}", backend.title()), measured)
+                (format!("{}, chunk size {chunk_size}", backend.title()), chunk_colors.next())
             }
-            Subject::Full => row("full field".into(), measured),
-        });
-    }
-    rows
+            Subject::Full => ("full field".into(), None),
+        };
+        let values = stats::by_edit(&measured.repeats).into_iter().map(|seconds| Some(seconds * 1e3));
+        Row { name, color: color.unwrap_or(FULL), values: values.collect() }
+    };
+    second.map(&mut row).collect()
 }
 
-/// The range of all values with some room, for a logarithmic axis.
+/// The range of all values with room for the legend above, for a logarithmic axis.
 fn range(rows: &[Row]) -> Range<f64> {
     let values = || rows.iter().flat_map(|row| &row.values).flatten().filter(|value| **value > 0.0);
     let low = values().copied().fold(f64::INFINITY, f64::min);
     let high = values().copied().fold(0.0, f64::max);
-    if high > 0.0 { low / 2.0..high * 2.5 } else { 0.1..1.0 }
+    if high > 0.0 { low / 2.0..high * 2.0 * (high / low).powf(0.3) } else { 0.1..1.0 }
 }
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
@@ -152,7 +155,8 @@ fn bars((path, title): &(impl AsRef<Path>, &str), groups: &[String], rows: &[Row
         .build_cartesian_2d(Groups(groups.to_vec()), range.log_scale())?;
     chart.configure_mesh().disable_x_mesh().light_line_style(WHITE).y_label_formatter(&label).draw()?;
     let width = 0.8 / rows.len().max(1) as f64;
-    for (number, (row, color)) in rows.iter().zip(COLORS).enumerate() {
+    for (number, row) in rows.iter().enumerate() {
+        let color = row.color;
         let left = |group: usize| group as f64 - 0.4 + width * number as f64;
         let values = || row.values.iter().enumerate().filter_map(|(group, value)| Some((group, (*value)?)));
         chart
@@ -188,7 +192,8 @@ fn lines((path, title): &(impl AsRef<Path>, &str), along: &str, rows: &[Row]) ->
         .y_label_formatter(&label)
         .x_label_formatter(&|x| format!("{x:.0}"))
         .draw()?;
-    for (row, color) in rows.iter().zip(COLORS.into_iter().rev()) {
+    for row in rows {
+        let color = row.color;
         let points =
             row.values.iter().enumerate().filter_map(|(at, value)| Some((at as f64 + 1.0, (*value)?)));
         chart

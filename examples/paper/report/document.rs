@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{checks, medians, ratio_table, ratios, tables};
 use crate::machine::Machine;
 use crate::measure::Measurements;
+use crate::mesher;
 use crate::plots::PLOTS;
 use crate::published;
 
@@ -111,7 +112,8 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
     writeln!(
         page,
         "- **Full field** (Table 5): one cube of {side}^3 samples of 16 bits that holds the same ground. An edit changes \
-         only the samples in its reach; then the whole mesh is made again into buffers that are kept."
+         only the samples in its reach; then the whole mesh is made again into buffers that are kept, by {}.",
+        mesher::DESCRIPTION
     )?;
     let ours = setup.tests(crate::backend::Backend::ALL.len() - measurements.missing.len());
     writeln!(
