@@ -150,7 +150,7 @@ fn run(args: &Args) -> Result<(), PaperError> {
     if let Some(results) = &args.results {
         publish(&args.out, results)?;
     }
-    match measurements.faults() {
+    match report::faults(&measurements) {
         faults if faults.is_empty() => Ok(()),
         faults => Err(PaperError::Faults(faults.join("\n"))),
     }
@@ -193,5 +193,9 @@ fn write_file(path: &Path, content: &str) -> Result<(), PaperError> {
 }
 
 fn copy(from: &Path, to: &Path) -> Result<(), PaperError> {
+    // A file copied onto itself would be emptied.
+    if fs::canonicalize(from).ok() == fs::canonicalize(to).ok() {
+        return Ok(());
+    }
     fs::copy(from, to).map(drop).map_err(|reason| PaperError::Write { path: to.into(), reason })
 }

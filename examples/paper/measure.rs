@@ -159,37 +159,6 @@ impl Measurements {
     }
 }
 
-impl Measurements {
-    /// What must hold and does not; nothing, if all is well.
-    pub fn faults(&self) -> Vec<String> {
-        let mut faults = Vec::new();
-        for run in Run::BOTH {
-            let mut hashes = Vec::new();
-            for measured in self.measured.iter().filter(|measured| measured.run == run) {
-                let name = format!("{}, {}", measured.subject.key(), run.title());
-                if let Ending::Hybrid { hash, is_flawless, .. } = measured.ending {
-                    hashes.push(hash);
-                    if !is_flawless {
-                        faults.push(format!("{name}: the seams have faults"));
-                    }
-                }
-                // An edit may fall on what another one of the same run made; not many do.
-                if measured.unchanged * 10 > self.setup.edits {
-                    faults.push(format!("{name}: {} edits changed nothing", measured.unchanged));
-                }
-            }
-            hashes.dedup();
-            if hashes.len() > 1 {
-                faults.push(format!("{}: worlds differ between chunk sizes", run.title()));
-            }
-        }
-        if !self.agreement.iter().all(|agreement| agreement.is_complete()) {
-            faults.push("the full field and the hybrid hold different ground".into());
-        }
-        faults
-    }
-}
-
 /// Runs the experiment; `progress` is told after each run of edits.
 pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements, PaperError> {
     let scene = setup.scene()?;
@@ -291,7 +260,7 @@ fn count_scenarios(scene: &Scene) -> Result<Vec<(u32, ScenarioCounts)>, PaperErr
     let count = |chunk_size| {
         let mut terrain: Terrain = play::terrain(scene, chunk_size)?;
         let mut counts = ScenarioCounts::default();
-        for receipt in terrain.apply(&scene.brushes(Run::First)) {
+        for receipt in terrain.apply(scene.brushes(Run::First)) {
             counts.count(&receipt);
         }
         Ok((chunk_size, counts))

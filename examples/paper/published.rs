@@ -18,7 +18,7 @@ pub const REPEATS: usize = 10;
 pub const TESTS: usize = 240;
 
 /// The machine of the paper.
-pub const MACHINE: &str = "Intel Core i5-2500 (4 cores), GeForce GTX 570, 4 GB, Windows 7";
+pub const MACHINE: &str = "Intel Core i5-2500 (4 cores), GeForce GTX 570, 4 GB";
 
 /// One column of a table.
 #[derive(Clone, Copy, Debug)]

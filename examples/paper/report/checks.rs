@@ -1,6 +1,7 @@
 //! What must hold for the figures to mean anything, run by run.
 
 use super::markdown::{Table, thousands};
+use crate::edits::Run;
 use crate::measure::{Ending, Measurements, Subject};
 
 /// Seams, hashes and edits without effect of each run.
@@ -28,7 +29,7 @@ pub fn checks(measurements: &Measurements) -> Table {
             hash,
             thousands(triangles as u64),
             of_all(measured.unchanged),
-            of_all(measured.undrawn),
+            if measured.subject == Subject::Full { "-".into() } else { of_all(measured.undrawn) },
         ]);
     }
     let points = thousands(measurements.agreement[0].points as u64);
@@ -40,4 +41,33 @@ pub fn checks(measurements: &Measurements) -> Table {
         solid[0], solid[1], differ[0], differ[1]
     );
     table
+}
+
+/// What must hold and does not; nothing, if all is well.
+pub fn faults(measurements: &Measurements) -> Vec<String> {
+    let mut faults = Vec::new();
+    for run in Run::BOTH {
+        let mut hashes = Vec::new();
+        for measured in measurements.measured.iter().filter(|measured| measured.run == run) {
+            let name = format!("{}, {}", measured.subject.key(), run.title());
+            if let Ending::Hybrid { hash, is_flawless, .. } = measured.ending {
+                hashes.push(hash);
+                if !is_flawless {
+                    faults.push(format!("{name}: the seams have faults"));
+                }
+            }
+            // An edit may fall on what another one of the same run made; not many do.
+            if measured.unchanged * 10 > measurements.setup.edits {
+                faults.push(format!("{name}: {} edits changed nothing", measured.unchanged));
+            }
+        }
+        hashes.dedup();
+        if hashes.len() > 1 {
+            faults.push(format!("{}: worlds differ between chunk sizes", run.title()));
+        }
+    }
+    if !measurements.agreement.iter().all(|agreement| agreement.is_complete()) {
+        faults.push("the full field and the hybrid hold different ground".into());
+    }
+    faults
 }

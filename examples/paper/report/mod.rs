@@ -7,7 +7,7 @@ mod markdown;
 mod ratios;
 mod tables;
 
-pub use checks::checks;
+pub use checks::{checks, faults};
 pub use document::document;
 pub use files::{summary, timings};
 pub use markdown::Table;
