@@ -19,10 +19,12 @@ PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
 
 # Random worlds of `make soak`.
 WORLDS ?= 10000
+# Repeats of each run of `make paper`.
+REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run test test-model test-plugin test-examples soak pictures
+.PHONY: help setup run test test-model test-plugin test-examples soak paper pictures
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -38,7 +40,7 @@ setup: ## Install what is missing
 
 # Model tests, in the dev profile: optimised, with overflow checks.
 test-model:
-	cargo test $(WITHOUT_BEVY) --lib --tests --example export
+	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example paper
 	cargo test $(WITHOUT_BEVY) --doc
 
 test-plugin:
@@ -57,6 +59,10 @@ test-examples:
 soak: ## Dig WORLDS (10000) random worlds and look at every seam
 	@tools/setup.sh build
 	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams -- --nocapture
+
+paper: ## Do the paper's experiment again and write docs/RESULTS.md (REPEATS=10)
+	@tools/setup.sh build
+	cargo run --release $(WITHOUT_BEVY) --example paper -- --out out/paper --results docs/RESULTS.md --repeats $(REPEATS)
 
 pictures: ## Make the pictures of the README again
 	@tools/setup.sh run

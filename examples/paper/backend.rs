@@ -1,0 +1,38 @@
+//! What computes a transaction: the CPU, or a GPU as the paper's Tables 3 and 4 have it.
+
+use bevy_burrow::terrain::{Commit, Transaction};
+
+/// Who does the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Backend {
+    Cpu,
+    Cuda,
+}
+
+/// Runs a transaction to its commit.
+pub type Runner = Box<dyn FnMut(Transaction) -> Commit>;
+
+/// Why a backend computes nothing here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no {0} backend on this machine")]
+pub struct NoBackend(pub &'static str);
+
+impl Backend {
+    pub const ALL: [Self; 2] = [Self::Cpu, Self::Cuda];
+
+    /// The backend, ready to run.
+    pub fn open(self) -> Result<Runner, NoBackend> {
+        match self {
+            Self::Cpu => Ok(Box::new(Transaction::run)),
+            Self::Cuda => Err(NoBackend("CUDA")),
+        }
+    }
+
+    /// The paper's name for it.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Cpu => "CPU",
+            Self::Cuda => "GPU",
+        }
+    }
+}

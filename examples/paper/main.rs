@@ -1,0 +1,201 @@
+//! The experiment of the paper behind this crate, done again: P. Andersson and S. Johansson, *Rendering with Marching
+//! Cubes, looking at Hybrid Solutions* (2012), Tables 1 to 5. Needs no Bevy.
+//!
+//! ```text
+//! cargo run --release --no-default-features --example paper -- --out out/paper --results docs/RESULTS.md
+//! ```
+//!
+//! A hundred edits on a terrain of 256 x 256 columns, in chunks of 25, 50, 75 and 100 cells and as one field of marching
+//! cubes; a first run on untouched ground, a second one at the same places. In `--out` it leaves
+//!
+//! | file | what it holds |
+//! | --- | --- |
+//! | `timings.csv` | each single timing |
+//! | `summary.json` | machine, statistics, checks, ratios |
+//! | `RESULTS.md` | all tables beside the paper's figures |
+//! | `plots/*.svg` | the plots that the page shows |
+//!
+//! It fails when a check does: seams, equal worlds in all chunk sizes, the full field's ground against the hybrid's.
+//! With `--results` the page goes there as well, and the plots into `plots/` beside it.
+
+mod backend;
+mod edits;
+mod full;
+mod machine;
+mod measure;
+mod memory;
+mod mesher;
+mod play;
+mod plots;
+mod published;
+mod report;
+mod stats;
+#[cfg(test)]
+mod tests;
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use bevy_burrow::brush::BrushError;
+use bevy_burrow::ground::GroundError;
+use bevy_burrow::terrain::{StaleCommit, TerrainError};
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use machine::Machine;
+use measure::{Measurements, Setup, Subject, measure};
+use memory::Footprint;
+
+/// Reproduces the paper's Tables 1 to 5 and writes them beside the paper's own figures.
+#[derive(Parser)]
+struct Args {
+    /// Folder for timings, summary, page and plots; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "out/paper")]
+    out: PathBuf,
+    /// Writes the page here as well, and the plots beside it
+    #[arg(long, value_name = "FILE")]
+    results: Option<PathBuf>,
+    /// How often each run is repeated
+    #[arg(long, value_name = "N", default_value_t = published::REPEATS as u32)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: u32,
+    /// One repeat only: to look whether all works
+    #[arg(long, conflicts_with = "repeats")]
+    quick: bool,
+    /// Threads that edits may use
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=256))]
+    threads: u32,
+    /// Prints what one test takes in memory; the program asks itself this
+    #[arg(long, hide = true)]
+    footprint_of: Option<Subject>,
+}
+
+impl Args {
+    fn setup(&self) -> Setup {
+        Setup {
+            side: 256,
+            edits: published::EDITS,
+            repeats: if self.quick { 1 } else { self.repeats as usize },
+            threads: self.threads as usize,
+            seed: 2012,
+        }
+    }
+}
+
+/// Why there are no results.
+#[derive(Debug, thiserror::Error)]
+enum PaperError {
+    #[error(transparent)]
+    Ground(#[from] GroundError),
+    #[error(transparent)]
+    Terrain(#[from] TerrainError),
+    #[error(transparent)]
+    Brush(#[from] BrushError),
+    #[error(transparent)]
+    Backend(#[from] backend::NoBackend),
+    #[error(transparent)]
+    Stale(#[from] StaleCommit),
+    #[error("a terrain had no transaction to begin")]
+    Busy,
+    #[error("{0}: a repeat ended otherwise than the one before")]
+    Unrepeatable(String),
+    #[error(transparent)]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    #[error("a plot could not be drawn: {0}")]
+    Plot(String),
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    #[error("{0}")]
+    Faults(String),
+    #[error("{}: {reason}", path.display())]
+    Write { path: PathBuf, reason: io::Error },
+}
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), PaperError> {
+    let setup = args.setup();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(setup.threads).build()?;
+    if let Some(subject) = args.footprint_of {
+        let footprint = pool.install(|| Footprint::here(subject, &setup))?;
+        println!("{}", serde_json::to_string(&footprint)?);
+        return Ok(());
+    }
+    // A folder that cannot be written is found before the long work.
+    make_folder(&args.out.join("plots"))?;
+    let measurements = pool.install(|| {
+        let bar = progress_bar(&setup);
+        let measured = measure(setup, || bar.inc(1));
+        bar.finish_and_clear();
+        measured
+    })?;
+    let machine = Machine::here();
+    for table in report::tables(&measurements) {
+        println!("{table}");
+    }
+    println!("{}", report::medians(&measurements));
+    println!("{}", report::checks(&measurements));
+    println!("{}", report::ratio_table(&report::ratios(&measurements)));
+    write(&measurements, &machine, &args.out)?;
+    if let Some(results) = &args.results {
+        publish(&args.out, results)?;
+    }
+    match report::faults(&measurements) {
+        faults if faults.is_empty() => Ok(()),
+        faults => Err(PaperError::Faults(faults.join("\n"))),
+    }
+}
+
+/// A bar of runs, drawn between them and never during one.
+fn progress_bar(setup: &Setup) -> ProgressBar {
+    let backends = backend::Backend::ALL.into_iter().filter(|backend| backend.open().is_ok()).count();
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed}, {eta} left");
+    ProgressBar::new(setup.tests(backends) as u64)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Writes everything into the folder, plots first: the page shows them.
+fn write(measurements: &Measurements, machine: &Machine, out: &Path) -> Result<(), PaperError> {
+    let plots = out.join("plots");
+    make_folder(&plots)?;
+    plots::draw(measurements, &plots)?;
+    write_file(&out.join("timings.csv"), &report::timings(measurements))?;
+    let mut summary = serde_json::to_string_pretty(&report::summary(measurements, machine))?;
+    summary.push('\n');
+    write_file(&out.join("summary.json"), &summary)?;
+    write_file(&out.join("RESULTS.md"), &report::document(measurements, machine))
+}
+
+/// Copies the page and its plots to where it is read.
+fn publish(out: &Path, results: &Path) -> Result<(), PaperError> {
+    let plots = results.parent().unwrap_or(Path::new("")).join("plots");
+    make_folder(&plots)?;
+    copy(&out.join("RESULTS.md"), results)?;
+    plots::PLOTS.iter().try_for_each(|(file, _)| copy(&out.join("plots").join(file), &plots.join(file)))
+}
+
+fn make_folder(path: &Path) -> Result<(), PaperError> {
+    fs::create_dir_all(path).map_err(|reason| PaperError::Write { path: path.into(), reason })
+}
+
+fn write_file(path: &Path, content: &str) -> Result<(), PaperError> {
+    fs::write(path, content).map_err(|reason| PaperError::Write { path: path.into(), reason })
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), PaperError> {
+    // A file copied onto itself would be emptied.
+    if fs::canonicalize(from).ok() == fs::canonicalize(to).ok() {
+        return Ok(());
+    }
+    fs::copy(from, to).map(drop).map_err(|reason| PaperError::Write { path: to.into(), reason })
+}

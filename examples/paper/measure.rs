@@ -1,0 +1,269 @@
+//! The experiment: every test of the paper that this machine can run, repeated, with what holds after each.
+
+use bevy_burrow::terrain::{Memory, ScenarioCounts, Terrain, World};
+
+use crate::PaperError;
+use crate::backend::{Backend, NoBackend};
+use crate::edits::{Run, Scene};
+use crate::full::{Agreement, FullField};
+use crate::memory::Footprint;
+use crate::play::{self, Played};
+use crate::published::CHUNK_SIZES;
+
+/// How large the experiment is.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Setup {
+    /// Lattice points along each side of the terrain.
+    pub side: u32,
+    pub edits: usize,
+    pub repeats: usize,
+    /// Threads of the pool that edits may use.
+    pub threads: usize,
+    pub seed: u64,
+}
+
+impl Setup {
+    pub fn scene(&self) -> Result<Scene, PaperError> {
+        Ok(Scene::new(self.side, self.edits, self.seed)?)
+    }
+
+    /// The same setup as arguments of this program.
+    pub fn arguments(&self) -> Vec<String> {
+        vec!["--threads".into(), self.threads.to_string()]
+    }
+
+    /// Runs of a hundred edits that the experiment makes with the backends that are there.
+    pub fn tests(&self, backends: usize) -> usize {
+        (backends * CHUNK_SIZES.len() + 1) * Run::BOTH.len() * self.repeats
+    }
+}
+
+/// What is put to the test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Subject {
+    /// Heightmap and marching cubes, in chunks.
+    Hybrid { backend: Backend, chunk_size: u32 },
+    /// One field of marching cubes.
+    Full,
+}
+
+impl Subject {
+    /// Its name in files and arguments.
+    pub fn key(self) -> String {
+        match self {
+            Self::Hybrid { backend, chunk_size } => {
+                format!("{}_{chunk_size}", backend.title().to_lowercase())
+            }
+            Self::Full => "full".into(),
+        }
+    }
+
+    /// Every test of the paper.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let hybrid = |backend| CHUNK_SIZES.map(|chunk_size| Self::Hybrid { backend, chunk_size });
+        Backend::ALL.into_iter().flat_map(hybrid).chain([Self::Full])
+    }
+}
+
+impl std::str::FromStr for Subject {
+    type Err = String;
+
+    fn from_str(key: &str) -> Result<Self, Self::Err> {
+        Self::all().find(|subject| subject.key() == key).ok_or_else(|| format!("there is no test {key}"))
+    }
+}
+
+/// One run of one subject, all repeats.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    pub subject: Subject,
+    pub run: Run,
+    /// Seconds of each edit, by repeat.
+    pub repeats: Vec<Vec<f64>>,
+    /// Edits that changed no sample, and that changed no mesh, in one repeat.
+    pub unchanged: usize,
+    pub undrawn: usize,
+    /// Kilobytes of the process after the run.
+    pub resident: Option<u64>,
+    pub ending: Ending,
+}
+
+/// What there is after a run.
+#[derive(Clone, Copy, Debug)]
+pub enum Ending {
+    Hybrid {
+        /// Of all samples; the same for all chunk sizes.
+        hash: u64,
+        /// Is all that is drawn one closed surface?
+        is_flawless: bool,
+        /// Triangles of the whole world, as drawn.
+        triangles: usize,
+        data: Memory,
+    },
+    Full {
+        triangles: usize,
+        sample_bytes: usize,
+        mesh_bytes: usize,
+    },
+}
+
+impl Ending {
+    fn of_world(world: &World) -> Self {
+        let seams = world.check_seams();
+        let (hash, data) = (world.hash(), world.memory());
+        Self::Hybrid { hash, is_flawless: seams.is_flawless(), triangles: seams.triangles, data }
+    }
+
+    /// Did the same come out?
+    fn agrees(&self, other: &Self) -> bool {
+        let facts = |ending: &Self| match *ending {
+            Self::Hybrid { hash, is_flawless, triangles, .. } => (Some((hash, is_flawless)), triangles),
+            Self::Full { triangles, .. } => (None, triangles),
+        };
+        facts(self) == facts(other)
+    }
+
+    fn of_field(field: &FullField) -> Self {
+        Self::Full {
+            triangles: field.triangles(),
+            sample_bytes: field.sample_bytes(),
+            mesh_bytes: field.mesh_bytes(),
+        }
+    }
+}
+
+/// All that was measured.
+pub struct Measurements {
+    pub setup: Setup,
+    pub measured: Vec<Measured>,
+    /// Backends of the paper that are not here.
+    pub missing: Vec<(Backend, NoBackend)>,
+    /// Full field against hybrid world, after each run.
+    pub agreement: [Agreement; 2],
+    /// The paper's five scenarios, first run, by chunk size.
+    pub scenarios: Vec<(u32, ScenarioCounts)>,
+    pub digs: usize,
+    /// Part of columns steeper than 45 degrees, and the steepest rise over run.
+    pub steepness: (f64, f64),
+}
+
+impl Measurements {
+    pub fn get(&self, subject: Subject, run: Run) -> Option<&Measured> {
+        self.measured.iter().find(|measured| measured.subject == subject && measured.run == run)
+    }
+
+    /// The hybrid's runs with a backend, in order of chunk sizes; none where the backend is missing.
+    pub fn hybrid(&self, backend: Backend, run: Run) -> Vec<&Measured> {
+        let of = |chunk_size| self.get(Subject::Hybrid { backend, chunk_size }, run);
+        CHUNK_SIZES.into_iter().filter_map(of).collect()
+    }
+}
+
+/// Runs the experiment; `progress` is told after each run of edits.
+pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements, PaperError> {
+    let scene = setup.scene()?;
+    let mut missing = Vec::new();
+    let mut subjects = Vec::new();
+    for backend in Backend::ALL {
+        match backend.open() {
+            Ok(_) => {
+                subjects.extend(CHUNK_SIZES.map(|chunk_size| Subject::Hybrid { backend, chunk_size }));
+            }
+            Err(reason) => missing.push((backend, reason)),
+        }
+    }
+    subjects.push(Subject::Full);
+
+    let mut measured: Vec<Measured> = Vec::new();
+    // Repeats outside: what else the machine does meanwhile falls on all subjects alike.
+    for _ in 0..setup.repeats {
+        for &subject in &subjects {
+            let mut keep = |run, played, ending| {
+                progress();
+                keep(&mut measured, subject, run, played, ending)
+            };
+            match subject {
+                Subject::Hybrid { backend, chunk_size } => {
+                    let mut runner = backend.open()?;
+                    let mut terrain = play::terrain(&scene, chunk_size)?;
+                    for run in Run::BOTH {
+                        let played = play::hybrid(&mut terrain, &mut runner, &scene.brushes(run))?;
+                        keep(run, played, Ending::of_world(terrain.world()))?;
+                    }
+                }
+                Subject::Full => {
+                    let mut field = FullField::new(&scene.ground);
+                    for run in Run::BOTH {
+                        let played = play::full(&mut field, &scene.brushes(run))?;
+                        keep(run, played, Ending::of_field(&field))?;
+                    }
+                }
+            }
+        }
+    }
+    for &subject in &subjects {
+        let footprint = Footprint::apart(subject, &setup);
+        for measured in measured.iter_mut().filter(|measured| measured.subject == subject) {
+            measured.resident = footprint.after(measured.run);
+        }
+    }
+    Ok(Measurements {
+        setup,
+        measured,
+        missing,
+        agreement: compare(&scene)?,
+        scenarios: count_scenarios(&scene)?,
+        digs: scene.digs(),
+        steepness: scene.steepness(),
+    })
+}
+
+/// Puts a repeat to those before it; what holds after it must be what held after them.
+fn keep(
+    measured: &mut Vec<Measured>,
+    subject: Subject,
+    run: Run,
+    played: Played,
+    ending: Ending,
+) -> Result<(), PaperError> {
+    let Played { seconds, unchanged, undrawn } = played;
+    match measured.iter_mut().find(|measured| measured.subject == subject && measured.run == run) {
+        Some(earlier) if !earlier.ending.agrees(&ending) => Err(PaperError::Unrepeatable(subject.key())),
+        Some(earlier) => {
+            earlier.repeats.push(seconds);
+            Ok(())
+        }
+        None => {
+            let repeats = vec![seconds];
+            measured.push(Measured { subject, run, repeats, unchanged, undrawn, resident: None, ending });
+            Ok(())
+        }
+    }
+}
+
+/// Plays both runs on a full field and on a terrain, and looks at every lattice point after each.
+fn compare(scene: &Scene) -> Result<[Agreement; 2], PaperError> {
+    let mut field = FullField::new(&scene.ground);
+    let mut terrain = play::terrain(scene, CHUNK_SIZES[0])?;
+    let mut agreement = [Agreement::default(); 2];
+    for (run, agreement) in Run::BOTH.into_iter().zip(&mut agreement) {
+        let brushes = scene.brushes(run);
+        play::full(&mut field, &brushes)?;
+        terrain.apply(&brushes);
+        *agreement = field.compare(terrain.world());
+    }
+    Ok(agreement)
+}
+
+/// Which of the paper's scenarios the first run consists of.
+fn count_scenarios(scene: &Scene) -> Result<Vec<(u32, ScenarioCounts)>, PaperError> {
+    let count = |chunk_size| {
+        let mut terrain: Terrain = play::terrain(scene, chunk_size)?;
+        let mut counts = ScenarioCounts::default();
+        for receipt in terrain.apply(scene.brushes(Run::First)) {
+            counts.count(&receipt);
+        }
+        Ok((chunk_size, counts))
+    };
+    CHUNK_SIZES.into_iter().map(count).collect()
+}

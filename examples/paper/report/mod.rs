@@ -1,0 +1,15 @@
+//! What the measurements say: tables in the paper's shape, ratios against targets, a document, files.
+
+mod checks;
+mod document;
+mod files;
+mod markdown;
+mod ratios;
+mod tables;
+
+pub use checks::{checks, faults};
+pub use document::document;
+pub use files::{summary, timings};
+pub use markdown::Table;
+pub use ratios::{ratios, table as ratio_table};
+pub use tables::{all as tables, medians};

@@ -1,0 +1,173 @@
+//! Ratios: what the paper concludes from its tables, and what this reproduction must reach.
+
+use super::markdown::{Table, significant};
+use crate::backend::Backend;
+use crate::edits::Run;
+use crate::measure::{Ending, Measured, Measurements, Subject};
+use crate::published::{self, CHUNK_SIZES};
+use crate::stats::{self, Statistics};
+
+/// How many times faster an edit of the hybrid must be than one of the full field, in the median.
+pub const FASTER: f64 = 300.0;
+
+/// What a ratio must be here.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Target {
+    AtLeast(f64),
+    AtMost(f64),
+}
+
+/// One line of the comparison.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Ratio {
+    pub what: String,
+    pub paper: Option<f64>,
+    /// From totals and averages, as the paper does it.
+    pub here: Option<f64>,
+    /// The same with each edit's median over the repeats.
+    pub by_medians: Option<f64>,
+    pub target: Option<Target>,
+}
+
+impl Ratio {
+    /// Is the target reached? `None` without one, or without a figure.
+    pub fn is_met(&self) -> Option<bool> {
+        Some(match self.target? {
+            Target::AtLeast(least) => self.here? >= least,
+            Target::AtMost(most) => self.here? <= most,
+        })
+    }
+}
+
+/// The average of an edit in two ways: of all timings, and of each edit's median.
+#[derive(Clone, Copy)]
+struct Averages {
+    plain: f64,
+    medians: f64,
+}
+
+impl Averages {
+    fn of(measured: &Measured) -> Self {
+        Self {
+            plain: Statistics::of(&measured.repeats).average,
+            medians: Statistics::of(&[stats::by_edit(&measured.repeats)]).average,
+        }
+    }
+}
+
+/// Every ratio that the paper draws, and those that have a target.
+pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
+    let cpu = |chunk_size| Subject::Hybrid { backend: Backend::Cpu, chunk_size };
+    let averages = |subject, run| measurements.get(subject, run).map(Averages::of);
+    let divide = |what: String, paper, above: Option<Averages>, below: Option<Averages>, target| {
+        let both = above.zip(below);
+        Ratio {
+            what,
+            paper,
+            here: both.map(|(above, below)| above.plain / below.plain),
+            by_medians: both.map(|(above, below)| above.medians / below.medians),
+            target,
+        }
+    };
+    let paper = |backend, run, at: usize| published::hybrid(backend, run)[at];
+    let (first, second) = (Run::First, Run::Second);
+    let mut ratios = Vec::new();
+
+    let paper_full = published::full(second).total;
+    for (at, chunk_size) in CHUNK_SIZES.into_iter().enumerate() {
+        ratios.push(divide(
+            format!("full over hybrid {chunk_size}, total, second run"),
+            Some(paper_full / paper(Backend::Cpu, second, at).total),
+            averages(Subject::Full, second),
+            averages(cpu(chunk_size), second),
+            None,
+        ));
+    }
+    for chunk_size in CHUNK_SIZES {
+        let full = measurements.get(Subject::Full, second);
+        let here = full.zip(measurements.get(cpu(chunk_size), second)).map(|(full, hybrid)| {
+            let (full, hybrid) = (stats::by_edit(&full.repeats), stats::by_edit(&hybrid.repeats));
+            stats::median(full.iter().zip(&hybrid).map(|(full, hybrid)| full / hybrid))
+        });
+        ratios.push(Ratio {
+            what: format!("full over hybrid {chunk_size}, median of edits, second run"),
+            paper: None,
+            here,
+            by_medians: here,
+            target: Some(Target::AtLeast(FASTER)),
+        });
+    }
+    let growth = |backend| {
+        let average = |at| paper(backend, second, at).average;
+        Some(average(3) / average(0))
+    };
+    ratios.push(divide(
+        "chunk size 100 over 25, average, second run".into(),
+        growth(Backend::Cpu),
+        averages(cpu(100), second),
+        averages(cpu(25), second),
+        Some(Target::AtMost(1.3)),
+    ));
+    for (at, chunk_size) in CHUNK_SIZES.into_iter().enumerate() {
+        ratios.push(divide(
+            format!("first over second run, average, chunk size {chunk_size}"),
+            Some(paper(Backend::Cpu, first, at).average / paper(Backend::Cpu, second, at).average),
+            averages(cpu(chunk_size), first),
+            averages(cpu(chunk_size), second),
+            Some(Target::AtMost(1.5)),
+        ));
+    }
+    for run in Run::BOTH {
+        for (at, chunk_size) in CHUNK_SIZES.into_iter().enumerate() {
+            ratios.push(divide(
+                format!("GPU over CPU, total, chunk size {chunk_size}, {}", run.title()),
+                Some(paper(Backend::Cuda, run, at).total / paper(Backend::Cpu, run, at).total),
+                averages(Subject::Hybrid { backend: Backend::Cuda, chunk_size }, run),
+                averages(cpu(chunk_size), run),
+                None,
+            ));
+        }
+    }
+    for chunk_size in CHUNK_SIZES {
+        let here = measurements.get(cpu(chunk_size), first).and_then(|measured| match measured.ending {
+            Ending::Hybrid { data, .. } => Some((data.ground + data.edits()) as f64 / 1e6),
+            Ending::Full { .. } => None,
+        });
+        ratios.push(Ratio {
+            what: format!("terrain data after the first run, MB, chunk size {chunk_size}"),
+            paper: None,
+            here,
+            by_medians: None,
+            target: Some(Target::AtMost(20.0)),
+        });
+    }
+    ratios
+}
+
+/// The ratios as a table.
+pub fn table(ratios: &[Ratio]) -> Table {
+    let header = ["ratio", "paper", "here", "here, medians of repeats", "target", "reached"];
+    let mut table = Table::new("Paper and reproduction", header);
+    for ratio in ratios {
+        let figure = |value: Option<f64>| value.map_or("-".into(), significant);
+        let target = ratio.target.map_or("-".into(), |target| match target {
+            Target::AtLeast(least) => format!(">= {least}"),
+            Target::AtMost(most) => format!("<= {most}"),
+        });
+        let reached = match ratio.is_met() {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "-",
+        };
+        table.row([
+            ratio.what.clone(),
+            figure(ratio.paper),
+            figure(ratio.here),
+            figure(ratio.by_medians),
+            target,
+            reached.into(),
+        ]);
+    }
+    table
+}
