@@ -14,9 +14,11 @@ use web_time::Instant;
 use super::Submission;
 use super::receipt::{Applied, ChunkScenario, Receipt, Rejection};
 use super::redraw::{self, MeshUpdates};
+use super::surface::ChunkSurface;
 use super::world::World;
 use crate::brush::Edit;
-use crate::lattice::{ChunkPos, LatticeBox};
+use crate::lattice::{ChunkPos, LatticeBox, TilePos};
+use crate::surface::tile::Rings;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Bricks, Draft, EditEffect, FieldId, Fields, UniformBricks, reach};
@@ -55,7 +57,9 @@ pub struct Commit {
     next_field: u64,
     receipts: Vec<Receipt>,
     news: Vec<(ChunkPos, FieldNews)>,
-    /// Meshes to be swapped together with this commit.
+    surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
+    rings: Vec<(TilePos, Arc<Rings>)>,
+    /// Meshes to be swapped together with this commit. The world keeps its own.
     pub meshes: MeshUpdates,
     /// Where the time went.
     pub stages: Stages,
@@ -137,6 +141,8 @@ impl Transaction {
             mask,
             sample_hash: draft.hash,
             receipts,
+            surfaces: meshes.chunks.clone(),
+            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, Arc::clone(&update.rings))).collect(),
             meshes,
             next_field: log.next,
             news,
@@ -235,16 +241,14 @@ impl Commit {
         world.mask.extend(&self.mask);
         world.fields.extend(self.fields);
         world.uniform.extend(self.uniform);
-        for (chunk, surface) in self.meshes.chunks {
+        for (chunk, surface) in self.surfaces {
             if surface.is_empty() {
                 world.surfaces.remove(&chunk);
             } else {
                 world.surfaces.insert(chunk, surface);
             }
         }
-        for (tile, update) in self.meshes.tiles {
-            world.rings.insert(tile, update.rings);
-        }
+        world.rings.extend(self.rings);
         world.sample_hash = self.sample_hash;
         world.next_field = self.next_field;
         world.revision += 1;

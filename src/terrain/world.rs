@@ -40,6 +40,11 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// All of it.
+    pub fn total(&self) -> usize {
+        self.ground + self.edits()
+    }
+
     /// What edits cost: all but the ground.
     pub fn edits(&self) -> usize {
         self.samples + self.materials + self.meshes + self.parts + self.index

@@ -51,9 +51,11 @@ fn run(measured: &Measured) -> Value {
             "triangles": triangles,
             "bytes": {
                 "ground": data.ground,
-                "bricks": data.bricks,
+                "samples": data.samples,
+                "materials": data.materials,
                 "index": data.index,
-                "surfaces": data.surfaces,
+                "meshes": data.meshes,
+                "parts": data.parts,
             },
         }),
         Ending::Full { triangles, sample_bytes, mesh_bytes } => json!({
