@@ -72,7 +72,11 @@ fn every_block_has_the_bits_of_the_mesher_by_the_book() {
                 println!("{} {}: extra {extra:?}\nmissing {missing:?}", ours.len(), theirs.len());
             }
             assert!(ours == theirs, "world {seed}, {block:?}: other triangles than by the book");
-            assert_eq!(vertices.len(), expected.vertices.len(), "world {seed}, {block:?}: vertices are shared");
+            assert_eq!(
+                vertices.len(),
+                expected.vertices.len(),
+                "world {seed}, {block:?}: vertices are shared"
+            );
             drawn += ours.len();
         }
         let kept: usize = world.drawn_chunks().map(|chunk| world.chunk_mesh(chunk).indices.len() / 3).sum();

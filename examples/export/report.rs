@@ -144,11 +144,7 @@ impl Report {
             tiles: grid.tiles().count(),
             bricks: world.bricks().count(),
             volumetric_cells: world.mask().len(),
-            bytes: ByteFigures {
-                world: memory,
-                edits: memory.edits(),
-                mesh_obj: 0,
-            },
+            bytes: ByteFigures { world: memory, edits: memory.edits(), mesh_obj: 0 },
             seams,
             timings,
         }

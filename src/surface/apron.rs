@@ -84,7 +84,8 @@ impl Apron {
         let low = neighbours.at.origin().y - 1;
         for layer in first..=last {
             let height = (low + layer as i32) * ONE;
-            let (level, y) = ((layer + 7) / 8, (layer + 7) % 8);
+            // Layer 0 is the last one of the brick below.
+            let (level, y) = (layer.div_ceil(8), (layer + 7) % 8);
             let rows = self.0[layer * AREA..].chunks_exact_mut(SIDE);
             for ((z, row), heights) in (7..).zip(rows).zip(heights) {
                 let bricks = &neighbours.bricks[level][z / 8 * 3..][..3];
@@ -98,7 +99,9 @@ impl Apron {
 /// the bricks.
 #[inline(always)]
 fn fill_row(row: &mut [Marked], bricks: &[Option<&Brick>], heights: &[i32; SIDE], height: i32, at: usize) {
-    let (Some(row), Some(inner)) = (row.first_chunk_mut::<SIDE>(), heights[1..].first_chunk::<8>()) else { return };
+    let (Some(row), Some(inner)) = (row.first_chunk_mut::<SIDE>(), heights[1..].first_chunk::<8>()) else {
+        return;
+    };
     let pristine = i32x8::splat(height) - i32x8::new(*inner);
     let mut marked = pristine + pristine;
     if let Some(brick) = bricks[1] {

@@ -69,7 +69,8 @@ impl Parts {
     pub fn iter(&self) -> impl Iterator<Item = (Block, &[Vertex], &[u16])> {
         let (mut vertex, mut index) = (0, 0);
         self.list.iter().map(move |part| {
-            let found = (part.block, &self.vertices[vertex..part.vertices], &self.indices[index..part.indices]);
+            let found =
+                (part.block, &self.vertices[vertex..part.vertices], &self.indices[index..part.indices]);
             (vertex, index) = (part.vertices, part.indices);
             found
         })
@@ -168,7 +169,9 @@ impl Mesher {
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
                 let entry = &table[case];
-                out.extend(entry.slots[..entry.len].iter().map(|&slot| self.numbers.at(base + usize::from(slot))));
+                out.extend(
+                    entry.slots[..entry.len].iter().map(|&slot| self.numbers.at(base + usize::from(slot))),
+                );
             });
         }
     }
@@ -268,9 +271,7 @@ impl Cubes {
     fn within(&self, cells: LatticeBox, brick: BrickPos) -> [Corners; 8] {
         let (low, high) = (cells.min - brick.origin(), cells.max - brick.origin());
         let area = corners::rectangle(Column::of(low), Column::of(high));
-        std::array::from_fn(|y| {
-            if (low.y..=high.y).contains(&(y as i32)) { self.drawn[y] & area } else { 0 }
-        })
+        std::array::from_fn(|y| if (low.y..=high.y).contains(&(y as i32)) { self.drawn[y] & area } else { 0 })
     }
 }
 
@@ -294,9 +295,8 @@ fn solid_layers(near: &Near, pristine: impl Fn() -> [Corners; 9]) -> [Corners; 9
     let mut layers = std::array::from_fn(|y| {
         corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))
     });
-    let missing = near.map(|bricks| {
-        corners::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 }))
-    });
+    let missing =
+        near.map(|bricks| corners::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 })));
     if missing != [0; 2] {
         let pristine = pristine();
         for (y, layer) in layers.iter_mut().enumerate() {

@@ -109,7 +109,7 @@ pub static PLACES: [Place; 81] = {
 /// Which corners of the 9 layers from `y` on are solid in the pristine world, under columns of these heights.
 pub fn pristine(heights: &Heights, y: i32) -> [Corners; 9] {
     // In each column the lowest samples are solid, as many as lie below its height; the rest of rows is done by words.
-    let count = |height: i32| ((height + (ONE - 1) >> ONE.trailing_zeros()) - y).clamp(0, 9) as usize;
+    let count = |height: i32| (((height + (ONE - 1)) >> ONE.trailing_zeros()) - y).clamp(0, 9) as usize;
     let mut rising = [[0u64; 2]; 10];
     for z in 0..9 {
         let (word, shift) = (z / 5, z % 5 * 9);

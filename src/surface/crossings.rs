@@ -45,7 +45,8 @@ impl Crossings {
         origin: IVec3,
         out: &mut Vec<Vertex>,
     ) {
-        let mut site = Site { apron, stack, materials: StoredMaterials::new(around), low, base: low - origin };
+        let mut site =
+            Site { apron, stack, materials: StoredMaterials::new(around), low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
         site.make::<0>(x, out);
@@ -91,16 +92,15 @@ impl Site<'_, '_> {
         let step = batch.steps[lane];
         let flags = 1 << lane;
         let is_pristine = batch.edited & flags == 0;
-        let normal = if is_pristine
-            && (batch.stencil_edited & flags == 0 || self.stack.is_border(corner, AXIS))
-        {
-            match AXIS {
-                1 => self.stack.normal(corner),
-                _ => lerp_normal(self.stack.normal(corner), self.stack.normal(other), step),
-            }
-        } else {
-            Vec3::new(batch.normals[0][lane], batch.normals[1][lane], batch.normals[2][lane])
-        };
+        let normal =
+            if is_pristine && (batch.stencil_edited & flags == 0 || self.stack.is_border(corner, AXIS)) {
+                match AXIS {
+                    1 => self.stack.normal(corner),
+                    _ => lerp_normal(self.stack.normal(corner), self.stack.normal(other), step),
+                }
+            } else {
+                Vec3::new(batch.normals[0][lane], batch.normals[1][lane], batch.normals[2][lane])
+            };
         let mut position = (self.base + IVec3::new(place.x, y, place.z)) * SNAP;
         position[AXIS] += step;
         let stored = if self.materials.is_any {
@@ -172,7 +172,7 @@ impl Batch {
         let [before, p, q, after, pb, pb2, qb, qb2, pc, pc2, qc, qc2] = gathered.map(i32x8::new);
         let is_edited = p | q;
         let stencil = is_edited | before | after | pb | pb2 | qb | qb2 | pc | pc2 | qc | qc2;
-        let flags = |marked: i32x8| (marked << 31u32).to_bitmask() as u32;
+        let flags = |marked: i32x8| (marked << 31u32).to_bitmask();
 
         let mut steps = linear_steps(p >> 1u32, q >> 1u32);
         if AXIS == 1 {
@@ -199,7 +199,7 @@ impl Batch {
             normals: [unit(x, 0.0), unit(y, 1.0), unit(z, 0.0)],
             edited: flags(is_edited),
             stencil_edited: flags(stencil),
-            lower_solid: p.to_bitmask() as u32,
+            lower_solid: p.to_bitmask(),
         }
     }
 }

@@ -184,8 +184,8 @@ mod tests {
     fn a_cell_goes_in_once() {
         let mut mask = Mask::default();
         let cell = Column::new(-3, 17);
-        mask.insert_word((-1, 2), 1 << (1 * 8 + 5));
-        mask.insert_word((-1, 2), 1 << (1 * 8 + 5));
+        mask.insert_word((-1, 2), 1 << 13);
+        mask.insert_word((-1, 2), 1 << 13);
         mask.insert_word((4, 4), 0);
         assert!(mask.contains(cell) && mask.len() == 1);
         assert_eq!(mask.iter().collect::<Vec<_>>(), [cell]);

@@ -102,7 +102,13 @@ impl Rings {
     }
 
     /// The same rings, but with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells, ascending.
-    pub fn updated(&self, world: &WorldView, tile: TilePos, borders: &Borders, patches: &[(i32, i32)]) -> Self {
+    pub fn updated(
+        &self,
+        world: &WorldView,
+        tile: TilePos,
+        borders: &Borders,
+        patches: &[(i32, i32)],
+    ) -> Self {
         let mut drawing = Drawing::new(world, tile, borders);
         let (mut own, mut fresh) = (0, 0);
         loop {
@@ -163,8 +169,7 @@ impl<'a> Drawing<'a> {
             None => (0, 0),
         };
         let moved = (self.rings.vertices.len() as u32).wrapping_sub(vertex as u32);
-        let shift =
-            |&index: &u32| if index < self.base { index } else { index.wrapping_add(moved) };
+        let shift = |&index: &u32| if index < self.base { index } else { index.wrapping_add(moved) };
         self.rings.fans.extend(from.fans[fan..end.fans].iter().map(shift));
         self.rings.vertices.extend_from_slice(&from.vertices[vertex..end.vertices]);
         self.close(end.at);
@@ -195,8 +200,7 @@ impl<'a> Drawing<'a> {
     /// Fans a cell's two triangles over the sides where it borders on the mask.
     fn cell(&mut self, cell: Column, flags: u8) {
         let width = (self.high.x - self.low.x + 1) as u32;
-        let number =
-            |column: Column| (column.z - self.low.z) as u32 * width + (column.x - self.low.x) as u32;
+        let number = |column: Column| (column.z - self.low.z) as u32 * width + (column.x - self.low.x) as u32;
         let (corners, ground) = (cell.corners(), self.ground);
         let mut sides = std::mem::take(&mut self.sides);
         for (side, line) in sides.iter_mut().enumerate() {

@@ -94,7 +94,9 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
     let mut dirty: Vec<([i32; 3], LatticeBox)> = Vec::with_capacity(changed.len() * 8);
     let last = IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1);
     let mut insert = |low: IVec3, high: IVec3| {
-        let Some(cells) = LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last)) else { return };
+        let Some(cells) = LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last)) else {
+            return;
+        };
         let (first, last): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
         for x in first.x..=last.x {
             for z in first.z..=last.z {
@@ -236,11 +238,7 @@ fn touched_tiles(world: &World, view: &WorldView, added: &Mask) -> Vec<(TilePos,
         let indices = tile::indices(view.grid, tile, &borders, &rings);
         (tile, TileUpdate { indices, rings, ground: Arc::clone(&world.ground), grid: view.grid })
     };
-    if tiles.len() < 8 {
-        tiles.iter().map(update).collect()
-    } else {
-        tiles.par_iter().map(update).collect()
-    }
+    if tiles.len() < 8 { tiles.iter().map(update).collect() } else { tiles.par_iter().map(update).collect() }
 }
 
 /// The tiles that draw some of the 8x8 cells of a word.
@@ -251,7 +249,8 @@ fn tiles_of(grid: ChunkGrid, (x, z): (i32, i32)) -> impl Iterator<Item = TilePos
         IVec3::new(last(x, grid.width()), 0, last(z, grid.depth())),
     );
     cells.into_iter().flat_map(move |cells| {
-        let (low, high) = (grid.tile_of_cell(Column::of(cells.min)), grid.tile_of_cell(Column::of(cells.max)));
+        let (low, high) =
+            (grid.tile_of_cell(Column::of(cells.min)), grid.tile_of_cell(Column::of(cells.max)));
         (low.z..=high.z).flat_map(move |z| (low.x..=high.x).map(move |x| TilePos { x, z }))
     })
 }

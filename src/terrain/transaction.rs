@@ -113,7 +113,8 @@ impl Transaction {
         let draft = Stages::time(&mut stages.edit, || {
             Draft::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &edits)
         });
-        let bricks: Bricks = draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
+        let bricks: Bricks =
+            draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         let samples = world.samples().over(&bricks);
 
         let mask = Stages::time(&mut stages.ring, || {

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use super::surface::ChunkSurface;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash};
-use super::surface::ChunkSurface;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
@@ -197,7 +197,8 @@ impl World {
 
     /// Bytes that the world takes.
     pub fn memory(&self) -> Memory {
-        let mut memory = Memory { ground: self.ground.bytes(), index: self.mask.bytes(), ..Memory::default() };
+        let mut memory =
+            Memory { ground: self.ground.bytes(), index: self.mask.bytes(), ..Memory::default() };
         // Bricks that are all alike are one brick.
         let single = self.bricks.values().filter(|brick| brick.uniform().is_none());
         for brick in single.chain(self.uniform.values()) {

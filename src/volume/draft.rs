@@ -387,8 +387,9 @@ impl<'a> Workpiece<'a> {
             for y in (0..8).filter(|&y| self.changed[y] >> bit & 1 == 1) {
                 let index = y * 64 + bit;
                 let height = low.y + y as i32;
-                let of =
-                    |brick: &Brick| sample_hash(place, height, brick.samples()[index], brick.material_at(index));
+                let of = |brick: &Brick| {
+                    sample_hash(place, height, brick.samples()[index], brick.material_at(index))
+                };
                 change = change.wrapping_add(of(&self.brick)).wrapping_sub(self.base.map_or(0, of));
             }
         }

@@ -41,7 +41,7 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
 /// column to column.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let (ground, chunk_size) = random_heights(rng, index);
-    if index % 3 != 0 {
+    if !index.is_multiple_of(3) {
         return (ground, chunk_size);
     }
     let (low, high) = ground.height_range();

@@ -1,0 +1,57 @@
+//! Transactions of one brush each, split into stages.
+
+use std::time::{Duration, Instant};
+
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::Stages;
+
+use crate::statistics::Sample;
+
+/// Times of many transactions.
+#[derive(Default)]
+pub struct Played {
+    pub stages: Vec<Stages>,
+    pub commits: Sample,
+}
+
+/// Plays brushes, a transaction each.
+pub fn play(terrain: &mut Terrain, brushes: impl IntoIterator<Item = Brush>) -> Played {
+    let mut played = Played::default();
+    for brush in brushes {
+        terrain.submit(&brush);
+        let commit = terrain.begin().expect("a brush waits").run();
+        played.stages.push(commit.stages);
+        let start = Instant::now();
+        let receipts = terrain.commit(commit).expect("nothing else commits");
+        played.commits.push(start.elapsed().as_secs_f64());
+        assert!(receipts.iter().all(|receipt| receipt.outcome.is_ok()));
+    }
+    played
+}
+
+impl Played {
+    /// One stage of every transaction, in seconds.
+    pub fn stage(&self, stage: fn(&Stages) -> Duration) -> Sample {
+        self.stages.iter().map(|stages| stage(stages).as_secs_f64()).collect()
+    }
+}
+
+/// Heads the lines that [`row`] prints.
+pub fn header(what: &str) {
+    let names = ["whole", "p99", "edit", "meshing", "assembly", "ring", "commit"];
+    let names: String = names.iter().map(|name| format!("{name:>9}")).collect();
+    println!("  {what:<32}{names}   us, medians but for p99");
+}
+
+/// One line: the whole transaction, its stages, and the commit.
+pub fn row(what: &str, played: &Played) {
+    let whole = played.stage(|stages| stages.whole);
+    let stages: [fn(&Stages) -> Duration; 4] =
+        [|stages| stages.edit, |stages| stages.meshing, |stages| stages.assembly, |stages| stages.ring];
+    let figures = [whole.median(), whole.percentile(0.99)]
+        .into_iter()
+        .chain(stages.map(|stage| played.stage(stage).median()))
+        .chain([played.commits.median()]);
+    let figures: String = figures.map(|seconds| format!("{:>9.1}", seconds * 1e6)).collect();
+    println!("  {what:<32}{figures}");
+}
