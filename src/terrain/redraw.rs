@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::IVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::surface::{ChunkSurface, Fresh, key};
 use super::transaction::Stages;
@@ -91,18 +92,16 @@ pub(super) fn updates(
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
 fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec<Block> {
-    let mut dirty: Vec<([i32; 3], LatticeBox)> = Vec::with_capacity(changed.len() * 8);
+    let mut dirty: FxHashMap<BrickPos, LatticeBox> = FxHashMap::default();
+    dirty.reserve(changed.len() * 2);
     let last = IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1);
     let mut insert = |low: IVec3, high: IVec3| {
         let Some(cells) = LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last)) else {
             return;
         };
-        let (first, last): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
-        for x in first.x..=last.x {
-            for z in first.z..=last.z {
-                for y in first.y..=last.y {
-                    dirty.push(([x, z, y], cells));
-                }
+        for brick in BrickPos::covering(cells) {
+            if let Some(cells) = brick.samples().intersection(cells) {
+                dirty.entry(brick).and_modify(|all| *all = all.union(cells)).or_insert(cells);
             }
         }
     };
@@ -121,17 +120,11 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
             }
         }
     }
-    dirty.sort_unstable_by_key(|&(brick, _)| brick);
+    let mut dirty: Vec<(BrickPos, LatticeBox)> = dirty.into_iter().collect();
+    dirty.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
     let mut blocks = Vec::with_capacity(dirty.len());
-    for same in dirty.chunk_by(|a, b| a.0 == b.0) {
-        let [x, z, y] = same[0].0;
-        let brick = BrickPos(IVec3::new(x, y, z));
-        let mut cells = None;
-        for part in same.iter().filter_map(|(_, cells)| cells.intersection(brick.samples())) {
-            LatticeBox::include(&mut cells, part);
-        }
-        let chunks = cells.into_iter().flat_map(|cells| view.grid.chunks_of(cells));
-        blocks.extend(chunks.map(|chunk| Block { brick, chunk }));
+    for (brick, cells) in dirty {
+        blocks.extend(view.grid.chunks_of(cells).map(|chunk| Block { brick, chunk }));
     }
     blocks
 }
