@@ -1,0 +1,71 @@
+//! How often an edit asks the system for memory: never while it meshes, and a known number of times in all.
+
+mod worlds;
+
+use allocation_counter::measure;
+use bevy_burrow::lattice::{BrickPos, LatticeBox};
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::block::{Block, Mesher, Parts};
+use bevy_burrow::terrain::World;
+use glam::{IVec3, Vec3};
+
+/// Runs `work`; how often did it ask for memory?
+fn count<T>(work: impl FnOnce() -> T) -> (Option<T>, u64) {
+    let mut result = None;
+    let allocations = measure(|| result = Some(work())).count_total;
+    (result, allocations)
+}
+
+/// The blocks of all stored bricks and those around them.
+fn blocks(world: &World) -> Vec<Block> {
+    let mut bricks: Vec<BrickPos> = world.bricks().map(|(brick, _)| brick).collect();
+    bricks.sort_unstable_by_key(|brick| (brick.0.x, brick.0.z, brick.0.y));
+    let last = IVec3::new(world.grid().width() - 1, i32::MAX, world.grid().depth() - 1);
+    let inside = LatticeBox { min: IVec3::new(0, i32::MIN, 0), max: last };
+    let cells = bricks.iter().filter_map(|brick| Some((*brick, brick.samples().intersection(inside)?)));
+    cells
+        .flat_map(|(brick, cells)| world.grid().chunks_of(cells).map(move |chunk| Block { brick, chunk }))
+        .collect()
+}
+
+#[test]
+fn meshing_takes_no_memory_once_it_is_warm() {
+    for seed in 0..20 {
+        let terrain = worlds::random_world(&mut fastrand::Rng::with_seed(seed), seed);
+        let (world, blocks) = (terrain.world(), blocks(terrain.world()));
+        let (mut mesher, mut parts) = (Mesher::default(), Parts::default());
+        let mesh = |mesher: &mut Mesher, parts: &mut Parts| {
+            parts.clear();
+            mesher.mesh(&world.view(), &blocks, parts);
+        };
+        mesh(&mut mesher, &mut parts);
+        let drawn = parts.indices.len();
+        let (_, allocations) = count(|| mesh(&mut mesher, &mut parts));
+        assert_eq!((allocations, parts.indices.len()), (0, drawn), "world {seed}");
+    }
+}
+
+#[test]
+fn an_edit_takes_memory_for_what_it_leaves_behind() {
+    let mut terrain =
+        Terrain::new(worlds::real_ground(), &TerrainSettings::default()).expect("valid settings");
+    let mut most = 0;
+    for i in 0..60 {
+        // Six times the same holes, a little deeper each time: bricks, mask and rings are there.
+        let (x, z) = (100 + i % 10 * 40, 200 + i % 7 * 3);
+        let height = terrain.world().ground().height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
+        let place = Vec3::new(x as f32, height - 0.3 * (i / 10) as f32, z as f32);
+        terrain.submit(&Brush::dig(Shape::sphere(place, 4.0)));
+        let transaction = terrain.begin().expect("a brush waits");
+        let (commit, allocations) = count(|| transaction.run());
+        let commit = commit.expect("it ran");
+        assert!(!commit.meshes.chunks.is_empty());
+        if i >= 10 {
+            most = most.max(allocations);
+        }
+        terrain.commit(commit).expect("nothing else commits");
+    }
+    println!("at most {most} allocations in the transaction of one radius-4 dig on dug ground");
+    // A brick and its share of the receipt for each of some thirty bricks, two buffers for each chunk, a few lists.
+    assert!(most <= 150, "{most} allocations");
+}
