@@ -22,10 +22,10 @@ WORLDS ?= 10000
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run test test-model test-plugin test-examples soak pictures
+.PHONY: help setup run test test-model test-plugin test-examples soak pictures bench peers instructions
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
 run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only)
 	@tools/setup.sh run
@@ -57,6 +57,16 @@ test-examples:
 soak: ## Dig WORLDS (10000) random worlds and look at every seam
 	@tools/setup.sh build
 	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams -- --nocapture
+
+bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short look)
+	@tools/setup.sh build
+	cargo bench $(WITHOUT_BEVY) --bench meshers -- $(ARGS)
+
+peers: ## The same beside VTK, scikit-image and PyMCubes, which it installs outside the clone
+	@tools/peers.sh $(ARGS)
+
+instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)
+	@tools/instructions.sh $(ARGS)
 
 pictures: ## Make the pictures of the README again
 	@tools/setup.sh run
