@@ -183,8 +183,8 @@ def check(meshers, grid):
         first = findings[0] if findings else found
         alike = all(found[key] == first[key] for key in ("triangles", "components", "euler"))
         findings.append({"field": grid.field, "size": grid.size, "name": mesher.name, "alike": alike, **found})
-        # Faces that are ambiguous may be cut either way, and scikit-image looks into cubes as well: in caves, pieces and
-        # handles differ and nobody is wrong. Balls and hills leave no choice to plain marching cubes.
+        # Ambiguous faces may be cut either way, and scikit-image looks into cubes as well: in caves, pieces and handles
+        # differ and nobody is wrong. Balls and hills leave no choice to plain marching cubes.
         is_plain = isinstance(mesher, (Ours, FlyingEdges))
         fine &= not is_plain or (found["unbalanced"] == 0 and (alike or grid.field == "caves"))
     return findings, fine
@@ -227,7 +227,7 @@ def measure(meshers, grid, least, most, budget):
     rows = []
     for mesher in meshers:
         reference = next(ours for ours in meshers if isinstance(ours, Ours) and ours.normals == mesher.normals)
-        pairs = zip(times[reference.name], times[mesher.name])
+        pairs = zip(times[reference.name], times[mesher.name], strict=True)
         rows.append(
             {
                 "field": grid.field,
