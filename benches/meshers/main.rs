@@ -125,9 +125,7 @@ fn run(args: &Args) -> std::io::Result<ExitCode> {
 }
 
 fn check_all(args: &Args) -> Vec<Finding> {
-    println!(
-        "closed grids: what each contender makes of them; after ! what is wrong, or different from the first"
-    );
+    println!("closed grids, before anything is timed");
     let mut all = Vec::new();
     for &field in &args.fields {
         for &size in &args.sizes {
