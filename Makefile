@@ -24,10 +24,10 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run test test-model test-plugin test-examples soak paper pictures
+.PHONY: help setup run test test-model test-plugin test-examples soak paper pictures bench peers instructions
 
 help: ## List the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
 run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only)
 	@tools/setup.sh run
@@ -63,6 +63,16 @@ soak: ## Dig WORLDS (10000) random worlds and look at every seam
 paper: ## Do the paper's experiment again and write docs/RESULTS.md (REPEATS=10)
 	@tools/setup.sh build
 	cargo run --release $(WITHOUT_BEVY) --example paper -- --out out/paper --results docs/RESULTS.md --repeats $(REPEATS)
+
+bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short look)
+	@tools/setup.sh build
+	cargo bench $(WITHOUT_BEVY) --bench meshers -- $(ARGS)
+
+peers: ## The same beside VTK, scikit-image and PyMCubes, which it installs outside the clone
+	@tools/peers.sh $(ARGS)
+
+instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)
+	@tools/instructions.sh $(ARGS)
 
 pictures: ## Make the pictures of the README again
 	@tools/setup.sh run

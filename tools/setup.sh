@@ -1,9 +1,11 @@
 #!/bin/sh
 # Installs what this machine lacks for building and running bevy_burrow; with nothing missing it only looks.
 #
-#   tools/setup.sh build     compiler, linker, Rust
-#   tools/setup.sh run       the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
-#   tools/setup.sh lint      the same as build, and rustfmt and clippy
+#   tools/setup.sh build          compiler, linker, Rust
+#   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
+#   tools/setup.sh lint           the same as build, and rustfmt and clippy
+#   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
+#   tools/setup.sh instructions   the same as build, and valgrind, which counts instructions
 #
 # Debian and its kin: uses apt-get, as root or with sudo, and the official Rust installer. Elsewhere it says what to
 # install. Compiling needs no -dev packages.
@@ -70,7 +72,10 @@ install_rust() {
     rust_is_new_enough || die "rustc is '$(rust_version)' after installing, but $wanted_rust is the least"
 }
 
-case $goal in build | run | lint) ;; *) die "unknown goal '$goal': build, run or lint" ;; esac
+case $goal in
+    build | run | lint | peers | instructions) ;;
+    *) die "unknown goal '$goal': build, run, lint, peers or instructions" ;;
+esac
 
 has make || want make
 if ! has cc; then
@@ -94,6 +99,13 @@ if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
         want_library libxkbcommon.so.0 libxkbcommon0
         want_library libxkbcommon-x11.so.0 libxkbcommon-x11-0
     fi
+fi
+if [ "$goal" = peers ]; then
+    has python3 || want python3
+    python3 -c 'import ensurepip, venv' 2>/dev/null || want python3-venv
+fi
+if [ "$goal" = instructions ]; then
+    has valgrind || want valgrind
 fi
 install_packages
 has cc || die "a C compiler and linker is missing"

@@ -1,0 +1,176 @@
+//! Fixed work whose instructions are counted: `tools/instructions.sh` runs every workload under callgrind, which counts
+//! what happens inside [`counted_workload`] and nothing else, and compares with `benches/instructions.txt`.
+//!
+//! Unlike times, counts are the same on a busy machine, so a small loss shows. One thread, fixed inputs, no clocks.
+//!
+//! `cargo bench --no-default-features --bench instructions -- NAME` does one workload; without a name it lists them.
+
+use std::hint::black_box;
+use std::process::ExitCode;
+
+use bevy_burrow::ground::MaterialId;
+use bevy_burrow::lattice::Column;
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
+use glam::Vec3;
+
+// The fields of the bench `meshers`, of which this one takes but a few.
+#[allow(dead_code)]
+#[path = "meshers/fields.rs"]
+mod fields;
+
+use fields::{Border, Field};
+
+/// What is counted. Callgrind knows it by this name, so it must stay a function of its own.
+#[inline(never)]
+fn counted_workload(work: &mut dyn FnMut()) {
+    work();
+    black_box(());
+}
+
+/// A name, and what to do.
+type Workload = (&'static str, fn());
+
+const WORKLOADS: [Workload; 10] = [
+    ("dense-caves", || dense(Field::Caves)),
+    ("dense-chunk-i16", dense_chunk),
+    ("dense-empty", || dense(Field::Empty)),
+    ("dense-sphere", || dense(Field::Sphere)),
+    ("dense-terrain", || dense(Field::Terrain)),
+    ("dig-radius-4-dug", || dig(Digging::Dug)),
+    ("dig-radius-4-fresh", || dig(Digging::Fresh)),
+    ("dig-radius-16", dig_wide),
+    ("paint", paint),
+    ("thousand-edits", thousand_edits),
+];
+
+fn main() -> ExitCode {
+    // Everything on this thread: work that is handed to another would not be counted, and order would not be fixed.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
+    pool.expect("no pool was made before");
+    // Cargo adds --bench.
+    let Some(name) = std::env::args().skip(1).find(|word| word != "--bench") else {
+        for (name, _) in WORKLOADS {
+            println!("{name}");
+        }
+        return ExitCode::SUCCESS;
+    };
+    let Some((_, workload)) = WORKLOADS.iter().find(|(known, _)| *known == name) else {
+        eprintln!("instructions: no workload '{name}'");
+        return ExitCode::FAILURE;
+    };
+    workload();
+    ExitCode::SUCCESS
+}
+
+/// One grid of 64^3 floats, with normals. Tables and buffers are there before the count begins.
+fn dense(field: Field) {
+    let grid = field.grid(64, Border::Cut);
+    mesh_counted(|| DenseGrid::new(&grid.samples, grid.sides()).expect("a cube of samples"));
+}
+
+/// One chunk of 32^3 cells in i16, with an apron.
+fn dense_chunk() {
+    let grid = Field::Terrain.chunk(1, 35);
+    mesh_counted(|| DenseGrid::with_apron(&grid.fixed, grid.sides()).expect("a cube of samples"));
+}
+
+fn mesh_counted<'a, S: Density + 'a>(grid: impl Fn() -> DenseGrid<'a, S>) {
+    let (mut mesher, mut mesh) = (DenseMesher::new(), DenseMesh::default());
+    mesher.mesh(grid(), Normals::Gradient, &mut mesh);
+    counted_workload(&mut || mesher.mesh(grid(), Normals::Gradient, &mut mesh));
+    black_box(&mesh);
+}
+
+/// Hills of 256^2 columns in chunks of 32.
+fn terrain() -> Terrain {
+    let hills = NoiseHeights { seed: 5, scale: 90.0, amplitude: 20.0, ..NoiseHeights::default() };
+    let ground = Ground::from_noise(256, 256, &hills).expect("valid noise");
+    Terrain::new(ground, &TerrainSettings::default()).expect("valid settings")
+}
+
+/// The ground's surface over a place number; places lie all over the hills, apart from each other.
+fn place(terrain: &Terrain, number: i32) -> Vec3 {
+    let (x, z) = (24 + number * 89 % 208, 24 + number * 55 % 208);
+    let height = terrain.world().ground().height(Column::new(x, z)) as f32 / 256.0;
+    Vec3::new(x as f32, height, z as f32)
+}
+
+/// One transaction per brush, as a player digs.
+fn one_by_one(terrain: &mut Terrain, brushes: &[Brush]) {
+    for brush in brushes {
+        terrain.submit(brush);
+        let commit = terrain.begin().expect("a brush waits").run();
+        black_box(terrain.commit(commit).expect("nothing else commits"));
+    }
+}
+
+fn spheres(terrain: &Terrain, radius: f32, offset: f32, count: i32) -> Vec<Brush> {
+    let sphere =
+        |number| Brush::dig(Shape::sphere(place(terrain, number) + Vec3::new(offset, 0.0, offset), radius));
+    (0..count).map(sphere).collect()
+}
+
+/// What lies where the spheres of radius 4 dig.
+enum Digging {
+    /// Ground that nobody has touched.
+    Fresh,
+    /// Half a radius beside earlier spheres.
+    Dug,
+}
+
+fn dig(ground: Digging) {
+    let mut terrain = terrain();
+    // The first edit of all makes tables.
+    let warm_up = Brush::dig(Shape::sphere(Vec3::new(8.0, 0.0, 8.0), 4.0));
+    terrain.apply([warm_up]);
+    let (first, second) = (spheres(&terrain, 4.0, 0.0, 24), spheres(&terrain, 4.0, 3.0, 24));
+    match ground {
+        Digging::Fresh => counted_workload(&mut || one_by_one(&mut terrain, &first)),
+        Digging::Dug => {
+            one_by_one(&mut terrain, &first);
+            counted_workload(&mut || one_by_one(&mut terrain, &second));
+        }
+    }
+}
+
+/// Spheres that reach several chunks.
+fn dig_wide() {
+    let mut terrain = terrain();
+    let wide = spheres(&terrain, 16.0, 0.0, 4);
+    counted_workload(&mut || one_by_one(&mut terrain, &wide));
+}
+
+/// Paint over what is dug and over what is not.
+fn paint() {
+    let mut terrain = terrain();
+    let dug = spheres(&terrain, 4.0, 0.0, 12);
+    terrain.apply(&dug);
+    let stroke = |number| Brush::paint(Shape::sphere(place(&terrain, number), 5.0), MaterialId(3));
+    let strokes: Vec<Brush> = (0..24).map(stroke).collect();
+    counted_workload(&mut || one_by_one(&mut terrain, &strokes));
+}
+
+/// A thousand edits of all kinds in one transaction, as when a saved game is played back.
+fn thousand_edits() {
+    let mut terrain = terrain();
+    let mut random = fastrand::Rng::with_seed(11);
+    let brush = |number: i32| {
+        let center = place(&terrain, number) + Vec3::Y * (random.f32() * 12.0 - 9.0);
+        let size = 1.5 + random.f32() * 3.0;
+        let shape = match number % 3 {
+            0 => Shape::sphere(center, size),
+            1 => Shape::cylinder(center, Vec3::Y * 2.0 * size, size),
+            _ => Shape::capsule(center, center + Vec3::X * size, size),
+        };
+        match number % 5 {
+            0 => Brush::add(shape, MaterialId(2)),
+            1 => Brush::dig(shape).with_roughness(Roughness::new(1.0, 4.0, number as u32)),
+            _ => Brush::dig(shape),
+        }
+    };
+    let brushes: Vec<Brush> = (0..1000).map(brush).collect();
+    counted_workload(&mut || {
+        black_box(terrain.apply(&brushes));
+    });
+}

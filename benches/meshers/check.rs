@@ -1,0 +1,117 @@
+//! What has to hold before anything is timed: all meshes are closed, and are the same surface where algorithms have to agree.
+//!
+//! Where two solid samples of a cube's face lie across from each other, programs may join them or cut them off, and each
+//! choice is right. Balls have no such faces and hills hardly any; caves are full of them, so pieces and handles may
+//! differ there and are only reported. A dual mesh has one vertex for all sheets in a cell, so it may pinch.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use crate::contender::{Contender, Part, Shading};
+use crate::fields::{Border, Field};
+use crate::topology::Topology;
+
+/// What one contender made of a closed grid.
+#[derive(Debug, Serialize)]
+pub struct Finding {
+    /// The field.
+    pub field: Field,
+    /// Samples along the grid's side.
+    pub size: usize,
+    /// The contender.
+    pub name: &'static str,
+    /// What its mesh is, if it is one at all.
+    pub topology: Option<Topology>,
+    /// What is wrong with it, or different from the first contender.
+    pub remarks: Vec<String>,
+    /// Does that stop the benchmark?
+    pub fatal: bool,
+}
+
+/// Meshes a closed grid with everything.
+pub fn closed_grid(contenders: &mut [Box<dyn Contender>], field: Field, size: usize) -> Vec<Finding> {
+    let grid = field.grid(size, Border::Closed);
+    let mut findings: Vec<Finding> = Vec::new();
+    for contender in contenders {
+        let (name, class) = (contender.name(), contender.class());
+        contender.load(&grid);
+        contender.mesh(&grid, Part::Whole);
+        let mesh = contender.result();
+        let (mut remarks, mut broken) = (Vec::new(), false);
+        let topology = match Topology::of(&mesh, class.sharing) {
+            Ok(topology) => Some(topology),
+            Err(error) => {
+                remarks.push(error.to_string());
+                broken = true;
+                None
+            }
+        };
+        if let Some(topology) = &topology {
+            if topology.unbalanced > 0 {
+                remarks.push(format!("not closed: {} unbalanced edges", topology.unbalanced));
+                broken = true;
+            }
+            if !topology.faces_air {
+                remarks.push("faces the ground".into());
+                broken = true;
+            }
+            if topology.degenerate > 0 {
+                remarks.push(format!("{} degenerate triangles", topology.degenerate));
+            }
+            if topology.crowded > 0 {
+                remarks.push(format!("{} edges of more than two triangles", topology.crowded));
+            }
+        }
+        if class.shading == Shading::Unit && !mesh.normals.iter().all(|&normal| is_unit(normal)) {
+            remarks.push("normals that are not of unit length".into());
+        }
+        let is_ours = name.starts_with("burrow");
+        let mut fatal = is_ours && broken;
+        if let (Some(topology), Some(first)) = (&topology, findings.first().and_then(|first| first.topology))
+        {
+            let same = (topology.components, topology.euler) == (first.components, first.euler);
+            if !same {
+                remarks.push(format!(
+                    "{} pieces and Euler characteristic {}, not {} and {}",
+                    topology.components, topology.euler, first.components, first.euler
+                ));
+            }
+            // A peer that is broken proves nothing.
+            fatal |= !same && !broken && !class.dual && field != Field::Caves;
+            fatal |= is_ours && topology.triangles != first.triangles;
+        }
+        findings.push(Finding { field, size, name, topology, remarks, fatal });
+    }
+    findings
+}
+
+fn is_unit([x, y, z]: [f32; 3]) -> bool {
+    let length = (x * x + y * y + z * z).sqrt();
+    (length - 1.0).abs() < 1e-3
+}
+
+/// The findings of one grid: what the first contender made, who agrees, and a line for whoever does not.
+pub fn describe(findings: &[Finding]) -> String {
+    let Some(first) = findings.first() else { return String::new() };
+    let shape = first.topology.map_or_else(
+        || "no mesh".to_string(),
+        |shape| {
+            let Topology { triangles, components, euler, .. } = shape;
+            format!("{triangles} triangles, {components} pieces, {} handles, Euler {euler}", shape.genus())
+        },
+    );
+    let agreed = findings.iter().filter(|finding| finding.remarks.is_empty()).count();
+    let mut text = format!(
+        "  {:<8} n = {:<4} {shape}; {agreed} of {} closed and alike\n",
+        first.field.name(),
+        first.size,
+        findings.len()
+    );
+    for Finding { name, remarks, fatal, .. } in findings.iter().filter(|finding| !finding.remarks.is_empty())
+    {
+        let mark = if *fatal { "WRONG " } else { "" };
+        let _ = writeln!(text, "      {mark}{name}: {}", remarks.join("; "));
+    }
+    text
+}

@@ -1,0 +1,137 @@
+//! Clocks: every contender once per round, in an order that turns, and what the rounds say in pairs.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::contender::{Class, Contender, Part};
+use crate::fields::{Field, Grid};
+
+/// One contender's times, in the order of the rounds.
+pub struct Times {
+    /// The contender.
+    pub name: &'static str,
+    /// What its meshes hold.
+    pub class: Class,
+    /// Triangles of all the meshes that were timed together.
+    pub triangles: usize,
+    /// Nanoseconds, one per round.
+    pub rounds: Vec<f64>,
+}
+
+/// A median and the quartiles beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// A quarter of the numbers are below.
+    pub low: f64,
+    /// Half of them.
+    pub median: f64,
+    /// Three quarters.
+    pub high: f64,
+}
+
+impl Spread {
+    /// Of some numbers.
+    pub fn of(numbers: impl IntoIterator<Item = f64>) -> Self {
+        let mut sorted: Vec<f64> = numbers.into_iter().collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+        Self { low: at(0.25), median: at(0.5), high: at(0.75) }
+    }
+}
+
+impl Times {
+    fn new(contender: &dyn Contender) -> Self {
+        Self { name: contender.name(), class: contender.class(), triangles: 0, rounds: Vec::new() }
+    }
+
+    /// Times divided by a number of cells.
+    pub fn per_cell(&self, cells: usize) -> Spread {
+        Spread::of(self.rounds.iter().map(|time| time / cells as f64))
+    }
+
+    /// These times as parts of another's, round by round.
+    pub fn over(&self, other: &Self) -> Spread {
+        Spread::of(self.rounds.iter().zip(&other.rounds).map(|(own, other)| own / other))
+    }
+}
+
+/// How long a grid is timed.
+#[derive(Clone, Copy)]
+pub struct Patience {
+    /// Rounds at least.
+    pub least: usize,
+    /// Rounds at most.
+    pub most: usize,
+    /// No further round begins after this, once there are enough.
+    pub budget: Duration,
+}
+
+/// Nanoseconds that one mesh takes.
+pub fn once(contender: &mut dyn Contender, grid: &Grid, part: Part) -> f64 {
+    let start = Instant::now();
+    contender.mesh(black_box(grid), part);
+    start.elapsed().as_nanos() as f64
+}
+
+/// Whose turn it is: everybody's once per round. Rounds begin with another contender each, and every other one runs
+/// backwards, so that nobody always comes after the same neighbour.
+fn turns(contenders: usize, round: usize) -> impl Iterator<Item = usize> {
+    (0..contenders).map(move |turn| {
+        let turn = if round.is_multiple_of(2) { turn } else { contenders - 1 - turn };
+        (turn + round / 2) % contenders
+    })
+}
+
+/// One grid again and again. Each call is made twice and the second one is timed, so that nobody pays for a cache that
+/// another has filled.
+pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Patience) -> Vec<Times> {
+    let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
+    for contender in contenders.iter_mut() {
+        contender.load(grid);
+    }
+    let start = Instant::now();
+    for round in 0..patience.most {
+        if round >= patience.least && start.elapsed() > patience.budget {
+            break;
+        }
+        for turn in turns(contenders.len(), round) {
+            let contender = &mut *contenders[turn];
+            contender.mesh(black_box(grid), Part::Whole);
+            times[turn].rounds.push(once(contender, grid, Part::Whole));
+            times[turn].triangles = contender.triangles();
+        }
+    }
+    times
+}
+
+/// Many chunks, each once: a round per chunk. Its samples are read before every call, as they would have been by whoever
+/// made the chunk, so that nobody pays for the memory that another has fetched.
+pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Times> {
+    let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
+    // Buffers grow and tables are made before the clock runs.
+    for contender in contenders.iter_mut() {
+        for chunk in chunks.iter().take(8) {
+            contender.mesh(chunk, Part::WithinApron);
+        }
+    }
+    for (round, chunk) in chunks.iter().enumerate() {
+        for turn in turns(contenders.len(), round) {
+            let contender = &mut *contenders[turn];
+            black_box(chunk.samples.iter().sum::<f32>());
+            black_box(chunk.fixed.iter().map(|&sample| i64::from(sample)).sum::<i64>());
+            times[turn].rounds.push(once(contender, chunk, Part::WithinApron));
+            times[turn].triangles += contender.triangles();
+        }
+    }
+    times
+}
+
+/// Cells along the side of a chunk of the stream.
+pub const CHUNK_CELLS: usize = 32;
+
+/// Chunks of a stream: a sample more than cells along each side, and an apron of one on each.
+pub fn chunks(field: Field, count: usize) -> Vec<Grid> {
+    (0..count).map(|number| field.chunk(number, CHUNK_CELLS + 3)).collect()
+}

@@ -1,0 +1,154 @@
+//! What a mesh is, whoever made it: is it closed, of how many pieces, with how many handles, which side is out.
+
+use std::collections::HashMap;
+
+use serde::Serialize;
+
+use crate::contender::{Mesh, Sharing};
+
+/// Numbers that do not depend on the order of vertices and triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Topology {
+    /// Vertices after welding that some triangle uses.
+    pub vertices: usize,
+    /// Vertices that the mesher wrote.
+    pub written: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Edges that some triangle runs along more often than others run back. None: the surface is closed.
+    pub unbalanced: usize,
+    /// Edges with more than two triangles.
+    pub crowded: usize,
+    /// Triangles with two corners in one vertex.
+    pub degenerate: usize,
+    /// Pieces that share no vertex.
+    pub components: usize,
+    /// Vertices minus edges plus triangles: twice the pieces minus twice the handles, for closed manifolds.
+    pub euler: i64,
+    /// Six times the enclosed volume is positive: triangles are counter-clockwise seen from the air.
+    pub faces_air: bool,
+}
+
+/// Why a mesh has no topology.
+#[derive(Debug, thiserror::Error)]
+pub enum TopologyError {
+    /// A vertex of marching cubes that is not on an edge of the lattice.
+    #[error("vertex {vertex} at {position:?} lies on no edge of the lattice")]
+    OffLattice {
+        /// Its number.
+        vertex: usize,
+        /// Where it is.
+        position: [f32; 3],
+    },
+    /// An index beyond the vertices.
+    #[error("index {index} of {vertices} vertices")]
+    Index {
+        /// The index.
+        index: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+}
+
+impl Topology {
+    /// Of a mesh. Vertices that are not shared are welded when they lie on the same edge of the lattice.
+    pub fn of(mesh: &Mesh, sharing: Sharing) -> Result<Self, TopologyError> {
+        let written = mesh.positions.len();
+        if let Some(&index) = mesh.indices.iter().find(|&&index| index as usize >= written) {
+            return Err(TopologyError::Index { index, vertices: written });
+        }
+        let number = match sharing {
+            Sharing::Shared => (0..written).collect(),
+            Sharing::Partly | Sharing::Soup => weld(&mesh.positions)?,
+        };
+        let corners =
+            mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|index| number[index as usize]));
+        let triangles: Vec<[usize; 3]> = corners.collect();
+        let mut pieces = Pieces::new(written);
+        // Runs along an edge, from low to high and back.
+        let mut runs: HashMap<(usize, usize), [u32; 2]> = HashMap::new();
+        let mut degenerate = 0;
+        for &[a, b, c] in &triangles {
+            degenerate += usize::from(a == b || b == c || c == a);
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                runs.entry((from.min(to), from.max(to))).or_default()[usize::from(from > to)] += 1;
+                pieces.join(from, to);
+            }
+        }
+        let mut used: Vec<usize> = triangles.iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        Ok(Self {
+            vertices: used.len(),
+            written,
+            triangles: triangles.len(),
+            unbalanced: runs.values().filter(|[there, back]| there != back).count(),
+            crowded: runs.values().filter(|[there, back]| there + back > 2).count(),
+            degenerate,
+            components: used.iter().filter(|&&vertex| pieces.root(vertex) == vertex).count(),
+            euler: used.len() as i64 - runs.len() as i64 + triangles.len() as i64,
+            faces_air: volume(mesh) >= 0.0,
+        })
+    }
+
+    /// Handles through all pieces together, of a closed manifold.
+    pub fn genus(&self) -> i64 {
+        self.components as i64 - self.euler / 2
+    }
+}
+
+/// Six times the volume that a mesh encloses.
+fn volume(mesh: &Mesh) -> f64 {
+    let corner = |index: u32| mesh.positions[index as usize].map(f64::from);
+    let of_triangle = |t: &[u32]| {
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = [corner(t[0]), corner(t[1]), corner(t[2])];
+        ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    };
+    mesh.indices.chunks_exact(3).map(of_triangle).sum()
+}
+
+/// For each vertex, the first one on the same edge of the lattice.
+fn weld(positions: &[[f32; 3]]) -> Result<Vec<usize>, TopologyError> {
+    let mut first = HashMap::new();
+    let numbered = positions.iter().enumerate().map(|(vertex, &position)| {
+        let edge = lattice_edge(position).ok_or(TopologyError::OffLattice { vertex, position })?;
+        Ok(*first.entry(edge).or_insert(vertex))
+    });
+    numbered.collect()
+}
+
+/// The axis and the lower end of the edge that a position lies on: one coordinate is a fraction, two are not, within
+/// what rounding does to them. Programs round differently, but never to another edge.
+fn lattice_edge(position: [f32; 3]) -> Option<(usize, [i32; 3])> {
+    const ROUNDING: f32 = 5e-4;
+    let off = position.map(|along| (along - along.round()).abs());
+    let axis = (0..3).max_by(|&a, &b| off[a].total_cmp(&off[b]))?;
+    let on_edge = (0..3).all(|other| other == axis || off[other] < ROUNDING);
+    let mut low = position.map(|along| along.round() as i32);
+    low[axis] = position[axis].floor() as i32;
+    on_edge.then_some((axis, low))
+}
+
+/// Which vertices hang together.
+struct Pieces {
+    parent: Vec<usize>,
+}
+
+impl Pieces {
+    fn new(vertices: usize) -> Self {
+        Self { parent: (0..vertices).collect() }
+    }
+
+    fn root(&mut self, mut vertex: usize) -> usize {
+        while self.parent[vertex] != vertex {
+            self.parent[vertex] = self.parent[self.parent[vertex]];
+            vertex = self.parent[vertex];
+        }
+        vertex
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b)] = a.min(b);
+    }
+}

@@ -1,0 +1,79 @@
+#!/bin/sh
+# Counts the instructions of fixed workloads (benches/instructions.rs) and compares them with benches/instructions.txt.
+#
+#   tools/instructions.sh            fails where a count grew by more than 3 %, and says what shrank
+#   tools/instructions.sh --update   writes the counts as the new baseline
+#
+# Counts depend on the compiler: the baseline names the one it was made with, and under another one they are shown but
+# nothing fails. Nor does it where valgrind can't be had: then nothing is counted.
+set -eu
+cd "$(dirname "$0")/.."
+
+baseline=benches/instructions.txt
+allowed_percent=3
+update=false
+case ${1:-} in
+    '') ;;
+    --update) update=true ;;
+    *)
+        echo "usage: tools/instructions.sh [--update]" >&2
+        exit 2
+        ;;
+esac
+
+PATH="$HOME/.cargo/bin:$PATH"
+CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$HOME/.cache/bevy_burrow/target}
+export PATH CARGO_TARGET_DIR
+tools/setup.sh instructions || true
+if ! command -v valgrind >/dev/null 2>&1; then
+    echo 'valgrind is not installed: instructions are not counted'
+    exit 0
+fi
+
+cargo bench --no-default-features --bench instructions --no-run
+# Cargo alone knows the binary's name.
+bench=$(cargo bench --no-default-features --bench instructions --no-run --message-format=json 2>/dev/null |
+    sed -n 's/.*"name":"instructions".*"executable":"\([^"]*\)".*/\1/p')
+counts=$(mktemp)
+trap 'rm -f "$counts"' EXIT
+
+# count NAME: the workload's name and its instructions.
+count() {
+    valgrind --tool=callgrind --toggle-collect='*counted_workload*' --callgrind-out-file=/dev/null "$bench" "$1" 2>&1 |
+        awk -v name="$1" '/Collected :/ { count = $NF } { last = $0 }
+            END { if (!count) { print name ": " last > "/dev/stderr"; exit 1 } print name, count }'
+}
+
+for name in $("$bench"); do
+    count "$name" >>"$counts"
+done
+LC_ALL=C sort -o "$counts" "$counts"
+compiler="# instructions, $(rustc --version), $(rustc -vV | sed -n 's/^host: //p')"
+
+if $update; then
+    { echo "$compiler"; cat "$counts"; } >"$baseline"
+    cat "$baseline"
+    exit 0
+fi
+
+fatal=1
+if ! grep -qxF "$compiler" "$baseline"; then
+    printf 'another compiler than that of the baseline, so nothing fails; --update makes a new one\n%s\n%s\n' \
+        "$(head -n 1 "$baseline")" "$compiler"
+    fatal=0
+fi
+awk -v fatal="$fatal" -v allowed="$allowed_percent" '
+    /^#/ { next }
+    NR == FNR { baseline[$1] = $2; next }
+    !($1 in baseline) { printf "%-22s %13d  not in the baseline\n", $1, $2; failed = 1; next }
+    {
+        change = 100 * ($2 / baseline[$1] - 1)
+        verdict = change > allowed ? "  more than " allowed " %: FAILED" : change < -allowed ? "  better: --update keeps it" : ""
+        printf "%-22s %13d  %+7.2f %%%s\n", $1, $2, change, verdict
+        failed = failed || change > allowed
+        delete baseline[$1]
+    }
+    END {
+        for (name in baseline) { printf "%-22s in the baseline, but no workload\n", name; failed = 1 }
+        exit failed && fatal
+    }' "$baseline" "$counts"
