@@ -36,20 +36,29 @@ impl Edges {
             return;
         }
         let [along_x, along_y, along_z] = &mut self.lists;
-        let (words, rows) = (signs.words(), signs.rows());
-        for (y, start) in starts.iter_mut().enumerate() {
+        let words = signs.words();
+        let own = signs.slice(z);
+        // The last row and the last slice stand in for those after them.
+        let below = own.clone().skip(1).chain(own.clone().last());
+        let corners = (0..).step_by(1 << 16);
+        for ((((start, own), below), behind), corner) in
+            starts.iter_mut().zip(own).zip(below).zip(signs.slice(next)).zip(corners)
+        {
             *start = [along_x.len() as u32, along_y.len() as u32, along_z.len() as u32];
-            let row = signs.row(y, z);
-            let below = signs.row((y + 1).min(rows - 1), z);
-            let behind = signs.row(y, next);
-            let corner = (y as u32) << 16;
             for word in 0..words {
-                let own = row[word];
-                let along = own ^ (own >> 1 | row[word + 1] << 63);
+                let bits = own[word];
+                if bits == below[word]
+                    && bits == behind[word]
+                    && (bits == 0 || bits == u64::MAX)
+                    && own[word + 1] == bits
+                {
+                    continue;
+                }
+                let along = (bits ^ (bits >> 1 | own[word + 1] << 63)) & inner(signs, word);
                 let base = corner + (word * 64) as u32;
-                push(along_x, along & self::inner(signs, word), base);
-                push(along_y, own ^ below[word], base);
-                push(along_z, own ^ behind[word], base);
+                push(along_x, along, base);
+                push(along_y, bits ^ below[word], base);
+                push(along_z, bits ^ behind[word], base);
             }
         }
         let first = first as u32;

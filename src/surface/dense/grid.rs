@@ -13,8 +13,8 @@ pub(super) mod sealed {
     pub trait Sealed: Copy + Default {
         /// The sample as a number.
         fn value(self) -> f32;
-        /// The signs of 64 samples: bit `i` is set where sample `i` is below zero.
-        fn signs(samples: &[Self; 64]) -> u64;
+        /// The signs of eight samples, as many lanes of all ones or all zeros.
+        fn below_zero(samples: [Self; 8]) -> wide::i16x8;
     }
 }
 
@@ -25,18 +25,10 @@ impl sealed::Sealed for f32 {
     }
 
     #[inline(always)]
-    fn signs(samples: &[f32; 64]) -> u64 {
+    fn below_zero(samples: [f32; 8]) -> i16x8 {
         // Not by the sign bit: -0 is air, and so is every NaN.
-        let mut word = 0;
-        for (sixteen, shift) in samples.chunks_exact(16).zip([0, 16, 32, 48]) {
-            let half = |from: usize| -> i16x8 {
-                let eight = sixteen[from..].first_chunk().copied().unwrap_or([0.0; 8]);
-                let below: i32x8 = bytemuck::cast(f32x8::new(eight).simd_lt(f32x8::ZERO));
-                i16x8::from_i32x8_saturate(below)
-            };
-            word |= join(half(0), half(8)) << shift;
-        }
-        word
+        let below: i32x8 = bytemuck::cast(f32x8::new(samples).simd_lt(f32x8::ZERO));
+        i16x8::from_i32x8_saturate(below)
     }
 }
 
@@ -47,21 +39,9 @@ impl sealed::Sealed for i16 {
     }
 
     #[inline(always)]
-    fn signs(samples: &[i16; 64]) -> u64 {
-        let mut word = 0;
-        for (sixteen, shift) in samples.chunks_exact(16).zip([0, 16, 32, 48]) {
-            let half = |from: usize| i16x8::new(sixteen[from..].first_chunk().copied().unwrap_or([0; 8]));
-            word |= join(half(0), half(8)) << shift;
-        }
-        word
+    fn below_zero(samples: [i16; 8]) -> i16x8 {
+        i16x8::new(samples).simd_lt(i16x8::ZERO)
     }
-}
-
-/// The signs of sixteen numbers.
-#[inline(always)]
-fn join(low: i16x8, high: i16x8) -> u64 {
-    let sixteen: wide::i16x16 = bytemuck::cast([low, high]);
-    u64::from(wide::i8x16::from_i16x16_saturate(sixteen).to_bitmask())
 }
 
 /// Samples of a box, x fastest, then y, then z.

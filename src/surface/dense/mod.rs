@@ -42,8 +42,7 @@ pub use grid::{DenseGrid, DenseGridError, Density};
 
 use edges::Edges;
 use signs::Signs;
-use triangles::Triangles;
-use vertices::Vertices;
+use triangles::Room;
 
 /// An indexed triangle mesh; triangles are counter-clockwise seen from the air.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -71,8 +70,7 @@ pub enum Normals {
 pub struct DenseMesher {
     signs: Signs,
     edges: Edges,
-    vertices: Vertices,
-    triangles: Triangles,
+    room: Room,
 }
 
 impl DenseMesher {
@@ -89,21 +87,20 @@ impl DenseMesher {
     pub fn mesh<S: Density>(&mut self, grid: DenseGrid<S>, normals: Normals, out: &mut DenseMesh) {
         self.signs.begin(&grid);
         self.edges.begin(&grid);
-        self.vertices.begin();
-        self.triangles.begin();
+        out.positions.clear();
+        out.normals.clear();
+        out.indices.clear();
         let last = grid.corners()[2] - 1;
         self.signs.read(&grid, 0);
         for z in 0..=last {
             if z < last {
                 self.signs.read(&grid, z + 1);
             }
-            self.edges.list(&self.signs, z, z == last, self.vertices.len());
-            self.vertices.make(&grid, z, &self.edges, normals);
+            self.edges.list(&self.signs, z, z == last, out.positions.len());
+            vertices::make(&grid, z, &self.edges, normals, out);
             if z > 0 {
-                self.triangles.make(&self.signs, &self.edges, z - 1);
+                triangles::make(&self.signs, &self.edges, z - 1, &mut self.room, &mut out.indices);
             }
         }
-        self.vertices.hand_over(out);
-        self.triangles.hand_over(out);
     }
 }

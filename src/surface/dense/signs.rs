@@ -1,5 +1,7 @@
 //! Signs of samples, as words of a row's bits.
 
+use wide::{i8x16, i16x8, i16x16};
+
 use super::grid::sealed::Sealed;
 use super::{DenseGrid, Density};
 
@@ -9,7 +11,6 @@ pub(super) struct Signs {
     slices: [Slice; 3],
     /// Words in a row, and one more that is always 0.
     words: usize,
-    rows: usize,
     /// Corners in a row.
     width: usize,
 }
@@ -22,13 +23,10 @@ struct Slice {
     side: Option<bool>,
 }
 
-/// One row of signs: 64 corners a word.
-pub(super) type Row<'a> = &'a [u64];
-
 impl Signs {
     pub fn begin<S: Density>(&mut self, grid: &DenseGrid<S>) {
         let [width, rows, _] = grid.corners();
-        (self.width, self.rows, self.words) = (width, rows, width.div_ceil(64) + 1);
+        (self.width, self.words) = (width, width.div_ceil(64) + 1);
         for slice in &mut self.slices {
             slice.words.clear();
             slice.words.resize(self.words * rows, 0);
@@ -40,19 +38,15 @@ impl Signs {
         self.words - 1
     }
 
-    pub fn rows(&self) -> usize {
-        self.rows
-    }
-
     /// Corners in a row.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// A row of slice `z`, with one more word after its last.
+    /// The rows of slice `z`, each with one more word after its last.
     #[inline(always)]
-    pub fn row(&self, y: usize, z: usize) -> Row<'_> {
-        &self.slices[z % 3].words[y * self.words..(y + 1) * self.words]
+    pub fn slice(&self, z: usize) -> impl Iterator<Item = &[u64]> + Clone {
+        self.slices[z % 3].words.chunks_exact(self.words)
     }
 
     /// Is all of slice `z` air, or all of it solid?
@@ -66,23 +60,17 @@ impl Signs {
         let [_, stride, _] = grid.strides();
         let first = grid.index([0, 0, z]);
         let (mut any, mut missing) = (0, 0);
-        for (y, row) in slice.words.chunks_exact_mut(self.words).enumerate() {
-            let samples = &grid.samples()[first + y * stride..][..self.width];
-            let mut whole = samples.chunks_exact(64);
-            let mut words = row.iter_mut();
-            for (samples, word) in whole.by_ref().zip(words.by_ref()) {
-                let Some(samples) = samples.first_chunk() else { continue };
-                *word = <S as Sealed>::signs(samples);
-                any |= *word;
-                missing |= !*word;
-            }
-            let rest = whole.remainder();
-            if let (false, Some(word)) = (rest.is_empty(), words.next()) {
-                let mut padded = [S::default(); 64];
-                padded[..rest.len()].copy_from_slice(rest);
-                *word = <S as Sealed>::signs(&padded);
-                any |= *word;
-                missing |= !*word & ones(rest.len());
+        let rows = grid.samples()[first..].chunks(stride);
+        for (row, samples) in slice.words.chunks_exact_mut(self.words).zip(rows) {
+            let samples = &samples[..self.width];
+            for (samples, word) in samples.chunks(64).zip(row) {
+                let (bits, all) = match samples.first_chunk::<64>() {
+                    Some(samples) => (whole(samples), u64::MAX),
+                    None => (part(samples), ones(samples.len())),
+                };
+                *word = bits;
+                any |= bits;
+                missing |= !bits & all;
             }
         }
         slice.side = match (any, missing) {
@@ -91,6 +79,47 @@ impl Signs {
             _ => None,
         };
     }
+}
+
+/// The signs of 64 samples: bit `i` is set where sample `i` is below zero.
+#[inline(always)]
+fn whole<S: Sealed>(samples: &[S; 64]) -> u64 {
+    let mut bits = 0;
+    for (i, sixteen) in samples.as_chunks::<16>().0.iter().enumerate() {
+        let eights = sixteen.as_chunks::<8>().0;
+        bits |= join(S::below_zero(eights[0]), S::below_zero(eights[1])) << (i * 16);
+    }
+    bits
+}
+
+/// The signs of fewer samples.
+#[inline(always)]
+fn part<S: Sealed>(samples: &[S]) -> u64 {
+    let eight = |samples: &[S; 8]| join(S::below_zero(*samples), i16x8::ZERO);
+    let (eights, rest) = samples.as_chunks::<8>();
+    let mut bits = 0;
+    for (i, samples) in eights.iter().enumerate() {
+        bits |= eight(samples) << (i * 8);
+    }
+    if rest.is_empty() {
+        return bits;
+    }
+    match samples.last_chunk::<8>() {
+        // The last eight once more, together with the rest.
+        Some(last) => bits | eight(last) << (samples.len() - 8),
+        None => {
+            let mut padded = [S::default(); 8];
+            padded[..rest.len()].copy_from_slice(rest);
+            eight(&padded)
+        }
+    }
+}
+
+/// The signs of sixteen numbers.
+#[inline(always)]
+fn join(low: i16x8, high: i16x8) -> u64 {
+    let sixteen: i16x16 = bytemuck::cast([low, high]);
+    u64::from(i8x16::from_i16x16_saturate(sixteen).to_bitmask())
 }
 
 /// The lowest `count` bits.

@@ -8,190 +8,180 @@ use super::{DenseGrid, DenseMesh, Density, Normals};
 /// Edges taken together.
 const LANES: usize = 8;
 
-/// Vertices in the making.
-#[derive(Debug, Default)]
-pub(super) struct Vertices {
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-}
-
-impl Vertices {
-    pub fn begin(&mut self) {
-        self.positions.clear();
-        self.normals.clear();
-    }
-
-    pub fn len(&self) -> usize {
-        self.positions.len()
-    }
-
-    pub fn hand_over(&self, out: &mut DenseMesh) {
-        out.positions.clear();
-        out.positions.extend_from_slice(&self.positions);
-        out.normals.clear();
-        out.normals.extend_from_slice(&self.normals);
-    }
-
-    /// Adds a vertex for each listed edge of slice `z`.
-    pub fn make<S: Density>(&mut self, grid: &DenseGrid<S>, z: usize, edges: &Edges, normals: Normals) {
-        self.along::<S, 0>(grid, z, &edges.lists[0], normals);
-        self.along::<S, 1>(grid, z, &edges.lists[1], normals);
-        self.along::<S, 2>(grid, z, &edges.lists[2], normals);
-    }
-
-    fn along<S: Density, const AXIS: usize>(
-        &mut self,
-        grid: &DenseGrid<S>,
-        z: usize,
-        list: &[Corner],
-        normals: Normals,
-    ) {
-        if list.is_empty() {
-            return;
-        }
-        let (first, slice) = (self.len(), Slice::<S>::new::<AXIS>(grid, z));
-        let with_normals = normals == Normals::Gradient;
-        for edges in list.chunks(LANES) {
-            let batch = slice.batch::<AXIS>(edges);
-            self.positions.extend_from_slice(&batch.positions::<AXIS>(&slice));
-            if with_normals {
-                self.normals.extend_from_slice(&slice.normals::<AXIS>(&batch));
-            }
-        }
-        self.positions.truncate(first + list.len());
-        if !with_normals {
-            return;
-        }
-        self.normals.truncate(first + list.len());
-        if grid.apron() == 0 {
-            let normals = self.normals[first..].iter_mut();
-            for (normal, &edge) in normals.zip(list).filter(|(_, edge)| slice.is_at_rim::<AXIS>(**edge)) {
-                *normal = rim_normal::<S, AXIS>(grid, edge, z);
-            }
-        }
-    }
-}
-
-/// The samples around one slice. Each list begins at the slice's first corner, moved as its name says. Where a move leaves
-/// the grid, what the list tells is wrong; it is only asked for gradients then, and these are made again.
-struct Slice<'a, S> {
-    /// Both ends of edges.
-    ends: [&'a [S]; 2],
-    /// Before the lower end and after the upper one, along the edge.
-    beyond: [&'a [S]; 2],
-    /// Around the lower end and around the upper one, along the other two axes: before and after.
-    around: [[[&'a [S]; 2]; 2]; 2],
-    row: usize,
-    corners: [usize; 3],
+/// Adds to `out` a vertex for each listed edge of slice `z`.
+pub(super) fn make<S: Density>(
+    grid: &DenseGrid<S>,
     z: usize,
-    apron: f32,
+    edges: &Edges,
+    normals: Normals,
+    out: &mut DenseMesh,
+) {
+    along::<S, 0>(grid, z, &edges.lists[0], normals, out);
+    along::<S, 1>(grid, z, &edges.lists[1], normals, out);
+    along::<S, 2>(grid, z, &edges.lists[2], normals, out);
 }
 
-/// Eight edges: where they begin, and how far along them the surface is.
-struct Batch {
-    /// Places in the lists of a slice.
-    at: [usize; LANES],
-    x: [f32; LANES],
-    y: [f32; LANES],
-    t: f32x8,
-    /// Samples at both ends.
-    ends: [f32x8; 2],
+fn along<S: Density, const AXIS: usize>(
+    grid: &DenseGrid<S>,
+    z: usize,
+    list: &[Corner],
+    normals: Normals,
+    out: &mut DenseMesh,
+) {
+    if list.is_empty() {
+        return;
+    }
+    let first = out.positions.len();
+    match normals {
+        Normals::None => positions::<S, AXIS>(grid, z, list, out),
+        Normals::Gradient => with_gradients::<S, AXIS>(grid, z, list, out),
+    }
+    out.positions.truncate(first + list.len());
+    out.normals.truncate(first + list.len());
+    if normals == Normals::None {
+        return;
+    }
+    if grid.apron() == 0 {
+        let is_at_rim = |corner: Corner| {
+            let low = [x_of(corner), y_of(corner), z];
+            let reaches = |axis: usize| low[axis] + usize::from(axis == AXIS) + 1 == grid.corners()[axis];
+            (0..3).any(|axis| low[axis] == 0 || reaches(axis))
+        };
+        let normals = out.normals[first..].iter_mut();
+        for (normal, &corner) in normals.zip(list).filter(|(_, corner)| is_at_rim(**corner)) {
+            *normal = rim_normal::<S, AXIS>(grid, corner, z);
+        }
+    }
 }
 
-/// The other two axes of an axis.
-const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+fn x_of(corner: Corner) -> usize {
+    (corner & 0xffff) as usize
+}
+
+fn y_of(corner: Corner) -> usize {
+    (corner >> 16) as usize
+}
+
+/// The samples of a slice at which edges along an axis begin, and as many after a move by `by`. Where that leaves the
+/// grid, those that were not moved: only gradients look there, and they are made again.
+struct Slice<'a, S> {
+    samples: &'a [S],
+    first: usize,
+    /// How many: up to the last corner that begins an edge.
+    len: usize,
+    row: usize,
+}
 
 impl<'a, S: Density> Slice<'a, S> {
     fn new<const AXIS: usize>(grid: &DenseGrid<'a, S>, z: usize) -> Self {
-        let (samples, strides) = (grid.samples(), grid.strides());
-        let (first, corners) = (grid.index([0, 0, z]), grid.corners());
-        let len = strides[1] * (corners[1] - 1) + corners[0];
-        let moved = |by: isize| {
-            let from = first.saturating_add_signed(by).min(samples.len());
-            &samples[from..samples.len().min(from + len)]
-        };
-        let [along, b, c] = [AXIS, OTHERS[AXIS][0], OTHERS[AXIS][1]].map(|axis| strides[axis] as isize);
-        let around = |end: isize| [[moved(end - b), moved(end + b)], [moved(end - c), moved(end + c)]];
-        Self {
-            ends: [moved(0), moved(along)],
-            beyond: [moved(-along), moved(2 * along)],
-            around: [around(0), around(along)],
-            row: strides[1],
-            corners,
-            z,
-            apron: grid.apron() as f32,
+        let ([width, rows, _], row) = (grid.corners(), grid.strides()[1]);
+        let last = row * (rows - 1 - usize::from(AXIS == 1)) + width - 1 - usize::from(AXIS == 0);
+        Self { samples: grid.samples(), first: grid.index([0, 0, z]), len: last + 1, row }
+    }
+
+    fn moved(&self, by: isize) -> &'a [S] {
+        let whole = |from: usize| self.samples.get(from..from + self.len);
+        let moved = self.first.checked_add_signed(by).and_then(whole);
+        moved.or(whole(self.first)).unwrap_or(&[])
+    }
+
+    /// Places of eight corners; the last ones of a list that is no multiple of eight repeat its first.
+    #[inline(always)]
+    fn places(&self, list: &[Corner]) -> [usize; LANES] {
+        let mut corners = [list[0]; LANES];
+        match list.first_chunk::<LANES>() {
+            Some(all) => corners = *all,
+            None => corners[..list.len()].copy_from_slice(list),
+        }
+        let mut places = [0; LANES];
+        for (place, corner) in places.iter_mut().zip(corners) {
+            *place = x_of(corner) + y_of(corner) * self.row;
+        }
+        places
+    }
+}
+
+/// The samples of `N` slices at each of eight places. All slices are equally long.
+#[inline(always)]
+fn gather<S: Density, const N: usize>(slices: &[&[S]; N], places: [usize; LANES]) -> [f32x8; N] {
+    // Said once for all, so that no access is checked again.
+    let len = slices[0].len();
+    let mut same = [slices[0]; N];
+    for (same, slice) in same.iter_mut().zip(slices) {
+        *same = &slice[..len];
+    }
+    let mut lanes = [[0.0; LANES]; N];
+    for (lane, place) in places.into_iter().enumerate() {
+        if place < len {
+            for (lanes, slice) in lanes.iter_mut().zip(same) {
+                lanes[lane] = slice[place].value();
+            }
         }
     }
+    lanes.map(f32x8::new)
+}
 
-    /// One sample of each of eight places.
-    #[inline(always)]
-    fn gather(samples: &[S], at: &[usize; LANES]) -> f32x8 {
-        f32x8::new(at.map(|at| samples.get(at).map_or(0.0, |sample| sample.value())))
+/// How far along an edge the surface is, between samples of which one is below zero and the other is not.
+#[inline(always)]
+fn share(p: f32x8, q: f32x8) -> f32x8 {
+    let t = p / (p - q);
+    // NaN and infinite samples may lead anywhere.
+    (t.simd_ge(f32x8::ZERO) & t.simd_le(f32x8::ONE)).select(t, f32x8::HALF)
+}
+
+fn positions<S: Density, const AXIS: usize>(
+    grid: &DenseGrid<S>,
+    z: usize,
+    list: &[Corner],
+    out: &mut DenseMesh,
+) {
+    let slice = Slice::new::<AXIS>(grid, z);
+    let ends = [0, grid.strides()[AXIS] as isize].map(|by| slice.moved(by));
+    let origin = [grid.apron() as f32, (z + grid.apron()) as f32];
+    for list in list.chunks(LANES) {
+        let [p, q] = gather(&ends, slice.places(list));
+        out.positions.extend_from_slice(&placed::<AXIS>(list, origin, share(p, q)));
     }
+}
 
-    #[inline(always)]
-    fn batch<const AXIS: usize>(&self, edges: &[Corner]) -> Batch {
-        let mut corners = [edges[0]; LANES];
-        corners[..edges.len()].copy_from_slice(edges);
-        let at = corners.map(|corner| (corner & 0xffff) as usize + (corner >> 16) as usize * self.row);
-        let ends = self.ends.map(|samples| Self::gather(samples, &at));
-        let t = ends[0] / (ends[0] - ends[1]);
-        // Infinite and NaN ends; all others are of different signs.
-        let is_inside = t.simd_ge(f32x8::ZERO) & t.simd_le(f32x8::ONE);
-        let t = is_inside.select(t, f32x8::HALF);
-        let [x, y] = [corners.map(|corner| corner & 0xffff), corners.map(|corner| corner >> 16)];
-        Batch { at, x: x.map(|x| x as f32), y: y.map(|y| y as f32), t, ends }
+/// Positions of up to eight vertices; `origin` is where x and y begin, and the slice's z.
+#[inline(always)]
+fn placed<const AXIS: usize>(list: &[Corner], origin: [f32; 2], share: f32x8) -> [[f32; 3]; LANES] {
+    let (share, mut positions) = (share.to_array(), [[0.0; 3]; LANES]);
+    for ((position, &corner), share) in positions.iter_mut().zip(list).zip(share) {
+        *position = [x_of(corner) as f32 + origin[0], y_of(corner) as f32 + origin[0], origin[1]];
+        position[AXIS] += share;
     }
+    positions
+}
 
-    #[inline(always)]
-    fn normals<const AXIS: usize>(&self, batch: &Batch) -> [[f32; 3]; LANES] {
-        let of = |samples: &[S]| Self::gather(samples, &batch.at);
-        let [p, q] = batch.ends;
-        let along = [q - of(self.beyond[0]), of(self.beyond[1]) - p];
-        let across =
-            |axis: usize| [0, 1].map(|end| of(self.around[end][axis][1]) - of(self.around[end][axis][0]));
-        let blend = |[a, b]: [f32x8; 2]| a + (b - a) * batch.t;
-        let (along, [b, c]) = (blend(along), [0, 1].map(|axis| blend(across(axis))));
-        let [x, y, z] = match AXIS {
+fn with_gradients<S: Density, const AXIS: usize>(
+    grid: &DenseGrid<S>,
+    z: usize,
+    list: &[Corner],
+    out: &mut DenseMesh,
+) {
+    let slice = Slice::new::<AXIS>(grid, z);
+    let strides = grid.strides().map(|stride| stride as isize);
+    let along = strides[AXIS];
+    let [b, c] = [[1, 2], [0, 2], [0, 1]][AXIS].map(|axis: usize| strides[axis]);
+    let moves = [0, along, -along, 2 * along, -b, b, along - b, along + b, -c, c, along - c, along + c];
+    let slices = moves.map(|by| slice.moved(by));
+    let origin = [grid.apron() as f32, (z + grid.apron()) as f32];
+    for list in list.chunks(LANES) {
+        let [p, q, before, after, pb, pb2, qb, qb2, pc, pc2, qc, qc2] = gather(&slices, slice.places(list));
+        let t = share(p, q);
+        let blend = |a: f32x8, b: f32x8| a + (b - a) * t;
+        let along = blend(q - before, after - p);
+        let b = blend(pb2 - pb, qb2 - qb);
+        let c = blend(pc2 - pc, qc2 - qc);
+        let gradients = match AXIS {
             0 => [along, b, c],
             1 => [b, along, c],
             _ => [b, c, along],
         };
-        let squared = x * x + y * y + z * z;
-        let length = squared.sqrt();
-        let is_sound = squared.simd_gt(f32x8::splat(LEAST)) & squared.simd_lt(f32x8::splat(MOST));
-        let [nx, ny, nz] = [x / length, y / length, z / length].map(|v| v.to_array());
-        let mut normals = std::array::from_fn(|lane| [nx[lane], ny[lane], nz[lane]]);
-        let sound = is_sound.to_bitmask();
-        if sound != 0xff {
-            let [x, y, z] = [x, y, z].map(|v| v.to_array());
-            for lane in (0..LANES).filter(|lane| sound >> lane & 1 == 0) {
-                normals[lane] = unit([x[lane], y[lane], z[lane]]);
-            }
-        }
-        normals
-    }
-
-    /// Do the gradients at an edge's ends look beyond the grid?
-    fn is_at_rim<const AXIS: usize>(&self, edge: Corner) -> bool {
-        let low = [(edge & 0xffff) as usize, (edge >> 16) as usize, self.z];
-        (0..3).any(|axis| {
-            let high = low[axis] + usize::from(axis == AXIS);
-            low[axis] == 0 || high + 1 == self.corners[axis]
-        })
-    }
-}
-
-impl Batch {
-    #[inline(always)]
-    fn positions<const AXIS: usize>(&self, slice: &Slice<impl Density>) -> [[f32; 3]; LANES] {
-        let t = self.t.to_array();
-        let (apron, z) = (slice.apron, slice.z as f32);
-        std::array::from_fn(|lane| {
-            let mut position = [self.x[lane] + apron, self.y[lane] + apron, z + apron];
-            position[AXIS] += t[lane];
-            position
-        })
+        out.positions.extend_from_slice(&placed::<AXIS>(list, origin, t));
+        out.normals.extend_from_slice(&units(gradients));
     }
 }
 
@@ -200,14 +190,34 @@ const LEAST: f32 = 1e-30;
 /// See [`LEAST`].
 const MOST: f32 = 1e30;
 
+/// Eight vectors, made unit ones.
+#[inline(always)]
+fn units([x, y, z]: [f32x8; 3]) -> [[f32; 3]; LANES] {
+    let squared = x * x + y * y + z * z;
+    let length = squared.sqrt();
+    let is_sound = squared.simd_gt(f32x8::splat(LEAST)) & squared.simd_lt(f32x8::splat(MOST));
+    let [ux, uy, uz] = [x / length, y / length, z / length].map(|v| v.to_array());
+    let mut units = [[0.0; 3]; LANES];
+    for (lane, unit) in units.iter_mut().enumerate() {
+        *unit = [ux[lane], uy[lane], uz[lane]];
+    }
+    if !is_sound.all() {
+        let [x, y, z] = [x, y, z].map(|v| v.to_array());
+        for (lane, normal) in units.iter_mut().enumerate() {
+            *normal = unit([x[lane], y[lane], z[lane]]);
+        }
+    }
+    units
+}
+
 /// A vector of any length, made a unit one; upwards where it has no direction.
 pub(super) fn unit(v: [f32; 3]) -> [f32; 3] {
-    let largest = v.iter().fold(0.0f32, |largest, c| largest.max(c.abs()));
     let squared = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
     if squared > LEAST && squared < MOST {
         let length = squared.sqrt();
         return v.map(|c| c / length);
     }
+    let largest = v.iter().fold(0.0f32, |largest, c| largest.max(c.abs()));
     let [x, y, z] = v.map(|c| c / largest);
     let length = (x * x + y * y + z * z).sqrt();
     let unit = [x / length, y / length, z / length];
@@ -215,23 +225,25 @@ pub(super) fn unit(v: [f32; 3]) -> [f32; 3] {
 }
 
 /// A normal where a gradient looks beyond the grid: differences are one-sided there.
-fn rim_normal<S: Density, const AXIS: usize>(grid: &DenseGrid<S>, edge: Corner, z: usize) -> [f32; 3] {
-    let p = [(edge & 0xffff) as usize, (edge >> 16) as usize, z];
+fn rim_normal<S: Density, const AXIS: usize>(grid: &DenseGrid<S>, corner: Corner, z: usize) -> [f32; 3] {
+    let (samples, strides, corners) = (grid.samples(), grid.strides(), grid.corners());
+    let p = [x_of(corner), y_of(corner), z];
     let mut q = p;
     q[AXIS] += 1;
-    let value = |corner: [usize; 3]| grid.samples()[grid.index(corner)].value();
-    let (a, b) = (value(p), value(q));
+    let (p_at, q_at) = (grid.index(p), grid.index(q));
+    let value = |at: usize| samples.get(at).map_or(0.0, |sample| sample.value());
+    let (a, b) = (value(p_at), value(q_at));
     let t = Some(a / (a - b)).filter(|t| (0.0..=1.0).contains(t)).unwrap_or(0.5);
-    let gradient = |corner: [usize; 3]| -> [f32; 3] {
-        std::array::from_fn(|axis| {
-            let (mut before, mut after) = (corner, corner);
-            before[axis] = before[axis].saturating_sub(1);
-            after[axis] = (after[axis] + 1).min(grid.corners()[axis] - 1);
-            let rise = value(after) - value(before);
-            // A one-sided difference is over half the way.
-            if after[axis] - before[axis] == 1 { rise * 2.0 } else { rise }
-        })
+    let gradient = |corner: [usize; 3], at: usize, axis: usize| {
+        let (is_first, is_last) = (corner[axis] == 0, corner[axis] + 1 == corners[axis]);
+        let before = if is_first { at } else { at - strides[axis] };
+        let after = if is_last { at } else { at + strides[axis] };
+        // A one-sided difference is over half the way.
+        (value(after) - value(before)) * if is_first || is_last { 2.0 } else { 1.0 }
     };
-    let (a, b) = (gradient(p), gradient(q));
-    unit(std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t))
+    let blend = |axis: usize| {
+        let (a, b) = (gradient(p, p_at, axis), gradient(q, q_at, axis));
+        a + (b - a) * t
+    };
+    unit([blend(0), blend(1), blend(2)])
 }
