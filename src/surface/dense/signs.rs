@@ -84,35 +84,35 @@ impl Signs {
 /// The signs of 64 samples: bit `i` is set where sample `i` is below zero.
 #[inline(always)]
 fn whole<S: Sealed>(samples: &[S; 64]) -> u64 {
-    let mut bits = 0;
-    for (i, sixteen) in samples.as_chunks::<16>().0.iter().enumerate() {
-        let eights = sixteen.as_chunks::<8>().0;
-        bits |= join(S::below_zero(eights[0]), S::below_zero(eights[1])) << (i * 16);
-    }
-    bits
+    let parts = samples.as_chunks::<16>().0;
+    sixteen(&parts[0]) | sixteen(&parts[1]) << 16 | sixteen(&parts[2]) << 32 | sixteen(&parts[3]) << 48
 }
 
 /// The signs of fewer samples.
 #[inline(always)]
 fn part<S: Sealed>(samples: &[S]) -> u64 {
-    let eight = |samples: &[S; 8]| join(S::below_zero(*samples), i16x8::ZERO);
-    let (eights, rest) = samples.as_chunks::<8>();
-    let mut bits = 0;
-    for (i, samples) in eights.iter().enumerate() {
-        bits |= eight(samples) << (i * 8);
+    let (mut bits, mut done) = (0, 0);
+    for samples in samples.as_chunks::<16>().0 {
+        bits |= sixteen(samples) << done;
+        done += 16;
     }
-    if rest.is_empty() {
+    if done == samples.len() {
         return bits;
     }
-    match samples.last_chunk::<8>() {
-        // The last eight once more, together with the rest.
-        Some(last) => bits | eight(last) << (samples.len() - 8),
-        None => {
-            let mut padded = [S::default(); 8];
-            padded[..rest.len()].copy_from_slice(rest);
-            eight(&padded)
-        }
+    // The last sixteen once more, together with the rest.
+    if let Some(last) = samples.last_chunk::<16>() {
+        return bits | sixteen(last) << (samples.len() - 16);
     }
+    let mut padded = [S::default(); 16];
+    padded[..samples.len()].copy_from_slice(samples);
+    sixteen(&padded)
+}
+
+/// The signs of sixteen samples.
+#[inline(always)]
+fn sixteen<S: Sealed>(samples: &[S; 16]) -> u64 {
+    let eights = samples.as_chunks::<8>().0;
+    join(S::below_zero(eights[0]), S::below_zero(eights[1]))
 }
 
 /// The signs of sixteen numbers.
