@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::fields::Grid;
-use crate::{fast_surface_nets, isosurface, mcubes, ours, transvoxel};
+use crate::{bricks, fast_surface_nets, isosurface, mcubes, ours, transvoxel};
 
 /// Normals in a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -89,6 +89,7 @@ pub fn all() -> Vec<Box<dyn Contender>> {
 /// What meshes the stream of chunks.
 pub fn of_streams() -> Vec<Box<dyn Contender>> {
     let mut all = ours::with_normals();
+    all.push(Box::new(bricks::Bricked::default()));
     all.push(Box::new(fast_surface_nets::FastSurfaceNets::default()));
     all
 }

@@ -13,6 +13,7 @@
 //! | [`timing`], [`table`], [`targets`] | how long they take |
 //! | [`export`], [`serve`] | the same for programs in other languages |
 
+mod bricks;
 mod check;
 mod contender;
 mod export;

@@ -1,4 +1,4 @@
-//! The meshers of bevy_burrow.
+//! The dense mesher of bevy_burrow.
 
 use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
 
@@ -10,7 +10,7 @@ pub const REFERENCE: &str = "burrow dense f32";
 /// The same without normals.
 pub const REFERENCE_BARE: &str = "burrow dense f32, bare";
 
-/// Ours with unit normals. A further mesher, of bricks say, is added here and takes part in everything.
+/// Ours with unit normals.
 pub fn with_normals() -> Vec<Box<dyn Contender>> {
     vec![
         Box::new(Dense::<f32>::new(REFERENCE, Normals::Gradient)),

@@ -113,12 +113,14 @@ pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Tim
     // Buffers grow and tables are made before the clock runs.
     for contender in contenders.iter_mut() {
         for chunk in chunks.iter().take(8) {
+            contender.load(chunk);
             contender.mesh(chunk, Part::WithinApron);
         }
     }
     for (round, chunk) in chunks.iter().enumerate() {
         for turn in turns(contenders.len(), round) {
             let contender = &mut *contenders[turn];
+            contender.load(chunk);
             black_box(chunk.samples.iter().sum::<f32>());
             black_box(chunk.fixed.iter().map(|&sample| i64::from(sample)).sum::<i64>());
             times[turn].rounds.push(once(contender, chunk, Part::WithinApron));

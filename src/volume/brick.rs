@@ -79,6 +79,17 @@ impl Brick {
         Self { samples: [Sample::PRISTINE; LEN], solid, edited: [0; 8], materials: None }
     }
 
+    /// A brick of these samples, none of them pristine, in the order of [`BrickPos::index`].
+    pub fn of_edited(samples: &[i16; 512]) -> Self {
+        let mut brick = Self::pristine([0; 8]);
+        for (row, samples) in samples.as_chunks::<8>().0.iter().enumerate() {
+            let samples = samples.map(|sample| sample.max(-i16::MAX));
+            let solid = (0..8).fold(0, |bits, x| bits | u8::from(samples[x] < 0) << x);
+            brick.set_row(row * 8, samples, 0xff, solid);
+        }
+        brick
+    }
+
     /// The sample at a lattice point that lies in this brick.
     pub fn sample(&self, point: IVec3) -> Sample {
         self.samples[BrickPos::index(point)]
@@ -209,10 +220,8 @@ mod tests {
 
     #[test]
     fn a_brick_of_one_number_is_uniform() {
-        let mut brick = Brick::pristine([0; 8]);
-        for row in 0..64 {
-            brick.set_row(row * 8, [-5; 8], 0xff, 0xff);
-        }
+        let mut brick = Brick::of_edited(&[-5; 512]);
+        assert_eq!((brick.solid(), brick.edited()), (&[u64::MAX; 8], &[u64::MAX; 8]));
         assert_eq!(brick.uniform(), Some((Sample(-5), MaterialId::GROUND)));
         brick.set_material(77, MaterialId(2));
         assert_eq!(brick.uniform(), None);

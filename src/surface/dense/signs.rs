@@ -99,7 +99,12 @@ fn part<S: Sealed>(samples: &[S]) -> u64 {
     if done == samples.len() {
         return bits;
     }
-    // The last sixteen once more, together with the rest.
+    // The last eight or sixteen once more, together with the rest.
+    if samples.len() - done <= 8
+        && let Some(last) = samples.last_chunk::<8>()
+    {
+        return bits | join(S::below_zero(*last), i16x8::ZERO) << (samples.len() - 8);
+    }
     if let Some(last) = samples.last_chunk::<16>() {
         return bits | sixteen(last) << (samples.len() - 16);
     }
