@@ -6,6 +6,7 @@ use allocation_counter::measure;
 use bevy_burrow::lattice::{BrickPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::block::{Block, Mesher, Parts};
+use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Normals};
 use bevy_burrow::terrain::World;
 use glam::{IVec3, Vec3};
 
@@ -42,6 +43,20 @@ fn meshing_takes_no_memory_once_it_is_warm() {
         let drawn = parts.indices.len();
         let (_, allocations) = count(|| mesh(&mut mesher, &mut parts));
         assert_eq!((allocations, parts.indices.len()), (0, drawn), "world {seed}");
+    }
+}
+
+#[test]
+fn dense_meshing_takes_no_memory_once_it_is_warm() {
+    let mut rng = fastrand::Rng::with_seed(1);
+    let (mut mesher, mut mesh) = (DenseMesher::new(), DenseMesh::default());
+    for size in [[40, 33, 20], [70, 9, 9], [5, 70, 8]] {
+        let samples: Vec<f32> = (0..size.iter().product()).map(|_| rng.f32() - 0.5).collect();
+        let grid = DenseGrid::new(&samples, size).expect("a grid");
+        mesher.mesh(grid, Normals::Gradient, &mut mesh);
+        let (_, allocations) = count(|| mesher.mesh(grid, Normals::Gradient, &mut mesh));
+        assert_eq!(allocations, 0, "{size:?}");
+        assert!(mesh.indices.len() > 1000);
     }
 }
 

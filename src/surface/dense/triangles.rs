@@ -139,12 +139,12 @@ const FEW: usize = 9;
 fn write(entry: &Entry, counts: &Numbers, room: &mut [u32; MOST]) {
     let numbers: [u32; 16] = bytemuck::cast(*counts);
     let number = |edge: u8| numbers[usize::from(edge & 15)];
-    for i in 0..FEW {
-        room[i] = number(entry.edges[i]);
+    for (index, &edge) in room[..FEW].iter_mut().zip(&entry.edges[..FEW]) {
+        *index = number(edge);
     }
     if usize::from(entry.len) > FEW {
-        for i in FEW..MOST {
-            room[i] = number(entry.edges[i]);
+        for (index, &edge) in room[FEW..].iter_mut().zip(&entry.edges[FEW..]) {
+            *index = number(edge);
         }
     }
 }
