@@ -1,6 +1,7 @@
 //! What is drawn: marching cubes where edits are, heightmap elsewhere, and the ring where they meet.
 //!
 //! - [`cases`]: the marching-cubes case table, derived from one rule about cube faces.
+//! - [`dense`]: marching cubes over a plain dense grid, for those who have one.
 //! - [`mask`]: which cells marching cubes draws (rule 2), as bits.
 //! - [`vertex`]: the one vertex function of cubes and ring (rule 4), with normals and materials.
 //! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk.
@@ -10,6 +11,7 @@
 
 pub mod block;
 pub mod cases;
+pub mod dense;
 pub mod mask;
 pub mod mesh;
 pub mod seams;
