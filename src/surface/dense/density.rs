@@ -71,7 +71,7 @@ impl sealed::Wide for i16 {
     }
 
     #[inline(always)]
-    fn numbers(samples: [Self; 4]) -> f32x4 {
-        f32x4::from_i32x4(i32x4::new(samples.map(i32::from)))
+    fn numbers([a, b, c, d]: [Self; 4]) -> f32x4 {
+        f32x4::from_i32x4(i32x4::new([a.into(), b.into(), c.into(), d.into()]))
     }
 }

@@ -27,32 +27,27 @@ pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
     normals: &mut [[f32; 3]],
 ) {
     let lattice = Lattice::new(grid, AXIS);
-    let taps = Taps::new(grid, AXIS);
+    let taps = Taps::<S, AXIS>::new(grid);
     let (mut positions, mut normals) = (positions.as_flattened_mut(), normals.as_flattened_mut());
     for points in points.as_chunks::<LANES>().0 {
-        let indices = points.map(|point| lattice.index(point));
-        let (ends, gradients);
-        if !NORMALS {
-            ends = lattice.ends(grid.samples(), indices);
-            gradients = None;
-        } else if lattice.are_inside(points) {
-            let both = taps.read(indices);
-            ends = both.0;
-            gradients = Some(both.1);
-        } else {
-            ends = lattice.ends(grid.samples(), indices);
-            gradients = Some(border_gradients(grid, points, AXIS));
-        }
-        let crossing = crossing(ends);
+        let indices = lattice.indices(points);
         let mut position = coordinates(points);
-        position[AXIS] += crossing;
+        if NORMALS {
+            let (ends, [start, end]) = if lattice.are_inside(points) {
+                taps.read(indices)
+            } else {
+                (lattice.ends(grid.samples(), indices), border_gradients(grid, points, AXIS))
+            };
+            let crossing = crossing(ends);
+            position[AXIS] += crossing;
+            let normal = |axis: usize| start[axis] + (end[axis] - start[axis]) * crossing;
+            write(unit([normal(0), normal(1), normal(2)]), normals);
+            normals = &mut normals[LANES * 3..];
+        } else {
+            position[AXIS] += crossing(lattice.ends(grid.samples(), indices));
+        }
         write(position, positions);
         positions = &mut positions[LANES * 3..];
-        if let Some([start, end]) = gradients {
-            let normal = std::array::from_fn(|axis| start[axis] + (end[axis] - start[axis]) * crossing);
-            write(unit(normal), normals);
-            normals = &mut normals[LANES * 3..];
-        }
     }
 }
 
@@ -81,16 +76,19 @@ impl Lattice {
     }
 
     #[inline(always)]
-    fn index(&self, point: Point) -> usize {
-        let [x, y, z] = unpack(point);
-        x + y * self.strides[1] + z * self.strides[2]
+    fn indices(&self, &[a, b, c, d]: &[Point; LANES]) -> [usize; LANES] {
+        let index = |point| {
+            let [x, y, z] = unpack(point);
+            x + y * self.strides[1] + z * self.strides[2]
+        };
+        [index(a), index(b), index(c), index(d)]
     }
 
     /// Do all neighbours of both ends of these edges lie in the grid?
     #[inline(always)]
     fn are_inside(&self, points: &[Point; LANES]) -> bool {
-        let inside = points.map(|point| ((point | TOP) - self.first) & (self.last - point));
-        inside[0] & inside[1] & inside[2] & inside[3] & TOP == TOP
+        let inside = |all, point| all & ((point | TOP) - self.first) & (self.last - point);
+        points.iter().fold(TOP, inside) == TOP
     }
 
     /// The samples at both ends of the edges.
@@ -98,93 +96,107 @@ impl Lattice {
     fn ends<S: Density>(&self, samples: &[S], indices: [usize; LANES]) -> [f32x4; 2] {
         let high = &samples[self.along..];
         let low = &samples[..high.len()];
-        [S::numbers(indices.map(|index| low[index])), S::numbers(indices.map(|index| high[index]))]
+        [gather(low, indices), gather(high, indices)]
     }
 }
 
 #[inline(always)]
+fn gather<S: Density>(samples: &[S], [a, b, c, d]: [usize; LANES]) -> f32x4 {
+    S::numbers([samples[a], samples[b], samples[c], samples[d]])
+}
+
+#[inline(always)]
 fn unpack(point: Point) -> [usize; 3] {
-    [point & 0xffff, point >> 16 & 0xffff, point >> 32].map(|coordinate| coordinate as usize)
+    [(point & 0xffff) as usize, (point >> 16 & 0xffff) as usize, (point >> 32) as usize]
 }
 
 /// Coordinates of four points.
 #[inline(always)]
-fn coordinates(points: &[Point; LANES]) -> Vectors {
-    let points = points.map(unpack);
-    std::array::from_fn(|axis| f32x4::from_i32x4(i32x4::new(points.map(|point| point[axis] as i32))))
+fn coordinates(&[a, b, c, d]: &[Point; LANES]) -> Vectors {
+    let xy = i32x4::new([a as i32, b as i32, c as i32, d as i32]);
+    let z = i32x4::new([(a >> 32) as i32, (b >> 32) as i32, (c >> 32) as i32, (d >> 32) as i32]);
+    [f32x4::from_i32x4(xy & i32x4::splat(0xffff)), f32x4::from_i32x4(xy >> 16), f32x4::from_i32x4(z)]
 }
 
 /// The samples around edges along one axis, each as a slice of its own that begins at the first edge's sample. All are of
 /// the same length, so that a single check covers the twelve samples of an edge.
-struct Taps<'a, S> {
-    axis: usize,
+struct Taps<'a, S, const AXIS: usize> {
     /// How far the slices begin behind the grid's first sample.
     first: usize,
+    /// From one before the start of the edge to one behind its end.
     along: [&'a [S]; 4],
-    across: [[[&'a [S]; 2]; 2]; 2],
+    /// Beside the start and beside the end, along the next axis, then along the one after that: before and behind.
+    across: [[&'a [S]; 4]; 2],
 }
 
-impl<'a, S: Density> Taps<'a, S> {
-    fn new(grid: &DenseGrid<'a, S>, axis: usize) -> Self {
-        let strides = grid.strides();
+impl<'a, S: Density, const AXIS: usize> Taps<'a, S, AXIS> {
+    #[inline(always)]
+    fn new(grid: &DenseGrid<'a, S>) -> Self {
+        let (samples, strides) = (grid.samples(), grid.strides());
+        let along = strides[AXIS];
+        let [u, v] = [strides[(AXIS + 1) % 3], strides[(AXIS + 2) % 3]];
         let first = strides[2];
-        let farthest = (2 * strides[axis]).max(strides[axis] + strides[if axis == 2 { 1 } else { 2 }]);
-        let len = grid.samples().len().saturating_sub(first + farthest);
+        let farthest = along + along.max(u).max(v);
+        let len = samples.len().saturating_sub(first + farthest);
         let tap = |back: usize, ahead: usize| {
-            grid.samples().get(first + ahead - back..).and_then(|tap| tap.get(..len)).unwrap_or_default()
+            // A grid too thin for any inner edge has no samples there either.
+            let start = (first + ahead - back).min(samples.len() - len);
+            &samples[start..start + len]
         };
-        let along = strides[axis];
-        let across = [1, 2].map(|turn| strides[(axis + turn) % 3]);
         Self {
-            axis,
             first,
             along: [tap(along, 0), tap(0, 0), tap(0, along), tap(0, 2 * along)],
-            across: [0, along].map(|end| across.map(|across| [tap(across, end), tap(0, end + across)])),
+            across: [
+                [tap(u, 0), tap(0, u), tap(v, 0), tap(0, v)],
+                [tap(u, along), tap(0, along + u), tap(v, along), tap(0, along + v)],
+            ],
         }
     }
 
     /// The samples at both ends of four edges, and the gradients there, by central differences.
     #[inline(always)]
-    fn read(&self, indices: [usize; LANES]) -> ([f32x4; 2], [Vectors; 2]) {
-        let read = |tap: &[S]| S::numbers(indices.map(|index| tap[index - self.first]));
-        let along = self.along.map(read);
-        let across = self.across.map(|end| end.map(|[low, high]| read(high) - read(low)));
-        let gradient = |end: usize| {
-            let mut gradient = [f32x4::ZERO; 3];
-            gradient[self.axis] = along[end + 2] - along[end];
-            gradient[(self.axis + 1) % 3] = across[end][0];
-            gradient[(self.axis + 2) % 3] = across[end][1];
+    fn read(&self, [a, b, c, d]: [usize; LANES]) -> ([f32x4; 2], [Vectors; 2]) {
+        let indices = [a - self.first, b - self.first, c - self.first, d - self.first];
+        let [before, start, end, behind] = self.along;
+        let [before, start, end, behind] =
+            [gather(before, indices), gather(start, indices), gather(end, indices), gather(behind, indices)];
+        let gradient = |along: f32x4, [u_low, u_high, v_low, v_high]: [&[S]; 4]| {
+            let mut gradient = [along; 3];
+            gradient[(AXIS + 1) % 3] = gather(u_high, indices) - gather(u_low, indices);
+            gradient[(AXIS + 2) % 3] = gather(v_high, indices) - gather(v_low, indices);
             gradient
         };
-        ([along[1], along[2]], [gradient(0), gradient(1)])
+        ([start, end], [gradient(end - before, self.across[0]), gradient(behind - start, self.across[1])])
     }
 }
 
 /// The gradients at both ends of edges that may lie in the grid's border.
 #[cold]
 fn border_gradients<S: Density>(grid: &DenseGrid<S>, points: &[Point; LANES], axis: usize) -> [Vectors; 2] {
-    [0, 1].map(|end| {
-        let gradients = points.map(|point| {
+    let mut ends = [[[0.0; LANES]; 3]; 2];
+    for (end, gradients) in ends.iter_mut().enumerate() {
+        for (lane, &point) in points.iter().enumerate() {
             let mut point = unpack(point);
             point[axis] += end;
-            border_gradient(grid, point)
-        });
-        std::array::from_fn(|axis| f32x4::new(gradients.map(|gradient| gradient[axis])))
-    })
+            for (axis, gradient) in gradients.iter_mut().enumerate() {
+                gradient[lane] = border_difference(grid, point, axis);
+            }
+        }
+    }
+    ends.map(|gradients| gradients.map(f32x4::new))
 }
 
-/// The gradient at a sample. Where a neighbour is missing, the difference to the other one counts twice.
+/// The difference of the samples around one, along an axis. Where a neighbour is missing, the difference to the other one
+/// counts twice.
 #[inline]
-fn border_gradient<S: Density>(grid: &DenseGrid<S>, point: [usize; 3]) -> [f32; 3] {
-    let (samples, strides, size) = (grid.samples(), grid.strides(), grid.size());
+fn border_difference<S: Density>(grid: &DenseGrid<S>, point: [usize; 3], axis: usize) -> f32 {
+    let (samples, strides) = (grid.samples(), grid.strides());
     let index = point[0] + point[1] * strides[1] + point[2] * strides[2];
-    std::array::from_fn(|axis| {
-        let has_low = usize::from(point[axis] > 0);
-        let has_high = usize::from(point[axis] + 1 < size[axis]);
-        let low = samples[index - strides[axis] * has_low].number();
-        let high = samples[index + strides[axis] * has_high].number();
-        (high - low) * (3 - has_low - has_high) as f32
-    })
+    let has_low = usize::from(point[axis] > 0);
+    let has_high = usize::from(point[axis] + 1 < grid.size()[axis]);
+    let low = samples[index - strides[axis] * has_low].number();
+    let high = samples[index + strides[axis] * has_high].number();
+    (high - low) * (3 - has_low - has_high) as f32
 }
 
 /// Where the surface crosses edges, 0 to 1; in the middle where numbers fail.
@@ -201,7 +213,7 @@ fn unit(vectors: Vectors) -> Vectors {
     let [x, y, z] = vectors;
     let squared = x * x + y * y + z * z;
     let scale = f32x4::ONE / squared.sqrt();
-    let units = vectors.map(|component| component * scale);
+    let units = [x * scale, y * scale, z * scale];
     // Smaller squares have lost digits, and larger ones are infinite.
     let is_exact = squared.simd_ge(f32x4::splat(1e-30)) & squared.simd_le(f32x4::splat(f32::MAX));
     if is_exact.all() { units } else { careful_units(vectors, units, is_exact.to_bitmask()) }
