@@ -9,8 +9,9 @@ use std::ops::Range;
 use super::density::Density;
 use super::grid::DenseGrid;
 use super::signs::{COLUMNS, Signs};
+use super::stream::Stream;
 
-/// A column behind the last cell of a row: the case's edges count, its triangles do not.
+/// Added to the case of a column behind the last cell of a row: its edges count, its triangles do not.
 pub(super) const NO_CELL: u16 = 256;
 
 /// The lattice point where a crossed edge starts: x, y and z in 16 bits each, counted from sample (0, 0, 0).
@@ -19,66 +20,6 @@ pub(super) type Point = u64;
 /// Packs a lattice point.
 pub(super) const fn point([x, y, z]: [usize; 3]) -> Point {
     x as u64 | (y as u64) << 16 | (z as u64) << 32
-}
-
-/// Slots behind the end of a stream that may be written in vain.
-const SLACK: usize = 8;
-
-/// A growing list that is written ahead of its end: the slots behind it hold nothing of worth.
-#[derive(Debug, Default)]
-pub(super) struct Stream<T> {
-    slots: Vec<T>,
-    len: usize,
-}
-
-impl<T: Copy + Default> Stream<T> {
-    /// Forgets the items, keeps the memory.
-    pub(super) fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.len
-    }
-
-    pub(super) fn truncate(&mut self, len: usize) {
-        self.len = self.len.min(len);
-    }
-
-    pub(super) fn items(&self) -> &[T] {
-        &self.slots[..self.len]
-    }
-
-    /// Appends an item. There must be room.
-    #[inline(always)]
-    fn push(&mut self, item: T) {
-        self.slots[self.len] = item;
-        self.len += 1;
-    }
-
-    /// Appends an item when `condition` is odd, without a branch. There must be room.
-    #[inline(always)]
-    fn push_if(&mut self, item: T, condition: u16) {
-        self.slots[self.len] = item;
-        self.len += usize::from(condition & 1);
-    }
-
-    /// Room for `more` items. Memory is cleared when it is first used, and never again.
-    fn reserve(&mut self, more: usize) {
-        if self.slots.len() < self.len + more {
-            self.slots.resize(self.len + more, T::default());
-        }
-    }
-
-    /// The items, the last one repeated until their number is a multiple of `group`.
-    pub(super) fn in_groups_of(&mut self, group: usize) -> &[T] {
-        let end = self.len.next_multiple_of(group);
-        self.reserve(end - self.len);
-        if let Some(&last) = self.items().last() {
-            self.slots[self.len..end].fill(last);
-        }
-        &self.slots[..end]
-    }
 }
 
 /// Where the vertices of a layer's edges begin: in the lists first, in the mesh once those are numbered.
@@ -103,26 +44,53 @@ impl LayerStart {
     }
 }
 
+/// What a word of signs stands for, in any layer.
+#[derive(Clone, Copy, Debug)]
+struct Columns {
+    /// One bit for each of its columns.
+    all: u64,
+    /// The column behind the last cell of the row, if it is here.
+    row_end: u64,
+    /// Its first column, in layer 0.
+    origin: Point,
+}
+
 /// Crossed cells and edges.
 #[derive(Debug, Default)]
 pub(super) struct Cells {
-    /// The crossed cells of all layers: cases, with [`NO_CELL`] added at the end of a row.
+    /// The crossed cells of all layers.
     pub(super) cases: Stream<u16>,
-    /// The crossed cells of this layer.
-    points: Stream<Point>,
     /// Where crossed edges start that have no vertex yet, for each axis.
     pub(super) edges: [Stream<Point>; 3],
     /// One for each layer of samples.
     pub(super) layers: Vec<LayerStart>,
+    /// The words of a layer.
+    columns: Vec<Columns>,
+    /// Crossed columns of some words of a layer, and the numbers of those words.
+    crossed: Stream<(u64, usize)>,
+    /// The crossed cells of a layer.
+    points: Stream<Point>,
 }
 
 impl Cells {
-    /// Forgets all, keeps the memory.
-    pub(super) fn clear(&mut self) {
+    /// Forgets all but its memory, and prepares for a grid.
+    pub(super) fn start<S: Density>(&mut self, grid: &DenseGrid<S>) {
         self.cases.clear();
-        self.points.clear();
         self.edges.iter_mut().for_each(Stream::clear);
         self.layers.clear();
+
+        let [width, height, _] = grid.meshed();
+        let words_per_row = Signs::words_per_row(width);
+        let origin = |x, y| point([grid.first() + x, grid.first() + y, grid.first()]);
+        self.columns.clear();
+        for y in 0..height {
+            for x in (0..words_per_row - 1).map(|word| word * COLUMNS) {
+                self.columns.push(Columns { all: (1 << COLUMNS) - 1, row_end: 0, origin: origin(x, y) });
+            }
+            let x = (words_per_row - 1) * COLUMNS;
+            let row_end = 1 << (width - 1 - x);
+            self.columns.push(Columns { all: row_end | (row_end - 1), row_end, origin: origin(x, y) });
+        }
     }
 
     /// How many edges wait for their vertices.
@@ -140,19 +108,22 @@ impl Cells {
         let first = self.cases.len();
         let mut end = first;
         if !low.is_uniform_with(high) {
-            let most = width * height + SLACK;
-            self.cases.reserve(most);
+            let words = self.columns.len();
+            let words_per_row = words / height;
+            self.crossed.reserve(words);
             self.points.clear();
-            self.points.reserve(most);
-            self.edges.iter_mut().for_each(|edges| edges.reserve(most));
+            self.cases.reserve(width * height);
+            self.points.reserve(width * height);
+            self.edges.iter_mut().for_each(|edges| edges.reserve(width * height));
 
-            self.add_rows(grid, z, low, high, 0..1);
+            let signs = Corners::new(low.words(), high.words(), words);
+            self.add_cells(z, signs, 0..words_per_row);
             let row_1 = self.cases.len();
-            self.add_rows(grid, z, low, high, 1..height - 1);
+            self.add_cells(z, signs, words_per_row..words - words_per_row);
             if z < depth - 1 {
                 end = self.cases.len();
             }
-            self.add_rows(grid, z, low, high, height - 1..height);
+            self.add_cells(z, signs, words - words_per_row..words);
             self.add_edges(first, first..row_1);
             [start.x[1], _, start.z[1]] = lists(self);
             self.add_edges(first, row_1..self.cases.len());
@@ -163,66 +134,86 @@ impl Cells {
         self.layers.push(start);
     }
 
-    /// Appends the crossed cells of some rows.
-    fn add_rows<S: Density>(
-        &mut self,
-        grid: &DenseGrid<S>,
-        z: usize,
-        low: &Signs,
-        high: &Signs,
-        rows: Range<usize>,
-    ) {
-        let [width, height, _] = grid.meshed();
-        let words_per_row = Signs::words_per_row(width);
-        let last_column = 1 << (width - 1 - (words_per_row - 1) * COLUMNS);
-        let (cases, points) = (&mut self.cases, &mut self.points);
-        for y in rows {
-            let next = if y + 1 < height { y + 1 } else { y };
-            let [a, b] = [y, next].map(|y| &low.words()[y * words_per_row..][..words_per_row]);
-            let [c, d] = [y, next].map(|y| &high.words()[y * words_per_row..][..words_per_row]);
-            for word in 0..words_per_row {
-                let corners = [a[word], b[word], c[word], d[word]];
-                let is_last = word + 1 == words_per_row;
-                let columns = if is_last { last_column * 2 - 1 } else { (1 << COLUMNS) - 1 };
-                let mut crossed = crossed_columns(corners) & columns;
-                if crossed == 0 {
-                    continue;
-                }
-                let origin = point([word * COLUMNS, y, z].map(|steps| grid.first() + steps));
-                let ends_row = is_last && crossed & last_column != 0;
-                while crossed != 0 {
-                    let x = crossed.trailing_zeros();
-                    crossed &= crossed - 1;
-                    cases.push(case(corners, x));
-                    points.push(origin + u64::from(x));
-                }
-                cases.slots[cases.len - 1] |= if ends_row { NO_CELL } else { 0 };
-            }
+    /// Appends the crossed cells of some words of layer `z`.
+    fn add_cells(&mut self, z: usize, signs: Corners, words: Range<usize>) {
+        let crossed = self.crossed.spare(words.len());
+        let mut words_crossed = 0;
+        for word in words.clone() {
+            let columns = signs.crossed(word) & self.columns[word].all;
+            crossed[words_crossed] = (columns, word);
+            words_crossed += usize::from(columns != 0);
         }
+
+        let most = words.len() * COLUMNS;
+        let most = self.cases.room().min(self.points.room()).min(most);
+        let (cases, points) = (self.cases.spare(most), self.points.spare(most));
+        let mut count = 0;
+        for &(columns, word) in &crossed[..words_crossed] {
+            let [a, b, c, d] = signs.at(word);
+            let Columns { row_end, origin, .. } = self.columns[word];
+            // Each word is turned so that its bits of the case only need a mask.
+            let [b, c, d] = [b.rotate_left(2), c.rotate_left(4), d.rotate_left(6)];
+            let origin = origin + point([0, 0, z]);
+            let mut rest = columns;
+            while rest != 0 {
+                let x = rest.trailing_zeros();
+                rest &= rest - 1;
+                let low = a.rotate_right(x) & 3 | b.rotate_right(x) & 12;
+                let high = c.rotate_right(x) & 48 | d.rotate_right(x) & 192;
+                cases[count] = (low | high) as u16;
+                points[count] = origin + u64::from(x);
+                count += 1;
+            }
+            cases[count - 1] |= if columns & row_end != 0 { NO_CELL } else { 0 };
+        }
+        self.cases.extend(count);
+        self.points.extend(count);
     }
 
     /// Appends the crossed edges that these cases start to the lists.
     fn add_edges(&mut self, first: usize, cases: Range<usize>) {
-        let points = &self.points.slots[cases.start - first..cases.end - first];
+        let points = &self.points.items()[cases.start - first..cases.end - first];
+        let most = points.len();
         let [x, y, z] = &mut self.edges;
-        for (&case, &point) in self.cases.slots[cases].iter().zip(points) {
-            x.push_if(point, case ^ case >> 1);
-            y.push_if(point, case ^ case >> 2);
-            z.push_if(point, case ^ case >> 4);
+        let (xs, ys, zs) = (x.spare(most), y.spare(most), z.spare(most));
+        let mut counts = [0; 3];
+        for (&case, &point) in self.cases.items()[cases].iter().zip(points) {
+            let case = usize::from(case);
+            xs[counts[0]] = point;
+            ys[counts[1]] = point;
+            zs[counts[2]] = point;
+            counts[0] += (case ^ case >> 1) & 1;
+            counts[1] += (case ^ case >> 2) & 1;
+            counts[2] += (case ^ case >> 4) & 1;
         }
+        x.extend(counts[0]);
+        y.extend(counts[1]);
+        z.extend(counts[2]);
     }
 }
 
-/// The columns in which the corners of a cell are neither all solid nor all air. The words hold the signs of the rows at
-/// (y, z), (y + 1, z), (y, z + 1) and (y + 1, z + 1).
-#[inline(always)]
-fn crossed_columns([a, b, c, d]: [u64; 4]) -> u64 {
-    let (some, every) = (a | b | c | d, a & b & c & d);
-    (some | some >> 1) & !(every & every >> 1)
-}
+/// The signs of four rows around each row of cells: at (y, z), (y + 1, z), (y, z + 1) and (y + 1, z + 1).
+#[derive(Clone, Copy)]
+struct Corners<'a>([&'a [u64]; 4]);
 
-/// The case of the cell in column `x`.
-#[inline(always)]
-fn case([a, b, c, d]: [u64; 4], x: u32) -> u16 {
-    (a >> x & 3 | (b >> x & 3) << 2 | (c >> x & 3) << 4 | (d >> x & 3) << 6) as u16
+impl<'a> Corners<'a> {
+    /// The first `words` words of two layers, and those one row on.
+    fn new(low: &'a [u64], high: &'a [u64], words: usize) -> Self {
+        let ahead = low.len() - words;
+        Self([&low[..words], &low[ahead..][..words], &high[..words], &high[ahead..][..words]])
+    }
+
+    #[inline(always)]
+    fn at(&self, word: usize) -> [u64; 4] {
+        let [a, b, c, d] = self.0;
+        [a[word], b[word], c[word], d[word]]
+    }
+
+    /// The columns of a word in which the corners of a cell are neither all solid nor all air.
+    #[inline(always)]
+    fn crossed(&self, word: usize) -> u64 {
+        let [a, b, c, d] = self.at(word);
+        let (some, every) = (a | b | c | d, a & b & c & d);
+        (some | some >> 1) & !(every & every >> 1)
+    }
 }

@@ -110,9 +110,12 @@ impl<'a, S: Density> DenseGrid<'a, S> {
         self.size.map(|side| side - 2 * self.apron)
     }
 
-    /// The row of meshed samples at `y` and `z`, counted from the first meshed sample.
-    pub(super) fn row(&self, y: usize, z: usize) -> &'a [S] {
-        let start = self.apron + self.size[0] * (self.apron + y + self.size[1] * (self.apron + z));
-        &self.samples[start..start + self.meshed()[0]]
+    /// The rows of layer `z`, counted from the first meshed one. Each begins with its first meshed sample, and ends where
+    /// the grid's next row begins.
+    pub(super) fn rows(&self, z: usize) -> impl Iterator<Item = &'a [S]> {
+        let [width, height, _] = self.size;
+        let start = width * (self.apron + height * (self.apron + z));
+        let rows = self.samples[start..start + width * self.meshed()[1]].chunks_exact(width);
+        rows.map(|row| &row[self.apron..])
     }
 }

@@ -46,15 +46,17 @@ mod grid;
 mod signs;
 #[cfg(test)]
 mod simple;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod triangles;
 mod vertices;
 
-use cells::{Cells, Point, Stream};
+use cells::{Cells, Point};
 pub use density::Density;
 pub use grid::{DenseGrid, DenseGridError};
 use signs::Signs;
+use stream::Stream;
 
 /// A triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -103,7 +105,7 @@ impl DenseMesher {
     /// The same samples give the same bits on every machine.
     pub fn mesh<S: Density>(&mut self, grid: DenseGrid<S>, normals: Normals, out: &mut DenseMesh) {
         let depth = grid.meshed()[2];
-        self.cells.clear();
+        self.cells.start(&grid);
         let mut vertices = 0;
         let mut numbered_layers = 0;
         self.low.read(&grid, 0);

@@ -7,8 +7,8 @@
 //! word 1: samples 63 ..= 126   columns 63 ..= 125
 //! ```
 //!
-//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a row
-//! stands twice: the column that it starts is no cell, and no edge along x is crossed there.
+//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a row is
+//! repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is repeated as well.
 
 use super::density::Density;
 use super::grid::DenseGrid;
@@ -42,13 +42,11 @@ impl Signs {
     pub(super) fn read<S: Density>(&mut self, grid: &DenseGrid<S>, z: usize) {
         let [width, height, _] = grid.meshed();
         let words_per_row = Self::words_per_row(width);
-        let length = words_per_row * height;
-        if self.words.len() != length {
-            self.words.resize(length, 0);
-        }
+        self.words.resize(words_per_row * (height + 1), 0);
         let (mut some, mut every) = (0, u64::MAX);
-        for (y, words) in self.words.chunks_exact_mut(words_per_row).enumerate() {
-            let mut rest = grid.row(y, z);
+        for (words, row) in self.words.chunks_exact_mut(words_per_row).zip(grid.rows(z)) {
+            let row = &row[..width];
+            let mut rest = row;
             if let Some((last, full)) = words.split_last_mut() {
                 for word in full {
                     *word = full_word(rest);
@@ -56,12 +54,13 @@ impl Signs {
                     every &= *word;
                     rest = &rest[COLUMNS..];
                 }
-                *last = last_word(rest);
+                *last = last_word(row, rest);
                 some |= *last;
-                // Bits behind the row's end are neither.
-                every &= *last | !(u64::MAX >> (COLUMNS - rest.len()));
+                every &= *last;
             }
         }
+        let last = words_per_row * (height - 1);
+        self.words.copy_within(last..last + words_per_row, last + words_per_row);
         self.content = match (some, every) {
             (0, _) => Content::Air,
             (_, u64::MAX) => Content::Solid,
@@ -69,7 +68,7 @@ impl Signs {
         };
     }
 
-    /// The words of all rows.
+    /// The words of all rows, and behind them those of the last row once more.
     pub(super) fn words(&self) -> &[u64] {
         &self.words
     }
@@ -90,18 +89,21 @@ fn full_word<S: Density>(samples: &[S]) -> u64 {
         | S::signs(&blocks[3]) << 48
 }
 
-/// The signs of a row's last samples, 1 to 63, the very last one twice.
+/// The signs of the last samples of a row, 1 to 63. The very last one is repeated until the word is full.
 #[inline(always)]
-fn last_word<S: Density>(samples: &[S]) -> u64 {
-    let (blocks, rest) = samples.as_chunks();
-    let (mut word, mut bit) = (0, 0);
-    for block in blocks {
-        word |= S::signs(block) << bit;
-        bit += 16;
+fn last_word<S: Density>(row: &[S], samples: &[S]) -> u64 {
+    let mut word = 0;
+    if let Some(end) = row.last_chunk() {
+        for (block, samples) in samples.as_chunks().0.iter().enumerate() {
+            word |= S::signs(samples) << (block * 16);
+        }
+        // What is left over, together with samples that were read before.
+        word |= S::signs(end) << 48 >> (64 - samples.len());
+    } else {
+        for (bit, sample) in samples.iter().enumerate() {
+            word |= u64::from(sample.is_solid()) << bit;
+        }
     }
-    for sample in rest {
-        word |= u64::from(sample.is_solid()) << bit;
-        bit += 1;
-    }
-    word | (word >> (bit - 1) & 1) << bit
+    let free = 64 - samples.len();
+    ((word << free) as i64 >> free) as u64
 }

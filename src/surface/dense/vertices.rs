@@ -158,15 +158,18 @@ impl<'a, S: Density, const AXIS: usize> Taps<'a, S, AXIS> {
     fn read(&self, [a, b, c, d]: [usize; LANES]) -> ([f32x4; 2], [Vectors; 2]) {
         let indices = [a - self.first, b - self.first, c - self.first, d - self.first];
         let [before, start, end, behind] = self.along;
-        let [before, start, end, behind] =
-            [gather(before, indices), gather(start, indices), gather(end, indices), gather(behind, indices)];
-        let gradient = |along: f32x4, [u_low, u_high, v_low, v_high]: [&[S]; 4]| {
-            let mut gradient = [along; 3];
-            gradient[(AXIS + 1) % 3] = gather(u_high, indices) - gather(u_low, indices);
-            gradient[(AXIS + 2) % 3] = gather(v_high, indices) - gather(v_low, indices);
-            gradient
-        };
-        ([start, end], [gradient(end - before, self.across[0]), gradient(behind - start, self.across[1])])
+        let (start, end) = (gather(start, indices), gather(end, indices));
+        let start_gradient = Self::gradient(end - gather(before, indices), self.across[0], indices);
+        let end_gradient = Self::gradient(gather(behind, indices) - start, self.across[1], indices);
+        ([start, end], [start_gradient, end_gradient])
+    }
+
+    #[inline(always)]
+    fn gradient(along: f32x4, [u_low, u_high, v_low, v_high]: [&[S]; 4], indices: [usize; LANES]) -> Vectors {
+        let mut gradient = [along; 3];
+        gradient[(AXIS + 1) % 3] = gather(u_high, indices) - gather(u_low, indices);
+        gradient[(AXIS + 2) % 3] = gather(v_high, indices) - gather(v_low, indices);
+        gradient
     }
 }
 
