@@ -1,10 +1,10 @@
 //! What is drawn: marching cubes where edits are, heightmap elsewhere, and the ring where they meet.
 //!
 //! - [`cases`]: the marching-cubes case table, derived from one rule about cube faces.
+//! - [`dense`]: marching cubes over a plain dense grid, for those who have one.
 //! - [`mask`]: which cells marching cubes draws (rule 2), as bits.
 //! - [`vertex`]: the one vertex function of cubes and ring (rule 4), with normals and materials.
 //! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk; [`plain`] is the same by the book.
-//! - [`dense`]: marching cubes over any dense grid, for its own sake.
 //! - [`tile`]: the heightmap's triangles outside the mask, rings included (rule 3).
 //! - [`mesh`]: vertex and index buffers, local to a chunk or tile.
 //! - [`seams`]: the validator: is everything drawn together closed?

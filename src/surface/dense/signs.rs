@@ -1,0 +1,109 @@
+//! Which samples of a layer are solid: bits, 64 samples to a word.
+//!
+//! A word holds 64 samples but only 63 columns, because neighbouring words share a sample:
+//!
+//! ```text
+//! word 0: samples  0 ..= 63    columns  0 ..= 62
+//! word 1: samples 63 ..= 126   columns 63 ..= 125
+//! ```
+//!
+//! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a row is
+//! repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is repeated as well.
+
+use super::density::Density;
+use super::grid::DenseGrid;
+
+/// Columns that one word holds.
+pub(super) const COLUMNS: usize = 63;
+
+/// The signs of one layer of samples, row by row.
+#[derive(Debug, Default)]
+pub(super) struct Signs {
+    words: Vec<u64>,
+    content: Content,
+}
+
+/// What a layer holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Content {
+    #[default]
+    Air,
+    Solid,
+    Mixed,
+}
+
+impl Signs {
+    /// Words of a row of `samples` samples.
+    pub(super) fn words_per_row(samples: usize) -> usize {
+        samples.div_ceil(COLUMNS)
+    }
+
+    /// Reads layer `z` of the meshed samples.
+    pub(super) fn read<S: Density>(&mut self, grid: &DenseGrid<S>, z: usize) {
+        let [width, height, _] = grid.meshed();
+        let words_per_row = Self::words_per_row(width);
+        self.words.resize(words_per_row * (height + 1), 0);
+        let (mut some, mut every) = (0, u64::MAX);
+        for (words, row) in self.words.chunks_exact_mut(words_per_row).zip(grid.rows(z)) {
+            let row = &row[..width];
+            let mut rest = row;
+            if let Some((last, full)) = words.split_last_mut() {
+                for word in full {
+                    *word = full_word(rest);
+                    some |= *word;
+                    every &= *word;
+                    rest = &rest[COLUMNS..];
+                }
+                *last = last_word(row, rest);
+                some |= *last;
+                every &= *last;
+            }
+        }
+        let last = words_per_row * (height - 1);
+        self.words.copy_within(last..last + words_per_row, last + words_per_row);
+        self.content = match (some, every) {
+            (0, _) => Content::Air,
+            (_, u64::MAX) => Content::Solid,
+            _ => Content::Mixed,
+        };
+    }
+
+    /// The words of all rows, and behind them those of the last row once more.
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// Is the layer one with `other`: both all air, or both all solid?
+    pub(super) fn is_uniform_with(&self, other: &Self) -> bool {
+        self.content != Content::Mixed && self.content == other.content
+    }
+}
+
+/// The signs of the first 64 samples.
+#[inline(always)]
+fn full_word<S: Density>(samples: &[S]) -> u64 {
+    let (blocks, _) = samples[..64].as_chunks();
+    S::signs(&blocks[0])
+        | S::signs(&blocks[1]) << 16
+        | S::signs(&blocks[2]) << 32
+        | S::signs(&blocks[3]) << 48
+}
+
+/// The signs of the last samples of a row, 1 to 63. The very last one is repeated until the word is full.
+#[inline(always)]
+fn last_word<S: Density>(row: &[S], samples: &[S]) -> u64 {
+    let mut word = 0;
+    if let Some(end) = row.last_chunk() {
+        for (block, samples) in samples.as_chunks().0.iter().enumerate() {
+            word |= S::signs(samples) << (block * 16);
+        }
+        // What is left over, together with samples that were read before.
+        word |= S::signs(end) << 48 >> (64 - samples.len());
+    } else {
+        for (bit, sample) in samples.iter().enumerate() {
+            word |= u64::from(sample.is_solid()) << bit;
+        }
+    }
+    let free = 64 - samples.len();
+    ((word << free) as i64 >> free) as u64
+}

@@ -1,0 +1,250 @@
+//! Vertices from the lists of crossed edges, four at a time.
+//!
+//! All edges of a list run along the same axis, so all four take the same steps: read the samples around both ends, then
+//! calculate with four numbers at once. Only + - * / and square roots in a fixed order, so all machines agree on every bit.
+
+use wide::{f32x4, i32x4};
+
+use super::cells::{Point, point};
+use super::density::Density;
+use super::grid::DenseGrid;
+
+/// Edges that are worked on together.
+pub(super) const LANES: usize = 4;
+
+/// Slots behind the last vertex that may be written in vain.
+pub(super) const SLACK: usize = LANES + 1;
+
+/// Three numbers for each of four edges.
+type Vectors = [f32x4; 3];
+
+/// Writes the vertices of the edges along `AXIS` that start at `points`, whose number is a multiple of [`LANES`]. The slot
+/// behind them is written too, with nothing of worth. Without `NORMALS` no normal is written.
+pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
+    grid: &DenseGrid<S>,
+    points: &[Point],
+    positions: &mut [[f32; 3]],
+    normals: &mut [[f32; 3]],
+) {
+    let lattice = Lattice::new(grid, AXIS);
+    let taps = Taps::<S, AXIS>::new(grid);
+    let (mut positions, mut normals) = (positions.as_flattened_mut(), normals.as_flattened_mut());
+    for points in points.as_chunks::<LANES>().0 {
+        let indices = lattice.indices(points);
+        let mut position = coordinates(points);
+        if NORMALS {
+            let (ends, [start, end]) = if lattice.are_inside(points) {
+                taps.read(indices)
+            } else {
+                (lattice.ends(grid.samples(), indices), border_gradients(grid, points, AXIS))
+            };
+            let crossing = crossing(ends);
+            position[AXIS] += crossing;
+            let normal = |axis: usize| start[axis] + (end[axis] - start[axis]) * crossing;
+            write(unit([normal(0), normal(1), normal(2)]), normals);
+            normals = &mut normals[LANES * 3..];
+        } else {
+            position[AXIS] += crossing(lattice.ends(grid.samples(), indices));
+        }
+        write(position, positions);
+        positions = &mut positions[LANES * 3..];
+    }
+}
+
+/// The bit above each coordinate of a point: what is left of it after a subtraction tells which one was greater.
+const TOP: Point = 0x8000_8000_8000;
+
+/// Where samples lie in the slice.
+struct Lattice {
+    strides: [usize; 3],
+    /// The stride along the edges.
+    along: usize,
+    /// The first point where an edge can start with all its neighbours inside the grid.
+    first: Point,
+    /// The last one, and [`TOP`].
+    last: Point,
+}
+
+impl Lattice {
+    fn new<S: Density>(grid: &DenseGrid<S>, axis: usize) -> Self {
+        let strides = grid.strides();
+        let mut far_end = [0; 3];
+        far_end[axis] = 1;
+        // Coordinates have 15 bits. The 16th keeps one from borrowing from the next.
+        let last = (point(grid.size().map(|side| side - 2)) | TOP) - point(far_end);
+        Self { strides, along: strides[axis], first: point([1; 3]), last }
+    }
+
+    #[inline(always)]
+    fn indices(&self, &[a, b, c, d]: &[Point; LANES]) -> [usize; LANES] {
+        let index = |point| {
+            let [x, y, z] = unpack(point);
+            x + y * self.strides[1] + z * self.strides[2]
+        };
+        [index(a), index(b), index(c), index(d)]
+    }
+
+    /// Do all neighbours of both ends of these edges lie in the grid?
+    #[inline(always)]
+    fn are_inside(&self, points: &[Point; LANES]) -> bool {
+        let inside = |all, point| all & ((point | TOP) - self.first) & (self.last - point);
+        points.iter().fold(TOP, inside) == TOP
+    }
+
+    /// The samples at both ends of the edges.
+    #[inline(always)]
+    fn ends<S: Density>(&self, samples: &[S], indices: [usize; LANES]) -> [f32x4; 2] {
+        let high = &samples[self.along..];
+        let low = &samples[..high.len()];
+        [gather(low, indices), gather(high, indices)]
+    }
+}
+
+#[inline(always)]
+fn gather<S: Density>(samples: &[S], [a, b, c, d]: [usize; LANES]) -> f32x4 {
+    S::numbers([samples[a], samples[b], samples[c], samples[d]])
+}
+
+#[inline(always)]
+fn unpack(point: Point) -> [usize; 3] {
+    [(point & 0xffff) as usize, (point >> 16 & 0xffff) as usize, (point >> 32) as usize]
+}
+
+/// Coordinates of four points.
+#[inline(always)]
+fn coordinates(&[a, b, c, d]: &[Point; LANES]) -> Vectors {
+    let xy = i32x4::new([a as i32, b as i32, c as i32, d as i32]);
+    let z = i32x4::new([(a >> 32) as i32, (b >> 32) as i32, (c >> 32) as i32, (d >> 32) as i32]);
+    [f32x4::from_i32x4(xy & i32x4::splat(0xffff)), f32x4::from_i32x4(xy >> 16), f32x4::from_i32x4(z)]
+}
+
+/// The samples around edges along one axis, each as a slice of its own that begins at the first edge's sample. All are of
+/// the same length, so that a single check covers the twelve samples of an edge.
+struct Taps<'a, S, const AXIS: usize> {
+    /// How far the slices begin behind the grid's first sample.
+    first: usize,
+    /// From one before the start of the edge to one behind its end.
+    along: [&'a [S]; 4],
+    /// Beside the start and beside the end, along the next axis, then along the one after that: before and behind.
+    across: [[&'a [S]; 4]; 2],
+}
+
+impl<'a, S: Density, const AXIS: usize> Taps<'a, S, AXIS> {
+    #[inline(always)]
+    fn new(grid: &DenseGrid<'a, S>) -> Self {
+        let (samples, strides) = (grid.samples(), grid.strides());
+        let along = strides[AXIS];
+        let [u, v] = [strides[(AXIS + 1) % 3], strides[(AXIS + 2) % 3]];
+        let first = strides[2];
+        let farthest = along + along.max(u).max(v);
+        let len = samples.len().saturating_sub(first + farthest);
+        let tap = |back: usize, ahead: usize| {
+            // A grid too thin for any inner edge has no samples there either.
+            let start = (first + ahead - back).min(samples.len() - len);
+            &samples[start..start + len]
+        };
+        Self {
+            first,
+            along: [tap(along, 0), tap(0, 0), tap(0, along), tap(0, 2 * along)],
+            across: [
+                [tap(u, 0), tap(0, u), tap(v, 0), tap(0, v)],
+                [tap(u, along), tap(0, along + u), tap(v, along), tap(0, along + v)],
+            ],
+        }
+    }
+
+    /// The samples at both ends of four edges, and the gradients there, by central differences.
+    #[inline(always)]
+    fn read(&self, [a, b, c, d]: [usize; LANES]) -> ([f32x4; 2], [Vectors; 2]) {
+        let indices = [a - self.first, b - self.first, c - self.first, d - self.first];
+        let [before, start, end, behind] = self.along;
+        let (start, end) = (gather(start, indices), gather(end, indices));
+        let start_gradient = Self::gradient(end - gather(before, indices), self.across[0], indices);
+        let end_gradient = Self::gradient(gather(behind, indices) - start, self.across[1], indices);
+        ([start, end], [start_gradient, end_gradient])
+    }
+
+    #[inline(always)]
+    fn gradient(along: f32x4, [u_low, u_high, v_low, v_high]: [&[S]; 4], indices: [usize; LANES]) -> Vectors {
+        let mut gradient = [along; 3];
+        gradient[(AXIS + 1) % 3] = gather(u_high, indices) - gather(u_low, indices);
+        gradient[(AXIS + 2) % 3] = gather(v_high, indices) - gather(v_low, indices);
+        gradient
+    }
+}
+
+/// The gradients at both ends of edges that may lie in the grid's border.
+#[cold]
+fn border_gradients<S: Density>(grid: &DenseGrid<S>, points: &[Point; LANES], axis: usize) -> [Vectors; 2] {
+    let mut ends = [[[0.0; LANES]; 3]; 2];
+    for (end, gradients) in ends.iter_mut().enumerate() {
+        for (lane, &point) in points.iter().enumerate() {
+            let mut point = unpack(point);
+            point[axis] += end;
+            for (axis, gradient) in gradients.iter_mut().enumerate() {
+                gradient[lane] = border_difference(grid, point, axis);
+            }
+        }
+    }
+    ends.map(|gradients| gradients.map(f32x4::new))
+}
+
+/// The difference of the samples around one, along an axis. Where a neighbour is missing, the difference to the other one
+/// counts twice.
+#[inline]
+fn border_difference<S: Density>(grid: &DenseGrid<S>, point: [usize; 3], axis: usize) -> f32 {
+    let (samples, strides) = (grid.samples(), grid.strides());
+    let index = point[0] + point[1] * strides[1] + point[2] * strides[2];
+    let has_low = usize::from(point[axis] > 0);
+    let has_high = usize::from(point[axis] + 1 < grid.size()[axis]);
+    let low = samples[index - strides[axis] * has_low].number();
+    let high = samples[index + strides[axis] * has_high].number();
+    (high - low) * (3 - has_low - has_high) as f32
+}
+
+/// Where the surface crosses edges, 0 to 1; in the middle where numbers fail.
+#[inline(always)]
+fn crossing([start, end]: [f32x4; 2]) -> f32x4 {
+    let crossing = start / (start - end);
+    // NaN alone is not equal to itself.
+    crossing.simd_eq(crossing).bitselect(crossing, f32x4::HALF)
+}
+
+/// Scaled to length 1. Where numbers fail, it points up.
+#[inline(always)]
+fn unit(vectors: Vectors) -> Vectors {
+    let [x, y, z] = vectors;
+    let squared = x * x + y * y + z * z;
+    let scale = f32x4::ONE / squared.sqrt();
+    let units = [x * scale, y * scale, z * scale];
+    // Smaller squares have lost digits, and larger ones are infinite.
+    let is_exact = squared.simd_ge(f32x4::splat(1e-30)) & squared.simd_le(f32x4::splat(f32::MAX));
+    if is_exact.all() { units } else { careful_units(vectors, units, is_exact.to_bitmask()) }
+}
+
+/// Calculates again those `units` that are not exact.
+#[cold]
+fn careful_units(vectors: Vectors, units: Vectors, exact: u32) -> Vectors {
+    let (vectors, mut units) = (vectors.map(f32x4::to_array), units.map(f32x4::to_array));
+    for lane in (0..LANES).filter(|lane| exact >> lane & 1 == 0) {
+        let vector = [0, 1, 2].map(|axis| f64::from(vectors[axis][lane]));
+        let length = (vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]).sqrt();
+        let unit =
+            if length > 0.0 && length.is_finite() { vector.map(|v| v / length) } else { [0.0, 1.0, 0.0] };
+        for (units, component) in units.iter_mut().zip(unit) {
+            units[lane] = component as f32;
+        }
+    }
+    units.map(f32x4::new)
+}
+
+/// Writes four vectors, and one number behind them.
+#[inline(always)]
+fn write([x, y, z]: Vectors, to: &mut [f32]) {
+    let vectors = f32x4::transpose([x, y, z, f32x4::ZERO]);
+    // Each fourth number is overwritten by the next vector's first.
+    let to = &mut to[..LANES * 3 + 1];
+    for (lane, vector) in vectors.iter().enumerate() {
+        to[lane * 3..lane * 3 + 4].copy_from_slice(vector.as_array());
+    }
+}
