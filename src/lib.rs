@@ -79,8 +79,18 @@
 //!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
 //! ```
 //!
-//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others. Integers decide what is solid, and
-//! floats are only drawn, so the same edits give the same [`hash`](terrain::World::hash) on every machine.
+//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others.
+//! Integers decide what is solid, and floats are only drawn, so the same edits give the same
+//! [`hash`](terrain::World::hash) on every machine.
+//!
+//! # What an edit costs
+//!
+//! What its brush reaches, whatever the chunk size. Bricks of 8x8x8 samples are copied, changed and shared; each keeps a
+//! bit per sample for solid and for edited, so that [`block`](surface::block) finds the cubes to draw by a few operations
+//! on whole layers and looks at samples only around them. Parts of a chunk's mesh that did not change are copied from its
+//! last one, and so are rings of a tile. Nothing is allocated while meshing. Bricks, blocks and chunks of a large
+//! transaction are spread over rayon's threads; the result does not depend on how many there are.
+//! [`Commit::stages`](terrain::Commit::stages) tells where the time went.
 //!
 //! # System sets
 //!
