@@ -538,3 +538,86 @@ fn a_normal_that_only_changes_the_sign_of_its_zeros_is_redrawn() {
     twice.apply(&[second], "second");
     assert!(once.chunks == twice.chunks, "batching shows");
 }
+
+#[test]
+fn at_the_ends_of_the_lattice_all_is_as_if_made_from_scratch() {
+    for (i, base) in [32_768.0, 32_767.5, 32_761.0, -32_768.0, -32_767.25, -32_760.0].into_iter().enumerate() {
+        let mut rng = Rng::with_seed(i as u64);
+        let bumps: Vec<f64> = (0..13 * 12).map(|_| rng.f64() * 6.0).collect();
+        let height = |x: i32, z: i32| (base + bumps[(z * 13 + x) as usize] - 3.0).clamp(-32_768.0, 32_768.0);
+        let ground = Ground::from_fn(12, 11, height).expect("heights in range");
+        let mut witness = Witness::new(ground, [8, 13, 128][i % 3]);
+        play(&mut witness, &mut rng, 8, 7.0, &format!("ground at {base}"));
+    }
+}
+
+#[test]
+fn on_a_cliff_of_sixty_thousand_voxels_all_is_as_if_made_from_scratch() {
+    for seed in 0..2 {
+        let mut rng = Rng::with_seed(seed);
+        let height = |x: i32, z: i32| if x + z > 9 { 30_000.5 } else { -30_000.25 - f64::from(z) };
+        let mut witness = Witness::new(Ground::from_fn(12, 9, height).expect("heights in range"), 100);
+        witness.is_meshed_again = false;
+        for i in 0..3 {
+            let y = [30_000.0, -30_000.0, 0.0, 130.0, 29_000.0][rng.usize(0..5)];
+            let place = Vec3::new(6.0 + rng.f32() * 3.0, y, rng.f32() * 5.0);
+            let brush = any_brush(&mut rng, place, 3.0);
+            witness.apply(&[brush], &format!("cliff {seed}, transaction {i}"));
+        }
+        witness.check_meshes(&format!("cliff {seed}"));
+    }
+}
+
+#[test]
+fn large_brushes_over_small_ones_are_as_if_made_from_scratch() {
+    let mut rng = Rng::with_seed(7);
+    let (ground, _) = any_ground(&mut rng, 2);
+    let ground = Ground::from_fn(70, 60, |x, z| {
+        f64::from(ground.height(Column::new(x % ground.width(), z % ground.depth()))) / 256.0
+    });
+    let mut witness = Witness::new(ground.expect("finite heights"), 27);
+    play(&mut witness, &mut rng, 4, 6.0, "small");
+    for (i, brush) in [
+        Brush::dig(Shape::sphere(Vec3::new(35.0, 0.0, 30.0), 28.0)),
+        Brush::add(Shape::cuboid(Vec3::new(30.0, 10.0, 30.0), Vec3::new(500.0, 9.0, 500.0)), MaterialId(3)),
+        Brush::paint(Shape::cuboid(Vec3::new(30.0, 0.0, 30.0), Vec3::splat(24.0)), MaterialId(2)),
+        Brush::paint(Shape::cuboid(Vec3::new(30.0, 0.0, 30.0), Vec3::splat(23.0)), MaterialId::GROUND),
+        Brush::dig(Shape::cylinder(Vec3::new(35.0, -25.0, 30.0), Vec3::Y * 60.0, 21.0))
+            .with_roughness(Roughness::new(8.0, 5.0, 1)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        witness.apply(&[brush], &format!("large brush {i}"));
+    }
+    play(&mut witness, &mut rng, 4, 6.0, "small again");
+}
+
+#[test]
+fn batches_and_threads_do_not_show() {
+    let pools = [1, 3].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
+    for seed in 0..worlds::world_count(30) / 3 {
+        let run = |pool: &rayon::ThreadPool, batch: usize| {
+            let mut rng = Rng::with_seed(seed);
+            let (ground, chunk_size) = any_ground(&mut rng, seed);
+            let brushes: Vec<Brush> = (0..12)
+                .map(|i| {
+                    let place = any_place(&mut rng, &ground);
+                    any_brush(&mut rng, place, if i % 4 == 0 { 9.0 } else { 3.0 })
+                })
+                .collect();
+            let settings = TerrainSettings { chunk_size, ..Default::default() };
+            let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
+            pool.install(|| brushes.chunks(batch).for_each(|brushes| drop(terrain.apply(brushes))));
+            let world = terrain.world();
+            let meshes: Vec<MeshBits> = world.drawn().map(|(_, mesh)| mesh_bits(&mesh)).collect();
+            (world.hash(), meshes)
+        };
+        let first = run(&pools[0], 1);
+        for (pool, batch) in [(0, 12), (1, 1), (1, 5)] {
+            let other = run(&pools[pool], batch);
+            assert_eq!(first.0, other.0, "world {seed}: hash of batches of {batch}");
+            assert!(first.1 == other.1, "world {seed}: meshes of batches of {batch}");
+        }
+    }
+}
