@@ -81,6 +81,11 @@ pub struct Vertex {
 }
 
 impl Vertex {
+    /// Is it the other one, bit by bit? Normals of 0.0 and -0.0 are equal, but not the same.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        self == other && self.normal.to_array().map(f32::to_bits) == other.normal.to_array().map(f32::to_bits)
+    }
+
     /// The position in voxels, exact in `f32`.
     pub fn position_f32(&self) -> [f32; 3] {
         self.position.to_array().map(|steps| steps as f32 / SNAP as f32)

@@ -88,7 +88,9 @@ impl ChunkSurface {
         };
         let ((vertex, index), part) = (self.start(at), self.parts[at]);
         let rebased = fresh.indices.iter().map(|&i| vertex as u32 + u32::from(i));
-        self.mesh.vertices[vertex..part.vertices] != *fresh.vertices
+        let old = &self.mesh.vertices[vertex..part.vertices];
+        old.len() != fresh.vertices.len()
+            || !old.iter().zip(fresh.vertices).all(|(old, new)| old.is_same(new))
             || rebased.cmp(self.mesh.indices[index..part.indices].iter().copied()) != Ordering::Equal
     }
 
