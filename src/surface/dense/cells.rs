@@ -22,6 +22,10 @@ pub(super) const fn point([x, y, z]: [usize; 3]) -> Point {
     x as u64 | (y as u64) << 16 | (z as u64) << 32
 }
 
+/// Edges that are listed before they get their vertices. Few enough to stay in the first cache, and their samples in the
+/// second; enough that the lists' ends do not matter.
+const BATCH: usize = 2048;
+
 /// Where the vertices of a layer's edges begin: in the lists first, in the mesh once those are numbered.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LayerStart {
@@ -80,6 +84,8 @@ impl Cells {
         self.layers.clear();
 
         let [width, height, _] = grid.meshed();
+        self.points.reserve(width * height);
+        self.edges.iter_mut().for_each(|edges| edges.reserve(BATCH + width * height));
         let words_per_row = Signs::words_per_row(width);
         let origin = |x, y| point([grid.first() + x, grid.first() + y, grid.first()]);
         self.columns.clear();
@@ -98,6 +104,11 @@ impl Cells {
         self.edges.iter().map(Stream::len).sum()
     }
 
+    /// Must the edges get their vertices before the next layer is added?
+    pub(super) fn is_full(&self) -> bool {
+        self.waiting() >= BATCH
+    }
+
     /// Adds layer `z`: the cells between `low`, its signs, and `high`, those of the next layer. Behind the last layer, which
     /// starts no cells, both are the same.
     pub(super) fn add_layer<S: Density>(&mut self, grid: &DenseGrid<S>, z: usize, low: &Signs, high: &Signs) {
@@ -113,8 +124,6 @@ impl Cells {
             self.crossed.reserve(words);
             self.points.clear();
             self.cases.reserve(width * height);
-            self.points.reserve(width * height);
-            self.edges.iter_mut().for_each(|edges| edges.reserve(width * height));
 
             let signs = Corners::new(low.words(), high.words(), words);
             self.add_cells(z, signs, 0..words_per_row);
@@ -130,6 +139,10 @@ impl Cells {
         }
         // What lies behind the last row and the last layer has told its edges, and is no cell.
         self.cases.truncate(end);
+        if z + 1 == depth {
+            // Room that another grid with as many cells may need, if more of them lie in its last layers.
+            self.cases.reserve(width * height);
+        }
         start.cases_end = end;
         self.layers.push(start);
     }

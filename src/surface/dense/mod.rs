@@ -80,13 +80,10 @@ pub enum Normals {
     Gradient,
 }
 
-/// Edges that are listed before they get their vertices. Few enough to stay in the first cache, and their samples in the
-/// second; enough that the lists' ends do not matter.
-const BATCH: usize = 2048;
-
 /// Meshes dense grids, and keeps its memory from one to the next.
 ///
-/// The first grids make it allocate; then nothing is allocated for a grid that is no larger and no richer than those before.
+/// The first grids make it allocate. Nothing is allocated for a grid with no longer sides, no more crossed cells and no more
+/// vertices and triangles than one before, if the mesh is reused as well.
 #[derive(Debug, Default)]
 pub struct DenseMesher {
     low: Signs,
@@ -118,7 +115,7 @@ impl DenseMesher {
                 self.cells.add_layer(&grid, z, &self.low, &self.high);
                 std::mem::swap(&mut self.low, &mut self.high);
             }
-            if is_last || self.cells.waiting() >= BATCH {
+            if is_last || self.cells.is_full() {
                 match normals {
                     Normals::None => {
                         self.add_vertices::<S, false>(&grid, numbered_layers, &mut vertices, out)

@@ -83,9 +83,13 @@ pub(super) fn mesh(cells: &Cells, indices: &mut Vec<u32>) {
         if codes.is_empty() {
             continue;
         }
-        let most = at + (codes.len() + 1) * MOST;
-        if indices.len() < most {
-            indices.resize(most, 0);
+        // The last cell writes up to MOST indices in vain.
+        if indices.len() < at + (codes.len() + 1) * MOST {
+            let count = codes.iter().map(|&code| usize::from(steps[usize::from(code & 511)].count)).sum::<usize>();
+            let needed = at + count + MOST;
+            if indices.len() < needed {
+                indices.resize(needed, 0);
+            }
         }
         at += mesh_layer(steps, codes, counters(low, high), &mut indices[at..]);
     }

@@ -36,7 +36,7 @@ pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
             let (ends, [start, end]) = if lattice.are_inside(points) {
                 taps.read(indices)
             } else {
-                (lattice.ends(grid.samples(), indices), border_gradients(grid, points, AXIS))
+                (lattice.ends(grid.samples(), indices), border_gradients::<S, AXIS>(grid, points, indices))
             };
             let crossing = crossing(ends);
             position[AXIS] += crossing;
@@ -173,33 +173,33 @@ impl<'a, S: Density, const AXIS: usize> Taps<'a, S, AXIS> {
     }
 }
 
-/// The gradients at both ends of edges that may lie in the grid's border.
-#[cold]
-fn border_gradients<S: Density>(grid: &DenseGrid<S>, points: &[Point; LANES], axis: usize) -> [Vectors; 2] {
-    let mut ends = [[[0.0; LANES]; 3]; 2];
-    for (end, gradients) in ends.iter_mut().enumerate() {
-        for (lane, &point) in points.iter().enumerate() {
-            let mut point = unpack(point);
-            point[axis] += end;
-            for (axis, gradient) in gradients.iter_mut().enumerate() {
-                gradient[lane] = border_difference(grid, point, axis);
+/// The gradients at both ends of edges that may lie in the grid's border. Where a neighbour is missing, the difference to
+/// the other one counts twice.
+#[inline(never)]
+fn border_gradients<S: Density, const AXIS: usize>(
+    grid: &DenseGrid<S>,
+    points: &[Point; LANES],
+    starts: [usize; LANES],
+) -> [Vectors; 2] {
+    let mut gradients = [[f32x4::ZERO; 3]; 2];
+    for (end, gradient) in gradients.iter_mut().enumerate() {
+        for (axis, gradient) in gradient.iter_mut().enumerate() {
+            let stride = grid.strides()[axis];
+            let on = if axis == AXIS { end } else { 0 };
+            let last = grid.size()[axis] - 1 - on;
+            let (mut low, mut high, mut weight) = (starts, starts, [1.0; LANES]);
+            for lane in 0..LANES {
+                let at = (points[lane] >> (16 * axis) & 0xffff) as usize;
+                let here = starts[lane] + end * grid.strides()[AXIS];
+                let (has_low, has_high) = (at + on > 0, at < last);
+                low[lane] = if has_low { here - stride } else { here };
+                high[lane] = if has_high { here + stride } else { here };
+                weight[lane] = if has_low & has_high { 1.0 } else { 2.0 };
             }
+            *gradient = (gather(grid.samples(), high) - gather(grid.samples(), low)) * f32x4::new(weight);
         }
     }
-    ends.map(|gradients| gradients.map(f32x4::new))
-}
-
-/// The difference of the samples around one, along an axis. Where a neighbour is missing, the difference to the other one
-/// counts twice.
-#[inline]
-fn border_difference<S: Density>(grid: &DenseGrid<S>, point: [usize; 3], axis: usize) -> f32 {
-    let (samples, strides) = (grid.samples(), grid.strides());
-    let index = point[0] + point[1] * strides[1] + point[2] * strides[2];
-    let has_low = usize::from(point[axis] > 0);
-    let has_high = usize::from(point[axis] + 1 < grid.size()[axis]);
-    let low = samples[index - strides[axis] * has_low].number();
-    let high = samples[index + strides[axis] * has_high].number();
-    (high - low) * (3 - has_low - has_high) as f32
+    gradients
 }
 
 /// Where the surface crosses edges, 0 to 1; in the middle where numbers fail.
