@@ -92,23 +92,12 @@ pub(super) fn updates(
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
 fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec<Block> {
-    let mut dirty: FxHashMap<BrickPos, LatticeBox> = FxHashMap::default();
-    dirty.reserve(changed.len() * 2);
     let last = IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1);
-    let mut insert = |low: IVec3, high: IVec3| {
-        let Some(cells) = LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last)) else {
-            return;
-        };
-        for brick in BrickPos::covering(cells) {
-            if let Some(cells) = brick.samples().intersection(cells) {
-                dirty.entry(brick).and_modify(|all| *all = all.union(cells)).or_insert(cells);
-            }
-        }
-    };
+    let in_world =
+        |low: IVec3, high: IVec3| LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last));
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
-    for drafted in changed {
-        insert(drafted.changed.min - 2, drafted.changed.max + 1);
-    }
+    let around = |drafted: &DraftedBrick| in_world(drafted.changed.min - 2, drafted.changed.max + 1);
+    let mut dirty: Vec<LatticeBox> = changed.iter().filter_map(around).collect();
     // A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border.
     for ((x, z), cells) in added.words() {
         for (dx, dz) in (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz))) {
@@ -116,17 +105,51 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
             if grown_into(cells, dx, dz) & view.mask.word(stack) != 0 {
                 let low = Column::new(stack.0 * 8, stack.1 * 8);
                 let rows = block::sheet_rows(view.samples.ground(), low);
-                insert(low.at(rows.start), low.offset(7, 7).at(rows.end - 1));
+                dirty.extend(in_world(low.at(rows.start), low.offset(7, 7).at(rows.end - 1)));
             }
         }
     }
-    let mut dirty: Vec<(BrickPos, LatticeBox)> = dirty.into_iter().collect();
-    dirty.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
+    let dirty = by_brick(&dirty);
     let mut blocks = Vec::with_capacity(dirty.len());
     for (brick, cells) in dirty {
         blocks.extend(view.grid.chunks_of(cells).map(|chunk| Block { brick, chunk }));
     }
     blocks
+}
+
+/// Most bricks that a table has a place for, whether they are dirty or not.
+const TABLE: u64 = 1 << 18;
+
+/// The bricks that hold cells of these boxes, by stacks from below, each with the box around its own of them.
+fn by_brick(boxes: &[LatticeBox]) -> Vec<(BrickPos, LatticeBox)> {
+    let mut found: Vec<(BrickPos, LatticeBox)> = Vec::with_capacity(boxes.len() * 2);
+    let Some(all) = boxes.iter().copied().reduce(LatticeBox::union) else { return found };
+    let all = LatticeBox { min: all.min >> 3, max: all.max >> 3 };
+    // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
+    let size = all.size();
+    let is_dense = all.volume() <= TABLE;
+    let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
+    let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
+    for cells in boxes {
+        for brick in BrickPos::covering(*cells) {
+            let Some(cells) = brick.samples().intersection(*cells) else { continue };
+            let number = if is_dense {
+                let at = brick.0 - all.min;
+                &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize]
+            } else {
+                index.entry(brick).or_default()
+            };
+            if *number == 0 {
+                found.push((brick, cells));
+                *number = found.len() as u32;
+            } else {
+                let own = &mut found[*number as usize - 1].1;
+                *own = own.union(cells);
+            }
+        }
+    }
+    found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
+    found
 }
 
 /// 8x8 cells and the cells beside and diagonally beside them, as far as they lie in the word (dx, dz) further.
@@ -175,10 +198,13 @@ fn mesh_blocks(
     }
     let stacks: Vec<&[Block]> =
         blocks.chunk_by(|a, b| (a.brick.0.x, a.brick.0.z) == (b.brick.0.x, b.brick.0.z)).collect();
+    // Meshed into memory that is there already, and copied out as large as it has to be.
     let mesh = |blocks: &&[Block]| {
-        let mut parts = Parts::default();
-        MESHER.with_borrow_mut(|(mesher, _)| mesher.mesh(view, blocks, &mut parts));
-        parts
+        MESHER.with_borrow_mut(|(mesher, parts)| {
+            parts.clear();
+            mesher.mesh(view, blocks, parts);
+            parts.clone()
+        })
     };
     let parts: Vec<Parts> = Stages::time(&mut stages.meshing, || stacks.par_iter().map(mesh).collect());
     Stages::time(&mut stages.assembly, || assemble(world, &parts.iter().collect::<Vec<_>>()))
@@ -189,20 +215,24 @@ fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>
     let fresh = |(block, vertices, indices): (Block, _, _)| {
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };
-    let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
-    all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
-    let chunks: Vec<&[(ChunkPos, Fresh)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
-    let update = |parts: &&[(ChunkPos, Fresh)]| {
-        let chunk = parts[0].0;
-        let fresh: Vec<Fresh> = parts.iter().map(|part| part.1).collect();
+    let mut chunks: FxHashMap<ChunkPos, Vec<Fresh>> = FxHashMap::default();
+    let mut count = 0;
+    for (chunk, part) in parts.iter().flat_map(|parts| parts.iter().map(fresh)) {
+        chunks.entry(chunk).or_default().push(part);
+        count += 1;
+    }
+    let mut chunks: Vec<(ChunkPos, Vec<Fresh>)> = chunks.into_iter().collect();
+    chunks.sort_unstable_by_key(|(chunk, _)| *chunk);
+    let update = |(chunk, parts): &mut (ChunkPos, Vec<Fresh>)| {
+        parts.sort_unstable_by_key(|part| part.key);
         let nothing = ChunkSurface::default();
-        let surface = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref).updated(&fresh)?;
-        Some((chunk, Arc::new(surface)))
+        let surface = world.surfaces.get(chunk).map_or(&nothing, Arc::as_ref).updated(parts)?;
+        Some((*chunk, Arc::new(surface)))
     };
-    if all.len() < PARALLEL_BLOCKS {
-        chunks.iter().filter_map(update).collect()
+    if count < PARALLEL_BLOCKS {
+        chunks.iter_mut().filter_map(update).collect()
     } else {
-        chunks.par_iter().filter_map(update).collect()
+        chunks.par_iter_mut().filter_map(update).collect()
     }
 }
 
