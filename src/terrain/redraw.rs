@@ -215,24 +215,24 @@ fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>
     let fresh = |(block, vertices, indices): (Block, _, _)| {
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };
-    let mut chunks: FxHashMap<ChunkPos, Vec<Fresh>> = FxHashMap::default();
-    let mut count = 0;
-    for (chunk, part) in parts.iter().flat_map(|parts| parts.iter().map(fresh)) {
-        chunks.entry(chunk).or_default().push(part);
-        count += 1;
-    }
-    let mut chunks: Vec<(ChunkPos, Vec<Fresh>)> = chunks.into_iter().collect();
-    chunks.sort_unstable_by_key(|(chunk, _)| *chunk);
-    let update = |(chunk, parts): &mut (ChunkPos, Vec<Fresh>)| {
-        parts.sort_unstable_by_key(|part| part.key);
-        let nothing = ChunkSurface::default();
-        let surface = world.surfaces.get(chunk).map_or(&nothing, Arc::as_ref).updated(parts)?;
-        Some((*chunk, Arc::new(surface)))
-    };
-    if count < PARALLEL_BLOCKS {
-        chunks.iter_mut().filter_map(update).collect()
+    let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
+    let is_large = all.len() >= PARALLEL_BLOCKS;
+    if is_large {
+        all.par_sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
     } else {
-        chunks.par_iter_mut().filter_map(update).collect()
+        all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
+    }
+    let chunks: Vec<&[(ChunkPos, Fresh)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
+    let update = |parts: &&[(ChunkPos, Fresh)]| {
+        let chunk = parts[0].0;
+        let nothing = ChunkSurface::default();
+        let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
+        Some((chunk, Arc::new(old.updated(parts.iter().map(|part| part.1))?)))
+    };
+    if is_large {
+        chunks.par_iter().filter_map(update).collect()
+    } else {
+        chunks.iter().filter_map(update).collect()
     }
 }
 

@@ -58,8 +58,8 @@ impl ChunkSurface {
     }
 
     /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes nothing.
-    pub(super) fn updated(&self, fresh: &[Fresh]) -> Option<Self> {
-        let changes: Vec<Fresh> = fresh.iter().copied().filter(|part| self.differs(part)).collect();
+    pub(super) fn updated<'a>(&self, fresh: impl Iterator<Item = Fresh<'a>>) -> Option<Self> {
+        let changes: Vec<Fresh> = fresh.filter(|part| self.differs(part)).collect();
         if changes.is_empty() {
             return None;
         }

@@ -127,7 +127,7 @@ impl Draft {
         let tools: Vec<Tool> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
         let bricks: Vec<&[Job]> = jobs.chunk_by(|a, b| a.brick == b.brick).collect();
-        let work = |jobs: &&[Job]| Workpiece::new(base, grid, jobs[0].pos()).take(&tools, jobs);
+        let work = |jobs: &&[Job]| finish(base, grid, &tools, jobs);
         let finished: Vec<Finished> = if bricks.len() < PARALLEL_BRICKS {
             bricks.iter().filter_map(work).collect()
         } else {
@@ -153,7 +153,7 @@ impl Draft {
     }
 }
 
-/// Which edit reaches which brick.
+/// Which edit may reach which brick.
 fn jobs(tools: &[Tool]) -> Vec<Job> {
     let mut jobs = Vec::new();
     for (edit, tool) in (0..).zip(tools) {
@@ -162,17 +162,26 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
         for x in low.x..=high.x {
             for z in low.z..=high.z {
                 for y in low.y..=high.y {
-                    let job = Job { brick: [x, z, y], edit };
-                    let samples = job.pos().samples().intersection(reach);
-                    if samples.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples)) {
-                        jobs.push(job);
-                    }
+                    jobs.push(Job { brick: [x, z, y], edit });
                 }
             }
         }
     }
     jobs.sort_unstable();
     jobs
+}
+
+/// Applies all edits of one brick; `None` when nothing changed.
+fn finish(base: SampleView, grid: ChunkGrid, tools: &[Tool], jobs: &[Job]) -> Option<Finished> {
+    let pos = jobs.first()?.pos();
+    let reaches = |job: &&Job| {
+        let tool = &tools[job.edit as usize];
+        let reached = tool.reach.and_then(|reach| reach.intersection(pos.samples()));
+        reached.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples))
+    };
+    let mut jobs = jobs.iter().filter(reaches).peekable();
+    jobs.peek()?;
+    Workpiece::new(base, grid, pos).take(tools, jobs)
 }
 
 /// What one edit changed in one chunk's part of one brick.
@@ -232,7 +241,7 @@ impl<'a> Workpiece<'a> {
     }
 
     /// Applies all jobs; `None` when nothing changed.
-    fn take(mut self, tools: &[Tool], jobs: &[Job]) -> Option<Finished> {
+    fn take<'j>(mut self, tools: &[Tool], jobs: impl Iterator<Item = &'j Job>) -> Option<Finished> {
         let mut distances = [[0; 8]; 64];
         let mut parts = Vec::new();
         let low = self.pos.origin();
