@@ -3,7 +3,8 @@
 use super::markdown::{Table, significant};
 use crate::backend::Backend;
 use crate::edits::Run;
-use crate::measure::{Ending, Measured, Measurements, Subject};
+use crate::full::Output;
+use crate::measure::{Measured, Measurements, Subject};
 use crate::published::{self, CHUNK_SIZES};
 use crate::stats::{self, Statistics};
 
@@ -76,27 +77,38 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
 
     let paper_full = published::full(second).total;
     for (at, chunk_size) in CHUNK_SIZES.into_iter().enumerate() {
-        ratios.push(divide(
-            format!("full over hybrid {chunk_size}, total, second run"),
-            Some(paper_full / paper(Backend::Cpu, second, at).total),
-            averages(Subject::Full, second),
-            averages(cpu(chunk_size), second),
-            None,
-        ));
+        for output in Output::BOTH {
+            ratios.push(divide(
+                format!("full over hybrid {chunk_size}, {}, total, second run", output.title()),
+                // The paper has one full field, whose output is that of its hybrid.
+                (output == Output::Same).then(|| paper_full / paper(Backend::Cpu, second, at).total),
+                averages(Subject::Full(output), second),
+                averages(cpu(chunk_size), second),
+                None,
+            ));
+        }
     }
+    let target = |output| (output == Output::Same).then_some(Target::AtLeast(FASTER));
     for chunk_size in CHUNK_SIZES {
-        let full = measurements.get(Subject::Full, second);
-        let here = full.zip(measurements.get(cpu(chunk_size), second)).map(|(full, hybrid)| {
-            let (full, hybrid) = (stats::by_edit(&full.repeats), stats::by_edit(&hybrid.repeats));
-            stats::median(full.iter().zip(&hybrid).map(|(full, hybrid)| full / hybrid))
-        });
-        ratios.push(Ratio {
-            what: format!("full over hybrid {chunk_size}, median of edits, second run"),
-            paper: None,
-            here,
-            by_medians: here,
-            target: Some(Target::AtLeast(FASTER)),
-        });
+        for output in Output::BOTH {
+            let here = by_edit(measurements, Subject::Full(output), cpu(chunk_size)).map(stats::median);
+            let what =
+                format!("full over hybrid {chunk_size}, {}, median of edits, second run", output.title());
+            ratios.push(Ratio { what, paper: None, here, by_medians: here, target: target(output) });
+        }
+    }
+    if let Some(hybrid) = measurements.get(cpu(CHUNK_SIZES[0]), second) {
+        let middle = middle_edits(&hybrid.voxels);
+        for output in Output::BOTH {
+            let of_all = by_edit(measurements, Subject::Full(output), hybrid.subject);
+            let here = of_all.map(|ratios| stats::median(middle.iter().map(|&edit| ratios[edit])));
+            let what = format!(
+                "full over hybrid {}, {}, edits of median size, second run",
+                CHUNK_SIZES[0],
+                output.title()
+            );
+            ratios.push(Ratio { what, paper: None, here, by_medians: here, target: None });
+        }
     }
     let growth = |backend| {
         let average = |at| paper(backend, second, at).average;
@@ -130,10 +142,8 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
         }
     }
     for chunk_size in CHUNK_SIZES {
-        let here = measurements.get(cpu(chunk_size), first).and_then(|measured| match measured.ending {
-            Ending::Hybrid { data, .. } => Some((data.ground + data.edits()) as f64 / 1e6),
-            Ending::Full { .. } => None,
-        });
+        let here = measurements.get(cpu(chunk_size), first);
+        let here = here.map(|measured| measured.ending.data_bytes() as f64 / 1e6);
         ratios.push(Ratio {
             what: format!("terrain data after the first run, MB, chunk size {chunk_size}"),
             paper: None,
@@ -143,6 +153,21 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
         });
     }
     ratios
+}
+
+/// For each edit of the second run how many times longer one test takes than another, by medians of repeats.
+fn by_edit(measurements: &Measurements, above: Subject, below: Subject) -> Option<Vec<f64>> {
+    let times = |subject| Some(stats::by_edit(&measurements.get(subject, Run::Second)?.repeats));
+    Some(times(above)?.iter().zip(times(below)?).map(|(above, below)| above / below).collect())
+}
+
+/// The tenth of all edits whose size is nearest to the median, by voxels changed.
+pub fn middle_edits(voxels: &[u64]) -> Vec<usize> {
+    let mut edits: Vec<usize> = (0..voxels.len()).collect();
+    edits.sort_by_key(|&edit| voxels[edit]);
+    let count = (edits.len() / 10).max(1).min(edits.len());
+    let start = (edits.len() - count) / 2;
+    edits[start..start + count].to_vec()
 }
 
 /// The ratios as a table.
