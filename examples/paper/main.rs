@@ -19,6 +19,7 @@
 //! hybrid's. With `--results` the page goes there as well, and the plots into `plots/` beside it.
 
 mod backend;
+mod clock;
 mod compare;
 mod edits;
 mod ending;

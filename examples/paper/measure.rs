@@ -90,6 +90,8 @@ pub struct Measured {
     pub run: Run,
     /// Seconds of each edit, by repeat.
     pub repeats: Vec<Vec<f64>>,
+    /// The same in processor time. With several threads it is not known, and these are the seconds.
+    pub processor: Vec<Vec<f64>>,
     /// Voxels that each edit dug away or filled; not known of a dense field.
     pub voxels: Vec<u64>,
     /// Edits that changed no sample, and that changed no mesh, in one repeat.
@@ -150,7 +152,7 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
         for &subject in &subjects {
             let mut keep = |run, played, ending| {
                 progress();
-                keep(&mut measured, subject, run, played, ending)
+                keep(&mut measured, setup.threads, subject, run, played, ending)
             };
             match subject {
                 Subject::Hybrid { backend, chunk_size } => {
@@ -199,24 +201,30 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
 /// Puts a repeat to those before it; what holds after it must be what held after them.
 fn keep(
     measured: &mut Vec<Measured>,
+    threads: usize,
     subject: Subject,
     run: Run,
     played: Played,
     ending: Ending,
 ) -> Result<(), PaperError> {
-    let Played { seconds, voxels, unchanged, undrawn } = played;
+    let Played { laps, voxels, unchanged, undrawn } = played;
+    let seconds: Vec<f64> = laps.iter().map(|lap| lap.seconds).collect();
+    let processor: Vec<f64> =
+        laps.iter().map(|lap| if threads == 1 { lap.processor } else { lap.seconds }).collect();
     match measured.iter_mut().find(|measured| measured.subject == subject && measured.run == run) {
         Some(earlier) if !earlier.ending.agrees(&ending) => Err(PaperError::Unrepeatable(subject.key())),
         Some(earlier) => {
             earlier.repeats.push(seconds);
+            earlier.processor.push(processor);
             Ok(())
         }
         None => {
-            let repeats = vec![seconds];
+            let (repeats, processor) = (vec![seconds], vec![processor]);
             measured.push(Measured {
                 subject,
                 run,
                 repeats,
+                processor,
                 voxels,
                 unchanged,
                 undrawn,

@@ -2,21 +2,21 @@
 //! are ready. Nothing else happens in between.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use bevy_burrow::brush::Brush;
 use bevy_burrow::terrain::{Applied, Receipt, Terrain, TerrainSettings};
 
 use crate::PaperError;
 use crate::backend::Runner;
+use crate::clock::{self, Lap};
 use crate::edits::Scene;
 use crate::full::{DenseField, FullWorld};
 
 /// What came of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Played {
-    /// Seconds that each edit took.
-    pub seconds: Vec<f64>,
+    /// What each edit took.
+    pub laps: Vec<Lap>,
     /// Voxels that each edit dug away or filled; not known of a dense field.
     pub voxels: Vec<u64>,
     /// Edits that changed no sample.
@@ -46,15 +46,16 @@ pub fn terrain(scene: &Scene, chunk_size: u32) -> Result<Terrain, PaperError> {
 pub fn hybrid(terrain: &mut Terrain, runner: &mut Runner, brushes: &[Brush]) -> Result<Played, PaperError> {
     let mut played = Played::default();
     for brush in brushes {
-        let start = Instant::now();
-        terrain.submit(brush);
-        let transaction = terrain.begin().ok_or(PaperError::Busy)?;
-        let mut commit = runner(transaction);
-        // The caller's now; a game uploads them.
-        let meshes = black_box(std::mem::take(&mut commit.meshes));
-        let receipts = terrain.commit(commit)?;
-        played.seconds.push(start.elapsed().as_secs_f64());
-
+        let (lap, answer) = clock::time(|| -> Result<_, PaperError> {
+            terrain.submit(brush);
+            let transaction = terrain.begin().ok_or(PaperError::Busy)?;
+            let mut commit = runner(transaction);
+            // The caller's now; a game uploads them.
+            let meshes = black_box(std::mem::take(&mut commit.meshes));
+            Ok((terrain.commit(commit)?, meshes))
+        });
+        let (receipts, meshes) = answer?;
+        played.laps.push(lap);
         played.look_at(&receipts);
         played.undrawn += usize::from(meshes.chunks.is_empty() && meshes.tiles.is_empty());
     }
@@ -65,10 +66,9 @@ pub fn hybrid(terrain: &mut Terrain, runner: &mut Runner, brushes: &[Brush]) -> 
 pub fn same(full: &mut FullWorld, brushes: &[Brush]) -> Played {
     let mut played = Played::default();
     for brush in brushes {
-        let start = Instant::now();
-        let receipts = full.edit(brush);
+        let (lap, receipts) = clock::time(|| full.edit(brush));
         black_box(&mut *full);
-        played.seconds.push(start.elapsed().as_secs_f64());
+        played.laps.push(lap);
         played.look_at(&receipts);
     }
     played
@@ -78,11 +78,10 @@ pub fn same(full: &mut FullWorld, brushes: &[Brush]) -> Played {
 pub fn bare(field: &mut DenseField, brushes: &[Brush]) -> Result<Played, PaperError> {
     let mut played = Played::default();
     for brush in brushes {
-        let start = Instant::now();
-        let changed = field.edit(brush)?;
+        let (lap, changed) = clock::time(|| field.edit(brush));
         black_box(&mut *field);
-        played.seconds.push(start.elapsed().as_secs_f64());
-        played.unchanged += usize::from(changed == 0);
+        played.laps.push(lap);
+        played.unchanged += usize::from(changed? == 0);
     }
     Ok(played)
 }

@@ -21,8 +21,8 @@ pub const PLOTS: [(&str, &str); 6] = [
     ("second_run.svg", "Second run: total time of all edits, seconds"),
     ("growth.svg", "Second run: average time over that of chunk size 25"),
     ("full.svg", "Second run: hybrid with chunk size 25 and full fields, total seconds"),
-    ("edits.svg", "Second run: milliseconds of each edit, in order"),
-    ("sorted.svg", "Second run: milliseconds of an edit, sorted"),
+    ("edits.svg", "Second run: processor milliseconds of each edit, in order"),
+    ("sorted.svg", "Second run: processor milliseconds of an edit, sorted"),
 ];
 
 const SIZE: (u32, u32) = (820, 460);
@@ -118,7 +118,7 @@ fn chunked_and_full(measurements: &Measurements) -> Vec<Row> {
     ]
 }
 
-/// Each edit's median over the repeats in milliseconds.
+/// Each edit's median over the repeats in milliseconds of the processor.
 fn latencies(measurements: &Measurements) -> Vec<Row> {
     let second = measurements.measured.iter().filter(|measured| measured.run == Run::Second);
     let mut chunk_colors = CHUNKS.into_iter().cycle();
@@ -130,7 +130,7 @@ fn latencies(measurements: &Measurements) -> Vec<Row> {
             }
             Subject::Full(_) => (measured.subject.title(), full_colors.next()),
         };
-        let values = stats::by_edit(&measured.repeats).into_iter().map(|seconds| Some(seconds * 1e3));
+        let values = stats::by_edit(&measured.processor).into_iter().map(|seconds| Some(seconds * 1e3));
         Row { name, color: color.unwrap_or_default(), values: values.collect() }
     };
     second.map(&mut row).collect()

@@ -248,7 +248,7 @@ fn everything_is_written_and_published() {
 
     let csv = fs::read_to_string(out.join("timings.csv")).expect("timings");
     assert_eq!(csv.lines().count(), 1 + SMALL.tests(1) * SMALL.edits);
-    assert!(csv.lines().skip(1).all(|line| line.split(',').count() == 5));
+    assert!(csv.lines().skip(1).all(|line| line.split(',').count() == 6));
     let summary = fs::read_to_string(out.join("summary.json")).expect("a summary");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("valid JSON");
     assert_eq!(summary["runs"].as_array().map(Vec::len), Some(12));

@@ -9,15 +9,15 @@ use crate::machine::Machine;
 use crate::measure::{Measured, Measurements};
 use crate::stats::Statistics;
 
-/// Every single timing: `test,run,repeat,edit,seconds`.
+/// Every single timing: `test,run,repeat,edit,seconds,processor_seconds`.
 pub fn timings(measurements: &Measurements) -> String {
-    let mut csv = String::from("test,run,repeat,edit,seconds\n");
+    let mut csv = String::from("test,run,repeat,edit,seconds,processor_seconds\n");
     for measured in &measurements.measured {
         let (test, run) = (measured.subject.key(), measured.run.title());
-        for (repeat, seconds) in measured.repeats.iter().enumerate() {
-            for (edit, seconds) in seconds.iter().enumerate() {
+        for (repeat, both) in measured.repeats.iter().zip(&measured.processor).enumerate() {
+            for (edit, (seconds, processor)) in both.0.iter().zip(both.1).enumerate() {
                 // Writing to a string never fails.
-                let _ = writeln!(csv, "{test},{run},{repeat},{edit},{seconds:.9}");
+                let _ = writeln!(csv, "{test},{run},{repeat},{edit},{seconds:.9},{processor:.9}");
             }
         }
     }
@@ -55,6 +55,7 @@ fn run(measured: &Measured) -> Value {
         "test": measured.subject.key(),
         "run": measured.run,
         "seconds": Statistics::of(&measured.repeats),
+        "processor_seconds": Statistics::of(&measured.processor),
         "voxels_by_edit": measured.voxels,
         "edits_without_changed_samples": measured.unchanged,
         "edits_without_changed_meshes": measured.undrawn,

@@ -122,20 +122,27 @@ fn extra(table: &mut Table, name: &str, columns: &[Shown], bytes: impl Fn(&Endin
 
 /// How times are spread, in microseconds: what totals and averages do not tell.
 pub fn medians(measurements: &Measurements) -> Table {
-    let header =
-        ["us an edit", "median", "99th percentile", "longest", "average of medians", "longest of medians"];
+    let header = [
+        "us an edit",
+        "median",
+        "99th percentile",
+        "longest",
+        "processor, median",
+        "average of medians",
+        "longest of medians",
+    ];
     let mut table = Table::new("How times are spread", header);
     for measured in &measurements.measured {
         let name = measured.subject.title();
         let all = Statistics::of(&measured.repeats);
-        let by_edit = Statistics::of(&[stats::by_edit(&measured.repeats)]);
-        let figures = [all.median, all.p99, all.max, by_edit.average, by_edit.max];
+        let by_edit = Statistics::of(&[stats::by_edit(&measured.processor)]);
+        let processor = Statistics::of(&measured.processor);
+        let figures = [all.median, all.p99, all.max, processor.median, by_edit.average, by_edit.max];
         let figures = figures.iter().map(|seconds| format!("{:.1}", seconds * 1e6));
         table.row(std::iter::once(format!("{name}, {}", measured.run.title())).chain(figures));
     }
-    table.note =
-        "The last two columns take each edit with its median over the repeats, which leaves out what else \
-                  the machine did meanwhile."
-            .into();
+    table.note = "The last three columns are processor time, which leaves out what else the machine did meanwhile; the last \
+                  two take each edit with its median over the repeats."
+        .into();
     table
 }
