@@ -38,7 +38,15 @@ impl Run {
 /// What is edited, and how.
 pub struct Scene {
     pub ground: Arc<Ground>,
-    shapes: Vec<(Shape, bool)>,
+    shapes: Vec<Planned>,
+}
+
+/// A shape, how large it is (radius or half side), and whether the first run digs it.
+#[derive(Clone, Copy)]
+struct Planned {
+    shape: Shape,
+    size: f32,
+    digs: bool,
 }
 
 impl Scene {
@@ -62,7 +70,7 @@ impl Scene {
 
     /// The brushes of a run in order.
     pub fn brushes(&self, run: Run) -> Vec<Brush> {
-        let brush = |(tag, &(shape, digs)): (u64, &(Shape, bool))| {
+        let brush = |(tag, &Planned { shape, digs, .. }): (u64, &Planned)| {
             let digs = digs == (run == Run::First);
             let brush = if digs { Brush::dig(shape) } else { Brush::add(shape, BUILT) };
             brush.with_tag(tag)
@@ -72,7 +80,13 @@ impl Scene {
 
     /// How many edits dig in the first run.
     pub fn digs(&self) -> usize {
-        self.shapes.iter().filter(|(_, digs)| *digs).count()
+        self.shapes.iter().filter(|planned| planned.digs).count()
+    }
+
+    /// How large each edit is, in voxels: the radius of a ball, the longest half side of a box, half of the axis of a
+    /// capsule or cylinder.
+    pub fn sizes(&self) -> Vec<f64> {
+        self.shapes.iter().map(|planned| f64::from(planned.size)).collect()
     }
 
     /// The part of columns steeper than 45 degrees, and the steepest one's rise over run.
@@ -85,8 +99,8 @@ impl Scene {
     }
 }
 
-/// A shape of 2 to 9 voxels at the surface, and whether the first run digs it.
-fn shape(random: &mut fastrand::Rng, ground: &Ground) -> (Shape, bool) {
+/// A shape of 2 to 9 voxels at the surface.
+fn shape(random: &mut fastrand::Rng, ground: &Ground) -> Planned {
     let mut between = |low: f32, high: f32| low + (high - low) * random.f32();
     let (width, depth) = (ground.width() as f32, ground.depth() as f32);
     let (x, z) = (between(MARGIN, width - MARGIN).round(), between(MARGIN, depth - MARGIN).round());
@@ -110,5 +124,5 @@ fn shape(random: &mut fastrand::Rng, ground: &Ground) -> (Shape, bool) {
         3 => Shape::capsule(center - arm, center + arm, 0.5 * size),
         _ => Shape::cylinder(center - arm, 2.0 * arm, 0.6 * size),
     };
-    (shape, digs)
+    Planned { shape, size, digs }
 }

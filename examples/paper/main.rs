@@ -15,16 +15,18 @@
 //! | `RESULTS.md` | all tables beside the paper's figures |
 //! | `plots/*.svg` | the plots that the page shows |
 //!
-//! It fails when a check does: seams, equal worlds in all chunk sizes, the full field's ground against the hybrid's.
-//! With `--results` the page goes there as well, and the plots into `plots/` beside it.
+//! It fails when a check does: seams, equal worlds in all chunk sizes, ground and surface of the full fields against the
+//! hybrid's. With `--results` the page goes there as well, and the plots into `plots/` beside it.
 
 mod backend;
+mod clock;
+mod compare;
 mod edits;
+mod ending;
 mod full;
 mod machine;
 mod measure;
 mod memory;
-mod mesher;
 mod play;
 mod plots;
 mod published;
@@ -40,6 +42,7 @@ use std::process::ExitCode;
 
 use bevy_burrow::brush::BrushError;
 use bevy_burrow::ground::GroundError;
+use bevy_burrow::surface::dense::DenseGridError;
 use bevy_burrow::terrain::{StaleCommit, TerrainError};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -93,6 +96,8 @@ enum PaperError {
     Terrain(#[from] TerrainError),
     #[error(transparent)]
     Brush(#[from] BrushError),
+    #[error(transparent)]
+    Grid(#[from] DenseGridError),
     #[error(transparent)]
     Backend(#[from] backend::NoBackend),
     #[error(transparent)]

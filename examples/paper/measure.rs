@@ -1,11 +1,13 @@
 //! The experiment: every test of the paper that this machine can run, repeated, with what holds after each.
 
-use bevy_burrow::terrain::{Memory, ScenarioCounts, Terrain, World};
+use bevy_burrow::terrain::{ScenarioCounts, Terrain};
 
 use crate::PaperError;
 use crate::backend::{Backend, NoBackend};
+use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
-use crate::full::{Agreement, FullField};
+use crate::ending::Ending;
+use crate::full::{DenseField, FullWorld, Output};
 use crate::memory::Footprint;
 use crate::play::{self, Played};
 use crate::published::CHUNK_SIZES;
@@ -34,7 +36,7 @@ impl Setup {
 
     /// Runs of a hundred edits that the experiment makes with the backends that are there.
     pub fn tests(&self, backends: usize) -> usize {
-        (backends * CHUNK_SIZES.len() + 1) * Run::BOTH.len() * self.repeats
+        (backends * CHUNK_SIZES.len() + Output::BOTH.len()) * Run::BOTH.len() * self.repeats
     }
 }
 
@@ -44,7 +46,7 @@ pub enum Subject {
     /// Heightmap and marching cubes, in chunks.
     Hybrid { backend: Backend, chunk_size: u32 },
     /// One field of marching cubes.
-    Full,
+    Full(Output),
 }
 
 impl Subject {
@@ -54,14 +56,22 @@ impl Subject {
             Self::Hybrid { backend, chunk_size } => {
                 format!("{}_{chunk_size}", backend.title().to_lowercase())
             }
-            Self::Full => "full".into(),
+            Self::Full(output) => output.key().into(),
+        }
+    }
+
+    /// Its name on the page.
+    pub fn title(self) -> String {
+        match self {
+            Self::Hybrid { backend, chunk_size } => format!("{} {chunk_size}", backend.title()),
+            Self::Full(output) => format!("full field, {}", output.title()),
         }
     }
 
     /// Every test of the paper.
     pub fn all() -> impl Iterator<Item = Self> {
         let hybrid = |backend| CHUNK_SIZES.map(|chunk_size| Self::Hybrid { backend, chunk_size });
-        Backend::ALL.into_iter().flat_map(hybrid).chain([Self::Full])
+        Backend::ALL.into_iter().flat_map(hybrid).chain(Output::BOTH.map(Self::Full))
     }
 }
 
@@ -80,6 +90,10 @@ pub struct Measured {
     pub run: Run,
     /// Seconds of each edit, by repeat.
     pub repeats: Vec<Vec<f64>>,
+    /// The same in processor time. With several threads it is not known, and these are the seconds.
+    pub processor: Vec<Vec<f64>>,
+    /// Voxels that each edit dug away or filled; not known of a dense field.
+    pub voxels: Vec<u64>,
     /// Edits that changed no sample, and that changed no mesh, in one repeat.
     pub unchanged: usize,
     pub undrawn: usize,
@@ -88,61 +102,19 @@ pub struct Measured {
     pub ending: Ending,
 }
 
-/// What there is after a run.
-#[derive(Clone, Copy, Debug)]
-pub enum Ending {
-    Hybrid {
-        /// Of all samples; the same for all chunk sizes.
-        hash: u64,
-        /// Is all that is drawn one closed surface?
-        is_flawless: bool,
-        /// Triangles of the whole world, as drawn.
-        triangles: usize,
-        data: Memory,
-    },
-    Full {
-        triangles: usize,
-        sample_bytes: usize,
-        mesh_bytes: usize,
-    },
-}
-
-impl Ending {
-    fn of_world(world: &World) -> Self {
-        let seams = world.check_seams();
-        let (hash, data) = (world.hash(), world.memory());
-        Self::Hybrid { hash, is_flawless: seams.is_flawless(), triangles: seams.triangles, data }
-    }
-
-    /// Did the same come out?
-    fn agrees(&self, other: &Self) -> bool {
-        let facts = |ending: &Self| match *ending {
-            Self::Hybrid { hash, is_flawless, triangles, .. } => (Some((hash, is_flawless)), triangles),
-            Self::Full { triangles, .. } => (None, triangles),
-        };
-        facts(self) == facts(other)
-    }
-
-    fn of_field(field: &FullField) -> Self {
-        Self::Full {
-            triangles: field.triangles(),
-            sample_bytes: field.sample_bytes(),
-            mesh_bytes: field.mesh_bytes(),
-        }
-    }
-}
-
 /// All that was measured.
 pub struct Measurements {
     pub setup: Setup,
     pub measured: Vec<Measured>,
     /// Backends of the paper that are not here.
     pub missing: Vec<(Backend, NoBackend)>,
-    /// Full field against hybrid world, after each run.
-    pub agreement: [Agreement; 2],
+    /// Full fields against the hybrid world, after each run.
+    pub agreement: [(Ground, Surface); 2],
     /// The paper's five scenarios, first run, by chunk size.
     pub scenarios: Vec<(u32, ScenarioCounts)>,
     pub digs: usize,
+    /// Radius or half side of each edit.
+    pub sizes: Vec<f64>,
     /// Part of columns steeper than 45 degrees, and the steepest rise over run.
     pub steepness: (f64, f64),
 }
@@ -172,7 +144,7 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
             Err(reason) => missing.push((backend, reason)),
         }
     }
-    subjects.push(Subject::Full);
+    subjects.extend(Output::BOTH.map(Subject::Full));
 
     let mut measured: Vec<Measured> = Vec::new();
     // Repeats outside: what else the machine does meanwhile falls on all subjects alike.
@@ -180,7 +152,7 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
         for &subject in &subjects {
             let mut keep = |run, played, ending| {
                 progress();
-                keep(&mut measured, subject, run, played, ending)
+                keep(&mut measured, setup.threads, subject, run, played, ending)
             };
             match subject {
                 Subject::Hybrid { backend, chunk_size } => {
@@ -191,10 +163,17 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
                         keep(run, played, Ending::of_world(terrain.world()))?;
                     }
                 }
-                Subject::Full => {
-                    let mut field = FullField::new(&scene.ground);
+                Subject::Full(Output::Same) => {
+                    let mut full = FullWorld::new(&scene)?;
                     for run in Run::BOTH {
-                        let played = play::full(&mut field, &scene.brushes(run))?;
+                        let played = play::same(&mut full, &scene.brushes(run));
+                        keep(run, played, Ending::of_full(&full))?;
+                    }
+                }
+                Subject::Full(Output::Bare) => {
+                    let mut field = DenseField::new(&scene.ground)?;
+                    for run in Run::BOTH {
+                        let played = play::bare(&mut field, &scene.brushes(run))?;
                         keep(run, played, Ending::of_field(&field))?;
                     }
                 }
@@ -211,9 +190,10 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
         setup,
         measured,
         missing,
-        agreement: compare(&scene)?,
+        agreement: compare::all(&scene)?,
         scenarios: count_scenarios(&scene)?,
         digs: scene.digs(),
+        sizes: scene.sizes(),
         steepness: scene.steepness(),
     })
 }
@@ -221,38 +201,39 @@ pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements,
 /// Puts a repeat to those before it; what holds after it must be what held after them.
 fn keep(
     measured: &mut Vec<Measured>,
+    threads: usize,
     subject: Subject,
     run: Run,
     played: Played,
     ending: Ending,
 ) -> Result<(), PaperError> {
-    let Played { seconds, unchanged, undrawn } = played;
+    let Played { laps, voxels, unchanged, undrawn } = played;
+    let seconds: Vec<f64> = laps.iter().map(|lap| lap.seconds).collect();
+    let processor: Vec<f64> =
+        laps.iter().map(|lap| if threads == 1 { lap.processor } else { lap.seconds }).collect();
     match measured.iter_mut().find(|measured| measured.subject == subject && measured.run == run) {
         Some(earlier) if !earlier.ending.agrees(&ending) => Err(PaperError::Unrepeatable(subject.key())),
         Some(earlier) => {
             earlier.repeats.push(seconds);
+            earlier.processor.push(processor);
             Ok(())
         }
         None => {
-            let repeats = vec![seconds];
-            measured.push(Measured { subject, run, repeats, unchanged, undrawn, resident: None, ending });
+            let (repeats, processor) = (vec![seconds], vec![processor]);
+            measured.push(Measured {
+                subject,
+                run,
+                repeats,
+                processor,
+                voxels,
+                unchanged,
+                undrawn,
+                resident: None,
+                ending,
+            });
             Ok(())
         }
     }
-}
-
-/// Plays both runs on a full field and on a terrain, and looks at every lattice point after each.
-fn compare(scene: &Scene) -> Result<[Agreement; 2], PaperError> {
-    let mut field = FullField::new(&scene.ground);
-    let mut terrain = play::terrain(scene, CHUNK_SIZES[0])?;
-    let mut agreement = [Agreement::default(); 2];
-    for (run, agreement) in Run::BOTH.into_iter().zip(&mut agreement) {
-        let brushes = scene.brushes(run);
-        play::full(&mut field, &brushes)?;
-        terrain.apply(&brushes);
-        *agreement = field.compare(terrain.world());
-    }
-    Ok(agreement)
 }
 
 /// Which of the paper's scenarios the first run consists of.

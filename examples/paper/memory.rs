@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::PaperError;
 use crate::backend::Backend;
 use crate::edits::{Run, Scene};
-use crate::full::FullField;
+use crate::full::{DenseField, FullWorld, Output};
 use crate::measure::{Setup, Subject};
 use crate::play;
 
@@ -35,7 +35,8 @@ impl Footprint {
         let mut footprint = Self { start: resident(), ..Self::default() };
         let mut ends = match subject {
             Subject::Hybrid { backend, chunk_size } => hybrid(&scene, backend, chunk_size)?,
-            Subject::Full => full(&scene)?,
+            Subject::Full(Output::Same) => same(&scene)?,
+            Subject::Full(Output::Bare) => bare(&scene)?,
         }
         .into_iter();
         footprint.first = ends.next().flatten();
@@ -70,11 +71,19 @@ fn hybrid(scene: &Scene, backend: Backend, chunk_size: u32) -> Result<[Option<u6
     Ok(ends)
 }
 
-fn full(scene: &Scene) -> Result<[Option<u64>; 2], PaperError> {
-    let mut field = FullField::new(&scene.ground);
+fn same(scene: &Scene) -> Result<[Option<u64>; 2], PaperError> {
+    let mut full = FullWorld::new(scene)?;
+    Ok(Run::BOTH.map(|run| {
+        play::same(&mut full, &scene.brushes(run));
+        resident()
+    }))
+}
+
+fn bare(scene: &Scene) -> Result<[Option<u64>; 2], PaperError> {
+    let mut field = DenseField::new(&scene.ground)?;
     let mut ends = [None; 2];
     for (run, end) in Run::BOTH.into_iter().zip(&mut ends) {
-        play::full(&mut field, &scene.brushes(run))?;
+        play::bare(&mut field, &scene.brushes(run))?;
         *end = resident();
     }
     Ok(ends)

@@ -2,25 +2,37 @@
 //! are ready. Nothing else happens in between.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use bevy_burrow::brush::Brush;
-use bevy_burrow::terrain::{Terrain, TerrainSettings};
+use bevy_burrow::terrain::{Applied, Receipt, Terrain, TerrainSettings};
 
 use crate::PaperError;
 use crate::backend::Runner;
+use crate::clock::{self, Lap};
 use crate::edits::Scene;
-use crate::full::FullField;
+use crate::full::{DenseField, FullWorld};
 
 /// What came of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Played {
-    /// Seconds that each edit took.
-    pub seconds: Vec<f64>,
+    /// What each edit took.
+    pub laps: Vec<Lap>,
+    /// Voxels that each edit dug away or filled; not known of a dense field.
+    pub voxels: Vec<u64>,
     /// Edits that changed no sample.
     pub unchanged: usize,
     /// Edits that changed no mesh.
     pub undrawn: usize,
+}
+
+impl Played {
+    /// Counts what an edit changed.
+    fn look_at(&mut self, receipts: &[Receipt]) {
+        let applied = || receipts.iter().filter_map(|receipt| receipt.outcome.as_ref().ok());
+        let voxels = |applied: &Applied| applied.removed.total() + applied.added.total();
+        self.voxels.push(applied().map(voxels).sum());
+        self.unchanged += usize::from(applied().all(|applied| applied.bounds.is_none()));
+    }
 }
 
 /// A terrain that nobody has edited.
@@ -34,33 +46,42 @@ pub fn terrain(scene: &Scene, chunk_size: u32) -> Result<Terrain, PaperError> {
 pub fn hybrid(terrain: &mut Terrain, runner: &mut Runner, brushes: &[Brush]) -> Result<Played, PaperError> {
     let mut played = Played::default();
     for brush in brushes {
-        let start = Instant::now();
-        terrain.submit(brush);
-        let transaction = terrain.begin().ok_or(PaperError::Busy)?;
-        let mut commit = runner(transaction);
-        // The caller's now; a game uploads them.
-        let meshes = black_box(std::mem::take(&mut commit.meshes));
-        let receipts = terrain.commit(commit)?;
-        played.seconds.push(start.elapsed().as_secs_f64());
-
-        let changed = |outcome: &Result<_, _>| {
-            outcome.as_ref().is_ok_and(|applied: &bevy_burrow::terrain::Applied| applied.bounds.is_some())
-        };
-        played.unchanged += usize::from(!receipts.iter().any(|receipt| changed(&receipt.outcome)));
+        let (lap, answer) = clock::time(|| -> Result<_, PaperError> {
+            terrain.submit(brush);
+            let transaction = terrain.begin().ok_or(PaperError::Busy)?;
+            let mut commit = runner(transaction);
+            // The caller's now; a game uploads them.
+            let meshes = black_box(std::mem::take(&mut commit.meshes));
+            Ok((terrain.commit(commit)?, meshes))
+        });
+        let (receipts, meshes) = answer?;
+        played.laps.push(lap);
+        played.look_at(&receipts);
         played.undrawn += usize::from(meshes.chunks.is_empty() && meshes.tiles.is_empty());
     }
     Ok(played)
 }
 
-/// Plays edits on the full field: samples changed, the whole mesh made again.
-pub fn full(field: &mut FullField, brushes: &[Brush]) -> Result<Played, PaperError> {
+/// Plays edits on the full field with the hybrid's output: the same transaction, then the whole mesh made again.
+pub fn same(full: &mut FullWorld, brushes: &[Brush]) -> Played {
     let mut played = Played::default();
     for brush in brushes {
-        let start = Instant::now();
-        let changed = field.edit(brush)?;
+        let (lap, receipts) = clock::time(|| full.edit(brush));
+        black_box(&mut *full);
+        played.laps.push(lap);
+        played.look_at(&receipts);
+    }
+    played
+}
+
+/// Plays edits on the dense field: samples changed, positions and normals of the whole mesh made again.
+pub fn bare(field: &mut DenseField, brushes: &[Brush]) -> Result<Played, PaperError> {
+    let mut played = Played::default();
+    for brush in brushes {
+        let (lap, changed) = clock::time(|| field.edit(brush));
         black_box(&mut *field);
-        played.seconds.push(start.elapsed().as_secs_f64());
-        played.unchanged += usize::from(changed == 0);
+        played.laps.push(lap);
+        played.unchanged += usize::from(changed? == 0);
     }
     Ok(played)
 }

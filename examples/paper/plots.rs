@@ -10,6 +10,7 @@ use plotters::prelude::*;
 use crate::PaperError;
 use crate::backend::Backend;
 use crate::edits::Run;
+use crate::full::Output;
 use crate::measure::{Measured, Measurements, Subject};
 use crate::published::{self, CHUNK_SIZES};
 use crate::stats::{self, Statistics};
@@ -19,9 +20,9 @@ pub const PLOTS: [(&str, &str); 6] = [
     ("first_run.svg", "First run: total time of all edits, seconds"),
     ("second_run.svg", "Second run: total time of all edits, seconds"),
     ("growth.svg", "Second run: average time over that of chunk size 25"),
-    ("full.svg", "Second run: hybrid with chunk size 25 and full field, total seconds"),
-    ("edits.svg", "Second run: milliseconds of each edit, in order"),
-    ("sorted.svg", "Second run: milliseconds of an edit, sorted"),
+    ("full.svg", "Second run: hybrid with chunk size 25 and full fields, total seconds"),
+    ("edits.svg", "Second run: processor milliseconds of each edit, in order"),
+    ("sorted.svg", "Second run: processor milliseconds of an edit, sorted"),
 ];
 
 const SIZE: (u32, u32) = (820, 460);
@@ -29,8 +30,8 @@ const SIZE: (u32, u32) = (820, 460);
 /// Paper's CPU and GPU, then ours.
 const WHO: [RGBColor; 4] =
     [RGBColor(165, 165, 165), RGBColor(100, 100, 100), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
-/// The full field, then the hybrid's chunk sizes.
-const FULL: RGBColor = RGBColor(60, 60, 60);
+/// The full fields, then the hybrid's chunk sizes.
+const FULL: [RGBColor; 2] = [RGBColor(60, 60, 60), RGBColor(160, 160, 160)];
 const CHUNKS: [RGBColor; 4] =
     [RGBColor(31, 119, 180), RGBColor(44, 160, 44), RGBColor(255, 127, 14), RGBColor(148, 103, 189)];
 
@@ -50,7 +51,9 @@ pub fn draw(measurements: &Measurements, folder: &Path) -> Result<(), PaperError
         bars(&first, &sizes, &totals(measurements, Run::First))?;
         bars(&second, &sizes, &totals(measurements, Run::Second))?;
         bars(&growth, &sizes, &growths(measurements))?;
-        bars(&full, &["hybrid, chunk size 25".into(), "full field".into()], &chunked_and_full(measurements))?;
+        let full_fields = Output::BOTH.map(|output| Subject::Full(output).title());
+        let groups = [&["hybrid, chunk size 25".to_owned()][..], &full_fields].concat();
+        bars(&full, &groups, &chunked_and_full(measurements))?;
         let latencies = latencies(measurements);
         lines(&edits, "edit", &latencies)?;
         let mut in_order = latencies;
@@ -106,27 +109,29 @@ fn growths(measurements: &Measurements) -> Vec<Row> {
 fn chunked_and_full(measurements: &Measurements) -> Vec<Row> {
     let run = Run::Second;
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size: CHUNK_SIZES[0] };
-    let here = |subject| measurements.get(subject, run).map(total);
+    let subjects = [&[hybrid][..], &Output::BOTH.map(Subject::Full)].concat();
+    let here = subjects.into_iter().map(|subject| measurements.get(subject, run).map(total));
     let paper = [published::hybrid(Backend::Cpu, run)[0].total, published::full(run).total];
     vec![
         Row { name: "paper, CPU".into(), color: WHO[0], values: paper.map(Some).into() },
-        Row { name: "here, CPU".into(), color: WHO[2], values: vec![here(hybrid), here(Subject::Full)] },
+        Row { name: "here, CPU".into(), color: WHO[2], values: here.collect() },
     ]
 }
 
-/// Each edit's median over the repeats in milliseconds.
+/// Each edit's median over the repeats in milliseconds of the processor.
 fn latencies(measurements: &Measurements) -> Vec<Row> {
     let second = measurements.measured.iter().filter(|measured| measured.run == Run::Second);
     let mut chunk_colors = CHUNKS.into_iter().cycle();
+    let mut full_colors = FULL.into_iter().cycle();
     let mut row = |measured: &Measured| {
         let (name, color) = match measured.subject {
             Subject::Hybrid { backend, chunk_size } => {
                 (format!("{}, chunk size {chunk_size}", backend.title()), chunk_colors.next())
             }
-            Subject::Full => ("full field".into(), None),
+            Subject::Full(_) => (measured.subject.title(), full_colors.next()),
         };
-        let values = stats::by_edit(&measured.repeats).into_iter().map(|seconds| Some(seconds * 1e3));
-        Row { name, color: color.unwrap_or(FULL), values: values.collect() }
+        let values = stats::by_edit(&measured.processor).into_iter().map(|seconds| Some(seconds * 1e3));
+        Row { name, color: color.unwrap_or_default(), values: values.collect() }
     };
     second.map(&mut row).collect()
 }

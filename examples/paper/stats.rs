@@ -38,6 +38,11 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     middle(&sorted(values))
 }
 
+/// The value that `percent` of all values do not exceed, of 0 the least.
+pub fn percentile_of(values: &[f64], percent: usize) -> f64 {
+    percentile(&sorted(values.iter().copied()), percent)
+}
+
 /// Each edit's median over the repeats: what it takes, without what else the machine did meanwhile.
 pub fn by_edit(repeats: &[Vec<f64>]) -> Vec<f64> {
     let edits = repeats.iter().map(Vec::len).min().unwrap_or(0);

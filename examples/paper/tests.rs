@@ -7,12 +7,12 @@ use bevy_burrow::prelude::{Edit, Operation};
 use clap::{CommandFactory, Parser};
 
 use crate::backend::Backend;
+use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
-use crate::full::FullField;
+use crate::full::{DenseField, FullWorld, Output};
 use crate::machine::Machine;
-use crate::measure::{Ending, Measurements, Setup, Subject, measure};
+use crate::measure::{Measurements, Setup, Subject, measure};
 use crate::memory::Footprint;
-use crate::mesher::WholeMesher;
 use crate::published::{self, CHUNK_SIZES};
 use crate::stats::{self, Statistics};
 use crate::{Args, play, plots, publish, report, write};
@@ -112,11 +112,15 @@ fn every_run_changes_the_ground_and_ends_alike_in_all_chunk_sizes() {
         for measured in runs {
             assert_eq!(measured.repeats.iter().map(Vec::len).collect::<Vec<_>>(), [SMALL.edits; 2]);
             assert_eq!((measured.unchanged, measured.undrawn), (0, 0), "{:?} {run:?}", measured.subject);
-            let Ending::Hybrid { hash, is_flawless, .. } = measured.ending else { panic!("a hybrid") };
-            assert!(is_flawless);
-            hashes.push(hash);
+            let world = measured.ending.world.expect("a hybrid");
+            assert!(world.is_flawless);
+            hashes.push(world.hash);
         }
-        assert_eq!(measurements.get(Subject::Full, run).map(|full| full.unchanged), Some(0));
+        for output in Output::BOTH {
+            let full = measurements.get(Subject::Full(output), run).expect("a full field");
+            assert_eq!(full.unchanged, 0);
+            hashes.extend(full.ending.world.map(|world| world.hash));
+        }
     }
     hashes.dedup();
     assert_eq!(hashes.len(), 2, "one hash for each run");
@@ -124,49 +128,63 @@ fn every_run_changes_the_ground_and_ends_alike_in_all_chunk_sizes() {
 }
 
 #[test]
-fn full_field_and_hybrid_are_solid_at_the_same_points() {
+fn dense_field_and_hybrid_are_solid_at_the_same_points() {
     let scene = SMALL.scene().expect("valid hills");
-    let mut field = FullField::new(&scene.ground);
+    let mut field = DenseField::new(&scene.ground).expect("a cube");
     let mut terrain = play::terrain(&scene, 25).expect("a valid chunk size");
+    let same = Ground { points: 72 * 72 * 72, ..Ground::default() };
     for run in Run::BOTH {
-        let before = field.compare(terrain.world());
-        assert!(before.is_complete() && before.points == 72 * 72 * 72);
+        assert_eq!(Ground::compare(&field, terrain.world()), same);
         terrain.apply(scene.brushes(run));
-        let apart = field.compare(terrain.world());
-        assert!(apart.otherwise_solid > 100 && !apart.is_complete(), "the comparison sees no edits");
-        play::full(&mut field, &scene.brushes(run)).expect("valid brushes");
-        assert!(field.compare(terrain.world()).is_complete());
+        let apart = Ground::compare(&field, terrain.world());
+        assert!(apart.otherwise_solid > 100 && apart.otherwise_dense > 100, "the comparison sees no edits");
+        play::bare(&mut field, &scene.brushes(run)).expect("valid brushes");
+        assert_eq!(Ground::compare(&field, terrain.world()), same);
     }
 }
 
 #[test]
-fn the_full_mesh_of_a_ball_is_closed_and_faces_the_air() {
-    for side in [20_usize, 64, 70] {
-        let center = side as f32 / 2.0 - 0.3;
-        let point = |i: usize| [i % side, i / side % side, i / side / side].map(|v| v as f32 - center);
-        let distance = |[x, y, z]: [f32; 3]| (x * x + y * y + z * z).sqrt() - side as f32 * 0.4;
-        let samples: Vec<i16> = (0..side.pow(3)).map(|i| (distance(point(i)) * 256.0) as i16).collect();
-        let mut mesher = WholeMesher::new();
-        mesher.mesh(&samples, side);
-        let (positions, normals, indices) = mesher.buffers();
-        let mut edges = std::collections::HashMap::new();
-        for triangle in indices.chunks_exact(3) {
-            let corners = [0, 1, 2].map(|i| triangle[i] as usize);
-            let [a, b, c] = corners.map(|i| positions[i]);
-            let normal = corners.iter().map(|&i| normals[i]).sum::<glam::Vec3>();
-            // Triangles over a corner cut off may have no area.
-            assert!((b - a).cross(c - a).dot(normal) > -1e-4);
-            for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (corners[i], corners[j])) {
-                *edges.entry((from.min(to), from.max(to))).or_insert(0) += if from < to { 1 } else { -1 };
-            }
-        }
-        assert!(edges.values().all(|&balance| balance == 0), "side {side}");
-        assert_eq!(positions.len() + mesher.triangles(), edges.len() + 2, "one ball");
-        for (position, normal) in positions.iter().zip(normals) {
-            let out = *position - glam::Vec3::splat(center);
-            assert!((out.length() - side as f32 * 0.4).abs() < 0.1 && out.normalize().dot(*normal) > 0.95);
-        }
+fn the_full_field_draws_the_hybrids_triangles_and_is_closed() {
+    let scene = SMALL.scene().expect("valid hills");
+    let mut full = FullWorld::new(&scene).expect("valid hills");
+    let mut terrain = play::terrain(&scene, 25).expect("a valid chunk size");
+    let untouched = full.indices().len() / 3;
+    assert!(full.check_seams().is_flawless() && untouched > 71 * 71);
+    for run in Run::BOTH {
+        terrain.apply(scene.brushes(run));
+        let apart = Surface::compare(&full, terrain.world());
+        assert!(apart.missing > 100 && apart.extra > 100, "the comparison sees no edits: {apart:?}");
+        play::same(&mut full, &scene.brushes(run));
+        let together = Surface::compare(&full, terrain.world());
+        assert!(together.is_the_same() && together.triangles > 1000, "{together:?}");
+        assert!(together.triangles < full.indices().len() / 3, "nothing is left to the heightmap");
+        assert_eq!(full.world().hash(), terrain.world().hash());
+        assert!(full.check_seams().is_flawless());
     }
+}
+
+#[test]
+fn both_full_fields_have_a_triangle_for_a_triangle() {
+    let scene = SMALL.scene().expect("valid hills");
+    let mut field = DenseField::new(&scene.ground).expect("a cube");
+    let mut full = FullWorld::new(&scene).expect("valid hills");
+    for brush in scene.brushes(Run::First) {
+        field.edit(&brush).expect("a valid brush");
+        full.edit(&brush);
+        assert_eq!(field.mesh().indices.len(), full.indices().len());
+        assert_eq!(field.mesh().positions.len(), field.mesh().normals.len());
+    }
+    let found = compare::all(&scene).expect("valid hills");
+    assert!(found.iter().all(|(_, surface)| surface.is_the_same()));
+}
+
+#[test]
+fn edits_of_median_size_are_the_tenth_in_the_middle() {
+    let voxels: Vec<u64> = (0..100).map(|edit| edit * 37 % 100).collect();
+    let middle: Vec<u64> = report::middle_edits(&voxels).into_iter().map(|edit| voxels[edit]).collect();
+    assert_eq!(middle, (45..55).collect::<Vec<_>>());
+    assert_eq!(report::middle_edits(&[5, 1, 3]), [2]);
+    assert!(report::middle_edits(&[]).is_empty());
 }
 
 #[test]
@@ -176,7 +194,7 @@ fn tables_have_the_papers_shape_and_the_page_holds_them_all() {
     assert_eq!(tables.len(), 5);
     for (number, table) in (1..).zip(&tables) {
         assert!(table.title.starts_with(&format!("Table {number}: ")), "{}", table.title);
-        let columns = if number == 5 { 1 + 2 * 2 } else { 1 + 2 * CHUNK_SIZES.len() };
+        let columns = if number == 5 { 1 + 2 * 3 } else { 1 + 2 * CHUNK_SIZES.len() };
         assert_eq!(table.header.len(), columns);
         assert!(table.rows.iter().all(|row| row.len() == columns), "{table}");
         let names: Vec<&str> = table.rows.iter().take(5).map(|row| row[0].as_str()).collect();
@@ -191,11 +209,12 @@ fn tables_have_the_papers_shape_and_the_page_holds_them_all() {
     }
 
     let page = report::document(&measurements, &Machine::here());
+    assert!(page.contains(&report::agreement(&measurements)));
     for table in tables.iter().chain([&report::medians(&measurements), &report::checks(&measurements)]) {
         assert!(page.contains(&table.to_string()), "{} is missing", table.title);
     }
     assert!(page.contains(&report::ratio_table(&report::ratios(&measurements)).to_string()));
-    assert!(page.contains("the paper counts 240") && page.contains("Here 20 were run"));
+    assert!(page.contains("the paper counts 240") && page.contains("Here 24 were run"));
     assert!(!page.contains("FAULTS"));
 }
 
@@ -208,7 +227,7 @@ fn the_papers_ratios_are_those_of_its_text() {
         ratio.paper.expect("a figure of the paper")
     };
     // 3138 %.
-    assert!((paper("full over hybrid 25, total") - 31.38).abs() < 0.01);
+    assert!((paper("full over hybrid 25, same output, total") - 31.38).abs() < 0.01);
     assert!((paper("chunk size 100 over 25") - 3.84).abs() < 0.01);
     assert!((paper("first over second run, average, chunk size 25") - 15.76).abs() < 0.01);
     let gpu = ratios.iter().filter(|ratio| ratio.what.starts_with("GPU over CPU"));
@@ -229,11 +248,12 @@ fn everything_is_written_and_published() {
 
     let csv = fs::read_to_string(out.join("timings.csv")).expect("timings");
     assert_eq!(csv.lines().count(), 1 + SMALL.tests(1) * SMALL.edits);
-    assert!(csv.lines().skip(1).all(|line| line.split(',').count() == 5));
+    assert!(csv.lines().skip(1).all(|line| line.split(',').count() == 6));
     let summary = fs::read_to_string(out.join("summary.json")).expect("a summary");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("valid JSON");
-    assert_eq!(summary["runs"].as_array().map(Vec::len), Some(10));
-    assert_eq!(summary["full_field_against_hybrid"][1]["otherwise_dense"], 0);
+    assert_eq!(summary["runs"].as_array().map(Vec::len), Some(12));
+    assert_eq!(summary["dense_field_against_hybrid"][1]["otherwise_dense"], 0);
+    assert_eq!(summary["full_field_against_hybrid"][1]["missing"], 0);
 
     let page = fs::read_to_string(&results).expect("the page");
     assert_eq!(fs::read_to_string(out.join("RESULTS.md")).expect("the page"), page);
@@ -246,7 +266,8 @@ fn everything_is_written_and_published() {
 
 #[test]
 fn the_process_tells_what_it_takes() {
-    for subject in [Subject::Hybrid { backend: Backend::Cpu, chunk_size: 25 }, Subject::Full] {
+    let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size: 25 };
+    for subject in Output::BOTH.map(Subject::Full).into_iter().chain([hybrid]) {
         let footprint = Footprint::here(subject, &SMALL).expect("a small experiment");
         let known = [footprint.start, footprint.first, footprint.second].map(|figure| figure.is_some());
         assert_eq!(known, [cfg!(target_os = "linux"); 3]);

@@ -1,8 +1,11 @@
 //! What must hold for the figures to mean anything, run by run.
 
+use std::fmt::Write;
+
 use super::markdown::{Table, thousands};
 use crate::edits::Run;
-use crate::measure::{Ending, Measurements, Subject};
+use crate::full::Output;
+use crate::measure::{Measurements, Subject};
 
 /// Seams, hashes and edits without effect of each run.
 pub fn checks(measurements: &Measurements) -> Table {
@@ -11,36 +14,48 @@ pub fn checks(measurements: &Measurements) -> Table {
     let edits = measurements.setup.edits;
     for measured in &measurements.measured {
         let of_all = |without: usize| format!("{} of {edits}", edits - without);
-        let (name, seams, hash, triangles) = match (measured.subject, measured.ending) {
-            (
-                Subject::Hybrid { backend, chunk_size },
-                Ending::Hybrid { hash, is_flawless, triangles, .. },
-            ) => {
-                let seams = if is_flawless { "flawless" } else { "FAULTS" };
-                (format!("{} {chunk_size}", backend.title()), seams, format!("{hash:#018x}"), triangles)
-            }
-            (_, Ending::Full { triangles, .. } | Ending::Hybrid { triangles, .. }) => {
-                ("full field".into(), "-", "-".into(), triangles)
-            }
-        };
+        let world = measured.ending.world;
+        let seams = world.map_or("-", |world| if world.is_flawless { "flawless" } else { "FAULTS" });
+        let is_full = matches!(measured.subject, Subject::Full(_));
         table.row([
-            format!("{name}, {}", measured.run.title()),
+            format!("{}, {}", measured.subject.title(), measured.run.title()),
             seams.into(),
-            hash,
-            thousands(triangles as u64),
+            world.map_or("-".into(), |world| format!("{:#018x}", world.hash)),
+            thousands(measured.ending.triangles as u64),
             of_all(measured.unchanged),
-            if measured.subject == Subject::Full { "-".into() } else { of_all(measured.undrawn) },
+            if is_full { "-".into() } else { of_all(measured.undrawn) },
         ]);
     }
-    let points = thousands(measurements.agreement[0].points as u64);
-    let differ = measurements.agreement.map(|agreement| agreement.otherwise_dense);
-    let solid = measurements.agreement.map(|agreement| agreement.otherwise_solid);
-    table.note = format!(
-        "Full field against hybrid at all {points} lattice points: {} and {} are solid in one and not in the other \
-         (first and second run), {} and {} hold another density.",
-        solid[0], solid[1], differ[0], differ[1]
-    );
     table
+}
+
+/// What the comparison of full fields and hybrid found, in words.
+pub fn agreement(measurements: &Measurements) -> String {
+    let mut text = String::new();
+    for (run, (ground, surface)) in Run::BOTH.into_iter().zip(measurements.agreement) {
+        // Writing to a string never fails.
+        let _ = writeln!(
+            text,
+            "- {}, {}: of all {} lattice points {} are solid in it and not in the hybrid or the other way round, {} hold \
+             another density.\n\
+             - {}, {}: of the {} triangles that marching cubes draw in the hybrid {} are missing in it, and it has {} others \
+             in their cells; {} corners have other materials, {} other normals (those at the mask's border left out, where \
+             the hybrid takes the heightmap's).",
+            Subject::Full(Output::Bare).title(),
+            run.title(),
+            thousands(ground.points as u64),
+            ground.otherwise_solid,
+            ground.otherwise_dense,
+            Subject::Full(Output::Same).title(),
+            run.title(),
+            thousands(surface.triangles as u64),
+            surface.missing,
+            surface.extra,
+            surface.other_materials,
+            surface.other_normals,
+        );
+    }
+    text
 }
 
 /// What must hold and does not; nothing, if all is well.
@@ -50,9 +65,9 @@ pub fn faults(measurements: &Measurements) -> Vec<String> {
         let mut hashes = Vec::new();
         for measured in measurements.measured.iter().filter(|measured| measured.run == run) {
             let name = format!("{}, {}", measured.subject.key(), run.title());
-            if let Ending::Hybrid { hash, is_flawless, .. } = measured.ending {
-                hashes.push(hash);
-                if !is_flawless {
+            if let Some(world) = measured.ending.world {
+                hashes.push(world.hash);
+                if !world.is_flawless {
                     faults.push(format!("{name}: the seams have faults"));
                 }
             }
@@ -63,11 +78,17 @@ pub fn faults(measurements: &Measurements) -> Vec<String> {
         }
         hashes.dedup();
         if hashes.len() > 1 {
-            faults.push(format!("{}: worlds differ between chunk sizes", run.title()));
+            faults.push(format!(
+                "{}: worlds differ between chunk sizes, or from the full field's",
+                run.title()
+            ));
         }
     }
-    if !measurements.agreement.iter().all(|agreement| agreement.is_complete()) {
-        faults.push("the full field and the hybrid hold different ground".into());
+    if measurements.agreement.iter().any(|(ground, _)| ground.otherwise_solid + ground.otherwise_dense > 0) {
+        faults.push("the dense field and the hybrid hold different ground".into());
+    }
+    if !measurements.agreement.iter().all(|(_, surface)| surface.is_the_same()) {
+        faults.push("the full field and the hybrid draw different marching cubes".into());
     }
     faults
 }

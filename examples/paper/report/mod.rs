@@ -7,9 +7,11 @@ mod markdown;
 mod ratios;
 mod tables;
 
-pub use checks::{checks, faults};
+pub use checks::{agreement, checks, faults};
 pub use document::document;
 pub use files::{summary, timings};
 pub use markdown::Table;
+#[cfg(test)]
+pub use ratios::middle_edits;
 pub use ratios::{ratios, table as ratio_table};
 pub use tables::{all as tables, medians};

@@ -3,7 +3,9 @@
 use super::markdown::{Table, kilobytes, thousands};
 use crate::backend::Backend;
 use crate::edits::Run;
-use crate::measure::{Ending, Measured, Measurements, Subject};
+use crate::ending::Ending;
+use crate::full::Output;
+use crate::measure::{Measured, Measurements, Subject};
 use crate::published::{self, CHUNK_SIZES, Column};
 use crate::stats::{self, Statistics};
 
@@ -54,75 +56,93 @@ fn hybrid(measurements: &Measurements, backend: Backend, run: Run, number: usize
     let title = format!("Table {number}: {name}, {}, chunk size 25 to 100", run.title());
     let mut table = Table::new(title, header);
     let here = measurements.hybrid(backend, run);
-    fill(&mut table, &published::hybrid(backend, run), &here);
+    let columns: Vec<_> = published::hybrid(backend, run)
+        .into_iter()
+        .enumerate()
+        .flat_map(|(at, paper)| {
+            [Shown::Paper(paper), here.get(at).map_or(Shown::Nothing, |&here| Shown::Here(here))]
+        })
+        .collect();
+    fill(&mut table, &columns);
     if here.is_empty() {
         let reason = measurements.missing.iter().find(|missing| missing.0 == backend);
         table.note = reason.map_or_else(String::new, |(_, reason)| format!("Here: {reason}."));
     } else {
-        let data = |ending: &Ending| match ending {
-            Ending::Hybrid { data, .. } => kilobytes(data.ground + data.edits()),
-            Ending::Full { .. } => String::new(),
-        };
-        extra(&mut table, "Memory, terrain data", &here, data);
+        extra(&mut table, "Memory, terrain data", &columns, Ending::data_bytes);
     }
     table
 }
 
 fn full(measurements: &Measurements) -> Table {
-    let pairs =
-        Run::BOTH.iter().flat_map(|run| ["paper", "here"].map(|who| format!("{}, {who}", run.title())));
-    let header = std::iter::once("Full marching cubes".to_owned()).chain(pairs);
+    let of_run = |run: Run| {
+        let who = ["paper"].into_iter().chain(Output::BOTH.map(Output::title));
+        who.map(move |who| format!("{}, {who}", run.title()))
+    };
+    let header =
+        std::iter::once("Full marching cubes".to_owned()).chain(Run::BOTH.into_iter().flat_map(of_run));
     let mut table = Table::new("Table 5: CPU, first and second run, the whole terrain as one field", header);
-    let here: Vec<_> = Run::BOTH.iter().filter_map(|&run| measurements.get(Subject::Full, run)).collect();
-    fill(&mut table, &Run::BOTH.map(published::full), &here);
-    extra(&mut table, "Memory, samples", &here, |ending| match ending {
-        Ending::Full { sample_bytes, .. } => kilobytes(*sample_bytes),
-        Ending::Hybrid { .. } => String::new(),
-    });
-    extra(&mut table, "Memory, mesh", &here, |ending| match ending {
-        Ending::Full { mesh_bytes, .. } => kilobytes(*mesh_bytes),
-        Ending::Hybrid { .. } => String::new(),
-    });
+    let of_run = |run: Run| {
+        let here = |output| measurements.get(Subject::Full(output), run).map_or(Shown::Nothing, Shown::Here);
+        [Shown::Paper(published::full(run))].into_iter().chain(Output::BOTH.map(here))
+    };
+    let columns: Vec<_> = Run::BOTH.into_iter().flat_map(of_run).collect();
+    fill(&mut table, &columns);
+    extra(&mut table, "Memory, terrain data", &columns, Ending::data_bytes);
+    extra(&mut table, "Memory, mesh", &columns, |ending| ending.mesh_bytes);
     table
 }
 
-/// Puts in the shared rows: for each column of the paper its figure and ours.
-fn fill(table: &mut Table, paper: &[Column], here: &[&Measured]) {
-    let statistics: Vec<_> = here.iter().map(|measured| Statistics::of(&measured.repeats)).collect();
+/// What a column shows.
+enum Shown<'a> {
+    Paper(Column),
+    Here(&'a Measured),
+    Nothing,
+}
+
+/// Puts in the rows that all tables share.
+fn fill(table: &mut Table, columns: &[Shown]) {
     for (name, published, measured) in ROWS {
-        let pairs = paper.iter().enumerate().flat_map(|(at, paper)| {
-            let ours = here.get(at).zip(statistics.get(at));
-            [published(paper), ours.map_or("-".into(), |(here, statistics)| measured(here, statistics))]
+        let figures = columns.iter().map(|column| match column {
+            Shown::Paper(paper) => published(paper),
+            Shown::Here(here) => measured(here, &Statistics::of(&here.repeats)),
+            Shown::Nothing => "-".into(),
         });
-        table.row(std::iter::once(name.to_owned()).chain(pairs));
+        table.row(std::iter::once(name.to_owned()).chain(figures));
     }
 }
 
-/// A row of figures that the paper does not have.
-fn extra(table: &mut Table, name: &str, here: &[&Measured], figure: impl Fn(&Ending) -> String) {
-    let pairs = here.iter().flat_map(|measured| ["-".to_owned(), figure(&measured.ending)]);
-    table.row(std::iter::once(name.to_owned()).chain(pairs));
+/// A row of bytes, which the paper does not have.
+fn extra(table: &mut Table, name: &str, columns: &[Shown], bytes: impl Fn(&Ending) -> usize) {
+    let figures = columns.iter().map(|column| match column {
+        Shown::Here(here) => kilobytes(bytes(&here.ending)),
+        Shown::Paper(_) | Shown::Nothing => "-".into(),
+    });
+    table.row(std::iter::once(name.to_owned()).chain(figures));
 }
 
 /// How times are spread, in microseconds: what totals and averages do not tell.
 pub fn medians(measurements: &Measurements) -> Table {
-    let header =
-        ["us an edit", "median", "99th percentile", "longest", "average of medians", "longest of medians"];
+    let header = [
+        "us an edit",
+        "median",
+        "99th percentile",
+        "longest",
+        "processor, median",
+        "average of medians",
+        "longest of medians",
+    ];
     let mut table = Table::new("How times are spread", header);
     for measured in &measurements.measured {
-        let name = match measured.subject {
-            Subject::Hybrid { backend, chunk_size } => format!("{} {chunk_size}", backend.title()),
-            Subject::Full => "full field".into(),
-        };
+        let name = measured.subject.title();
         let all = Statistics::of(&measured.repeats);
-        let by_edit = Statistics::of(&[stats::by_edit(&measured.repeats)]);
-        let figures = [all.median, all.p99, all.max, by_edit.average, by_edit.max];
+        let by_edit = Statistics::of(&[stats::by_edit(&measured.processor)]);
+        let processor = Statistics::of(&measured.processor);
+        let figures = [all.median, all.p99, all.max, processor.median, by_edit.average, by_edit.max];
         let figures = figures.iter().map(|seconds| format!("{:.1}", seconds * 1e6));
         table.row(std::iter::once(format!("{name}, {}", measured.run.title())).chain(figures));
     }
-    table.note =
-        "The last two columns take each edit with its median over the repeats, which leaves out what else \
-                  the machine did meanwhile."
-            .into();
+    table.note = "The last three columns are processor time, which leaves out what else the machine did meanwhile; the last \
+                  two take each edit with its median over the repeats."
+        .into();
     table
 }

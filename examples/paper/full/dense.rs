@@ -1,54 +1,56 @@
-//! The whole terrain as one field of marching cubes, as in the paper's Table 5: all of its mesh is made again at each
-//! edit.
+//! The whole terrain as one dense field: a cube of samples, and positions and normals of its whole surface.
 
-use bevy_burrow::brush::{BAND, Brush, BrushError, Edit};
+use bevy_burrow::brush::{BAND, Brush, Edit};
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::LatticeBox;
-use bevy_burrow::terrain::World;
+use bevy_burrow::surface::dense::{DenseGrid, DenseGridError, DenseMesh, DenseMesher, Normals};
 use glam::IVec3;
 
-use crate::mesher::WholeMesher;
+use crate::PaperError;
 
 /// A cube of samples and the one mesh over it.
-pub struct FullField {
+pub struct DenseField {
     /// Lattice points along each axis.
     side: usize,
     /// Densities in 1/256 voxel, negative is solid; x fastest, then y, then z.
     samples: Vec<i16>,
-    mesher: WholeMesher,
+    mesher: DenseMesher,
+    mesh: DenseMesh,
 }
 
 /// A density as a sample holds it, in the dense field as in the bricks of a world.
-fn stored(distance: i32) -> i16 {
+pub fn stored(distance: i32) -> i16 {
     distance.clamp(-i32::from(i16::MAX), i32::from(i16::MAX)) as i16
 }
 
-impl FullField {
+impl DenseField {
     /// The ground's lattice points from y = 0 to the height of the cube, meshed once: all is allocated from the start.
-    pub fn new(ground: &Ground) -> Self {
+    pub fn new(ground: &Ground) -> Result<Self, PaperError> {
         let side = ground.width() as usize + 1;
-        let mut field = Self { side, samples: Vec::with_capacity(side.pow(3)), mesher: WholeMesher::new() };
-        field.samples.extend(field.bounds().lines().map(|point| stored(ground.distance(point))));
-        field.mesher.mesh(&field.samples, side);
-        field
+        let samples = Cube(side as i32).lines().map(|point| stored(ground.distance(point))).collect();
+        let mut field = Self { side, samples, mesher: DenseMesher::new(), mesh: DenseMesh::default() };
+        field.remesh()?;
+        Ok(field)
     }
 
-    fn bounds(&self) -> Cube {
-        Cube(self.side as i32)
+    fn remesh(&mut self) -> Result<(), DenseGridError> {
+        let grid = DenseGrid::new(&self.samples, [self.side; 3])?;
+        self.mesher.mesh(grid, Normals::Gradient, &mut self.mesh);
+        Ok(())
     }
 
     /// Edits the samples in the edit's reach and nothing else, then makes the whole mesh again. Says how many samples
     /// changed.
-    pub fn edit(&mut self, brush: &Brush) -> Result<usize, BrushError> {
+    pub fn edit(&mut self, brush: &Brush) -> Result<usize, PaperError> {
         let edit = Edit::quantize(brush)?;
         let changed = self.apply(&edit);
-        self.mesher.mesh(&self.samples, self.side);
+        self.remesh()?;
         Ok(changed)
     }
 
     /// The rule by which a world's samples change as well.
     fn apply(&mut self, edit: &Edit) -> usize {
-        let Some(reach) = edit.reach().intersection(self.bounds().points()) else { return 0 };
+        let Some(reach) = edit.reach().intersection(Cube(self.side as i32).points()) else { return 0 };
         let (evaluator, operation) = (edit.evaluator(), edit.operation());
         let mut row = vec![0; reach.size().x as usize];
         let mut changed = 0;
@@ -74,9 +76,14 @@ impl FullField {
         (point.z * self.side + point.y) * self.side + point.x
     }
 
-    /// Triangles of the mesh as it is now.
-    pub fn triangles(&self) -> usize {
-        self.mesher.triangles()
+    /// Every lattice point with its sample.
+    pub fn points(&self) -> impl Iterator<Item = (IVec3, i16)> {
+        Cube(self.side as i32).lines().zip(self.samples.iter().copied())
+    }
+
+    /// The mesh as it is now.
+    pub fn mesh(&self) -> &DenseMesh {
+        &self.mesh
     }
 
     /// Bytes of the samples.
@@ -86,37 +93,8 @@ impl FullField {
 
     /// Bytes of the vertex and index buffers.
     pub fn mesh_bytes(&self) -> usize {
-        self.mesher.bytes()
-    }
-
-    /// Compares each lattice point of the cube with a world's.
-    pub fn compare(&self, world: &World) -> Agreement {
-        let view = world.samples();
-        let mut agreement = Agreement::default();
-        for (point, &here) in self.bounds().lines().zip(&self.samples) {
-            let there = stored(view.distance(point));
-            agreement.points += 1;
-            agreement.otherwise_solid += usize::from((here < 0) != (there < 0));
-            agreement.otherwise_dense += usize::from(here != there);
-        }
-        agreement
-    }
-}
-
-/// How far the full field and a world agree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Agreement {
-    /// Lattice points that were compared.
-    pub points: usize,
-    /// Points that are solid in one and air in the other.
-    pub otherwise_solid: usize,
-    /// Points of another density.
-    pub otherwise_dense: usize,
-}
-
-impl Agreement {
-    pub fn is_complete(self) -> bool {
-        self.otherwise_solid + self.otherwise_dense == 0
+        let DenseMesh { positions, normals, indices } = &self.mesh;
+        size_of_val(positions.as_slice()) + size_of_val(normals.as_slice()) + size_of_val(indices.as_slice())
     }
 }
 

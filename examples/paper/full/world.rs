@@ -1,0 +1,126 @@
+//! The whole terrain as one field with the hybrid's own mesher: a world whose mask holds every cell.
+
+use bevy_burrow::brush::{Brush, Shape};
+use bevy_burrow::ground::MaterialId;
+use bevy_burrow::lattice::{BrickPos, LatticeBox, ONE, SNAP};
+use bevy_burrow::surface::block::{Block, Mesher, Parts};
+use bevy_burrow::surface::vertex::WorldView;
+use bevy_burrow::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh, Vertex};
+use bevy_burrow::terrain::{Receipt, Terrain, World};
+use glam::{IVec3, Vec3};
+
+use crate::PaperError;
+use crate::edits::Scene;
+use crate::play;
+
+/// Cells along a chunk's side: whole bricks, so that no block is cut in two.
+const CHUNK_SIZE: u32 = 32;
+
+/// A terrain, and one vertex and one index buffer over all of it, none of which is left to the heightmap.
+pub struct FullWorld {
+    terrain: Terrain,
+    /// Every cell of the world. The terrain's own mask has only those that were edited.
+    mask: Mask,
+    /// Every block of the cube, by stacks, from below.
+    blocks: Vec<Block>,
+    mesher: Mesher,
+    /// The blocks' surfaces; their vertices are the vertex buffer.
+    parts: Parts,
+    indices: Vec<u32>,
+}
+
+impl FullWorld {
+    /// The ground from y = 0 to the height of the cube, meshed once: all is allocated from the start.
+    pub fn new(scene: &Scene) -> Result<Self, PaperError> {
+        let terrain = play::terrain(scene, CHUNK_SIZE)?;
+        let mut full = Self {
+            mask: whole_mask(scene)?,
+            blocks: blocks(terrain.world()),
+            terrain,
+            mesher: Mesher::default(),
+            parts: Parts::default(),
+            indices: Vec::new(),
+        };
+        full.remesh();
+        Ok(full)
+    }
+
+    /// The usual transaction, then the whole mesh again.
+    pub fn edit(&mut self, brush: &Brush) -> Vec<Receipt> {
+        let receipts = self.terrain.apply([brush]);
+        self.remesh();
+        receipts
+    }
+
+    /// Meshes every block into the buffers.
+    fn remesh(&mut self) {
+        let world = self.terrain.world();
+        let view = WorldView { mask: MaskView::new(&self.mask), ..world.view() };
+        self.parts.clear();
+        self.indices.clear();
+        self.mesher.mesh(&view, &self.blocks, &mut self.parts);
+        // Parts count positions from their chunk and indices from their own first vertex.
+        let Parts { list, vertices, indices } = &mut self.parts;
+        let (mut vertex, mut index) = (0, 0);
+        for part in list {
+            let origin = world.grid().origin(part.block.chunk) * SNAP;
+            vertices[vertex..part.vertices].iter_mut().for_each(|vertex| vertex.position += origin);
+            self.indices.extend(indices[index..part.indices].iter().map(|&at| vertex as u32 + u32::from(at)));
+            (vertex, index) = (part.vertices, part.indices);
+        }
+    }
+
+    pub fn world(&self) -> &World {
+        self.terrain.world()
+    }
+
+    /// The vertex buffer, in 1/4096 voxel of the world.
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.parts.vertices
+    }
+
+    /// The index buffer.
+    pub fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
+    /// Bytes of both buffers.
+    pub fn mesh_bytes(&self) -> usize {
+        size_of_val(self.vertices()) + size_of_val(self.indices())
+    }
+
+    /// Is the mesh one closed surface?
+    pub fn check_seams(&self) -> SeamReport {
+        let mut soup = SeamSoup::default();
+        let mesh = SurfaceMesh { vertices: self.vertices().to_vec(), indices: self.indices.clone() };
+        soup.add(&mesh, IVec3::ZERO);
+        soup.check(self.world().grid())
+    }
+}
+
+/// All cells of the world: the mask of one that is painted all over.
+fn whole_mask(scene: &Scene) -> Result<Mask, PaperError> {
+    let mut painted = play::terrain(scene, CHUNK_SIZE)?;
+    let (low, high) = scene.ground.height_range();
+    let (low, high) = (low as f32 / ONE as f32, high as f32 / ONE as f32);
+    let size = Vec3::new(scene.ground.width() as f32, high - low, scene.ground.depth() as f32);
+    let everything = Shape::cuboid(size / 2.0 + Vec3::Y * low, size / 2.0 + 2.0);
+    painted.apply([Brush::paint(everything, MaterialId(0))]);
+    Ok(painted.world().mask().clone())
+}
+
+/// Every block of a cube as high as the world is wide.
+fn blocks(world: &World) -> Vec<Block> {
+    let grid = world.grid();
+    let cube = LatticeBox { min: IVec3::ZERO, max: IVec3::new(grid.width(), grid.width(), grid.depth()) - 1 };
+    let mut bricks: Vec<BrickPos> = BrickPos::covering(cube).collect();
+    bricks.sort_unstable_by_key(|brick| (brick.0.x, brick.0.z, brick.0.y));
+    let of_brick = |brick: BrickPos| {
+        let cells = brick.samples().intersection(cube);
+        cells
+            .into_iter()
+            .flat_map(move |cells| grid.chunks_of(cells))
+            .map(move |chunk| Block { brick, chunk })
+    };
+    bricks.into_iter().flat_map(of_brick).collect()
+}
