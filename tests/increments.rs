@@ -133,7 +133,9 @@ impl Witness {
         let Some(reach) = edit.reach().intersection(grid.edit_bounds()) else { return effect };
         let evaluator: Evaluator = edit.evaluator();
         let mut row = vec![0; reach.size().x as usize];
-        for (y, z) in (reach.min.y..=reach.max.y).flat_map(|y| (reach.min.z..=reach.max.z).map(move |z| (y, z))) {
+        for (y, z) in
+            (reach.min.y..=reach.max.y).flat_map(|y| (reach.min.z..=reach.max.z).map(move |z| (y, z)))
+        {
             evaluator.row(IVec3::new(reach.min.x, y, z), &mut row);
             for (x, &outside) in (reach.min.x..).zip(&row) {
                 let point = IVec3::new(x, y, z);
@@ -292,7 +294,8 @@ impl Witness {
         for cell in (0..depth).flat_map(|z| (0..width).map(move |x| Column::new(x, z))) {
             let sheet = cell_sheet(world.ground(), cell);
             let is_in_sheet = |y: &i32| (sheet.start..=sheet.end).contains(y);
-            let is_touched = |column| edited.get(column).is_some_and(|all: &Vec<i32>| all.iter().any(is_in_sheet));
+            let is_touched =
+                |column| edited.get(column).is_some_and(|all: &Vec<i32>| all.iter().any(is_in_sheet));
             let expected = cell.corners().iter().any(is_touched);
             assert_eq!(world.mask().contains(cell), expected, "{what}: {cell:?}");
             count += usize::from(expected);
@@ -541,7 +544,8 @@ fn a_normal_that_only_changes_the_sign_of_its_zeros_is_redrawn() {
 
 #[test]
 fn at_the_ends_of_the_lattice_all_is_as_if_made_from_scratch() {
-    for (i, base) in [32_768.0, 32_767.5, 32_761.0, -32_768.0, -32_767.25, -32_760.0].into_iter().enumerate() {
+    for (i, base) in [32_768.0, 32_767.5, 32_761.0, -32_768.0, -32_767.25, -32_760.0].into_iter().enumerate()
+    {
         let mut rng = Rng::with_seed(i as u64);
         let bumps: Vec<f64> = (0..13 * 12).map(|_| rng.f64() * 6.0).collect();
         let height = |x: i32, z: i32| (base + bumps[(z * 13 + x) as usize] - 3.0).clamp(-32_768.0, 32_768.0);
@@ -619,5 +623,23 @@ fn batches_and_threads_do_not_show() {
             assert_eq!(first.0, other.0, "world {seed}: hash of batches of {batch}");
             assert!(first.1 == other.1, "world {seed}: meshes of batches of {batch}");
         }
+    }
+}
+
+#[test]
+fn memory_is_what_the_world_gives_back() {
+    for seed in 0..12 {
+        let mut rng = Rng::with_seed(seed);
+        let (ground, chunk_size) = worlds::random_ground(&mut rng, seed);
+        let brushes: Vec<Brush> = (0..10).map(|_| worlds::random_brush(&mut rng, &ground)).collect();
+        let settings = TerrainSettings { chunk_size, ..Default::default() };
+        let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
+        brushes.iter().for_each(|brush| drop(terrain.apply([brush])));
+        let told = terrain.world().memory();
+        let blocks = told.samples / Brick::BYTES + terrain.world().drawn().count() + 2;
+        let given_back = allocation_counter::measure(|| drop(terrain)).bytes_current.unsigned_abs() as usize;
+        // Two counts of references stand before whatever is shared.
+        let least = told.total();
+        assert!((least..=least + blocks * 16 + 1024).contains(&given_back), "{given_back}, not {told:?}");
     }
 }
