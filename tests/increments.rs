@@ -643,3 +643,13 @@ fn memory_is_what_the_world_gives_back() {
         assert!((least..=least + blocks * 16 + 1024).contains(&given_back), "{given_back}, not {told:?}");
     }
 }
+
+#[test]
+fn tiles_and_chunks_that_the_world_does_not_have_are_empty() {
+    let terrain = Terrain::new(Ground::flat(40, 33, 0.0).expect("valid"), &TerrainSettings::default());
+    let world = terrain.expect("valid settings");
+    for (x, z) in [(2, 0), (0, 2), (-1, 0), (0, -3), (5, 5), (i32::MAX, i32::MIN), (i32::MIN, 0)] {
+        assert_eq!(world.world().tile_mesh(TilePos { x, z }), SurfaceMesh::default());
+        assert_eq!(world.world().chunk_mesh(ChunkPos { x, y: 0, z }), SurfaceMesh::default());
+    }
+}

@@ -160,9 +160,9 @@ impl World {
         self.surfaces.keys().copied()
     }
 
-    /// The mesh of a tile, relative to its lowest column at y = 0.
+    /// The mesh of a tile, relative to its lowest column at y = 0; empty where the world has no tile.
     pub fn tile_mesh(&self, tile: TilePos) -> SurfaceMesh {
-        tile::mesh(&self.view(), tile)
+        if self.grid.has_tile(tile) { tile::mesh(&self.view(), tile) } else { SurfaceMesh::default() }
     }
 
     /// The mesh of a chunk, relative to its lowest lattice point; empty where it draws nothing.
