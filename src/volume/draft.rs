@@ -81,6 +81,10 @@ pub struct Draft {
 /// From how many bricks on they are spread over threads.
 const PARALLEL_BRICKS: usize = 64;
 
+/// How many bricks are worked on before what edits did to them is added up: that takes more memory than the bricks when
+/// there are many edits, and most bricks of a large cave are given up for a shared one.
+const BATCH: usize = 2048;
+
 /// One edit's work on one brick; sorted by brick, then by edit.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Job {
@@ -128,28 +132,33 @@ impl Draft {
         let jobs = jobs(&tools);
         let bricks: Vec<&[Job]> = jobs.chunk_by(|a, b| a.brick == b.brick).collect();
         let work = |jobs: &&[Job]| Workpiece::new(base, grid, jobs[0].pos()).take(&tools, jobs);
-        let finished: Vec<Finished> = if bricks.len() < PARALLEL_BRICKS {
-            bricks.iter().filter_map(work).collect()
-        } else {
-            bricks.par_iter().filter_map(work).collect()
-        };
 
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits.len(), EditEffect::default);
-        draft.bricks.reserve_exact(finished.len());
-        for mut brick in finished {
-            draft.hash = draft.hash.wrapping_add(brick.hash);
-            for part in &brick.parts {
-                draft.effects[part.edit].add(part);
-            }
-            if let Some(kind) = brick.drafted.brick.uniform() {
-                let known = uniform.get(&kind);
-                let fresh = || Arc::clone(draft.uniform.entry(kind).or_insert(brick.drafted.brick));
-                brick.drafted.brick = known.cloned().unwrap_or_else(fresh);
-            }
-            draft.bricks.push(brick.drafted);
+        for bricks in bricks.chunks(BATCH) {
+            let finished: Vec<Finished> = if bricks.len() < PARALLEL_BRICKS {
+                bricks.iter().filter_map(work).collect()
+            } else {
+                bricks.par_iter().filter_map(work).collect()
+            };
+            draft.bricks.reserve(finished.len());
+            finished.into_iter().for_each(|brick| draft.add(brick, uniform));
         }
         draft
+    }
+
+    /// Takes in a brick after all of its edits; one that is all alike is replaced by the one of its kind.
+    fn add(&mut self, mut brick: Finished, uniform: &UniformBricks) {
+        self.hash = self.hash.wrapping_add(brick.hash);
+        for part in &brick.parts {
+            self.effects[part.edit].add(part);
+        }
+        if let Some(kind) = brick.drafted.brick.uniform() {
+            let known = uniform.get(&kind);
+            let fresh = || Arc::clone(self.uniform.entry(kind).or_insert(brick.drafted.brick));
+            brick.drafted.brick = known.cloned().unwrap_or_else(fresh);
+        }
+        self.bricks.push(brick.drafted);
     }
 }
 
