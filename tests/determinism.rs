@@ -180,8 +180,7 @@ fn the_meshes_of_commits_add_up_to_the_drawn_world() {
         for brush in &brushes {
             terrain.submit(brush);
             let commit = terrain.begin().expect("something is queued").run();
-            let tiles =
-                commit.meshes.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.mesh(*tile)));
+            let tiles = commit.meshes.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.mesh()));
             let chunks =
                 commit.meshes.chunks.iter().map(|(at, chunk)| (Drawn::Chunk(*at), chunk.mesh().clone()));
             for (drawn, mesh) in tiles.chain(chunks) {

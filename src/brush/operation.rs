@@ -16,7 +16,8 @@ pub enum Operation {
         /// The material of the new ground.
         material: MaterialId,
     },
-    /// Changes the material of ground that is there, and no density.
+    /// Changes the material of ground that is there, and no density. [`MaterialId::GROUND`] gives ground its own look
+    /// back, and leaves alone what has it.
     ///
     /// It stores the density of what it paints: exactly within 127 voxels of the surface. On taller cliffs, between
     /// neighbouring columns, painting may move the surface by less than a voxel.

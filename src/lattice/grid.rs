@@ -116,6 +116,12 @@ impl ChunkGrid {
         (0..nz).flat_map(move |z| (0..nx).map(move |x| TilePos { x, z }))
     }
 
+    /// Does the world have this tile?
+    pub fn has_tile(self, tile: TilePos) -> bool {
+        let (nx, nz) = self.tile_counts();
+        (0..nx).contains(&tile.x) && (0..nz).contains(&tile.z)
+    }
+
     /// Is the cell inside the world?
     pub fn has_cell(self, cell: Column) -> bool {
         (0..self.width).contains(&cell.x) && (0..self.depth).contains(&cell.z)
@@ -126,7 +132,7 @@ impl ChunkGrid {
         TilePos { x: cell.x / self.size, z: cell.z / self.size }
     }
 
-    /// The cells of a tile: lowest and one past the highest, cut at the rim.
+    /// The cells of a tile, which the world must have: lowest and one past the highest, cut at the rim.
     pub fn tile_cells(self, tile: TilePos) -> (Column, Column) {
         let low = Column::new(tile.x * self.size, tile.z * self.size);
         let high = Column::new((low.x + self.size).min(self.width), (low.z + self.size).min(self.depth));

@@ -15,9 +15,11 @@
 mod boxes;
 mod grid;
 pub(crate) mod hash;
+mod tables;
 
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
+pub(crate) use tables::table_bytes;
 
 use glam::IVec3;
 

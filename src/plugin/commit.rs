@@ -55,9 +55,10 @@ pub(super) fn begin_transactions(
             let commit = transaction.run();
             let build = |surface: &SurfaceMesh| if draws { meshes::build(surface, &colors) } else { None };
             let updates = &commit.meshes;
-            let tiles = updates.tiles.iter().map(|(tile, update)| {
-                (Drawn::Tile(*tile), if draws { build(&update.mesh(*tile)) } else { None })
-            });
+            let tiles = updates
+                .tiles
+                .iter()
+                .map(|(tile, update)| (Drawn::Tile(*tile), if draws { build(&update.mesh()) } else { None }));
             let chunks = updates.chunks.iter().map(|(at, chunk)| (Drawn::Chunk(*at), build(chunk.mesh())));
             let meshes = tiles.chain(chunks).collect();
             Prepared { commit, meshes, took: start.elapsed() }

@@ -336,7 +336,16 @@ pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {
     (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))
 }
 
-/// Lattice y of the cubes that the pristine surface crosses over the 8x8 cells from `low` on.
-pub(crate) fn sheet_rows(ground: &Ground, low: Column) -> Range<i32> {
-    sheet(corners::corner_heights(&corners::heights(ground, low)))
+/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.
+pub(crate) fn sheet_rows(ground: &Ground, low: Column, mut cells: u64) -> Range<i32> {
+    let heights = ground.heights::<9>(low);
+    let mut range = (i32::MAX, i32::MIN);
+    while cells != 0 {
+        let (x, z) = (cells.trailing_zeros() as usize & 7, cells.trailing_zeros() as usize >> 3);
+        for height in [heights[z][x], heights[z][x + 1], heights[z + 1][x], heights[z + 1][x + 1]] {
+            range = (range.0.min(height), range.1.max(height));
+        }
+        cells &= cells - 1;
+    }
+    sheet([range.0, range.1])
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE};
+use crate::lattice::{Column, ONE, table_bytes};
 
 /// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
 /// lattice point counts below it.
@@ -76,7 +76,7 @@ impl Mask {
 
     /// Bytes of the mask.
     pub fn bytes(&self) -> usize {
-        self.0.capacity() * size_of::<((i32, i32), u64)>()
+        table_bytes(&self.0)
     }
 }
 

@@ -98,7 +98,7 @@ impl Rings {
                 drawing.patch((z, x));
             }
         }
-        drawing.rings
+        drawing.finish()
     }
 
     /// The same rings, but with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells, ascending.
@@ -113,7 +113,7 @@ impl Rings {
         let (mut own, mut fresh) = (0, 0);
         loop {
             let next = match (self.patches.get(own), patches.get(fresh)) {
-                (None, None) => return drawing.rings,
+                (None, None) => return drawing.finish(),
                 (Some(_), None) => Ordering::Less,
                 (None, Some(_)) => Ordering::Greater,
                 (Some(patch), Some(at)) => patch.at.cmp(at),
@@ -133,11 +133,12 @@ impl Rings {
         &self.vertices
     }
 
-    /// Bytes of the buffers.
+    /// Bytes of the rings, their buffers included.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.vertices.as_slice())
-            + size_of_val(self.fans.as_slice())
-            + size_of_val(self.patches.as_slice())
+        size_of::<Self>()
+            + self.vertices.capacity() * size_of::<Vertex>()
+            + self.fans.capacity() * size_of::<u32>()
+            + self.patches.capacity() * size_of::<Patch>()
     }
 }
 
@@ -159,6 +160,14 @@ impl<'a> Drawing<'a> {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
         Self { ground, borders, low, high, base, rings: Rings::default(), sides: Default::default() }
+    }
+
+    /// The rings, without room for more: they are kept until the next edit nearby.
+    fn finish(mut self) -> Rings {
+        self.rings.vertices.shrink_to_fit();
+        self.rings.fans.shrink_to_fit();
+        self.rings.patches.shrink_to_fit();
+        self.rings
     }
 
     /// Takes a patch over as it was.

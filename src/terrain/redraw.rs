@@ -34,14 +34,15 @@ pub struct TileUpdate {
     pub indices: Vec<u32>,
     /// The rings; their vertices follow after those of the columns.
     pub rings: Arc<Rings>,
+    tile: TilePos,
     ground: Arc<Ground>,
     grid: ChunkGrid,
 }
 
 impl TileUpdate {
     /// The tile's whole mesh, its columns included.
-    pub fn mesh(&self, tile: TilePos) -> SurfaceMesh {
-        let mut vertices = tile::columns(&self.ground, self.grid, tile);
+    pub fn mesh(&self) -> SurfaceMesh {
+        let mut vertices = tile::columns(&self.ground, self.grid, self.tile);
         vertices.extend_from_slice(self.rings.vertices());
         SurfaceMesh { vertices, indices: self.indices.clone() }
     }
@@ -102,9 +103,10 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
     for ((x, z), cells) in added.words() {
         for (dx, dz) in (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz))) {
             let stack = (x + dx, z + dz);
-            if grown_into(cells, dx, dz) & view.mask.word(stack) != 0 {
+            let near = grown_into(cells, dx, dz) & view.mask.word(stack);
+            if near != 0 {
                 let low = Column::new(stack.0 * 8, stack.1 * 8);
-                let rows = block::sheet_rows(view.samples.ground(), low);
+                let rows = block::sheet_rows(view.samples.ground(), low, near);
                 dirty.extend(in_world(low.at(rows.start), low.offset(7, 7).at(rows.end - 1)));
             }
         }
@@ -259,7 +261,7 @@ fn touched_tiles(world: &World, view: &WorldView, added: &Mask) -> Vec<(TilePos,
         let old = world.rings.get(&tile).map_or(&nothing, Arc::as_ref);
         let rings = Arc::new(old.updated(view, tile, &borders, &patches));
         let indices = tile::indices(view.grid, tile, &borders, &rings);
-        (tile, TileUpdate { indices, rings, ground: Arc::clone(&world.ground), grid: view.grid })
+        (tile, TileUpdate { indices, rings, tile, ground: Arc::clone(&world.ground), grid: view.grid })
     };
     if tiles.len() < 8 { tiles.iter().map(update).collect() } else { tiles.par_iter().map(update).collect() }
 }

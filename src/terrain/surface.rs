@@ -57,18 +57,34 @@ impl ChunkSurface {
         part.checked_sub(1).map_or((0, 0), |before| (self.parts[before].vertices, self.parts[before].indices))
     }
 
+    /// The number of the part with a key.
+    fn find(&self, key: Key) -> Option<usize> {
+        self.parts.binary_search_by(|part| part.key.cmp(&key)).ok()
+    }
+
     /// The surface with these parts, in order, in place of old ones; others are copied. `None` where that changes nothing.
     pub(super) fn updated<'a>(&self, fresh: impl Iterator<Item = Fresh<'a>>) -> Option<Self> {
         let changes: Vec<Fresh> = fresh.filter(|part| self.differs(part)).collect();
         if changes.is_empty() {
             return None;
         }
-        let count = |of: fn(&Fresh) -> usize| changes.iter().map(of).sum::<usize>();
+        let (mut parts, mut vertices, mut indices) =
+            (self.parts.len(), self.mesh.vertices.len(), self.mesh.indices.len());
+        for change in &changes {
+            if let Some(at) = self.find(change.key) {
+                let (part, (vertex, index)) = (self.parts[at], self.start(at));
+                (parts, vertices, indices) =
+                    (parts - 1, vertices - (part.vertices - vertex), indices - (part.indices - index));
+            }
+            if !change.indices.is_empty() {
+                (parts, vertices, indices) =
+                    (parts + 1, vertices + change.vertices.len(), indices + change.indices.len());
+            }
+        }
         let mut new = Self::default();
-        new.parts.reserve_exact(self.parts.len() + changes.len());
-        // A little too much where parts are replaced; it is the next edit's to make use of.
-        new.mesh.vertices.reserve_exact(self.mesh.vertices.len() + count(|part| part.vertices.len()));
-        new.mesh.indices.reserve_exact(self.mesh.indices.len() + count(|part| part.indices.len()));
+        new.parts.reserve_exact(parts);
+        new.mesh.vertices.reserve_exact(vertices);
+        new.mesh.indices.reserve_exact(indices);
         let mut kept = 0;
         for change in &changes {
             let upto = kept + self.parts[kept..].partition_point(|part| part.key < change.key);
@@ -83,7 +99,7 @@ impl ChunkSurface {
 
     /// Is a part other than the one with its key, or without it?
     fn differs(&self, fresh: &Fresh) -> bool {
-        let Ok(at) = self.parts.binary_search_by(|part| part.key.cmp(&fresh.key)) else {
+        let Some(at) = self.find(fresh.key) else {
             return !fresh.indices.is_empty();
         };
         let ((vertex, index), part) = (self.start(at), self.parts[at]);

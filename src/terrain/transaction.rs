@@ -190,7 +190,8 @@ impl<'a> FieldLog<'a> {
         let existed = |id| committed.is_some_and(|fields| fields.get(id).is_some());
         let into = absorbed.field;
         // What went into a field that goes now as well is in the last one.
-        for (_, news) in self.merged.iter_mut().filter(|(at, _)| *at == chunk) {
+        let merged = if absorbed.gone.is_empty() { &mut [] } else { self.merged.as_mut_slice() };
+        for (_, news) in merged.iter_mut().filter(|(at, _)| *at == chunk) {
             if let FieldNews::Merged { into: earlier, .. } = news
                 && absorbed.gone.contains(earlier)
             {

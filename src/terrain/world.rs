@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, table_bytes};
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
@@ -62,7 +62,7 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Of tiles that have any.
+    /// Of tiles that bordered on the mask when they were last drawn; some may have none.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
     pub(super) sample_hash: u64,
@@ -160,9 +160,9 @@ impl World {
         self.surfaces.keys().copied()
     }
 
-    /// The mesh of a tile, relative to its lowest column at y = 0.
+    /// The mesh of a tile, relative to its lowest column at y = 0; empty where the world has no tile.
     pub fn tile_mesh(&self, tile: TilePos) -> SurfaceMesh {
-        tile::mesh(&self.view(), tile)
+        if self.grid.has_tile(tile) { tile::mesh(&self.view(), tile) } else { SurfaceMesh::default() }
     }
 
     /// The mesh of a chunk, relative to its lowest lattice point; empty where it draws nothing.
@@ -217,9 +217,4 @@ impl World {
         memory.index += self.stacks.values().map(|stack| stack.capacity() * size_of::<i32>()).sum::<usize>();
         memory
     }
-}
-
-/// Bytes of a hash table: its entries, and one byte for each to find them by.
-fn table_bytes<K, V>(table: &FxHashMap<K, V>) -> usize {
-    table.capacity() * 8 / 7 * (size_of::<(K, V)>() + 1)
 }

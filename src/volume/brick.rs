@@ -66,7 +66,7 @@ pub struct Brick {
     samples: [Sample; LEN],
     solid: Layers,
     edited: Layers,
-    /// `None` where all are [`MaterialId::GROUND`].
+    /// `None` while all are [`MaterialId::GROUND`].
     materials: Option<Box<[MaterialId; LEN]>>,
 }
 

@@ -39,16 +39,12 @@ pub struct EditEffect {
 }
 
 impl EditEffect {
-    /// Adds what the edit did in one chunk's part of one brick.
-    fn add(&mut self, part: &PartEffect) {
-        let changed = ChunkEffect { chunk: part.chunk, bounds: part.bounds };
-        match self.chunks.binary_search_by_key(&part.chunk, |effect| effect.chunk) {
-            Ok(at) => self.chunks[at].bounds = self.chunks[at].bounds.union(part.bounds),
-            Err(at) => self.chunks.insert(at, changed),
+    /// Takes in that samples of a chunk changed.
+    fn reach(&mut self, chunk: ChunkPos, bounds: LatticeBox) {
+        match self.chunks.binary_search_by_key(&chunk, |effect| effect.chunk) {
+            Ok(at) => self.chunks[at].bounds = self.chunks[at].bounds.union(bounds),
+            Err(at) => self.chunks.insert(at, ChunkEffect { chunk, bounds }),
         }
-        self.removed.add(&part.counts.removed);
-        self.added.add(&part.counts.added);
-        self.painted.add(&part.counts.painted);
     }
 }
 
@@ -80,6 +76,13 @@ pub struct Draft {
 
 /// From how many bricks on they are spread over threads.
 const PARALLEL_BRICKS: usize = 64;
+
+/// How many bricks are worked on before what edits did to them is added up: that takes more memory than the bricks when
+/// there are many edits, and most bricks of a large cave are given up for a shared one.
+const BATCH: usize = 2048;
+
+/// How many bricks a thread takes at a time.
+const GROUP: usize = 16;
 
 /// One edit's work on one brick; sorted by brick, then by edit.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -127,29 +130,49 @@ impl Draft {
         let tools: Vec<Tool> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
         let bricks: Vec<&[Job]> = jobs.chunk_by(|a, b| a.brick == b.brick).collect();
-        let work = |jobs: &&[Job]| finish(base, grid, &tools, jobs);
-        let finished: Vec<Finished> = if bricks.len() < PARALLEL_BRICKS {
-            bricks.iter().filter_map(work).collect()
-        } else {
-            bricks.par_iter().filter_map(work).collect()
+        let work = |bricks: &[&[Job]]| {
+            let mut ledger = Ledger::default();
+            bricks.iter().for_each(|jobs| finish(base, grid, &tools, jobs, &mut ledger));
+            ledger
         };
 
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits.len(), EditEffect::default);
-        draft.bricks.reserve_exact(finished.len());
-        for mut brick in finished {
-            draft.hash = draft.hash.wrapping_add(brick.hash);
-            for part in &brick.parts {
-                draft.effects[part.edit].add(part);
-            }
-            if let Some(kind) = brick.drafted.brick.uniform() {
-                let known = uniform.get(&kind);
-                let fresh = || Arc::clone(draft.uniform.entry(kind).or_insert(brick.drafted.brick));
-                brick.drafted.brick = known.cloned().unwrap_or_else(fresh);
-            }
-            draft.bricks.push(brick.drafted);
+        if bricks.len() < PARALLEL_BRICKS {
+            draft.add(work(&bricks), uniform);
+            return draft;
+        }
+        for batch in bricks.chunks(BATCH) {
+            let ledgers: Vec<Ledger> = batch.par_chunks(GROUP).map(work).collect();
+            ledgers.into_iter().for_each(|ledger| draft.add(ledger, uniform));
         }
         draft
+    }
+
+    /// Takes in what was done to some bricks; one that is all alike is replaced by the one of its kind.
+    fn add(&mut self, ledger: Ledger, uniform: &UniformBricks) {
+        self.hash = self.hash.wrapping_add(ledger.hash);
+        for part in &ledger.parts {
+            self.effects[part.edit].reach(part.chunk, part.bounds);
+        }
+        for count in &ledger.counts {
+            let effect = &mut self.effects[count.edit];
+            let tally = match count.fate {
+                Fate::Removed => &mut effect.removed,
+                Fate::Added => &mut effect.added,
+                Fate::Painted => &mut effect.painted,
+            };
+            tally.count_many(count.material, count.voxels);
+        }
+        self.bricks.reserve(ledger.bricks.len());
+        for mut drafted in ledger.bricks {
+            if let Some(kind) = drafted.brick.uniform() {
+                let known = uniform.get(&kind);
+                let fresh = || Arc::clone(self.uniform.entry(kind).or_insert(drafted.brick));
+                drafted.brick = known.cloned().unwrap_or_else(fresh);
+            }
+            self.bricks.push(drafted);
+        }
     }
 }
 
@@ -171,17 +194,28 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
     jobs
 }
 
-/// Applies all edits of one brick; `None` when nothing changed.
-fn finish(base: SampleView, grid: ChunkGrid, tools: &[Tool], jobs: &[Job]) -> Option<Finished> {
-    let pos = jobs.first()?.pos();
+/// Applies all edits of one brick and enters what they changed.
+fn finish(base: SampleView, grid: ChunkGrid, tools: &[Tool], jobs: &[Job], ledger: &mut Ledger) {
+    let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
     let reaches = |job: &&Job| {
         let tool = &tools[job.edit as usize];
         let reached = tool.reach.and_then(|reach| reach.intersection(pos.samples()));
         reached.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples))
     };
     let mut jobs = jobs.iter().filter(reaches).peekable();
-    jobs.peek()?;
-    Workpiece::new(base, grid, pos).take(tools, jobs)
+    if jobs.peek().is_some() {
+        Workpiece::new(base, grid, pos).take(tools, jobs, ledger);
+    }
+}
+
+/// What edits did to some bricks.
+#[derive(Default)]
+struct Ledger {
+    bricks: Vec<DraftedBrick>,
+    parts: Vec<PartEffect>,
+    counts: Vec<Count>,
+    /// By how much the hash of the world's samples changes.
+    hash: u64,
 }
 
 /// What one edit changed in one chunk's part of one brick.
@@ -189,22 +223,40 @@ struct PartEffect {
     edit: usize,
     chunk: ChunkPos,
     bounds: LatticeBox,
-    counts: Counts,
 }
 
-#[derive(Default)]
-struct Counts {
-    removed: Tally,
-    added: Tally,
-    painted: Tally,
+/// What became of voxels.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Removed,
+    Added,
+    Painted,
 }
 
-/// A brick after all of its edits.
-struct Finished {
-    drafted: DraftedBrick,
-    parts: Vec<PartEffect>,
-    /// By how much the hash of the world's samples changes.
-    hash: u64,
+/// Voxels of one material that an edit dealt with in one brick.
+struct Count {
+    edit: usize,
+    fate: Fate,
+    material: MaterialId,
+    voxels: u64,
+}
+
+/// What one edit does to one brick is counted here.
+struct Counts<'l> {
+    edit: usize,
+    list: &'l mut Vec<Count>,
+    /// Where this edit's counts of this brick begin.
+    first: usize,
+}
+
+impl Counts<'_> {
+    fn add(&mut self, fate: Fate, material: MaterialId) {
+        let own = &mut self.list[self.first..];
+        match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
+            Some(count) => count.voxels += 1,
+            None => self.list.push(Count { edit: self.edit, fate, material, voxels: 1 }),
+        }
+    }
 }
 
 /// A brick under work.
@@ -240,32 +292,32 @@ impl<'a> Workpiece<'a> {
         Self { view, grid, pos, base, brick, floor, changed: [0; 8] }
     }
 
-    /// Applies all jobs; `None` when nothing changed.
-    fn take<'j>(mut self, tools: &[Tool], jobs: impl Iterator<Item = &'j Job>) -> Option<Finished> {
+    /// Applies all jobs.
+    fn take<'j>(mut self, tools: &[Tool], jobs: impl Iterator<Item = &'j Job>, ledger: &mut Ledger) {
         let mut distances = [[0; 8]; 64];
-        let mut parts = Vec::new();
         let low = self.pos.origin();
         for job in jobs {
-            let tool = &tools[job.edit as usize];
+            let (edit, tool) = (job.edit as usize, &tools[job.edit as usize]);
             let Some(reached) = tool.reach.and_then(|reach| reach.intersection(self.pos.samples())) else {
                 continue;
             };
             let (from, to) = (reached.min - low, reached.max - low);
             tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
+            let first = ledger.counts.len();
+            let mut counts = Counts { edit, first, list: &mut ledger.counts };
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
-                let mut counts = Counts::default();
                 if let Some(bounds) = self.apply(tool.operation, samples, &distances, &mut counts) {
-                    parts.push(PartEffect { edit: job.edit as usize, chunk, bounds, counts });
+                    ledger.parts.push(PartEffect { edit, chunk, bounds });
                 }
             }
         }
-        let changed = bounds(&self.changed, low)?;
-        let hash = self.hash_change();
+        let Some(changed) = bounds(&self.changed, low) else { return };
+        ledger.hash = ledger.hash.wrapping_add(self.hash_change());
         let before = self.base.map_or([0; 8], |brick| *brick.edited());
         let is_extended = before != *self.brick.edited();
         let drafted = DraftedBrick { pos: self.pos, brick: Arc::new(self.brick), changed, is_extended };
-        Some(Finished { drafted, parts, hash })
+        ledger.bricks.push(drafted);
     }
 
     /// Applies an operation to some samples; returns the box of those that changed.
@@ -274,7 +326,7 @@ impl<'a> Workpiece<'a> {
         operation: Operation,
         samples: LatticeBox,
         distances: &[[i32; 8]; 64],
-        counts: &mut Counts,
+        counts: &mut Counts<'_>,
     ) -> Option<LatticeBox> {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
@@ -302,7 +354,7 @@ impl<'a> Workpiece<'a> {
         outside: i32x8,
         lanes: i32x8,
         operation: Operation,
-        counts: &mut Counts,
+        counts: &mut Counts<'_>,
     ) -> u8 {
         let at = y * 64 + z * 8;
         let row = i16x8::new(self.brick.row(at));
@@ -330,19 +382,21 @@ impl<'a> Workpiece<'a> {
     }
 
     /// Counts voxels that changed sides, and gives new ones their material.
-    fn count(&mut self, at: usize, moved: Moved, operation: Operation, counts: &mut Counts) {
+    fn count(&mut self, at: usize, moved: Moved, operation: Operation, counts: &mut Counts<'_>) {
         let ground = self.view.ground();
         for x in ones(moved.removed | moved.added) {
             let index = at + x;
             let point = self.pos.origin() + offset(index);
             if moved.removed >> x & 1 == 1 {
-                counts.removed.count(resolve(ground, point, self.brick.material_at(index)));
+                counts.add(Fate::Removed, resolve(ground, point, self.brick.material_at(index)));
+                // Air is of no material.
+                self.brick.set_material(index, MaterialId::GROUND);
                 continue;
             }
             if let Operation::Add { material } = operation {
                 self.brick.set_material(index, material);
             }
-            counts.added.count(resolve(ground, point, self.brick.material_at(index)));
+            counts.add(Fate::Added, resolve(ground, point, self.brick.material_at(index)));
         }
     }
 
@@ -353,7 +407,7 @@ impl<'a> Workpiece<'a> {
         outside: i32x8,
         lanes: i32x8,
         material: MaterialId,
-        counts: &mut Counts,
+        counts: &mut Counts<'_>,
     ) -> u8 {
         let at = y * 64 + z * 8;
         let mut row = self.brick.row(at);
@@ -364,13 +418,16 @@ impl<'a> Workpiece<'a> {
             let index = at + x;
             let (sample, old) = (self.brick.samples()[index], self.brick.material_at(index));
             let before = sample.or(pristine[x]);
-            if before >= 0 || sample != Sample::PRISTINE && material == old {
+            // A pristine sample has the ground's own look already.
+            if before >= 0
+                || material == old && (sample != Sample::PRISTINE || material == MaterialId::GROUND)
+            {
                 continue;
             }
             let point = self.pos.origin() + offset(index);
             let (ground, is_pristine) = (self.view.ground(), sample == Sample::PRISTINE);
             if resolve(ground, point, material) != resolve(ground, point, old) {
-                counts.painted.count(resolve(ground, point, material));
+                counts.add(Fate::Painted, resolve(ground, point, material));
             }
             if is_pristine {
                 row[x] = Sample::edited(before).distance().unwrap_or_default() as i16;

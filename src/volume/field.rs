@@ -45,7 +45,7 @@ pub struct Absorbed {
     pub gone: Vec<FieldId>,
 }
 
-/// The fields of one chunk. No two of them meet: a cell touches at most one.
+/// The fields of one chunk, by age. No two of them meet: a cell touches at most one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fields(Vec<Field>);
 
@@ -67,7 +67,7 @@ impl Fields {
 
     /// A field by its name.
     pub fn get(&self, id: FieldId) -> Option<&Field> {
-        self.0.iter().find(|field| field.id == id)
+        self.0.binary_search_by_key(&id, |field| field.id).ok().map(|at| &self.0[at])
     }
 
     /// Bytes of the list.

@@ -7,12 +7,8 @@ use crate::ground::MaterialId;
 pub struct Tally(Vec<(MaterialId, u64)>);
 
 impl Tally {
-    /// Counts one more voxel.
-    pub(crate) fn count(&mut self, material: MaterialId) {
-        self.count_many(material, 1);
-    }
-
-    fn count_many(&mut self, material: MaterialId, voxels: u64) {
+    /// Counts more voxels of one material.
+    pub(crate) fn count_many(&mut self, material: MaterialId, voxels: u64) {
         match self.0.binary_search_by_key(&material, |entry| entry.0) {
             Ok(at) => self.0[at].1 += voxels,
             Err(at) => self.0.insert(at, (material, voxels)),
