@@ -85,7 +85,8 @@ pub(super) fn mesh(cells: &Cells, indices: &mut Vec<u32>) {
         }
         // The last cell writes up to MOST indices in vain.
         if indices.len() < at + (codes.len() + 1) * MOST {
-            let count = codes.iter().map(|&code| usize::from(steps[usize::from(code & 511)].count)).sum::<usize>();
+            let count =
+                codes.iter().map(|&code| usize::from(steps[usize::from(code & 511)].count)).sum::<usize>();
             let needed = at + count + MOST;
             if indices.len() < needed {
                 indices.resize(needed, 0);
