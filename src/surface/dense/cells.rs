@@ -147,7 +147,8 @@ impl Cells {
         self.layers.push(start);
     }
 
-    /// Appends the crossed cells of some words of layer `z`.
+    /// Appends the crossed cells of some words of layer `z`: first the words that hold any, without a branch, as most hold
+    /// none; then their cells.
     fn add_cells(&mut self, z: usize, signs: Corners, words: Range<usize>) {
         // Slices of one length: a single check covers all of them.
         let [a, b, c, d] = signs.0.map(|signs| &signs[words.clone()]);
