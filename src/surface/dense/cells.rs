@@ -80,6 +80,7 @@ impl Cells {
     /// Forgets all but its memory, and prepares for a grid.
     pub(super) fn start<S: Density>(&mut self, grid: &DenseGrid<S>) {
         self.cases.clear();
+        self.points.clear();
         self.edges.iter_mut().for_each(Stream::clear);
         self.layers.clear();
 
