@@ -80,7 +80,9 @@ fn it_does_not_matter_which_layers_hold_the_surface() {
     // Cells in every layer first, then as many triangles in few layers, at either end.
     let spread = sphere(50, 20.0);
     let checkered = |layers: std::ops::Range<usize>| -> Vec<f32> {
-        let at = |index: usize| if layers.contains(&(index / 2500)) && index % 3 == 0 { -1.0 } else { 1.0 };
+        let at = |index: usize| {
+            if layers.contains(&(index / 2500)) && index.is_multiple_of(3) { -1.0 } else { 1.0 }
+        };
         (0..50_usize.pow(3)).map(at).collect()
     };
     let all = |samples: &[f32], mesher: &mut DenseMesher, mesh: &mut DenseMesh| {
