@@ -72,3 +72,30 @@ fn a_grid_is_meshed_again_without_allocating() {
         assert_eq!(allocations(&mut mesher, whole, normals, &mut mesh), 0);
     }
 }
+
+#[test]
+fn it_does_not_matter_which_layers_hold_the_surface() {
+    let mut mesher = DenseMesher::new();
+    let mut mesh = DenseMesh::default();
+    // Cells in every layer first, then as many triangles in few layers, at either end.
+    let spread = sphere(50, 20.0);
+    let checkered = |layers: std::ops::Range<usize>| -> Vec<f32> {
+        let at = |index: usize| {
+            if layers.contains(&(index / 2500)) && index.is_multiple_of(3) { -1.0 } else { 1.0 }
+        };
+        (0..50_usize.pow(3)).map(at).collect()
+    };
+    let all = |samples: &[f32], mesher: &mut DenseMesher, mesh: &mut DenseMesh| {
+        allocations(mesher, DenseGrid::new(samples, [50; 3]).expect("a grid"), Normals::Gradient, mesh)
+    };
+    all(&spread, &mut mesher, &mut mesh);
+    let (vertices, triangles) = (mesh.positions.len(), mesh.indices.len());
+    for layers in [1..2, 25..26, 48..49] {
+        let dense = checkered(layers);
+        assert_eq!(all(&dense, &mut mesher, &mut mesh), 0);
+        assert!(
+            mesh.positions.len() < vertices && mesh.indices.len() < triangles,
+            "a case of no more surface"
+        );
+    }
+}

@@ -80,6 +80,7 @@ impl Cells {
     /// Forgets all but its memory, and prepares for a grid.
     pub(super) fn start<S: Density>(&mut self, grid: &DenseGrid<S>) {
         self.cases.clear();
+        self.points.clear();
         self.edges.iter_mut().for_each(Stream::clear);
         self.layers.clear();
 
@@ -147,23 +148,27 @@ impl Cells {
         self.layers.push(start);
     }
 
-    /// Appends the crossed cells of some words of layer `z`.
+    /// Appends the crossed cells of some words of layer `z`: first the words that hold any, without a branch, as most hold
+    /// none; then their cells.
     fn add_cells(&mut self, z: usize, signs: Corners, words: Range<usize>) {
-        let crossed = self.crossed.spare(words.len());
+        // Slices of one length: a single check covers all of them.
+        let [a, b, c, d] = signs.0.map(|signs| &signs[words.clone()]);
+        let layout = &self.columns[words];
+        let crossed = self.crossed.spare(layout.len());
         let mut words_crossed = 0;
-        for word in words.clone() {
-            let columns = signs.crossed(word) & self.columns[word].all;
+        let rows = a.iter().zip(b).zip(c).zip(d);
+        for (word, ((((&a, &b), &c), &d), layout)) in rows.zip(layout).enumerate() {
+            let columns = crossed_columns([a, b, c, d]) & layout.all;
             crossed[words_crossed] = (columns, word);
             words_crossed += usize::from(columns != 0);
         }
 
-        let most = words.len() * COLUMNS;
-        let most = self.cases.room().min(self.points.room()).min(most);
+        let most = self.cases.room().min(self.points.room());
         let (cases, points) = (self.cases.spare(most), self.points.spare(most));
         let mut count = 0;
         for &(columns, word) in &crossed[..words_crossed] {
-            let [a, b, c, d] = signs.at(word);
-            let Columns { row_end, origin, .. } = self.columns[word];
+            let [a, b, c, d] = [a[word], b[word], c[word], d[word]];
+            let Columns { row_end, origin, .. } = layout[word];
             // Each word is turned so that its bits of the case only need a mask.
             let [b, c, d] = [b.rotate_left(2), c.rotate_left(4), d.rotate_left(6)];
             let origin = origin + point([0, 0, z]);
@@ -215,18 +220,11 @@ impl<'a> Corners<'a> {
         let ahead = low.len() - words;
         Self([&low[..words], &low[ahead..][..words], &high[..words], &high[ahead..][..words]])
     }
+}
 
-    #[inline(always)]
-    fn at(&self, word: usize) -> [u64; 4] {
-        let [a, b, c, d] = self.0;
-        [a[word], b[word], c[word], d[word]]
-    }
-
-    /// The columns of a word in which the corners of a cell are neither all solid nor all air.
-    #[inline(always)]
-    fn crossed(&self, word: usize) -> u64 {
-        let [a, b, c, d] = self.at(word);
-        let (some, every) = (a | b | c | d, a & b & c & d);
-        (some | some >> 1) & !(every & every >> 1)
-    }
+/// The columns in which the corners of a cell are neither all solid nor all air.
+#[inline(always)]
+fn crossed_columns([a, b, c, d]: [u64; 4]) -> u64 {
+    let (some, every) = (a | b | c | d, a & b & c & d);
+    (some | some >> 1) & !(every & every >> 1)
 }

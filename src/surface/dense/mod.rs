@@ -32,10 +32,10 @@
 //!
 //! Four passes, each over flat arrays, so that none of them waits for the others' branches:
 //!
-//! 1. [`signs`]: each layer of samples becomes bits.
-//! 2. [`cells`]: bits of four rows become a stream of crossed cells, and three lists of the edges that they start.
-//! 3. [`vertices`]: each list becomes vertices, four at a time.
-//! 4. [`triangles`]: the stream becomes indices; vertices are found by counting.
+//! 1. `signs`: each layer of samples becomes bits.
+//! 2. `cells`: bits of four rows become a stream of crossed cells, and three lists of the edges that they start.
+//! 3. `vertices`: each list becomes vertices, four at a time.
+//! 4. `triangles`: the stream becomes indices; vertices are found by counting.
 //!
 //! It follows *Flying Edges: A High-Performance Scalable Isocontouring Algorithm* (Schroeder, Maynard, Geveci 2015) in
 //! that each edge is interpolated once, in row order, and that vertices are numbered by counting along rows.

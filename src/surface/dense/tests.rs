@@ -284,3 +284,18 @@ fn the_longest_rows_are_meshed_like_cell_by_cell() {
         check_random(&mut rng, &mut mesher, size);
     }
 }
+
+#[test]
+fn all_machines_agree_on_every_bit() {
+    let samples = random_samples(&mut Rng::with_seed(9), [70, 20, 20]);
+    let mut mesh = DenseMesh::default();
+    let grid = DenseGrid::new(&samples, [70, 20, 20]).expect("a grid");
+    DenseMesher::new().mesh(grid, Normals::Gradient, &mut mesh);
+    let bits = mesh.positions.iter().chain(&mesh.normals).flatten().map(|number| number.to_bits());
+    let fnv = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3);
+    let hash = bits.chain(mesh.indices.iter().copied()).fold(0xcbf2_9ce4_8422_2325, fnv);
+    assert_eq!(
+        hash, 15_915_429_079_213_948_004,
+        "new bits or a new order of vertices: if that was meant, put the new hash here"
+    );
+}

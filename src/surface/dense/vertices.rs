@@ -12,6 +12,9 @@ use super::grid::DenseGrid;
 /// Edges that are worked on together.
 pub(super) const LANES: usize = 4;
 
+/// A bit for each of them.
+const ALL_LANES: u32 = (1 << LANES) - 1;
+
 /// Slots behind the last vertex that may be written in vain.
 pub(super) const SLACK: usize = LANES + 1;
 
@@ -28,23 +31,29 @@ pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
 ) {
     let lattice = Lattice::new(grid, AXIS);
     let taps = Taps::<S, AXIS>::new(grid);
+    let has_apron = grid.first() > 0;
     let (mut positions, mut normals) = (positions.as_flattened_mut(), normals.as_flattened_mut());
     for points in points.as_chunks::<LANES>().0 {
-        let indices = lattice.indices(points);
         let mut position = coordinates(points);
         if NORMALS {
-            let (ends, [start, end]) = if lattice.are_inside(points) {
-                taps.read(indices)
+            let (ends, [start, end]) = if has_apron || lattice.are_inside(points) {
+                taps.read(lattice.indices(points))
             } else {
+                let indices = lattice.indices(points);
                 (lattice.ends(grid.samples(), indices), border_gradients::<S, AXIS>(grid, points, indices))
             };
             let crossing = crossing(ends);
             position[AXIS] += crossing;
             let normal = |axis: usize| start[axis] + (end[axis] - start[axis]) * crossing;
-            write(unit([normal(0), normal(1), normal(2)]), normals);
+            let normal = [normal(0), normal(1), normal(2)];
+            let (units, are_exact) = units(normal);
+            write(units, normals);
+            if are_exact != ALL_LANES {
+                write_careful_units(normal, are_exact, normals);
+            }
             normals = &mut normals[LANES * 3..];
         } else {
-            position[AXIS] += crossing(lattice.ends(grid.samples(), indices));
+            position[AXIS] += crossing(lattice.ends(grid.samples(), lattice.indices(points)));
         }
         write(position, positions);
         positions = &mut positions[LANES * 3..];
@@ -210,32 +219,28 @@ fn crossing([start, end]: [f32x4; 2]) -> f32x4 {
     crossing.simd_eq(crossing).bitselect(crossing, f32x4::HALF)
 }
 
-/// Scaled to length 1. Where numbers fail, it points up.
+/// Scaled to length 1; and a bit for each lane where numbers did not fail.
 #[inline(always)]
-fn unit(vectors: Vectors) -> Vectors {
-    let [x, y, z] = vectors;
+fn units([x, y, z]: Vectors) -> (Vectors, u32) {
     let squared = x * x + y * y + z * z;
     let scale = f32x4::ONE / squared.sqrt();
-    let units = [x * scale, y * scale, z * scale];
     // Smaller squares have lost digits, and larger ones are infinite.
     let is_exact = squared.simd_ge(f32x4::splat(1e-30)) & squared.simd_le(f32x4::splat(f32::MAX));
-    if is_exact.all() { units } else { careful_units(vectors, units, is_exact.to_bitmask()) }
+    ([x * scale, y * scale, z * scale], is_exact.to_bitmask())
 }
 
-/// Calculates again those `units` that are not exact.
+/// Calculates the unit vectors again whose bit is not set. Vectors that have no length point up.
 #[cold]
-fn careful_units(vectors: Vectors, units: Vectors, exact: u32) -> Vectors {
-    let (vectors, mut units) = (vectors.map(f32x4::to_array), units.map(f32x4::to_array));
-    for lane in (0..LANES).filter(|lane| exact >> lane & 1 == 0) {
+fn write_careful_units(vectors: Vectors, are_exact: u32, to: &mut [f32]) {
+    let vectors = vectors.map(f32x4::to_array);
+    let failed = |&(lane, _): &(usize, &mut [f32])| are_exact >> lane & 1 == 0;
+    for (lane, to) in to.chunks_exact_mut(3).take(LANES).enumerate().filter(failed) {
         let vector = [0, 1, 2].map(|axis| f64::from(vectors[axis][lane]));
         let length = (vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]).sqrt();
-        let unit =
-            if length > 0.0 && length.is_finite() { vector.map(|v| v / length) } else { [0.0, 1.0, 0.0] };
-        for (units, component) in units.iter_mut().zip(unit) {
-            units[lane] = component as f32;
-        }
+        let has_length = length > 0.0 && length.is_finite();
+        let unit = if has_length { vector.map(|component| component / length) } else { [0.0, 1.0, 0.0] };
+        to.copy_from_slice(&unit.map(|component| component as f32));
     }
-    units.map(f32x4::new)
 }
 
 /// Writes four vectors, and one number behind them.
