@@ -267,7 +267,8 @@ fn golden_script(ground: &Ground) -> Vec<Brush> {
     .enumerate()
     {
         let at = |k: usize| {
-            let (x, z) = (6.25 + 9.5 * k as f32, 8.0 + 11.125 * i as f32);
+            // The ground's own look is given back to what was painted.
+            let (x, z) = (6.25 + 9.5 * k as f32, 8.0 + 11.125 * i.min(2) as f32 + (i / 3) as f32);
             let height = ground.height(Column::new(x as i32, z as i32));
             Vec3::new(x, (height / 64) as f32 / 4.0, z)
         };
@@ -305,7 +306,7 @@ fn the_hash_of_a_dug_world_is_the_same_on_every_machine() {
     }
     assert_eq!(
         format!("{:#018x}", terrain.world().hash()),
-        "0xea3c41759167b53e",
+        "0x68dbd02faeb11217",
         "the same script made another world than before, or than on other machines. If edits are meant to come out \
          differently from now on, put the new hash here, and say in the change log that saved journals give other \
          worlds. If not, something in `ground`, `brush` or `volume` lost its written order of arithmetic"
