@@ -134,8 +134,9 @@ impl ChunkGrid {
 
     /// The cells of a tile, which the world must have: lowest and one past the highest, cut at the rim.
     pub fn tile_cells(self, tile: TilePos) -> (Column, Column) {
-        let low = Column::new(tile.x * self.size, tile.z * self.size);
-        let high = Column::new((low.x + self.size).min(self.width), (low.z + self.size).min(self.depth));
+        let low = Column::new(tile.x.saturating_mul(self.size), tile.z.saturating_mul(self.size));
+        let end = |low: i32, cells: i32| low.saturating_add(self.size).min(cells);
+        let high = Column::new(end(low.x, self.width), end(low.z, self.depth));
         (low, high)
     }
 
@@ -152,7 +153,7 @@ impl ChunkGrid {
     /// The samples that belong to a chunk, far-rim samples included.
     pub fn chunk_samples(self, chunk: ChunkPos) -> LatticeBox {
         let min = self.origin(chunk);
-        let mut max = min + (self.size - 1);
+        let mut max = min.saturating_add(IVec3::splat(self.size - 1));
         if max.x >= self.width - 1 {
             max.x = self.width;
         }
@@ -165,7 +166,11 @@ impl ChunkGrid {
     /// The cells of a chunk, named by their lowest corners, cut at the rim.
     pub fn chunk_cells(self, chunk: ChunkPos) -> LatticeBox {
         let min = self.origin(chunk);
-        let end = (min + (self.size - 1)).min(IVec3::new(self.width - 1, i32::MAX, self.depth - 1));
+        let end = min.saturating_add(IVec3::splat(self.size - 1)).min(IVec3::new(
+            self.width - 1,
+            i32::MAX,
+            self.depth - 1,
+        ));
         LatticeBox { min, max: end }
     }
 
@@ -177,7 +182,7 @@ impl ChunkGrid {
 
     /// The lowest lattice point of a chunk.
     pub fn origin(self, chunk: ChunkPos) -> IVec3 {
-        chunk.as_ivec3() * self.size
+        chunk.as_ivec3().saturating_mul(IVec3::splat(self.size))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::sync::Arc;
+use std::time::Duration;
 
 use glam::IVec3;
 use rayon::prelude::*;
@@ -53,17 +54,14 @@ const PARALLEL_BLOCKS: usize = 48;
 
 /// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
 pub(super) fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
-    let mut near = Vec::new();
-    for drafted in changed.iter().filter(|drafted| drafted.is_extended) {
-        // A sample is a corner of the cells one below it.
-        let cells = LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
-        near.extend(BrickPos::covering(cells).map(|brick| [brick.0.x, brick.0.z, brick.0.y]));
-    }
-    near.sort_unstable();
-    near.dedup();
-    let disturbed = |&[x, z, y]: &[i32; 3]| {
-        let cells = block::disturbed(view, BrickPos(IVec3::new(x, y, z)));
-        ((x, z), cells & !view.mask.word((x, z)))
+    // A sample is a corner of the cells one below it.
+    let around =
+        |drafted: &DraftedBrick| LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
+    let boxes: Vec<LatticeBox> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
+    let near = by_brick(&boxes);
+    let disturbed = |&(brick, _): &(BrickPos, LatticeBox)| {
+        let word = (brick.0.x, brick.0.z);
+        (word, block::disturbed(view, brick) & !view.mask.word(word))
     };
     let cells: Vec<_> = if near.len() < PARALLEL_BLOCKS {
         near.iter().map(disturbed).collect()
@@ -85,9 +83,21 @@ pub(super) fn updates(
     added: &Mask,
     stages: &mut Stages,
 ) -> MeshUpdates {
-    let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, changed, added));
-    let chunks = mesh_blocks(world, view, &blocks, stages);
-    let tiles = Stages::time(&mut stages.ring, || touched_tiles(world, view, added));
+    let chunks = || {
+        let mut stages = Stages::default();
+        let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, changed, added));
+        (mesh_blocks(world, view, &blocks, &mut stages), stages)
+    };
+    let tiles = || {
+        let mut ring = Duration::ZERO;
+        (Stages::time(&mut ring, || touched_tiles(world, view, added)), ring)
+    };
+    // Tiles and chunks do not depend on each other. What either does alone is time for the other.
+    let ((chunks, own), (tiles, ring)) =
+        if changed.len() < PARALLEL_BLOCKS { (chunks(), tiles()) } else { rayon::join(chunks, tiles) };
+    stages.meshing += own.meshing;
+    stages.assembly += own.assembly;
+    stages.ring += ring;
     MeshUpdates { tiles, chunks }
 }
 
@@ -218,12 +228,7 @@ fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };
     let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
-    let is_large = all.len() >= PARALLEL_BLOCKS;
-    if is_large {
-        all.par_sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
-    } else {
-        all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
-    }
+    all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
     let chunks: Vec<&[(ChunkPos, Fresh)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
     let update = |parts: &&[(ChunkPos, Fresh)]| {
         let chunk = parts[0].0;
@@ -231,10 +236,10 @@ fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         Some((chunk, Arc::new(old.updated(parts.iter().map(|part| part.1))?)))
     };
-    if is_large {
-        chunks.par_iter().filter_map(update).collect()
-    } else {
+    if all.len() < PARALLEL_BLOCKS {
         chunks.iter().filter_map(update).collect()
+    } else {
+        chunks.par_iter().filter_map(update).collect()
     }
 }
 

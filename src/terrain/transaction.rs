@@ -65,7 +65,8 @@ pub struct Commit {
     pub stages: Stages,
 }
 
-/// How long the stages of a transaction took.
+/// How long the stages of a transaction took. In large ones tiles and chunks are made side by side, so stages may take
+/// longer than the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stages {
     /// Edits, from distances to new bricks.

@@ -190,7 +190,11 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
             }
         }
     }
-    jobs.sort_unstable();
+    if jobs.len() < BATCH {
+        jobs.sort_unstable()
+    } else {
+        jobs.par_sort_unstable()
+    }
     jobs
 }
 
