@@ -56,9 +56,9 @@ test-examples:
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
 
-soak: ## Dig WORLDS (10000) random worlds and look at every seam
+soak: ## Dig WORLDS (10000) random worlds; look at every seam, and compare every mesh with the plain mesher
 	@tools/setup.sh build
-	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams -- --nocapture
+	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams --test plain --test increments -- --nocapture
 
 paper: ## Do the paper's experiment again and write docs/RESULTS.md (REPEATS=10)
 	@tools/setup.sh build

@@ -311,6 +311,11 @@ fn edited_layer(near: &Near, y: usize) -> Corners {
     corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8])))
 }
 
+/// Derives the table of cases now, so that the first edit need not wait for it.
+pub(crate) fn prepare() {
+    LazyLock::force(&SLOTS);
+}
+
 /// Cells of the brick's stack that belong to the mask because of samples around this brick (rule 2): a corner of a cube
 /// of their sheet is edited. As 8x8 cells, bit `z * 8 + x`.
 pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {

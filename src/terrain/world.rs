@@ -8,6 +8,7 @@ use rustc_hash::FxHashMap;
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, table_bytes};
+use crate::surface::block;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
@@ -82,6 +83,7 @@ pub struct Version {
 impl World {
     pub(super) fn new(ground: Arc<Ground>, chunk_size: i32) -> Self {
         let grid = ChunkGrid::new(chunk_size, ground.width(), ground.depth());
+        block::prepare();
         Self {
             ground,
             grid,
