@@ -129,8 +129,8 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
     blocks
 }
 
-/// Most bricks that a table has a place for, whether they are dirty or not.
-const TABLE: u64 = 1 << 18;
+/// How many places for bricks a table may have for each box.
+const PLACES: u64 = 64;
 
 /// The bricks that hold cells of these boxes, by stacks from below, each with the box around its own of them.
 fn by_brick(boxes: &[LatticeBox]) -> Vec<(BrickPos, LatticeBox)> {
@@ -139,7 +139,7 @@ fn by_brick(boxes: &[LatticeBox]) -> Vec<(BrickPos, LatticeBox)> {
     let all = LatticeBox { min: all.min >> 3, max: all.max >> 3 };
     // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
     let size = all.size();
-    let is_dense = all.volume() <= TABLE;
+    let is_dense = all.volume() <= PLACES * boxes.len() as u64;
     let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
     let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
     for cells in boxes {
@@ -215,7 +215,11 @@ fn mesh_blocks(
         MESHER.with_borrow_mut(|(mesher, parts)| {
             parts.clear();
             mesher.mesh(view, blocks, parts);
-            parts.clone()
+            let copy = parts.clone();
+            if parts.vertices.capacity() > KEPT_VERTICES {
+                *parts = Parts::default();
+            }
+            copy
         })
     };
     let parts: Vec<Parts> = Stages::time(&mut stages.meshing, || stacks.par_iter().map(mesh).collect());
