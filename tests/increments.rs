@@ -146,8 +146,7 @@ impl Witness {
                 let number = after.clamp(-32767, 32767);
                 match edit.operation() {
                     Operation::Paint { material } => {
-                        let is_news = own != material || stored.is_none() && material != MaterialId::GROUND;
-                        if outside <= 0 && before < 0 && is_news {
+                        if outside <= 0 && before < 0 && (stored.is_none() || own != material) {
                             changes.push((point, before, (number, material)));
                         }
                     }

@@ -17,7 +17,7 @@ pub enum Operation {
         material: MaterialId,
     },
     /// Changes the material of ground that is there, and no density. [`MaterialId::GROUND`] gives ground its own look
-    /// back, and leaves alone what has it.
+    /// back; ground that has it is handed over to marching cubes all the same, without a difference to be seen.
     ///
     /// It stores the density of what it paints: exactly within 127 voxels of the surface. On taller cliffs, between
     /// neighbouring columns, painting may move the surface by less than a voxel.

@@ -53,7 +53,7 @@ impl TileUpdate {
 const PARALLEL_BLOCKS: usize = 48;
 
 /// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
-pub(super) fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
+fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
     // A sample is a corner of the cells one below it.
     let around =
         |drafted: &DraftedBrick| LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
@@ -75,41 +75,69 @@ pub(super) fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
     added
 }
 
-/// Every mesh that these bricks and cells change.
+/// Cells by the bricks that hold them: by stacks of bricks, each from below.
+type ByBrick = Vec<(BrickPos, LatticeBox)>;
+
+/// The cells that join the mask, and those that the changed samples show in, whether they join or not.
+pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut Stages) -> (Mask, ByBrick) {
+    // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
+    let around = |drafted: &DraftedBrick| in_world(view, drafted.changed.min - 2, drafted.changed.max + 1);
+    let added = || timed(|| added_cells(view, changed));
+    let dirty = || timed(|| by_brick(&changed.iter().filter_map(around).collect::<Vec<_>>()));
+    let ((added, ring), (dirty, meshing)) = side_by_side(changed, added, dirty);
+    stages.ring += ring;
+    stages.meshing += meshing;
+    (added, dirty)
+}
+
+/// Every mesh that these cells change.
 pub(super) fn updates(
     world: &World,
     view: &WorldView,
     changed: &[DraftedBrick],
+    dirty: ByBrick,
     added: &Mask,
     stages: &mut Stages,
 ) -> MeshUpdates {
     let chunks = || {
         let mut stages = Stages::default();
-        let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, changed, added));
+        let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, dirty, added));
         (mesh_blocks(world, view, &blocks, &mut stages), stages)
     };
-    let tiles = || {
-        let mut ring = Duration::ZERO;
-        (Stages::time(&mut ring, || touched_tiles(world, view, added)), ring)
-    };
+    let tiles = || timed(|| touched_tiles(world, view, added));
     // Tiles and chunks do not depend on each other. What either does alone is time for the other.
-    let ((chunks, own), (tiles, ring)) =
-        if changed.len() < PARALLEL_BLOCKS { (chunks(), tiles()) } else { rayon::join(chunks, tiles) };
+    let ((chunks, own), (tiles, ring)) = side_by_side(changed, chunks, tiles);
     stages.meshing += own.meshing;
     stages.assembly += own.assembly;
     stages.ring += ring;
     MeshUpdates { tiles, chunks }
 }
 
-/// Every block that may draw something else than before, by stacks of bricks, each from below.
-fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec<Block> {
+/// Two things, at once where much has changed.
+fn side_by_side<A: Send, B: Send>(
+    changed: &[DraftedBrick],
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    if changed.len() < PARALLEL_BLOCKS { (a(), b()) } else { rayon::join(a, b) }
+}
+
+/// What `work` gives, and how long it took.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let mut time = Duration::ZERO;
+    (Stages::time(&mut time, work), time)
+}
+
+/// The box from `low` to `high` as far as it lies in the world.
+fn in_world(view: &WorldView, low: IVec3, high: IVec3) -> Option<LatticeBox> {
     let last = IVec3::new(view.grid.width() - 1, i32::MAX, view.grid.depth() - 1);
-    let in_world =
-        |low: IVec3, high: IVec3| LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last));
-    // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
-    let around = |drafted: &DraftedBrick| in_world(drafted.changed.min - 2, drafted.changed.max + 1);
-    let mut dirty: Vec<LatticeBox> = changed.iter().filter_map(around).collect();
+    LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last))
+}
+
+/// Every block that may draw something else than before, by stacks of bricks, each from below.
+fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block> {
     // A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border.
+    let mut sheets = Vec::new();
     for ((x, z), cells) in added.words() {
         for (dx, dz) in (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz))) {
             let stack = (x + dx, z + dz);
@@ -117,24 +145,35 @@ fn dirty_blocks(view: &WorldView, changed: &[DraftedBrick], added: &Mask) -> Vec
             if near != 0 {
                 let low = Column::new(stack.0 * 8, stack.1 * 8);
                 let rows = block::sheet_rows(view.samples.ground(), low, near);
-                dirty.extend(in_world(low.at(rows.start), low.offset(7, 7).at(rows.end - 1)));
+                sheets.extend(in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1)));
             }
         }
     }
-    let dirty = by_brick(&dirty);
+    if !sheets.is_empty() {
+        dirty.extend(by_brick(&sheets));
+        // Two sorted lists, which this merges.
+        dirty.sort_by_key(|(brick, _)| stack_order(brick));
+    }
     let mut blocks = Vec::with_capacity(dirty.len());
-    for (brick, cells) in dirty {
+    for same in dirty.chunk_by(|a, b| a.0 == b.0) {
+        let brick = same[0].0;
+        let cells = same.iter().fold(same[0].1, |all, (_, cells)| all.union(*cells));
         blocks.extend(view.grid.chunks_of(cells).map(|chunk| Block { brick, chunk }));
     }
     blocks
 }
 
+/// Stacks of bricks one after the other, each from below.
+fn stack_order(brick: &BrickPos) -> (i32, i32, i32) {
+    (brick.0.x, brick.0.z, brick.0.y)
+}
+
 /// How many places for bricks a table may have for each box.
 const PLACES: u64 = 64;
 
-/// The bricks that hold cells of these boxes, by stacks from below, each with the box around its own of them.
-fn by_brick(boxes: &[LatticeBox]) -> Vec<(BrickPos, LatticeBox)> {
-    let mut found: Vec<(BrickPos, LatticeBox)> = Vec::with_capacity(boxes.len() * 2);
+/// The bricks that hold cells of these boxes, each with the box around its own of them.
+fn by_brick(boxes: &[LatticeBox]) -> ByBrick {
+    let mut found = ByBrick::with_capacity(boxes.len() * 2);
     let Some(all) = boxes.iter().copied().reduce(LatticeBox::union) else { return found };
     let all = LatticeBox { min: all.min >> 3, max: all.max >> 3 };
     // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
@@ -160,7 +199,7 @@ fn by_brick(boxes: &[LatticeBox]) -> Vec<(BrickPos, LatticeBox)> {
             }
         }
     }
-    found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
+    found.sort_unstable_by_key(|(brick, _)| stack_order(brick));
     found
 }
 

@@ -118,11 +118,10 @@ impl Transaction {
             draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         let samples = world.samples().over(&bricks);
 
-        let mask = Stages::time(&mut stages.ring, || {
-            redraw::added_cells(&WorldView { samples, ..world.view() }, &draft.bricks)
-        });
+        let before = WorldView { samples, ..world.view() };
+        let (mask, dirty) = redraw::disturb(&before, &draft.bricks, &mut stages);
         let view = WorldView { samples, mask: MaskView::new(&world.mask).with(&mask), ..world.view() };
-        let meshes = redraw::updates(world, &view, &draft.bricks, &mask, &mut stages);
+        let meshes = redraw::updates(world, &view, &draft.bricks, dirty, &mask, &mut stages);
 
         let mut log = FieldLog::new(world);
         let mut effects = draft.effects.into_iter();

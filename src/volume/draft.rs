@@ -422,10 +422,7 @@ impl<'a> Workpiece<'a> {
             let index = at + x;
             let (sample, old) = (self.brick.samples()[index], self.brick.material_at(index));
             let before = sample.or(pristine[x]);
-            // A pristine sample has the ground's own look already.
-            if before >= 0
-                || material == old && (sample != Sample::PRISTINE || material == MaterialId::GROUND)
-            {
+            if before >= 0 || sample != Sample::PRISTINE && material == old {
                 continue;
             }
             let point = self.pos.origin() + offset(index);
