@@ -223,6 +223,9 @@ thread_local! {
     static MESHER: RefCell<(Mesher, Parts)> = RefCell::default();
 }
 
+/// How many stacks of bricks a thread takes at a time.
+const STACKS: usize = 4;
+
 /// Most vertices whose memory a thread keeps for its next transaction.
 const KEPT_VERTICES: usize = 1 << 16;
 
@@ -247,8 +250,15 @@ fn mesh_blocks(
         }
         return chunks;
     }
+    let mut groups: Vec<&[Block]> = Vec::new();
+    let mut rest = blocks;
     let stacks: Vec<&[Block]> =
         blocks.chunk_by(|a, b| (a.brick.0.x, a.brick.0.z) == (b.brick.0.x, b.brick.0.z)).collect();
+    for stacks in stacks.chunks(STACKS) {
+        let (group, others) = rest.split_at(stacks.iter().map(|stack| stack.len()).sum());
+        groups.push(group);
+        rest = others;
+    }
     // Meshed into memory that is there already, and copied out as large as it has to be.
     let mesh = |blocks: &&[Block]| {
         MESHER.with_borrow_mut(|(mesher, parts)| {
@@ -261,7 +271,7 @@ fn mesh_blocks(
             copy
         })
     };
-    let parts: Vec<Parts> = Stages::time(&mut stages.meshing, || stacks.par_iter().map(mesh).collect());
+    let parts: Vec<Parts> = Stages::time(&mut stages.meshing, || groups.par_iter().map(mesh).collect());
     Stages::time(&mut stages.assembly, || assemble(world, &parts.iter().collect::<Vec<_>>()))
 }
 
@@ -271,7 +281,12 @@ fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };
     let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
-    all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
+    let is_large = all.len() >= PARALLEL_BLOCKS;
+    if is_large {
+        all.par_sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
+    } else {
+        all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
+    }
     let chunks: Vec<&[(ChunkPos, Fresh)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
     let update = |parts: &&[(ChunkPos, Fresh)]| {
         let chunk = parts[0].0;
@@ -279,10 +294,10 @@ fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         Some((chunk, Arc::new(old.updated(parts.iter().map(|part| part.1))?)))
     };
-    if all.len() < PARALLEL_BLOCKS {
-        chunks.iter().filter_map(update).collect()
-    } else {
+    if is_large {
         chunks.par_iter().filter_map(update).collect()
+    } else {
+        chunks.iter().filter_map(update).collect()
     }
 }
 
