@@ -35,6 +35,11 @@ pub const LIMIT: i32 = 1 << 15;
 /// Samples along one side of a brick.
 pub const BRICK: i32 = 8;
 
+/// The lowest lattice y that is not below a height in 1/256 voxel.
+pub(crate) const fn ceil(height: i32) -> i32 {
+    height.div_euclid(ONE) + (height.rem_euclid(ONE) != 0) as i32
+}
+
 /// A vertical line of lattice points; also the cell (square of four columns) of which it is the lowest corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Column {

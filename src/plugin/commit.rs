@@ -52,9 +52,10 @@ pub(super) fn begin_transactions(
         let colors = colors.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let start = Instant::now();
-            let commit = transaction.run();
+            let mut commit = transaction.run();
             let build = |surface: &SurfaceMesh| if draws { meshes::build(surface, &colors) } else { None };
-            let updates = &commit.meshes;
+            // Taken out, so that they are dropped here and not on the main thread.
+            let updates = std::mem::take(&mut commit.meshes);
             let tiles = updates
                 .tiles
                 .iter()

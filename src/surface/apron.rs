@@ -16,18 +16,15 @@ pub(super) const AREA: usize = SIDE * SIDE;
 pub(super) type Marked = i32;
 
 /// The bricks around a brick and itself: `[y][z * 3 + x]`, each from one before to one after.
-#[derive(Clone, Copy)]
 pub(super) struct Neighbours<'a> {
     bricks: [[Option<&'a Brick>; 9]; 3],
     at: BrickPos,
-    /// Were all bricks looked up, or only those that hold corners?
-    is_whole: bool,
 }
 
 impl<'a> Neighbours<'a> {
     /// Looks up the bricks that hold corners of a brick's cells.
     pub fn corners_of(view: &SampleView<'a>, at: BrickPos) -> Self {
-        let mut own = Self { bricks: [[None; 9]; 3], at, is_whole: false };
+        let mut own = Self { bricks: [[None; 9]; 3], at };
         for dy in 1..3 {
             for i in CORNER_STACKS {
                 own.bricks[dy][i] = view.brick(own.pos(dy, i));
@@ -38,12 +35,9 @@ impl<'a> Neighbours<'a> {
 
     /// Looks up the others as well.
     pub fn complete(&mut self, view: &SampleView<'a>) {
-        if !self.is_whole {
-            self.is_whole = true;
-            for (dy, i) in (0..3).flat_map(|dy| (0..9).map(move |i| (dy, i))) {
-                if dy == 0 || !CORNER_STACKS.contains(&i) {
-                    self.bricks[dy][i] = view.brick(self.pos(dy, i));
-                }
+        for (dy, i) in (0..3).flat_map(|dy| (0..9).map(move |i| (dy, i))) {
+            if dy == 0 || !CORNER_STACKS.contains(&i) {
+                self.bricks[dy][i] = view.brick(self.pos(dy, i));
             }
         }
     }

@@ -19,7 +19,7 @@ use super::corners::{self, Corners, X, Z};
 use super::crossings::{Crossings, Edge};
 use super::mask::sheet;
 use super::mesh::Vertex;
-use super::stack::{Stack, world_cells};
+use super::stack::{Stack, pristine_side, world_cells};
 use super::vertex::WorldView;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
@@ -322,9 +322,7 @@ pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {
     let stack = (brick.0.x, brick.0.z);
     let low = brick.origin();
     let heights = corners::heights(view.samples.ground(), Column::of(low));
-    let range = corners::corner_heights(&heights)
-        .fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
-    if super::stack::pristine_side(range, low.y).is_some() {
+    if pristine_side(corners::range(&heights), low.y).is_some() {
         return 0;
     }
     let around = Neighbours::corners_of(&view.samples, brick);

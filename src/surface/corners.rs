@@ -5,7 +5,7 @@
 
 use super::apron::SIDE;
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE};
+use crate::lattice::{Column, ceil};
 
 /// A bit for each of 9x9 corners, or of 8x8 cells.
 pub type Corners = u128;
@@ -109,7 +109,7 @@ pub static PLACES: [Place; 81] = {
 /// Which corners of the 9 layers from `y` on are solid in the pristine world, under columns of these heights.
 pub fn pristine(heights: &Heights, y: i32) -> [Corners; 9] {
     // In each column the lowest samples are solid, as many as lie below its height; the rest of rows is done by words.
-    let count = |height: i32| (((height + (ONE - 1)) >> ONE.trailing_zeros()) - y).clamp(0, 9) as usize;
+    let count = |height: i32| (ceil(height) - y).clamp(0, 9) as usize;
     let mut rising = [[0u64; 2]; 10];
     for z in 0..9 {
         let (word, shift) = (z / 5, z % 5 * 9);
@@ -135,13 +135,19 @@ pub fn heights(ground: &Ground, low: Column) -> Heights {
 }
 
 /// The heights of a stack's own 9x9 corners.
-pub fn corner_heights(heights: &Heights) -> impl Iterator<Item = i32> {
+fn corner_heights(heights: &Heights) -> impl Iterator<Item = i32> {
     heights[1..10].iter().flat_map(|row| row[1..10].iter().copied())
+}
+
+/// Lowest and highest of a stack's own 9x9 corners.
+pub fn range(heights: &Heights) -> (i32, i32) {
+    corner_heights(heights).fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::ONE;
     use proptest::{prop_assert, prop_assert_eq, proptest};
 
     fn at(bits: Corners, x: usize, z: usize) -> bool {

@@ -5,14 +5,13 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE, table_bytes};
+use crate::lattice::{Column, ceil, table_bytes};
 
 /// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
 /// lattice point counts below it.
 pub fn sheet(heights: impl IntoIterator<Item = i32>) -> Range<i32> {
     let (low, high) =
         heights.into_iter().fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
-    let ceil = |height: i32| height.div_euclid(ONE) + i32::from(height.rem_euclid(ONE) != 0);
     ceil(low) - 1..ceil(high)
 }
 
@@ -165,6 +164,7 @@ impl Borders {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::ONE;
 
     #[test]
     fn the_sheet_holds_every_cube_with_both_signs() {

@@ -39,14 +39,12 @@ impl<'a> Stack<'a> {
     pub fn new(view: &WorldView<'a>, (x, z): (i32, i32)) -> Self {
         let (low, ground) = (Column::new(x * 8, z * 8), view.samples.ground());
         let heights = corners::heights(ground, low);
-        let range = |(low, high): (i32, i32), h: i32| (low.min(h), high.max(h));
-        let range = corners::corner_heights(&heights).fold((i32::MAX, i32::MIN), range);
         let own = view.mask.word((x, z));
         Self {
             ground,
             low,
             heights,
-            range,
+            range: corners::range(&heights),
             mask: corners::spread(own),
             borders: borders(view, (x, z), own),
             normals: [Vec3::ZERO; 81],

@@ -6,7 +6,7 @@ use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use crate::ground::MaterialId;
-use crate::lattice::{BRICK, BrickPos, ONE};
+use crate::lattice::{BRICK, BrickPos, ceil};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -43,7 +43,7 @@ pub type Layers = [u64; BRICK as usize];
 /// Which pristine samples of a brick are solid, whose lowest samples lie at `y`, under columns of these heights.
 pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     // In each column the lowest samples are solid, as many as lie below its height.
-    let solid = |height: i32| (((height + (ONE - 1)) >> ONE.trailing_zeros()) - y).clamp(0, 8);
+    let solid = |height: i32| (ceil(height) - y).clamp(0, 8);
     let mut rising = [0u64; 9];
     for (bit, &height) in heights.iter().flatten().enumerate() {
         rising[solid(height) as usize] |= 1 << bit;
@@ -181,6 +181,7 @@ pub type UniformBricks = FxHashMap<(Sample, MaterialId), Arc<Brick>>;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::ONE;
 
     #[test]
     fn an_edited_sample_is_never_the_sentinel() {

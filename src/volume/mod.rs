@@ -7,8 +7,10 @@
 mod brick;
 mod draft;
 mod field;
+mod ledger;
 mod tally;
 mod view;
+mod workpiece;
 
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, reach};

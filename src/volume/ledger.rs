@@ -1,0 +1,56 @@
+//! What edits did to bricks, entered brick by brick and added up later.
+
+use super::DraftedBrick;
+use crate::ground::MaterialId;
+use crate::lattice::{ChunkPos, LatticeBox};
+
+/// What edits did to some bricks.
+#[derive(Default)]
+pub(super) struct Ledger {
+    pub bricks: Vec<DraftedBrick>,
+    pub parts: Vec<PartEffect>,
+    pub counts: Vec<Count>,
+    /// By how much the hash of the world's samples changes.
+    pub hash: u64,
+}
+
+/// What one edit changed in one chunk's part of one brick.
+pub(super) struct PartEffect {
+    pub edit: usize,
+    pub chunk: ChunkPos,
+    pub bounds: LatticeBox,
+}
+
+/// What became of voxels.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fate {
+    Removed,
+    Added,
+    Painted,
+}
+
+/// Voxels of one material that an edit dealt with in one brick.
+pub(super) struct Count {
+    pub edit: usize,
+    pub fate: Fate,
+    pub material: MaterialId,
+    pub voxels: u64,
+}
+
+/// What one edit does to one brick is counted here.
+pub(super) struct Counts<'l> {
+    pub edit: usize,
+    pub list: &'l mut Vec<Count>,
+    /// Where this edit's counts of this brick begin.
+    pub first: usize,
+}
+
+impl Counts<'_> {
+    pub fn add(&mut self, fate: Fate, material: MaterialId) {
+        let own = &mut self.list[self.first..];
+        match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
+            Some(count) => count.voxels += 1,
+            None => self.list.push(Count { edit: self.edit, fate, material, voxels: 1 }),
+        }
+    }
+}
