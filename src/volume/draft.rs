@@ -112,8 +112,8 @@ pub fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
 }
 
 impl Draft {
-    /// Applies edits in order to a snapshot whose edited samples have the given hash. Samples farther than [`BAND`](crate::brush::BAND)
-    /// outside a shape stay as they are (rule 6). The result does not depend on how many threads there are.
+    /// Applies edits in order to a snapshot whose edited samples have the given hash. Samples farther than
+    /// [`BAND`](crate::brush::BAND) outside a shape stay as they are (rule 6). The result does not depend on how many threads there are.
     pub fn new(
         base: SampleView,
         grid: ChunkGrid,
