@@ -51,7 +51,7 @@
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
 //! Rooms, from the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`terrain`], `plugin`, `view`.
+//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`.
 //!
 //! # How the seam closes
 //!
@@ -114,6 +114,7 @@
 //! A terrain may be moved by whole voxels and scaled by powers of two; rotated, stretched or moved by a part of a voxel,
 //! its seams lose their equal bits.
 
+pub mod backend;
 pub mod brush;
 pub mod ground;
 pub mod lattice;

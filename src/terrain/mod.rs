@@ -31,6 +31,7 @@ pub use world::{Drawn, Memory, Version, World};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::backend::Engine;
 use crate::brush::{Brush, BrushError, Edit};
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
@@ -89,6 +90,7 @@ pub(crate) struct Submission {
 /// to it. Committing by oneself, with [`apply`](Self::apply) say, works too, but then all of its meshes are made again.
 pub struct Terrain {
     world: Arc<World>,
+    engine: Engine,
     voxel_size: f32,
     queue: Vec<Submission>,
     in_flight: Option<InFlight>,
@@ -116,11 +118,18 @@ impl Terrain {
         let world = World::new(ground.into(), settings.chunk_size as i32);
         Ok(Self {
             world: Arc::new(world),
+            engine: Engine::default(),
             voxel_size: settings.voxel_size,
             queue: Vec::new(),
             in_flight: None,
             answered: Vec::new(),
         })
+    }
+
+    /// From now on, transactions run on this engine. The world is the same whichever it is. A new terrain has one of the
+    /// CPU; the plugin gives every terrain its own.
+    pub fn set_engine(&mut self, engine: Engine) {
+        self.engine = engine;
     }
 
     /// Metres along a voxel's side.
@@ -181,7 +190,7 @@ impl Terrain {
         let submissions: Arc<[Submission]> = std::mem::take(&mut self.queue).into();
         let ticket = unique();
         self.in_flight = Some(InFlight { ticket, submissions: Arc::clone(&submissions) });
-        Some(Transaction::new(ticket, self.snapshot(), submissions))
+        Some(Transaction::new(ticket, self.snapshot(), submissions, self.engine.clone()))
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.

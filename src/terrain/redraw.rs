@@ -1,6 +1,5 @@
 //! What a transaction draws anew: cells that join the mask, dirty blocks, touched tiles.
 
-use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,9 +10,10 @@ use rustc_hash::FxHashMap;
 use super::surface::{ChunkSurface, Fresh, key};
 use super::transaction::Stages;
 use super::world::World;
+use crate::backend::{Backend, PARALLEL_BLOCKS};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos};
-use crate::surface::block::{self, Block, Mesher, Parts};
+use crate::surface::block::{self, Block, Parts};
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, SurfaceMesh};
@@ -48,9 +48,6 @@ impl TileUpdate {
         SurfaceMesh { vertices, indices: self.indices.clone() }
     }
 }
-
-/// From how many blocks on meshing is spread over threads; below, handing out costs more than it saves.
-const PARALLEL_BLOCKS: usize = 48;
 
 /// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
 fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
@@ -94,6 +91,7 @@ pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut S
 pub(super) fn updates(
     world: &World,
     view: &WorldView,
+    backend: &dyn Backend,
     changed: &[DraftedBrick],
     dirty: ByBrick,
     added: &Mask,
@@ -102,7 +100,7 @@ pub(super) fn updates(
     let chunks = || {
         let mut stages = Stages::default();
         let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, dirty, added));
-        (mesh_blocks(world, view, &blocks, &mut stages), stages)
+        (mesh_blocks(world, view, backend, &blocks, &mut stages), stages)
     };
     let tiles = || timed(|| touched_tiles(world, view, added));
     // Tiles and chunks do not depend on each other. What either does alone is time for the other.
@@ -218,65 +216,27 @@ fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
     }
 }
 
-thread_local! {
-    /// Working memory of the mesher, and parts that wait for assembly.
-    static MESHER: RefCell<(Mesher, Parts)> = RefCell::default();
-}
-
-/// How many stacks of bricks a thread takes at a time.
-const STACKS: usize = 4;
-
-/// Most vertices whose memory a thread keeps for its next transaction.
-const KEPT_VERTICES: usize = 1 << 16;
-
-/// Meshes blocks and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
+/// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
 fn mesh_blocks(
     world: &World,
     view: &WorldView,
+    backend: &dyn Backend,
     blocks: &[Block],
     stages: &mut Stages,
 ) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
-    if blocks.len() < PARALLEL_BLOCKS {
-        let mut parts = Stages::time(&mut stages.meshing, || {
-            MESHER.with_borrow_mut(|(mesher, parts)| {
-                parts.clear();
-                mesher.mesh(view, blocks, parts);
-                std::mem::take(parts)
-            })
+    let (mut chunks, mut assembly) = (Vec::new(), Duration::ZERO);
+    let (_, all) = timed(|| {
+        backend.mesh(view, blocks, &mut |parts| {
+            chunks = Stages::time(&mut assembly, || assemble(world, parts));
         });
-        let chunks = Stages::time(&mut stages.assembly, || assemble(world, &[&parts]));
-        if parts.vertices.capacity() <= KEPT_VERTICES {
-            MESHER.with_borrow_mut(|(_, kept)| std::mem::swap(kept, &mut parts));
-        }
-        return chunks;
-    }
-    let mut groups: Vec<&[Block]> = Vec::new();
-    let mut rest = blocks;
-    let stacks: Vec<&[Block]> =
-        blocks.chunk_by(|a, b| (a.brick.0.x, a.brick.0.z) == (b.brick.0.x, b.brick.0.z)).collect();
-    for stacks in stacks.chunks(STACKS) {
-        let (group, others) = rest.split_at(stacks.iter().map(|stack| stack.len()).sum());
-        groups.push(group);
-        rest = others;
-    }
-    // Meshed into memory that is there already, and copied out as large as it has to be.
-    let mesh = |blocks: &&[Block]| {
-        MESHER.with_borrow_mut(|(mesher, parts)| {
-            parts.clear();
-            mesher.mesh(view, blocks, parts);
-            let copy = parts.clone();
-            if parts.vertices.capacity() > KEPT_VERTICES {
-                *parts = Parts::default();
-            }
-            copy
-        })
-    };
-    let parts: Vec<Parts> = Stages::time(&mut stages.meshing, || groups.par_iter().map(mesh).collect());
-    Stages::time(&mut stages.assembly, || assemble(world, &parts.iter().collect::<Vec<_>>()))
+    });
+    stages.meshing += all - assembly;
+    stages.assembly += assembly;
+    chunks
 }
 
 /// The surfaces of chunks with these parts in place of old ones.
-fn assemble(world: &World, parts: &[&Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
+fn assemble(world: &World, parts: &[Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
     let fresh = |(block, vertices, indices): (Block, _, _)| {
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };

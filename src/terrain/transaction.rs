@@ -16,12 +16,13 @@ use super::receipt::{Applied, ChunkScenario, Receipt, Rejection};
 use super::redraw::{self, MeshUpdates};
 use super::surface::ChunkSurface;
 use super::world::World;
+use crate::backend::Engine;
 use crate::brush::Edit;
 use crate::lattice::{ChunkPos, LatticeBox, TilePos};
 use crate::surface::tile::Rings;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, Draft, EditEffect, FieldId, Fields, UniformBricks, reach};
+use crate::volume::{Bricks, Draft, EditEffect, EditWork, FieldId, Fields, UniformBricks, reach};
 
 /// Something that happened to a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +45,7 @@ pub struct Transaction {
     ticket: u64,
     world: Arc<World>,
     submissions: Arc<[Submission]>,
+    engine: Engine,
 }
 
 /// The result of a transaction: only what changed.
@@ -92,8 +94,13 @@ impl Stages {
 }
 
 impl Transaction {
-    pub(super) fn new(ticket: u64, world: Arc<World>, submissions: Arc<[Submission]>) -> Self {
-        Self { ticket, world, submissions }
+    pub(super) fn new(
+        ticket: u64,
+        world: Arc<World>,
+        submissions: Arc<[Submission]>,
+        engine: Engine,
+    ) -> Self {
+        Self { ticket, world, submissions, engine }
     }
 
     /// How many edits it holds.
@@ -111,8 +118,12 @@ impl Transaction {
     pub fn run(self) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = self.submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
+        let backend = self.engine.backend();
         let draft = Stages::time(&mut stages.edit, || {
-            Draft::new(world.samples(), world.grid, world.sample_hash, &world.uniform, &edits)
+            let mut draft = Draft::new(edits.len(), world.sample_hash);
+            let work = EditWork::new(world.samples(), world.grid, &edits);
+            backend.edit(&work, &mut |ledger| draft.add(ledger, &world.uniform));
+            draft
         });
         let bricks: Bricks =
             draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
@@ -121,7 +132,7 @@ impl Transaction {
         let before = WorldView { samples, ..world.view() };
         let (mask, dirty) = redraw::disturb(&before, &draft.bricks, &mut stages);
         let view = WorldView { samples, mask: MaskView::new(&world.mask).with(&mask), ..world.view() };
-        let meshes = redraw::updates(world, &view, &draft.bricks, dirty, &mask, &mut stages);
+        let meshes = redraw::updates(world, &view, backend, &draft.bricks, dirty, &mask, &mut stages);
 
         let mut log = FieldLog::new(world);
         let mut effects = draft.effects.into_iter();

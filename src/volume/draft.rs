@@ -1,7 +1,8 @@
 //! Edits applied to copies of bricks, before anything is committed.
 //!
 //! Edits are sorted by the bricks they reach. Then each brick takes its edits in their order, on its own: bricks share
-//! no samples, so threads share no work, and whatever an edit changed is added up afterwards.
+//! no samples, so threads share no work, and whatever an edit changed is added up afterwards. A [`backend`](crate::backend)
+//! does the middle part.
 
 use std::sync::Arc;
 
@@ -85,21 +86,22 @@ const GROUP: usize = 16;
 
 /// One edit's work on one brick; sorted by brick, then by edit.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Job {
+pub(crate) struct Job {
     /// The brick's position as (x, z, y).
     brick: [i32; 3],
     pub edit: u32,
 }
 
 impl Job {
-    fn pos(self) -> BrickPos {
+    /// The brick's position.
+    pub fn pos(self) -> BrickPos {
         let [x, z, y] = self.brick;
         BrickPos(IVec3::new(x, y, z))
     }
 }
 
 /// An edit with what is derived from it once.
-pub(super) struct Tool {
+pub(crate) struct Tool {
     /// The part of the edit's reach that lies in the world.
     pub reach: Option<LatticeBox>,
     pub operation: Operation,
@@ -111,16 +113,19 @@ pub fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
 }
 
-impl Draft {
-    /// Applies edits in order to a snapshot whose edited samples have the given hash. Samples farther than
-    /// [`BAND`](crate::brush::BAND) outside a shape stay as they are (rule 6). The result does not depend on how many threads there are.
-    pub fn new(
-        base: SampleView,
-        grid: ChunkGrid,
-        hash: u64,
-        uniform: &UniformBricks,
-        edits: &[&Edit],
-    ) -> Self {
+/// Edits, sorted by the bricks that they may reach.
+pub struct EditWork<'a> {
+    /// What they apply to.
+    pub base: SampleView<'a>,
+    /// How the world is cut into chunks.
+    pub grid: ChunkGrid,
+    pub(crate) tools: Vec<Tool>,
+    jobs: Vec<Job>,
+}
+
+impl<'a> EditWork<'a> {
+    /// Sorts edits.
+    pub fn new(base: SampleView<'a>, grid: ChunkGrid, edits: &[&Edit]) -> Self {
         let tool = |edit: &&Edit| Tool {
             reach: reach(grid, edit),
             operation: edit.operation(),
@@ -128,28 +133,44 @@ impl Draft {
         };
         let tools: Vec<Tool> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
-        let bricks: Vec<&[Job]> = jobs.chunk_by(|a, b| a.brick == b.brick).collect();
+        Self { base, grid, tools, jobs }
+    }
+
+    /// The jobs of each brick, in order of the edits.
+    pub(crate) fn bricks(&self) -> Vec<&[Job]> {
+        self.jobs.chunk_by(|a, b| a.brick == b.brick).collect()
+    }
+
+    /// Applies all edits on the CPU and hands out what they changed, brick by brick. The result does not depend on how
+    /// many threads there are.
+    pub(crate) fn run(&self, mut each: impl FnMut(Ledger)) {
+        let bricks = self.bricks();
         let work = |bricks: &[&[Job]]| {
             let mut ledger = Ledger::default();
-            bricks.iter().for_each(|jobs| finish(base, grid, &tools, jobs, &mut ledger));
+            bricks.iter().for_each(|jobs| finish(self, jobs, &mut ledger));
             ledger
         };
-
-        let mut draft = Self { hash, ..Self::default() };
-        draft.effects.resize_with(edits.len(), EditEffect::default);
         if bricks.len() < PARALLEL_BRICKS {
-            draft.add(work(&bricks), uniform);
-            return draft;
+            each(work(&bricks));
+            return;
         }
         for batch in bricks.chunks(BATCH) {
             let ledgers: Vec<Ledger> = batch.par_chunks(GROUP).map(work).collect();
-            ledgers.into_iter().for_each(|ledger| draft.add(ledger, uniform));
+            ledgers.into_iter().for_each(&mut each);
         }
+    }
+}
+
+impl Draft {
+    /// A draft of so many edits on samples of this hash, without what they did.
+    pub fn new(edits: usize, hash: u64) -> Self {
+        let mut draft = Self { hash, ..Self::default() };
+        draft.effects.resize_with(edits, EditEffect::default);
         draft
     }
 
     /// Takes in what was done to some bricks; one that is all alike is replaced by the one of its kind.
-    fn add(&mut self, ledger: Ledger, uniform: &UniformBricks) {
+    pub(crate) fn add(&mut self, ledger: Ledger, uniform: &UniformBricks) {
         self.hash = self.hash.wrapping_add(ledger.hash);
         for part in &ledger.parts {
             self.effects[part.edit].reach(part.chunk, part.bounds);
@@ -198,15 +219,15 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
 }
 
 /// Applies all edits of one brick and enters what they changed.
-fn finish(base: SampleView, grid: ChunkGrid, tools: &[Tool], jobs: &[Job], ledger: &mut Ledger) {
+fn finish(work: &EditWork, jobs: &[Job], ledger: &mut Ledger) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
     let reaches = |job: &&Job| {
-        let tool = &tools[job.edit as usize];
+        let tool = &work.tools[job.edit as usize];
         let reached = tool.reach.and_then(|reach| reach.intersection(pos.samples()));
         reached.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples))
     };
     let mut jobs = jobs.iter().filter(reaches).peekable();
     if jobs.peek().is_some() {
-        Workpiece::new(base, grid, pos).take(tools, jobs, ledger);
+        Workpiece::new(work.base, work.grid, pos).take(&work.tools, jobs, ledger);
     }
 }

@@ -6,7 +6,7 @@ use crate::lattice::{ChunkPos, LatticeBox};
 
 /// What edits did to some bricks.
 #[derive(Default)]
-pub(super) struct Ledger {
+pub(crate) struct Ledger {
     pub bricks: Vec<DraftedBrick>,
     pub parts: Vec<PartEffect>,
     pub counts: Vec<Count>,
@@ -15,7 +15,7 @@ pub(super) struct Ledger {
 }
 
 /// What one edit changed in one chunk's part of one brick.
-pub(super) struct PartEffect {
+pub(crate) struct PartEffect {
     pub edit: usize,
     pub chunk: ChunkPos,
     pub bounds: LatticeBox,
@@ -23,14 +23,14 @@ pub(super) struct PartEffect {
 
 /// What became of voxels.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Fate {
+pub(crate) enum Fate {
     Removed,
     Added,
     Painted,
 }
 
 /// Voxels of one material that an edit dealt with in one brick.
-pub(super) struct Count {
+pub(crate) struct Count {
     pub edit: usize,
     pub fate: Fate,
     pub material: MaterialId,

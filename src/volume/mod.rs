@@ -13,7 +13,8 @@ mod view;
 mod workpiece;
 
 pub use brick::{Brick, Layers, Sample, UniformBricks};
-pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, reach};
+pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
+pub(crate) use ledger::Ledger;
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};
