@@ -14,7 +14,11 @@ mod workpiece;
 
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};
+#[cfg(feature = "cuda")]
+pub(crate) use draft::{Job, Tool};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
+#[cfg(feature = "cuda")]
+pub(crate) use ledger::{Count, Fate, PartEffect};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};
