@@ -46,11 +46,11 @@ pub(super) struct Counts<'l> {
 }
 
 impl Counts<'_> {
-    pub fn add(&mut self, fate: Fate, material: MaterialId) {
+    pub fn add(&mut self, fate: Fate, material: MaterialId, voxels: u64) {
         let own = &mut self.list[self.first..];
         match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
-            Some(count) => count.voxels += 1,
-            None => self.list.push(Count { edit: self.edit, fate, material, voxels: 1 }),
+            Some(count) => count.voxels += voxels,
+            None => self.list.push(Count { edit: self.edit, fate, material, voxels }),
         }
     }
 }
