@@ -22,6 +22,7 @@ pub mod seams;
 mod stack;
 pub mod tile;
 pub mod vertex;
+pub(crate) mod window;
 
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};

@@ -16,6 +16,7 @@ use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos}
 use crate::surface::block::{self, Block, Parts};
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
+use crate::surface::window::{self, Window};
 use crate::surface::{Mask, SurfaceMesh};
 use crate::volume::DraftedBrick;
 
@@ -55,15 +56,27 @@ fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
     let around =
         |drafted: &DraftedBrick| LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
     let boxes: Vec<LatticeBox> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
-    let near = by_brick(&boxes);
-    let disturbed = |&(brick, _): &(BrickPos, LatticeBox)| {
-        let word = (brick.0.x, brick.0.z);
-        (word, block::disturbed(view, brick) & !view.mask.word(word))
+    let near: Vec<BrickPos> = by_brick(&boxes).into_iter().map(|(brick, _)| brick).collect();
+    let mut windows = Vec::new();
+    let mut rest = &near[..];
+    while let Some((count, places)) = window::shared(rest.iter().copied()) {
+        let (bricks, others) = rest.split_at(count);
+        windows.push((bricks, places));
+        rest = others;
+    }
+    let disturbed = |&(bricks, places): &(&[BrickPos], LatticeBox)| {
+        let window = Window::new(&view.samples, places);
+        let mut found = Vec::new();
+        for stack in bricks.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
+            let word = (stack[0].0.x, stack[0].0.z);
+            found.push((word, block::disturbed(view, &window, stack) & !view.mask.word(word)));
+        }
+        found
     };
     let cells: Vec<_> = if near.len() < PARALLEL_BLOCKS {
-        near.iter().map(disturbed).collect()
+        windows.iter().flat_map(disturbed).collect()
     } else {
-        near.par_iter().map(disturbed).collect()
+        windows.par_iter().flat_map_iter(disturbed).collect()
     };
     let mut added = Mask::default();
     for (word, cells) in cells {

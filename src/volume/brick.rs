@@ -37,6 +37,15 @@ impl Sample {
     }
 }
 
+/// The samples of a brick that is not stored.
+pub(crate) static PRISTINE: [Sample; LEN] = [Sample::PRISTINE; LEN];
+
+/// The eight samples of a row along x, which begins at index `at`.
+#[inline(always)]
+pub(crate) fn row(samples: &[Sample; LEN], at: usize) -> [i16; 8] {
+    samples[at..].first_chunk::<8>().map_or([0; 8], |row| row.map(|sample| sample.0))
+}
+
 /// One bit for each sample of a brick: a word for each y, in it bit `z * 8 + x`.
 pub type Layers = [u64; BRICK as usize];
 
@@ -114,13 +123,6 @@ impl Brick {
     /// Samples in order: x fastest, then z, then y.
     pub(crate) fn samples(&self) -> &[Sample; LEN] {
         &self.samples
-    }
-
-    /// The eight samples of a row along x, which begins at index `at`.
-    #[inline]
-    pub(crate) fn row(&self, at: usize) -> [i16; 8] {
-        let row = self.samples[at..].first_chunk::<8>();
-        row.map_or([0; 8], |row| row.map(|sample| sample.0))
     }
 
     /// Stores the samples of the row that begins at index `at`; [`Self::set_bits`] says what they are.
@@ -211,7 +213,7 @@ mod tests {
         let mut brick = Brick::pristine([u64::MAX; 8]);
         let pos = BrickPos(IVec3::new(-1, 0, 2));
         let point = pos.origin() + IVec3::new(3, 5, 7);
-        let mut row = brick.row(5 * 64 + 7 * 8);
+        let mut row = row(brick.samples(), 5 * 64 + 7 * 8);
         row[3] = 7;
         brick.set_row(5 * 64 + 7 * 8, row);
         brick.set_bits(5, 1 << 59, 0);

@@ -13,6 +13,7 @@ mod view;
 mod workpiece;
 
 pub use brick::{Brick, Layers, Sample, UniformBricks};
+pub(crate) use brick::{PRISTINE, row};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;

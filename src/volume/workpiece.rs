@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::IVec3;
 use wide::{i16x8, i32x8};
 
-use super::brick::solid_layers;
+use super::brick::{PRISTINE, row, solid_layers};
 use super::draft::{Job, Tool};
 use super::ledger::{Counts, Fate, Ledger, PartEffect};
 use super::view::resolve;
@@ -28,9 +28,6 @@ pub(super) struct Workpiece<'a> {
     /// Samples that changed.
     changed: Layers,
 }
-
-/// The samples of a brick that is not stored.
-static PRISTINE: [Sample; 512] = [Sample::PRISTINE; 512];
 
 /// Samples of a layer that changed: a bit each, as in [`Layers`].
 #[derive(Clone, Copy, Default)]
@@ -284,12 +281,6 @@ fn place_hash(column: Column) -> u64 {
 fn sample_hash(place: u64, y: i32, sample: Sample, material: MaterialId) -> u64 {
     let Some(distance) = sample.distance() else { return 0 };
     hash::mix(place ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))
-}
-
-/// The eight samples of a row, which begins at index `at`.
-#[inline(always)]
-fn row(samples: &[Sample; 512], at: usize) -> [i16; 8] {
-    samples[at..].first_chunk::<8>().map_or([0; 8], |row| row.map(Sample::bits))
 }
 
 /// Lanes below zero, as those of masks are.
