@@ -174,18 +174,29 @@ impl Mesher {
         top: usize,
         out: &mut Vec<u16>,
     ) {
+        const MOST: usize = 15;
         let table = &*SLOTS;
+        let cubes: u32 = drawn[bottom..=top].iter().map(|layer| layer.count_ones()).sum();
+        let mut end = out.len();
+        out.resize(end + cubes as usize * MOST, 0);
         for y in bottom..=top {
             corners::for_ones(drawn[y], |cell| {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
                 let entry = &table[case];
-                for triangle in entry.slots[..entry.len].as_chunks::<3>().0 {
-                    out.extend_from_slice(&triangle.map(|slot| self.numbers.at(base + usize::from(slot))));
-                }
+                let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
+                // Most cubes have two triangles at most. Those two are always written; what is too many is written over.
+                let (usual, others) = entry.slots.split_at(6);
+                let (first, rest) = room.split_at_mut(6);
+                let number = |slot: &u16| self.numbers.at(base + usize::from(*slot));
+                first.iter_mut().zip(usual).for_each(|(to, slot)| *to = number(slot));
+                let more = entry.len.saturating_sub(6);
+                rest.iter_mut().zip(&others[..more]).for_each(|(to, slot)| *to = number(slot));
+                end += entry.len;
             });
         }
+        out.truncate(end);
     }
 }
 
