@@ -353,7 +353,7 @@ pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos]) 
         }
         let around = Neighbours::corners_of(window, brick);
         let near = [around.corners(0), around.corners(1)];
-        let pristine = corners::pristine(&heights, low);
+        let pristine = corners::pristine(&heights, range, low);
         for y in 0..8 {
             let sheet = corners::mixed(pristine[y], pristine[y + 1]);
             if sheet & !cells != 0 {

@@ -169,7 +169,8 @@ impl<'a> Drawing<'a> {
     fn new(world: &WorldView<'a>, tile: TilePos, borders: &'a Borders) -> Self {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
-        Self { ground, borders, low, high, base, rings: Rings::default(), sides: Default::default() }
+        let sides = [(); 4].map(|()| Vec::with_capacity(ROOM));
+        Self { ground, borders, low, high, base, rings: Rings::default(), sides }
     }
 
     /// The rings, without room for more: they are kept until the next edit nearby.

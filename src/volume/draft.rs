@@ -146,7 +146,7 @@ impl<'a> EditWork<'a> {
     pub(crate) fn run(&self, mut each: impl FnMut(Ledger)) {
         let bricks = self.bricks();
         let work = |bricks: &[&[Job]]| {
-            let mut ledger = Ledger::default();
+            let mut ledger = Ledger::with_room(bricks.len());
             bricks.iter().for_each(|jobs| finish(self, jobs, &mut ledger));
             ledger
         };

@@ -14,6 +14,18 @@ pub(crate) struct Ledger {
     pub hash: u64,
 }
 
+impl Ledger {
+    /// An empty one, with room for what edits do to so many bricks as a rule.
+    pub fn with_room(bricks: usize) -> Self {
+        Self {
+            bricks: Vec::with_capacity(bricks),
+            parts: Vec::with_capacity(bricks),
+            counts: Vec::with_capacity(bricks),
+            hash: 0,
+        }
+    }
+}
+
 /// What one edit changed in one chunk's part of one brick.
 pub(crate) struct PartEffect {
     pub edit: usize,
