@@ -366,15 +366,15 @@ pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos]) 
 }
 
 /// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.
-pub(crate) fn sheet_rows(ground: &Ground, low: Column, mut cells: u64) -> Range<i32> {
+pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
     let heights = ground.heights::<9>(low);
+    let cells = corners::spread(cells);
+    // The corners of these cells.
+    let along = cells | cells << X;
     let mut range = (i32::MAX, i32::MIN);
-    while cells != 0 {
-        let (x, z) = (cells.trailing_zeros() as usize & 7, cells.trailing_zeros() as usize >> 3);
-        for height in [heights[z][x], heights[z][x + 1], heights[z + 1][x], heights[z + 1][x + 1]] {
-            range = (range.0.min(height), range.1.max(height));
-        }
-        cells &= cells - 1;
-    }
+    corners::for_ones(along | along << Z, |corner| {
+        let height = heights.as_flattened()[corner];
+        range = (range.0.min(height), range.1.max(height));
+    });
     sheet([range.0, range.1])
 }

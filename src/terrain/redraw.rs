@@ -152,16 +152,9 @@ fn in_world(view: &WorldView, low: IVec3, high: IVec3) -> Option<LatticeBox> {
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
 fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block> {
-    let words: Vec<_> = added.words().collect();
     let is_large = dirty.len() >= PARALLEL_BLOCKS;
-    let sheets = |&word: &((i32, i32), u64)| sheets_near(view, word);
-    let mut sheets: Vec<(i32, LatticeBox)> = if is_large {
-        words.par_iter().flat_map_iter(sheets).collect()
-    } else {
-        words.iter().flat_map(sheets).collect()
-    };
+    let sheets = sheets_near(view, added);
     if !sheets.is_empty() {
-        sheets.sort_unstable_by_key(|(x, _)| *x);
         dirty.extend(by_brick(&sheets));
         // Two sorted lists, which this merges.
         dirty.sort_by_key(|(brick, _)| stack_order(brick));
@@ -181,27 +174,29 @@ fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block
 }
 
 /// A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border. The boxes around all of these,
-/// with the x of their stacks.
-fn sheets_near<'a>(
-    view: &'a WorldView<'a>,
-    ((x, z), cells): ((i32, i32), u64),
-) -> impl Iterator<Item = (i32, LatticeBox)> + 'a {
-    let steps = (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz)));
-    steps.filter_map(move |(dx, dz)| {
-        let near = grown_into(cells, dx, dz);
-        if near == 0 {
-            return None;
+/// one for each stack of bricks and with its x, by which they are sorted.
+fn sheets_near(view: &WorldView, added: &Mask) -> Vec<(i32, LatticeBox)> {
+    let mut near = Vec::new();
+    for ((x, z), cells) in added.words() {
+        for (dx, dz) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dz| (dx, dz))) {
+            let cells = grown_into(cells, dx, dz);
+            near.extend((cells != 0).then_some(((x + dx, z + dz), cells)));
         }
-        let stack = (x + dx, z + dz);
-        let near = near & view.mask.word(stack);
-        if near == 0 {
-            return None;
-        }
+    }
+    sort_by_place(&mut near, |&((x, z), _)| [x, z, 0]);
+    let sheet = |same: &[((i32, i32), u64)]| {
+        let stack = same[0].0;
+        let cells = same.iter().fold(0, |all, (_, cells)| all | cells) & view.mask.word(stack);
         let low = Column::new(stack.0 * 8, stack.1 * 8);
-        let rows = block::sheet_rows(view.samples.ground(), low, near);
-        let sheet = in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))?;
-        Some((stack.0, sheet))
-    })
+        let rows = (cells != 0).then(|| block::sheet_rows(view.samples.ground(), low, cells))?;
+        Some((stack.0, in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))?))
+    };
+    let stacks = |a: &((i32, i32), u64), b: &((i32, i32), u64)| a.0 == b.0;
+    if near.len() < PARALLEL_BLOCKS {
+        near.chunk_by(stacks).filter_map(sheet).collect()
+    } else {
+        near.par_chunk_by(stacks).filter_map(sheet).collect()
+    }
 }
 
 /// Stacks of bricks one after the other, each from below.
