@@ -13,6 +13,7 @@ mod view;
 mod workpiece;
 
 pub use brick::{Brick, Layers, Sample, UniformBricks};
+pub(crate) use brick::{PRISTINE, row};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};
 #[cfg(feature = "cuda")]
 pub(crate) use draft::{Job, Tool};
