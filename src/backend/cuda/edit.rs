@@ -129,7 +129,7 @@ impl Session {
         self.inbox.put(tool_list, &tools);
         self.inbox.entries::<u32>(counters).fill(0);
         let is_long = jobs.len() >= COPIED;
-        self.edits.results.reserve(&mut *self.device, jobs.len(), false)?;
+        self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
 
         for _ in 0..2 {

@@ -135,7 +135,7 @@ impl Session {
         fill(blocks, self.inbox.entries(job_list), LONG, job);
         self.inbox.entries::<u32>(counters).fill(0);
         let is_long = blocks.len() >= COPIED;
-        self.meshes.results.reserve(&mut *self.device, blocks.len(), false)?;
+        self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
         self.meshes.reserve(&mut *self.device, (0, 0), is_long)?;
 
         for _ in 0..2 {
