@@ -119,12 +119,12 @@ impl Outbox {
     /// gone then.
     pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
         self.is_long = is_long;
-        let room = entries + entries / 4;
+        let is_short = entries > self.capacity() as usize;
         if entries > self.capacity {
+            let room = entries + entries / 4;
             (self.host, self.capacity) = (device.alloc_host(room * self.entry)?, room);
         }
-        let is_short = entries > self.capacity() as usize || self.is_own() && self.own.is_none();
-        if self.is_own() && is_short {
+        if self.is_own() && (is_short || self.own.is_none()) {
             if let Some((address, _)) = self.own.take() {
                 device.free(address);
             }
