@@ -1,6 +1,8 @@
 //! Who does the heavy work of a transaction: applying edits to bricks, and meshing blocks.
 
 mod cpu;
+#[cfg(feature = "cuda")]
+mod cuda;
 mod engine;
 
 use cpu::Cpu;

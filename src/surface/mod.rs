@@ -23,6 +23,9 @@ mod stack;
 pub mod tile;
 pub mod vertex;
 
+#[cfg(feature = "cuda")]
+pub(crate) use stack::borders;
+
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};
 pub use seams::{SeamFault, SeamReport, SeamSoup};

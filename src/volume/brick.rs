@@ -90,6 +90,18 @@ impl Brick {
         brick
     }
 
+    /// A brick of samples, bits that agree with them, and materials.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn of_parts(
+        samples: &[i16; LEN],
+        solid: Layers,
+        edited: Layers,
+        materials: Option<&[u8; LEN]>,
+    ) -> Self {
+        let materials = materials.map(|materials| Box::new(materials.map(MaterialId)));
+        Self { samples: samples.map(Sample), solid, edited, materials }
+    }
+
     /// The sample at a lattice point that lies in this brick.
     pub fn sample(&self, point: IVec3) -> Sample {
         self.samples[BrickPos::index(point)]
@@ -146,6 +158,12 @@ impl Brick {
     /// The material of the sample with this index.
     pub(crate) fn material_at(&self, index: usize) -> MaterialId {
         self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[index])
+    }
+
+    /// The materials in order of the samples, `None` while all are [`MaterialId::GROUND`].
+    #[cfg(feature = "cuda")]
+    pub(crate) fn materials(&self) -> Option<&[MaterialId; LEN]> {
+        self.materials.as_deref()
     }
 
     /// Bytes that materials take beside the brick itself.
