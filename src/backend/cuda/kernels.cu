@@ -683,7 +683,7 @@ __device__ inline void store(const EditParams& params, const Workbench& bench, B
 
 extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
     __shared__ Workbench bench;
-    const EditJob& job = params.jobs[blockIdx.x];
+    const EditJob job = params.jobs[blockIdx.x];
     const Brick* base = job.base == NONE ? nullptr : &params.bricks[job.base >> 1];
     bool has_materials = base != nullptr && job.base & 1;
 
@@ -1095,30 +1095,34 @@ __device__ inline Mix column_mix(u32 column) {
     return {base | overlay << 8, (255 - blend) | blend << 8};
 }
 
-// Materials of both mixes, at most two of each, with their weights.
+// Materials of both mixes, at most two of each, with their weights. Loops over them are unrolled, so that indices are
+// constant and all stays in registers.
 struct Shares {
     u32 ids[4];
     i32 weights[4];
     i32 count;
 };
 
-__device__ inline void add_share(Shares& shares, u32 id, i32 weight) {
+// Adds a material, if it has any weight.
+__device__ inline void add_share(Shares& shares, u32 id, u32 weight, i32 share) {
+    if (weight == 0) return;
+    bool is_known = false;
+#pragma unroll
     for (i32 i = 0; i < 4; i++) {
-        if (i < shares.count && shares.ids[i] == id) {
-            shares.weights[i] += weight;
-            return;
-        }
+        bool is_it = i < shares.count && shares.ids[i] == id;
+        if (is_it) shares.weights[i] += weight * share;
+        is_known |= is_it;
     }
+#pragma unroll
     for (i32 i = 0; i < 4; i++) {
-        if (i == shares.count) {
-            shares.ids[i] = id;
-            shares.weights[i] = weight;
-        }
+        if (is_known || i != shares.count) continue;
+        shares.ids[i] = id;
+        shares.weights[i] = weight * share;
     }
-    shares.count++;
+    shares.count += !is_known;
 }
 
-// Sorts by weight, the largest first, then by id. Indices are constant once unrolled, so all stays in registers.
+// Sorts by weight, the largest first, then by id.
 __device__ inline void sort_shares(Shares& shares) {
 #pragma unroll
     for (i32 pass = 0; pass < 3; pass++) {
@@ -1140,14 +1144,10 @@ __device__ inline void sort_shares(Shares& shares) {
 __device__ inline Mix lerp_mix(Mix a, Mix b, i32 step) {
     if (a.ids == b.ids && a.weights == b.weights) return a;
     Shares shares = {{0, 0, 0, 0}, {0, 0, 0, 0}, 0};
-    for (i32 i = 0; i < 2; i++) {
-        u32 weight = a.weights >> (i * 8) & 0xff;
-        if (weight) add_share(shares, a.ids >> (i * 8) & 0xff, weight * (SNAP - step));
-    }
-    for (i32 i = 0; i < 2; i++) {
-        u32 weight = b.weights >> (i * 8) & 0xff;
-        if (weight) add_share(shares, b.ids >> (i * 8) & 0xff, weight * step);
-    }
+    add_share(shares, a.ids & 0xff, a.weights & 0xff, SNAP - step);
+    add_share(shares, a.ids >> 8 & 0xff, a.weights >> 8 & 0xff, SNAP - step);
+    add_share(shares, b.ids & 0xff, b.weights & 0xff, step);
+    add_share(shares, b.ids >> 8 & 0xff, b.weights >> 8 & 0xff, step);
     sort_shares(shares);
     i32 total = largest(shares.weights[0] + shares.weights[1] + shares.weights[2] + shares.weights[3], 1);
     u32 rest = 255;
