@@ -23,7 +23,7 @@ pub(crate) struct Emulator {
 }
 
 impl Emulator {
-    /// Builds the emulator if need be, and starts it; `None`, and a line that says why, where there is no C++ compiler.
+    /// Builds the emulator if need be, and starts it; `None` where it can't be built: no C++ compiler, no Linux.
     ///
     /// `BURROW_EMULATOR` names another program that speaks the same.
     pub fn start() -> io::Result<Option<Self>> {
@@ -107,7 +107,10 @@ fn program() -> io::Result<Option<PathBuf>> {
         return Ok(Some(named.into()));
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/emulator.sh");
-    let built = Command::new("sh").arg(script).stderr(Stdio::inherit()).output()?;
+    let built = match Command::new("sh").arg(script).stderr(Stdio::inherit()).output() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        built => built?,
+    };
     match built.status.code() {
         Some(0) => Ok(Some(String::from_utf8_lossy(&built.stdout).trim().into())),
         // It said why.

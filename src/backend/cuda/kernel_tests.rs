@@ -375,7 +375,9 @@ impl EditRun {
         let mut expected: Vec<Part> = ledger
             .parts
             .iter()
-            .map(|part| (part.edit, BrickPos::of(part.bounds.min).0.to_array(), part.chunk, ends(part.bounds)))
+            .map(|part| {
+                (part.edit, BrickPos::of(part.bounds.min).0.to_array(), part.chunk, ends(part.bounds))
+            })
             .collect();
         let mut found: Vec<Part> = self
             .parts
@@ -420,7 +422,6 @@ fn compare_edits(device: &mut Device, world: &crate::terrain::World, edits: &[Ed
     let edits: Vec<&Edit> = edits.iter().collect();
     let work = EditWork::new(world.samples(), world.grid(), &edits);
     let ledger = ledger_of(&work);
-    // Counts of one brick are not put together where materials lie far apart, so that there may be more.
     let most = EditRoom {
         records: ledger.bricks.len(),
         materials: ledger.bricks.iter().filter(|drafted| drafted.brick.materials().is_some()).count(),
