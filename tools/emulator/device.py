@@ -12,6 +12,7 @@ import os
 import pathlib
 import struct
 import sys
+import time
 
 PTX = pathlib.Path(__file__).resolve().parent.parent.parent / "src" / "backend" / "cuda" / "kernels.ptx"
 KERNELS = [b"scatter", b"edit", b"mesh"]
@@ -54,7 +55,10 @@ def start():
     call("cuDeviceGet", ctypes.byref(device), 0)
     call("cuDevicePrimaryCtxRetain", ctypes.byref(context), device)
     call("cuCtxSetCurrent", context)
+    begin = time.perf_counter()
     call("cuModuleLoadData", ctypes.byref(module), PTX.read_bytes() + b"\0")
+    if TIMES:
+        print(f"device: kernels loaded in {(time.perf_counter() - begin) * 1000:.0f} ms", file=sys.stderr)
     functions = []
     for name in KERNELS:
         function = ctypes.c_void_p()

@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
-use super::emulator::{Emulator, Kernel};
+use self::emulator::{Emulator, Kernel};
 use super::layout::{self, *};
 use crate::brush::{Brush, Edit, Roughness, Shape};
 use crate::ground::{ColumnMaterial, Ground, MaterialControl, MaterialId};
@@ -20,8 +20,9 @@ use crate::surface::vertex::WorldView;
 use crate::terrain::{Terrain, TerrainSettings};
 use crate::volume::{Brick, EditWork, Ledger, SampleView};
 
+mod emulator;
 #[path = "../../../tests/worlds/mod.rs"]
-mod worlds;
+pub(super) mod worlds;
 
 /// A device, and what is allocated there.
 struct Device {
@@ -450,7 +451,7 @@ fn compare_edits(device: &mut Device, world: &crate::terrain::World, edits: &[Ed
 fn edits_are_those_of_the_cpu() {
     let Some(mut device) = Device::start() else { return };
     let mut bricks = 0;
-    for (seed, mut rng) in seeds(60) {
+    for (seed, mut rng) in seeds(40) {
         let terrain = worlds::random_world(&mut rng, seed);
         let world = terrain.world();
         let edits = random_edits(&mut rng, world.ground(), world.grid().size() as u32);
@@ -659,7 +660,7 @@ fn compare_meshes(device: &mut Device, world: &crate::terrain::World, rng: &mut 
 fn meshes_are_those_of_the_cpu() {
     let Some(mut device) = Device::start() else { return };
     let mut blocks = 0;
-    for (seed, mut rng) in seeds(60) {
+    for (seed, mut rng) in seeds(40) {
         let terrain = worlds::random_world(&mut rng, seed);
         blocks += compare_meshes(&mut device, terrain.world(), &mut rng);
     }

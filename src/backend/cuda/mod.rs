@@ -1,8 +1,6 @@
 //! The device: kernels for NVIDIA cards.
 
 #[cfg(test)]
-mod emulator;
-#[cfg(test)]
 mod kernel_tests;
 #[allow(dead_code, reason = "the host side is not here yet")]
 mod layout;

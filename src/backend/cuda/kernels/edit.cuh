@@ -8,8 +8,8 @@
 #include "shapes.cuh"
 
 // How many samples a thread owns, and how many layers they are apart.
-static const i32 OWN = LEN / THREADS;
-static const i32 STEP = SIDE / OWN;
+constexpr i32 OWN = LEN / THREADS;
+constexpr i32 STEP = SIDE / OWN;
 
 // What one edit did.
 struct Effect {

@@ -9,32 +9,32 @@ typedef unsigned int u32;
 typedef long long i64;
 typedef unsigned long long u64;
 
-static const i32 THREADS = 128;
-static const u32 WARP = 0xffffffff;
+constexpr i32 THREADS = 128;
+constexpr u32 WARP = 0xffffffff;
 
 // Samples of a brick, and along one side of it.
-static const i32 LEN = 512;
-static const i32 SIDE = 8;
+constexpr i32 LEN = 512;
+constexpr i32 SIDE = 8;
 // Columns along a side of the window around a stack of bricks: one before it, two after. Also samples of an apron.
-static const i32 WINDOW = 11;
-static const i32 AREA = WINDOW * WINDOW;
+constexpr i32 WINDOW = 11;
+constexpr i32 AREA = WINDOW * WINDOW;
 // Corners of 8x8 cells.
-static const i32 CORNERS = 81;
+constexpr i32 CORNERS = 81;
 
 // Units of 1/256 voxel, of 1/4096 voxel.
-static const i32 ONE = 256;
-static const i32 SNAP = 4096;
+constexpr i32 ONE = 256;
+constexpr i32 SNAP = 4096;
 // How far outside a shape samples still change, and how deep inside distances are told apart.
-static const i32 BAND = 2 * ONE;
-static const i32 DEPTH = 4 * ONE;
-static const i32 OVERLAY_DEPTH = ONE + ONE / 2;
+constexpr i32 BAND = 2 * ONE;
+constexpr i32 DEPTH = 4 * ONE;
+constexpr i32 OVERLAY_DEPTH = ONE + ONE / 2;
 
 // A sample that nobody edited, and a material that nobody changed.
-static const i32 PRISTINE = -32768;
-static const u32 GROUND = 255;
+constexpr i32 PRISTINE = -32768;
+constexpr u32 GROUND = 255;
 
 // No brick; no entry.
-static const u32 NONE = 0xffffffff;
+constexpr u32 NONE = 0xffffffff;
 
 // Sample (x, y, z) is at x + 8 z + 64 y; of the bits, layer y is a word of 64 bits, here two halves.
 struct alignas(16) Brick {

@@ -3,14 +3,14 @@
 
 #include "threads.cuh"
 
-static const i32 LEVELS = 27;
+constexpr i32 LEVELS = 27;
 // Warps that have a corner.
-static const i32 CORNER_WARPS = 3;
+constexpr i32 CORNER_WARPS = 3;
 // Most edges that cross a surface: 8 x 9 x 9 along each axis. Most triangles: five in each cube.
-static const i32 MOST_VERTICES = 3 * 8 * 9 * 9;
-static const i32 MOST_TRIANGLES = 5 * LEN;
+constexpr i32 MOST_VERTICES = 3 * 8 * 9 * 9;
+constexpr i32 MOST_TRIANGLES = 5 * LEN;
 // A thread's own cells: four in a row.
-static const u32 CELLS_EACH = LEN / THREADS;
+constexpr u32 CELLS_EACH = LEN / THREADS;
 
 // Samples with their editedness in one number: twice the density, and one more if it is edited.
 typedef i32 Marked;
@@ -46,7 +46,7 @@ struct MeshBench {
 };
 
 // From where the corner (0, 0) is in `solid` and `drawn`.
-static const i32 MARGIN = 10;
+constexpr i32 MARGIN = 10;
 
 // A brick and what its stack has.
 struct Site {

@@ -4,18 +4,18 @@ use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use super::layout::Address;
+use crate::backend::cuda::layout::Address;
 
 /// The kernels, by their numbers.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Kernel {
+pub(super) enum Kernel {
     Scatter,
     Edit,
     Mesh,
 }
 
 /// A device with memory of its own.
-pub(crate) struct Emulator {
+pub(super) struct Emulator {
     child: Child,
     /// `None` once it was told to end.
     requests: Option<BufWriter<ChildStdin>>,
