@@ -211,6 +211,13 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
                 let roughness = Roughness::new(rng.f32() * 8.0, 1.0 + rng.f32() * 30.0, rng.u32(..));
                 brush = brush.with_roughness(roughness);
             }
+            4 => {
+                // Deeper than stored densities reach.
+                let column = Column::new(rng.i32(0..ground.width()), rng.i32(0..ground.depth()));
+                let y = ground.height(column) as f32 / 256.0 - 90.0 - rng.f32() * 80.0;
+                let shape = Shape::sphere(Vec3::new(column.x as f32, y, column.z as f32), 4.0);
+                brush = Brush::paint(shape, MaterialId(rng.u8(..)));
+            }
             _ => {}
         }
         brushes.push(brush);
@@ -684,5 +691,23 @@ fn a_brick_of_noise_is_meshed_like_on_the_cpu() {
         }
         let blocks = compare_meshes(&mut device, terrain.world(), &mut rng);
         assert!(blocks > 20, "seed {seed}");
+    }
+}
+
+#[test]
+fn cliffs_are_meshed_like_on_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    for (seed, mut rng) in seeds(6) {
+        // Between columns 32 voxels apart, crossings lie in the middle of two steps, which are rounded up.
+        let step = f64::from(1 << rng.u32(5..8));
+        let rises: Vec<f64> = (0..41).map(|_| f64::from(rng.i32(0..512)) / 256.0).collect();
+        let height = |x: i32, z: i32| rises[z as usize] + if (x + z / 3) & 1 == 0 { step } else { 0.0 };
+        let ground = Ground::from_fn(30, 40, height).expect("finite heights");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("a terrain");
+        for _ in 0..4 {
+            let center = Vec3::new(rng.f32() * 30.0, rng.f32() * step as f32, rng.f32() * 40.0);
+            terrain.apply([Brush::dig(Shape::sphere(center, 4.0))]);
+        }
+        assert!(compare_meshes(&mut device, terrain.world(), &mut rng) > 20, "seed {seed}");
     }
 }
