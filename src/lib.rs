@@ -114,8 +114,8 @@
 //! A terrain may be moved by whole voxels and scaled by powers of two; rotated, stretched or moved by a part of a voxel,
 //! its seams lose their equal bits.
 
-// Unit tests share the random worlds of tests/worlds, which call the crate by its name.
-#[cfg(all(test, feature = "cuda"))]
+// Tests of the crate share worlds with those beside it.
+#[cfg(test)]
 extern crate self as bevy_burrow;
 
 pub mod backend;

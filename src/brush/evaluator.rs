@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use glam::{I64Vec3, IVec3};
+use wide::{i16x8, i32x8};
 
 use super::BAND;
 use super::distance::{Distance, Form, larger, smaller};
@@ -66,9 +67,10 @@ impl Evaluator {
         }
     }
 
-    /// The same for the rows of 8 samples along x from `origin` on: those with `y` and `z` in these ranges, counted from
-    /// `origin`, go to `out[y * 8 + z]`; other rows stay as they are.
-    pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [[i32; 8]; 64]) {
+    /// The same for the rows of 8 samples along x from `origin` on, cut off at what 16 bits hold, far beyond where edits
+    /// tell distances apart: those with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`;
+    /// other rows stay as they are.
+    pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [i16x8; 64]) {
         match &self.form {
             Form::Sphere(sphere) => self.fill_rows(sphere, origin, y, z, out),
             Form::Cuboid(cuboid) => self.fill_rows(cuboid, origin, y, z, out),
@@ -85,17 +87,27 @@ impl Evaluator {
         origin: IVec3,
         y: Range<i32>,
         z: Range<i32>,
-        out: &mut [[i32; 8]; 64],
+        out: &mut [i16x8; 64],
     ) {
+        let along = |start: i32, home: i32, rest: i32| -> [f32; 8] {
+            std::array::from_fn(|i| units(i64::from(start) + i as i64, home, rest))
+        };
+        // Eight steps from beyond where coordinates stop count on from there, as in longer runs.
+        let first = voxels(origin.x.into(), self.home.x);
+        let xs: [f32; 8] = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);
+        let ys = along(origin.y, self.home.y, self.rest.y);
+        let zs = along(origin.z, self.home.z, self.rest.z);
         for y in y {
             for z in z.clone() {
-                let start = origin + IVec3::new(0, y, z);
                 let mut distances = [0.0; 8];
-                self.fill(shape, i64::from(start.x), start, &mut distances);
-                if let Some(grain) = &self.grain {
-                    grain.add(i64::from(start.x), start, &mut distances);
+                for (distance, &x) in distances.iter_mut().zip(&xs) {
+                    *distance = shape.at(x, ys[y as usize], zs[z as usize]);
                 }
-                out[(y * 8 + z) as usize] = distances.map(round);
+                if let Some(grain) = &self.grain {
+                    grain.add(i64::from(origin.x), origin + IVec3::new(0, y, z), &mut distances);
+                }
+                let rounded = i32x8::new(distances.map(round));
+                out[(y * 8 + z) as usize] = i16x8::from_i32x8_saturate(rounded);
             }
         }
     }
@@ -133,14 +145,25 @@ impl Evaluator {
     /// The loop that the compiler vectorises, one for each shape. `out` holds at most [`RUN`] distances.
     #[inline(always)]
     fn fill(&self, shape: &impl Distance, x: i64, start: IVec3, out: &mut [f32]) {
-        let voxels = |v: i64, home: i32| (v - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32;
         let first = voxels(x, self.home.x);
-        let y = (voxels(i64::from(start.y), self.home.y) * ONE - self.rest.y) as f32;
-        let z = (voxels(i64::from(start.z), self.home.z) * ONE - self.rest.z) as f32;
+        let y = units(start.y.into(), self.home.y, self.rest.y);
+        let z = units(start.z.into(), self.home.z, self.rest.z);
         for (i, out) in (0..).zip(out) {
             *out = shape.at(((first + i) * ONE - self.rest.x) as f32, y, z);
         }
     }
+}
+
+/// From a shape's home to a coordinate, in voxels.
+#[inline(always)]
+fn voxels(at: i64, home: i32) -> i32 {
+    (at - i64::from(home)).clamp(-FARTHEST, FARTHEST) as i32
+}
+
+/// From a shape's origin to a coordinate, in 1/256 voxel.
+#[inline(always)]
+fn units(at: i64, home: i32, rest: i32) -> f32 {
+    (voxels(at, home) * ONE - rest) as f32
 }
 
 /// An evaluator as plain numbers, for other machines.
@@ -210,15 +233,17 @@ mod tests {
             let grain = seed.map(|seed| Grain::quantize(&Roughness::new(1.5, 3.0, seed)).unwrap());
             let evaluator = Evaluator::new(&solid, grain);
             for origin in [IVec3::new(-3, -4, 0), IVec3::new(8, 0, -8), IVec3::new(1 << 14, 0, 0)] {
-                let mut rows = [[i32::MIN; 8]; 64];
+                let mut rows = [i16x8::splat(i16::MIN); 64];
                 evaluator.rows(origin, 1..7, 2..8, &mut rows);
                 for (i, row) in (0..).zip(rows) {
                     let (y, z) = (i / 8, i % 8);
-                    let mut expected = [i32::MIN; 8];
+                    let mut expected = [i32::from(i16::MIN); 8];
                     if (1..7).contains(&y) && (2..8).contains(&z) {
                         evaluator.row(origin + IVec3::new(0, y, z), &mut expected);
                     }
-                    assert_eq!(row, expected, "{solid:?} at {origin}, row {y} {z}");
+                    let expected =
+                        expected.map(|distance| distance.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
+                    assert_eq!(row.to_array(), expected, "{solid:?} at {origin}, row {y} {z}");
                 }
             }
         }

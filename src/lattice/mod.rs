@@ -15,10 +15,12 @@
 mod boxes;
 mod grid;
 pub(crate) mod hash;
+mod places;
 mod tables;
 
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
+pub(crate) use places::sort_by_place;
 pub(crate) use tables::table_bytes;
 
 use glam::IVec3;

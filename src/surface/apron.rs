@@ -1,11 +1,13 @@
 //! The samples around a brick, copied out of its bricks into one array.
 
-use glam::IVec3;
+use std::ops::RangeInclusive;
+
 use wide::{i16x8, i32x8};
 
 use super::corners::Heights;
+use super::window::Window;
 use crate::lattice::{BrickPos, ONE};
-use crate::volume::{Brick, Sample, SampleView};
+use crate::volume::{self, Brick, PRISTINE, Sample};
 
 /// Samples along one side: 9 corners, one more before and after for gradients.
 pub(super) const SIDE: usize = 11;
@@ -22,28 +24,30 @@ pub(super) struct Neighbours<'a> {
 }
 
 impl<'a> Neighbours<'a> {
-    /// Looks up the bricks that hold corners of a brick's cells.
-    pub fn corners_of(view: &SampleView<'a>, at: BrickPos) -> Self {
+    /// Finds the bricks that hold corners of a brick's cells.
+    #[inline]
+    pub fn corners_of(window: &Window<'a>, at: BrickPos) -> Self {
         let mut own = Self { bricks: [[None; 9]; 3], at };
-        for dy in 1..3 {
-            for i in CORNER_STACKS {
-                own.bricks[dy][i] = view.brick(own.pos(dy, i));
+        let [x, y, z] = window.steps();
+        let place = window.place(at);
+        for dy in 0..2 {
+            for (i, step) in CORNER_STACKS.into_iter().zip([0, x, z, x + z]) {
+                own.bricks[dy + 1][i] = window.at(place + dy * y + step);
             }
         }
         own
     }
 
-    /// Looks up the others as well.
-    pub fn complete(&mut self, view: &SampleView<'a>) {
-        for (dy, i) in (0..3).flat_map(|dy| (0..9).map(move |i| (dy, i))) {
-            if dy == 0 || !CORNER_STACKS.contains(&i) {
-                self.bricks[dy][i] = view.brick(self.pos(dy, i));
+    /// Finds the others as well.
+    #[inline]
+    pub fn complete(&mut self, window: &Window<'a>) {
+        let [x, y, z] = window.steps();
+        let first = window.place(self.at) - x - y - z;
+        for (dy, level) in self.bricks.iter_mut().enumerate() {
+            for (i, brick) in level.iter_mut().enumerate() {
+                *brick = window.at(first + dy * y + i / 3 * z + i % 3 * x);
             }
         }
-    }
-
-    fn pos(&self, dy: usize, i: usize) -> BrickPos {
-        BrickPos(self.at.0 + IVec3::new((i % 3) as i32, dy as i32, (i / 3) as i32) - 1)
     }
 
     /// The bricks that hold corners of the own brick's cells at its own height (`up` = 0) or at the next (1): the own
@@ -73,17 +77,26 @@ impl Apron {
         &*self.0
     }
 
-    /// Copies the layers `first..=last`, counted from the one before the brick's first.
-    pub fn fill(&mut self, neighbours: &Neighbours, heights: &Heights, first: usize, last: usize) {
+    /// Copies the layers `layers` of the rows `rows`, both counted from the one before the brick's first.
+    pub fn fill(
+        &mut self,
+        neighbours: &Neighbours,
+        heights: &Heights,
+        layers: RangeInclusive<usize>,
+        rows: RangeInclusive<usize>,
+    ) {
         let low = neighbours.at.origin().y - 1;
-        for layer in first..=last {
+        for layer in layers {
             let height = (low + layer as i32) * ONE;
-            // Layer 0 is the last one of the brick below.
+            // Layer 0 is the last one of the brick below; with rows it is the same.
             let (level, y) = (layer.div_ceil(8), (layer + 7) % 8);
-            let rows = self.0[layer * AREA..].chunks_exact_mut(SIDE);
-            for ((z, row), heights) in (7..).zip(rows).zip(heights) {
-                let bricks = &neighbours.bricks[level][z / 8 * 3..][..3];
-                fill_row(row, bricks, heights, height, y * 64 + z % 8 * 8);
+            for (z, bricks) in neighbours.bricks[level].as_chunks::<3>().0.iter().enumerate() {
+                let stored = bricks.map(|brick| brick.map_or(&PRISTINE, Brick::samples));
+                let own = (z * 8).saturating_sub(7)..=z * 8;
+                for row in *own.start().max(rows.start())..=*own.end().min(rows.end()) {
+                    let at = y * 64 + (row + 7) % 8 * 8;
+                    fill_row(&mut self.0[layer * AREA + row * SIDE..], stored, &heights[row], height, at);
+                }
             }
         }
     }
@@ -92,23 +105,26 @@ impl Apron {
 /// One row: a sample of the brick before, eight of the middle one, two of the one after. `at` is where the row begins in
 /// the bricks.
 #[inline(always)]
-fn fill_row(row: &mut [Marked], bricks: &[Option<&Brick>], heights: &[i32; SIDE], height: i32, at: usize) {
+fn fill_row(
+    row: &mut [Marked],
+    [before, own, after]: [&[Sample; 512]; 3],
+    heights: &[i32; SIDE],
+    height: i32,
+    at: usize,
+) {
     let (Some(row), Some(inner)) = (row.first_chunk_mut::<SIDE>(), heights[1..].first_chunk::<8>()) else {
         return;
     };
+    let samples = i32x8::from_i16x8(i16x8::new(volume::row(own, at)));
+    let is_pristine = samples.simd_eq(i32x8::splat(i16::MIN.into()));
     let pristine = i32x8::splat(height) - i32x8::new(*inner);
-    let mut marked = pristine + pristine;
-    if let Some(brick) = bricks[1] {
-        let samples = i32x8::from_i16x8(i16x8::new(brick.row(at)));
-        let is_pristine = samples.simd_eq(i32x8::splat(i16::MIN.into()));
-        marked = is_pristine.select(marked, samples + samples + i32x8::splat(1));
-    }
+    let marked = is_pristine.select(pristine + pristine, samples + samples + i32x8::splat(1));
     row[1..9].copy_from_slice(&marked.to_array());
-    let beside = |brick: Option<&Brick>, x: usize, pristine: i32| {
-        let stored = brick.map_or(Sample::PRISTINE, |brick| brick.samples()[at + x]);
-        stored.distance().map_or((height - pristine) * 2, |distance| distance * 2 + 1)
+    let beside = |stored: Sample, surface: i32| match stored {
+        Sample::PRISTINE => (height - surface) * 2,
+        stored => i32::from(stored.bits()) * 2 + 1,
     };
-    row[0] = beside(bricks[0], 7, heights[0]);
-    row[9] = beside(bricks[2], 0, heights[9]);
-    row[10] = beside(bricks[2], 1, heights[10]);
+    row[0] = beside(before[at + 7], heights[0]);
+    row[9] = beside(after[at], heights[9]);
+    row[10] = beside(after[at + 1], heights[10]);
 }

@@ -21,6 +21,7 @@ use super::mask::sheet;
 use super::mesh::Vertex;
 use super::stack::{Stack, pristine_side, world_cells};
 use super::vertex::WorldView;
+use super::window::{self, Window};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 use crate::volume::Brick;
@@ -83,25 +84,33 @@ pub struct Mesher {
     apron: Apron,
     crossings: Crossings,
     numbers: Numbers,
+    window: Window<'static>,
 }
 
 impl Mesher {
     /// Meshes blocks and adds their parts to `out`, in the same order. Blocks of one stack of bricks should follow each
     /// other, from below.
     pub fn mesh(&mut self, view: &WorldView, blocks: &[Block], out: &mut Parts) {
-        for stack in blocks.chunk_by(|a, b| stack_of(a.brick) == stack_of(b.brick)) {
-            self.mesh_stack(view, stack, out);
+        let (mut blocks, mut window) = (blocks, std::mem::take(&mut self.window).emptied());
+        while let Some((count, places)) = window::shared(blocks.iter().map(|block| block.brick)) {
+            let (near, others) = blocks.split_at(count);
+            window = window.moved(&view.samples, places);
+            for stack in near.chunk_by(|a, b| stack_of(a.brick) == stack_of(b.brick)) {
+                self.mesh_stack(view, &window, stack, out);
+            }
+            blocks = others;
         }
+        self.window = window.emptied();
     }
 
-    fn mesh_stack(&mut self, view: &WorldView, blocks: &[Block], out: &mut Parts) {
+    fn mesh_stack(&mut self, view: &WorldView, window: &Window, blocks: &[Block], out: &mut Parts) {
         let Some(first) = blocks.first() else { return };
         let mut stack = Stack::new(view, stack_of(first.brick));
         for brick in blocks.chunk_by(|a, b| a.brick == b.brick) {
-            let mut around = Neighbours::corners_of(&view.samples, brick[0].brick);
+            let mut around = Neighbours::corners_of(window, brick[0].brick);
             let cubes = Cubes::find(&stack, &around, brick[0].brick);
             if cubes.is_some() {
-                around.complete(&view.samples);
+                around.complete(window);
             }
             for &block in brick {
                 let cells = block.brick.samples().intersection(view.grid.chunk_cells(block.chunk));
@@ -127,8 +136,11 @@ impl Mesher {
         let drawn = cubes.within(cells, brick);
         let filled = |y: &usize| drawn[*y] != 0;
         let (Some(bottom), Some(top)) = ((0..8).find(filled), (0..8).rfind(filled)) else { return };
-        // Layers of the apron start one below; the gradients at the upper corners look one further.
-        self.apron.fill(around, &stack.heights, bottom, top + 3);
+        let all = drawn.iter().fold(0, |all, layer| all | layer);
+        let (near, far) = (all.trailing_zeros() / Z, all.ilog2() / Z);
+        // The apron starts one before the cells; the gradients at the corners beyond them look one further.
+        let rows = near as usize..=far as usize + 3;
+        self.apron.fill(around, &stack.heights, bottom..=top + 3, rows);
         self.list_edges(&cubes.solid, &drawn, bottom, top);
         self.crossings.make(&self.apron, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
@@ -162,18 +174,29 @@ impl Mesher {
         top: usize,
         out: &mut Vec<u16>,
     ) {
+        const MOST: usize = 15;
         let table = &*SLOTS;
+        let cubes: u32 = drawn[bottom..=top].iter().map(|layer| layer.count_ones()).sum();
+        let mut end = out.len();
+        out.resize(end + cubes as usize * MOST, 0);
         for y in bottom..=top {
             corners::for_ones(drawn[y], |cell| {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
                 let entry = &table[case];
-                out.extend(
-                    entry.slots[..entry.len].iter().map(|&slot| self.numbers.at(base + usize::from(slot))),
-                );
+                let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
+                // Most cubes have two triangles at most. Those two are always written; what is too many is written over.
+                let (usual, others) = entry.slots.split_at(6);
+                let (first, rest) = room.split_at_mut(6);
+                let number = |slot: &u16| self.numbers.at(base + usize::from(*slot));
+                first.iter_mut().zip(usual).for_each(|(to, slot)| *to = number(slot));
+                let more = entry.len.saturating_sub(6);
+                rest.iter_mut().zip(&others[..more]).for_each(|(to, slot)| *to = number(slot));
+                end += entry.len;
             });
         }
+        out.truncate(end);
     }
 }
 
@@ -325,23 +348,26 @@ pub(crate) fn prepare() {
     LazyLock::force(&SLOTS);
 }
 
-/// Cells of the brick's stack that belong to the mask because of samples around this brick (rule 2): a corner of a cube
-/// of their sheet is edited. As 8x8 cells, bit `z * 8 + x`.
-pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {
-    let stack = (brick.0.x, brick.0.z);
-    let low = brick.origin();
-    let heights = corners::heights(view.samples.ground(), Column::of(low));
-    if pristine_side(corners::range(&heights), low.y).is_some() {
-        return 0;
-    }
-    let around = Neighbours::corners_of(&view.samples, brick);
-    let near = [around.corners(0), around.corners(1)];
-    let pristine = corners::pristine(&heights, low.y);
+/// Cells of a stack that belong to the mask because of samples around some of its bricks (rule 2): a corner of a cube of
+/// their sheet is edited. As 8x8 cells, bit `z * 8 + x`. The window must reach one brick further.
+pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos]) -> u64 {
+    let Some(stack) = bricks.first().map(|&brick| stack_of(brick)) else { return 0 };
+    let heights = corners::heights(view.samples.ground(), Column::new(stack.0 * 8, stack.1 * 8));
+    let range = corners::range(&heights);
     let mut cells = 0;
-    for y in 0..8 {
-        let sheet = corners::mixed(pristine[y], pristine[y + 1]);
-        if sheet & !cells != 0 {
-            cells |= sheet & corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1));
+    for &brick in bricks {
+        let low = brick.origin().y;
+        if pristine_side(range, low).is_some() {
+            continue;
+        }
+        let around = Neighbours::corners_of(window, brick);
+        let near = [around.corners(0), around.corners(1)];
+        let pristine = corners::pristine(&heights, range, low);
+        for y in 0..8 {
+            let sheet = corners::mixed(pristine[y], pristine[y + 1]);
+            if sheet & !cells != 0 {
+                cells |= sheet & corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1));
+            }
         }
     }
     let cells = cells & world_cells(view, stack);
@@ -349,15 +375,15 @@ pub(crate) fn disturbed(view: &WorldView, brick: BrickPos) -> u64 {
 }
 
 /// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.
-pub(crate) fn sheet_rows(ground: &Ground, low: Column, mut cells: u64) -> Range<i32> {
+pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
     let heights = ground.heights::<9>(low);
+    let cells = corners::spread(cells);
+    // The corners of these cells.
+    let along = cells | cells << X;
     let mut range = (i32::MAX, i32::MIN);
-    while cells != 0 {
-        let (x, z) = (cells.trailing_zeros() as usize & 7, cells.trailing_zeros() as usize >> 3);
-        for height in [heights[z][x], heights[z][x + 1], heights[z + 1][x], heights[z + 1][x + 1]] {
-            range = (range.0.min(height), range.1.max(height));
-        }
-        cells &= cells - 1;
-    }
+    corners::for_ones(along | along << Z, |corner| {
+        let height = heights.as_flattened()[corner];
+        range = (range.0.min(height), range.1.max(height));
+    });
     sheet([range.0, range.1])
 }

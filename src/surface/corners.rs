@@ -3,9 +3,11 @@
 //! Bit `z * 9 + x` stands for the corner (x, z), and also for the cell whose lowest corner that is. So the corner one
 //! step along x is one bit further, the one along z nine bits, and a whole layer is judged by a few operations.
 
+use wide::i32x8;
+
 use super::apron::SIDE;
 use crate::ground::Ground;
-use crate::lattice::{Column, ceil};
+use crate::lattice::{Column, ONE, ceil};
 
 /// A bit for each of 9x9 corners, or of 8x8 cells.
 pub type Corners = u128;
@@ -106,24 +108,28 @@ pub static PLACES: [Place; 81] = {
     places
 };
 
-/// Which corners of the 9 layers from `y` on are solid in the pristine world, under columns of these heights.
-pub fn pristine(heights: &Heights, y: i32) -> [Corners; 9] {
-    // In each column the lowest samples are solid, as many as lie below its height; the rest of rows is done by words.
-    let count = |height: i32| (ceil(height) - y).clamp(0, 9) as usize;
-    let mut rising = [[0u64; 2]; 10];
-    for z in 0..9 {
-        let (word, shift) = (z / 5, z % 5 * 9);
-        for x in 0..9 {
-            rising[count(heights[z + 1][x + 1])][word] |= 1 << (shift + x);
-        }
-    }
+/// Which corners of the 9 layers from `y` on are solid in the pristine world, under columns of these heights, of which
+/// `range` is the range.
+pub fn pristine(heights: &Heights, range: (i32, i32), y: i32) -> [Corners; 9] {
+    // Below the lowest height all is solid, from the highest on nothing is.
+    let [all, some] = [ceil(range.0), ceil(range.1)].map(|top| (top - y).clamp(0, 9) as usize);
     let mut layers = [0; 9];
-    let mut above = [0; 2];
-    for y in (0..9).rev() {
-        above = [above[0] | rising[y + 1][0], above[1] | rising[y + 1][1]];
-        layers[y] = u128::from(above[0]) | u128::from(above[1]) << 45;
+    layers[..all].fill(ALL);
+    for (layer, y) in layers[all..some].iter_mut().zip(y + all as i32..) {
+        *layer = below(heights, y * ONE);
     }
     layers
+}
+
+/// Corners whose columns are higher than this.
+fn below(heights: &Heights, y: i32) -> Corners {
+    let mut words = [0u64; 2];
+    for (z, row) in heights[1..10].iter().enumerate() {
+        let Some(first) = row[1..].first_chunk::<8>() else { continue };
+        let solid = i32x8::new(*first).simd_gt(i32x8::splat(y)).to_bitmask() | u32::from(row[9] > y) << 8;
+        words[z / 5] |= u64::from(solid) << (z % 5 * 9);
+    }
+    u128::from(words[0]) | u128::from(words[1]) << 45
 }
 
 /// Heights of the columns around a stack of bricks, from one before its first on.
@@ -147,7 +153,6 @@ pub fn range(heights: &Heights) -> (i32, i32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::ONE;
     use proptest::{prop_assert, prop_assert_eq, proptest};
 
     fn at(bits: Corners, x: usize, z: usize) -> bool {
@@ -196,7 +201,7 @@ mod tests {
     fn pristine_corners_are_those_below_the_ground() {
         let heights: Heights =
             std::array::from_fn(|z| std::array::from_fn(|x| (z * 11 + x) as i32 * 4051 % 3001 - 900));
-        let layers = pristine(&heights, -3);
+        let layers = pristine(&heights, range(&heights), -3);
         for (y, layer) in (-3..).zip(layers) {
             for (bit, height) in corner_heights(&heights).enumerate() {
                 assert_eq!(layer >> bit & 1 == 1, y * ONE < height);

@@ -7,7 +7,7 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x8, i32x8};
 
-use super::apron::{AREA, Apron, Neighbours, SIDE};
+use super::apron::{AREA, Apron, Marked, Neighbours, SIDE};
 use super::corners::PLACES;
 use super::mesh::{MaterialMix, Vertex};
 use super::stack::Stack;
@@ -86,7 +86,7 @@ impl Site<'_, '_> {
 
     #[inline(always)]
     fn vertex<const AXIS: usize>(&mut self, batch: &Batch, lane: usize, edge: Edge) -> Vertex {
-        let (corner, y) = (usize::from(edge.corner), i32::from(edge.y));
+        let (lane, corner, y) = (lane % LANES, usize::from(edge.corner), i32::from(edge.y));
         let place = &PLACES[corner];
         let other = corner + NEXT_CORNER[AXIS];
         let step = batch.steps[lane];
@@ -157,19 +157,22 @@ impl Batch {
     fn new<const AXIS: usize>(apron: &Apron, edges: &[Edge]) -> Self {
         let [along, b, c] = STEPS[AXIS];
         let (p, q) = (AREA, AREA + along);
+        // Lanes beyond the last edge repeat it.
+        let near: [&[Marked; NEAR]; LANES] = std::array::from_fn(|lane| {
+            let edge = edges[lane.min(edges.len() - 1)];
+            let first = usize::from(edge.y) * AREA + PLACES[usize::from(edge.corner)].apron;
+            apron.samples()[first..].first_chunk().unwrap_or(&[0; NEAR])
+        });
+        let at = |place: usize| {
+            let [a, b, c, d, e, f, g, h] = near;
+            i32x8::new([a[place], b[place], c[place], d[place], e[place], f[place], g[place], h[place]])
+        };
+        let around = |end: usize, step: usize| [at(end - step), at(end + step)];
         // Both ends, one before and one after them along the edge, and around both ends along the other two axes.
-        let places: [usize; 12] =
-            [p - along, p, q, q + along, p - b, p + b, q - b, q + b, p - c, p + c, q - c, q + c];
-        let mut gathered = [[0; LANES]; 12];
-        for (lane, &edge) in edges.iter().enumerate() {
-            let corner = &PLACES[usize::from(edge.corner)];
-            let first = usize::from(edge.y) * AREA + corner.apron;
-            let Some(near) = apron.samples()[first..].first_chunk::<NEAR>() else { continue };
-            for (samples, &place) in gathered.iter_mut().zip(&places) {
-                samples[lane] = near[place];
-            }
-        }
-        let [before, p, q, after, pb, pb2, qb, qb2, pc, pc2, qc, qc2] = gathered.map(i32x8::new);
+        let ([before, _], [_, after]) = (around(p, along), around(q, along));
+        let ([pb, pb2], [qb, qb2]) = (around(p, b), around(q, b));
+        let ([pc, pc2], [qc, qc2]) = (around(p, c), around(q, c));
+        let (p, q) = (at(p), at(q));
         let is_edited = p | q;
         let stencil = is_edited | before | after | pb | pb2 | qb | qb2 | pc | pc2 | qc | qc2;
         let flags = |marked: i32x8| (marked << 31u32).to_bitmask();

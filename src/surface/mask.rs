@@ -112,18 +112,21 @@ impl<'a> MaskView<'a> {
     pub fn borders(&self, low: Column, high: Column) -> Borders {
         let (width, depth) = ((high.x - low.x).max(0) as usize, (high.z - low.z).max(0) as usize);
         let mut borders = Borders { low, width, cells: vec![0; width * depth] };
-        for z in (low.z - 1) >> 3..=high.z >> 3 {
-            for x in (low.x - 1) >> 3..=high.x >> 3 {
-                let mut bits = self.word((x, z));
-                while bits != 0 {
-                    let bit = bits.trailing_zeros() as i32;
-                    bits &= bits - 1;
-                    let cell = Column::new(x << 3 | bit & 7, z << 3 | bit >> 3);
-                    borders.mark(cell, Borders::VOLUMETRIC);
-                    for (side, (dx, dz)) in Borders::SIDES.into_iter().enumerate() {
-                        borders.mark(cell.offset(-dx, -dz), 1 << side);
-                    }
+        let xs = low.x >> 3..=(high.x - 1) >> 3;
+        for z in low.z >> 3..=(high.z - 1) >> 3 {
+            // The words around the one at x: [dz + 1][dx + 1].
+            let mut words = [0; 3].map(|_: i32| [0; 3]);
+            let column = |x: i32| [-1, 0, 1].map(|dz| self.word((x, z + dz)));
+            let mut shift = |next: [u64; 3]| {
+                for (row, word) in words.iter_mut().zip(next) {
+                    *row = [row[1], row[2], word];
                 }
+                words
+            };
+            shift(column(xs.start() - 1));
+            shift(column(*xs.start()));
+            for x in xs.clone() {
+                borders.mark((x, z), &shift(column(x + 1)));
             }
         }
         borders
@@ -145,12 +148,29 @@ impl Borders {
     /// [`Column::corners`] runs.
     pub const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
-    fn mark(&mut self, cell: Column, bits: u8) {
-        let (x, z) = ((cell.x - self.low.x) as usize, (cell.z - self.low.z) as usize);
-        if x < self.width
-            && let Some(flags) = self.cells.get_mut(z.wrapping_mul(self.width).wrapping_add(x))
-        {
-            *flags |= bits;
+    /// Enters the flags of 8x8 cells, by the words of the mask around them: `[dz + 1][dx + 1]`.
+    fn mark(&mut self, (x, z): (i32, i32), words: &[[u64; 3]; 3]) {
+        const FIRST: u64 = 0x0101_0101_0101_0101;
+        let own = words[1][1];
+        // In the order of SIDES: each cell's neighbour moved to where the cell is.
+        let sides = [
+            (own & !(FIRST << 7)) << 1 | words[1][0] >> 7 & FIRST,
+            own >> 8 | words[2][1] << 56,
+            (own & !FIRST) >> 1 | (words[1][2] & FIRST) << 7,
+            own << 8 | words[0][1] >> 56,
+        ];
+        if own | sides[0] | sides[1] | sides[2] | sides[3] == 0 {
+            return;
+        }
+        let (from, end) = ((x * 8).max(self.low.x), (x * 8 + 8).min(self.low.x + self.width as i32));
+        for row in 0..8 {
+            let Ok(along) = usize::try_from(z * 8 + row - self.low.z) else { continue };
+            let start = along * self.width + (from - self.low.x) as usize;
+            let Some(cells) = self.cells.get_mut(start..start + (end - from) as usize) else { return };
+            let lanes = |word: u64| spread((word >> (row * 8)) as u8);
+            let flags =
+                (0..).zip(sides).fold(lanes(own) << 4, |flags, (side, word)| flags | lanes(word) << side);
+            cells.copy_from_slice(&flags.to_le_bytes()[(from - x * 8) as usize..][..cells.len()]);
         }
     }
 
@@ -159,6 +179,12 @@ impl Borders {
         let start = (z - self.low.z) as usize * self.width;
         &self.cells[start..start + self.width]
     }
+}
+
+/// Eight bits as the lowest bits of eight bytes.
+fn spread(bits: u8) -> u64 {
+    let each = u64::from(bits) * 0x0101_0101_0101_0101 & 0x8040_2010_0804_0201;
+    (each + 0x7f7f_7f7f_7f7f_7f7f) >> 7 & 0x0101_0101_0101_0101
 }
 
 #[cfg(test)]
@@ -177,6 +203,29 @@ mod tests {
         ];
         for (heights, expected) in cases {
             assert_eq!(sheet(heights), expected, "{heights:?}");
+        }
+    }
+
+    #[test]
+    fn borders_are_beside_the_mask() {
+        let mut mask = Mask::default();
+        for (word, cells) in
+            [((0, 0), 0x8100_0000_0012_0081), ((1, 0), 0x0180), ((0, 1), 0xf0), ((-1, 0), 0x80)]
+        {
+            mask.insert_word(word, cells);
+        }
+        let view = MaskView::new(&mask);
+        for (low, high) in [((0, 0), (8, 8)), ((-3, -2), (11, 13)), ((3, 5), (5, 7)), ((7, 7), (30, 9))] {
+            let (low, high) = (Column::new(low.0, low.1), Column::new(high.0, high.1));
+            let borders = view.borders(low, high);
+            for (x, z) in (low.z..high.z).flat_map(|z| (low.x..high.x).map(move |x| (x, z))) {
+                let cell = Column::new(x, z);
+                let mut expected = if mask.contains(cell) { Borders::VOLUMETRIC } else { 0 };
+                for (side, (dx, dz)) in Borders::SIDES.into_iter().enumerate() {
+                    expected |= u8::from(mask.contains(cell.offset(dx, dz))) << side;
+                }
+                assert_eq!(borders.row(z)[(x - low.x) as usize], expected, "{cell:?}");
+            }
         }
     }
 

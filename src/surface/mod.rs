@@ -22,6 +22,7 @@ pub mod seams;
 mod stack;
 pub mod tile;
 pub mod vertex;
+pub(crate) mod window;
 
 #[cfg(feature = "cuda")]
 pub(crate) use stack::borders;

@@ -20,8 +20,9 @@ pub(super) struct Stack<'a> {
     range: (i32, i32),
     /// Cells of the mask.
     pub mask: Corners,
-    /// Lattice edges along x, y and z on the mask's border; see [`Self::is_border`].
-    borders: [u128; 3],
+    /// Lattice edges along x, y and z on the mask's border, once [`Self::is_border`] has been asked.
+    borders: Option<[u128; 3]>,
+    view: WorldView<'a>,
     normals: [Vec3; 81],
     has_normal: [bool; 81],
     /// Near the surface, and deeper than the overlay.
@@ -46,7 +47,8 @@ impl<'a> Stack<'a> {
             heights,
             range: corners::range(&heights),
             mask: corners::spread(own),
-            borders: borders(view, (x, z), own),
+            borders: None,
+            view: *view,
             normals: [Vec3::ZERO; 81],
             has_normal: [false; 81],
             mixes: [[MaterialMix::default(); 2]; 81],
@@ -65,14 +67,16 @@ impl<'a> Stack<'a> {
         match self.pristine_side(y) {
             Some(true) => [corners::ALL; 9],
             Some(false) => [0; 9],
-            None => corners::pristine(&self.heights, y),
+            None => corners::pristine(&self.heights, self.range, y),
         }
     }
 
     /// Does the lattice edge from a corner along an axis lie between a volumetric cell and one that stays heightmap?
-    pub fn is_border(&self, corner: usize, axis: usize) -> bool {
+    pub fn is_border(&mut self, corner: usize, axis: usize) -> bool {
         let place = &PLACES[corner];
-        self.borders[axis] >> ((place.z + 1) * WINDOW + place.x + 1) & 1 == 1
+        let stack = (self.low.x >> 3, self.low.z >> 3);
+        let own = self.borders.get_or_insert_with(|| borders(&self.view, stack, self.view.mask.word(stack)));
+        own[axis] >> ((place.z + 1) * WINDOW + place.x + 1) & 1 == 1
     }
 
     /// The height over a corner.

@@ -55,6 +55,10 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     for z in low.z..high.z {
         let (row, base) = (borders.row(z), (z - low.z) as u32 * width);
         // Runs of whole cells are the first row's, moved.
+        if row.iter().fold(0, |all, flags| all | flags) == 0 {
+            indices.extend(first.iter().map(|&index| index + base));
+            continue;
+        }
         let mut rest = row;
         while !rest.is_empty() {
             let whole = rest.iter().position(|&flags| flags != 0).unwrap_or(rest.len());
@@ -76,6 +80,9 @@ pub struct Rings {
     fans: Vec<u32>,
     patches: Vec<Patch>,
 }
+
+/// Vertices for which updated rings have room at first.
+const ROOM: usize = 64;
 
 /// The rings of 8x8 cells of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,6 +117,9 @@ impl Rings {
         patches: &[(i32, i32)],
     ) -> Self {
         let mut drawing = Drawing::new(world, tile, borders);
+        drawing.rings.vertices.reserve(self.vertices.len() + ROOM);
+        drawing.rings.fans.reserve(self.fans.len() + 3 * ROOM);
+        drawing.rings.patches.reserve(self.patches.len() + patches.len());
         let (mut own, mut fresh) = (0, 0);
         loop {
             let next = match (self.patches.get(own), patches.get(fresh)) {
@@ -159,7 +169,8 @@ impl<'a> Drawing<'a> {
     fn new(world: &WorldView<'a>, tile: TilePos, borders: &'a Borders) -> Self {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
-        Self { ground, borders, low, high, base, rings: Rings::default(), sides: Default::default() }
+        let sides = [(); 4].map(|()| Vec::with_capacity(ROOM));
+        Self { ground, borders, low, high, base, rings: Rings::default(), sides }
     }
 
     /// The rings, without room for more: they are kept until the next edit nearby.

@@ -1,5 +1,6 @@
 //! What a transaction draws anew: cells that join the mask, dirty blocks, touched tiles.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,12 +11,13 @@ use rustc_hash::FxHashMap;
 use super::surface::{ChunkSurface, Fresh, key};
 use super::transaction::Stages;
 use super::world::World;
-use crate::backend::{Backend, PARALLEL_BLOCKS};
+use crate::backend::{Compute, PARALLEL_BLOCKS};
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos, sort_by_place};
 use crate::surface::block::{self, Block, Parts};
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
+use crate::surface::window::{self, Window};
 use crate::surface::{Mask, SurfaceMesh};
 use crate::volume::DraftedBrick;
 
@@ -52,18 +54,31 @@ impl TileUpdate {
 /// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
 fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
     // A sample is a corner of the cells one below it.
-    let around =
-        |drafted: &DraftedBrick| LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
-    let boxes: Vec<LatticeBox> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
-    let near = by_brick(&boxes);
-    let disturbed = |&(brick, _): &(BrickPos, LatticeBox)| {
-        let word = (brick.0.x, brick.0.z);
-        (word, block::disturbed(view, brick) & !view.mask.word(word))
+    let around = |drafted: &DraftedBrick| {
+        (drafted.pos.0.x, LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max })
+    };
+    let boxes: Vec<_> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
+    let near: Vec<BrickPos> = by_brick(&boxes).into_iter().map(|(brick, _)| brick).collect();
+    let mut windows = Vec::new();
+    let mut rest = &near[..];
+    while let Some((count, places)) = window::shared(rest.iter().copied()) {
+        let (bricks, others) = rest.split_at(count);
+        windows.push((bricks, places));
+        rest = others;
+    }
+    let disturbed = |&(bricks, places): &(&[BrickPos], LatticeBox)| {
+        let window = Window::new(&view.samples, places);
+        let mut found = Vec::new();
+        for stack in bricks.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
+            let word = (stack[0].0.x, stack[0].0.z);
+            found.push((word, block::disturbed(view, &window, stack) & !view.mask.word(word)));
+        }
+        found
     };
     let cells: Vec<_> = if near.len() < PARALLEL_BLOCKS {
-        near.iter().map(disturbed).collect()
+        windows.iter().flat_map(disturbed).collect()
     } else {
-        near.par_iter().map(disturbed).collect()
+        windows.par_iter().flat_map_iter(disturbed).collect()
     };
     let mut added = Mask::default();
     for (word, cells) in cells {
@@ -78,7 +93,10 @@ type ByBrick = Vec<(BrickPos, LatticeBox)>;
 /// The cells that join the mask, and those that the changed samples show in, whether they join or not.
 pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut Stages) -> (Mask, ByBrick) {
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
-    let around = |drafted: &DraftedBrick| in_world(view, drafted.changed.min - 2, drafted.changed.max + 1);
+    let around = |drafted: &DraftedBrick| {
+        let (x, changed) = (drafted.pos.0.x, drafted.changed);
+        in_world(view, changed.min - 2, changed.max + 1).map(|cells| (x, cells))
+    };
     let added = || timed(|| added_cells(view, changed));
     let dirty = || timed(|| by_brick(&changed.iter().filter_map(around).collect::<Vec<_>>()));
     let ((added, ring), (dirty, meshing)) = side_by_side(changed, added, dirty);
@@ -91,7 +109,7 @@ pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut S
 pub(super) fn updates(
     world: &World,
     view: &WorldView,
-    backend: &dyn Backend,
+    backend: &dyn Compute,
     changed: &[DraftedBrick],
     dirty: ByBrick,
     added: &Mask,
@@ -134,31 +152,51 @@ fn in_world(view: &WorldView, low: IVec3, high: IVec3) -> Option<LatticeBox> {
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
 fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block> {
-    // A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border.
-    let mut sheets = Vec::new();
-    for ((x, z), cells) in added.words() {
-        for (dx, dz) in (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz))) {
-            let stack = (x + dx, z + dz);
-            let near = grown_into(cells, dx, dz) & view.mask.word(stack);
-            if near != 0 {
-                let low = Column::new(stack.0 * 8, stack.1 * 8);
-                let rows = block::sheet_rows(view.samples.ground(), low, near);
-                sheets.extend(in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1)));
-            }
-        }
-    }
+    let is_large = dirty.len() >= PARALLEL_BLOCKS;
+    let sheets = sheets_near(view, added);
     if !sheets.is_empty() {
         dirty.extend(by_brick(&sheets));
         // Two sorted lists, which this merges.
         dirty.sort_by_key(|(brick, _)| stack_order(brick));
     }
-    let mut blocks = Vec::with_capacity(dirty.len());
-    for same in dirty.chunk_by(|a, b| a.0 == b.0) {
+    let blocks = |same: &[(BrickPos, LatticeBox)]| {
         let brick = same[0].0;
         let cells = same.iter().fold(same[0].1, |all, (_, cells)| all.union(*cells));
-        blocks.extend(view.grid.chunks_of(cells).map(|chunk| Block { brick, chunk }));
+        view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
+    };
+    if is_large {
+        dirty.par_chunk_by(|a, b| a.0 == b.0).flat_map_iter(blocks).collect()
+    } else {
+        let mut found = Vec::with_capacity(dirty.len());
+        dirty.chunk_by(|a, b| a.0 == b.0).for_each(|same| found.extend(blocks(same)));
+        found
     }
-    blocks
+}
+
+/// A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border. The boxes around all of these,
+/// one for each stack of bricks and with its x, by which they are sorted.
+fn sheets_near(view: &WorldView, added: &Mask) -> Vec<(i32, LatticeBox)> {
+    let mut near = Vec::new();
+    for ((x, z), cells) in added.words() {
+        for (dx, dz) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dz| (dx, dz))) {
+            let cells = grown_into(cells, dx, dz);
+            near.extend((cells != 0).then_some(((x + dx, z + dz), cells)));
+        }
+    }
+    sort_by_place(&mut near, |&((x, z), _)| [x, z, 0]);
+    let sheet = |same: &[((i32, i32), u64)]| {
+        let stack = same[0].0;
+        let cells = same.iter().fold(0, |all, (_, cells)| all | cells) & view.mask.word(stack);
+        let low = Column::new(stack.0 * 8, stack.1 * 8);
+        let rows = (cells != 0).then(|| block::sheet_rows(view.samples.ground(), low, cells))?;
+        Some((stack.0, in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))?))
+    };
+    let stacks = |a: &((i32, i32), u64), b: &((i32, i32), u64)| a.0 == b.0;
+    if near.len() < PARALLEL_BLOCKS {
+        near.chunk_by(stacks).filter_map(sheet).collect()
+    } else {
+        near.par_chunk_by(stacks).filter_map(sheet).collect()
+    }
 }
 
 /// Stacks of bricks one after the other, each from below.
@@ -169,18 +207,39 @@ fn stack_order(brick: &BrickPos) -> (i32, i32, i32) {
 /// How many places for bricks a table may have for each box.
 const PLACES: u64 = 64;
 
-/// The bricks that hold cells of these boxes, each with the box around its own of them.
-fn by_brick(boxes: &[LatticeBox]) -> ByBrick {
-    let mut found = ByBrick::with_capacity(boxes.len() * 2);
-    let Some(all) = boxes.iter().copied().reduce(LatticeBox::union) else { return found };
-    let all = LatticeBox { min: all.min >> 3, max: all.max >> 3 };
+/// The bricks that hold cells of these boxes, each with the box around its own of them. Every box belongs to something
+/// whose x, in bricks, stands beside it, at most one brick away; by that number they are sorted.
+fn by_brick(boxes: &[(i32, LatticeBox)]) -> ByBrick {
+    let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return ByBrick::new() };
+    if boxes.len() < PARALLEL_BLOCKS {
+        return those_within(first.0 - 1..=last.0 + 1, boxes);
+    }
+    let slab = |x: i32| {
+        let from = boxes.partition_point(|(home, _)| *home < x - 1);
+        let near = boxes[from..].partition_point(|(home, _)| *home <= x + 1);
+        those_within(x..=x, &boxes[from..from + near])
+    };
+    (first.0 - 1..last.0 + 2).into_par_iter().map(slab).collect::<Vec<_>>().concat()
+}
+
+/// Those of the bricks whose x lies in a range.
+fn those_within(xs: RangeInclusive<i32>, boxes: &[(i32, LatticeBox)]) -> ByBrick {
+    let within = |cells: &LatticeBox| {
+        let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
+        LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
+    };
+    let bricks = || boxes.iter().filter_map(|(_, cells)| Some((within(cells)?, cells)));
+    let Some(all) = bricks().map(|(bricks, _)| bricks).reduce(LatticeBox::union) else {
+        return ByBrick::new();
+    };
     // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
     let size = all.size();
     let is_dense = all.volume() <= PLACES * boxes.len() as u64;
     let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
     let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
-    for cells in boxes {
-        for brick in BrickPos::covering(*cells) {
+    let mut found = ByBrick::with_capacity(boxes.len() * 4);
+    for (bricks, cells) in bricks() {
+        for brick in bricks.points().map(BrickPos) {
             let Some(cells) = brick.samples().intersection(*cells) else { continue };
             let number = if is_dense {
                 let at = brick.0 - all.min;
@@ -196,6 +255,13 @@ fn by_brick(boxes: &[LatticeBox]) -> ByBrick {
                 *own = own.union(cells);
             }
         }
+    }
+    if is_dense {
+        return table
+            .iter()
+            .filter(|&&number| number != 0)
+            .map(|&number| found[number as usize - 1])
+            .collect();
     }
     found.sort_unstable_by_key(|(brick, _)| stack_order(brick));
     found
@@ -220,7 +286,7 @@ fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
 fn mesh_blocks(
     world: &World,
     view: &WorldView,
-    backend: &dyn Backend,
+    backend: &dyn Compute,
     blocks: &[Block],
     stages: &mut Stages,
 ) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
@@ -241,23 +307,20 @@ fn assemble(world: &World, parts: &[Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };
     let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
+    sort_by_place(&mut all, |(chunk, _)| chunk.as_ivec3().to_array());
     let is_large = all.len() >= PARALLEL_BLOCKS;
-    if is_large {
-        all.par_sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
-    } else {
-        all.sort_unstable_by_key(|(chunk, part)| (*chunk, part.key));
-    }
-    let chunks: Vec<&[(ChunkPos, Fresh)]> = all.chunk_by(|a, b| a.0 == b.0).collect();
-    let update = |parts: &&[(ChunkPos, Fresh)]| {
+    let mut chunks: Vec<&mut [(ChunkPos, Fresh)]> = all.chunk_by_mut(|a, b| a.0 == b.0).collect();
+    let update = |parts: &mut &mut [(ChunkPos, Fresh)]| {
+        parts.sort_unstable_by_key(|(_, part)| part.key);
         let chunk = parts[0].0;
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         Some((chunk, Arc::new(old.updated(parts.iter().map(|part| part.1))?)))
     };
     if is_large {
-        chunks.par_iter().filter_map(update).collect()
+        chunks.par_iter_mut().filter_map(update).collect()
     } else {
-        chunks.iter().filter_map(update).collect()
+        chunks.iter_mut().filter_map(update).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Samples and the bricks that store them.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::IVec3;
 use rustc_hash::FxHashMap;
@@ -30,11 +31,20 @@ impl Sample {
         (self != Self::PRISTINE).then_some(i32::from(self.0))
     }
 
-    /// The stored density, or that of the pristine sample.
+    /// The density as it is stored, that of a pristine sample being [`i16::MIN`].
     #[inline]
-    pub(crate) fn or(self, pristine: i32) -> i32 {
-        if self == Self::PRISTINE { pristine } else { i32::from(self.0) }
+    pub(crate) fn bits(self) -> i16 {
+        self.0
     }
+}
+
+/// The samples of a brick that is not stored.
+pub(crate) static PRISTINE: [Sample; LEN] = [Sample::PRISTINE; LEN];
+
+/// The eight samples of a row along x, which begins at index `at`.
+#[inline(always)]
+pub(crate) fn row(samples: &[Sample; LEN], at: usize) -> [i16; 8] {
+    samples[at..].first_chunk::<8>().map_or([0; 8], |row| row.map(|sample| sample.0))
 }
 
 /// One bit for each sample of a brick: a word for each y, in it bit `z * 8 + x`.
@@ -57,6 +67,29 @@ pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     layers
 }
 
+/// A word that a backend keeps with a brick, to find its own copy of it. A clone starts without one.
+#[derive(Debug, Default)]
+pub(crate) struct Tag(AtomicU64);
+
+impl Clone for Tag {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+#[cfg_attr(not(feature = "cuda"), expect(dead_code))]
+impl Tag {
+    /// What was kept last; 0 to begin with.
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Keeps a word. It says nothing about the brick, so nobody needs to see it in time.
+    pub fn set(&self, word: u64) {
+        self.0.store(word, Ordering::Relaxed);
+    }
+}
+
 /// 8x8x8 samples with their materials.
 ///
 /// Beside them the brick keeps two bits a sample, so that whole rows are judged at once: is it solid, pristine samples
@@ -68,6 +101,7 @@ pub struct Brick {
     edited: Layers,
     /// `None` while all are [`MaterialId::GROUND`].
     materials: Option<Box<[MaterialId; LEN]>>,
+    pub(crate) tag: Tag,
 }
 
 impl Brick {
@@ -76,7 +110,7 @@ impl Brick {
 
     /// A brick without an edited sample, of which these pristine ones are solid.
     pub(crate) fn pristine(solid: Layers) -> Self {
-        Self { samples: [Sample::PRISTINE; LEN], solid, edited: [0; 8], materials: None }
+        Self { samples: [Sample::PRISTINE; LEN], solid, edited: [0; 8], materials: None, tag: Tag::default() }
     }
 
     /// A brick of these samples, none of them pristine, in the order of [`BrickPos::index`].
@@ -84,8 +118,9 @@ impl Brick {
         let mut brick = Self::pristine([0; 8]);
         for (row, samples) in samples.as_chunks::<8>().0.iter().enumerate() {
             let samples = samples.map(|sample| sample.max(-i16::MAX));
-            let solid = (0..8).fold(0, |bits, x| bits | u8::from(samples[x] < 0) << x);
-            brick.set_row(row * 8, samples, 0xff, solid);
+            let solid = (0..8).fold(0, |bits, x| bits | u64::from(samples[x] < 0) << x);
+            brick.set_row(row * 8, samples);
+            brick.set_bits(row / 8, 0xff << (row % 8 * 8), solid << (row % 8 * 8));
         }
         brick
     }
@@ -99,7 +134,16 @@ impl Brick {
         materials: Option<&[u8; LEN]>,
     ) -> Self {
         let materials = materials.map(|materials| Box::new(materials.map(MaterialId)));
-        Self { samples: samples.map(Sample), solid, edited, materials }
+        Self { samples: samples.map(Sample), solid, edited, materials, tag: Tag::default() }
+    }
+
+    /// A brick all of whose samples were edited to the same.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn of_one(sample: i16, material: MaterialId) -> Self {
+        let sample = Sample::edited(sample.into());
+        let solid = if sample.0 < 0 { [u64::MAX; 8] } else { [0; 8] };
+        let materials = (material != MaterialId::GROUND).then(|| Box::new([material; LEN]));
+        Self { samples: [sample; LEN], solid, edited: [u64::MAX; 8], materials, tag: Tag::default() }
     }
 
     /// The sample at a lattice point that lies in this brick.
@@ -127,24 +171,19 @@ impl Brick {
         &self.samples
     }
 
-    /// The eight samples of a row along x, which begins at index `at`.
+    /// Stores the samples of the row that begins at index `at`; [`Self::set_bits`] says what they are.
     #[inline]
-    pub(crate) fn row(&self, at: usize) -> [i16; 8] {
-        let row = self.samples[at..].first_chunk::<8>();
-        row.map_or([0; 8], |row| row.map(|sample| sample.0))
-    }
-
-    /// Stores edited samples in the row that begins at index `at`: those of the lanes `changed`, of which those in
-    /// `solid` are.
-    #[inline]
-    pub(crate) fn set_row(&mut self, at: usize, row: [i16; 8], changed: u8, solid: u8) {
+    pub(crate) fn set_row(&mut self, at: usize, row: [i16; 8]) {
         if let Some(samples) = self.samples[at..].first_chunk_mut::<8>() {
             *samples = row.map(Sample);
         }
-        let (y, shift) = (at / 64, at % 64);
-        let lanes = |bits: u8| u64::from(bits) << shift;
-        self.edited[y] |= lanes(changed);
-        self.solid[y] = self.solid[y] & !lanes(changed) | lanes(solid & changed);
+    }
+
+    /// Enters which samples of a layer are edited now, beside those that are already, and which of them are solid.
+    #[inline]
+    pub(crate) fn set_bits(&mut self, y: usize, edited: u64, solid: u64) {
+        self.edited[y] |= edited;
+        self.solid[y] = self.solid[y] & !edited | solid & edited;
     }
 
     /// Changes the material of the sample with this index.
@@ -153,6 +192,17 @@ impl Brick {
             return;
         }
         self.materials.get_or_insert_with(|| Box::new([MaterialId::GROUND; LEN]))[index] = material;
+    }
+
+    /// Changes the material of some samples of a layer: bit `z * 8 + x`.
+    pub(crate) fn set_materials(&mut self, y: usize, samples: u64, material: MaterialId) {
+        if self.materials.is_none() && material == MaterialId::GROUND {
+            return;
+        }
+        let materials = self.materials.get_or_insert_with(|| Box::new([MaterialId::GROUND; LEN]));
+        for (bit, own) in materials[y * 64..][..64].iter_mut().enumerate() {
+            *own = if samples >> bit & 1 == 1 { material } else { *own };
+        }
     }
 
     /// The material of the sample with this index.
@@ -215,9 +265,10 @@ mod tests {
         let mut brick = Brick::pristine([u64::MAX; 8]);
         let pos = BrickPos(IVec3::new(-1, 0, 2));
         let point = pos.origin() + IVec3::new(3, 5, 7);
-        let mut row = brick.row(5 * 64 + 7 * 8);
+        let mut row = row(brick.samples(), 5 * 64 + 7 * 8);
         row[3] = 7;
-        brick.set_row(5 * 64 + 7 * 8, row, 1 << 3, 0);
+        brick.set_row(5 * 64 + 7 * 8, row);
+        brick.set_bits(5, 1 << 59, 0);
         brick.set_material(BrickPos::index(point), MaterialId(4));
         assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, 7, MaterialId(4))]);
         assert_eq!(brick.edited_count(), 1);

@@ -14,7 +14,7 @@ use super::ledger::{Fate, Ledger};
 use super::workpiece::Workpiece;
 use super::{Brick, SampleView, Tally};
 use crate::brush::{Edit, Evaluator, Operation};
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, sort_by_place};
 
 /// What one edit changed in one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ const BATCH: usize = 2048;
 const GROUP: usize = 16;
 
 /// One edit's work on one brick; sorted by brick, then by edit.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy)]
 pub(crate) struct Job {
     /// The brick's position as (x, z, y).
     brick: [i32; 3],
@@ -141,12 +141,18 @@ impl<'a> EditWork<'a> {
         self.jobs.chunk_by(|a, b| a.brick == b.brick).collect()
     }
 
+    /// Every brick that some edit may reach, once for each edit.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn jobs(&self) -> &[Job] {
+        &self.jobs
+    }
+
     /// Applies all edits on the CPU and hands out what they changed, brick by brick. The result does not depend on how
     /// many threads there are.
     pub(crate) fn run(&self, mut each: impl FnMut(Ledger)) {
         let bricks = self.bricks();
         let work = |bricks: &[&[Job]]| {
-            let mut ledger = Ledger::default();
+            let mut ledger = Ledger::with_room(bricks.len());
             bricks.iter().for_each(|jobs| finish(self, jobs, &mut ledger));
             ledger
         };
@@ -198,23 +204,20 @@ impl Draft {
 
 /// Which edit may reach which brick.
 fn jobs(tools: &[Tool]) -> Vec<Job> {
-    let mut jobs = Vec::new();
-    for (edit, tool) in (0..).zip(tools) {
-        let Some(reach) = tool.reach else { continue };
-        let (low, high): (IVec3, IVec3) = (reach.min >> 3, reach.max >> 3);
+    let reaches = || (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, tool.reach?)));
+    let bricks = |reach: LatticeBox| (reach.min >> 3, reach.max >> 3);
+    let count = |(low, high): (IVec3, IVec3)| (high - low + 1).as_usizevec3().element_product();
+    let mut jobs = Vec::with_capacity(reaches().map(|(_, reach)| count(bricks(reach))).sum());
+    for (edit, reach) in reaches() {
+        let (low, high) = bricks(reach);
         for x in low.x..=high.x {
             for z in low.z..=high.z {
-                for y in low.y..=high.y {
-                    jobs.push(Job { brick: [x, z, y], edit });
-                }
+                jobs.extend((low.y..=high.y).map(|y| Job { brick: [x, z, y], edit }));
             }
         }
     }
-    if jobs.len() < BATCH {
-        jobs.sort_unstable()
-    } else {
-        jobs.par_sort_unstable()
-    }
+    // They stand in order of the edits, and stay so for each brick.
+    sort_by_place(&mut jobs, |job| job.brick);
     jobs
 }
 

@@ -14,6 +14,18 @@ pub(crate) struct Ledger {
     pub hash: u64,
 }
 
+impl Ledger {
+    /// An empty one, with room for what edits do to so many bricks as a rule.
+    pub fn with_room(bricks: usize) -> Self {
+        Self {
+            bricks: Vec::with_capacity(bricks),
+            parts: Vec::with_capacity(bricks),
+            counts: Vec::with_capacity(bricks),
+            hash: 0,
+        }
+    }
+}
+
 /// What one edit changed in one chunk's part of one brick.
 pub(crate) struct PartEffect {
     pub edit: usize,
@@ -46,11 +58,11 @@ pub(super) struct Counts<'l> {
 }
 
 impl Counts<'_> {
-    pub fn add(&mut self, fate: Fate, material: MaterialId) {
+    pub fn add(&mut self, fate: Fate, material: MaterialId, voxels: u64) {
         let own = &mut self.list[self.first..];
         match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
-            Some(count) => count.voxels += 1,
-            None => self.list.push(Count { edit: self.edit, fate, material, voxels: 1 }),
+            Some(count) => count.voxels += voxels,
+            None => self.list.push(Count { edit: self.edit, fate, material, voxels }),
         }
     }
 }

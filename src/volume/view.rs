@@ -36,6 +36,11 @@ impl<'a> SampleView<'a> {
         self.ground
     }
 
+    /// Where bricks are looked up, the older ones first.
+    pub(crate) fn tables(&self) -> impl Iterator<Item = &'a Bricks> {
+        std::iter::once(self.bricks).chain(self.newer)
+    }
+
     /// A brick, `None` where all samples are pristine.
     pub fn brick(&self, pos: BrickPos) -> Option<&'a Brick> {
         self.newer.and_then(|newer| newer.get(&pos)).or_else(|| self.bricks.get(&pos)).map(Arc::as_ref)

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use glam::IVec3;
 use wide::{i16x8, i32x8};
 
-use super::brick::solid_layers;
+use super::brick::{PRISTINE, row, solid_layers};
 use super::draft::{Job, Tool};
 use super::ledger::{Counts, Fate, Ledger, PartEffect};
 use super::view::resolve;
-use super::{Brick, DraftedBrick, Sample, SampleView};
+use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
 use crate::brush::{BAND, DEPTH, Operation};
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE, hash};
@@ -21,36 +21,34 @@ pub(super) struct Workpiece<'a> {
     pos: BrickPos,
     /// What it was before.
     base: Option<&'a Brick>,
-    brick: Brick,
-    /// Heights of its columns, and the density of its lowest pristine samples.
-    floor: [i32x8; 8],
+    /// What it is now; `None` until its first sample changes.
+    brick: Option<Brick>,
+    /// Heights of its columns.
+    heights: [[i32; 8]; 8],
     /// Samples that changed.
-    changed: [u64; 8],
+    changed: Layers,
 }
 
-/// Samples of a row that changed sides: one bit each.
+/// Samples of a layer that changed: a bit each, as in [`Layers`].
 #[derive(Clone, Copy, Default)]
-struct Moved {
-    /// Solid before, and air now.
-    removed: u8,
-    /// Air before, and solid now.
-    added: u8,
+struct Changed {
+    all: u64,
+    /// Those that were solid.
+    was: u64,
+    /// Those that are solid now.
+    is: u64,
 }
 
 impl<'a> Workpiece<'a> {
     /// A brick as it is.
     pub fn new(view: SampleView<'a>, grid: ChunkGrid, pos: BrickPos) -> Self {
-        let low = pos.origin();
-        let heights = view.ground().heights::<8>(Column::of(low));
-        let base = view.brick(pos);
-        let brick = base.cloned().unwrap_or_else(|| Brick::pristine(solid_layers(&heights, low.y)));
-        let floor = heights.map(|row| i32x8::splat(low.y * ONE) - i32x8::new(row));
-        Self { view, grid, pos, base, brick, floor, changed: [0; 8] }
+        let heights = view.ground().heights::<8>(Column::of(pos.origin()));
+        Self { view, grid, pos, base: view.brick(pos), brick: None, heights, changed: [0; 8] }
     }
 
     /// Applies all jobs.
-    pub fn take<'j>(mut self, tools: &[Tool], jobs: impl Iterator<Item = &'j Job>, ledger: &mut Ledger) {
-        let mut distances = [[0; 8]; 64];
+    pub fn take<'j>(&mut self, tools: &[Tool], jobs: impl Iterator<Item = &'j Job>, ledger: &mut Ledger) {
+        let mut distances = [i16x8::ZERO; 64];
         let low = self.pos.origin();
         for job in jobs {
             let (edit, tool) = (job.edit as usize, &tools[job.edit as usize]);
@@ -69,11 +67,26 @@ impl<'a> Workpiece<'a> {
             }
         }
         let Some(changed) = bounds(&self.changed, low) else { return };
-        ledger.hash = ledger.hash.wrapping_add(self.hash_change());
+        let Some(brick) = self.brick.take() else { return };
+        ledger.hash = ledger.hash.wrapping_add(self.hash_change(&brick));
         let before = self.base.map_or([0; 8], |brick| *brick.edited());
-        let is_extended = before != *self.brick.edited();
-        let drafted = DraftedBrick { pos: self.pos, brick: Arc::new(self.brick), changed, is_extended };
-        ledger.bricks.push(drafted);
+        let is_extended = before != *brick.edited();
+        let brick = Arc::new(brick);
+        ledger.bricks.push(DraftedBrick { pos: self.pos, brick, changed, is_extended });
+    }
+
+    /// The samples as they are now.
+    fn samples(&self) -> &[Sample; 512] {
+        self.brick.as_ref().or(self.base).map_or(&PRISTINE, Brick::samples)
+    }
+
+    /// The brick, to be changed.
+    fn brick(&mut self) -> &mut Brick {
+        let (base, heights, y) = (self.base, &self.heights, self.pos.origin().y);
+        self.brick.get_or_insert_with(|| match base {
+            Some(base) => base.clone(),
+            None => Brick::pristine(solid_layers(heights, y)),
+        })
     }
 
     /// Applies an operation to some samples; returns the box of those that changed.
@@ -81,139 +94,177 @@ impl<'a> Workpiece<'a> {
         &mut self,
         operation: Operation,
         samples: LatticeBox,
-        distances: &[[i32; 8]; 64],
+        distances: &[i16x8; 64],
         counts: &mut Counts<'_>,
     ) -> Option<LatticeBox> {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
-        let lanes = i32x8::new(std::array::from_fn(|x| -i32::from((from.x..=to.x).contains(&x))));
+        let lanes = i16x8::new(std::array::from_fn(|x| -i16::from((from.x..=to.x).contains(&x))));
         let mut changed = [0; 8];
         for (y, layer) in (from.y..=to.y).zip(&mut changed[from.y..]) {
-            for z in from.z..=to.z {
-                let outside = i32x8::new(distances[y * 8 + z]);
-                let row = match operation {
-                    Operation::Paint { material } => self.paint((y, z), outside, lanes, material, counts),
-                    _ => self.carve((y, z), outside, lanes, operation, counts),
-                };
-                *layer |= u64::from(row) << (z * 8);
-            }
+            let rows = (from.z..=to.z).zip(&distances[y * 8 + from.z..]);
+            *layer = match operation {
+                Operation::Paint { material } => rows.fold(0, |layer, (z, &outside)| {
+                    let row = self.paint((y, z), outside, lanes, material, counts);
+                    layer | u64::from(row) << (z * 8)
+                }),
+                _ => self.carve(y, rows, lanes, operation, counts),
+            };
         }
         self.changed.iter_mut().zip(&changed).for_each(|(all, layer)| *all |= layer);
         bounds(&changed, low)
     }
 
-    /// Digs or adds in a row; returns the lanes that changed.
-    #[inline(always)]
-    fn carve(
+    /// Digs or adds in rows of a layer; returns the samples that changed.
+    ///
+    /// Densities that 16 bits do not hold are cut off. That changes no sample: the operation compares with depths of a
+    /// few voxels, and leaves what is beyond them or puts a depth in its place.
+    fn carve<'d>(
         &mut self,
-        (y, z): (usize, usize),
-        outside: i32x8,
-        lanes: i32x8,
+        y: usize,
+        rows: impl Iterator<Item = (usize, &'d i16x8)>,
+        lanes: i16x8,
         operation: Operation,
         counts: &mut Counts<'_>,
-    ) -> u8 {
-        let at = y * 64 + z * 8;
-        let row = i16x8::new(self.brick.row(at));
-        let raw = i32x8::from_i16x8(row);
-        let pristine = self.floor[z] + i32x8::splat(y as i32 * ONE);
-        let before = raw.simd_eq(i32x8::splat(i16::MIN.into())).select(pristine, raw);
-        let depth = outside.max(i32x8::splat(-DEPTH));
-        let after = if operation == Operation::Dig { before.max(-depth) } else { before.min(depth) };
-        let most = i32x8::splat(i16::MAX.into());
-        let stored = after.max(-most).min(most);
-        let kept = outside.simd_gt(i32x8::splat(BAND)) | after.simd_eq(before) | stored.simd_eq(raw);
-        let changes = lanes & !kept;
-        let changed = bits(changes);
-        if changed == 0 {
-            return 0;
-        }
-        let row = i16x8::from_i32x8_saturate(changes.select(stored, raw));
-        let (was, is) = (negative(before), negative(after));
-        self.brick.set_row(at, row.to_array(), changed, is);
-        let moved = Moved { removed: changed & was & !is, added: changed & is & !was };
-        if moved.removed | moved.added != 0 {
-            self.count(at, moved, operation, counts);
-        }
-        changed
-    }
-
-    /// Counts voxels that changed sides, and gives new ones their material.
-    fn count(&mut self, at: usize, moved: Moved, operation: Operation, counts: &mut Counts<'_>) {
-        let ground = self.view.ground();
-        for x in ones(moved.removed | moved.added) {
-            let index = at + x;
-            let point = self.pos.origin() + offset(index);
-            if moved.removed >> x & 1 == 1 {
-                counts.add(Fate::Removed, resolve(ground, point, self.brick.material_at(index)));
-                // Air is of no material.
-                self.brick.set_material(index, MaterialId::GROUND);
+    ) -> u64 {
+        let mut changed = Changed::default();
+        let height = i32x8::splat((self.pos.origin().y + y as i32) * ONE);
+        for (z, &outside) in rows {
+            let in_reach = lanes & !outside.simd_gt(i16x8::splat(BAND as i16));
+            if in_reach.to_bitmask() == 0 {
                 continue;
             }
-            if let Operation::Add { material } = operation {
-                self.brick.set_material(index, material);
+            let at = y * 64 + z * 8;
+            let raw = i16x8::new(row(self.samples(), at));
+            let pristine = i16x8::from_i32x8_saturate(height - i32x8::new(self.heights[z]));
+            let before = raw.simd_eq(i16x8::splat(i16::MIN)).select(pristine, raw);
+            let depth = outside.max(i16x8::splat(-DEPTH as i16));
+            let after = if operation == Operation::Dig { before.max(-depth) } else { before.min(depth) };
+            let changes = in_reach & !after.simd_eq(before);
+            let lanes = bits(changes);
+            if lanes != 0 {
+                self.brick().set_row(at, changes.select(after, raw).to_array());
+                let of_layer = |lanes: u8| u64::from(lanes) << (z * 8);
+                changed.all |= of_layer(lanes);
+                changed.was |= of_layer(lanes & bits(before));
+                changed.is |= of_layer(lanes & bits(after));
             }
-            counts.add(Fate::Added, resolve(ground, point, self.brick.material_at(index)));
         }
+        if changed.all != 0 {
+            self.brick().set_bits(y, changed.all, changed.is);
+            self.count(y, changed, operation, counts);
+        }
+        changed.all
+    }
+
+    /// Counts voxels of a layer that changed sides, and gives new ones their material.
+    fn count(&mut self, y: usize, changed: Changed, operation: Operation, counts: &mut Counts<'_>) {
+        let (removed, added) = (changed.was & !changed.is, changed.is & !changed.was);
+        if removed != 0 {
+            self.tally(Fate::Removed, y, removed, counts);
+            // Air is of no material.
+            self.brick().set_materials(y, removed, MaterialId::GROUND);
+        }
+        if added != 0 {
+            if let Some(material) = operation.material() {
+                self.brick().set_materials(y, added, material);
+            }
+            self.tally(Fate::Added, y, added, counts);
+        }
+    }
+
+    /// Counts voxels of a layer by the materials that they have now.
+    fn tally(&mut self, fate: Fate, y: usize, voxels: u64, counts: &mut Counts<'_>) {
+        let (ground, low) = (self.view.ground(), self.pos.origin());
+        let single = ground.single_material();
+        let brick = &*self.brick();
+        if brick.material_bytes() == 0
+            && let Some(material) = single
+        {
+            return counts.add(fate, material, voxels.count_ones().into());
+        }
+        // Neighbours mostly are of one material.
+        let (mut last, mut count) = (None, 0);
+        for bit in ones(voxels) {
+            let index = y * 64 + bit;
+            let stored = brick.material_at(index);
+            let own = || single.unwrap_or_else(|| ground.material(low + offset(index)));
+            let material = if stored == MaterialId::GROUND { own() } else { stored };
+            if last != Some(material) {
+                last.into_iter().for_each(|last| counts.add(fate, last, count));
+                (last, count) = (Some(material), 0);
+            }
+            count += 1;
+        }
+        last.into_iter().for_each(|last| counts.add(fate, last, count));
     }
 
     /// Paints the solid samples of a row inside the shape; returns the lanes that changed.
     fn paint(
         &mut self,
         (y, z): (usize, usize),
-        outside: i32x8,
-        lanes: i32x8,
+        outside: i16x8,
+        lanes: i16x8,
         material: MaterialId,
         counts: &mut Counts<'_>,
     ) -> u8 {
-        let at = y * 64 + z * 8;
-        let mut row = self.brick.row(at);
-        let pristine = (self.floor[z] + i32x8::splat(y as i32 * ONE)).to_array();
-        let inside = bits(lanes & !outside.simd_gt(i32x8::splat(0)));
+        let (at, low) = (y * 64 + z * 8, self.pos.origin());
+        let mut samples = row(self.samples(), at);
+        let inside = bits(lanes & !outside.simd_gt(i16x8::ZERO));
         let mut changed = 0;
-        for x in ones(inside) {
-            let index = at + x;
-            let (sample, old) = (self.brick.samples()[index], self.brick.material_at(index));
-            let before = sample.or(pristine[x]);
-            if before >= 0 || sample != Sample::PRISTINE && material == old {
+        for x in ones(inside.into()) {
+            let (index, is_pristine) = (at + x, samples[x] == i16::MIN);
+            let old = self.brick.as_ref().or(self.base).map_or(MaterialId::GROUND, |b| b.material_at(index));
+            let pristine = (low.y + y as i32) * ONE - self.heights[z][x];
+            let before = if is_pristine { pristine } else { samples[x].into() };
+            if before >= 0 || !is_pristine && material == old {
                 continue;
             }
-            let point = self.pos.origin() + offset(index);
-            let (ground, is_pristine) = (self.view.ground(), sample == Sample::PRISTINE);
+            let (point, ground) = (low + offset(index), self.view.ground());
             if resolve(ground, point, material) != resolve(ground, point, old) {
-                counts.add(Fate::Painted, resolve(ground, point, material));
+                counts.add(Fate::Painted, resolve(ground, point, material), 1);
             }
             if is_pristine {
-                row[x] = Sample::edited(before).distance().unwrap_or_default() as i16;
+                samples[x] = Sample::edited(before).distance().unwrap_or_default() as i16;
             }
-            self.brick.set_material(index, material);
+            self.brick().set_material(index, material);
             changed |= 1 << x;
         }
         if changed != 0 {
-            self.brick.set_row(at, row, changed, changed);
+            let layer = u64::from(changed) << (z * 8);
+            self.brick().set_row(at, samples);
+            self.brick().set_bits(y, layer, layer);
         }
         changed
     }
 
     /// By how much the brick changes the hash of the world's samples.
-    fn hash_change(&self) -> u64 {
+    fn hash_change(&self, brick: &Brick) -> u64 {
         let low = self.pos.origin();
-        let mut columns = self.changed.iter().fold(0, |all, layer| all | layer);
-        let mut change = 0u64;
-        while columns != 0 {
-            let bit = columns.trailing_zeros() as usize;
-            columns &= columns - 1;
-            let place = place_hash(Column::of(low + offset(bit)));
-            for y in (0..8).filter(|&y| self.changed[y] >> bit & 1 == 1) {
-                let index = y * 64 + bit;
-                let height = low.y + y as i32;
-                let of = |brick: &Brick| {
-                    sample_hash(place, height, brick.samples()[index], brick.material_at(index))
-                };
-                change = change.wrapping_add(of(&self.brick)).wrapping_sub(self.base.map_or(0, of));
-            }
+        let mut places = [0; 64];
+        for bit in ones(self.changed.iter().fold(0, |all, layer| all | layer)) {
+            places[bit] = place_hash(Column::of(low + offset(bit)));
         }
-        change
+        // Samples that were pristine counted nothing.
+        let before = self.base.map_or(0, |base| {
+            let stored = std::array::from_fn(|y| self.changed[y] & base.edited()[y]);
+            hash_of(base, low.y, &stored, &places)
+        });
+        hash_of(brick, low.y, &self.changed, &places).wrapping_sub(before)
     }
+}
+
+/// What some edited samples of a brick add to the world's hash, by the hashes of their columns.
+fn hash_of(brick: &Brick, low: i32, layers: &Layers, places: &[u64; 64]) -> u64 {
+    let of_layer = |(y, &layer): (usize, &u64)| {
+        let height = low + y as i32;
+        let of = |bit: usize| {
+            let index = y * 64 + bit;
+            sample_hash(places[bit], height, brick.samples()[index], brick.material_at(index))
+        };
+        ones(layer).fold(0u64, |sum, bit| sum.wrapping_add(of(bit)))
+    };
+    layers.iter().enumerate().map(of_layer).fold(0, u64::wrapping_add)
 }
 
 /// From a brick's lowest sample to the one with this index.
@@ -232,27 +283,24 @@ fn sample_hash(place: u64, y: i32, sample: Sample, material: MaterialId) -> u64 
     hash::mix(place ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))
 }
 
-/// Lanes whose mask is set.
-fn bits(mask: i32x8) -> u8 {
-    mask.to_bitmask() as u8
-}
-
-/// Lanes below zero.
-fn negative(values: i32x8) -> u8 {
-    bits(values.simd_lt(i32x8::splat(0)))
+/// Lanes below zero, as those of masks are.
+#[inline(always)]
+fn bits(lanes: i16x8) -> u8 {
+    lanes.to_bitmask() as u8
 }
 
 /// Positions of the bits that are set, lowest first.
-fn ones(mut bits: u8) -> impl Iterator<Item = usize> {
+#[inline(always)]
+fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
-        (bit < 8).then_some(bit)
+        (bit < 64).then_some(bit)
     })
 }
 
 /// The box around the samples of some layers, which lie from `low` on.
-fn bounds(layers: &[u64; 8], low: IVec3) -> Option<LatticeBox> {
+fn bounds(layers: &Layers, low: IVec3) -> Option<LatticeBox> {
     let all = layers.iter().fold(0, |all, layer| all | layer);
     if all == 0 {
         return None;

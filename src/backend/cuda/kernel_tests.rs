@@ -1,4 +1,4 @@
-//! Kernels give what the CPU gives, bit for bit: random worlds on the emulator of the device.
+//! Kernels give what the CPU gives, bit for bit: random worlds on a card, or on the emulator where there is none.
 //!
 //! `BURROW_WORLDS` says how many worlds to try.
 
@@ -8,8 +8,9 @@ use bytemuck::{Pod, Zeroable};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
-use self::emulator::{Emulator, Kernel};
+use super::device::{self, Kernel};
 use super::layout::{self, *};
+use super::tests::{self, worlds};
 use crate::brush::{Brush, Edit, Roughness, Shape};
 use crate::ground::{ColumnMaterial, Ground, MaterialControl, MaterialId};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, SNAP};
@@ -20,13 +21,9 @@ use crate::surface::vertex::WorldView;
 use crate::terrain::{Terrain, TerrainSettings};
 use crate::volume::{Brick, EditWork, Ledger, SampleView};
 
-mod emulator;
-#[path = "../../../tests/worlds/mod.rs"]
-pub(super) mod worlds;
-
 /// A device, and what is allocated there.
 struct Device {
-    emulator: Emulator,
+    own: Box<dyn device::Device>,
     allocated: Vec<Address>,
 }
 
@@ -38,32 +35,29 @@ const RUBBISH: u8 = 0xa5;
 impl Device {
     /// `None` where there is none; the test is skipped then.
     fn start() -> Option<Self> {
-        let emulator = Emulator::start().expect("the emulator starts");
-        if emulator.is_none() {
-            println!("skipped: there is no emulator");
-        }
-        Some(Self { emulator: emulator?, allocated: Vec::new() })
+        Some(Self { own: tests::device()?, allocated: Vec::new() })
     }
 
-    fn allocate(&mut self, bytes: usize) -> Address {
-        let address = self.emulator.allocate(bytes as u64).expect("memory");
+    /// Copies bytes to memory of the device.
+    fn place(&mut self, bytes: &[u8]) -> Address {
+        let address = self.own.alloc(bytes.len()).expect("memory of the device");
         self.allocated.push(address);
+        let mut host = self.own.alloc_host(bytes.len()).expect("memory of the host");
+        host.bytes_mut()[..bytes.len()].copy_from_slice(bytes);
+        self.own.upload(&*host, 0..bytes.len(), address).expect("upload");
+        self.own.wait().expect("upload");
         address
     }
 
     /// Copies values to the device.
     fn upload<T: Pod>(&mut self, values: &[T]) -> Address {
-        let bytes: &[u8] = bytemuck::cast_slice(values);
-        let address = self.allocate(bytes.len().max(16));
-        self.emulator.write(address, bytes).expect("write");
-        address
+        self.place(bytemuck::cast_slice(values))
     }
 
     /// Room for an output of so many values.
     fn output<T: Pod>(&mut self, len: usize) -> Output<T> {
         let bytes = (len * size_of::<T>()).next_multiple_of(16) + MARGIN;
-        let address = self.allocate(bytes);
-        self.emulator.fill(address, bytes as u64, RUBBISH).expect("fill");
+        let address = self.place(&vec![RUBBISH; bytes]);
         Output { address, len, of: std::marker::PhantomData }
     }
 
@@ -79,7 +73,11 @@ impl Device {
 
     fn read_at<T: Pod>(&mut self, address: Address, len: usize) -> Vec<T> {
         let mut values = vec![T::zeroed(); len];
-        self.emulator.read(address, bytemuck::cast_slice_mut(&mut values)).expect("read");
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
+        let mut host = self.own.alloc_host(bytes.len()).expect("memory of the host");
+        self.own.download(address, &mut *host, 0..bytes.len()).expect("download");
+        self.own.wait().expect("download");
+        bytes.copy_from_slice(&host.bytes()[..bytes.len()]);
         values
     }
 
@@ -93,14 +91,13 @@ impl Device {
     }
 
     fn launch<T: Pod>(&mut self, kernel: Kernel, blocks: usize, params: T) {
-        self.emulator.launch(kernel, blocks, bytemuck::bytes_of(&params)).expect("the launch succeeds");
+        self.own.launch(kernel, blocks as u32, bytemuck::bytes_of(&params)).expect("the launch succeeds");
+        self.own.wait().expect("the kernel succeeds");
     }
 
     /// Frees everything.
     fn clear(&mut self) {
-        for address in self.allocated.drain(..) {
-            self.emulator.free(address).expect("free");
-        }
+        self.allocated.drain(..).for_each(|address| self.own.free(address));
     }
 }
 

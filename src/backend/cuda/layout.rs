@@ -7,11 +7,11 @@ use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
 
 use crate::brush::{Evaluator, Operation};
-use crate::ground::{Ground, MaterialId};
+use crate::ground::{ColumnMaterial, Ground, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{MaterialMix, block, borders};
-use crate::volume::Brick;
+use crate::volume::{Brick, Sample};
 
 /// An address on the device.
 pub(crate) type Address = u64;
@@ -309,10 +309,11 @@ const _: () = assert!(size_of::<MeshParams>() == 128 && size_of::<ScatterParams>
 
 /// Writes a brick as it is in a slot: [`BRICK_BYTES`], or [`RECORD_BYTES`] where `out` has no room for materials.
 pub(crate) fn brick_record(brick: &Brick, out: &mut [u8]) {
-    let mut record = BrickRecord { samples: [0; 512], solid: *brick.solid(), edited: *brick.edited() };
-    for (row, samples) in record.samples.as_chunks_mut::<8>().0.iter_mut().enumerate() {
-        *samples = brick.row(row * 8);
-    }
+    let record = BrickRecord {
+        samples: brick.samples().map(Sample::bits),
+        solid: *brick.solid(),
+        edited: *brick.edited(),
+    };
     if let Some((place, rest)) = out.split_first_chunk_mut::<RECORD_BYTES>() {
         *place = bytemuck::cast(record);
         if let Some(place) = rest.first_chunk_mut::<MATERIAL_BYTES>() {
@@ -335,12 +336,19 @@ pub(crate) fn brick_of(record: &[u8], materials: Option<&[u8]>) -> Option<Brick>
 /// The columns around the stack of bricks (x, z).
 pub(crate) fn stack_record(ground: &Ground, (x, z): (i32, i32)) -> StackRecord {
     let low = Column::new(x * 8 - 1, z * 8 - 1);
+    let word = |material: ColumnMaterial| {
+        u32::from_le_bytes([material.base.0, material.overlay.0, material.blend, 0])
+    };
+    let heights = ground.heights::<11>(low);
     let mut record = StackRecord { heights: [0; 121], columns: [0; 121], pad: [0; 2] };
-    let columns = (0..11).flat_map(|z| (0..11).map(move |x| low.offset(x, z)));
-    for ((column, height), at) in record.columns.iter_mut().zip(&mut record.heights).zip(columns) {
-        let material = ground.column_material(at);
-        *height = ground.height(at);
-        *column = u32::from_le_bytes([material.base.0, material.overlay.0, material.blend, 0]);
+    record.heights.copy_from_slice(heights.as_flattened());
+    match ground.single_material() {
+        Some(material) => record.columns.fill(word(ColumnMaterial::solid(material))),
+        None => {
+            let columns = (0..11).flat_map(|z| (0..11).map(move |x| low.offset(x, z)));
+            let words = columns.map(|column| word(ground.column_material(column)));
+            record.columns.iter_mut().zip(words).for_each(|(place, word)| *place = word);
+        }
     }
     record
 }

@@ -1,0 +1,175 @@
+//! Memory that launches read from and write to, kept from one to the next.
+
+use bytemuck::Pod;
+use rayon::prelude::*;
+
+use super::device::{Device, Fault, HostMemory};
+
+/// Everything that a launch reads, packed into one piece, so that it takes one copy.
+pub(super) struct Inbox {
+    host: Box<dyn HostMemory>,
+    device: u64,
+    len: usize,
+}
+
+/// Where something is in an [`Inbox`]: offset and length in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Section {
+    start: usize,
+    len: usize,
+}
+
+/// What an [`Inbox`] is to hold, in order.
+#[derive(Debug, Default)]
+pub(super) struct Plan(usize);
+
+/// Sections start at multiples of this.
+const ALIGNMENT: usize = 16;
+
+impl Plan {
+    /// Room for so many entries.
+    pub fn section<T>(&mut self, count: usize) -> Section {
+        let start = self.0;
+        let len = count * size_of::<T>();
+        self.0 = start + len.next_multiple_of(ALIGNMENT);
+        Section { start, len }
+    }
+}
+
+/// Allocates with room to spare.
+fn roomy(len: usize) -> usize {
+    len.next_power_of_two().max(1 << 16)
+}
+
+impl Inbox {
+    pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
+        let len = roomy(0);
+        let host = device.alloc_host(len)?;
+        Ok(Self { host, device: device.alloc(len)?, len })
+    }
+
+    /// Makes room for what was planned. What was in it is gone.
+    pub fn open(&mut self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
+        if plan.0 > self.len {
+            let len = roomy(plan.0);
+            let (host, address) = (device.alloc_host(len)?, device.alloc(len)?);
+            device.free(self.device);
+            *self = Self { host, device: address, len };
+        }
+        Ok(())
+    }
+
+    /// Where kernels find a section.
+    pub fn address(&self, section: Section) -> u64 {
+        self.device + section.start as u64
+    }
+
+    /// A section's entries, to be written.
+    pub fn entries<T: Pod>(&mut self, section: Section) -> &mut [T] {
+        let bytes = &mut self.host.bytes_mut()[section.start..section.start + section.len];
+        bytemuck::cast_slice_mut(bytes)
+    }
+
+    /// Copies entries into a section.
+    pub fn put<T: Pod>(&mut self, section: Section, entries: &[T]) {
+        self.entries(section).copy_from_slice(entries);
+    }
+
+    /// Sends all of it.
+    pub fn send(&self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
+        device.upload(&*self.host, 0..plan.0, self.device)
+    }
+}
+
+/// A list that kernels write. Short ones go straight into the host's memory, where the device can do that; long ones into
+/// its own, and what is used of them is copied afterwards.
+pub(super) struct Outbox {
+    entry: usize,
+    host: Box<dyn HostMemory>,
+    capacity: usize,
+    /// Address, and how many entries there is room for; none at first.
+    own: Option<(u64, usize)>,
+    is_long: bool,
+}
+
+impl Outbox {
+    /// A list of entries of so many bytes, with room for some.
+    pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
+        let host = device.alloc_host(entry * capacity)?;
+        Ok(Self { entry, host, capacity, own: None, is_long: false })
+    }
+
+    /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
+    pub fn read(&mut self, device: &mut dyn Device, from: u64, entries: usize) -> Result<(), Fault> {
+        device.download(from, &mut *self.host, 0..entries * self.entry)
+    }
+
+    /// How many entries kernels may write.
+    pub fn capacity(&self) -> u32 {
+        let own = self.own.map_or(0, |(_, capacity)| capacity);
+        (if self.is_own() { own } else { self.capacity }) as u32
+    }
+
+    /// Is it written on the device?
+    fn is_own(&self) -> bool {
+        self.is_long || self.host.address().is_none()
+    }
+
+    /// Room for so many entries, of a list that will be long or not; says whether there was too little. What was in it is
+    /// gone then.
+    pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
+        self.is_long = is_long;
+        let room = entries + entries / 4;
+        if entries > self.capacity {
+            (self.host, self.capacity) = (device.alloc_host(room * self.entry)?, room);
+        }
+        let is_short = entries > self.capacity() as usize || self.is_own() && self.own.is_none();
+        if self.is_own() && is_short {
+            if let Some((address, _)) = self.own.take() {
+                device.free(address);
+            }
+            self.own = Some((device.alloc(self.capacity * self.entry)?, self.capacity));
+        }
+        Ok(is_short)
+    }
+
+    /// Where kernels write.
+    pub fn address(&self) -> u64 {
+        let own = self.own.map(|(address, _)| address);
+        (if self.is_own() { own } else { self.host.address() }).unwrap_or_default()
+    }
+
+    /// Sees to it that so many entries are here after the next [`Device::wait`]; says whether that has to be.
+    pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
+        match self.own {
+            Some((address, _)) if entries > 0 && self.is_own() => {
+                device.download(address, &mut *self.host, 0..entries * self.entry).map(|()| true)
+            }
+            _ => Ok(false),
+        }
+    }
+
+    /// The first entries.
+    pub fn entries<T: Pod>(&self, count: usize) -> &[T] {
+        bytemuck::cast_slice(&self.host.bytes()[..count * size_of::<T>()])
+    }
+}
+
+/// Maps a list, side by side where it is long.
+pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+    if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
+}
+
+/// Writes what `work` makes of each entry of a list, side by side where it is long.
+pub(super) fn fill<T: Sync, R: Send>(
+    list: &[T],
+    out: &mut [R],
+    long: usize,
+    work: impl Fn(usize, &T) -> R + Send + Sync,
+) {
+    if list.len() < long {
+        list.iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
+    } else {
+        list.par_iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
+    }
+}

@@ -1,0 +1,72 @@
+//! Sorting by place: what lies in a box of grid positions is counted into order, without comparing.
+
+use rayon::prelude::*;
+
+/// How many places the box around all items may have for each of them.
+const PLACES: u64 = 16;
+
+/// From how many items on sorts are spread over threads.
+const PARALLEL: usize = 2048;
+
+/// Sorts items by their positions, by the first number, then the second, then the third; equal ones stay in order.
+pub(crate) fn sort_by_place<T: Copy + Send>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3] + Sync) {
+    if items.is_sorted_by_key(&place) {
+        return;
+    }
+    let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+    for at in items.iter().map(&place) {
+        (0..3).for_each(|i| (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i])));
+    }
+    let size: [u64; 3] = std::array::from_fn(|i| u64::from(low[i].abs_diff(high[i])) + 1);
+    let volume = size.iter().fold(1u64, |all, &size| all.saturating_mul(size));
+    if volume <= PLACES * items.len() as u64 {
+        count_into_order(items, volume as usize, |item| {
+            let [x, y, z] = place(item);
+            let [x, y, z] = [x - low[0], y - low[1], z - low[2]].map(|step| step as usize);
+            (x * size[1] as usize + y) * size[2] as usize + z
+        });
+    } else if items.len() < PARALLEL {
+        items.sort_by_key(place);
+    } else {
+        items.par_sort_by_key(place);
+    }
+}
+
+/// A stable sort by small numbers, all below `end`.
+fn count_into_order<T: Copy>(items: &mut Vec<T>, end: usize, number: impl Fn(&T) -> usize) {
+    let mut next = vec![0u32; end];
+    items.iter().for_each(|item| next[number(item)] += 1);
+    let mut before = 0;
+    for next in &mut next {
+        (*next, before) = (before, before + *next);
+    }
+    let mut sorted = items.clone();
+    for item in items.iter() {
+        let next = &mut next[number(item)];
+        sorted[*next as usize] = *item;
+        *next += 1;
+    }
+    *items = sorted;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn items_are_sorted_and_equal_ones_stay_in_order(
+            places in prop::collection::vec((-3..4i32, 0..3i32, -9..1i32), 0..200),
+            far in any::<bool>(),
+        ) {
+            let scale = if far { 1 << 28 } else { 1 };
+            let place = |&(at, _): &((i32, i32, i32), usize)| [at.0 * scale, at.1, at.2];
+            let mut items: Vec<_> = places.into_iter().zip(0..).collect();
+            let mut expected = items.clone();
+            expected.sort_by_key(place);
+            sort_by_place(&mut items, place);
+            prop_assert_eq!(items, expected);
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The bricks in and around some blocks, each looked up once and found by its place from then on.
+
+use glam::IVec3;
+
+use crate::lattice::{BrickPos, LatticeBox};
+use crate::volume::{Brick, SampleView};
+
+/// Most places of a window, so that it stays in a near cache.
+const MOST: u64 = 4096;
+
+/// Places that a window may have in any case.
+const FREE: u64 = 64;
+
+/// Places that it may have for each brick that is asked for.
+const EACH: u64 = 12;
+
+/// A box of bricks; those that are not stored are `None`.
+#[derive(Default)]
+pub(crate) struct Window<'a> {
+    /// The lowest position.
+    low: IVec3,
+    /// Positions along each axis.
+    size: IVec3,
+    /// By place: y fastest, then z, then x.
+    bricks: Vec<Option<&'a Brick>>,
+}
+
+impl<'a> Window<'a> {
+    /// The bricks of a box of brick positions.
+    pub fn new(view: &SampleView<'a>, places: LatticeBox) -> Self {
+        Window::default().moved(view, places)
+    }
+
+    /// The bricks of another box, maybe of another world, in the memory of this window.
+    pub fn moved<'b>(self, view: &SampleView<'b>, places: LatticeBox) -> Window<'b> {
+        let mut window = Window { low: places.min, size: places.size(), bricks: emptied(self.bricks) };
+        window.bricks.resize(places.volume() as usize, None);
+        for table in view.tables() {
+            // Newer tables come later; what they hold stands over what older ones do.
+            if table.len() < window.bricks.len() {
+                let near = table.iter().filter(|(pos, _)| places.contains(pos.0));
+                near.for_each(|(&pos, brick)| window.put(pos, brick));
+            } else {
+                for pos in places.points().map(BrickPos) {
+                    table.get(&pos).into_iter().for_each(|brick| window.put(pos, brick));
+                }
+            }
+        }
+        window
+    }
+
+    /// The same memory without bricks, to be kept for later.
+    pub fn emptied<'b>(self) -> Window<'b> {
+        Window { bricks: emptied(self.bricks), ..Window::default() }
+    }
+
+    fn put(&mut self, pos: BrickPos, brick: &'a Brick) {
+        let place = self.place(pos);
+        self.bricks[place] = Some(brick);
+    }
+
+    /// The place of a position, which must lie in the window.
+    #[inline]
+    pub fn place(&self, pos: BrickPos) -> usize {
+        let at = pos.0 - self.low;
+        ((at.x * self.size.z + at.z) * self.size.y + at.y) as usize
+    }
+
+    /// How many places further the next brick along x, y, z is.
+    #[inline]
+    pub fn steps(&self) -> [usize; 3] {
+        [(self.size.z * self.size.y) as usize, 1, self.size.y as usize]
+    }
+
+    /// The brick at a place.
+    #[inline]
+    pub fn at(&self, place: usize) -> Option<&'a Brick> {
+        self.bricks[place]
+    }
+}
+
+/// A list without elements in the memory of another.
+fn emptied<'b>(mut bricks: Vec<Option<&Brick>>) -> Vec<Option<&'b Brick>> {
+    bricks.clear();
+    // A list of the same layout is collected in place.
+    bricks.into_iter().map(|_| None).collect()
+}
+
+/// How many of the first bricks one window suits, and the box of that window: around them, one brick more on each side.
+/// Bricks should be sorted by stacks; `None` where there is none.
+pub(crate) fn shared(bricks: impl IntoIterator<Item = BrickPos>) -> Option<(usize, LatticeBox)> {
+    let mut bricks = bricks.into_iter();
+    let around = |brick: BrickPos| LatticeBox::point(brick.0).grown(1);
+    let (mut count, mut places) = (1, around(bricks.next()?));
+    for brick in bricks {
+        let more = places.union(around(brick));
+        if more != places && more.volume() > (FREE + EACH * count).min(MOST) {
+            break;
+        }
+        (count, places) = (count + 1, more);
+    }
+    Some((count as usize, places))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::volume::Bricks;
+
+    fn bricks(positions: &[[i32; 3]], sample: i16) -> Bricks {
+        let brick = Arc::new(Brick::of_edited(&[sample; 512]));
+        positions.iter().map(|&at| (BrickPos(IVec3::from_array(at)), Arc::clone(&brick))).collect()
+    }
+
+    #[test]
+    fn a_window_shows_what_the_view_does() {
+        let ground = Ground::flat(8, 8, 0.0).unwrap();
+        let many: Vec<[i32; 3]> = (0..200).map(|i| [i % 7 - 3, i % 5 - 2, i % 11 - 4]).collect();
+        let (old, new) = (bricks(&many, 1), bricks(&[[0, 0, 0], [1, -1, 2], [90, 0, 0]], 2));
+        let view = SampleView::new(&ground, &old).over(&new);
+        for (low, high) in [([0; 3], [0; 3]), ([-2, -1, 0], [1, 1, 4]), ([-9; 3], [9; 3])] {
+            let places = LatticeBox { min: IVec3::from_array(low), max: IVec3::from_array(high) };
+            let window = Window::new(&view, places);
+            for pos in places.points().map(BrickPos) {
+                let seen = window.at(window.place(pos)).map(std::ptr::from_ref);
+                assert_eq!(seen, view.brick(pos).map(std::ptr::from_ref), "{pos:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn bricks_far_from_each_other_share_no_window() {
+        let at = |x| BrickPos(IVec3::new(x, 0, 0));
+        assert_eq!(shared([]), None);
+        let (count, places) = shared([at(0), at(1), at(1), at(90), at(91)]).unwrap();
+        assert_eq!((count, places.min.x, places.max.x), (3, -1, 2));
+        let column = (0..8192).map(|y| BrickPos(IVec3::new(0, y, 0)));
+        assert!(shared(column).unwrap().1.volume() <= MOST);
+    }
+}
