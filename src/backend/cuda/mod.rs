@@ -29,6 +29,8 @@ mod windows;
 #[cfg(test)]
 mod emulator;
 #[cfg(test)]
+mod kernel_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
