@@ -165,9 +165,7 @@ impl Batch {
         });
         let at = |place: usize| {
             let [a, b, c, d, e, f, g, h] = near;
-            i32x8::new([
-                a[place], b[place], c[place], d[place], e[place], f[place], g[place], h[place],
-            ])
+            i32x8::new([a[place], b[place], c[place], d[place], e[place], f[place], g[place], h[place]])
         };
         let around = |end: usize, step: usize| [at(end - step), at(end + step)];
         // Both ends, one before and one after them along the edge, and around both ends along the other two axes.

@@ -168,7 +168,8 @@ impl Borders {
             let start = along * self.width + (from - self.low.x) as usize;
             let Some(cells) = self.cells.get_mut(start..start + (end - from) as usize) else { return };
             let lanes = |word: u64| spread((word >> (row * 8)) as u8);
-            let flags = (0..).zip(sides).fold(lanes(own) << 4, |flags, (side, word)| flags | lanes(word) << side);
+            let flags =
+                (0..).zip(sides).fold(lanes(own) << 4, |flags, (side, word)| flags | lanes(word) << side);
             cells.copy_from_slice(&flags.to_le_bytes()[(from - x * 8) as usize..][..cells.len()]);
         }
     }
@@ -208,7 +209,9 @@ mod tests {
     #[test]
     fn borders_are_beside_the_mask() {
         let mut mask = Mask::default();
-        for (word, cells) in [((0, 0), 0x8100_0000_0012_0081), ((1, 0), 0x0180), ((0, 1), 0xf0), ((-1, 0), 0x80)] {
+        for (word, cells) in
+            [((0, 0), 0x8100_0000_0012_0081), ((1, 0), 0x0180), ((0, 1), 0xf0), ((-1, 0), 0x80)]
+        {
             mask.insert_word(word, cells);
         }
         let view = MaskView::new(&mask);

@@ -33,8 +33,7 @@ impl<'a> Window<'a> {
 
     /// The bricks of another box, maybe of another world, in the memory of this window.
     pub fn moved<'b>(self, view: &SampleView<'b>, places: LatticeBox) -> Window<'b> {
-        let mut window =
-            Window { low: places.min, size: places.size(), bricks: emptied(self.bricks) };
+        let mut window = Window { low: places.min, size: places.size(), bricks: emptied(self.bricks) };
         window.bricks.resize(places.volume() as usize, None);
         for table in view.tables() {
             // Newer tables come later; what they hold stands over what older ones do.

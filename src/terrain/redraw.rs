@@ -257,7 +257,11 @@ fn those_within(xs: RangeInclusive<i32>, boxes: &[(i32, LatticeBox)]) -> ByBrick
         }
     }
     if is_dense {
-        return table.iter().filter(|&&number| number != 0).map(|&number| found[number as usize - 1]).collect();
+        return table
+            .iter()
+            .filter(|&&number| number != 0)
+            .map(|&number| found[number as usize - 1])
+            .collect();
     }
     found.sort_unstable_by_key(|(brick, _)| stack_order(brick));
     found
