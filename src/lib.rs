@@ -114,6 +114,10 @@
 //! A terrain may be moved by whole voxels and scaled by powers of two; rotated, stretched or moved by a part of a voxel,
 //! its seams lose their equal bits.
 
+// Tests of the crate share worlds with those beside it.
+#[cfg(test)]
+extern crate self as bevy_burrow;
+
 pub mod backend;
 pub mod brush;
 pub mod ground;

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use rayon::prelude::*;
 
-use super::Backend;
+use super::Compute;
 use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
@@ -27,7 +27,7 @@ thread_local! {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cpu;
 
-impl Backend for Cpu {
+impl Compute for Cpu {
     fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
         work.run(each);
     }

@@ -1,18 +1,46 @@
-//! Who does the heavy work of a transaction: applying edits to bricks, and meshing blocks.
+//! Who does the heavy work of a transaction, applying edits to bricks and meshing blocks: the processor, or a CUDA card.
+//!
+//! A [`Terrain`](crate::terrain::Terrain) has an [`Engine`], and whatever that runs on, the world is the same bit by bit.
+//!
+//! ```
+//! use bevy_burrow::backend::{Backend, Engine};
+//! use bevy_burrow::prelude::*;
+//!
+//! let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+//! terrain.set_engine(Engine::new(Backend::Auto));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod choice;
 mod cpu;
+#[cfg(feature = "cuda")]
+mod cuda;
 mod engine;
 
+pub use choice::{Choice, Estimate, Stage};
 use cpu::Cpu;
 pub(crate) use cpu::PARALLEL_BLOCKS;
-pub use engine::Engine;
+pub use engine::{Engine, EngineFigures, EngineState};
 
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 
-/// The heavy work of a transaction. Every backend gives the same bits, so a transaction need not know which one it has.
-pub(crate) trait Backend: Send + Sync {
+/// What an [`Engine`] may run on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Backend {
+    /// Whichever is faster, by measurement, for each transaction. Until a card is found and measured, and where there is
+    /// none, the processor.
+    #[default]
+    Auto,
+    /// The processor.
+    Cpu,
+    /// A CUDA card for all transactions, small ones too, as soon as it is found. Where there is none, the processor.
+    Cuda,
+}
+
+/// The heavy work of a transaction. All who do it give the same bits, so a transaction need not know whom it asks.
+pub(crate) trait Compute: Send + Sync {
     /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one ledger or as
     /// several.
     fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger));

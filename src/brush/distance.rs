@@ -48,6 +48,44 @@ impl Form {
     }
 }
 
+#[cfg(feature = "cuda")]
+impl Form {
+    /// Which shape it is, in the order of the variants, and its constants in the order of their fields.
+    pub(super) fn constants(&self) -> (u32, [f32; 12]) {
+        let mut all = [0.0; 12];
+        let mut put = |at: usize, values: &[f32]| {
+            all[at..].iter_mut().zip(values).for_each(|(place, value)| *place = *value);
+        };
+        let kind = match self {
+            Self::Sphere(Sphere { radius }) => {
+                put(0, &[*radius]);
+                0
+            }
+            Self::Cuboid(Cuboid { columns, half }) => {
+                put(0, columns.as_flattened());
+                put(9, half);
+                1
+            }
+            Self::Cylinder(Cylinder { axis, radius }) => {
+                put(0, &axis.unit);
+                put(3, &[axis.length, *radius]);
+                2
+            }
+            Self::Capsule(Capsule { axis, radius }) => {
+                put(0, &axis.unit);
+                put(3, &[axis.length, *radius]);
+                3
+            }
+            Self::Cone(Cone { axis, radius, slant, rise, run }) => {
+                put(0, &axis.unit);
+                put(3, &[axis.length, *radius, *slant, *rise, *run]);
+                4
+            }
+        };
+        (kind, all)
+    }
+}
+
 /// A ball around the origin.
 #[derive(Clone, Debug)]
 pub(super) struct Sphere {

@@ -166,6 +166,30 @@ fn units(at: i64, home: i32, rest: i32) -> f32 {
     (voxels(at, home) * ONE - rest) as f32
 }
 
+/// An evaluator as plain numbers, for other machines.
+#[cfg(feature = "cuda")]
+pub(crate) struct Constants {
+    /// The shape's origin in voxels, and 1/256 voxel from there.
+    pub home: IVec3,
+    pub rest: IVec3,
+    /// Sphere, cuboid, cylinder, capsule, cone.
+    pub kind: u32,
+    /// What [`Form::constants`] says.
+    pub shape: [f32; 12],
+    /// Amplitude, scale and seed of roughness.
+    pub grain: Option<(i32, i32, u32)>,
+}
+
+#[cfg(feature = "cuda")]
+impl Evaluator {
+    /// All that distances are computed from.
+    pub(crate) fn constants(&self) -> Constants {
+        let (kind, shape) = self.form.constants();
+        let grain = self.grain.as_ref().map(Grain::constants);
+        Constants { home: self.home, rest: self.rest, kind, shape, grain }
+    }
+}
+
 /// Rounds to the nearest integer, halves to even, with an addition: next to 1.5 * 2^23, floats are the integers.
 #[inline(always)]
 fn round(distance: f32) -> i32 {

@@ -51,6 +51,12 @@ impl Grain {
         })
     }
 
+    /// Amplitude, scale, seed.
+    #[cfg(feature = "cuda")]
+    pub(super) fn constants(&self) -> (i32, i32, u32) {
+        (self.amplitude, self.scale, self.seed)
+    }
+
     pub(super) fn check(&self) -> Result<(), BrushError> {
         for (what, value, (least, most)) in
             [("amplitude", self.amplitude, AMPLITUDES), ("scale", self.scale, SCALES)]

@@ -262,6 +262,15 @@ static SLOTS: LazyLock<[Slots; 256]> = LazyLock::new(|| {
     std::array::from_fn(|case| of(&cases::table()[case]))
 });
 
+/// For each case the places of its edges as [`Numbers`] has them, three for a triangle, and how many they are.
+#[cfg(feature = "cuda")]
+pub(crate) fn slot_table() -> [[u16; 16]; 256] {
+    std::array::from_fn(|case| {
+        let Slots { slots, len } = &SLOTS[case];
+        std::array::from_fn(|i| slots.get(i).copied().unwrap_or(*len as u16))
+    })
+}
+
 /// The cubes of a brick that marching cubes draws.
 struct Cubes {
     /// Solid corners, layer by layer.

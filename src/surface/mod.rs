@@ -24,6 +24,9 @@ pub mod tile;
 pub mod vertex;
 pub(crate) mod window;
 
+#[cfg(feature = "cuda")]
+pub(crate) use stack::borders;
+
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};
 pub use seams::{SeamFault, SeamReport, SeamSoup};

@@ -125,7 +125,7 @@ pub(super) fn pristine_side((lowest, highest): (i32, i32), y: i32) -> Option<boo
 }
 
 /// Edges along x, y, z between a cell of the mask and one of the heightmap, at bit `(z + 1) * 10 + x + 1`.
-fn borders(view: &WorldView, (x, z): (i32, i32), own: u64) -> [u128; 3] {
+pub(crate) fn borders(view: &WorldView, (x, z): (i32, i32), own: u64) -> [u128; 3] {
     // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word after.
     let row = |words: [u64; 3], z: i32| {
         let [before, own, after] = words.map(|word| u128::from(word >> (z * 8) & 0xff));

@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use super::surface::{ChunkSurface, Fresh, key};
 use super::transaction::Stages;
 use super::world::World;
-use crate::backend::{Backend, PARALLEL_BLOCKS};
+use crate::backend::{Compute, PARALLEL_BLOCKS};
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos, sort_by_place};
 use crate::surface::block::{self, Block, Parts};
@@ -109,7 +109,7 @@ pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut S
 pub(super) fn updates(
     world: &World,
     view: &WorldView,
-    backend: &dyn Backend,
+    backend: &dyn Compute,
     changed: &[DraftedBrick],
     dirty: ByBrick,
     added: &Mask,
@@ -286,7 +286,7 @@ fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
 fn mesh_blocks(
     world: &World,
     view: &WorldView,
-    backend: &dyn Backend,
+    backend: &dyn Compute,
     blocks: &[Block],
     stages: &mut Stages,
 ) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {

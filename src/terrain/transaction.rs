@@ -40,7 +40,8 @@ pub enum FieldNews {
     },
 }
 
-/// Edits on their way, with the snapshot that they apply to.
+/// Edits on their way, with the snapshot that they apply to. A clone gives the same commit; a terrain takes one of them.
+#[derive(Clone)]
 pub struct Transaction {
     ticket: u64,
     world: Arc<World>,
@@ -113,12 +114,17 @@ impl Transaction {
         self.submissions.is_empty()
     }
 
+    /// Computes the commit on another engine than the terrain's own.
+    pub fn run_on(self, engine: &Engine) -> Commit {
+        Self { engine: engine.clone(), ..self }.run()
+    }
+
     /// Computes the commit. Runs on any thread; large transactions use the threads of the current rayon pool, and the
     /// result does not depend on how many those are.
     pub fn run(self) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = self.submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
-        let backend = self.engine.backend();
+        let backend = self.engine.compute();
         let draft = Stages::time(&mut stages.edit, || {
             let mut draft = Draft::new(edits.len(), world.sample_hash);
             let work = EditWork::new(world.samples(), world.grid, &edits);

@@ -1,6 +1,7 @@
 //! Samples and the bricks that store them.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::IVec3;
 use rustc_hash::FxHashMap;
@@ -66,6 +67,29 @@ pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     layers
 }
 
+/// A word that a backend keeps with a brick, to find its own copy of it. A clone starts without one.
+#[derive(Debug, Default)]
+pub(crate) struct Tag(AtomicU64);
+
+impl Clone for Tag {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+#[cfg_attr(not(feature = "cuda"), expect(dead_code))]
+impl Tag {
+    /// What was kept last; 0 to begin with.
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Keeps a word. It says nothing about the brick, so nobody needs to see it in time.
+    pub fn set(&self, word: u64) {
+        self.0.store(word, Ordering::Relaxed);
+    }
+}
+
 /// 8x8x8 samples with their materials.
 ///
 /// Beside them the brick keeps two bits a sample, so that whole rows are judged at once: is it solid, pristine samples
@@ -77,6 +101,7 @@ pub struct Brick {
     edited: Layers,
     /// `None` while all are [`MaterialId::GROUND`].
     materials: Option<Box<[MaterialId; LEN]>>,
+    pub(crate) tag: Tag,
 }
 
 impl Brick {
@@ -85,7 +110,7 @@ impl Brick {
 
     /// A brick without an edited sample, of which these pristine ones are solid.
     pub(crate) fn pristine(solid: Layers) -> Self {
-        Self { samples: [Sample::PRISTINE; LEN], solid, edited: [0; 8], materials: None }
+        Self { samples: [Sample::PRISTINE; LEN], solid, edited: [0; 8], materials: None, tag: Tag::default() }
     }
 
     /// A brick of these samples, none of them pristine, in the order of [`BrickPos::index`].
@@ -98,6 +123,27 @@ impl Brick {
             brick.set_bits(row / 8, 0xff << (row % 8 * 8), solid << (row % 8 * 8));
         }
         brick
+    }
+
+    /// A brick of samples, bits that agree with them, and materials.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn of_parts(
+        samples: &[i16; LEN],
+        solid: Layers,
+        edited: Layers,
+        materials: Option<&[u8; LEN]>,
+    ) -> Self {
+        let materials = materials.map(|materials| Box::new(materials.map(MaterialId)));
+        Self { samples: samples.map(Sample), solid, edited, materials, tag: Tag::default() }
+    }
+
+    /// A brick all of whose samples were edited to the same.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn of_one(sample: i16, material: MaterialId) -> Self {
+        let sample = Sample::edited(sample.into());
+        let solid = if sample.0 < 0 { [u64::MAX; 8] } else { [0; 8] };
+        let materials = (material != MaterialId::GROUND).then(|| Box::new([material; LEN]));
+        Self { samples: [sample; LEN], solid, edited: [u64::MAX; 8], materials, tag: Tag::default() }
     }
 
     /// The sample at a lattice point that lies in this brick.
@@ -164,6 +210,12 @@ impl Brick {
     /// The material of the sample with this index.
     pub(crate) fn material_at(&self, index: usize) -> MaterialId {
         self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[index])
+    }
+
+    /// The materials in order of the samples, `None` while all are [`MaterialId::GROUND`].
+    #[cfg(feature = "cuda")]
+    pub(crate) fn materials(&self) -> Option<&[MaterialId; LEN]> {
+        self.materials.as_deref()
     }
 
     /// Bytes that materials take beside the brick itself.

@@ -141,6 +141,12 @@ impl<'a> EditWork<'a> {
         self.jobs.chunk_by(|a, b| a.brick == b.brick).collect()
     }
 
+    /// Every brick that some edit may reach, once for each edit.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn jobs(&self) -> &[Job] {
+        &self.jobs
+    }
+
     /// Applies all edits on the CPU and hands out what they changed, brick by brick. The result does not depend on how
     /// many threads there are.
     pub(crate) fn run(&self, mut each: impl FnMut(Ledger)) {

@@ -15,7 +15,11 @@ mod workpiece;
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub(crate) use brick::{PRISTINE, row};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};
+#[cfg(feature = "cuda")]
+pub(crate) use draft::{Job, Tool};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
+#[cfg(feature = "cuda")]
+pub(crate) use ledger::{Count, Fate, PartEffect};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};

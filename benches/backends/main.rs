@@ -1,0 +1,253 @@
+//! The processor beside a CUDA card: `cargo bench --no-default-features --features cuda --bench backends [-- SECTION...]`.
+//!
+//! Transactions on the landscape that ships with the crate, the same ones on each backend in turns. The processor has all
+//! of its threads unless said otherwise. Times run from the edits to the commit, with vertices in the host's memory.
+
+#[path = "../edits/landscape.rs"]
+#[allow(dead_code)]
+mod landscape;
+mod level;
+#[path = "../edits/statistics.rs"]
+#[allow(dead_code)]
+mod statistics;
+
+use std::time::Duration;
+
+use bevy_burrow::backend::{Backend, Choice, Engine, EngineState, Stage};
+use bevy_burrow::terrain::{Commit, Stages, Transaction};
+use glam::Vec3;
+
+use landscape::{dig, landscape, threads};
+use level::Level;
+use statistics::Sample;
+
+const SECTIONS: [(&str, fn(&Engines)); 4] =
+    [("bulk", bulk), ("field", one_field), ("brush", brush), ("sweep", sweep)];
+
+/// One engine of each kind.
+struct Engines {
+    cpu: Engine,
+    cuda: Engine,
+    auto: Engine,
+}
+
+impl Engines {
+    /// Each with its name.
+    fn named(&self) -> [(&str, &Engine); 3] {
+        [("CPU", &self.cpu), ("CUDA", &self.cuda), ("Auto", &self.auto)]
+    }
+}
+
+fn main() {
+    // Cargo itself passes `--bench`.
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect();
+    if let Some(unknown) = wanted.iter().find(|name| !SECTIONS.iter().any(|(known, _)| known == name)) {
+        eprintln!("no section {unknown}; there are {:?}", SECTIONS.map(|(name, _)| name));
+        std::process::exit(2);
+    }
+    let open = |backend| {
+        let engine = Engine::new(backend);
+        engine.wait(Duration::from_secs(30));
+        engine
+    };
+    let engines = Engines { cpu: open(Backend::Cpu), cuda: open(Backend::Cuda), auto: open(Backend::Auto) };
+    match engines.cuda.state() {
+        EngineState::Cuda(name) => println!("{name}, {} threads", rayon::current_num_threads()),
+        state => return println!("no card: {state:?}"),
+    }
+    for (name, run) in SECTIONS {
+        if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
+            println!("\n{name}");
+            run(&engines);
+        }
+    }
+}
+
+/// Times of many transactions on one engine.
+#[derive(Default)]
+struct Times {
+    whole: Sample,
+    edit: Sample,
+    meshing: Sample,
+    assembly: Sample,
+    ring: Sample,
+    /// On the card alone: edits, meshing; and their kernels.
+    device: [Sample; 2],
+    kernel: [Sample; 2],
+}
+
+impl Times {
+    fn push(&mut self, stages: &Stages, choices: &[Choice]) {
+        let parts = [
+            (&mut self.whole, stages.whole),
+            (&mut self.edit, stages.edit),
+            (&mut self.meshing, stages.meshing),
+            (&mut self.assembly, stages.assembly),
+            (&mut self.ring, stages.ring),
+        ];
+        parts.into_iter().for_each(|(sample, time)| sample.push(time.as_secs_f64()));
+        for (at, stage) in [Stage::Edit, Stage::Mesh].into_iter().enumerate() {
+            if let Some(choice) = choices.iter().rev().find(|choice| choice.stage == stage && choice.is_cuda)
+            {
+                self.device[at].push(choice.device.as_secs_f64());
+                self.kernel[at].push(choice.kernel.as_secs_f64());
+            }
+        }
+    }
+
+    fn print(&self, what: &str) {
+        let stages = [&self.edit, &self.meshing, &self.assembly, &self.ring];
+        let stages: String = stages.iter().map(|stage| format!("{:>9.0}", stage.median() * 1e6)).collect();
+        let device: String = self
+            .device
+            .iter()
+            .zip(&self.kernel)
+            .filter(|(device, _)| device.len() > 0)
+            .map(|(device, kernel)| format!("{:>9.0} ({:.0})", device.median() * 1e6, kernel.median() * 1e6))
+            .collect();
+        let whole = &self.whole;
+        println!(
+            "  {what:<28}{:>9.0}{:>9.0}{stages} {device}",
+            whole.median() * 1e6,
+            whole.percentile(0.99) * 1e6
+        );
+    }
+}
+
+/// Heads the lines of [`Times::print`].
+fn header(what: &str) {
+    let names =
+        ["whole", "p99", "edit", "meshing", "assembly", "ring"].map(|name| format!("{name:>9}")).concat();
+    println!("  {what:<28}{names}  edits, meshing on the card (kernels)   us, medians but for p99");
+}
+
+/// One transaction on an engine.
+fn run(transaction: Transaction, engine: &Engine, times: &mut Times) -> Commit {
+    let commit = transaction.run_on(engine);
+    times.push(&commit.stages, &engine.figures().choices);
+    commit
+}
+
+/// 512 fields of 32x32x32, all of them dirty: made, and then dug all over again.
+fn bulk(engines: &Engines) {
+    let level = Level::new();
+    let [mut cpu, mut cuda] = [(); 2].map(|()| [Times::default(), Times::default()]);
+    let mut ratios = [Sample::default(), Sample::default()];
+    let mut vertices = 0;
+    for round in 0..12 {
+        let mut hashes = Vec::new();
+        let mut wholes = Vec::new();
+        for (engine, times) in [(&engines.cpu, &mut cpu), (&engines.cuda, &mut cuda)] {
+            let mut terrain = level.terrain();
+            for (pass, times) in times.iter_mut().enumerate() {
+                level.brushes(pass).for_each(|brush| terrain.submit(&brush));
+                let mut discarded = Times::default();
+                let transaction = terrain.begin().expect("brushes wait");
+                let commit = run(transaction, engine, if round < 2 { &mut discarded } else { times });
+                wholes.push(commit.stages.whole.as_secs_f64());
+                vertices = commit.meshes.chunks.iter().map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
+                terrain.commit(commit).expect("nothing else commits");
+            }
+            hashes.push(terrain.world().hash());
+        }
+        assert_eq!(hashes[0], hashes[1], "the same world");
+        if round >= 2 {
+            ratios
+                .iter_mut()
+                .enumerate()
+                .for_each(|(pass, ratio)| ratio.push(wholes[pass] / wholes[pass + 2]));
+        }
+    }
+    header("512 fields");
+    for (pass, what) in ["first dig", "dug again"].into_iter().enumerate() {
+        cpu[pass].print(&format!("{what}, CPU"));
+        cuda[pass].print(&format!("{what}, CUDA"));
+        println!("  {what}: CUDA {:.2} times as fast (median of pairs)", ratios[pass].median());
+    }
+    println!("  {vertices} vertices");
+}
+
+/// One field meshed whole.
+fn one_field(engines: &Engines) {
+    header("one field");
+    for size in [64, 100] {
+        let mut samples = [(); 3].map(|()| Times::default());
+        let one = threads(1);
+        for round in 0..30 {
+            let mut discarded = [(); 3].map(|()| Times::default());
+            let kept = if round < 5 { &mut discarded } else { &mut samples };
+            let [alone, cpu, cuda] = kept;
+            let dig_all = |engine: &Engine, times: &mut Times| {
+                let mut terrain = level::one_field(size, round);
+                run(terrain.begin().expect("a brush waits"), engine, times);
+            };
+            one.install(|| dig_all(&engines.cpu, alone));
+            dig_all(&engines.cpu, cpu);
+            dig_all(&engines.cuda, cuda);
+        }
+        for (times, who) in samples.iter().zip(["1 thread", "CPU", "CUDA"]) {
+            times.print(&format!("{size}^3, {who}"));
+        }
+    }
+}
+
+/// Single brushes of radius 4 on dug ground.
+fn brush(engines: &Engines) {
+    header("radius 4");
+    let mut times = [(); 3].map(|()| Times::default());
+    let mut terrain = landscape(32);
+    for (round, at) in landscape::Places::new(600).iter().enumerate() {
+        terrain.apply([dig(at, 4.0)]);
+        terrain.submit(&dig(at + Vec3::splat(2.0), 4.0));
+        let transaction = terrain.begin().expect("a brush waits");
+        for ((_, engine), times) in engines.named().into_iter().zip(&mut times) {
+            let mut discarded = Times::default();
+            run(transaction.clone(), engine, if round < 100 { &mut discarded } else { times });
+        }
+        terrain.commit(transaction.run()).expect("nothing else commits");
+    }
+    for ((who, _), times) in engines.named().into_iter().zip(&times) {
+        times.print(who);
+    }
+}
+
+/// Transactions of one block to thousands, on each backend and as `Auto` has it.
+fn sweep(engines: &Engines) {
+    println!(
+        "  {:<28}{:>9}{:>9}{:>9}   us, medians; Auto over the better one",
+        "dirty blocks", "CPU", "CUDA", "Auto"
+    );
+    let mut worst = 0.0f64;
+    for count in [1, 2, 4, 8, 16, 32, 64, 128, 256, 512] {
+        let mut times = [(); 3].map(|()| Times::default());
+        let mut ratios = Sample::default();
+        let mut blocks = 0;
+        let mut terrain = landscape(32);
+        let places: Vec<Vec3> = landscape::Places::new(4096).iter().collect();
+        for round in 0..25 {
+            let radius = if count == 1 { 1.0 } else { 3.0 };
+            let own = places.iter().cycle().skip(round * count).take(count);
+            own.for_each(|&place| terrain.submit(&dig(place + Vec3::splat(round as f32 * 0.1), radius)));
+            let transaction = terrain.begin().expect("brushes wait");
+            let mut taken = [0.0; 3];
+            for (i, (_, engine)) in engines.named().into_iter().enumerate() {
+                let mut discarded = Times::default();
+                let kept = if round < 5 { &mut discarded } else { &mut times[i] };
+                taken[i] = run(transaction.clone(), engine, kept).stages.whole.as_secs_f64();
+            }
+            blocks = engines.auto.figures().choices.last().map_or(blocks, |choice| choice.amount);
+            if round >= 5 {
+                ratios.push(taken[2] / taken[0].min(taken[1]));
+            }
+            terrain.commit(transaction.run()).expect("nothing else commits");
+        }
+        let [cpu, cuda, auto] = times.each_ref().map(|times| times.whole.median() * 1e6);
+        let ratio = auto / cpu.min(cuda);
+        worst = worst.max(ratio);
+        println!(
+            "  {blocks:<28}{cpu:>9.0}{cuda:>9.0}{auto:>9.0}   {ratio:.2}, median of pairs {:.2}",
+            ratios.median()
+        );
+    }
+    println!("  worst {worst:.2}");
+}

@@ -1,0 +1,240 @@
+//! A CUDA card, through its driver.
+//!
+//! All of the crate's unsafe code is here. Addresses come from the driver and are handed back to it alone; what kernels do
+//! with them is bounded by the capacities they are given.
+#![allow(unsafe_code)]
+
+use std::ffi::{CString, c_void};
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
+
+use cudarc::driver::sys::{self, CUfunction};
+use cudarc::driver::{CudaContext, CudaEvent, CudaStream, DriverError, result};
+
+use super::device::{Device, Fault, HostMemory, Kernel};
+use super::layout::THREADS;
+
+/// The kernels, compiled ahead.
+const PTX: &str = include_str!("kernels.ptx");
+
+/// A card with the kernels on it.
+pub(super) struct Card {
+    context: Arc<CudaContext>,
+    stream: Arc<CudaStream>,
+    /// Recorded before the first upload, before a kernel, and after what is to be waited for.
+    marks: [CudaEvent; 3],
+    is_begun: bool,
+    module: sys::CUmodule,
+    kernels: [CUfunction; 3],
+}
+
+// SAFETY: the module and its functions belong to the context, which any thread may use once it is bound there; every
+// method binds it first.
+unsafe impl Send for Card {}
+
+/// What the driver says of an error. Only to be called once the driver is known to be there.
+fn failed(error: DriverError) -> Fault {
+    let name = error.error_name().map_or("unknown error".into(), |name| name.to_string_lossy().into_owned());
+    Fault::Failed(name)
+}
+
+impl Card {
+    /// Opens the first card.
+    pub fn open() -> Result<Self, Fault> {
+        Self::open_with(PTX)
+    }
+
+    /// The same with other kernels.
+    pub fn open_with(ptx: &str) -> Result<Self, Fault> {
+        // SAFETY: loads the driver's library to see whether it is there, as every later call does.
+        if !unsafe { sys::is_culib_present() } {
+            return Err(Fault::NoDriver);
+        }
+        let no_device = |error: DriverError| match failed(error) {
+            Fault::Failed(name) => Fault::NoDevice(name),
+            fault => fault,
+        };
+        let context = CudaContext::new(0).map_err(no_device)?;
+        let (major, minor) = context.compute_capability().map_err(failed)?;
+        if (major, minor) < (7, 5) {
+            return Err(Fault::OldDevice(major, minor));
+        }
+        let image = CString::new(ptx).map_err(|error| Fault::Refused(error.to_string()))?;
+        let refused = |error: DriverError| match failed(error) {
+            Fault::Failed(name) => Fault::Refused(name),
+            fault => fault,
+        };
+        // SAFETY: the image is PTX and ends with a zero byte.
+        let module = unsafe { result::module::load_data(image.as_ptr().cast()) }.map_err(refused)?;
+        let mut kernels = [std::ptr::null_mut(); 3];
+        for (function, kernel) in kernels.iter_mut().zip(Kernel::ALL) {
+            let name = CString::new(kernel.name()).map_err(|error| Fault::Refused(error.to_string()))?;
+            // SAFETY: the module was just loaded.
+            *function = unsafe { result::module::get_function(module, name) }.map_err(refused)?;
+        }
+        let stream = context.new_stream().map_err(failed)?;
+        let mark = || context.new_event(Some(sys::CUevent_flags::CU_EVENT_DEFAULT)).map_err(failed);
+        let marks = [mark()?, mark()?, mark()?];
+        Ok(Self { context, stream, marks, is_begun: false, module, kernels })
+    }
+
+    fn bind(&self) -> Result<(), Fault> {
+        self.context.bind_to_thread().map_err(failed)
+    }
+}
+
+impl Drop for Card {
+    fn drop(&mut self) {
+        if self.bind().is_ok() {
+            // What still runs may use the module and memory that goes next. A card that fails here is lost anyway.
+            let _ = self.context.synchronize();
+            // SAFETY: nothing runs any more, and nobody else has the module.
+            let _ = unsafe { result::module::unload(self.module) };
+        }
+    }
+}
+
+/// Pinned memory, which the card sees at an address of its own.
+struct Pinned {
+    context: Arc<CudaContext>,
+    start: *mut u8,
+    len: usize,
+    address: u64,
+}
+
+// SAFETY: the memory is only reached through this owner; any thread may free it once the context is bound there.
+unsafe impl Send for Pinned {}
+// SAFETY: shared references only read.
+unsafe impl Sync for Pinned {}
+
+impl HostMemory for Pinned {
+    fn bytes(&self) -> &[u8] {
+        // SAFETY: `start` is `len` bytes of initialised memory, which the card does not write to now: whoever started a
+        // copy waits for it before looking.
+        unsafe { std::slice::from_raw_parts(self.start, self.len) }
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        // SAFETY: as above, and nobody else has a reference.
+        unsafe { std::slice::from_raw_parts_mut(self.start, self.len) }
+    }
+
+    fn address(&self) -> Option<u64> {
+        Some(self.address)
+    }
+}
+
+impl Drop for Pinned {
+    fn drop(&mut self) {
+        if self.context.bind_to_thread().is_ok() {
+            // SAFETY: the memory is this owner's; freeing it waits for copies that use it.
+            let _ = unsafe { result::free_host(self.start.cast()) };
+        }
+    }
+}
+
+impl Device for Card {
+    fn name(&self) -> String {
+        self.context.name().unwrap_or_else(|_| "CUDA device".into())
+    }
+
+    fn free_memory(&mut self) -> usize {
+        self.bind().and_then(|()| result::mem_get_info().map_err(failed)).map_or(0, |(free, _)| free)
+    }
+
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        self.bind()?;
+        // SAFETY: a plain allocation.
+        unsafe { result::malloc_sync(bytes.max(1)) }.map_err(|_| Fault::Memory(bytes))
+    }
+
+    fn free(&mut self, address: u64) {
+        if self.bind().is_ok() {
+            // SAFETY: the address is from `alloc`; freeing waits for whatever uses it.
+            let _ = unsafe { result::free_sync(address) };
+        }
+    }
+
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        self.bind()?;
+        let len = bytes.max(1);
+        let flags = sys::CU_MEMHOSTALLOC_PORTABLE | sys::CU_MEMHOSTALLOC_DEVICEMAP;
+        // SAFETY: a plain allocation, cleared before anyone looks at it.
+        let start =
+            unsafe { result::malloc_host(len, flags) }.map_err(|_| Fault::Memory(bytes))?.cast::<u8>();
+        // SAFETY: `start` has `len` bytes.
+        unsafe { start.write_bytes(0, len) };
+        let mut pinned = Pinned { context: Arc::clone(&self.context), start, len, address: 0 };
+        // SAFETY: the pointer is from `malloc_host`, with a mapping for the device.
+        let mapped = unsafe { sys::cuMemHostGetDevicePointer_v2(&mut pinned.address, start.cast(), 0) };
+        mapped.result().map_err(failed)?;
+        Ok(Box::new(pinned))
+    }
+
+    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+        self.bind()?;
+        let Some(bytes) = from.bytes().get(bytes) else {
+            return Err(Fault::Failed("copy out of range".into()));
+        };
+        if !std::mem::replace(&mut self.is_begun, true) {
+            self.marks[0].record(&self.stream).map_err(failed)?;
+        }
+        // SAFETY: callers keep the memory until they have waited, and `to` has room for so many bytes.
+        unsafe { result::memcpy_htod_async(to, bytes, self.stream.cu_stream()) }.map_err(failed)
+    }
+
+    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
+        self.bind()?;
+        let bytes = to.bytes_mut().get_mut(bytes);
+        let Some(bytes) = bytes else { return Err(Fault::Failed("copy out of range".into())) };
+        // SAFETY: callers keep the memory and do not look at it until they have waited; `from` has so many bytes.
+        unsafe { result::memcpy_dtoh_async(bytes, from, self.stream.cu_stream()) }.map_err(failed)
+    }
+
+    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+        self.bind()?;
+        // SAFETY: both addresses are from `alloc`, with so many bytes each, and do not overlap.
+        unsafe { result::memcpy_dtod_async(to, from, bytes, self.stream.cu_stream()) }.map_err(failed)
+    }
+
+    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+        if blocks == 0 {
+            return Ok(());
+        }
+        self.bind()?;
+        self.marks[1].record(&self.stream).map_err(failed)?;
+        // The driver copies the one parameter during the call; its words are 64 bits wide.
+        let mut words = vec![0u64; params.len().div_ceil(8)];
+        bytemuck::cast_slice_mut(&mut words)[..params.len()].copy_from_slice(params);
+        let mut list = [words.as_mut_ptr().cast::<c_void>()];
+        let (function, stream) = (self.kernels[kernel as usize], self.stream.cu_stream());
+        // SAFETY: `params` is the kernel's parameter struct as the ABI has it. Its addresses are from `alloc` or from
+        // mapped memory, each with as many entries as the struct says, and live until the next `wait`.
+        unsafe { result::launch_kernel(function, (blocks, 1, 1), (THREADS, 1, 1), 0, stream, &mut list) }
+            .map_err(failed)
+    }
+
+    fn times(&mut self) -> [Duration; 2] {
+        let [begun, launched, done] = &self.marks;
+        [begun, launched].map(|start| {
+            let millis = start.elapsed_ms(done).unwrap_or_default();
+            Duration::try_from_secs_f32(millis / 1e3).unwrap_or_default()
+        })
+    }
+
+    fn wait(&mut self) -> Result<(), Fault> {
+        self.bind()?;
+        self.is_begun = false;
+        let done = &self.marks[2];
+        done.record(&self.stream).map_err(failed)?;
+        // Small transactions take less time than a sleeping thread needs to wake.
+        for _ in 0..20_000 {
+            if done.try_is_complete().map_err(failed)? {
+                return Ok(());
+            }
+            std::hint::spin_loop();
+        }
+        done.synchronize().map_err(failed)
+    }
+}

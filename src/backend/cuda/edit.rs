@@ -1,0 +1,279 @@
+//! Edits on the device: one launch for all bricks that they may reach.
+
+use std::sync::Arc;
+
+use super::device::{Device, Fault, Kernel};
+use super::layout::{
+    self, EditCount, EditJob, EditParams, EditPart, EditResult, MATERIAL_BYTES, MOST_JOBS, MOST_LIST, NONE,
+    RECORD_BYTES,
+};
+use super::mail::{Outbox, Plan, map};
+use super::session::{Session, Uploads};
+use crate::ground::MaterialId;
+use crate::lattice::ChunkGrid;
+use crate::volume::{Brick, Count, DraftedBrick, EditWork, Fate, Job, Ledger, PartEffect, Tool};
+
+/// What the edit kernel writes.
+pub(super) struct EditOutput {
+    results: Outbox,
+    records: Outbox,
+    materials: Outbox,
+    parts: Outbox,
+    counts: Outbox,
+    totals: Outbox,
+}
+
+/// How many entries of each list the kernel wanted to write.
+#[derive(Clone, Copy, Debug)]
+struct Totals {
+    records: usize,
+    materials: usize,
+    parts: usize,
+    counts: usize,
+}
+
+/// Entries that there is room for at the start.
+const FIRST: usize = 1 << 8;
+
+impl EditOutput {
+    pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
+        Ok(Self {
+            results: Outbox::new(device, size_of::<EditResult>(), FIRST)?,
+            records: Outbox::new(device, RECORD_BYTES, FIRST)?,
+            materials: Outbox::new(device, MATERIAL_BYTES, FIRST)?,
+            parts: Outbox::new(device, size_of::<EditPart>(), 4 * FIRST)?,
+            counts: Outbox::new(device, size_of::<EditCount>(), 4 * FIRST)?,
+            totals: Outbox::new(device, size_of::<u32>(), 4)?,
+        })
+    }
+
+    /// Room for all that; says whether there was too little.
+    fn reserve(&mut self, device: &mut dyn Device, totals: Totals) -> Result<bool, Fault> {
+        let mut grown = self.records.reserve(device, totals.records)?;
+        grown |= self.materials.reserve(device, totals.materials)?;
+        grown |= self.parts.reserve(device, totals.parts)?;
+        grown |= self.counts.reserve(device, totals.counts)?;
+        Ok(grown)
+    }
+
+    fn fetch(&mut self, device: &mut dyn Device, totals: Totals) -> Result<(), Fault> {
+        self.records.fetch(device, totals.records)?;
+        self.materials.fetch(device, totals.materials)?;
+        self.parts.fetch(device, totals.parts)?;
+        self.counts.fetch(device, totals.counts)
+    }
+
+    fn totals(&self) -> Totals {
+        let mut totals = [0; 4];
+        totals.copy_from_slice(self.totals.entries::<u32>(4));
+        let [records, materials, parts, counts] = totals.map(|count: u32| count as usize);
+        Totals { records, materials, parts, counts }
+    }
+}
+
+/// From how many bricks on they are dealt with side by side.
+const LONG: usize = 64;
+
+/// Bricks that one thread makes of what came back.
+const GROUP: usize = 64;
+
+/// A slot that is to hold a changed brick, with its tag.
+type Target = (u32, u64);
+
+impl Session {
+    /// Applies edits: what they changed, brick by brick.
+    pub fn edit(&mut self, work: &EditWork) -> Result<Vec<Ledger>, Fault> {
+        self.begin();
+        let (bricks, mut uploads) = (work.bricks(), Uploads::new(work.base.ground()));
+        let mut targets = Vec::with_capacity(bricks.len());
+        let ledgers = self.run_edits(work, &bricks, &mut uploads, &mut targets);
+        if ledgers.is_err() {
+            self.give_up(&uploads);
+            targets.iter().for_each(|&(slot, _)| self.bricks.give_back(slot));
+        }
+        ledgers
+    }
+
+    fn run_edits<'a>(
+        &mut self,
+        work: &EditWork<'a>,
+        bricks: &[&[Job]],
+        uploads: &mut Uploads<'a>,
+        targets: &mut Vec<Target>,
+    ) -> Result<Vec<Ledger>, Fault> {
+        if bricks.len() > MOST_JOBS || work.jobs().len() > MOST_LIST {
+            return Err(Fault::TooLarge(work.jobs().len()));
+        }
+        let mut jobs = self.edit_jobs(work, bricks, uploads, targets)?;
+        let mut plan = Plan::default();
+        uploads.plan(&mut plan);
+        let job_list = plan.section::<EditJob>(jobs.len());
+        let tool_list = plan.section::<layout::Tool>(work.tools.len());
+        let edits = plan.section::<u32>(bricks.iter().map(|jobs| jobs.len()).sum());
+        let counters = plan.section::<u32>(4);
+        self.inbox.open(&mut *self.device, &plan)?;
+        let list = self.inbox.entries::<u32>(edits).iter_mut();
+        list.zip(bricks.iter().copied().flatten()).for_each(|(entry, job)| *entry = job.edit);
+        let mut first = 0;
+        for (job, own) in jobs.iter_mut().zip(bricks) {
+            (job.first, job.count) = (first, own.len() as u32);
+            first += job.count;
+        }
+        self.inbox.put(job_list, &jobs);
+        let tools: Vec<layout::Tool> = work.tools.iter().map(tool).collect();
+        self.inbox.put(tool_list, &tools);
+        self.inbox.entries::<u32>(counters).fill(0);
+        self.edits.results.reserve(&mut *self.device, jobs.len())?;
+
+        for _ in 0..2 {
+            self.send(&plan, uploads)?;
+            let params = EditParams {
+                bricks: self.bricks.base(),
+                stacks: self.stacks.base(),
+                jobs: self.inbox.address(job_list),
+                list: self.inbox.address(edits),
+                tools: self.inbox.address(tool_list),
+                results: self.edits.results.address(),
+                records: self.edits.records.address(),
+                materials: self.edits.materials.address(),
+                parts: self.edits.parts.address(),
+                counts: self.edits.counts.address(),
+                counters: self.inbox.address(counters),
+                record_capacity: self.edits.records.capacity(),
+                material_capacity: self.edits.materials.capacity(),
+                part_capacity: self.edits.parts.capacity(),
+                count_capacity: self.edits.counts.capacity(),
+            };
+            self.device.launch(Kernel::Edit, jobs.len() as u32, bytemuck::bytes_of(&params))?;
+            self.edits.results.fetch(&mut *self.device, jobs.len())?;
+            self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
+            self.device.wait()?;
+            self.times = self.device.times();
+            let totals = self.edits.totals();
+            if !self.edits.reserve(&mut *self.device, totals)? {
+                self.edits.fetch(&mut *self.device, totals)?;
+                self.device.wait()?;
+                self.free_targets(targets);
+                return Ok(self.edits.ledgers(work, bricks, targets, totals));
+            }
+            // A second pass, with room for all.
+        }
+        Err(Fault::Failed("results changed from one pass to the next".into()))
+    }
+
+    /// A job for each brick, with slots for what it is and what it will be.
+    fn edit_jobs<'a>(
+        &mut self,
+        work: &EditWork<'a>,
+        bricks: &[&[Job]],
+        uploads: &mut Uploads<'a>,
+        targets: &mut Vec<Target>,
+    ) -> Result<Vec<EditJob>, Fault> {
+        let base = |jobs: &&[Job]| jobs.first().and_then(|job| work.base.brick(job.pos()));
+        let bases = map(bricks, LONG, base);
+        let mut list = Vec::with_capacity(bricks.len());
+        let mut last = None;
+        for (jobs, base) in bricks.iter().zip(bases) {
+            let Some(pos) = jobs.first().map(|job| job.pos()) else { continue };
+            let place = (pos.0.x, pos.0.z);
+            let stack = match last {
+                Some((same, stack)) if same == place => stack,
+                _ => self.need_stack(uploads, place)?,
+            };
+            last = Some((place, stack));
+            let base = base.map_or(Ok(NONE), |brick| self.need_brick(uploads, brick))?;
+            let target = self.bricks.take(&mut *self.device)?;
+            targets.push(target);
+            list.push(EditJob {
+                brick: pos.0.to_array(),
+                base,
+                target: target.0,
+                stack,
+                cuts: layout::cuts(work.grid, pos),
+                ..EditJob::default()
+            });
+        }
+        Ok(list)
+    }
+
+    /// Gives slots back that no brick of its own will be in: of bricks that did not change, or are all alike.
+    fn free_targets(&mut self, targets: &[Target]) {
+        let results = self.edits.results.entries::<EditResult>(targets.len());
+        for (result, &(slot, _)) in results.iter().zip(targets) {
+            if result.flags & EditResult::CHANGED == 0 || result.flags & EditResult::UNIFORM != 0 {
+                self.bricks.give_back(slot);
+            }
+        }
+    }
+}
+
+impl EditOutput {
+    /// What came back, as ledgers.
+    fn ledgers(&self, work: &EditWork, bricks: &[&[Job]], targets: &[Target], totals: Totals) -> Vec<Ledger> {
+        let results = self.results.entries::<EditResult>(bricks.len());
+        let group = |((bricks, results), targets): &((&[&[Job]], &[EditResult]), &[Target])| {
+            let mut ledger = Ledger::default();
+            for ((jobs, result), &(_, tag)) in bricks.iter().zip(*results).zip(*targets) {
+                let Some(job) = jobs.first().filter(|_| result.flags & EditResult::CHANGED != 0) else {
+                    continue;
+                };
+                let (pos, Some(brick)) = (job.pos(), self.brick(result, tag)) else { continue };
+                ledger.hash = ledger.hash.wrapping_add(result.hash);
+                ledger.bricks.push(DraftedBrick {
+                    pos,
+                    brick: Arc::new(brick),
+                    changed: layout::unpack_box(result.bounds, pos.origin()),
+                    is_extended: result.flags & EditResult::EXTENDED != 0,
+                });
+            }
+            ledger
+        };
+        let groups: Vec<_> =
+            bricks.chunks(GROUP).zip(results.chunks(GROUP)).zip(targets.chunks(GROUP)).collect();
+        let mut ledgers = map(&groups, 2, group);
+        if let Some(first) = ledgers.first_mut() {
+            let parts = self.parts.entries::<EditPart>(totals.parts).iter();
+            first.parts = parts.filter_map(|part| effect(work.grid, bricks, part)).collect();
+            first.counts = self.counts.entries::<EditCount>(totals.counts).iter().map(count).collect();
+        }
+        ledgers
+    }
+
+    /// The brick of a result, whose place on the device has this tag.
+    fn brick<'a>(&'a self, result: &EditResult, tag: u64) -> Option<Brick> {
+        if result.flags & EditResult::UNIFORM != 0 {
+            let [low, high, material, _] = result.uniform.to_le_bytes();
+            return Some(Brick::of_one(i16::from_le_bytes([low, high]), MaterialId(material)));
+        }
+        let entry = |list: &'a Outbox, number: u32, bytes: usize| {
+            list.entries::<u8>((number as usize + 1) * bytes).get(number as usize * bytes..)
+        };
+        let record = entry(&self.records, result.record, RECORD_BYTES).unwrap_or_default();
+        let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
+        let materials = has_materials.then(|| entry(&self.materials, result.material, MATERIAL_BYTES));
+        let brick = layout::brick_of(record, materials.flatten())?;
+        brick.tag.set(tag);
+        Some(brick)
+    }
+}
+
+/// What an edit changed in a chunk's part of a brick.
+fn effect(grid: ChunkGrid, bricks: &[&[Job]], part: &EditPart) -> Option<PartEffect> {
+    let pos = bricks.get(part.job as usize)?.first()?.pos();
+    let bounds = layout::unpack_box(part.bounds, pos.origin());
+    Some(PartEffect { edit: part.edit as usize, chunk: layout::part_chunk(grid, pos, part.part), bounds })
+}
+
+fn tool(tool: &Tool) -> layout::Tool {
+    layout::tool(tool.reach, tool.operation, &tool.evaluator)
+}
+
+fn count(count: &EditCount) -> Count {
+    let [fate, material, ..] = count.fate.to_le_bytes();
+    let fate = match fate {
+        0 => Fate::Removed,
+        1 => Fate::Added,
+        _ => Fate::Painted,
+    };
+    Count { edit: count.edit as usize, fate, material: MaterialId(material), voxels: count.voxels.into() }
+}

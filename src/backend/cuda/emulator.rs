@@ -1,0 +1,146 @@
+//! A process that runs the kernels on the processor, for tests where there is no card.
+
+use std::io::{BufReader, BufWriter, Read, Write};
+use std::ops::Range;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use super::device::{Device, Fault, HostMemory, Kernel};
+
+/// The process; it ends with this.
+pub(super) struct Emulator {
+    child: Child,
+    input: BufWriter<ChildStdin>,
+    output: BufReader<ChildStdout>,
+}
+
+/// Plain memory, which the process does not see.
+struct Plain {
+    words: Vec<u128>,
+    len: usize,
+}
+
+impl HostMemory for Plain {
+    fn bytes(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.len]
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.words)[..self.len]
+    }
+
+    fn address(&self) -> Option<u64> {
+        None
+    }
+}
+
+/// Requests, by their numbers.
+const ALLOC: u64 = 1;
+const FREE: u64 = 2;
+const WRITE: u64 = 3;
+const READ: u64 = 4;
+const LAUNCH: u64 = 5;
+
+impl Emulator {
+    /// Builds the process if need be and starts it; `None`, with a line that says why, where there is no C++ compiler.
+    pub fn start() -> Option<Self> {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/emulator.sh");
+        let built = Command::new(script).stderr(Stdio::inherit()).output().expect("the script can be run");
+        if built.status.code() == Some(2) {
+            println!("no C++ compiler: kernels are not tested");
+            return None;
+        }
+        assert!(built.status.success(), "the emulator can be built");
+        let path = String::from_utf8(built.stdout).expect("a path");
+        let mut child = Command::new(path.trim())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the emulator can be started");
+        let input = BufWriter::new(child.stdin.take().expect("piped"));
+        let output = BufReader::new(child.stdout.take().expect("piped"));
+        Some(Self { child, input, output })
+    }
+
+    fn ask(&mut self, words: &[u64]) -> Result<(), Fault> {
+        self.send(bytemuck::cast_slice(words))
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), Fault> {
+        self.input.write_all(bytes).map_err(|error| Fault::Failed(error.to_string()))
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<(), Fault> {
+        let all = self.input.flush().and_then(|()| self.output.read_exact(bytes));
+        all.map_err(|error| Fault::Failed(error.to_string()))
+    }
+
+    fn answer(&mut self) -> Result<u64, Fault> {
+        let mut word = [0; 8];
+        self.receive(&mut word)?;
+        Ok(u64::from_le_bytes(word))
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Device for Emulator {
+    fn name(&self) -> String {
+        "emulator".into()
+    }
+
+    fn free_memory(&mut self) -> usize {
+        1 << 30
+    }
+
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        self.ask(&[ALLOC, bytes.max(1) as u64])?;
+        match self.answer()? {
+            0 => Err(Fault::Memory(bytes)),
+            address => Ok(address),
+        }
+    }
+
+    fn free(&mut self, address: u64) {
+        let _ = self.ask(&[FREE, address]);
+    }
+
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        Ok(Box::new(Plain { words: vec![0; bytes.div_ceil(16)], len: bytes }))
+    }
+
+    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+        self.ask(&[WRITE, to, bytes.len() as u64])?;
+        self.send(&from.bytes()[bytes])
+    }
+
+    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
+        self.ask(&[READ, from, bytes.len() as u64])?;
+        self.receive(&mut to.bytes_mut()[bytes])
+    }
+
+    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+        let mut all = vec![0; bytes];
+        self.ask(&[READ, from, bytes as u64])?;
+        self.receive(&mut all)?;
+        self.ask(&[WRITE, to, bytes as u64])?;
+        self.send(&all)
+    }
+
+    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+        self.ask(&[LAUNCH, kernel as u64, u64::from(blocks), params.len() as u64])?;
+        self.send(params)?;
+        match self.answer()? {
+            0 => Ok(()),
+            status => Err(Fault::Failed(format!("status {status}"))),
+        }
+    }
+
+    fn wait(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}

@@ -1,0 +1,160 @@
+//! Memory that launches read from and write to, kept from one to the next.
+
+use bytemuck::Pod;
+use rayon::prelude::*;
+
+use super::device::{Device, Fault, HostMemory};
+
+/// Everything that a launch reads, packed into one piece, so that it takes one copy.
+pub(super) struct Inbox {
+    host: Box<dyn HostMemory>,
+    device: u64,
+    len: usize,
+}
+
+/// Where something is in an [`Inbox`]: offset and length in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Section {
+    start: usize,
+    len: usize,
+}
+
+/// What an [`Inbox`] is to hold, in order.
+#[derive(Debug, Default)]
+pub(super) struct Plan(usize);
+
+/// Sections start at multiples of this.
+const ALIGNMENT: usize = 16;
+
+impl Plan {
+    /// Room for so many entries.
+    pub fn section<T>(&mut self, count: usize) -> Section {
+        let start = self.0;
+        let len = count * size_of::<T>();
+        self.0 = start + len.next_multiple_of(ALIGNMENT);
+        Section { start, len }
+    }
+}
+
+/// Allocates with room to spare.
+fn roomy(len: usize) -> usize {
+    len.next_power_of_two().max(1 << 16)
+}
+
+impl Inbox {
+    pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
+        let len = roomy(0);
+        let host = device.alloc_host(len)?;
+        Ok(Self { host, device: device.alloc(len)?, len })
+    }
+
+    /// Makes room for what was planned. What was in it is gone.
+    pub fn open(&mut self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
+        if plan.0 > self.len {
+            let len = roomy(plan.0);
+            let (host, address) = (device.alloc_host(len)?, device.alloc(len)?);
+            device.free(self.device);
+            *self = Self { host, device: address, len };
+        }
+        Ok(())
+    }
+
+    /// Where kernels find a section.
+    pub fn address(&self, section: Section) -> u64 {
+        self.device + section.start as u64
+    }
+
+    /// A section's entries, to be written.
+    pub fn entries<T: Pod>(&mut self, section: Section) -> &mut [T] {
+        let bytes = &mut self.host.bytes_mut()[section.start..section.start + section.len];
+        bytemuck::cast_slice_mut(bytes)
+    }
+
+    /// Copies entries into a section.
+    pub fn put<T: Pod>(&mut self, section: Section, entries: &[T]) {
+        self.entries(section).copy_from_slice(entries);
+    }
+
+    /// Sends all of it.
+    pub fn send(&self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
+        device.upload(&*self.host, 0..plan.0, self.device)
+    }
+}
+
+/// A list that kernels write: straight into the host's memory where the device can do that, else copied afterwards.
+pub(super) struct Outbox {
+    host: Box<dyn HostMemory>,
+    device: Option<u64>,
+    entry: usize,
+    capacity: usize,
+}
+
+impl Outbox {
+    /// A list of entries of so many bytes.
+    pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
+        let host = device.alloc_host(entry * capacity)?;
+        let address = if host.address().is_some() { None } else { Some(device.alloc(entry * capacity)?) };
+        Ok(Self { host, device: address, entry, capacity })
+    }
+
+    /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
+    pub fn read(&mut self, device: &mut dyn Device, from: u64, entries: usize) -> Result<(), Fault> {
+        device.download(from, &mut *self.host, 0..entries * self.entry)
+    }
+
+    /// How many entries it holds.
+    pub fn capacity(&self) -> u32 {
+        self.capacity as u32
+    }
+
+    /// Room for so many entries; says whether there was too little. What was in it is gone then.
+    pub fn reserve(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
+        if entries <= self.capacity {
+            return Ok(false);
+        }
+        let new = Self::new(device, self.entry, entries + entries / 4)?;
+        if let Some(address) = std::mem::replace(self, new).device {
+            device.free(address);
+        }
+        Ok(true)
+    }
+
+    /// Where kernels write.
+    pub fn address(&self) -> u64 {
+        self.device.or(self.host.address()).unwrap_or_default()
+    }
+
+    /// Sees to it that so many entries are here after the next [`Device::wait`].
+    pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<(), Fault> {
+        match self.device {
+            Some(address) if entries > 0 => {
+                device.download(address, &mut *self.host, 0..entries * self.entry)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The first entries.
+    pub fn entries<T: Pod>(&self, count: usize) -> &[T] {
+        bytemuck::cast_slice(&self.host.bytes()[..count * size_of::<T>()])
+    }
+}
+
+/// Maps a list, side by side where it is long.
+pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+    if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
+}
+
+/// Writes what `work` makes of each entry of a list, side by side where it is long.
+pub(super) fn fill<T: Sync, R: Send>(
+    list: &[T],
+    out: &mut [R],
+    long: usize,
+    work: impl Fn(usize, &T) -> R + Send + Sync,
+) {
+    if list.len() < long {
+        list.iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
+    } else {
+        list.par_iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
+    }
+}

@@ -1,0 +1,237 @@
+//! CUDA: fields kept on a card, edits applied there, one launch for all that is dirty, and only what is used comes back.
+//!
+//! ```text
+//! edits  -> jobs, missing bricks ---one copy--->  edit kernel: a block for each brick
+//!           bricks, receipts     <--what changed-
+//! blocks -> windows of bricks    ---one copy--->  mesh kernel: a block for each block
+//!           vertices, indices    <--what is used-
+//! ```
+//!
+//! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
+//! - [`session`](self::session) keeps bricks and heights on it, with a budget; `slots` says where, and which go first.
+//! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
+//! - `trial` compares the device with the processor, and measures both.
+//!
+//! A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
+//! processor, so nobody ever waits for the device but the task that uses it.
+
+mod device;
+mod driver;
+mod edit;
+mod layout;
+mod mail;
+mod mesh;
+mod session;
+mod slots;
+mod trial;
+mod windows;
+
+#[cfg(test)]
+mod emulator;
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use web_time::Instant;
+
+use super::choice::Costs;
+use super::{Choice, Compute, Cpu, EngineFigures, EngineState, Stage};
+use crate::surface::block::{Block, Parts};
+use crate::surface::vertex::WorldView;
+use crate::volume::{EditWork, Ledger};
+use device::{Device, Fault};
+use session::Session;
+
+/// A card beside the processor.
+pub(super) struct Cuda {
+    /// Is the faster of both taken? Else the card is, whenever it can be.
+    is_auto: bool,
+    slot: Arc<Mutex<Place>>,
+    /// What became of opening it, to be asked at any time.
+    state: Arc<Mutex<EngineState>>,
+    record: Mutex<Record>,
+}
+
+/// Where the session is.
+enum Place {
+    Opening,
+    Open(Box<Session>, Costs),
+    Lost,
+}
+
+/// What was done.
+#[derive(Default)]
+struct Record {
+    cpu: u64,
+    cuda: u64,
+    choices: VecDeque<Choice>,
+}
+
+/// Choices that are remembered.
+const REMEMBERED: usize = 64;
+
+/// Of a device's free memory, the part that bricks and ground may take.
+const SHARE: usize = 4;
+/// And the most of it.
+const MOST: usize = 1 << 30;
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Cuda {
+    /// Opens the first card, in the background.
+    pub fn open(is_auto: bool) -> Self {
+        Self::open_with(is_auto, None, trial::FULL, || Ok(Box::new(driver::Card::open()?)))
+    }
+
+    /// Opens some device, in the background; bricks and ground may take so many bytes of it.
+    fn open_with(
+        is_auto: bool,
+        budget: Option<usize>,
+        sizes: trial::Sizes,
+        device: impl FnOnce() -> Result<Box<dyn Device>, Fault> + Send + 'static,
+    ) -> Self {
+        let own = Self {
+            is_auto,
+            slot: Arc::new(Mutex::new(Place::Opening)),
+            state: Arc::new(Mutex::new(EngineState::Opening)),
+            record: Mutex::default(),
+        };
+        let (slot, state) = (Arc::clone(&own.slot), Arc::clone(&own.state));
+        let open = move || {
+            let opened = device().and_then(|mut device| {
+                let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
+                let mut session = Session::new(device, budget)?;
+                let costs = trial::run(&mut session, sizes)?;
+                Ok((session, costs))
+            });
+            match opened {
+                Ok((session, costs)) => {
+                    let name = session.name();
+                    *lock(&slot) = Place::Open(Box::new(session), costs);
+                    *lock(&state) = EngineState::Cuda(name);
+                }
+                Err(fault) => lose(&mut lock(&slot), &state, &fault),
+            }
+        };
+        let thread = std::thread::Builder::new().name("burrow-cuda".into()).spawn(open);
+        if let Err(error) = thread {
+            lose(&mut lock(&own.slot), &own.state, &Fault::Failed(error.to_string()));
+        }
+        own
+    }
+
+    pub fn state(&self) -> EngineState {
+        lock(&self.state).clone()
+    }
+
+    pub fn figures(&self) -> EngineFigures {
+        let record = lock(&self.record);
+        EngineFigures {
+            cpu: record.cpu,
+            cuda: record.cuda,
+            choices: record.choices.iter().copied().collect(),
+        }
+    }
+
+    /// Does a stage on the card if that is there, free and chosen. `None` means that the processor has to do it, together
+    /// with what is known of the choice.
+    fn offer<T>(
+        &self,
+        stage: Stage,
+        amount: usize,
+        missing: impl FnOnce(&Session) -> usize,
+        work: impl FnOnce(&mut Session) -> Result<T, Fault>,
+    ) -> (Option<T>, Choice) {
+        let mut choice = Choice {
+            stage,
+            amount,
+            missing: 0,
+            estimate: None,
+            is_cuda: false,
+            took: Duration::ZERO,
+            device: Duration::ZERO,
+            kernel: Duration::ZERO,
+        };
+        // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
+        let Ok(mut place) = self.slot.try_lock() else { return (None, choice) };
+        let Place::Open(session, costs) = &mut *place else { return (None, choice) };
+        choice.missing = missing(session);
+        let estimate = match stage {
+            Stage::Edit => costs.edit(amount, choice.missing),
+            Stage::Mesh => costs.mesh(amount, choice.missing),
+        };
+        choice.estimate = Some(estimate);
+        if amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda {
+            return (None, choice);
+        }
+        match work(session) {
+            Ok(done) => {
+                choice.is_cuda = true;
+                [choice.device, choice.kernel] = session.times();
+                (Some(done), choice)
+            }
+            Err(fault) => {
+                if !fault.is_passing() {
+                    lose(&mut place, &self.state, &fault);
+                }
+                (None, choice)
+            }
+        }
+    }
+
+    fn remember(&self, choice: Choice) {
+        let mut record = lock(&self.record);
+        if choice.is_cuda {
+            record.cuda += 1
+        } else {
+            record.cpu += 1
+        }
+        if record.choices.len() == REMEMBERED {
+            record.choices.pop_front();
+        }
+        record.choices.push_back(choice);
+    }
+}
+
+/// Gives the card up, with the one warning.
+fn lose(place: &mut Place, state: &Mutex<EngineState>, fault: &Fault) {
+    log::warn!("bevy_burrow goes on without CUDA: {fault}");
+    *place = Place::Lost;
+    *lock(state) = EngineState::Lost(fault.to_string());
+}
+
+impl Compute for Cuda {
+    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
+        let start = Instant::now();
+        let missing = |session: &Session| session.missing_for_edits(work);
+        let (done, mut choice) =
+            self.offer(Stage::Edit, work.jobs().len(), missing, |session| session.edit(work));
+        match done {
+            Some(ledgers) => ledgers.into_iter().for_each(each),
+            None => Cpu.edit(work, each),
+        }
+        choice.took = start.elapsed();
+        self.remember(choice);
+    }
+
+    fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts])) {
+        let start = Instant::now();
+        let missing = |session: &Session| session.missing_for_mesh(view, blocks);
+        let (done, mut choice) =
+            self.offer(Stage::Mesh, blocks.len(), missing, |session| session.mesh(view, blocks));
+        let mut then = |parts: &[Parts]| {
+            choice.took = start.elapsed();
+            then(parts);
+        };
+        match done {
+            Some(parts) => then(&parts),
+            None => Cpu.mesh(view, blocks, &mut then),
+        }
+        self.remember(choice);
+    }
+}

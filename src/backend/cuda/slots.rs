@@ -1,0 +1,143 @@
+//! Places for records on the device: which of them are taken, and which to give up when they run out.
+
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+use super::device::{Device, Fault};
+use crate::volume::Brick;
+
+/// Records of one kind on the device.
+pub(super) struct Slots {
+    /// Bytes of a record.
+    record: usize,
+    /// Where the first one is.
+    base: u64,
+    /// Most slots there may be.
+    most: usize,
+    /// What is in each slot, as a number that is never used again; 0 for nothing.
+    stamps: Vec<u64>,
+    /// In which round each was used last.
+    used: Vec<AtomicU32>,
+    free: Vec<u32>,
+    round: u32,
+    /// Where to look next for a slot that can be given up.
+    hand: usize,
+}
+
+/// Slots at the start.
+const FIRST: usize = 4096;
+
+/// A number that no other record of this process has.
+fn stamp() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// Bits of a tag that are the slot; the rest is its stamp.
+const SLOT_BITS: u32 = 24;
+
+impl Slots {
+    /// No slots yet; all together may take `budget` bytes.
+    pub fn new(record: usize, budget: usize) -> Self {
+        Self {
+            record,
+            base: 0,
+            most: (budget / record).min(1 << SLOT_BITS),
+            stamps: Vec::new(),
+            used: Vec::new(),
+            free: Vec::new(),
+            round: 1,
+            hand: 0,
+        }
+    }
+
+    /// Where the first slot is.
+    pub fn base(&self) -> u64 {
+        self.base
+    }
+
+    /// Where a slot is.
+    pub fn address(&self, slot: u32) -> u64 {
+        self.base + u64::from(slot) * self.record as u64
+    }
+
+    /// Begins a round: what is used from now on stays until the next one.
+    pub fn begin(&mut self) {
+        self.round = self.round.wrapping_add(1).max(1);
+    }
+
+    /// The slot of a tag, if what was put there still is.
+    pub fn find(&self, tag: u64) -> Option<u32> {
+        let slot = tag as u32 & ((1 << SLOT_BITS) - 1);
+        let is_there = tag != 0 && self.stamps.get(slot as usize) == Some(&(tag >> SLOT_BITS));
+        is_there.then(|| {
+            self.used[slot as usize].store(self.round, Ordering::Relaxed);
+            slot
+        })
+    }
+
+    /// A slot for something new, with its tag. `Budget` where all slots are in use in this round.
+    ///
+    /// May move the records, and then waits for the device.
+    pub fn take(&mut self, device: &mut dyn Device) -> Result<(u32, u64), Fault> {
+        if self.free.is_empty() && !self.grow(device)? {
+            self.evict();
+        }
+        let Some(slot) = self.free.pop() else { return Err(Fault::Budget(self.most * self.record)) };
+        let stamp = stamp();
+        self.stamps[slot as usize] = stamp;
+        self.used[slot as usize].store(self.round, Ordering::Relaxed);
+        Ok((slot, stamp << SLOT_BITS | u64::from(slot)))
+    }
+
+    /// Gives a slot back.
+    pub fn give_back(&mut self, slot: u32) {
+        self.stamps[slot as usize] = 0;
+        self.free.push(slot);
+    }
+
+    /// Twice as many slots, unless that is too many.
+    fn grow(&mut self, device: &mut dyn Device) -> Result<bool, Fault> {
+        let old = self.stamps.len();
+        let new = (old * 2).max(FIRST).min(self.most);
+        if new <= old {
+            return Ok(false);
+        }
+        let Ok(base) = device.alloc(new * self.record) else { return Ok(false) };
+        if old > 0 {
+            device.wait()?;
+            device.copy(self.base, base, old * self.record)?;
+            device.wait()?;
+            device.free(self.base);
+        }
+        self.base = base;
+        self.stamps.resize(new, 0);
+        self.used.resize_with(new, AtomicU32::default);
+        self.free.extend((old as u32..new as u32).rev());
+        Ok(true)
+    }
+
+    /// Frees slots that were not used in this round: an eighth of all at most.
+    fn evict(&mut self) {
+        let all = self.stamps.len();
+        for _ in 0..all {
+            if self.free.len() >= (all / 8).max(1) {
+                break;
+            }
+            self.hand = (self.hand + 1) % all;
+            let is_taken = self.stamps[self.hand] != 0;
+            if is_taken && self.used[self.hand].load(Ordering::Relaxed) != self.round {
+                self.give_back(self.hand as u32);
+            }
+        }
+    }
+
+    /// How many records there are.
+    pub fn len(&self) -> usize {
+        self.stamps.len() - self.free.len()
+    }
+}
+
+/// How kernels refer to a brick in a slot.
+pub(super) fn reference(slot: u32, brick: &Brick) -> u32 {
+    slot << 1 | u32::from(brick.material_bytes() > 0)
+}

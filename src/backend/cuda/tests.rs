@@ -1,0 +1,260 @@
+//! The device against the processor, bit by bit, and whatever can go wrong with it.
+//!
+//! A card is used where there is one, else the emulator. `BURROW_WORLDS` says how many random worlds.
+
+use std::sync::Mutex;
+
+use fastrand::Rng;
+
+use super::device::{Device, Fault, HostMemory, Kernel};
+use super::driver::Card;
+use super::emulator::Emulator;
+use super::*;
+use crate::backend::Engine;
+use crate::prelude::*;
+use crate::terrain::Drawn;
+use crate::terrain::World;
+
+#[path = "../../../tests/worlds/mod.rs"]
+mod worlds;
+
+/// A device to test, if there is any.
+fn device() -> Option<Box<dyn Device>> {
+    match Card::open() {
+        Ok(card) => Some(Box::new(card)),
+        Err(_) => Some(Box::new(Emulator::start()?)),
+    }
+}
+
+/// An engine that does everything on a device, small as it may be.
+fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
+    let engine = Engine::from_cuda(Cuda::open_with(false, Some(budget), &[(4, 3.0)], || Ok(device)));
+    engine.wait(Duration::from_secs(60));
+    engine
+}
+
+/// Everything that is drawn, as bits.
+fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Vec<u32>)> {
+    let bits = |vertex: &crate::surface::Vertex| {
+        let mut bytes = Vec::with_capacity(32);
+        vertex.position.to_array().iter().for_each(|part| bytes.extend(part.to_le_bytes()));
+        vertex.normal.to_array().iter().for_each(|part| bytes.extend(part.to_bits().to_le_bytes()));
+        bytes.extend(vertex.materials.ids);
+        bytes.extend(vertex.materials.weights);
+        bytes
+    };
+    let all = world.drawn();
+    all.map(|(drawn, mesh)| (drawn, mesh.vertices.iter().flat_map(bits).collect(), mesh.indices)).collect()
+}
+
+/// The same brushes on the processor and on an engine, in the same transactions.
+fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
+    let seed = rng.u64(..);
+    let (ground, chunk_size) = worlds::random_ground(&mut Rng::with_seed(seed), index);
+    let settings = TerrainSettings { chunk_size, ..Default::default() };
+    let ground = Arc::new(ground);
+    let mut expected = Terrain::new(Arc::clone(&ground), &settings).expect("valid settings");
+    let mut found = Terrain::new(Arc::clone(&ground), &settings).expect("valid settings");
+    found.set_engine(engine.clone());
+    for _ in 0..rng.u32(1..5) {
+        let brush = |rng: &mut Rng| match rng.u32(0..4) {
+            0 => worlds::random_brush_at_a_face(rng, &ground, chunk_size),
+            _ => worlds::random_brush(rng, &ground),
+        };
+        let brushes: Vec<Brush> = (0..rng.u32(1..6)).map(|_| brush(rng)).collect();
+        assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
+    }
+    let (expected, found) = (expected.world(), found.world());
+    assert_eq!(expected.hash(), found.hash(), "world {index}");
+    assert!(drawn(expected) == drawn(found), "world {index}");
+    // What bricks hold, bits and materials included; and as much memory.
+    let bricks = |world: &World| {
+        let mut all: Vec<_> =
+            world.bricks().map(|(pos, brick)| (pos.0.to_array(), trial::contents(brick))).collect();
+        all.sort_unstable();
+        all
+    };
+    assert!(bricks(expected) == bricks(found), "world {index}");
+    assert_eq!(expected.memory().samples, found.memory().samples, "world {index}");
+    assert_eq!(expected.memory().materials, found.memory().materials, "world {index}");
+}
+
+#[test]
+fn worlds_of_a_device_are_those_of_the_processor() {
+    let Some(device) = device() else { return };
+    let (name, engine) = (device.name(), engine(device, 64 << 20));
+    assert_eq!(engine.state(), EngineState::Cuda(name));
+    let mut rng = Rng::with_seed(11);
+    let worlds = worlds::world_count(40);
+    (0..worlds).for_each(|index| compare(&mut rng, index, &engine));
+    let figures = engine.figures();
+    assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+    assert!(figures.cuda > figures.cpu * 20, "{figures:?}");
+    println!("{worlds} worlds, {} stages on the device", figures.cuda);
+}
+
+/// A device that fails when it is told to.
+struct Faulty {
+    own: Box<dyn Device>,
+    /// Calls to go until it fails, and how.
+    plan: Arc<Mutex<Option<(u32, Fault)>>>,
+}
+
+impl Faulty {
+    fn call(&self) -> Result<(), Fault> {
+        let mut plan = lock(&self.plan);
+        match &mut *plan {
+            Some((0, fault)) => Err(fault.clone()),
+            Some((left, _)) => {
+                *left -= 1;
+                Ok(())
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+impl Device for Faulty {
+    fn name(&self) -> String {
+        self.own.name()
+    }
+    fn free_memory(&mut self) -> usize {
+        self.own.free_memory()
+    }
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        self.call()?;
+        self.own.alloc(bytes)
+    }
+    fn free(&mut self, address: u64) {
+        self.own.free(address);
+    }
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        self.call()?;
+        self.own.alloc_host(bytes)
+    }
+    fn upload(&mut self, from: &dyn HostMemory, bytes: std::ops::Range<usize>, to: u64) -> Result<(), Fault> {
+        self.call()?;
+        self.own.upload(from, bytes, to)
+    }
+    fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: std::ops::Range<usize>,
+    ) -> Result<(), Fault> {
+        self.call()?;
+        self.own.download(from, to, bytes)
+    }
+    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+        self.call()?;
+        self.own.copy(from, to, bytes)
+    }
+    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+        self.call()?;
+        self.own.launch(kernel, blocks, params)
+    }
+    fn wait(&mut self) -> Result<(), Fault> {
+        self.call()?;
+        self.own.wait()
+    }
+}
+
+#[test]
+fn a_device_that_fails_at_any_call_is_given_up_and_nothing_is_lost() {
+    for calls in 0..40 {
+        let Some(own) = device() else { return };
+        let plan = Arc::new(Mutex::new(None));
+        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        assert!(matches!(engine.state(), EngineState::Cuda(_)));
+        *lock(&plan) = Some((calls, Fault::Failed("CUDA_ERROR_LAUNCH_FAILED".into())));
+        let mut rng = Rng::with_seed(u64::from(calls));
+        (0..2).for_each(|index| compare(&mut rng, index, &engine));
+        let reached = lock(&plan).as_ref().is_some_and(|plan| plan.0 == 0);
+        assert_eq!(reached, matches!(engine.state(), EngineState::Lost(_)), "after {calls} calls");
+    }
+}
+
+#[test]
+fn a_device_that_can_not_be_opened_is_no_device() {
+    for fault in [
+        Fault::NoDriver,
+        Fault::NoDevice("CUDA_ERROR_NO_DEVICE".into()),
+        Fault::OldDevice(6, 1),
+        Fault::Refused("CUDA_ERROR_UNSUPPORTED_PTX_VERSION".into()),
+        Fault::Memory(1 << 30),
+    ] {
+        let text = fault.to_string();
+        let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, move || Err(fault)));
+        assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(text));
+        compare(&mut Rng::with_seed(3), 3, &engine);
+    }
+}
+
+#[test]
+fn a_device_that_computes_something_else_is_not_trusted() {
+    /// Turns a bit of every read.
+    struct Liar(Box<dyn Device>);
+    impl Device for Liar {
+        fn name(&self) -> String {
+            self.0.name()
+        }
+        fn free_memory(&mut self) -> usize {
+            self.0.free_memory()
+        }
+        fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+            self.0.alloc(bytes)
+        }
+        fn free(&mut self, address: u64) {
+            self.0.free(address);
+        }
+        fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+            self.0.alloc_host(bytes)
+        }
+        fn upload(
+            &mut self,
+            from: &dyn HostMemory,
+            bytes: std::ops::Range<usize>,
+            to: u64,
+        ) -> Result<(), Fault> {
+            self.0.upload(from, bytes, to)
+        }
+        fn download(
+            &mut self,
+            from: u64,
+            to: &mut dyn HostMemory,
+            bytes: std::ops::Range<usize>,
+        ) -> Result<(), Fault> {
+            self.0.download(from, to, bytes.clone())?;
+            // The last bit of a density, of a normal or of a hash.
+            if bytes.len() > 1000 {
+                to.bytes_mut()[bytes][512] ^= 1;
+            }
+            Ok(())
+        }
+        fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+            self.0.copy(from, to, bytes)
+        }
+        fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+            self.0.launch(kernel, blocks, params)
+        }
+        fn wait(&mut self) -> Result<(), Fault> {
+            self.0.wait()
+        }
+    }
+    // A card writes to the host's memory without a copy, so only the emulator can be made to lie here.
+    let Some(emulator) = Emulator::start() else { return };
+    let engine = engine(Box::new(Liar(Box::new(emulator))), 64 << 20);
+    assert_eq!(engine.state(), EngineState::Lost(Fault::SelfTest.to_string()));
+}
+
+#[test]
+fn a_small_budget_is_kept_and_nothing_is_lost() {
+    let Some(device) = device() else { return };
+    // Bricks for a handful of brushes; larger transactions go to the processor.
+    let engine = engine(device, 6 << 20);
+    let mut rng = Rng::with_seed(5);
+    (0..worlds::world_count(40) / 4).for_each(|index| compare(&mut rng, index, &engine));
+    assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+    let figures = engine.figures();
+    assert!(figures.cuda > 0, "{figures:?}");
+}

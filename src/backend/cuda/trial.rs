@@ -1,0 +1,183 @@
+//! A trial before a device is trusted: a piece of ground is dug on it and on the processor. Every bit is compared, and both
+//! are timed.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use glam::Vec3;
+use web_time::Instant;
+
+use super::device::Fault;
+use super::layout;
+use super::session::Session;
+use crate::backend::choice::Costs;
+use crate::backend::{Compute, Cpu};
+use crate::brush::{Brush, Edit, Roughness, Shape};
+use crate::ground::{Ground, MaterialId};
+use crate::lattice::{ChunkGrid, Column, ONE};
+use crate::surface::block::{Block, Parts};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Mask, MaskView, Vertex};
+use crate::volume::{Brick, Bricks, DraftedBrick, EditWork, Ledger, SampleView};
+
+/// Cells along a side of the ground.
+const SIDE: i32 = 256;
+
+/// How often each thing is timed; the shortest time counts.
+const REPEATS: usize = 3;
+
+/// How thorough a trial is: brushes at once, and their radius, smallest first.
+pub(super) type Sizes = &'static [(i32, f32)];
+
+/// Enough to know how fast both are.
+pub(super) const FULL: Sizes = &[(1, 1.0), (1, 5.0), (4, 8.0), (16, 8.0), (64, 8.0)];
+
+/// Tries a device out and measures it beside the processor.
+///
+/// # Errors
+/// Where it fails, or differs from the processor in a single bit.
+pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
+    let ground = ground()?;
+    let grid = ChunkGrid::new(32, SIDE, SIDE);
+    let mut costs = Costs::default();
+    for &(count, radius) in sizes {
+        let edits = edits(&ground, count, radius);
+        let edits: Vec<&Edit> = edits.iter().collect();
+        let none = Bricks::default();
+        let work = EditWork::new(SampleView::new(&ground, &none), grid, &edits);
+        let on_cpu = || {
+            let mut ledgers = Vec::new();
+            Cpu.edit(&work, &mut |ledger| ledgers.push(ledger));
+            ledgers
+        };
+        let ([cpu, cuda], drafted) = compare(
+            session,
+            on_cpu,
+            |session| session.edit(&work),
+            |cpu, cuda| summary(cpu) == summary(cuda),
+        )?;
+        costs.edit[0].push(work.jobs().len(), cpu);
+        costs.edit[1].push(work.jobs().len(), cuda);
+
+        let drafted: Vec<DraftedBrick> = drafted.into_iter().flat_map(|ledger| ledger.bricks).collect();
+        let bricks: Bricks =
+            drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
+        let mask = Mask::default();
+        let view = WorldView { samples: SampleView::new(&ground, &bricks), mask: MaskView::new(&mask), grid };
+        let block =
+            |drafted: &DraftedBrick| Block { brick: drafted.pos, chunk: grid.chunk_of(drafted.pos.origin()) };
+        let blocks: Vec<Block> = drafted.iter().map(block).collect();
+        let on_cpu = || {
+            let mut all = Vec::new();
+            Cpu.mesh(&view, &blocks, &mut |parts| all.extend_from_slice(parts));
+            all
+        };
+        let start = Instant::now();
+        session.mesh(&view, &blocks)?;
+        let with_uploads = start.elapsed();
+        let ([cpu, cuda], _) =
+            compare(session, on_cpu, |session| session.mesh(&view, &blocks), |cpu, cuda| same(cpu, cuda))?;
+        costs.mesh[0].push(blocks.len(), cpu);
+        costs.mesh[1].push(blocks.len(), cuda);
+        costs.upload = with_uploads.saturating_sub(cuda).as_secs_f64() / blocks.len().max(1) as f64;
+    }
+    Ok(costs)
+}
+
+/// Does a thing on both, several times: the shortest times, and what came out on the processor.
+fn compare<T>(
+    session: &mut Session,
+    mut cpu: impl FnMut() -> T,
+    mut cuda: impl FnMut(&mut Session) -> Result<T, Fault>,
+    is_same: impl Fn(&T, &T) -> bool,
+) -> Result<([Duration; 2], T), Fault> {
+    // The first time, memory grows and threads wake.
+    let expected = cpu();
+    if !is_same(&expected, &cuda(session)?) {
+        return Err(Fault::SelfTest);
+    }
+    let mut best = [Duration::MAX; 2];
+    for _ in 0..REPEATS {
+        let start = Instant::now();
+        cpu();
+        best[0] = best[0].min(start.elapsed());
+        let start = Instant::now();
+        cuda(session)?;
+        best[1] = best[1].min(start.elapsed());
+    }
+    Ok((best, expected))
+}
+
+/// Hills, and a slope steep enough for several cubes in a column.
+fn ground() -> Result<Ground, Fault> {
+    let height = |x: i32, z: i32| {
+        let (x, z) = (f64::from(x), f64::from(z));
+        (x * 0.11).sin() * 6.0 + (z * 0.07).cos() * 9.0 + (x - z) * 0.4 * f64::from(x > 128.0)
+    };
+    let made = Ground::from_fn(SIDE as u32, SIDE as u32, height);
+    made.map_err(|error| Fault::Failed(error.to_string()))
+}
+
+/// Brushes of all kinds at the surface, side by side.
+fn edits(ground: &Ground, count: i32, radius: f32) -> Vec<Edit> {
+    let place = |i: i32| {
+        let (x, z) = (16 + i % 8 * 31, 16 + i / 8 * 29);
+        let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;
+        Vec3::new(x as f32 + 0.3, height - 0.2 * radius, z as f32 - 0.4)
+    };
+    let brush = |i: i32| match (i % 4, place(i)) {
+        (0, center) => Brush::dig(Shape::sphere(center, radius)),
+        (1, center) => {
+            Brush::dig(Shape::sphere(center, radius)).with_roughness(Roughness::new(1.5, 4.0, i as u32))
+        }
+        (2, base) => Brush::add(Shape::cone(base, Vec3::new(1.0, radius * 1.5, 2.0), radius), MaterialId(3)),
+        (_, from) => Brush::dig(Shape::capsule(from, from + Vec3::new(3.0, -radius, 4.0), radius * 0.7)),
+    };
+    (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
+}
+
+/// What ledgers say, in an order that does not depend on who wrote them.
+fn summary(ledgers: &[Ledger]) -> (u64, Vec<(String, Vec<u8>)>, Vec<String>) {
+    let bricks = ledgers.iter().flat_map(|ledger| &ledger.bricks);
+    let brick = |drafted: &DraftedBrick| {
+        let what = format!("{} {:?} {}", drafted.pos.0, drafted.changed, drafted.is_extended);
+        (what, contents(&drafted.brick))
+    };
+    let parts = ledgers.iter().flat_map(|ledger| &ledger.parts);
+    let parts = parts.map(|part| format!("{} {:?} {:?}", part.edit, part.chunk, part.bounds));
+    let counts = ledgers.iter().flat_map(|ledger| &ledger.counts);
+    let counts = counts.map(|count| (count.edit, count.fate as u8, count.material, count.voxels));
+    let mut totals = std::collections::BTreeMap::new();
+    counts.for_each(|(edit, fate, material, voxels)| {
+        *totals.entry((edit, fate, material)).or_insert(0) += voxels;
+    });
+    let hash = ledgers.iter().fold(0u64, |hash, ledger| hash.wrapping_add(ledger.hash));
+    let mut entries: Vec<String> = parts.chain(totals.iter().map(|total| format!("{total:?}"))).collect();
+    entries.sort_unstable();
+    entries.dedup();
+    (hash, bricks.map(brick).collect(), entries)
+}
+
+/// Everything that a brick holds.
+pub(super) fn contents(brick: &Brick) -> Vec<u8> {
+    let mut bytes = vec![0; layout::RECORD_BYTES];
+    layout::brick_record(brick, &mut bytes);
+    bytes.extend((0..512).map(|index| brick.material_at(index).0));
+    bytes.push(u8::from(brick.material_bytes() > 0));
+    bytes
+}
+
+/// Are these the same parts, bit by bit?
+fn same(a: &[Parts], b: &[Parts]) -> bool {
+    let mut others = b.iter().flat_map(Parts::iter);
+    let is_next = |(block, vertices, indices): (Block, &[Vertex], &[u16])| {
+        others.next().is_some_and(|(other, other_vertices, other_indices)| {
+            let mut pairs = vertices.iter().zip(other_vertices);
+            block == other
+                && indices == other_indices
+                && vertices.len() == other_vertices.len()
+                && pairs.all(|(a, b)| a.is_same(b))
+        })
+    };
+    a.iter().flat_map(Parts::iter).all(is_next) && others.next().is_none()
+}
