@@ -138,8 +138,19 @@ impl Ground {
     /// Unit normal of the surface over a column: central differences of the height, one-sided at the rim; beyond the
     /// rim, that of the nearest rim column. Same bits on every machine.
     pub fn normal(&self, column: Column) -> Vec3 {
+        Self::normal_of(self.rises(column))
+    }
+
+    /// The same as [`Self::normal`], by the heights of the columns before and after along x and z; `None` at the rim.
+    pub(crate) fn inner_normal(&self, column: Column, x: [i32; 2], z: [i32; 2]) -> Option<Vec3> {
+        let is_inner = (1..self.width()).contains(&column.x) && (1..self.depth()).contains(&column.z);
+        let rise = |[before, after]: [i32; 2]| Rise { rise: after - before, run: 2 };
+        is_inner.then(|| Self::normal_of([rise(x), rise(z)]))
+    }
+
+    fn normal_of(rises: [Rise; 2]) -> Vec3 {
         let slope = |along: Rise| along.rise as f32 / (along.run * ONE) as f32;
-        let [x, z] = self.rises(column).map(slope);
+        let [x, z] = rises.map(slope);
         let length = (x * x + z * z + 1.0).sqrt();
         Vec3::new(-x / length, 1.0 / length, -z / length)
     }

@@ -94,15 +94,25 @@ pub struct Place {
     pub z: i32,
     /// Index in a layer of the apron.
     pub apron: usize,
+    /// Which of the four bricks that hold corners holds it: the own one, those beyond x, beyond z and beyond both.
+    pub brick: usize,
+    /// Index in a layer of that brick.
+    pub index: usize,
 }
 
 /// The place of each corner.
 pub static PLACES: [Place; 81] = {
-    let mut places = [const { Place { x: 0, z: 0, apron: 0 } }; 81];
+    let mut places = [const { Place { x: 0, z: 0, apron: 0, brick: 0, index: 0 } }; 81];
     let mut corner = 0;
     while corner < 81 {
         let (x, z) = (corner % 9, corner / 9);
-        places[corner] = Place { x: x as i32, z: z as i32, apron: (z + 1) * SIDE + x + 1 };
+        places[corner] = Place {
+            x: x as i32,
+            z: z as i32,
+            apron: (z + 1) * SIDE + x + 1,
+            brick: x / 8 + z / 8 * 2,
+            index: z % 8 * 8 + x % 8,
+        };
         corner += 1;
     }
     places

@@ -242,9 +242,9 @@ impl<'a> StoredMaterials<'a> {
     /// What is stored at the solid end of an edge.
     fn at<const AXIS: usize>(&self, edge: Edge, is_lower: bool) -> MaterialId {
         let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
-        let (x, z) = (corner % 9, corner / 9);
         let y = usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower);
-        let brick = self.bricks[y / 8][x / 8 + z / 8 * 2];
-        brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + z % 8 * 8 + x % 8))
+        let place = &PLACES[corner];
+        let brick = self.bricks[y / 8][place.brick];
+        brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + place.index))
     }
 }

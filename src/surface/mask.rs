@@ -183,7 +183,7 @@ impl Borders {
 
 /// Eight bits as the lowest bits of eight bytes.
 fn spread(bits: u8) -> u64 {
-    let each = u64::from(bits) * 0x0101_0101_0101_0101 & 0x8040_2010_0804_0201;
+    let each = (u64::from(bits) * 0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
     (each + 0x7f7f_7f7f_7f7f_7f7f) >> 7 & 0x0101_0101_0101_0101
 }
 

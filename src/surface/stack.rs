@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::apron::SIDE;
 use super::corners::{self, CELLS, Corners, Heights, PLACES};
 use super::mesh::MaterialMix;
 use super::vertex::WorldView;
@@ -97,7 +98,11 @@ impl<'a> Stack<'a> {
     pub fn normal(&mut self, corner: usize) -> Vec3 {
         if !self.has_normal[corner] {
             self.has_normal[corner] = true;
-            self.normals[corner] = self.ground.normal(self.column(corner));
+            let (column, at) = (self.column(corner), PLACES[corner].apron);
+            let height = |at: usize| self.heights.as_flattened()[at];
+            let (x, z) = ([height(at - 1), height(at + 1)], [height(at - SIDE), height(at + SIDE)]);
+            let inner = self.ground.inner_normal(column, x, z);
+            self.normals[corner] = inner.unwrap_or_else(|| self.ground.normal(column));
         }
         self.normals[corner]
     }

@@ -200,8 +200,10 @@ impl Brick {
             return;
         }
         let materials = self.materials.get_or_insert_with(|| Box::new([MaterialId::GROUND; LEN]));
-        for (bit, own) in materials[y * 64..][..64].iter_mut().enumerate() {
-            *own = if samples >> bit & 1 == 1 { material } else { *own };
+        let mut rest = samples;
+        while rest != 0 {
+            materials[y * 64 + rest.trailing_zeros() as usize] = material;
+            rest &= rest - 1;
         }
     }
 

@@ -79,7 +79,7 @@ const PARALLEL_BRICKS: usize = 64;
 
 /// How many bricks are worked on before what edits did to them is added up: that takes more memory than the bricks when
 /// there are many edits, and most bricks of a large cave are given up for a shared one.
-const BATCH: usize = 2048;
+const BATCH: usize = 8192;
 
 /// How many bricks a thread takes at a time.
 const GROUP: usize = 16;

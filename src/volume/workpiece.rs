@@ -166,10 +166,12 @@ impl<'a> Workpiece<'a> {
             self.brick().set_materials(y, removed, MaterialId::GROUND);
         }
         if added != 0 {
-            if let Some(material) = operation.material() {
-                self.brick().set_materials(y, added, material);
+            let material = operation.material().unwrap_or(MaterialId::GROUND);
+            self.brick().set_materials(y, added, material);
+            match material {
+                MaterialId::GROUND => self.tally(Fate::Added, y, added, counts),
+                _ => counts.add(Fate::Added, material, added.count_ones().into()),
             }
-            self.tally(Fate::Added, y, added, counts);
         }
     }
 
