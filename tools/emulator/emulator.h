@@ -8,7 +8,7 @@
 
 #define __global__
 #define __device__
-#define __launch_bounds__(threads)
+#define __launch_bounds__(...)
 // One block runs at a time. A section of its own, so that it can be filled with rubbish before each block.
 #define __shared__ static EMULATOR_SHARED
 #ifdef BURROW_SANITIZE
@@ -77,6 +77,10 @@ T __shfl_sync(unsigned mask, T value, int from) {
     return emulator::of_word<T>(emulator::meet_warp(mask, emulator::to_word(value))[from & 31]);
 }
 template <typename T>
+T __shfl_xor_sync(unsigned mask, T value, unsigned by) {
+    return __shfl_sync(mask, value, (int)((threadIdx.x & 31) ^ by));
+}
+template <typename T>
 T __shfl_up_sync(unsigned mask, T value, unsigned by) {
     int from = (int)(threadIdx.x & 31) - (int)by;
     const uint64_t* brought = emulator::meet_warp(mask, emulator::to_word(value));
@@ -103,6 +107,13 @@ inline unsigned atomicOr(unsigned* at, unsigned value) {
     return old;
 }
 
+// Four of the eight bytes of `low` and `high`, named by four digits, the lowest first.
+inline unsigned __byte_perm(unsigned low, unsigned high, unsigned digits) {
+    uint64_t bytes = low | (uint64_t)high << 32;
+    unsigned word = 0;
+    for (int i = 0; i < 4; i++) word |= (unsigned)(bytes >> (digits >> i * 4 & 7) * 8 & 0xff) << i * 8;
+    return word;
+}
 inline int __popc(unsigned value) { return __builtin_popcount(value); }
 inline int __clz(int value) { return value == 0 ? 32 : __builtin_clz((unsigned)value); }
 inline int __clzll(long long value) { return value == 0 ? 64 : __builtin_clzll((unsigned long long)value); }

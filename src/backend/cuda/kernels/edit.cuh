@@ -22,6 +22,8 @@ struct Effect {
 struct Workbench {
     Brick brick;
     Effect effects[2];
+    // Of the edit at hand, if it is rough.
+    float noise[MOST_POINTS];
     // Samples that any edit changed.
     u32 changed[16];
     u64 hash;
@@ -183,6 +185,16 @@ __device__ inline void take(const Brick* base, bool has_materials, Brick& brick)
     }
 }
 
+// Takes the brick to the bench. For the whole block.
+__device__ inline void begin(Workbench& bench, const Brick* base, bool had_materials) {
+    take(base, had_materials, bench.brick);
+    for (i32 i = threadIdx.x; i < 512; i += THREADS) bench.effects[i / 256].counts[i % 256] = 0;
+    if (threadIdx.x == 0) {
+        bench.hash = 0;
+        bench.flags = 0;
+    }
+}
+
 // Does any sample of the brick lie in an edit's reach?
 __device__ inline bool is_reached(const Tool& tool, const i32* low) {
     bool is_reached = true;
@@ -204,17 +216,22 @@ __device__ inline bool reaches(const Tool& tool, const i32* low, const i32* offs
 // Applies one edit to the thread's samples; returns which of them changed, a bit for each. `has_materials` is set where
 // a material was stored.
 __device__ inline u32 apply(
-    const Tool& tool, const OwnColumn& column, Brick& brick, Effect& effect, bool& has_materials
+    const Tool& tool, const OwnColumn& column, const Noise& noise, Workbench& bench, Effect& effect,
+    bool& has_materials
 ) {
+    Brick& brick = bench.brick;
     u32 changed = 0;
     // Not unrolled: the code is long, and other warps are there to wait for.
 #pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
-        i32 index = own_index(k);
-        i32 offset[3] = {column.x, own_y(column, k), column.z};
+        i32 index = own_index(k), y = own_y(column, k);
+        i32 offset[3] = {column.x, y, column.z};
+        Place along_x = place_of(noise, 0, column.x), along_y = place_of(noise, 1, y), along_z = place_of(noise, 2, column.z);
         Outcome outcome = {false, NONE};
         if (reaches(tool, column.low, offset)) {
-            i32 outside = distance_to(tool, column.low, offset), pristine = pristine_distance(column, k);
+            float distance = smooth_distance(tool, from_origin(tool, column.low, offset));
+            if (tool.is_rough) distance += bumps(tool, noise, bench.noise, along_x, along_y, along_z);
+            i32 outside = round_distance(distance), pristine = pristine_distance(column, k);
             i16& sample = brick.samples[index];
             u8& material = brick.materials[index];
             outcome = tool.operation == PAINT ? paint(tool, outside, column, pristine, sample, material)
@@ -330,22 +347,19 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
         stack.heights[window],
         stack.columns[window],
     };
-    take(base, had_materials, bench.brick);
-    for (i32 i = threadIdx.x; i < 512; i += THREADS) bench.effects[i / 256].counts[i % 256] = 0;
-    if (threadIdx.x == 0) {
-        bench.hash = 0;
-        bench.flags = 0;
-    }
-    __syncthreads();
-
     u32 changed = 0, turn = 0;
-    bool has_materials = had_materials;
+    bool has_materials = had_materials, is_taken = false;
     for (u32 i = 0; i < job.count; i++) {
         u32 number = params.list[job.first + i];
         const Tool& tool = params.tools[number];
-        if (!is_reached(tool, column.low)) continue;
+        if (!is_reached(tool, column.low) || is_out_of_reach(tool, column.low)) continue;
+        Noise noise = {{0, 0.0f}, 0, 0};
+        if (tool.is_rough) noise = hash_noise(tool, column.low, bench.noise);
+        if (!is_taken) begin(bench, base, had_materials);
+        if (tool.is_rough || !is_taken) __syncthreads();
+        is_taken = true;
         Effect& effect = bench.effects[turn & 1];
-        u32 own = apply(tool, column, bench.brick, effect, has_materials);
+        u32 own = apply(tool, column, noise, bench, effect, has_materials);
         changed |= own;
         if (!__syncthreads_or(own != 0)) continue;
         // While these two warps enter what was done, nobody can get past the next edit, which takes the other place.

@@ -4,11 +4,12 @@
 // layer y: a few operations on them tell the cubes to draw, and the lattice edges with a vertex. Most bricks are done
 // then. For the others:
 //
-//   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges; a
-//      ballot turns a level of all columns into words, and counting bits in them numbers the edges.
+//   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges; the
+//      bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
 //   2. Samples are copied out of 27 bricks, only the layers that those edges look at.
-//   3. Threads take vertices from a list of the edges, each as the vertex function has it (surface/crossings.rs).
-//   4. Threads take triangles from a list of them, and look up the numbers of their vertices by lattice edge.
+//   3. Three warps list the edges, while the fourth lists the cubes and their triangles and reserves room for the output.
+//   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or 32 triangles, which look up the
+//      numbers of their vertices by lattice edge.
 //
 // Edges are called by their place, as in surface/block.rs: 81 level + corner, where level = 9 axis + y and corner = 9 z + x.
 #pragma once
@@ -24,11 +25,17 @@ __device__ inline void gather_bits(const Site& site, MeshBench& bench) {
         i32 along_x = (t % 3 - 1) * (i32)(strides & 0xffff), along_z = (t / 3 % 3 - 1) * (i32)(strides >> 16);
         bench.refs[t] = window[along_x + along_z + t / 9 - 1];
     }
-    // Eight bricks of sixteen words: a word for each thread.
-    i32 brick = t / 16, word = t % 16;
+    // Eight bricks of eight layers of two halves: four rows for each thread.
+    i32 brick = t / 16, half = t % 16;
     u32 ref = window[(brick & 1) * (strides & 0xffff) + (brick >> 1 & 1) * (strides >> 16) + (brick >> 2)];
-    u64 bits = ref == NONE ? 0 : ((const u64*)site.params.bricks[ref >> 1].solid)[word];
-    ((u64*)bench.rows[brick])[word] = bits;
+    u32 solid = 0, edited = 0;
+    if (ref != NONE) {
+        const Brick& found = site.params.bricks[ref >> 1];
+        solid = found.solid[half];
+        edited = found.edited[half];
+    }
+    // A byte of the one, a byte of the other.
+    ((uint2*)bench.rows[brick])[half] = {__byte_perm(solid, edited, 0x5140), __byte_perm(solid, edited, 0x7362)};
 
     if (t < AREA) bench.heights[t] = site.stack.heights[t];
     if (t < CORNERS + 20) bench.solid[t] = bench.drawn[t] = 0;
@@ -42,13 +49,10 @@ struct CornerColumn {
 
 __device__ inline CornerColumn corner_column(const Site& site, const MeshBench& bench, i32 x, i32 z) {
     i32 brick = x / SIDE + z / SIDE * 2, row = z % SIDE, bit = x % SIDE;
-    CornerColumn column = {0, 0};
-    for (i32 y = 0; y <= SIDE; y++) {
-        const u8(&rows)[2][SIDE * SIDE] = bench.rows[brick + y / SIDE * 4];
-        i32 at = y % SIDE * SIDE + row;
-        column.solid |= (rows[0][at] >> bit & 1u) << y;
-        column.edited |= (rows[1][at] >> bit & 1u) << y;
-    }
+    u32 layers = 0;
+    for (i32 y = 0; y < SIDE; y++) layers |= (bench.rows[brick][y * SIDE + row] >> bit & 0x101u) << y;
+    u32 above = bench.rows[brick + 4][row] >> bit & 0x101u;
+    CornerColumn column = {(layers & 0xff) | (above & 1) << 8, layers >> 8 | (above & 0x100)};
     // Where there is no brick, the ground tells: below its height all is solid.
     i32 height = bench.heights[(z + 1) * WINDOW + x + 1];
     i32 filled = smallest(largest(((height + ONE - 1) >> 8) - site.low[1], 0), 9);
@@ -76,40 +80,21 @@ __device__ inline u32 drawn_cubes(const Site& site, const u16* solid, const u16*
 // Layers of corners below and above cubes.
 __device__ inline u32 both_faces(u32 cubes) { return cubes | cubes << 1; }
 
-// The edges along each axis from the corners of one column that have a vertex: the two ends differ, and a cube beside it
-// is drawn.
-struct ColumnEdges {
-    u32 along[3];
-};
-
-__device__ inline ColumnEdges column_edges(const u16* solid, const u16* drawn) {
+// The edges from the corners of one column that have a vertex, a bit for each level: their two ends differ, and a cube
+// beside them is drawn.
+__device__ inline u32 column_edges(const u16* solid, const u16* drawn) {
     u32 own = solid[0];
-    ColumnEdges edges;
-    edges.along[0] = (own ^ solid[1]) & both_faces(drawn[0] | drawn[-9]);
-    edges.along[1] = (own ^ own >> 1) & (u32)(drawn[0] | drawn[-1] | drawn[-9] | drawn[-10]);
-    edges.along[2] = (own ^ solid[9]) & both_faces(drawn[0] | drawn[-1]);
-    return edges;
-}
-
-// Turns the edges of 32 columns to words, one for each level, and stores them. For one warp.
-__device__ inline void store_levels(MeshBench& bench, const ColumnEdges& edges) {
-    u32 own = 0;
-#pragma unroll
-    for (i32 level = 0; level < LEVELS; level++) {
-        u32 word = __ballot_sync(WARP, edges.along[level / 9] >> level % 9 & 1);
-        if (lane() == level) own = word;
-    }
-    if (lane() < LEVELS) bench.crossed[warp()][lane()] = own;
+    u32 along_x = (own ^ solid[1]) & both_faces(drawn[0] | drawn[-9]);
+    u32 along_y = (own ^ own >> 1) & (u32)(drawn[0] | drawn[-1] | drawn[-9] | drawn[-10]);
+    u32 along_z = (own ^ solid[9]) & both_faces(drawn[0] | drawn[-1]);
+    return along_x | along_y << 9 | along_z << 18;
 }
 
 // Two bits, the second one two places from the first.
 __device__ inline u32 spread_pair(u32 bits) { return (bits & 1) | (bits & 2) << 1; }
 
-// The case of a cube, which says what corners are solid; 0, without a triangle, for one that is not drawn.
-__device__ inline u32 cube_case(const MeshBench& bench, u32 cell) {
-    u32 y = cell / 64, corner = MARGIN + cell / SIDE % SIDE * 9 + cell % SIDE;
-    if (!(bench.drawn[corner] >> y & 1)) return 0;
-    const u16* solid = bench.solid + corner;
+// The case of a cube, which says what corners are solid.
+__device__ inline u32 cube_case(const u16* solid, u32 y) {
     // Two bits of each column: the lower corner's, and the upper one's two places further.
     u32 near = spread_pair(solid[0] >> y) | spread_pair(solid[1] >> y) << 1;
     u32 far = spread_pair(solid[9] >> y) | spread_pair(solid[10] >> y) << 1;
@@ -128,65 +113,96 @@ __device__ inline void copy_row(const Site& site, MeshBench& bench, i32 layer, i
     i32 level = (layer + 7) / SIDE - 1, at = (layer + 7) % SIDE * 64 + (z + 7) % SIDE * SIDE;
     i32 height = (site.low[1] + layer - 1) * ONE;
     const i32* heights = bench.heights + z * WINDOW;
-    Marked* row = bench.apron + layer * AREA + z * WINDOW;
     const u32* refs = bench.refs + around(0, level, (z + 7) / SIDE - 1);
-    for (i32 x = 0; x < WINDOW; x++) row[x] = mark(PRISTINE, (i32)((u32)height - (u32)heights[x]));
-    if (refs[-1] != NONE) {
-        i32 before = site.params.bricks[refs[-1] >> 1].samples[at + 7];
-        if (before != PRISTINE) row[0] = mark(before, 0);
-    }
-    if (refs[0] != NONE) {
-        uint4 eight = *(const uint4*)&site.params.bricks[refs[0] >> 1].samples[at];
-        u32 pairs[4] = {eight.x, eight.y, eight.z, eight.w};
-        for (i32 x = 0; x < SIDE; x++) {
-            i32 stored = (i16)(pairs[x / 2] >> (x % 2 * 16));
-            if (stored != PRISTINE) row[x + 1] = mark(stored, 0);
-        }
-    }
-    if (refs[1] != NONE) {
-        const i16* after = &site.params.bricks[refs[1] >> 1].samples[at];
-        for (i32 x = 0; x < 2; x++) {
-            if (after[x] != PRISTINE) row[x + 9] = mark(after[x], 0);
-        }
+    // Two samples to a word.
+    const u32 NOTHING = (u16)PRISTINE * 0x10001u;
+    u32 before = NOTHING, after = NOTHING;
+    uint4 own = {NOTHING, NOTHING, NOTHING, NOTHING};
+    if (refs[-1] != NONE) before = *(const u32*)&site.params.bricks[refs[-1] >> 1].samples[at + 6];
+    if (refs[0] != NONE) own = *(const uint4*)&site.params.bricks[refs[0] >> 1].samples[at];
+    if (refs[1] != NONE) after = *(const u32*)&site.params.bricks[refs[1] >> 1].samples[at];
+    u32 pairs[6] = {before, own.x, own.y, own.z, own.w, after};
+    Marked* row = bench.apron + layer * AREA + z * WINDOW;
+#pragma unroll
+    for (i32 x = 0; x < WINDOW; x++) {
+        i32 stored = (i16)(pairs[(x + 1) / 2] >> ((x + 1) % 2 * 16));
+        row[x] = mark(stored, (i32)((u32)height - (u32)heights[x]));
     }
 }
 
-// Numbers the edges of one warp's corners and lists them; returns how many edges the whole block has. For one warp.
-__device__ inline u32 list_edges(MeshBench& bench, const ColumnEdges& edges) {
+// Numbers the edges of each level from a warp's corners, if it has any; returns how many edges the whole block has. For one
+// warp.
+__device__ inline u32 number_edges(MeshBench& bench) {
     u32 own = 0, before = 0;
     for (i32 i = 0; i < CORNER_WARPS && lane() < LEVELS; i++) {
-        u32 count = __popc(bench.crossed[i][lane()]);
+        u32 count = __popc(bench.runs[lane()][i].crossed);
         if (i < warp()) before += count;
         own += count;
     }
     u32 end = running_sum(own);
-    if (lane() < LEVELS) bench.first[warp()][lane()] = (u16)(end - own + before);
+    if (lane() < LEVELS && warp() < CORNER_WARPS) bench.runs[lane()][warp()].first = end - own + before;
     __syncwarp();
+    return __shfl_sync(WARP, end, 31);
+}
 
-    for (i32 axis = 0; axis < 3; axis++) {
-        for (u32 rest = edges.along[axis]; rest != 0; rest &= rest - 1) {
-            i32 level = axis * 9 + __ffs(rest) - 1;
-            u32 number = bench.first[warp()][level] + __popc(bench.crossed[warp()][level] & lanes_before());
-            bench.edges[number] = (u16)(level * CORNERS + threadIdx.x);
+// Lists the edges from the corner of a thread, a bit for each level.
+__device__ inline void list_edges(MeshBench& bench, u32 edges) {
+    for (u32 rest = edges; rest != 0; rest &= rest - 1) {
+        i32 level = __ffs(rest) - 1;
+        Run run = bench.runs[level][warp()];
+        bench.edges[run.first + __popc(run.crossed & lanes_before())] = (u16)(level * CORNERS + threadIdx.x);
+    }
+}
+
+// Lists the cubes to draw; returns how many there are. For one warp.
+__device__ inline u32 list_cubes(MeshBench& bench) {
+    // The lower half of a layer's cells, and the upper half.
+    u32 corners[2] = {lane() / SIDE * 9 + lane() % SIDE, (lane() / SIDE + 4) * 9 + lane() % SIDE};
+    u32 drawn[2] = {bench.drawn[MARGIN + corners[0]], bench.drawn[MARGIN + corners[1]]};
+    u32 cubes = 0;
+    for (u32 y = 0; y < SIDE; y++) {
+        if (!(bench.layers >> y & 1)) continue;
+#pragma unroll
+        for (i32 half = 0; half < 2; half++) {
+            bool is_drawn = drawn[half] >> y & 1;
+            u32 word = __ballot_sync(WARP, is_drawn);
+            if (is_drawn) {
+                u32 kind = cube_case(bench.solid + MARGIN + corners[half], y);
+                bench.cubes[cubes + __popc(word & lanes_before())] = (y * CORNERS + corners[half]) | kind << PLACE_BITS;
+            }
+            cubes += __popc(word);
         }
     }
-    return __shfl_sync(WARP, end, 31);
+    __syncwarp();
+    return cubes;
+}
+
+// Lists the triangles of the cubes; returns how many there are. For one warp.
+__device__ inline u32 list_triangles(const MeshParams& params, MeshBench& bench, u32 cubes) {
+    u32 triangles = 0;
+    for (u32 base = 0; base < cubes; base += 32) {
+        u32 cube = base + lane();
+        u32 count = cube < cubes ? triangles_of(params, bench.cubes[cube] >> PLACE_BITS) : 0;
+        u32 end = running_sum(count), first = triangles + end - count;
+        for (u32 number = 0; number < count; number++) bench.triangles[first + number] = (u16)(cube | number << CUBE_BITS);
+        triangles += __shfl_sync(WARP, end, 31);
+    }
+    return triangles;
 }
 
 // The number of the vertex on the lattice edge at a place.
 __device__ inline u32 vertex_number(const MeshBench& bench, u32 place) {
     u32 level = place / CORNERS, corner = place % CORNERS;
-    u32 word = corner / 32, before = (1u << corner % 32) - 1;
-    return bench.first[word][level] + __popc(bench.crossed[word][level] & before);
+    Run run = bench.runs[level][corner / 32];
+    return run.first + __popc(run.crossed & ((1u << corner % 32) - 1));
 }
 
 // Reserves room for the block. For one thread.
-__device__ inline void reserve(const MeshParams& params, MeshBench& bench, u32 vertices) {
-    u32 triangles = 0;
-    for (i32 i = 0; i < THREADS / 32; i++) triangles += bench.warp_triangles[i];
+__device__ inline void reserve(const MeshParams& params, MeshBench& bench, u32 vertices, u32 triangles) {
     u32 indices = triangles * 3;
-    u32 vertex = atomicAdd(&params.counters[0], vertices);
-    u32 index = atomicAdd(&params.counters[1], indices);
+    // Both counters at once.
+    u64 first = atomicAdd((u64*)params.counters, vertices | (u64)indices << 32);
+    u32 vertex = (u32)first, index = (u32)(first >> 32);
     bool is_room = fits(vertex, vertices, params.vertex_capacity);
     is_room &= fits(index, indices, params.index_capacity);
     bench.vertex = is_room ? vertex : NONE;
@@ -196,69 +212,48 @@ __device__ inline void reserve(const MeshParams& params, MeshBench& bench, u32 v
     params.results[blockIdx.x] = {bench.vertex, vertices, is_room ? index : 0, indices};
 }
 
-// Makes the block's vertices, 32 at a time. For each warp; normals go through shared memory, so that what the lanes of a
-// warp write lies side by side.
-__device__ inline void make_vertices(const Site& site, MeshBench& bench) {
+// Makes up to 32 vertices, the first of number `base`. For one warp; normals go through shared memory, so that what its
+// lanes write lies side by side.
+__device__ inline void make_vertices(const Site& site, MeshBench& bench, u32 base) {
     const MeshParams& params = site.params;
-    float* normals = bench.normals[warp()];
-    for (u32 base = warp() * 32; base < bench.vertices; base += THREADS) {
-        u32 count = smallest(bench.vertices - base, 32);
-        u64 to = (u64)bench.vertex + base;
-        if (lane() < count) {
-            Edge edge = edge_at(bench.edges[base + lane()]);
-            Crossing crossing = crossing_on(bench.apron, edge);
-            Vector normal = normal_of(site, bench, edge, crossing);
-            normals[lane() * 3] = normal.x;
-            normals[lane() * 3 + 1] = normal.y;
-            normals[lane() * 3 + 2] = normal.z;
-            params.positions[to + lane()] = position_of(edge, crossing.step);
-            if (params.mixes) {
-                Mix mix = mix_at(site, bench, edge, crossing);
-                params.mixes[to + lane()] = {mix.ids, mix.weights};
-            }
+    float* normals = bench.staged[warp()].normals;
+    u32 count = smallest(bench.vertices - base, 32);
+    u64 to = (u64)bench.vertex + base;
+    if (lane() < count) {
+        Edge edge = edge_at(bench.edges[base + lane()]);
+        Crossing crossing = crossing_on(bench.apron, edge);
+        Vector normal = normal_of(site, bench, edge, crossing);
+        normals[lane() * 3] = normal.x;
+        normals[lane() * 3 + 1] = normal.y;
+        normals[lane() * 3 + 2] = normal.z;
+        params.positions[to + lane()] = position_of(edge, crossing.step);
+        if (params.mixes) {
+            Mix mix = mix_at(site, bench, edge, crossing);
+            params.mixes[to + lane()] = {mix.ids, mix.weights};
         }
-        __syncwarp();
-        for (u32 i = lane(); i < count * 3; i += 32) params.normals[to * 3 + i] = normals[i];
-        __syncwarp();
     }
-}
-
-// How many triangles a thread's own cells have.
-__device__ inline u32 count_triangles(const MeshParams& params, const MeshBench& bench) {
-    u32 triangles = 0;
-    for (u32 i = 0; i < CELLS_EACH; i++) {
-        triangles += triangles_of(params, cube_case(bench, threadIdx.x * CELLS_EACH + i));
-    }
-    return triangles;
-}
-
-// Lists the triangles of a thread's own cells, from number `first` on.
-__device__ inline void list_triangles(const MeshParams& params, MeshBench& bench, u32 first) {
-    for (u32 i = 0; i < CELLS_EACH; i++) {
-        u32 cell = threadIdx.x * CELLS_EACH + i, count = triangles_of(params, cube_case(bench, cell));
-        for (u32 number = 0; number < count; number++) bench.triangles[first++] = (u16)(cell | number << 9);
-    }
+    __syncwarp();
+    for (u32 i = lane(); i < count * 3; i += 32) params.normals[to * 3 + i] = normals[i];
+    __syncwarp();
 }
 
 // The three vertex numbers of a listed triangle.
 __device__ inline void look_up(const MeshParams& params, const MeshBench& bench, u32 triangle, u16* numbers) {
-    u32 cell = triangle & 511, first = (triangle >> 9) * 3;
-    u32 y = cell / 64, corner = cell / SIDE % SIDE * 9 + cell % SIDE;
-    const u16* slots = params.table[cube_case(bench, cell)] + first;
-    for (u32 i = 0; i < 3; i++) numbers[i] = (u16)vertex_number(bench, y * CORNERS + corner + slots[i]);
+    u32 cube = bench.cubes[triangle & ((1 << CUBE_BITS) - 1)], first = (triangle >> CUBE_BITS) * 3;
+    const u16* slots = params.table[cube >> PLACE_BITS] + first;
+    u32 place = cube & ((1 << PLACE_BITS) - 1);
+    for (u32 i = 0; i < 3; i++) numbers[i] = (u16)vertex_number(bench, place + slots[i]);
 }
 
-// Writes the block's triangles, 32 at a time. For each warp.
-__device__ inline void write_triangles(const MeshParams& params, MeshBench& bench) {
-    u16* numbers = bench.indices[warp()];
-    for (u32 base = warp() * 32; base < bench.triangles_in_all; base += THREADS) {
-        u32 count = smallest(bench.triangles_in_all - base, 32);
-        if (lane() < count) look_up(params, bench, bench.triangles[base + lane()], numbers + lane() * 3);
-        __syncwarp();
-        u64 to = (u64)bench.index + base * 3;
-        for (u32 i = lane(); i < count * 3; i += 32) params.indices[to + i] = numbers[i];
-        __syncwarp();
-    }
+// Writes up to 32 triangles, the first of number `base`. For one warp.
+__device__ inline void write_triangles(const MeshParams& params, MeshBench& bench, u32 base) {
+    u16* numbers = bench.staged[warp()].indices;
+    u32 count = smallest(bench.triangles_in_all - base, 32);
+    if (lane() < count) look_up(params, bench, bench.triangles[base + lane()], numbers + lane() * 3);
+    __syncwarp();
+    u64 to = (u64)bench.index + base * 3;
+    for (u32 i = lane(); i < count * 3; i += 32) params.indices[to + i] = numbers[i];
+    __syncwarp();
 }
 
 extern "C" __global__ void __launch_bounds__(THREADS) mesh(MeshParams params) {
@@ -294,31 +289,32 @@ extern "C" __global__ void __launch_bounds__(THREADS) mesh(MeshParams params) {
         return;
     }
 
-    // Edges to words, samples to the apron, and triangles are counted.
-    ColumnEdges edges = {{0, 0, 0}};
-    if (t < CORNERS) edges = column_edges(solid, drawn);
-    if (warp() < CORNER_WARPS) store_levels(bench, edges);
+    // Edges to words, samples to the apron.
+    u32 edges = t < CORNERS ? column_edges(solid, drawn) : 0;
+    if (warp() < CORNER_WARPS) {
+        u32 level = transpose(edges);
+        if (lane() < LEVELS) bench.runs[lane()][warp()].crossed = level;
+    }
     i32 bottom = __ffs(layers) - 1, top = 31 - __clz(layers);
     i32 rows = (top - bottom + 4) * WINDOW;
     for (i32 row = t; row < rows; row += THREADS) copy_row(site, bench, bottom + row / WINDOW, row % WINDOW);
-    u32 triangles = count_triangles(params, bench);
-    u32 end = running_sum(triangles);
-    if (lane() == 31) bench.warp_triangles[warp()] = end;
     __syncthreads();
 
-    if (warp() < CORNER_WARPS) {
-        u32 vertices = list_edges(bench, edges);
-        if (t == 0) reserve(params, bench, vertices);
+    u32 vertices = number_edges(bench);
+    list_edges(bench, edges);
+    if (warp() == CORNER_WARPS) {
+        u32 triangles = list_triangles(params, bench, list_cubes(bench));
+        if (lane() == 0) reserve(params, bench, vertices, triangles);
     }
-    u32 first = end - triangles;
-    for (i32 i = 0; i < warp(); i++) first += bench.warp_triangles[i];
     __syncthreads();
     if (bench.vertex == NONE) return;
 
-    make_vertices(site, bench);
-    // The list of triangles takes the place of the samples.
-    __syncthreads();
-    list_triangles(params, bench, first);
-    __syncthreads();
-    write_triangles(params, bench);
+    u32 batches = (bench.vertices + 31) / 32, all_batches = batches + (bench.triangles_in_all + 31) / 32;
+    for (u32 batch = warp(); batch < all_batches; batch += THREADS / 32) {
+        if (batch < batches) {
+            make_vertices(site, bench, batch * 32);
+        } else {
+            write_triangles(params, bench, (batch - batches) * 32);
+        }
+    }
 }

@@ -108,19 +108,55 @@ __device__ inline float noise_point(i32 x, i32 y, i32 z, u64 seed) {
     return (float)((i32)(mix(place ^ seed) >> 40) - (1 << 23)) / (float)(1 << 23);
 }
 
-// The noise on the plane of noise points with one x.
-__device__ inline float noise_face(i32 x, Place y, Place z, u64 seed) {
-    auto row = [&](i32 z) {
-        return lerp(noise_point(x, y.cell, z, seed), noise_point(x, y.cell + 1, z, seed), y.t);
-    };
-    return lerp(row(z.cell), row(z.cell + 1), z.t);
+// The noise around one brick, as one edit has it. A noise cell is at least as wide as a voxel, so eight samples lie in
+// eight cells at most, between nine noise points: they are hashed once, for all samples.
+constexpr i32 MOST_POINTS = 9 * 9 * 9;
+
+// Where samples of a brick are among the noise points: a lane of each warp knows it for one coordinate, lanes 0 to 7 along
+// x, then along y, then along z.
+struct Noise {
+    Place own;
+    // From a point to the next along y, and along z.
+    i32 row, area;
+};
+
+__device__ inline i32 noise_lane(i32 axis, i32 offset) { return axis * SIDE + offset; }
+
+// Hashes the noise points around the brick whose lowest sample is `low`. For the whole block, which waits for itself before
+// it looks at them.
+__device__ inline Noise hash_noise(const Tool& tool, const i32* low, float* points) {
+    i32 axis = lane() / SIDE, start = axis == 0 ? low[0] : axis == 1 ? low[1] : low[2];
+    Noise noise = {locate(start + (i32)lane() % SIDE, tool.scale), 0, 0};
+    i32 first[3], count[3];
+#pragma unroll
+    for (i32 i = 0; i < 3; i++) {
+        first[i] = __shfl_sync(WARP, noise.own.cell, noise_lane(i, 0));
+        count[i] = __shfl_sync(WARP, noise.own.cell, noise_lane(i, SIDE - 1)) - first[i] + 2;
+        // From here on, cells count from the first.
+        if (axis == i) noise.own.cell -= first[i];
+    }
+    noise.row = count[0];
+    noise.area = count[0] * count[1];
+    u64 seed = mix(tool.seed);
+    for (i32 i = threadIdx.x; i < noise.area * count[2]; i += THREADS) {
+        i32 x = i % noise.row, y = i / noise.row % count[1], z = i / noise.area;
+        points[i] = noise_point(first[0] + x, first[1] + y, first[2] + z, seed);
+    }
+    return noise;
 }
 
-// Bumps at a lattice point.
-__device__ inline float bumps(const Tool& tool, i32 x, i32 y, i32 z) {
-    Place px = locate(x, tool.scale), py = locate(y, tool.scale), pz = locate(z, tool.scale);
-    u64 seed = mix(tool.seed);
-    float value = lerp(noise_face(px.cell, py, pz, seed), noise_face(px.cell + 1, py, pz, seed), px.t);
+// The place of one coordinate, the same axis in all lanes of a warp.
+__device__ inline Place place_of(const Noise& noise, i32 axis, i32 offset) {
+    i32 from = noise_lane(axis, offset);
+    return {__shfl_sync(WARP, noise.own.cell, from), __shfl_sync(WARP, noise.own.t, from)};
+}
+
+// Bumps at a sample: between noise points along y, then z, then x.
+__device__ inline float bumps(const Tool& tool, const Noise& noise, const float* points, Place x, Place y, Place z) {
+    const float* near = points + x.cell + y.cell * noise.row + z.cell * noise.area;
+    auto row = [&](const float* p) { return lerp(p[0], p[noise.row], y.t); };
+    auto face = [&](const float* p) { return lerp(row(p), row(p + noise.area), z.t); };
+    float value = lerp(face(near), face(near + 1), x.t);
     if (value < -1.0f) value = -1.0f;
     if (value > 1.0f) value = 1.0f;
     return value * (float)tool.amplitude;
@@ -140,16 +176,23 @@ __device__ inline i32 voxels_from(i32 voxel, i32 home) {
     return (i32)(voxels < -FARTHEST ? -FARTHEST : voxels > FARTHEST ? FARTHEST : voxels);
 }
 
-// The signed distance of the lattice point `offset` from a brick's lowest sample `low`. Rows along x begin at `low`, and
-// only their first coordinate stops at the end of all distances, as on the CPU.
-__device__ inline i32 distance_to(const Tool& tool, const i32* low, const i32* offset) {
-    i32 y = low[1] + offset[1], z = low[2] + offset[2];
-    Vector p = {
+// From the shape's origin to the sample `offset` from a brick's lowest sample `low`. Rows along x begin at `low`, and only
+// their first coordinate stops at the end of all distances, as on the CPU.
+__device__ inline Vector from_origin(const Tool& tool, const i32* low, const i32* offset) {
+    return {
         (float)((voxels_from(low[0], tool.home[0]) + offset[0]) * ONE - tool.rest[0]),
-        (float)(voxels_from(y, tool.home[1]) * ONE - tool.rest[1]),
-        (float)(voxels_from(z, tool.home[2]) * ONE - tool.rest[2]),
+        (float)(voxels_from(low[1] + offset[1], tool.home[1]) * ONE - tool.rest[1]),
+        (float)(voxels_from(low[2] + offset[2], tool.home[2]) * ONE - tool.rest[2]),
     };
-    float distance = smooth_distance(tool, p);
-    if (tool.is_rough) distance += bumps(tool, low[0] + offset[0], y, z);
-    return round_distance(distance);
+}
+
+// Is every sample of the brick too far outside the shape to change? Not sure means no. As `Evaluator::is_out_of_reach`:
+// from the sample in the middle none is farther than half of the diagonal.
+__device__ inline bool is_out_of_reach(const Tool& tool, const i32* low) {
+    // 4 voxels times the root of 3, rounded up.
+    const i32 DIAGONAL = 1774, MIDDLE[3] = {SIDE / 2, SIDE / 2, SIDE / 2};
+    i32 distance = round_distance(smooth_distance(tool, from_origin(tool, low, MIDDLE)));
+    // What rounding to floats may have cost, generously.
+    i32 rounding = 16 + (distance >> 14), amplitude = tool.is_rough ? tool.amplitude : 0;
+    return distance - rounding > BAND + amplitude + DIAGONAL;
 }

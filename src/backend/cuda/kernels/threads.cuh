@@ -23,6 +23,19 @@ __device__ inline u32 running_sum(u32 value) {
     return value;
 }
 
+// Turns 32 words of 32 bits around: bit i of lane k becomes bit k of lane i. Swaps halves of the words, then quarters, and so
+// on to single bits.
+__device__ inline u32 transpose(u32 bits) {
+    u32 low = 0xffff;
+#pragma unroll
+    for (i32 step = 16; step > 0; step /= 2) {
+        u32 other = __shfl_xor_sync(WARP, bits, step);
+        bits = lane() & step ? (bits & ~low) | (other >> step & low) : (bits & low) | (other << step & ~low);
+        low ^= low << (step / 2);
+    }
+    return bits;
+}
+
 // Is there room for so many entries from `first` on?
 __device__ inline bool fits(u32 first, u32 count, u32 capacity) {
     return first <= capacity && count <= capacity - first;
