@@ -27,9 +27,13 @@ struct Workbench {
     // Samples that any edit changed.
     u32 changed[16];
     u64 hash;
+    // As in `ResultFlags`, and `NOT_UNIFORM`.
     u32 flags;
-    u32 record, material;
+    // Where the brick goes, and the box around what changed, as the result has them.
+    u32 record, material, bounds;
 };
+
+constexpr u32 NOT_UNIFORM = 16;
 
 // What a thread's samples have in common.
 struct OwnColumn {
@@ -195,13 +199,13 @@ __device__ inline void begin(Workbench& bench, const Brick* base, bool had_mater
     }
 }
 
-// Does any sample of the brick lie in an edit's reach?
-__device__ inline bool is_reached(const Tool& tool, const i32* low) {
+// May an edit change a sample of the brick?
+__device__ inline bool may_change(const Tool& tool, const i32* low) {
     bool is_reached = true;
     for (i32 axis = 0; axis < 3; axis++) {
         is_reached &= tool.min[axis] <= low[axis] + SIDE - 1 && low[axis] <= tool.max[axis];
     }
-    return is_reached;
+    return is_reached && !is_out_of_reach(tool, low);
 }
 
 __device__ inline bool reaches(const Tool& tool, const i32* low, const i32* offset) {
@@ -220,13 +224,14 @@ __device__ inline u32 apply(
     bool& has_materials
 ) {
     Brick& brick = bench.brick;
+    Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
     u32 changed = 0;
     // Not unrolled: the code is long, and other warps are there to wait for.
 #pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         i32 index = own_index(k), y = own_y(column, k);
         i32 offset[3] = {column.x, y, column.z};
-        Place along_x = place_of(noise, 0, column.x), along_y = place_of(noise, 1, y), along_z = place_of(noise, 2, column.z);
+        Place along_y = place_of(noise, 1, y);
         Outcome outcome = {false, NONE};
         if (reaches(tool, column.low, offset)) {
             float distance = smooth_distance(tool, from_origin(tool, column.low, offset));
@@ -257,6 +262,7 @@ __device__ inline u64 hash_change(
 ) {
     u64 place = mix((u64)(u32)(column.low[0] + column.x) | (u64)(u32)(column.low[2] + column.z) << 32);
     u64 change = 0;
+#pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         if (!(changed >> k & 1)) continue;
         i32 index = own_index(k), y = column.low[1] + own_y(column, k);
@@ -275,6 +281,7 @@ __device__ inline void sum_up(
 ) {
     Brick& brick = bench.brick;
     bool is_uniform = true, is_extended = false;
+#pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         i32 index = own_index(k), sample = brick.samples[index];
         bool is_edited = sample != PRISTINE, is_changed = changed >> k & 1;
@@ -287,33 +294,36 @@ __device__ inline void sum_up(
     u64 hash = hash_change(column, brick, base, had_materials, changed);
     for (i32 step = 16; step > 0; step /= 2) hash += __shfl_down_sync(WARP, hash, step);
 
-    u32 flags = __all_sync(WARP, is_uniform) ? 0 : UNIFORM;
+    u32 flags = __all_sync(WARP, is_uniform) ? 0 : NOT_UNIFORM;
     flags |= __any_sync(WARP, is_extended) ? EXTENDED : 0;
     flags |= __any_sync(WARP, has_materials) ? HAS_MATERIALS : 0;
     if (lane() == 0) {
         atomicAdd(&bench.hash, hash);
-        // Uniform is what is nowhere otherwise.
         atomicOr(&bench.flags, flags);
     }
 }
 
-// Reserves room for the brick and writes its result. For one thread.
+__device__ inline bool is_uniform(const Workbench& bench) { return !(bench.flags & NOT_UNIFORM); }
+
+// Reserves room for the brick. For one thread.
 __device__ inline void reserve(const EditParams& params, Workbench& bench) {
-    EditResult result = {bench.hash, (bench.flags ^ UNIFORM) | CHANGED, NONE, NONE, 0, 0, 0};
-    if (result.flags & UNIFORM) {
-        result.uniform = (u16)bench.brick.samples[0] | (u32)bench.brick.materials[0] << 16;
-    } else {
-        u32 record = atomicAdd(&params.counters[0], 1);
-        if (record < params.record_capacity) result.record = record;
-        if (result.flags & HAS_MATERIALS) {
-            u32 material = atomicAdd(&params.counters[1], 1);
-            if (material < params.material_capacity) result.material = material;
-        }
+    bench.record = bench.material = NONE;
+    if (is_uniform(bench)) return;
+    // Records and materials at once.
+    bool has_materials = bench.flags & HAS_MATERIALS;
+    u64 first = atomicAdd((u64*)params.counters, 1 | (u64)has_materials << 32);
+    u32 record = (u32)first, material = (u32)(first >> 32);
+    if (record < params.record_capacity) bench.record = record;
+    if (has_materials && material < params.material_capacity) bench.material = material;
+}
+
+__device__ inline EditResult result_of(const Workbench& bench) {
+    u32 flags = CHANGED | (bench.flags & (EXTENDED | HAS_MATERIALS)), uniform = 0;
+    if (is_uniform(bench)) {
+        flags |= UNIFORM;
+        uniform = (u16)bench.brick.samples[0] | (u32)bench.brick.materials[0] << 16;
     }
-    result.bounds = bounds_of(bench.changed, ~0ull, 0, SIDE);
-    bench.record = result.record;
-    bench.material = result.material;
-    params.results[blockIdx.x] = result;
+    return {bench.hash, flags, bench.record, bench.material, bench.bounds, uniform, 0};
 }
 
 // Writes the brick to its slot, and to the entries that were reserved for it.
@@ -349,23 +359,27 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
     };
     u32 changed = 0, turn = 0;
     bool has_materials = had_materials, is_taken = false;
-    for (u32 i = 0; i < job.count; i++) {
-        u32 number = params.list[job.first + i];
-        const Tool& tool = params.tools[number];
-        if (!is_reached(tool, column.low) || is_out_of_reach(tool, column.low)) continue;
-        Noise noise = {{0, 0.0f}, 0, 0};
-        if (tool.is_rough) noise = hash_noise(tool, column.low, bench.noise);
-        if (!is_taken) begin(bench, base, had_materials);
-        if (tool.is_rough || !is_taken) __syncthreads();
-        is_taken = true;
-        Effect& effect = bench.effects[turn & 1];
-        u32 own = apply(tool, column, noise, bench, effect, has_materials);
-        changed |= own;
-        if (!__syncthreads_or(own != 0)) continue;
-        // While these two warps enter what was done, nobody can get past the next edit, which takes the other place.
-        if (warp() == 0) enter_parts(params, job.cuts, number, effect.changed);
-        if (warp() == 1) enter_counts(params, number, tool.operation, effect.counts);
-        turn++;
+    for (u32 start = 0; start < job.count; start += 32) {
+        // Each lane looks at one edit; the warps all look at the same ones.
+        u32 number = start + lane() < job.count ? params.list[job.first + start + lane()] : NONE;
+        u32 reaching = __ballot_sync(WARP, number != NONE && may_change(params.tools[number], column.low));
+        for (; reaching != 0; reaching &= reaching - 1) {
+            u32 edit = __shfl_sync(WARP, number, __ffs(reaching) - 1);
+            const Tool& tool = params.tools[edit];
+            Noise noise = {{0, 0.0f}, 0, 0};
+            if (tool.is_rough) noise = hash_noise(tool, column.low, bench.noise);
+            if (!is_taken) begin(bench, base, had_materials);
+            if (tool.is_rough || !is_taken) __syncthreads();
+            is_taken = true;
+            Effect& effect = bench.effects[turn & 1];
+            u32 own = apply(tool, column, noise, bench, effect, has_materials);
+            changed |= own;
+            if (!__syncthreads_or(own != 0)) continue;
+            // While these two warps enter what was done, nobody can get past the next edit, which takes the other place.
+            if (warp() == 0) enter_parts(params, job.cuts, edit, effect.changed);
+            if (warp() == 1) enter_counts(params, edit, tool.operation, effect.counts);
+            turn++;
+        }
     }
     // Whoever entered an edit since then did not change the brick.
     if (turn == 0) {
@@ -375,6 +389,8 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
     sum_up(bench, column, base, had_materials, has_materials, changed);
     __syncthreads();
     if (threadIdx.x == 0) reserve(params, bench);
+    if (warp() == 1 && lane() == 0) bench.bounds = bounds_of(bench.changed, ~0ull, 0, SIDE);
     __syncthreads();
     store(params, bench, &params.bricks[job.target]);
+    if (threadIdx.x == THREADS - 1) params.results[blockIdx.x] = result_of(bench);
 }

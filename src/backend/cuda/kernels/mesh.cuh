@@ -7,7 +7,8 @@
 //   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges; the
 //      bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
 //   2. Samples are copied out of 27 bricks, only the layers that those edges look at.
-//   3. Three warps list the edges, while the fourth lists the cubes and their triangles and reserves room for the output.
+//      Meanwhile one warp lists the cubes and their triangles, and reserves room for the output.
+//   3. Edges are listed.
 //   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or 32 triangles, which look up the
 //      numbers of their vertices by lattice edge.
 //
@@ -130,9 +131,17 @@ __device__ inline void copy_row(const Site& site, MeshBench& bench, i32 layer, i
     }
 }
 
-// Numbers the edges of each level from a warp's corners, if it has any; returns how many edges the whole block has. For one
-// warp.
-__device__ inline u32 number_edges(MeshBench& bench) {
+// Counts the edges of all levels. For one warp.
+__device__ inline u32 count_edges(const MeshBench& bench) {
+    u32 edges = 0;
+    for (u32 corner = lane(); corner < CORNERS; corner += 32) {
+        edges += __popc(column_edges(bench.solid + MARGIN + corner, bench.drawn + MARGIN + corner));
+    }
+    return __shfl_sync(WARP, running_sum(edges), 31);
+}
+
+// Numbers the edges of each level from a warp's corners. For one warp.
+__device__ inline void number_edges(MeshBench& bench) {
     u32 own = 0, before = 0;
     for (i32 i = 0; i < CORNER_WARPS && lane() < LEVELS; i++) {
         u32 count = __popc(bench.runs[lane()][i].crossed);
@@ -140,9 +149,8 @@ __device__ inline u32 number_edges(MeshBench& bench) {
         own += count;
     }
     u32 end = running_sum(own);
-    if (lane() < LEVELS && warp() < CORNER_WARPS) bench.runs[lane()][warp()].first = end - own + before;
+    if (lane() < LEVELS) bench.runs[lane()][warp()].first = end - own + before;
     __syncwarp();
-    return __shfl_sync(WARP, end, 31);
 }
 
 // Lists the edges from the corner of a thread, a bit for each level.
@@ -197,12 +205,16 @@ __device__ inline u32 vertex_number(const MeshBench& bench, u32 place) {
     return run.first + __popc(run.crossed & ((1u << corner % 32) - 1));
 }
 
-// Reserves room for the block. For one thread.
-__device__ inline void reserve(const MeshParams& params, MeshBench& bench, u32 vertices, u32 triangles) {
-    u32 indices = triangles * 3;
-    // Both counters at once.
-    u64 first = atomicAdd((u64*)params.counters, vertices | (u64)indices << 32);
-    u32 vertex = (u32)first, index = (u32)(first >> 32);
+// Reserves room for the block: the first vertex, and the first index in the upper half. For one thread.
+__device__ inline u64 reserve(const MeshParams& params, u32 vertices, u32 triangles) {
+    return atomicAdd((u64*)params.counters, vertices | (u64)triangles * 3 << 32);
+}
+
+// Enters what was reserved. For one thread.
+__device__ inline void enter(
+    const MeshParams& params, MeshBench& bench, u64 reserved, u32 vertices, u32 triangles
+) {
+    u32 vertex = (u32)reserved, index = (u32)(reserved >> 32), indices = triangles * 3;
     bool is_room = fits(vertex, vertices, params.vertex_capacity);
     is_room &= fits(index, indices, params.index_capacity);
     bench.vertex = is_room ? vertex : NONE;
@@ -256,7 +268,7 @@ __device__ inline void write_triangles(const MeshParams& params, MeshBench& benc
     __syncwarp();
 }
 
-extern "C" __global__ void __launch_bounds__(THREADS) mesh(MeshParams params) {
+extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params) {
     __shared__ MeshBench bench;
     const MeshJob& job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
@@ -289,22 +301,29 @@ extern "C" __global__ void __launch_bounds__(THREADS) mesh(MeshParams params) {
         return;
     }
 
-    // Edges to words, samples to the apron.
-    u32 edges = t < CORNERS ? column_edges(solid, drawn) : 0;
+    // Three warps turn edges to words, and copy samples to the apron. The fourth lists triangles, and reserves room; while it
+    // waits for that, edges are listed.
+    u32 edges = 0, vertices = 0, triangles = 0;
+    u64 reserved = 0;
     if (warp() < CORNER_WARPS) {
+        edges = t < CORNERS ? column_edges(solid, drawn) : 0;
         u32 level = transpose(edges);
         if (lane() < LEVELS) bench.runs[lane()][warp()].crossed = level;
+        i32 bottom = __ffs(layers) - 1, top = 31 - __clz(layers), rows = (top - bottom + 4) * WINDOW;
+        for (i32 row = t; row < rows; row += CORNER_WARPS * 32) {
+            copy_row(site, bench, bottom + row / WINDOW, row % WINDOW);
+        }
+    } else {
+        vertices = count_edges(bench);
+        triangles = list_triangles(params, bench, list_cubes(bench));
+        if (lane() == 0) reserved = reserve(params, vertices, triangles);
     }
-    i32 bottom = __ffs(layers) - 1, top = 31 - __clz(layers);
-    i32 rows = (top - bottom + 4) * WINDOW;
-    for (i32 row = t; row < rows; row += THREADS) copy_row(site, bench, bottom + row / WINDOW, row % WINDOW);
     __syncthreads();
-
-    u32 vertices = number_edges(bench);
-    list_edges(bench, edges);
-    if (warp() == CORNER_WARPS) {
-        u32 triangles = list_triangles(params, bench, list_cubes(bench));
-        if (lane() == 0) reserve(params, bench, vertices, triangles);
+    if (warp() < CORNER_WARPS) {
+        number_edges(bench);
+        list_edges(bench, edges);
+    } else if (lane() == 0) {
+        enter(params, bench, reserved, vertices, triangles);
     }
     __syncthreads();
     if (bench.vertex == NONE) return;

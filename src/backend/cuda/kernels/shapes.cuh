@@ -97,7 +97,8 @@ __device__ inline Place locate(i32 voxel, i32 scale) {
     const i32 RIM = 1 << 20;
     i32 place = smallest(largest(voxel, -RIM), RIM) * ONE;
     // Rounded down.
-    i32 cell = place / scale - (place % scale < 0);
+    i32 cell = place / scale;
+    if (place < cell * scale) cell--;
     float t = (float)(place - cell * scale) / (float)scale;
     return {cell, t * t * (3.0f - 2.0f * t)};
 }
@@ -137,9 +138,12 @@ __device__ inline Noise hash_noise(const Tool& tool, const i32* low, float* poin
     }
     noise.row = count[0];
     noise.area = count[0] * count[1];
+    // Divisions of small integers by floats: half of one is much more than what those may be wrong.
+    float by_row = 1.0f / (float)noise.row, by_area = 1.0f / (float)noise.area;
     u64 seed = mix(tool.seed);
     for (i32 i = threadIdx.x; i < noise.area * count[2]; i += THREADS) {
-        i32 x = i % noise.row, y = i / noise.row % count[1], z = i / noise.area;
+        i32 z = (i32)(((float)i + 0.5f) * by_area), in_area = i - z * noise.area;
+        i32 y = (i32)(((float)in_area + 0.5f) * by_row), x = in_area - y * noise.row;
         points[i] = noise_point(first[0] + x, first[1] + y, first[2] + z, seed);
     }
     return noise;
@@ -169,11 +173,11 @@ __device__ inline i32 round_distance(float distance) {
     return __float_as_int(near + SHIFT) - __float_as_int(SHIFT);
 }
 
-// Voxels from a shape's origin; they stop where no distance shows the difference.
+// Voxels from a shape's origin; they stop where no distance shows the difference. Both are less than 2^24, as the sample is
+// in the shape's reach.
 __device__ inline i32 voxels_from(i32 voxel, i32 home) {
-    const i64 FARTHEST = 65000;
-    i64 voxels = (i64)voxel - home;
-    return (i32)(voxels < -FARTHEST ? -FARTHEST : voxels > FARTHEST ? FARTHEST : voxels);
+    const i32 FARTHEST = 65000;
+    return smallest(largest(voxel - home, -FARTHEST), FARTHEST);
 }
 
 // From the shape's origin to the sample `offset` from a brick's lowest sample `low`. Rows along x begin at `low`, and only
