@@ -1,8 +1,8 @@
 // Applies edits to one brick, as volume/workpiece.rs does.
 //
-// A thread owns four samples of one column, two layers apart, from the first edit to the last, so edits wait for each
-// other only to be entered: which samples they changed, as bits, and how many voxels of which material. That is kept
-// twice, so that two warps write down one edit while all go on with the next.
+// A thread owns four samples of one column, two layers apart, from the first edit to the last. Two warps write down what an
+// edit did: which samples it changed, as bits, and how many voxels of which material. What is far from a shape, and samples
+// that no distance could change, are told apart first: digging has a brush dig through much air.
 #pragma once
 
 #include "shapes.cuh"
@@ -21,7 +21,7 @@ struct Effect {
 
 struct Workbench {
     Brick brick;
-    Effect effects[2];
+    Effect effect;
     // Of the edit at hand, if it is rough.
     float noise[MOST_POINTS];
     // Samples that any edit changed.
@@ -192,7 +192,7 @@ __device__ inline void take(const Brick* base, bool has_materials, Brick& brick)
 // Takes the brick to the bench. For the whole block.
 __device__ inline void begin(Workbench& bench, const Brick* base, bool had_materials) {
     take(base, had_materials, bench.brick);
-    for (i32 i = threadIdx.x; i < 512; i += THREADS) bench.effects[i / 256].counts[i % 256] = 0;
+    for (i32 i = threadIdx.x; i < 256; i += THREADS) bench.effect.counts[i] = 0;
     if (threadIdx.x == 0) {
         bench.hash = 0;
         bench.flags = 0;
@@ -208,20 +208,30 @@ __device__ inline bool may_change(const Tool& tool, const i32* low) {
     return is_reached && !is_out_of_reach(tool, low);
 }
 
-__device__ inline bool reaches(const Tool& tool, const i32* low, const i32* offset) {
-    bool is_inside = true;
-    for (i32 axis = 0; axis < 3; axis++) {
-        i32 at = low[axis] + offset[axis];
-        is_inside &= tool.min[axis] <= at && at <= tool.max[axis];
-    }
-    return is_inside;
+// Is a sample so far in the air, or in the solid, that the operation leaves it as it is, whatever its distance?
+__device__ inline bool is_settled(u32 operation, i32 density) {
+    if (operation == DIG) return density >= DEPTH;
+    return operation == ADD ? density <= -DEPTH : density >= 0;
 }
 
-// Applies one edit to the thread's samples; returns which of them changed, a bit for each. `has_materials` is set where
+// Which of the thread's samples an edit may change, a bit for each.
+__device__ inline u32 open_samples(const Tool& tool, const OwnColumn& column, const Brick& brick) {
+    i32 x = column.low[0] + column.x, z = column.low[2] + column.z;
+    if (x < tool.min[0] || x > tool.max[0] || z < tool.min[2] || z > tool.max[2]) return 0;
+    u32 open = 0;
+    for (i32 k = 0; k < OWN; k++) {
+        i32 y = column.low[1] + own_y(column, k), raw = brick.samples[own_index(k)];
+        i32 density = raw == PRISTINE ? pristine_distance(column, k) : raw;
+        bool is_open = tool.min[1] <= y && y <= tool.max[1] && !is_settled(tool.operation, density);
+        open |= (u32)is_open << k;
+    }
+    return open;
+}
+
+// Applies one edit to the thread's open samples; returns which of them changed, a bit for each. `has_materials` is set where
 // a material was stored.
 __device__ inline u32 apply(
-    const Tool& tool, const OwnColumn& column, const Noise& noise, Workbench& bench, Effect& effect,
-    bool& has_materials
+    const Tool& tool, const OwnColumn& column, u32 open, const Noise& noise, Workbench& bench, bool& has_materials
 ) {
     Brick& brick = bench.brick;
     Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
@@ -230,10 +240,10 @@ __device__ inline u32 apply(
 #pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         i32 index = own_index(k), y = own_y(column, k);
-        i32 offset[3] = {column.x, y, column.z};
         Place along_y = place_of(noise, 1, y);
         Outcome outcome = {false, NONE};
-        if (reaches(tool, column.low, offset)) {
+        if (open >> k & 1) {
+            i32 offset[3] = {column.x, y, column.z};
             float distance = smooth_distance(tool, from_origin(tool, column.low, offset));
             if (tool.is_rough) distance += bumps(tool, noise, bench.noise, along_x, along_y, along_z);
             i32 outside = round_distance(distance), pristine = pristine_distance(column, k);
@@ -244,8 +254,8 @@ __device__ inline u32 apply(
             has_materials |= material != GROUND;
         }
         changed |= (u32)outcome.is_changed << k;
-        store_bits(effect.changed, k, outcome.is_changed);
-        count_voxels(effect.counts, outcome.counted);
+        store_bits(bench.effect.changed, k, outcome.is_changed);
+        count_voxels(bench.effect.counts, outcome.counted);
     }
     return changed;
 }
@@ -357,8 +367,8 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
         stack.heights[window],
         stack.columns[window],
     };
-    u32 changed = 0, turn = 0;
-    bool has_materials = had_materials, is_taken = false;
+    u32 changed = 0;
+    bool has_materials = had_materials, is_taken = false, is_changed = false;
     for (u32 start = 0; start < job.count; start += 32) {
         // Each lane looks at one edit; the warps all look at the same ones.
         u32 number = start + lane() < job.count ? params.list[job.first + start + lane()] : NONE;
@@ -366,23 +376,25 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
         for (; reaching != 0; reaching &= reaching - 1) {
             u32 edit = __shfl_sync(WARP, number, __ffs(reaching) - 1);
             const Tool& tool = params.tools[edit];
-            Noise noise = {{0, 0.0f}, 0, 0};
-            if (tool.is_rough) noise = hash_noise(tool, column.low, bench.noise);
             if (!is_taken) begin(bench, base, had_materials);
-            if (tool.is_rough || !is_taken) __syncthreads();
             is_taken = true;
-            Effect& effect = bench.effects[turn & 1];
-            u32 own = apply(tool, column, noise, bench, effect, has_materials);
+            u32 open = open_samples(tool, column, bench.brick);
+            if (!__syncthreads_or(open != 0)) continue;
+            Noise noise = {{0, 0.0f}, 0, 0};
+            if (tool.is_rough) {
+                noise = hash_noise(tool, column.low, bench.noise);
+                __syncthreads();
+            }
+            u32 own = apply(tool, column, open, noise, bench, has_materials);
             changed |= own;
             if (!__syncthreads_or(own != 0)) continue;
-            // While these two warps enter what was done, nobody can get past the next edit, which takes the other place.
-            if (warp() == 0) enter_parts(params, job.cuts, edit, effect.changed);
-            if (warp() == 1) enter_counts(params, edit, tool.operation, effect.counts);
-            turn++;
+            is_changed = true;
+            // Nobody begins with the next edit before these two warps are done.
+            if (warp() == 0) enter_parts(params, job.cuts, edit, bench.effect.changed);
+            if (warp() == 1) enter_counts(params, edit, tool.operation, bench.effect.counts);
         }
     }
-    // Whoever entered an edit since then did not change the brick.
-    if (turn == 0) {
+    if (!is_changed) {
         if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, NONE, NONE, 0, 0, 0};
         return;
     }

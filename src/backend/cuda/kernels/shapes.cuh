@@ -191,11 +191,13 @@ __device__ inline Vector from_origin(const Tool& tool, const i32* low, const i32
 }
 
 // Is every sample of the brick too far outside the shape to change? Not sure means no. As `Evaluator::is_out_of_reach`:
-// from the sample in the middle none is farther than half of the diagonal.
+// no sample is farther from the brick's middle than half of the diagonal.
 __device__ inline bool is_out_of_reach(const Tool& tool, const i32* low) {
-    // 4 voxels times the root of 3, rounded up.
-    const i32 DIAGONAL = 1774, MIDDLE[3] = {SIDE / 2, SIDE / 2, SIDE / 2};
-    i32 distance = round_distance(smooth_distance(tool, from_origin(tool, low, MIDDLE)));
+    // 3.5 voxels along each axis, which times the root of 3 is less than this.
+    const float HALF = 3.5f * (float)ONE;
+    const i32 DIAGONAL = 1553, LOWEST[3] = {0, 0, 0};
+    Vector p = from_origin(tool, low, LOWEST);
+    i32 distance = round_distance(smooth_distance(tool, {p.x + HALF, p.y + HALF, p.z + HALF}));
     // What rounding to floats may have cost, generously.
     i32 rounding = 16 + (distance >> 14), amplitude = tool.is_rough ? tool.amplitude : 0;
     return distance - rounding > BAND + amplitude + DIAGONAL;
