@@ -1,8 +1,8 @@
 // Applies edits to one brick, as volume/workpiece.rs does.
 //
-// A thread owns four samples of one column, two layers apart, from the first edit to the last. Two warps write down what an
-// edit did: which samples it changed, as bits, and how many voxels of which material. What is far from a shape, and samples
-// that no distance could change, are told apart first: digging has a brush dig through much air.
+// A thread owns four samples of one column, two layers apart, from the first edit to the last. Before distances are
+// computed, bricks too far from the shape are sorted out, and samples that no distance changes: much of what brushes reach
+// is air. Two warps enter what an edit did: which samples changed, as bits, and how many voxels of which material.
 #pragma once
 
 #include "shapes.cuh"
@@ -228,8 +228,8 @@ __device__ inline u32 open_samples(const Tool& tool, const OwnColumn& column, co
     return open;
 }
 
-// Applies one edit to the thread's open samples; returns which of them changed, a bit for each. `has_materials` is set where
-// a material was stored.
+// Applies one edit to the thread's open samples; returns which of them changed, a bit for each. `has_materials` is set
+// where a material was stored.
 __device__ inline u32 apply(
     const Tool& tool, const OwnColumn& column, u32 open, const Noise& noise, Workbench& bench, bool& has_materials
 ) {

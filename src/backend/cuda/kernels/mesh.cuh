@@ -4,13 +4,13 @@
 // layer y: a few operations on them tell the cubes to draw, and the lattice edges with a vertex. Most bricks are done
 // then. For the others:
 //
-//   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges; the
-//      bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
+//   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges;
+//      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
 //   2. Samples are copied out of 27 bricks, only the layers that those edges look at.
 //      Meanwhile one warp lists the cubes and their triangles, and reserves room for the output.
 //   3. Edges are listed.
-//   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or 32 triangles, which look up the
-//      numbers of their vertices by lattice edge.
+//   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or 32 triangles, which look up
+//      the numbers of their vertices by lattice edge.
 //
 // Edges are called by their place, as in surface/block.rs: 81 level + corner, where level = 9 axis + y and corner = 9 z + x.
 #pragma once
@@ -162,22 +162,18 @@ __device__ inline void list_edges(MeshBench& bench, u32 edges) {
     }
 }
 
-// Lists the cubes to draw; returns how many there are. For one warp.
+// Lists the places of the cubes to draw; returns how many there are. For one warp.
 __device__ inline u32 list_cubes(MeshBench& bench) {
     // The lower half of a layer's cells, and the upper half.
     u32 corners[2] = {lane() / SIDE * 9 + lane() % SIDE, (lane() / SIDE + 4) * 9 + lane() % SIDE};
     u32 drawn[2] = {bench.drawn[MARGIN + corners[0]], bench.drawn[MARGIN + corners[1]]};
     u32 cubes = 0;
     for (u32 y = 0; y < SIDE; y++) {
-        if (!(bench.layers >> y & 1)) continue;
 #pragma unroll
         for (i32 half = 0; half < 2; half++) {
             bool is_drawn = drawn[half] >> y & 1;
             u32 word = __ballot_sync(WARP, is_drawn);
-            if (is_drawn) {
-                u32 kind = cube_case(bench.solid + MARGIN + corners[half], y);
-                bench.cubes[cubes + __popc(word & lanes_before())] = (y * CORNERS + corners[half]) | kind << PLACE_BITS;
-            }
+            if (is_drawn) bench.cubes[cubes + __popc(word & lanes_before())] = y * CORNERS + corners[half];
             cubes += __popc(word);
         }
     }
@@ -185,14 +181,20 @@ __device__ inline u32 list_cubes(MeshBench& bench) {
     return cubes;
 }
 
-// Lists the triangles of the cubes; returns how many there are. For one warp.
+// Adds the cases of the cubes to their places, and lists their triangles; returns how many there are. For one warp.
 __device__ inline u32 list_triangles(const MeshParams& params, MeshBench& bench, u32 cubes) {
     u32 triangles = 0;
     for (u32 base = 0; base < cubes; base += 32) {
-        u32 cube = base + lane();
-        u32 count = cube < cubes ? triangles_of(params, bench.cubes[cube] >> PLACE_BITS) : 0;
+        u32 cube = base + lane(), count = 0;
+        if (cube < cubes) {
+            u32 place = bench.cubes[cube], kind = cube_case(bench.solid + MARGIN + place % CORNERS, place / CORNERS);
+            bench.cubes[cube] = place | kind << PLACE_BITS;
+            count = triangles_of(params, kind);
+        }
         u32 end = running_sum(count), first = triangles + end - count;
-        for (u32 number = 0; number < count; number++) bench.triangles[first + number] = (u16)(cube | number << CUBE_BITS);
+        for (u32 number = 0; number < count; number++) {
+            bench.triangles[first + number] = (u16)(cube | number << CUBE_BITS);
+        }
         triangles += __shfl_sync(WARP, end, 31);
     }
     return triangles;
@@ -301,8 +303,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
         return;
     }
 
-    // Three warps turn edges to words, and copy samples to the apron. The fourth lists triangles, and reserves room; while it
-    // waits for that, edges are listed.
+    // Three warps turn edges to words, and copy samples to the apron. The fourth lists triangles, and reserves room; while
+    // it waits for that, edges are listed.
     u32 edges = 0, vertices = 0, triangles = 0;
     u64 reserved = 0;
     if (warp() < CORNER_WARPS) {

@@ -113,8 +113,8 @@ __device__ inline float noise_point(i32 x, i32 y, i32 z, u64 seed) {
 // eight cells at most, between nine noise points: they are hashed once, for all samples.
 constexpr i32 MOST_POINTS = 9 * 9 * 9;
 
-// Where samples of a brick are among the noise points: a lane of each warp knows it for one coordinate, lanes 0 to 7 along
-// x, then along y, then along z.
+// Where samples of a brick are among the noise points: a lane of each warp knows it for one coordinate, lanes 0 to 7
+// along x, then along y, then along z.
 struct Noise {
     Place own;
     // From a point to the next along y, and along z.
@@ -123,8 +123,8 @@ struct Noise {
 
 __device__ inline i32 noise_lane(i32 axis, i32 offset) { return axis * SIDE + offset; }
 
-// Hashes the noise points around the brick whose lowest sample is `low`. For the whole block, which waits for itself before
-// it looks at them.
+// Hashes the noise points around the brick whose lowest sample is `low`. For the whole block, which waits for itself
+// before it looks at them.
 __device__ inline Noise hash_noise(const Tool& tool, const i32* low, float* points) {
     i32 axis = lane() / SIDE, start = axis == 0 ? low[0] : axis == 1 ? low[1] : low[2];
     Noise noise = {locate(start + (i32)lane() % SIDE, tool.scale), 0, 0};
@@ -173,8 +173,8 @@ __device__ inline i32 round_distance(float distance) {
     return __float_as_int(near + SHIFT) - __float_as_int(SHIFT);
 }
 
-// Voxels from a shape's origin; they stop where no distance shows the difference. Both are less than 2^24, as the sample is
-// in the shape's reach.
+// Voxels from a shape's origin; they stop where no distance shows the difference. Both are less than 2^24, as the sample
+// is in the shape's reach.
 __device__ inline i32 voxels_from(i32 voxel, i32 home) {
     const i32 FARTHEST = 65000;
     return smallest(largest(voxel - home, -FARTHEST), FARTHEST);

@@ -23,7 +23,7 @@ struct MeshBench {
     u32 refs[27];
     i32 heights[AREA];
     union alignas(8) {
-        // Rows of the eight bricks that hold corners: the solid samples in the low byte, the edited ones in the high one.
+        // Rows of the eight bricks that hold corners: solid samples in the low byte, edited ones in the high one.
         u16 rows[8][SIDE * SIDE];
         // They are not needed any more when this is filled.
         Marked apron[WINDOW * AREA];

@@ -23,8 +23,8 @@ __device__ inline u32 running_sum(u32 value) {
     return value;
 }
 
-// Turns 32 words of 32 bits around: bit i of lane k becomes bit k of lane i. Swaps halves of the words, then quarters, and so
-// on to single bits.
+// Turns 32 words of 32 bits around: bit i of lane k becomes bit k of lane i. Swaps halves of the words, then quarters, and
+// so on to single bits.
 __device__ inline u32 transpose(u32 bits) {
     u32 low = 0xffff;
 #pragma unroll
