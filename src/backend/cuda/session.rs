@@ -10,10 +10,12 @@ use super::layout::{self, BRICK_BYTES, RECORD_BYTES, ScatterJob, ScatterParams, 
 use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
 use super::slots::{Slots, reference};
+use crate::backend::choice::Load;
 use crate::ground::Ground;
+use crate::lattice::BrickPos;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
-use crate::volume::{Brick, EditWork};
+use crate::volume::{Brick, EditWork, Job, SampleView};
 
 /// A device that works for terrains.
 pub(super) struct Session {
@@ -146,22 +148,34 @@ impl Session {
         self.device.name()
     }
 
-    /// How many of the bricks that edits apply to are not on the device, roughly.
-    pub fn missing_for_edits(&self, work: &EditWork) -> usize {
-        self.missing(work.jobs().len(), |at| work.base.brick(work.jobs()[at].pos()))
+    /// What there is to do for edits.
+    pub fn load_of_edits(&self, work: &EditWork) -> Load {
+        let jobs = work.jobs();
+        let is_rough = |job: &&Job| work.tools[job.edit as usize].evaluator.is_rough();
+        Load {
+            amount: jobs.len(),
+            rough: jobs.iter().filter(is_rough).count(),
+            missing: self.missing(work.base, jobs.len(), |at| jobs[at].pos()),
+        }
     }
 
-    /// How many of the bricks of blocks are not on the device, roughly.
-    pub fn missing_for_mesh(&self, view: &WorldView, blocks: &[Block]) -> usize {
-        self.missing(blocks.len(), |at| view.samples.brick(blocks[at].brick))
+    /// What there is to do for blocks.
+    pub fn load_of_mesh(&self, view: &WorldView, blocks: &[Block]) -> Load {
+        let missing = self.missing(view.samples, blocks.len(), |at| blocks[at].brick);
+        Load { amount: blocks.len(), rough: 0, missing }
     }
 
-    /// How many of so many bricks are not here, judged by some of them.
-    fn missing<'a>(&self, count: usize, brick: impl Fn(usize) -> Option<&'a Brick>) -> usize {
+    /// How many of so many bricks are not here, with the stacks that they belong to; judged by some of them.
+    fn missing(&self, view: SampleView, count: usize, pos: impl Fn(usize) -> BrickPos) -> usize {
         let step = count.div_ceil(LOOKS).max(1);
-        let is_missing =
-            |at: &usize| brick(*at).is_some_and(|brick| self.bricks.find(brick.tag.get()).is_none());
-        (0..count).step_by(step).filter(is_missing).count() * step
+        let mut missing = 0;
+        for at in (0..count).step_by(step) {
+            let pos = pos(at);
+            let is_here = |brick: &Brick| self.bricks.find(brick.tag.get()).is_some();
+            missing += usize::from(view.brick(pos).is_some_and(|brick| !is_here(brick)));
+            missing += usize::from(self.stacks.find(view.ground(), (pos.0.x, pos.0.z)).is_none());
+        }
+        missing * step
     }
 
     /// Begins a launch: what it finds or takes stays where it is until the next one.

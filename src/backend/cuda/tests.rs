@@ -3,6 +3,7 @@
 //! A card is used where there is one, else the emulator. `BURROW_WORLDS` says how many random worlds.
 
 use std::sync::Mutex;
+use std::time::Duration;
 
 use fastrand::Rng;
 
