@@ -139,7 +139,8 @@ impl Mesher {
         // The apron starts one before the cells; the gradients at the corners beyond them look one further. So a layer
         // shows in the cells of the three below it and of its own.
         let rows = (bottom..=top + 3).map(|layer| {
-            let cells = drawn[layer.saturating_sub(3)..=layer.min(7)].iter().fold(0, |all, cells| all | cells);
+            let cells =
+                drawn[layer.saturating_sub(3)..=layer.min(7)].iter().fold(0, |all, cells| all | cells);
             let (near, far) = (cells.trailing_zeros() / Z, cells.checked_ilog2().unwrap_or(0) / Z);
             if cells == 0 { 0..0 } else { near as usize..far as usize + 4 }
         });
