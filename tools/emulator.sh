@@ -8,9 +8,15 @@
 set -eu
 cd "$(dirname "$0")/.."
 
+if [ "$(uname -s)" != Linux ]; then
+    echo 'tools/emulator.sh: the emulator is for Linux' >&2
+    exit 2
+fi
 folder=${1:-${CARGO_TARGET_DIR:-$HOME/.cache/bevy_burrow/target}/emulator}
-sources="tools/emulator.sh tools/emulator/emulator.h tools/emulator/emulator.cpp src/backend/cuda/kernels.cu"
-program=$folder/burrow-emulator
+sources="tools/emulator.sh tools/emulator/emulator.h tools/emulator/emulator.cpp src/backend/cuda/kernels.cu
+    src/backend/cuda/kernels/*.cuh"
+mkdir -p "$folder"
+program=$(cd "$folder" && pwd)/burrow-emulator
 # As on the device: no operation is fused. Words are read as halves, and the other way round.
 flags='-std=c++17 -O2 -g -ffp-contract=off -fno-strict-aliasing -U_FORTIFY_SOURCE
     -Wall -Wextra -Wno-sign-compare -Wno-parentheses -Wno-unknown-pragmas'
@@ -37,7 +43,6 @@ if ! is_fresh; then
         echo 'tools/emulator.sh: there is no C++ compiler; install g++, or set CXX' >&2
         exit 2
     fi
-    mkdir -p "$folder"
     # Put in place at once: several tests may build it together.
     # shellcheck disable=SC2086 # flags are words
     "$compiler" $flags tools/emulator/emulator.cpp -o "$program.$$"

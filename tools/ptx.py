@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compiles src/backend/cuda/kernels.cu to the PTX that the crate embeds. Needs no GPU.
+"""Compiles src/backend/cuda/kernels.cu, with what it includes, to the PTX that the crate embeds. Needs no GPU.
 
     tools/ptx.py            writes src/backend/cuda/kernels.ptx
     tools/ptx.py --check    compares instead, and fails where they differ
@@ -54,8 +54,8 @@ def compiler():
         fail(f"NVRTC does not run on this machine: {error}")
 
 
-def compiled(source):
-    """The source as PTX."""
+def compiled():
+    """The sources as PTX."""
     nvrtc = compiler()
     nvrtc.nvrtcGetErrorString.restype = ctypes.c_char_p
 
@@ -71,10 +71,17 @@ def compiled(source):
         call(f"nvrtcGet{kind}", program, buffer)
         return buffer.value.decode()
 
-    program = ctypes.c_void_p()
-    # The name goes into the PTX: no path of this machine.
-    call("nvrtcCreateProgram", ctypes.byref(program), source.encode(), b"kernels.cu", 0, None, None)
-    options = (ctypes.c_char_p * len(OPTIONS))(*(option.encode() for option in OPTIONS))
+    def strings(values):
+        return (ctypes.c_char_p * len(values))(*(value.encode() for value in values))
+
+    # By the names that sources include them by, so that no path of this machine goes into the PTX.
+    headers = {}
+    for path in sorted((FOLDER / "kernels").glob("*.cuh")):
+        headers[path.name] = headers[f"kernels/{path.name}"] = path.read_text()
+    texts, names = strings(list(headers.values())), strings(list(headers))
+    program, source = ctypes.c_void_p(), (FOLDER / "kernels.cu").read_text()
+    call("nvrtcCreateProgram", ctypes.byref(program), source.encode(), b"kernels.cu", len(headers), texts, names)
+    options = strings(OPTIONS)
     code = nvrtc.nvrtcCompileProgram(program, len(OPTIONS), options)
     log = text("ProgramLog").strip()
     if log:
@@ -89,7 +96,7 @@ def main():
     parser.add_argument("--check", action="store_true", help="compare instead of writing")
     check = parser.parse_args().check
     target = FOLDER / "kernels.ptx"
-    fresh = compiled((FOLDER / "kernels.cu").read_text())
+    fresh = compiled()
     if not check:
         target.write_text(fresh)
         return

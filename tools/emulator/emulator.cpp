@@ -81,7 +81,7 @@ void fail(const char* why) {
 // ---- Changing from one fiber to another. Jumps are many times faster than swapcontext, which calls the kernel; the
 // sanitizer wants to be told, and takes no jumps between stacks. ----
 
-static void leave(State state) {
+__attribute__((noinline)) static void leave(State state) {
     Fiber& fiber = fibers[running];
     fiber.state = state;
 #ifdef BURROW_SANITIZE
@@ -101,7 +101,7 @@ static void begin() {
     leave(State::DONE);
 }
 
-static void resume(int number) {
+__attribute__((noinline)) static void resume(int number) {
     Fiber& fiber = fibers[number];
     running = number;
     threadIdx = {(unsigned)number, 0, 0};

@@ -24,7 +24,7 @@ pub(super) struct EditOutput {
 }
 
 /// How many entries of each list the kernel wanted to write.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Totals {
     records: usize,
     materials: usize,
@@ -48,19 +48,21 @@ impl EditOutput {
     }
 
     /// Room for all that; says whether there was too little.
-    fn reserve(&mut self, device: &mut dyn Device, totals: Totals) -> Result<bool, Fault> {
-        let mut grown = self.records.reserve(device, totals.records)?;
-        grown |= self.materials.reserve(device, totals.materials)?;
-        grown |= self.parts.reserve(device, totals.parts)?;
-        grown |= self.counts.reserve(device, totals.counts)?;
+    fn reserve(&mut self, device: &mut dyn Device, totals: Totals, is_long: bool) -> Result<bool, Fault> {
+        let mut grown = self.records.reserve(device, totals.records, is_long)?;
+        grown |= self.materials.reserve(device, totals.materials, is_long)?;
+        grown |= self.parts.reserve(device, totals.parts, is_long)?;
+        grown |= self.counts.reserve(device, totals.counts, is_long)?;
         Ok(grown)
     }
 
+    /// Copies what is not here yet.
     fn fetch(&mut self, device: &mut dyn Device, totals: Totals) -> Result<(), Fault> {
-        self.records.fetch(device, totals.records)?;
-        self.materials.fetch(device, totals.materials)?;
-        self.parts.fetch(device, totals.parts)?;
-        self.counts.fetch(device, totals.counts)
+        let mut is_copied = self.records.fetch(device, totals.records)?;
+        is_copied |= self.materials.fetch(device, totals.materials)?;
+        is_copied |= self.parts.fetch(device, totals.parts)?;
+        is_copied |= self.counts.fetch(device, totals.counts)?;
+        if is_copied { device.wait() } else { Ok(()) }
     }
 
     fn totals(&self) -> Totals {
@@ -73,6 +75,9 @@ impl EditOutput {
 
 /// From how many bricks on they are dealt with side by side.
 const LONG: usize = 64;
+
+/// From how many bricks on they are copied, instead of written to the host's memory by the kernel.
+const COPIED: usize = 256;
 
 /// Bricks that one thread makes of what came back.
 const GROUP: usize = 64;
@@ -123,7 +128,9 @@ impl Session {
         let tools: Vec<layout::Tool> = work.tools.iter().map(tool).collect();
         self.inbox.put(tool_list, &tools);
         self.inbox.entries::<u32>(counters).fill(0);
-        self.edits.results.reserve(&mut *self.device, jobs.len())?;
+        let is_long = jobs.len() >= COPIED;
+        self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
+        self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
 
         for _ in 0..2 {
             self.send(&plan, uploads)?;
@@ -150,9 +157,8 @@ impl Session {
             self.device.wait()?;
             self.times = self.device.times();
             let totals = self.edits.totals();
-            if !self.edits.reserve(&mut *self.device, totals)? {
+            if !self.edits.reserve(&mut *self.device, totals, is_long)? {
                 self.edits.fetch(&mut *self.device, totals)?;
-                self.device.wait()?;
                 self.free_targets(targets);
                 return Ok(self.edits.ledgers(work, bricks, targets, totals));
             }

@@ -25,8 +25,8 @@ pub(crate) const THREADS: u32 = 128;
 /// Most jobs of one launch. Each block may ask for 7680 indices, and counters have 32 bits.
 pub(crate) const MOST_JOBS: usize = 1 << 19;
 
-/// Most tools that all jobs of an `edit` launch may have together: each may enter 512 counts.
-pub(crate) const MOST_LIST: usize = 1 << 22;
+/// Most numbers in the `list` of one `edit` launch. Each may enter 256 counts and 8 parts.
+pub(crate) const MOST_LIST: usize = 1 << 23;
 
 /// Bytes of a brick's slot: a record, then materials.
 pub(crate) const BRICK_BYTES: usize = RECORD_BYTES + MATERIAL_BYTES;
@@ -431,4 +431,53 @@ pub(crate) fn single_mix(ground: &Ground) -> SingleMix {
 /// `729 axis + 81 y + 9 z + x`; the last number is how many there are.
 pub(crate) fn table() -> [[u16; 16]; 256] {
     block::slot_table()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fastrand::Rng;
+
+    #[test]
+    fn boxes_go_through_a_word() {
+        let from = IVec3::new(-8, 16, -24);
+        let whole = LatticeBox { min: from, max: from + 7 };
+        for min in whole.points() {
+            let cells = LatticeBox { min, max: min.max(from + IVec3::new(7, 3, 5)) };
+            assert_eq!(unpack_box(pack_box(cells, from), from), cells);
+        }
+    }
+
+    #[test]
+    fn bricks_go_through_a_record() {
+        let mut rng = Rng::with_seed(3);
+        let mut brick = Brick::of_edited(&std::array::from_fn(|_| rng.i16(..)));
+        let mut bytes = [7; BRICK_BYTES];
+        for _ in 0..2 {
+            brick_record(&brick, &mut bytes);
+            let materials = brick.materials().map(|_| &bytes[RECORD_BYTES..]);
+            let found = brick_of(&bytes, materials).expect("all bytes are there");
+            assert_eq!(found.samples(), brick.samples());
+            assert_eq!((found.solid(), found.edited()), (brick.solid(), brick.edited()));
+            assert_eq!(found.materials(), brick.materials());
+            brick.set_material(300, MaterialId(9));
+        }
+        assert_eq!(bytes[RECORD_BYTES + 299..][..3], [255, 9, 255]);
+        assert!(brick_of(&bytes[..RECORD_BYTES - 1], None).is_none());
+    }
+
+    #[test]
+    fn every_sample_is_in_the_part_of_its_chunk() {
+        for (size, width, depth) in [(8, 24, 20), (25, 64, 75), (9, 8, 10), (100, 104, 116)] {
+            let grid = ChunkGrid::new(size, width, depth);
+            let world = LatticeBox { min: IVec3::new(0, -30, 0), max: IVec3::new(width, 30, depth) };
+            for point in world.points() {
+                let brick = BrickPos::of(point);
+                let (inside, cuts) = ((point & 7).to_array(), cuts(grid, brick));
+                let is_beyond = |axis: usize| inside[axis] >= (cuts >> (axis * 4) & 15) as i32;
+                let part = (0..3).fold(0, |part, axis| part | u32::from(is_beyond(axis)) << axis);
+                assert_eq!(part_chunk(grid, brick, part), grid.chunk_of(point), "{point}");
+            }
+        }
+    }
 }

@@ -81,20 +81,22 @@ impl Inbox {
     }
 }
 
-/// A list that kernels write: straight into the host's memory where the device can do that, else copied afterwards.
+/// A list that kernels write. Short ones go straight into the host's memory, where the device can do that; long ones into
+/// its own, and what is used of them is copied afterwards.
 pub(super) struct Outbox {
-    host: Box<dyn HostMemory>,
-    device: Option<u64>,
     entry: usize,
+    host: Box<dyn HostMemory>,
     capacity: usize,
+    /// Address, and how many entries there is room for; none at first.
+    own: Option<(u64, usize)>,
+    is_long: bool,
 }
 
 impl Outbox {
-    /// A list of entries of so many bytes.
+    /// A list of entries of so many bytes, with room for some.
     pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
         let host = device.alloc_host(entry * capacity)?;
-        let address = if host.address().is_some() { None } else { Some(device.alloc(entry * capacity)?) };
-        Ok(Self { host, device: address, entry, capacity })
+        Ok(Self { entry, host, capacity, own: None, is_long: false })
     }
 
     /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
@@ -102,35 +104,48 @@ impl Outbox {
         device.download(from, &mut *self.host, 0..entries * self.entry)
     }
 
-    /// How many entries it holds.
+    /// How many entries kernels may write.
     pub fn capacity(&self) -> u32 {
-        self.capacity as u32
+        let own = self.own.map_or(0, |(_, capacity)| capacity);
+        (if self.is_own() { own } else { self.capacity }) as u32
     }
 
-    /// Room for so many entries; says whether there was too little. What was in it is gone then.
-    pub fn reserve(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
-        if entries <= self.capacity {
-            return Ok(false);
+    /// Is it written on the device?
+    fn is_own(&self) -> bool {
+        self.is_long || self.host.address().is_none()
+    }
+
+    /// Room for so many entries, of a list that will be long or not; says whether there was too little. What was in it is
+    /// gone then.
+    pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
+        self.is_long = is_long;
+        let is_short = entries > self.capacity() as usize;
+        if entries > self.capacity {
+            let room = entries + entries / 4;
+            (self.host, self.capacity) = (device.alloc_host(room * self.entry)?, room);
         }
-        let new = Self::new(device, self.entry, entries + entries / 4)?;
-        if let Some(address) = std::mem::replace(self, new).device {
-            device.free(address);
+        if self.is_own() && (is_short || self.own.is_none()) {
+            if let Some((address, _)) = self.own.take() {
+                device.free(address);
+            }
+            self.own = Some((device.alloc(self.capacity * self.entry)?, self.capacity));
         }
-        Ok(true)
+        Ok(is_short)
     }
 
     /// Where kernels write.
     pub fn address(&self) -> u64 {
-        self.device.or(self.host.address()).unwrap_or_default()
+        let own = self.own.map(|(address, _)| address);
+        (if self.is_own() { own } else { self.host.address() }).unwrap_or_default()
     }
 
-    /// Sees to it that so many entries are here after the next [`Device::wait`].
-    pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<(), Fault> {
-        match self.device {
-            Some(address) if entries > 0 => {
-                device.download(address, &mut *self.host, 0..entries * self.entry)
+    /// Sees to it that so many entries are here after the next [`Device::wait`]; says whether that has to be.
+    pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
+        match self.own {
+            Some((address, _)) if entries > 0 && self.is_own() => {
+                device.download(address, &mut *self.host, 0..entries * self.entry).map(|()| true)
             }
-            _ => Ok(()),
+            _ => Ok(false),
         }
     }
 

@@ -44,11 +44,13 @@ impl MeshOutput {
         &mut self,
         device: &mut dyn Device,
         (vertices, indices): (usize, usize),
+        is_long: bool,
     ) -> Result<bool, Fault> {
-        let mut grown = self.positions.reserve(device, vertices)?;
-        grown |= self.normals.reserve(device, vertices)?;
-        grown |= self.mixes.reserve(device, vertices)?;
-        grown |= self.indices.reserve(device, indices)?;
+        let mut grown = false;
+        for list in [&mut self.positions, &mut self.normals, &mut self.mixes] {
+            grown |= list.reserve(device, vertices, is_long)?;
+        }
+        grown |= self.indices.reserve(device, indices, is_long)?;
         Ok(grown)
     }
 
@@ -66,10 +68,11 @@ impl MeshOutput {
         (vertices, indices): (usize, usize),
         with_mixes: bool,
     ) -> Result<(), Fault> {
-        self.positions.fetch(device, vertices)?;
-        self.normals.fetch(device, vertices)?;
-        self.indices.fetch(device, indices)?;
-        if with_mixes { self.mixes.fetch(device, vertices) } else { Ok(()) }
+        let mut is_copied = self.positions.fetch(device, vertices)?;
+        is_copied |= self.normals.fetch(device, vertices)?;
+        is_copied |= self.indices.fetch(device, indices)?;
+        is_copied |= with_mixes && self.mixes.fetch(device, vertices)?;
+        if is_copied { device.wait() } else { Ok(()) }
     }
 
     fn vertex_capacity(&self) -> u32 {
@@ -79,6 +82,9 @@ impl MeshOutput {
 
 /// From how many things on they are dealt with side by side.
 const LONG: usize = 256;
+
+/// From how many blocks on their surfaces are copied, instead of written to the host's memory by the kernel.
+const COPIED: usize = 512;
 
 /// Blocks whose parts are put together by one thread.
 const GROUP: usize = 64;
@@ -128,7 +134,9 @@ impl Session {
         let job = |number: usize, block: &Block| mesh_job(view, &windows, number, block, numbers[number]);
         fill(blocks, self.inbox.entries(job_list), LONG, job);
         self.inbox.entries::<u32>(counters).fill(0);
-        self.meshes.results.reserve(&mut *self.device, blocks.len())?;
+        let is_long = blocks.len() >= COPIED;
+        self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
+        self.meshes.reserve(&mut *self.device, (0, 0), is_long)?;
 
         for _ in 0..2 {
             self.send(&plan, uploads)?;
@@ -157,9 +165,8 @@ impl Session {
             self.device.wait()?;
             self.times = self.device.times();
             let totals = self.meshes.totals(blocks.len());
-            if !self.meshes.reserve(&mut *self.device, totals)? {
+            if !self.meshes.reserve(&mut *self.device, totals, is_long)? {
                 self.meshes.fetch(&mut *self.device, totals, plain.is_none())?;
-                self.device.wait()?;
                 return Ok(self.meshes.parts(view, blocks, totals, plain));
             }
             // A second pass, with room for all.

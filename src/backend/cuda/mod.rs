@@ -29,9 +29,12 @@ mod windows;
 #[cfg(test)]
 mod emulator;
 #[cfg(test)]
+mod kernel_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -103,12 +106,16 @@ impl Cuda {
         };
         let (slot, state) = (Arc::clone(&own.slot), Arc::clone(&own.state));
         let open = move || {
-            let opened = device().and_then(|mut device| {
+            let open = || {
+                let mut device = device()?;
                 let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
                 let mut session = Session::new(device, budget)?;
                 let costs = trial::run(&mut session, sizes)?;
                 Ok((session, costs))
-            });
+            };
+            // A driver may do anything, and nobody else would hear of it.
+            let opened = catch_unwind(AssertUnwindSafe(open))
+                .unwrap_or_else(|_| Err(Fault::Failed("panic while it was opened".into())));
             match opened {
                 Ok((session, costs)) => {
                     let name = session.name();

@@ -16,10 +16,10 @@ use crate::terrain::Drawn;
 use crate::terrain::World;
 
 #[path = "../../../tests/worlds/mod.rs"]
-mod worlds;
+pub(super) mod worlds;
 
 /// A device to test, if there is any.
-fn device() -> Option<Box<dyn Device>> {
+pub(super) fn device() -> Option<Box<dyn Device>> {
     match Card::open() {
         Ok(card) => Some(Box::new(card)),
         Err(_) => Some(Box::new(Emulator::start()?)),

@@ -1,0 +1,67 @@
+// Lattice edges, and where the surface crosses them.
+#pragma once
+
+#include "shapes.cuh"
+#include "site.cuh"
+
+// A lattice edge with a vertex.
+struct Edge {
+    i32 axis;
+    // Its lower end, from the brick's lowest sample.
+    i32 x, y, z;
+    // The lower end's column in the window of columns, and how far the other end's is.
+    i32 window, next_window;
+};
+
+__device__ inline Edge edge_at(u32 place) {
+    i32 level = place / CORNERS, corner = place % CORNERS, axis = level / 9;
+    i32 x = corner % 9, z = corner / 9;
+    return {axis, x, level % 9, z, (z + 1) * WINDOW + x + 1, axis == 0 ? 1 : axis == 1 ? 0 : WINDOW};
+}
+
+// Where the surface crosses an edge between two densities, one of them negative: linear, to the nearest step of 1/4096,
+// halves up, and not at the ends.
+__device__ inline i32 linear_steps(i32 p, i32 q) {
+    // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, so the bias
+    // decides halves and nothing else.
+    const double SHIFT = 6755399441055744.0, BIAS = 1.0 / (1 << 28);
+    i32 from = p < 0 ? -p : p, sum = from + (q < 0 ? -q : q);
+    double share = (double)SNAP * (double)from / (double)sum;
+    i32 steps = __double2loint(share + BIAS + SHIFT);
+    return smallest(largest(steps, 1), SNAP - 1);
+}
+
+// What its samples say of an edge's crossing.
+struct Crossing {
+    // Steps of 1/4096 voxel from the lower end.
+    i32 step;
+    bool is_lower_solid;
+    // Is no end edited; no sample that the gradients at both ends look at?
+    bool is_pristine, is_stencil_pristine;
+    // The gradient there, towards the air.
+    Vector gradient;
+};
+
+__device__ inline Crossing crossing_on(const Marked* apron, const Edge& edge) {
+    const i32 STRIDES[3] = {1, AREA, WINDOW};
+    const Marked* p = apron + (edge.y + 1) * AREA + edge.window;
+    const Marked* q = p + (edge.axis == 0 ? 1 : edge.axis == 1 ? AREA : WINDOW);
+    Crossing crossing;
+    crossing.is_lower_solid = *p < 0;
+    crossing.is_pristine = !((*p | *q) & 1);
+    // A pristine vertical edge is crossed at the height itself, its upper end included.
+    bool is_exact = edge.axis == 1 && crossing.is_pristine;
+    crossing.step = is_exact ? -(*p >> 1) * (SNAP / ONE) : linear_steps(*p >> 1, *q >> 1);
+
+    float t = (float)crossing.step / (float)SNAP, components[3];
+    Marked stencil = *p | *q;
+#pragma unroll
+    for (i32 i = 0; i < 3; i++) {
+        Marked p0 = p[-STRIDES[i]], p1 = p[STRIDES[i]], q0 = q[-STRIDES[i]], q1 = q[STRIDES[i]];
+        stencil |= p0 | p1 | q0 | q1;
+        components[i] = lerp((float)((p1 >> 1) - (p0 >> 1)), (float)((q1 >> 1) - (q0 >> 1)), t);
+    }
+    crossing.is_stencil_pristine = !(stencil & 1);
+    crossing.gradient = {components[0], components[1], components[2]};
+    return crossing;
+}

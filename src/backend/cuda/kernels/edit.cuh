@@ -1,0 +1,366 @@
+// Applies edits to one brick, as volume/workpiece.rs does.
+//
+// A thread owns four samples of one column, two layers apart, from the first edit to the last, so edits wait for each
+// other only to be entered: which samples they changed, as bits, and how many voxels of which material. That is kept
+// twice, so that two warps write down one edit while all go on with the next.
+#pragma once
+
+#include "shapes.cuh"
+
+// How many samples a thread owns, and how many layers they are apart.
+constexpr i32 OWN = LEN / THREADS;
+constexpr i32 STEP = SIDE / OWN;
+
+// What one edit did.
+struct Effect {
+    // Samples that changed, like the bits of a brick.
+    u32 changed[16];
+    // Voxels of each material that were removed, added or painted, whichever the edit does.
+    u32 counts[256];
+};
+
+struct Workbench {
+    Brick brick;
+    Effect effects[2];
+    // Samples that any edit changed.
+    u32 changed[16];
+    u64 hash;
+    u32 flags;
+    u32 record, material;
+};
+
+// What a thread's samples have in common.
+struct OwnColumn {
+    // The brick's lowest sample.
+    i32 low[3];
+    i32 x, z;
+    // The lowest of its samples, counted from the brick's lowest.
+    i32 first_y;
+    i32 height;
+    u32 materials;
+};
+
+__device__ inline i32 own_index(i32 k) { return k * THREADS + threadIdx.x; }
+
+__device__ inline i32 own_y(const OwnColumn& column, i32 k) { return column.first_y + k * STEP; }
+
+__device__ inline i32 pristine_distance(const OwnColumn& column, i32 k) {
+    return (column.low[1] + own_y(column, k)) * ONE - column.height;
+}
+
+// Bits of the samples with a property, in order of the samples: each warp writes those of its own.
+__device__ inline void store_bits(u32* words, i32 k, bool is_set) {
+    u32 word = __ballot_sync(WARP, is_set);
+    if (lane() == 0) words[k * 4 + warp()] = word;
+}
+
+// The box around the samples of a mask and some layers: lo x|y<<3|z<<6 | hi x<<9|y<<12|z<<15; `NONE` where it is empty.
+__device__ inline u32 bounds_of(const u32* words, u64 mask, i32 first_y, i32 end_y) {
+    u64 all = 0;
+    i32 bottom = 0, top = 0;
+    for (i32 y = end_y - 1; y >= first_y; y--) {
+        u64 layer = ((u64)words[y * 2] | (u64)words[y * 2 + 1] << 32) & mask;
+        if (layer == 0) continue;
+        if (all == 0) top = y;
+        bottom = y;
+        all |= layer;
+    }
+    if (all == 0) return NONE;
+    u32 row = (u32)all | (u32)(all >> 32);
+    row |= row >> 16;
+    row = (row | row >> 8) & 0xff;
+    u32 low = (__ffs(row) - 1) | bottom << 3 | ((__ffsll(all) - 1) >> 3) << 6;
+    u32 high = (31 - __clz(row)) | top << 3 | ((63 - __clzll(all)) >> 3) << 6;
+    return low | high << 9;
+}
+
+// Of the samples along one side, those before the cut or those beyond it, as bits.
+__device__ inline u32 side_bits(u32 cut, bool is_beyond) {
+    u32 before = (1u << smallest(cut, SIDE)) - 1;
+    return is_beyond ? 0xff & ~before : before;
+}
+
+// The samples of one part of the brick.
+__device__ inline u32 part_bounds(const u32* changed, u32 cuts, u32 part) {
+    u64 rows = side_bits(cuts & 15, part & 1) * 0x0101010101010101ull;
+    u32 z = side_bits(cuts >> 8 & 15, part & 4), y = side_bits(cuts >> 4 & 15, part & 2);
+    if (y == 0 || z == 0) return NONE;
+    u64 level = 0;
+    for (i32 i = 0; i < SIDE; i++) level |= (u64)(z >> i & 1 ? 0xff : 0) << (i * 8);
+    return bounds_of(changed, rows & level, __ffs(y) - 1, 32 - __clz(y));
+}
+
+// Enters what an edit changed in each part of the brick. For one warp.
+__device__ void enter_parts(const EditParams& params, u32 cuts, u32 edit, const u32* changed) {
+    u32 bounds = lane() < 8 ? part_bounds(changed, cuts, lane()) : NONE;
+    u32 filled = __ballot_sync(WARP, bounds != NONE);
+    u32 first = 0;
+    if (lane() == 0) first = atomicAdd(&params.counters[2], __popc(filled));
+    u32 at = __shfl_sync(WARP, first, 0) + __popc(filled & lanes_before());
+    if (bounds != NONE && at < params.part_capacity) {
+        params.parts[at] = {blockIdx.x, edit, (u32)lane(), bounds};
+    }
+}
+
+// Enters how many voxels an edit dealt with, and clears the counts. For one warp.
+__device__ void enter_counts(const EditParams& params, u32 edit, u32 fate, u32* counts) {
+    for (u32 base = 0; base < 256; base += 32) {
+        u32 material = base + lane(), voxels = counts[material];
+        u32 filled = __ballot_sync(WARP, voxels != 0);
+        if (filled == 0) continue;
+        u32 first = 0;
+        if (lane() == 0) first = atomicAdd(&params.counters[3], __popc(filled));
+        u32 at = __shfl_sync(WARP, first, 0) + __popc(filled & lanes_before());
+        if (voxels != 0 && at < params.count_capacity) {
+            params.counts[at] = {edit, fate | material << 8, voxels, 0};
+        }
+        counts[material] = 0;
+    }
+}
+
+// Counts a voxel of this material, or none. Lanes of one material count as one.
+__device__ inline void count_voxels(u32* counts, u32 material) {
+    u32 rest = __ballot_sync(WARP, material != NONE);
+    while (rest != 0) {
+        i32 leader = __ffs(rest) - 1;
+        u32 same = __ballot_sync(WARP, material == __shfl_sync(WARP, material, leader));
+        if (lane() == leader) atomicAdd(&counts[material], __popc(same));
+        rest &= ~same;
+    }
+}
+
+// What became of a sample.
+struct Outcome {
+    bool is_changed;
+    // The material of a voxel to be counted, or `NONE`.
+    u32 counted;
+};
+
+__device__ inline u32 resolve(u32 stored, const OwnColumn& column, i32 pristine) {
+    return stored == GROUND ? ground_material(column.materials, pristine) : stored;
+}
+
+// Digs or adds.
+__device__ inline Outcome carve(
+    const Tool& tool, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
+) {
+    i32 raw = sample, before = raw == PRISTINE ? pristine : raw;
+    i32 depth = largest(outside, -DEPTH);
+    i32 after = tool.operation == DIG ? largest(before, -depth) : smallest(before, depth);
+    i32 stored = smallest(largest(after, -32767), 32767);
+    if (outside > BAND || after == before || stored == raw) return {false, NONE};
+    sample = (i16)stored;
+    if ((before < 0) == (after < 0)) return {true, NONE};
+    if (after >= 0) {
+        u32 removed = resolve(material, column, pristine);
+        // Air is of no material.
+        material = GROUND;
+        return {true, removed};
+    }
+    if (tool.operation == ADD) material = (u8)tool.material;
+    return {true, resolve(material, column, pristine)};
+}
+
+// Changes the material of a solid sample inside the shape.
+__device__ inline Outcome paint(
+    const Tool& tool, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
+) {
+    i32 raw = sample, before = raw == PRISTINE ? pristine : raw;
+    u32 old = material;
+    if (outside > 0 || before >= 0 || (raw != PRISTINE && old == tool.material)) return {false, NONE};
+    if (raw == PRISTINE) sample = (i16)largest(before, -32767);
+    material = (u8)tool.material;
+    u32 painted = resolve(tool.material, column, pristine);
+    return {true, painted == resolve(old, column, pristine) ? NONE : painted};
+}
+
+// Copies the thread's samples from its brick, pristine ones where there is none.
+__device__ inline void take(const Brick* base, bool has_materials, Brick& brick) {
+    for (i32 k = 0; k < OWN; k++) {
+        i32 index = own_index(k);
+        brick.samples[index] = base ? base->samples[index] : (i16)PRISTINE;
+        brick.materials[index] = has_materials ? base->materials[index] : (u8)GROUND;
+    }
+}
+
+// Does any sample of the brick lie in an edit's reach?
+__device__ inline bool is_reached(const Tool& tool, const i32* low) {
+    bool is_reached = true;
+    for (i32 axis = 0; axis < 3; axis++) {
+        is_reached &= tool.min[axis] <= low[axis] + SIDE - 1 && low[axis] <= tool.max[axis];
+    }
+    return is_reached;
+}
+
+__device__ inline bool reaches(const Tool& tool, const i32* low, const i32* offset) {
+    bool is_inside = true;
+    for (i32 axis = 0; axis < 3; axis++) {
+        i32 at = low[axis] + offset[axis];
+        is_inside &= tool.min[axis] <= at && at <= tool.max[axis];
+    }
+    return is_inside;
+}
+
+// Applies one edit to the thread's samples; returns which of them changed, a bit for each. `has_materials` is set where
+// a material was stored.
+__device__ inline u32 apply(
+    const Tool& tool, const OwnColumn& column, Brick& brick, Effect& effect, bool& has_materials
+) {
+    u32 changed = 0;
+    // Not unrolled: the code is long, and other warps are there to wait for.
+#pragma unroll 1
+    for (i32 k = 0; k < OWN; k++) {
+        i32 index = own_index(k);
+        i32 offset[3] = {column.x, own_y(column, k), column.z};
+        Outcome outcome = {false, NONE};
+        if (reaches(tool, column.low, offset)) {
+            i32 outside = distance_to(tool, column.low, offset), pristine = pristine_distance(column, k);
+            i16& sample = brick.samples[index];
+            u8& material = brick.materials[index];
+            outcome = tool.operation == PAINT ? paint(tool, outside, column, pristine, sample, material)
+                                              : carve(tool, outside, column, pristine, sample, material);
+            has_materials |= material != GROUND;
+        }
+        changed |= (u32)outcome.is_changed << k;
+        store_bits(effect.changed, k, outcome.is_changed);
+        count_voxels(effect.counts, outcome.counted);
+    }
+    return changed;
+}
+
+// What a sample adds to the world's hash; a pristine one adds nothing.
+__device__ inline u64 sample_hash(u64 place, i32 y, i16 sample, u8 material) {
+    if (sample == PRISTINE) return 0;
+    return mix(place ^ (u64)(u32)y << 32 ^ (u64)(u16)sample << 8 ^ material);
+}
+
+// By how much the thread's samples change the world's hash, if they were these before.
+__device__ inline u64 hash_change(
+    const OwnColumn& column, const Brick& now, const Brick* base, bool had_materials, u32 changed
+) {
+    u64 place = mix((u64)(u32)(column.low[0] + column.x) | (u64)(u32)(column.low[2] + column.z) << 32);
+    u64 change = 0;
+    for (i32 k = 0; k < OWN; k++) {
+        if (!(changed >> k & 1)) continue;
+        i32 index = own_index(k), y = column.low[1] + own_y(column, k);
+        change += sample_hash(place, y, now.samples[index], now.materials[index]);
+        if (base == nullptr) continue;
+        u8 material = had_materials ? base->materials[index] : (u8)GROUND;
+        change -= sample_hash(place, y, base->samples[index], material);
+    }
+    return change;
+}
+
+// Derives the bits of the brick and of what changed, and adds up what all threads know of it.
+__device__ inline void sum_up(
+    Workbench& bench, const OwnColumn& column, const Brick* base, bool had_materials, bool has_materials,
+    u32 changed
+) {
+    Brick& brick = bench.brick;
+    bool is_uniform = true, is_extended = false;
+    for (i32 k = 0; k < OWN; k++) {
+        i32 index = own_index(k), sample = brick.samples[index];
+        bool is_edited = sample != PRISTINE, is_changed = changed >> k & 1;
+        store_bits(brick.solid, k, (is_edited ? sample : pristine_distance(column, k)) < 0);
+        store_bits(brick.edited, k, is_edited);
+        store_bits(bench.changed, k, is_changed);
+        is_uniform &= is_edited && sample == brick.samples[0] && brick.materials[index] == brick.materials[0];
+        is_extended |= is_changed && (base == nullptr || base->samples[index] == PRISTINE);
+    }
+    u64 hash = hash_change(column, brick, base, had_materials, changed);
+    for (i32 step = 16; step > 0; step /= 2) hash += __shfl_down_sync(WARP, hash, step);
+
+    u32 flags = __all_sync(WARP, is_uniform) ? 0 : UNIFORM;
+    flags |= __any_sync(WARP, is_extended) ? EXTENDED : 0;
+    flags |= __any_sync(WARP, has_materials) ? HAS_MATERIALS : 0;
+    if (lane() == 0) {
+        atomicAdd(&bench.hash, hash);
+        // Uniform is what is nowhere otherwise.
+        atomicOr(&bench.flags, flags);
+    }
+}
+
+// Reserves room for the brick and writes its result. For one thread.
+__device__ inline void reserve(const EditParams& params, Workbench& bench) {
+    EditResult result = {bench.hash, (bench.flags ^ UNIFORM) | CHANGED, NONE, NONE, 0, 0, 0};
+    if (result.flags & UNIFORM) {
+        result.uniform = (u16)bench.brick.samples[0] | (u32)bench.brick.materials[0] << 16;
+    } else {
+        u32 record = atomicAdd(&params.counters[0], 1);
+        if (record < params.record_capacity) result.record = record;
+        if (result.flags & HAS_MATERIALS) {
+            u32 material = atomicAdd(&params.counters[1], 1);
+            if (material < params.material_capacity) result.material = material;
+        }
+    }
+    result.bounds = bounds_of(bench.changed, ~0ull, 0, SIDE);
+    bench.record = result.record;
+    bench.material = result.material;
+    params.results[blockIdx.x] = result;
+}
+
+// Writes the brick to its slot, and to the entries that were reserved for it.
+__device__ inline void store(const EditParams& params, const Workbench& bench, Brick* target) {
+    const u32 MATERIALS = LEN / sizeof(uint4), RECORD = sizeof(Brick) / sizeof(uint4) - MATERIALS;
+    u32 piece = threadIdx.x;
+    if (piece >= RECORD + MATERIALS) return;
+    bool is_record = piece < RECORD;
+    if (!is_record && !(bench.flags & HAS_MATERIALS)) return;
+    uint4 data = ((const uint4*)&bench.brick)[piece];
+    ((uint4*)target)[piece] = data;
+    u64 entry = is_record ? bench.record : bench.material;
+    if (entry == NONE) return;
+    uint4* entries = is_record ? params.records + entry * RECORD : params.materials + entry * MATERIALS;
+    entries[is_record ? piece : piece - RECORD] = data;
+}
+
+extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
+    __shared__ Workbench bench;
+    const EditJob job = params.jobs[blockIdx.x];
+    const Brick* base = job.base == NONE ? nullptr : &params.bricks[job.base >> 1];
+    const bool had_materials = base != nullptr && job.base & 1;
+
+    const Stack& stack = params.stacks[job.stack];
+    i32 x = threadIdx.x % SIDE, z = threadIdx.x / SIDE % SIDE, window = (z + 1) * WINDOW + x + 1;
+    OwnColumn column = {
+        {job.brick[0] * SIDE, job.brick[1] * SIDE, job.brick[2] * SIDE},
+        x,
+        z,
+        (i32)threadIdx.x / (SIDE * SIDE),
+        stack.heights[window],
+        stack.columns[window],
+    };
+    take(base, had_materials, bench.brick);
+    for (i32 i = threadIdx.x; i < 512; i += THREADS) bench.effects[i / 256].counts[i % 256] = 0;
+    if (threadIdx.x == 0) {
+        bench.hash = 0;
+        bench.flags = 0;
+    }
+    __syncthreads();
+
+    u32 changed = 0, turn = 0;
+    bool has_materials = had_materials;
+    for (u32 i = 0; i < job.count; i++) {
+        u32 number = params.list[job.first + i];
+        const Tool& tool = params.tools[number];
+        if (!is_reached(tool, column.low)) continue;
+        Effect& effect = bench.effects[turn & 1];
+        u32 own = apply(tool, column, bench.brick, effect, has_materials);
+        changed |= own;
+        if (!__syncthreads_or(own != 0)) continue;
+        // While these two warps enter what was done, nobody can get past the next edit, which takes the other place.
+        if (warp() == 0) enter_parts(params, job.cuts, number, effect.changed);
+        if (warp() == 1) enter_counts(params, number, tool.operation, effect.counts);
+        turn++;
+    }
+    // Whoever entered an edit since then did not change the brick.
+    if (turn == 0) {
+        if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, NONE, NONE, 0, 0, 0};
+        return;
+    }
+    sum_up(bench, column, base, had_materials, has_materials, changed);
+    __syncthreads();
+    if (threadIdx.x == 0) reserve(params, bench);
+    __syncthreads();
+    store(params, bench, &params.bricks[job.target]);
+}

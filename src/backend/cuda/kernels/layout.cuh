@@ -1,0 +1,161 @@
+// What host and kernels hand each other, and the numbers of the lattice. layout.rs has the same in Rust.
+#pragma once
+
+typedef unsigned char u8;
+typedef short i16;
+typedef unsigned short u16;
+typedef int i32;
+typedef unsigned int u32;
+typedef long long i64;
+typedef unsigned long long u64;
+
+constexpr i32 THREADS = 128;
+constexpr u32 WARP = 0xffffffff;
+
+// Samples of a brick, and along one side of it.
+constexpr i32 LEN = 512;
+constexpr i32 SIDE = 8;
+// Columns along a side of the window around a stack of bricks: one before it, two after. Also samples of an apron.
+constexpr i32 WINDOW = 11;
+constexpr i32 AREA = WINDOW * WINDOW;
+// Corners of 8x8 cells.
+constexpr i32 CORNERS = 81;
+
+// Units of 1/256 voxel, of 1/4096 voxel.
+constexpr i32 ONE = 256;
+constexpr i32 SNAP = 4096;
+// How far outside a shape samples still change, and how deep inside distances are told apart.
+constexpr i32 BAND = 2 * ONE;
+constexpr i32 DEPTH = 4 * ONE;
+constexpr i32 OVERLAY_DEPTH = ONE + ONE / 2;
+
+// A sample that nobody edited, and a material that nobody changed.
+constexpr i32 PRISTINE = -32768;
+constexpr u32 GROUND = 255;
+
+// No brick; no entry.
+constexpr u32 NONE = 0xffffffff;
+
+// Sample (x, y, z) is at x + 8 z + 64 y; of the bits, layer y is a word of 64 bits, here two halves.
+struct alignas(16) Brick {
+    i16 samples[LEN];
+    u32 solid[16];
+    u32 edited[16];
+    u8 materials[LEN];
+};
+
+// The columns around a stack of bricks, from one before its first on, x fastest.
+struct alignas(16) Stack {
+    i32 heights[AREA];
+    // base | overlay << 8 | blend << 16
+    u32 columns[AREA];
+    u32 pad[2];
+};
+
+struct ScatterJob {
+    u64 to, from;
+    u32 bytes, pad;
+};
+
+struct ScatterParams {
+    const ScatterJob* jobs;
+};
+
+struct EditJob {
+    i32 brick[3];
+    u32 base, target, stack;
+    u32 first, count;
+    u32 cuts;
+    u32 pad[3];
+};
+
+enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE };
+enum Operation { DIG, ADD, PAINT };
+
+struct Tool {
+    u32 kind, operation, material, is_rough;
+    // The shape's origin: voxels, and 1/256 voxel from there.
+    i32 home[3], rest[3];
+    // The lattice points that it reaches, both ends included.
+    i32 min[3], max[3];
+    float constants[12];
+    i32 amplitude, scale;
+    u32 seed, pad;
+};
+
+enum ResultFlags { CHANGED = 1, EXTENDED = 2, UNIFORM = 4, HAS_MATERIALS = 8 };
+
+struct EditResult {
+    u64 hash;
+    u32 flags, record, material, bounds, uniform, pad;
+};
+
+struct EditPart {
+    u32 job, edit, part, bounds;
+};
+
+struct EditCount {
+    u32 edit, fate, voxels, pad;
+};
+
+struct EditParams {
+    Brick* bricks;
+    const Stack* stacks;
+    const EditJob* jobs;
+    const u32* list;
+    const Tool* tools;
+    EditResult* results;
+    // 72 and 32 to an entry.
+    uint4* records;
+    uint4* materials;
+    EditPart* parts;
+    EditCount* counts;
+    // Records, materials, parts, counts.
+    u32* counters;
+    u32 record_capacity, material_capacity, part_capacity, count_capacity;
+};
+
+struct ColumnJob {
+    u32 stack;
+    i32 x, z;
+    u32 pad;
+    u64 mask, pad2;
+    u32 borders[3][4];
+};
+
+struct MeshJob {
+    u32 window, strides, column;
+    i32 y;
+    u32 cells, pad;
+};
+
+struct MeshResult {
+    u32 vertex, vertices, index, indices;
+};
+
+struct MeshParams {
+    const Brick* bricks;
+    const Stack* stacks;
+    const u32* windows;
+    const ColumnJob* columns;
+    const MeshJob* jobs;
+    const u16 (*table)[16];
+    MeshResult* results;
+    ushort4* positions;
+    float* normals;
+    // Null where no mixes are wanted.
+    uint2* mixes;
+    u16* indices;
+    // Vertices, indices.
+    u32* counters;
+    u32 vertex_capacity, index_capacity;
+    // Cells of the world.
+    i32 width, depth;
+    u32 is_single, single_ids, single_weights, pad;
+};
+
+static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout.rs");
+static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout.rs");
+static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout.rs");
+static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout.rs");
+static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout.rs");

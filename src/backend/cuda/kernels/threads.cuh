@@ -1,0 +1,35 @@
+// Small things that all kernels use: threads, counting, whole numbers.
+#pragma once
+
+#include "layout.cuh"
+
+__device__ inline i32 smallest(i32 a, i32 b) { return a < b ? a : b; }
+
+__device__ inline i32 largest(i32 a, i32 b) { return a > b ? a : b; }
+
+__device__ inline u32 lane() { return threadIdx.x & 31; }
+
+__device__ inline u32 warp() { return threadIdx.x >> 5; }
+
+// Lanes of the warp before this one.
+__device__ inline u32 lanes_before() { return (1u << lane()) - 1; }
+
+// Sum over this lane and those before it.
+__device__ inline u32 running_sum(u32 value) {
+    for (i32 step = 1; step < 32; step *= 2) {
+        u32 other = __shfl_up_sync(WARP, value, step);
+        if (lane() >= step) value += other;
+    }
+    return value;
+}
+
+// Is there room for so many entries from `first` on?
+__device__ inline bool fits(u32 first, u32 count, u32 capacity) {
+    return first <= capacity && count <= capacity - first;
+}
+
+// The ground's own material, where a voxel is so far above the surface.
+__device__ inline u32 ground_material(u32 column, i32 distance) {
+    bool is_overlay = distance >= -OVERLAY_DEPTH && column >> 16 >= 128;
+    return (is_overlay ? column >> 8 : column) & 0xff;
+}
