@@ -68,7 +68,7 @@ bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench meshers -- $(ARGS)
 
-bench-backends: ## Time the processor beside a CUDA card (ARGS="bulk field brush sweep" for some sections only)
+bench-backends: ## Time the processor beside a CUDA card (ARGS="craters sweep" for some sections only)
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench backends -- $(ARGS)
 

@@ -21,8 +21,13 @@ use landscape::{dig, landscape, threads};
 use level::Level;
 use statistics::Sample;
 
-const SECTIONS: [(&str, fn(&Engines)); 4] =
-    [("bulk", bulk), ("field", one_field), ("brush", brush), ("sweep", sweep)];
+const SECTIONS: [(&str, fn(&Engines)); 5] = [
+    ("craters", |engines| bulk(engines, false)),
+    ("rough-craters", |engines| bulk(engines, true)),
+    ("field", one_field),
+    ("brush", brush),
+    ("sweep", sweep),
+];
 
 /// One engine of each kind.
 struct Engines {
@@ -129,7 +134,7 @@ fn run(transaction: Transaction, engine: &Engine, times: &mut Times) -> Commit {
 }
 
 /// 512 fields of 32x32x32, all of them dirty: made, and then dug all over again.
-fn bulk(engines: &Engines) {
+fn bulk(engines: &Engines, are_rough: bool) {
     let level = Level::new();
     let [mut cpu, mut cuda] = [(); 2].map(|()| [Times::default(), Times::default()]);
     let mut ratios = [Sample::default(), Sample::default()];
@@ -140,7 +145,7 @@ fn bulk(engines: &Engines) {
         for (engine, times) in [(&engines.cpu, &mut cpu), (&engines.cuda, &mut cuda)] {
             let mut terrain = level.terrain();
             for (pass, times) in times.iter_mut().enumerate() {
-                level.brushes(pass).for_each(|brush| terrain.submit(&brush));
+                level.brushes(pass, are_rough).for_each(|brush| terrain.submit(&brush));
                 let mut discarded = Times::default();
                 let transaction = terrain.begin().expect("brushes wait");
                 let commit = run(transaction, engine, if round < 2 { &mut discarded } else { times });
