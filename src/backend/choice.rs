@@ -41,7 +41,6 @@ pub struct Choice {
     pub kernel: Duration,
 }
 
-#[cfg(feature = "cuda")]
 impl Choice {
     /// A choice that was not made yet.
     pub(super) fn of(stage: Stage, amount: usize) -> Self {

@@ -33,14 +33,11 @@ mod kernel_tests;
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use web_time::Instant;
-
 use super::choice::{Costs, Load};
-use super::{Choice, Compute, Cpu, EngineFigures, EngineState, Stage};
+use super::{Choice, EngineState, Stage};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
@@ -54,7 +51,6 @@ pub(super) struct Cuda {
     slot: Arc<Mutex<Place>>,
     /// What became of opening it, to be asked at any time.
     state: Arc<Mutex<EngineState>>,
-    record: Mutex<Record>,
 }
 
 /// Where the session is.
@@ -63,17 +59,6 @@ enum Place {
     Open(Box<Session>, Costs),
     Lost,
 }
-
-/// What was done.
-#[derive(Default)]
-struct Record {
-    cpu: u64,
-    cuda: u64,
-    choices: VecDeque<Choice>,
-}
-
-/// Choices that are remembered.
-const REMEMBERED: usize = 64;
 
 /// Of a device's free memory, the part that bricks and ground may take.
 const SHARE: usize = 4;
@@ -101,7 +86,6 @@ impl Cuda {
             is_auto,
             slot: Arc::new(Mutex::new(Place::Opening)),
             state: Arc::new(Mutex::new(EngineState::Opening)),
-            record: Mutex::default(),
         };
         let (slot, state) = (Arc::clone(&own.slot), Arc::clone(&own.state));
         let open = move || {
@@ -133,15 +117,6 @@ impl Cuda {
 
     pub fn state(&self) -> EngineState {
         lock(&self.state).clone()
-    }
-
-    pub fn figures(&self) -> EngineFigures {
-        let record = lock(&self.record);
-        EngineFigures {
-            cpu: record.cpu,
-            cuda: record.cuda,
-            choices: record.choices.iter().copied().collect(),
-        }
     }
 
     /// Does a stage on the card if that is there, free and chosen; else the processor has to do it.
@@ -178,24 +153,30 @@ impl Cuda {
         }
     }
 
-    /// Enters a stage that took so long, and learns from it.
-    fn remember(&self, choice: Choice, load: Load) {
+    /// Takes in how long a stage took.
+    pub fn learn(&self, choice: &Choice, load: Load) {
         if choice.estimate.is_some()
             && let Ok(mut place) = self.slot.try_lock()
             && let Place::Open(_, costs) = &mut *place
         {
             costs.learn(choice.stage, load, choice.is_cuda, choice.took);
         }
-        let mut record = lock(&self.record);
-        if choice.is_cuda {
-            record.cuda += 1
-        } else {
-            record.cpu += 1
-        }
-        if record.choices.len() == REMEMBERED {
-            record.choices.pop_front();
-        }
-        record.choices.push_back(choice);
+    }
+
+    /// Applies edits on the card, if that is chosen.
+    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Vec<Ledger>>, Load) {
+        self.offer(choice, |session| session.load_of_edits(work), |session| session.edit(work))
+    }
+
+    /// Meshes blocks on the card, if that is chosen.
+    pub fn mesh(
+        &self,
+        view: &WorldView,
+        blocks: &[Block],
+        choice: &mut Choice,
+    ) -> (Option<Vec<Parts>>, Load) {
+        let load = |session: &Session| session.load_of_mesh(view, blocks);
+        self.offer(choice, load, |session| session.mesh(view, blocks))
     }
 }
 
@@ -204,35 +185,4 @@ fn lose(place: &mut Place, state: &Mutex<EngineState>, fault: &Fault) {
     log::warn!("bevy_burrow goes on without CUDA: {fault}");
     *place = Place::Lost;
     *lock(state) = EngineState::Lost(fault.to_string());
-}
-
-impl Compute for Cuda {
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
-        let start = Instant::now();
-        let mut choice = Choice::of(Stage::Edit, work.jobs().len());
-        let load = |session: &Session| session.load_of_edits(work);
-        let (done, load) = self.offer(&mut choice, load, |session| session.edit(work));
-        match done {
-            Some(ledgers) => ledgers.into_iter().for_each(each),
-            None => Cpu.edit(work, each),
-        }
-        choice.took = start.elapsed();
-        self.remember(choice, load);
-    }
-
-    fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts])) {
-        let start = Instant::now();
-        let mut choice = Choice::of(Stage::Mesh, blocks.len());
-        let load = |session: &Session| session.load_of_mesh(view, blocks);
-        let (done, load) = self.offer(&mut choice, load, |session| session.mesh(view, blocks));
-        let mut then = |parts: &[Parts]| {
-            choice.took = start.elapsed();
-            then(parts);
-        };
-        match done {
-            Some(parts) => then(&parts),
-            None => Cpu.mesh(view, blocks, &mut then),
-        }
-        self.remember(choice, load);
-    }
 }

@@ -34,13 +34,26 @@ pub(super) struct Session {
 /// Stacks of the ground on the device. They never change.
 pub(super) struct Stacks {
     slots: Slots,
-    /// Tags by ground and place.
-    of: FxHashMap<(u64, (i32, i32)), u64>,
+    /// Tags by place, in pages of each ground.
+    pages: FxHashMap<(u64, i32, i32), Box<[u64; PAGE * PAGE]>>,
+}
+
+/// Stacks along a side of a page.
+const PAGE: usize = 64;
+
+/// Most pages that are kept; all are let go of when there are more, and found again.
+const MOST_PAGES: usize = 1 << 12;
+
+/// The page of a stack, and its number there.
+fn page(ground: &Ground, (x, z): (i32, i32)) -> ((u64, i32, i32), usize) {
+    let side = PAGE as i32;
+    let number = z.rem_euclid(side) * side + x.rem_euclid(side);
+    ((ground.hash(), x.div_euclid(side), z.div_euclid(side)), number as usize)
 }
 
 impl Stacks {
     fn new(budget: usize) -> Self {
-        Self { slots: Slots::new(size_of::<StackRecord>(), budget), of: FxHashMap::default() }
+        Self { slots: Slots::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
     }
 
     /// Where the first one is.
@@ -50,17 +63,18 @@ impl Stacks {
 
     /// The slot of a stack that is there.
     pub fn find(&self, ground: &Ground, place: (i32, i32)) -> Option<u32> {
-        self.slots.find(*self.of.get(&(ground.hash(), place))?)
+        let (page, number) = page(ground, place);
+        self.slots.find(self.pages.get(&page)?[number])
     }
 
     /// A slot for a stack that is not there.
     fn take(&mut self, device: &mut dyn Device, ground: &Ground, place: (i32, i32)) -> Result<u32, Fault> {
         let (slot, tag) = self.slots.take(device)?;
-        if self.of.len() > 2 * self.slots.len() {
-            let slots = &self.slots;
-            self.of.retain(|_, tag| slots.find(*tag).is_some());
+        if self.pages.len() > MOST_PAGES {
+            self.pages.clear();
         }
-        self.of.insert((ground.hash(), place), tag);
+        let (page, number) = page(ground, place);
+        self.pages.entry(page).or_insert_with(|| Box::new([0; PAGE * PAGE]))[number] = tag;
         Ok(slot)
     }
 }

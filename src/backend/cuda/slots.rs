@@ -148,11 +148,6 @@ impl Slots {
             }
         }
     }
-
-    /// How many records there are.
-    pub fn len(&self) -> usize {
-        self.stamps.len() - self.free.len()
-    }
 }
 
 /// How kernels refer to a brick in a slot.
