@@ -66,11 +66,39 @@ impl EditOutput {
         if is_copied { device.wait() } else { Ok(()) }
     }
 
-    fn totals(&self) -> Totals {
-        let mut totals = [0; 4];
-        totals.copy_from_slice(self.totals.entries::<u32>(4));
-        let [records, materials, parts, counts] = totals.map(|count: u32| count as usize);
-        Totals { records, materials, parts, counts }
+    /// How much of each list was written. Asking the device takes longer than a small launch; so where lists are in the
+    /// host's memory, they are wiped before, and end where no entry stands.
+    fn totals(&mut self, results: usize) -> Totals {
+        if !self.parts.is_mapped() {
+            let mut totals = [0; 4];
+            totals.copy_from_slice(self.totals.entries::<u32>(4));
+            let [records, materials, parts, counts] = totals.map(|count: u32| count as usize);
+            return Totals { records, materials, parts, counts };
+        }
+        let (parts, counts) = (self.parts.capacity() as usize, self.counts.capacity() as usize);
+        let parts = self.parts.entries::<EditPart>(parts).iter().take_while(|part| part.job != NONE).count();
+        let counts =
+            self.counts.entries::<EditCount>(counts).iter().take_while(|count| count.edit != NONE).count();
+        self.parts.wrote(parts);
+        self.counts.wrote(counts);
+        // A list that is full may have been too short; nobody knows by how much.
+        let wanted = |count: usize, list: &Outbox| match list.capacity() as usize {
+            full if full == count => 2 * count,
+            _ => count,
+        };
+        let mut totals = Totals {
+            records: 0,
+            materials: 0,
+            parts: wanted(parts, &self.parts),
+            counts: wanted(counts, &self.counts),
+        };
+        for result in self.results.entries::<EditResult>(results) {
+            let is = |flag: u32| result.flags & flag != 0;
+            let is_stored = is(EditResult::CHANGED) && !is(EditResult::UNIFORM);
+            totals.records += usize::from(is_stored);
+            totals.materials += usize::from(is_stored && is(EditResult::HAS_MATERIALS));
+        }
+        totals
     }
 }
 
@@ -79,6 +107,9 @@ const LONG: usize = 64;
 
 /// From how many bricks on they are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 256;
+
+/// Most passes: each gives twice the room where it is not known how much is needed.
+const PASSES: usize = 12;
 
 /// Bricks that one thread makes of what came back.
 const GROUP: usize = 64;
@@ -146,7 +177,9 @@ impl Session {
         self.edits.results.reserve(&mut *self.device, sites.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
 
-        for _ in 0..2 {
+        for _ in 0..PASSES {
+            self.edits.parts.wipe();
+            self.edits.counts.wipe();
             self.send(&plan, uploads)?;
             let params = EditParams {
                 bricks: self.bricks.base(),
@@ -167,16 +200,18 @@ impl Session {
             };
             self.device.launch(Kernel::Edit, sites.len() as u32, bytemuck::bytes_of(&params))?;
             self.edits.results.fetch(&mut *self.device, sites.len())?;
-            self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
+            if !self.edits.parts.is_mapped() {
+                self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
+            }
             self.device.wait()?;
             self.times = self.device.times();
-            let totals = self.edits.totals();
+            let totals = self.edits.totals(sites.len());
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
                 self.edits.fetch(&mut *self.device, totals)?;
                 self.free_targets(targets);
                 return Ok(self.edits.ledgers(work, bricks, targets, totals));
             }
-            // A second pass, with room for all.
+            // Once more, with room for all.
         }
         Err(Fault::Failed("results changed from one pass to the next".into()))
     }
