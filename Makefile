@@ -1,8 +1,8 @@
 # bevy_burrow: diggable ground for Bevy. `make help` lists what can be done.
 #
 # One feature set and one profile for everything that compiles Bevy, so that it is compiled once:
-#   without Bevy   cargo ... --no-default-features           the model: tests, soak
-#   with Bevy      cargo ... --release --features examples   the plugin and the examples
+#   without Bevy   cargo ... --no-default-features --features cuda   the model: tests, soak
+#   with Bevy      cargo ... --release --features examples           the plugin and the examples
 #
 # What is built goes to CARGO_TARGET_DIR, outside the clone unless set otherwise.
 
@@ -10,7 +10,7 @@ SHELL := /bin/sh
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
-WITHOUT_BEVY := --no-default-features
+WITHOUT_BEVY := --no-default-features --features cuda
 WITH_BEVY := --release --features examples
 
 # Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice.
@@ -24,7 +24,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run test test-model test-plugin test-examples soak paper pictures bench peers instructions
+.PHONY: help setup run test test-model test-plugin test-examples soak paper pictures bench bench-backends peers instructions ptx
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -36,7 +36,7 @@ run: ## Install what is missing, then dig: first person on a real landscape (ARG
 test: setup test-model test-plugin test-examples ## Install what is missing, then run every test
 
 setup: ## Install what is missing
-	@tools/setup.sh run
+	@tools/setup.sh test
 
 # Model tests, in the dev profile: optimised, with overflow checks.
 test-model:
@@ -68,7 +68,15 @@ bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench meshers -- $(ARGS)
 
-peers: ## The same beside VTK, scikit-image and PyMCubes, which it installs outside the clone
+bench-backends: ## Time the processor beside a CUDA card (ARGS="craters sweep" for some sections only)
+	@tools/setup.sh build
+	cargo bench $(WITHOUT_BEVY) --bench backends -- $(ARGS)
+
+ptx: ## Compile the CUDA kernels to PTX again; needs no card (ARGS=--check to compare only)
+	@tools/setup.sh ptx
+	@python3 tools/ptx.py $(ARGS)
+
+peers: ## Time the dense mesher beside VTK, scikit-image and PyMCubes, which it installs outside the clone
 	@tools/peers.sh $(ARGS)
 
 instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)

@@ -101,6 +101,7 @@
 //!
 //! | feature | what it adds | default |
 //! | --- | --- | --- |
+//! | `cuda` | transactions on an NVIDIA card where one is found, see [`backend`]; compiles everywhere | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `examples` | what the examples need: window, UI, PNG | |
@@ -139,8 +140,8 @@ pub mod prelude {
     };
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
-        BrushApplied, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk, Field,
-        HeightmapImage, MaterialColors, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile,
+        BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
+        Field, HeightmapImage, MaterialColors, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile,
     };
     pub use crate::terrain::{Applied, Receipt, Rejection, ScenarioCounts, Span, Terrain, TerrainSettings};
     #[cfg(feature = "render")]

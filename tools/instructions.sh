@@ -30,9 +30,9 @@ if ! command -v valgrind >/dev/null 2>&1; then
     exit 0
 fi
 
-cargo bench --no-default-features --bench instructions --no-run
+cargo bench --no-default-features --features cuda --bench instructions --no-run
 # Cargo alone knows the binary's name.
-bench=$(cargo bench --no-default-features --bench instructions --no-run --message-format=json 2>/dev/null |
+bench=$(cargo bench --no-default-features --features cuda --bench instructions --no-run --message-format=json 2>/dev/null |
     sed -n 's/.*"name":"instructions".*"executable":"\([^"]*\)".*/\1/p')
 counts=$(mktemp)
 trap 'rm -f "$counts"' EXIT

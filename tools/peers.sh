@@ -18,8 +18,8 @@ if ! cmp -s tools/peers.txt "$environment/peers.txt"; then
     cp tools/peers.txt "$environment/peers.txt"
 fi
 
-cargo bench --no-default-features --bench meshers --no-run
+cargo bench --no-default-features --features cuda --bench meshers --no-run
 # Cargo alone knows the binary's name.
-bench=$(cargo bench --no-default-features --bench meshers --no-run --message-format=json 2>/dev/null |
+bench=$(cargo bench --no-default-features --features cuda --bench meshers --no-run --message-format=json 2>/dev/null |
     sed -n 's/.*"name":"meshers".*"executable":"\([^"]*\)".*/\1/p')
 exec "$environment/bin/python" tools/peers.py --bench "$bench" "$@"

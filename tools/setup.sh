@@ -3,8 +3,10 @@
 #
 #   tools/setup.sh build          compiler, linker, Rust
 #   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
+#   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a card
 #   tools/setup.sh lint           the same as build, and rustfmt and clippy
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
+#   tools/setup.sh ptx            Python, whose package index has the compiler of the CUDA kernels
 #   tools/setup.sh instructions   the same as build, and valgrind, which counts instructions
 #
 # Debian and its kin: uses apt-get, as root or with sudo, and the official Rust installer. Elsewhere it says what to
@@ -73,8 +75,8 @@ install_rust() {
 }
 
 case $goal in
-    build | run | lint | peers | instructions) ;;
-    *) die "unknown goal '$goal': build, run, lint, peers or instructions" ;;
+    build | run | test | lint | peers | ptx | instructions) ;;
+    *) die "unknown goal '$goal': build, run, test, lint, peers, ptx or instructions" ;;
 esac
 
 has make || want make
@@ -85,6 +87,10 @@ fi
 if ! rust_is_new_enough && ! has rustup; then
     has curl || want curl
     [ -e /etc/ssl/certs/ca-certificates.crt ] || want ca-certificates
+fi
+if [ "$goal" = test ]; then
+    has c++ || want g++
+    goal=run
 fi
 if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
     want_library libvulkan.so.1 libvulkan1
@@ -104,10 +110,15 @@ if [ "$goal" = peers ]; then
     has python3 || want python3
     python3 -c 'import ensurepip, venv' 2>/dev/null || want python3-venv
 fi
+if [ "$goal" = ptx ]; then
+    has python3 || want python3
+    python3 -c 'import pip' 2>/dev/null || want python3-pip
+fi
 if [ "$goal" = instructions ]; then
     has valgrind || want valgrind
 fi
 install_packages
+[ "$goal" != ptx ] || exit 0
 has cc || die "a C compiler and linker is missing"
 install_rust
 if [ "$goal" = lint ]; then

@@ -27,13 +27,13 @@ impl Level {
         Terrain::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid settings")
     }
 
-    /// A brush for each chunk, which changes samples in all of its bricks.
-    pub fn brushes(&self, pass: usize) -> impl Iterator<Item = Brush> {
+    /// A brush for each chunk, which changes samples in nearly all of its bricks: a crater, rough or smooth.
+    pub fn brushes(&self, pass: usize, is_rough: bool) -> impl Iterator<Item = Brush> {
         (0..512u32).map(move |i| {
             let (x, z) = ((i % 16) as f32 * 32.0 + 16.0, (i / 16) as f32 * 32.0 + 16.0);
             let center = Vec3::new(x + pass as f32, 16.0, z);
-            Brush::dig(Shape::sphere(center, 13.0 + pass as f32 * 0.7))
-                .with_roughness(Roughness::new(2.0, 6.0, i))
+            let brush = Brush::dig(Shape::sphere(center, 13.0 + pass as f32 * 0.7));
+            if is_rough { brush.with_roughness(Roughness::new(2.0, 6.0, i)) } else { brush }
         })
     }
 }

@@ -11,6 +11,7 @@ mod level;
 #[allow(dead_code)]
 mod statistics;
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use bevy_burrow::backend::{Backend, Choice, Engine, EngineState, Stage};
@@ -21,8 +22,13 @@ use landscape::{dig, landscape, threads};
 use level::Level;
 use statistics::Sample;
 
-const SECTIONS: [(&str, fn(&Engines)); 4] =
-    [("bulk", bulk), ("field", one_field), ("brush", brush), ("sweep", sweep)];
+const SECTIONS: [(&str, fn(&Engines)); 5] = [
+    ("craters", |engines| bulk(engines, false)),
+    ("rough-craters", |engines| bulk(engines, true)),
+    ("field", one_field),
+    ("brush", brush),
+    ("sweep", sweep),
+];
 
 /// One engine of each kind.
 struct Engines {
@@ -71,13 +77,15 @@ struct Times {
     meshing: Sample,
     assembly: Sample,
     ring: Sample,
+    /// The part of edits and of meshing that a backend does.
+    backend: [Sample; 2],
     /// On the card alone: edits, meshing; and their kernels.
     device: [Sample; 2],
     kernel: [Sample; 2],
 }
 
 impl Times {
-    fn push(&mut self, stages: &Stages, choices: &[Choice]) {
+    fn push(&mut self, stages: &Stages, choices: &VecDeque<Choice>) {
         let parts = [
             (&mut self.whole, stages.whole),
             (&mut self.edit, stages.edit),
@@ -96,7 +104,8 @@ impl Times {
     }
 
     fn print(&self, what: &str) {
-        let stages = [&self.edit, &self.meshing, &self.assembly, &self.ring];
+        let [edits, meshing] = &self.backend;
+        let stages = [edits, meshing, &self.edit, &self.meshing, &self.assembly, &self.ring];
         let stages: String = stages.iter().map(|stage| format!("{:>9.0}", stage.median() * 1e6)).collect();
         let device: String = self
             .device
@@ -118,7 +127,7 @@ impl Times {
 fn header(what: &str) {
     let names =
         ["whole", "p99", "edit", "meshing", "assembly", "ring"].map(|name| format!("{name:>9}")).concat();
-    println!("  {what:<28}{names}  edits, meshing on the card (kernels)   us, medians but for p99");
+    println!("  {what:<28}{names}  edits, blocks: on the card (kernels)   us, medians but for p99");
 }
 
 /// One transaction on an engine.
@@ -129,7 +138,7 @@ fn run(transaction: Transaction, engine: &Engine, times: &mut Times) -> Commit {
 }
 
 /// 512 fields of 32x32x32, all of them dirty: made, and then dug all over again.
-fn bulk(engines: &Engines) {
+fn bulk(engines: &Engines, are_rough: bool) {
     let level = Level::new();
     let [mut cpu, mut cuda] = [(); 2].map(|()| [Times::default(), Times::default()]);
     let mut ratios = [Sample::default(), Sample::default()];
@@ -140,7 +149,7 @@ fn bulk(engines: &Engines) {
         for (engine, times) in [(&engines.cpu, &mut cpu), (&engines.cuda, &mut cuda)] {
             let mut terrain = level.terrain();
             for (pass, times) in times.iter_mut().enumerate() {
-                level.brushes(pass).for_each(|brush| terrain.submit(&brush));
+                level.brushes(pass, are_rough).for_each(|brush| terrain.submit(&brush));
                 let mut discarded = Times::default();
                 let transaction = terrain.begin().expect("brushes wait");
                 let commit = run(transaction, engine, if round < 2 { &mut discarded } else { times });
@@ -235,7 +244,7 @@ fn sweep(engines: &Engines) {
                 let kept = if round < 5 { &mut discarded } else { &mut times[i] };
                 taken[i] = run(transaction.clone(), engine, kept).stages.whole.as_secs_f64();
             }
-            blocks = engines.auto.figures().choices.last().map_or(blocks, |choice| choice.amount);
+            blocks = engines.auto.figures().choices.back().map_or(blocks, |choice| choice.amount);
             if round >= 5 {
                 ratios.push(taken[2] / taken[0].min(taken[1]));
             }

@@ -13,6 +13,7 @@ use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
 use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
+use bevy_burrow::prelude::*;
 
 /// The script's time from frame to frame.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
@@ -30,7 +31,7 @@ pub fn find_renderer() -> Option<RenderResources> {
 }
 
 /// The game's app, ready for its first frame: `update` runs one frame of a sixtieth of a second.
-pub fn build_app(renderer: Option<RenderResources>) -> App {
+pub fn build_app(renderer: Option<RenderResources>, engine: BurrowEngine) -> App {
     let (render_creation, filter) = match renderer {
         Some(renderer) => (RenderCreation::Manual(renderer), ""),
         // The absence of a renderer is told once, in plain words, and not by everyone who misses it.
@@ -49,7 +50,7 @@ pub fn build_app(renderer: Option<RenderResources>) -> App {
             .disable::<PipelinedRenderingPlugin>(),
     )
     .insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-    crate::game(&mut app);
+    crate::game(&mut app, engine);
     while app.plugins_state() == PluginsState::Adding {
         bevy::tasks::tick_global_task_pools_on_main_thread();
     }

@@ -51,6 +51,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use bevy::prelude::*;
+use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
 use clap::Parser;
 
@@ -69,6 +70,30 @@ pub struct Options {
     /// Height of the window or the pictures, in pixels.
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
+    /// Draw every frame of the script, not only the pictures: for frame times.
+    #[arg(long)]
+    draw_all: bool,
+    /// What edits are computed on.
+    #[arg(long, value_enum, default_value_t = Computer::Auto)]
+    backend: Computer,
+}
+
+/// A [`Backend`] as the command line has it.
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Computer {
+    Auto,
+    Cpu,
+    Cuda,
+}
+
+impl Computer {
+    fn engine(self) -> BurrowEngine {
+        BurrowEngine(Engine::new(match self {
+            Self::Auto => Backend::Auto,
+            Self::Cpu => Backend::Cpu,
+            Self::Cuda => Backend::Cuda,
+        }))
+    }
 }
 
 fn main() -> ExitCode {
@@ -86,8 +111,8 @@ fn main() -> ExitCode {
 }
 
 /// Everything of the game that needs no window.
-pub fn game(app: &mut App) {
-    app.add_plugins((
+pub fn game(app: &mut App, engine: BurrowEngine) {
+    app.insert_resource(engine).add_plugins((
         BurrowPlugins,
         landscape::LandscapePlugin,
         sky::SkyPlugin,
@@ -106,7 +131,7 @@ fn open_window(options: &Options) -> App {
     };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
-    game(&mut app);
+    game(&mut app, options.backend.engine());
     app.add_plugins(hud::HudPlugin);
     app
 }

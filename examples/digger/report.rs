@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use bevy::prelude::*;
+use bevy_burrow::backend::EngineState;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SeamReport;
 use bevy_burrow::terrain::Memory;
@@ -66,31 +67,29 @@ pub struct EditTime {
     pub transaction: Duration,
 }
 
-/// How many frames, and how long they took together.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FrameTimes {
-    count: u32,
-    total: Duration,
-}
+/// How long each of some frames took.
+#[derive(Clone, Debug, Default)]
+pub struct FrameTimes(Vec<Duration>);
 
 impl FrameTimes {
     /// One frame more.
     pub fn count(&mut self, took: Duration) {
-        self.count += 1;
-        self.total += took;
+        self.0.push(took);
     }
 }
 
 impl fmt::Display for FrameTimes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let each = self.total.as_secs_f64() * 1e3 / f64::from(self.count.max(1));
-        write!(f, "{} at {each:.1} ms", self.count)
+        write!(f, "{} in p50 {} ms", self.0.len(), Percentiles::of(self.0.iter().copied()))
     }
 }
 
 /// All figures of a played script.
 pub struct Report {
     pub renderer: Option<String>,
+    pub engine: EngineState,
+    /// Stages of transactions on the processor, and on a card.
+    pub stages: (u64, u64),
     pub size: (i32, i32),
     pub tunnel: f32,
     pub logbook: Logbook,
@@ -160,6 +159,15 @@ impl fmt::Display for Report {
             kib(memory.samples + memory.materials),
             kib(memory.meshes + memory.parts),
             kib(memory.index)
+        )?;
+        let computer = match &self.engine {
+            EngineState::Cuda(name) => name.as_str(),
+            _ => "the processor",
+        };
+        let (cpu, cuda) = self.stages;
+        writeln!(
+            f,
+            "  computed by   {computer}: {cuda} stages of transactions on a card, {cpu} on the processor"
         )?;
         writeln!(f, "  frames        {} walked and dug, {} drawn", self.frames, self.drawn)?;
         write!(f, "  pictures      {}", self.pictures.len())?;

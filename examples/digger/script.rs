@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy::render::settings::RenderResources;
+use bevy_burrow::plugin::BurrowEngine;
 use bevy_burrow::terrain::World as Model;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -215,6 +216,8 @@ impl Stage {
 
     fn report(&mut self, places: &Places, start: Instant) -> Result<Report> {
         let renderer = self.studio.renderer();
+        let engine: BurrowEngine = self.studio.resource();
+        let (engine, figures) = (engine.state(), engine.figures());
         let logbook: Logbook = self.studio.resource();
         let (times, pictures) = (self.studio.times.clone(), self.studio.pictures.clone());
         let world: &Model = self.studio.terrain()?.world();
@@ -229,8 +232,10 @@ impl Stage {
             seams: world.check_seams(),
             memory: world.memory(),
             pictures,
-            frames: self.studio.frames,
-            drawn: self.studio.drawn,
+            engine,
+            stages: (figures.cpu, figures.cuda),
+            frames: self.studio.frames.clone(),
+            drawn: self.studio.drawn.clone(),
             took: start.elapsed(),
         })
     }

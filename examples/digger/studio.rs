@@ -37,6 +37,8 @@ pub struct Studio {
     film: Option<Handle<Image>>,
     folder: PathBuf,
     is_warm: bool,
+    /// Is every frame drawn, and not only the pictures?
+    draws_all: bool,
     /// Frames without a picture.
     pub frames: FrameTimes,
     /// Frames that were drawn.
@@ -55,7 +57,12 @@ impl Studio {
     pub fn open(options: &Options, renderer: Option<RenderResources>) -> Result<Self> {
         std::fs::create_dir_all(&options.out)?;
         let renders = renderer.is_some();
-        let mut app = build_app(renderer);
+        let engine = options.backend.engine();
+        if options.headless {
+            // The script is not to be over before a card is found.
+            engine.wait(PATIENCE);
+        }
+        let mut app = build_app(renderer, engine);
         app.init_resource::<Developed>();
         // One frame, for the systems that spawn the camera.
         app.update();
@@ -73,12 +80,13 @@ impl Studio {
             film,
             folder: options.out.clone(),
             is_warm: false,
+            draws_all: options.draw_all,
             frames: FrameTimes::default(),
             drawn: FrameTimes::default(),
             times: Vec::new(),
             pictures: Vec::new(),
         };
-        studio.film_runs(false);
+        studio.film_runs(studio.draws_all);
         Ok(studio)
     }
 
@@ -111,6 +119,9 @@ impl Studio {
     fn step(&mut self) {
         let start = Instant::now();
         self.app.update();
+        if self.draws_all {
+            self.finish_drawing();
+        }
         self.frames.count(start.elapsed());
     }
 
@@ -223,7 +234,7 @@ impl Studio {
         };
         self.app.world_mut().spawn(Screenshot::image(film)).observe(develop);
         self.step_and_draw();
-        self.film_runs(false);
+        self.film_runs(self.draws_all);
         let start = Instant::now();
         while self.app.world().resource::<Developed>().0 == before && start.elapsed() < PATIENCE {
             self.step_and_draw();
@@ -253,11 +264,15 @@ impl Studio {
     fn step_and_draw(&mut self) {
         let start = Instant::now();
         self.app.update();
+        self.finish_drawing();
+        self.drawn.count(start.elapsed());
+    }
+
+    fn finish_drawing(&self) {
         if let Some(device) = self.app.world().get_resource::<RenderDevice>() {
             // An error here is the device's end, and shows as a missing picture.
             let _ = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
         }
-        self.drawn.count(start.elapsed());
     }
 }
 

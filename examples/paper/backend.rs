@@ -1,5 +1,8 @@
 //! What computes a transaction: the CPU, or a GPU as the paper's Tables 3 and 4 have it.
 
+use std::time::Duration;
+
+use bevy_burrow::backend::{Backend as Kind, Engine, EngineState};
 use bevy_burrow::terrain::{Commit, Transaction};
 
 /// Who does the work.
@@ -22,9 +25,14 @@ impl Backend {
 
     /// The backend, ready to run.
     pub fn open(self) -> Result<Runner, NoBackend> {
-        match self {
-            Self::Cpu => Ok(Box::new(Transaction::run)),
-            Self::Cuda => Err(NoBackend("CUDA")),
+        let kind = match self {
+            Self::Cpu => return Ok(Box::new(Transaction::run)),
+            Self::Cuda => Kind::Cuda,
+        };
+        let engine = Engine::new(kind);
+        match engine.wait(Duration::from_secs(30)) {
+            EngineState::Cuda(_) => Ok(Box::new(move |transaction| transaction.run_on(&engine))),
+            _ => Err(NoBackend("CUDA")),
         }
     }
 

@@ -27,9 +27,9 @@ pub struct Choice {
     pub stage: Stage,
     /// Bricks that edits may reach, or blocks to be meshed.
     pub amount: usize,
-    /// Bricks that the card does not have yet, roughly.
+    /// Bricks and stacks of the ground that the card does not have yet, roughly.
     pub missing: usize,
-    /// What was expected; `None` where nothing is measured.
+    /// What was expected, for edits with the meshing that follows; `None` where the card is not there, or busy.
     pub estimate: Option<Estimate>,
     /// Was it the card?
     pub is_cuda: bool,
@@ -41,15 +41,31 @@ pub struct Choice {
     pub kernel: Duration,
 }
 
+impl Choice {
+    /// A choice that was not made yet.
+    pub(super) fn of(stage: Stage, amount: usize) -> Self {
+        Self {
+            stage,
+            amount,
+            missing: 0,
+            estimate: None,
+            is_cuda: false,
+            took: Duration::ZERO,
+            device: Duration::ZERO,
+            kernel: Duration::ZERO,
+        }
+    }
+}
+
 /// Time by amount: measured at some amounts, linear between them and beyond.
+#[cfg(feature = "cuda")]
 #[derive(Clone, Debug, Default)]
-#[cfg_attr(not(feature = "cuda"), expect(dead_code))]
 pub(super) struct Curve {
     /// Amount and seconds, ascending.
     points: Vec<(f64, f64)>,
 }
 
-#[cfg_attr(not(feature = "cuda"), expect(dead_code))]
+#[cfg(feature = "cuda")]
 impl Curve {
     /// Takes in a measurement; amounts must ascend.
     pub fn push(&mut self, amount: usize, time: Duration) {
@@ -74,39 +90,96 @@ impl Curve {
     }
 }
 
-/// What both backends take, by measurement.
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(not(feature = "cuda"), expect(dead_code))]
+/// What a stage has to do.
+#[cfg(feature = "cuda")]
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Load {
+    /// Bricks, once for each edit that may reach them; or blocks.
+    pub amount: usize,
+    /// Of those, how many times an edit is rough.
+    pub rough: usize,
+    /// Bricks and stacks of the ground that the card does not have.
+    pub missing: usize,
+}
+
+/// What both backends take, by measurement: the processor first, then the card.
+#[cfg(feature = "cuda")]
+#[derive(Clone, Debug)]
 pub(super) struct Costs {
-    /// Edits on the processor, on the card.
     pub edit: [Curve; 2],
-    /// Meshing on the processor, on the card.
+    /// Seconds that roughness adds for each brick.
+    pub rough: [f64; 2],
     pub mesh: [Curve; 2],
     /// Seconds to bring a brick to the card.
     pub upload: f64,
+    /// How much longer stages take than was measured: edits, meshing.
+    drift: [[f64; 2]; 2],
 }
 
 /// Blocks that are meshed anew for each brick that edits may reach, roughly.
 #[cfg(feature = "cuda")]
 const BLOCKS_PER_BRICK: f64 = 1.25;
 
+/// How far one transaction moves what is expected of the next.
+#[cfg(feature = "cuda")]
+const LEARNING: f64 = 0.2;
+/// How fast that is forgotten of the backend that is not used.
+#[cfg(feature = "cuda")]
+const FORGETTING: f64 = 0.02;
+/// The most that it may come to, and the least.
+#[cfg(feature = "cuda")]
+const DRIFT: [f64; 2] = [0.25, 4.0];
+
+#[cfg(feature = "cuda")]
+impl Default for Costs {
+    fn default() -> Self {
+        Self {
+            edit: Default::default(),
+            rough: [0.0; 2],
+            mesh: Default::default(),
+            upload: 0.0,
+            drift: [[1.0; 2]; 2],
+        }
+    }
+}
+
 #[cfg(feature = "cuda")]
 impl Costs {
-    /// The stages of a transaction are chosen one by one, but what is edited on the processor has to be brought to the
-    /// card for meshing: so the card is charged less, or the processor more, for edits.
-    pub fn edit(&self, bricks: usize, missing: usize) -> Estimate {
-        let blocks = (bricks as f64 * BLOCKS_PER_BRICK) as usize;
-        let (mesh, card) = (self.mesh[0].at(blocks), self.mesh[1].at(blocks));
-        let brought = card + self.upload * bricks as f64;
+    /// The stages of a transaction are chosen one by one. But what is edited on the processor has to be brought to the
+    /// card before it is meshed there, and that counts already when edits are chosen.
+    pub fn edit(&self, load: Load) -> Estimate {
+        let rough = self.rough.map(|each| each * load.rough as f64);
+        let blocks = (load.amount as f64 * BLOCKS_PER_BRICK) as usize;
+        let mesh = [0, 1].map(|on| self.mesh[on].at(blocks) * self.drift[1][on]);
+        let brought = mesh[1] + self.upload * load.amount as f64;
         estimate(
-            self.edit[0].at(bricks) + mesh.min(brought),
-            self.edit[1].at(bricks) + self.upload * missing as f64 + card.min(mesh),
+            (self.edit[0].at(load.amount) + rough[0]) * self.drift[0][0] + mesh[0].min(brought),
+            (self.edit[1].at(load.amount) + rough[1]) * self.drift[0][1]
+                + self.upload * load.missing as f64
+                + mesh[0].min(mesh[1]),
         )
     }
 
-    /// Meshing blocks, when so many bricks are not on the card.
-    pub fn mesh(&self, blocks: usize, missing: usize) -> Estimate {
-        estimate(self.mesh[0].at(blocks), self.mesh[1].at(blocks) + self.upload * missing as f64)
+    /// Meshing blocks.
+    pub fn mesh(&self, load: Load) -> Estimate {
+        let [cpu, cuda] = [0, 1].map(|on| self.mesh[on].at(load.amount) * self.drift[1][on]);
+        estimate(cpu, cuda + self.upload * load.missing as f64)
+    }
+
+    /// Takes in how long a stage took that was expected to take so long, the other one's part not counted.
+    pub fn learn(&mut self, stage: Stage, load: Load, is_cuda: bool, took: Duration) {
+        let on = usize::from(is_cuda);
+        let drift = &mut self.drift[stage as usize];
+        let expected = match stage {
+            Stage::Edit => self.edit[on].at(load.amount) + self.rough[on] * load.rough as f64,
+            Stage::Mesh => self.mesh[on].at(load.amount),
+        };
+        let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
+        if expected > 0.0 {
+            let found = (took.as_secs_f64() / expected).clamp(DRIFT[0], DRIFT[1]);
+            drift[on] += (found - drift[on]) * LEARNING;
+            drift[1 - on] += (1.0 - drift[1 - on]) * FORGETTING;
+        }
     }
 }
 
@@ -116,7 +189,7 @@ fn estimate(cpu: f64, cuda: f64) -> Estimate {
     Estimate { cpu: time(cpu), cuda: time(cuda) }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cuda"))]
 mod tests {
     use super::*;
 
@@ -130,5 +203,25 @@ mod tests {
         let micros = |amount| (curve.at(amount) * 1e6).round();
         assert_eq!([1, 10, 15, 20, 30, 40].map(micros), [20.0, 20.0, 25.0, 30.0, 30.0, 30.0]);
         assert_eq!([60, 80, 160].map(micros), [70.0, 110.0, 270.0]);
+    }
+
+    #[test]
+    fn what_takes_longer_than_it_should_is_expected_to_next_time() {
+        let mut costs = Costs::default();
+        for curve in &mut costs.mesh {
+            curve.push(10, Duration::from_micros(10));
+            curve.push(100, Duration::from_micros(100));
+        }
+        let load = Load { amount: 50, ..Load::default() };
+        let expected = |costs: &Costs| {
+            let estimate = costs.mesh(load);
+            [estimate.cpu, estimate.cuda].map(|time| time.as_micros())
+        };
+        assert_eq!(expected(&costs), [50, 50]);
+        (0..30).for_each(|_| costs.learn(Stage::Mesh, load, true, Duration::from_micros(100)));
+        assert_eq!(expected(&costs), [50, 99]);
+        // And forgotten while the other one is used.
+        (0..400).for_each(|_| costs.learn(Stage::Mesh, load, false, Duration::from_micros(50)));
+        assert_eq!(expected(&costs), [50, 50]);
     }
 }

@@ -1,9 +1,12 @@
 //! What a terrain runs its transactions on.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::{Backend, Choice, Compute, Cpu};
+use web_time::Instant;
+
+use super::{Backend, Choice, Compute, Cpu, Stage};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
@@ -21,7 +24,11 @@ pub struct Engine(Arc<Shared>);
 struct Shared {
     #[cfg(feature = "cuda")]
     cuda: Option<Cuda>,
+    figures: Mutex<EngineFigures>,
 }
+
+/// Choices that are remembered.
+const REMEMBERED: usize = 64;
 
 /// What an engine has to run on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -44,7 +51,7 @@ pub struct EngineFigures {
     /// Stages of transactions done on a card.
     pub cuda: u64,
     /// The latest ones, newest last.
-    pub choices: Vec<Choice>,
+    pub choices: VecDeque<Choice>,
 }
 
 impl Default for Engine {
@@ -62,12 +69,13 @@ impl Engine {
         Self(Arc::new(Shared {
             #[cfg(feature = "cuda")]
             cuda: (backend != Backend::Cpu).then(|| Cuda::open(backend == Backend::Auto)),
+            figures: Mutex::default(),
         }))
     }
 
     #[cfg(all(test, feature = "cuda"))]
     pub(super) fn from_cuda(cuda: Cuda) -> Self {
-        Self(Arc::new(Shared { cuda: Some(cuda) }))
+        Self(Arc::new(Shared { cuda: Some(cuda), figures: Mutex::default() }))
     }
 
     /// What it has to run on now.
@@ -81,20 +89,16 @@ impl Engine {
 
     /// Waits until it is known whether a card can be used, but no longer than that. Tools and benchmarks want this.
     pub fn wait(&self, longest: Duration) -> EngineState {
-        let start = web_time::Instant::now();
+        let start = Instant::now();
         while self.state() == EngineState::Opening && start.elapsed() < longest {
             std::thread::sleep(Duration::from_millis(2));
         }
         self.state()
     }
 
-    /// What it did so far. Without a card nothing is counted.
+    /// What it did so far.
     pub fn figures(&self) -> EngineFigures {
-        #[cfg(feature = "cuda")]
-        if let Some(cuda) = &self.0.cuda {
-            return cuda.figures();
-        }
-        EngineFigures::default()
+        self.0.figures.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     pub(crate) fn compute(&self) -> &dyn Compute {
@@ -102,20 +106,60 @@ impl Engine {
     }
 }
 
+impl Shared {
+    fn remember(&self, choice: Choice) {
+        let mut figures = self.figures.lock().unwrap_or_else(PoisonError::into_inner);
+        if choice.is_cuda {
+            figures.cuda += 1
+        } else {
+            figures.cpu += 1
+        }
+        if figures.choices.len() == REMEMBERED {
+            figures.choices.pop_front();
+        }
+        figures.choices.push_back(choice);
+    }
+}
+
 impl Compute for Shared {
     fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
+        let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            return cuda.edit(work, each);
+            let (ledgers, load) = cuda.edit(work, &mut choice);
+            match ledgers {
+                Some(ledgers) => ledgers.into_iter().for_each(each),
+                None => Cpu.edit(work, each),
+            }
+            choice.took = start.elapsed();
+            cuda.learn(&choice, load);
+            return self.remember(choice);
         }
         Cpu.edit(work, each);
+        choice.took = start.elapsed();
+        self.remember(choice);
     }
 
     fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts])) {
+        let (start, mut choice) = (Instant::now(), Choice::of(Stage::Mesh, blocks.len()));
+        let mut took = Duration::ZERO;
+        let mut then = |parts: &[Parts]| {
+            took = start.elapsed();
+            then(parts);
+        };
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            return cuda.mesh(view, blocks, then);
+            let (parts, load) = cuda.mesh(view, blocks, &mut choice);
+            match parts {
+                Some(parts) => then(&parts),
+                None => Cpu.mesh(view, blocks, &mut then),
+            }
+            choice.took = took;
+            cuda.learn(&choice, load);
+            return self.remember(choice);
         }
-        Cpu.mesh(view, blocks, then);
+        Cpu.mesh(view, blocks, &mut then);
+        choice.took = took;
+        self.remember(choice);
     }
 }

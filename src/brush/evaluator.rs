@@ -182,6 +182,11 @@ pub(crate) struct Constants {
 
 #[cfg(feature = "cuda")]
 impl Evaluator {
+    /// Is the shape rough?
+    pub(crate) fn is_rough(&self) -> bool {
+        self.grain.is_some()
+    }
+
     /// All that distances are computed from.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();

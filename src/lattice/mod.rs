@@ -20,7 +20,7 @@ mod tables;
 
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
-pub(crate) use places::sort_by_place;
+pub(crate) use places::{order_of_places, sort_by_place};
 pub(crate) use tables::table_bytes;
 
 use glam::IVec3;

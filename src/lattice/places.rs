@@ -9,10 +9,14 @@ const PLACES: u64 = 16;
 const PARALLEL: usize = 2048;
 
 /// Sorts items by their positions, by the first number, then the second, then the third; equal ones stay in order.
-pub(crate) fn sort_by_place<T: Copy + Send>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3] + Sync) {
-    if items.is_sorted_by_key(&place) {
-        return;
+pub(crate) fn sort_by_place<T: Copy + Sync>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3] + Sync) {
+    if !items.is_sorted_by_key(&place) {
+        *items = order_of_places(items, place).into_iter().map(|item| items[item as usize]).collect();
     }
+}
+
+/// The numbers of items as [`sort_by_place`] would sort them.
+pub(crate) fn order_of_places<T: Sync>(items: &[T], place: impl Fn(&T) -> [i32; 3] + Sync) -> Vec<u32> {
     let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
     for at in items.iter().map(&place) {
         (0..3).for_each(|i| (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i])));
@@ -20,33 +24,37 @@ pub(crate) fn sort_by_place<T: Copy + Send>(items: &mut Vec<T>, place: impl Fn(&
     let size: [u64; 3] = std::array::from_fn(|i| u64::from(low[i].abs_diff(high[i])) + 1);
     let volume = size.iter().fold(1u64, |all, &size| all.saturating_mul(size));
     if volume <= PLACES * items.len() as u64 {
-        count_into_order(items, volume as usize, |item| {
+        return counted(items, volume as usize, |item| {
             let [x, y, z] = place(item);
             let [x, y, z] = [x - low[0], y - low[1], z - low[2]].map(|step| step as usize);
             (x * size[1] as usize + y) * size[2] as usize + z
         });
-    } else if items.len() < PARALLEL {
-        items.sort_by_key(place);
-    } else {
-        items.par_sort_by_key(place);
     }
+    let mut order: Vec<u32> = (0..items.len() as u32).collect();
+    let key = |&item: &u32| place(&items[item as usize]);
+    if items.len() < PARALLEL {
+        order.sort_by_key(key)
+    } else {
+        order.par_sort_by_key(key)
+    }
+    order
 }
 
-/// A stable sort by small numbers, all below `end`.
-fn count_into_order<T: Copy>(items: &mut Vec<T>, end: usize, number: impl Fn(&T) -> usize) {
+/// The order of items by small numbers, all below `end`.
+fn counted<T>(items: &[T], end: usize, number: impl Fn(&T) -> usize) -> Vec<u32> {
     let mut next = vec![0u32; end];
     items.iter().for_each(|item| next[number(item)] += 1);
     let mut before = 0;
     for next in &mut next {
         (*next, before) = (before, before + *next);
     }
-    let mut sorted = items.clone();
-    for item in items.iter() {
-        let next = &mut next[number(item)];
-        sorted[*next as usize] = *item;
+    let mut order = vec![0; items.len()];
+    for (item, own) in (0..).zip(items) {
+        let next = &mut next[number(own)];
+        order[*next as usize] = item;
         *next += 1;
     }
-    *items = sorted;
+    order
 }
 
 #[cfg(test)]

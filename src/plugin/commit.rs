@@ -10,7 +10,9 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use super::entities::{TerrainEntities, tell};
 use super::load::Loading;
 use super::meshes::{self, Ready};
-use super::{BrushApplied, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, MaterialColors};
+use super::{
+    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, MaterialColors,
+};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Commit, Drawn, Terrain};
 
@@ -38,6 +40,7 @@ pub(super) fn begin_transactions(
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
+    engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
     mut number: Local<u64>,
 ) {
@@ -49,10 +52,10 @@ pub(super) fn begin_transactions(
             continue;
         }
         let Some(transaction) = terrain.begin() else { continue };
-        let colors = colors.clone();
+        let (colors, engine) = (colors.clone(), terrain.engine().unwrap_or(&engine).clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let start = Instant::now();
-            let mut commit = transaction.run();
+            let mut commit = transaction.run_on(&engine);
             let build = |surface: &SurfaceMesh| if draws { meshes::build(surface, &colors) } else { None };
             // Taken out, so that they are dropped here and not on the main thread.
             let updates = std::mem::take(&mut commit.meshes);

@@ -29,7 +29,7 @@ pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, TargetedBrush,
 };
 pub use query::{TerrainHit, Terrains};
-pub use settings::{BurrowFigures, BurrowSettings};
+pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings};
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
@@ -78,6 +78,7 @@ impl Plugin for TerrainPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<BurrowSettings>()
             .init_resource::<BurrowFigures>()
+            .init_resource::<BurrowEngine>()
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()

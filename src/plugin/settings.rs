@@ -4,6 +4,26 @@ use std::time::Duration;
 
 use bevy::prelude::*;
 
+use crate::backend::{Backend, Engine};
+
+/// What terrains without an engine of their own run their transactions on. [`Backend::Auto`] unless the game inserts
+/// another one, best before the plugins; [`Engine::state`] and [`Engine::figures`] tell what it does.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::backend::{Backend, Engine};
+/// # use bevy_burrow::prelude::*;
+/// App::new().insert_resource(BurrowEngine(Engine::new(Backend::Cpu)));
+/// ```
+#[derive(Resource, Clone, Deref)]
+pub struct BurrowEngine(pub Engine);
+
+impl Default for BurrowEngine {
+    fn default() -> Self {
+        Self(Engine::new(Backend::Auto))
+    }
+}
+
 /// How the plugin spends its frames.
 #[derive(Resource, Reflect, Clone, Debug, PartialEq, Eq)]
 #[reflect(Resource, Default)]

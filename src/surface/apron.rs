@@ -1,6 +1,6 @@
 //! The samples around a brick, copied out of its bricks into one array.
 
-use std::ops::Range;
+use std::ops::RangeInclusive;
 
 use wide::{i16x8, i32x8};
 
@@ -77,24 +77,23 @@ impl Apron {
         &*self.0
     }
 
-    /// Copies some rows of some layers, both counted from the one before the brick's first: of each layer from `first` on
-    /// the rows in `layers`.
+    /// Copies some rows of some layers, both counted from the one before the brick's first.
     pub fn fill(
         &mut self,
         neighbours: &Neighbours,
         heights: &Heights,
-        first: usize,
-        layers: impl Iterator<Item = Range<usize>>,
+        layers: RangeInclusive<usize>,
+        rows: RangeInclusive<usize>,
     ) {
         let low = neighbours.at.origin().y - 1;
-        for (layer, rows) in (first..).zip(layers) {
+        for layer in layers {
             let height = (low + layer as i32) * ONE;
             // Layer 0 is the last one of the brick below; with rows it is the same.
             let (level, y) = (layer.div_ceil(8), (layer + 7) % 8);
             for (z, bricks) in neighbours.bricks[level].as_chunks::<3>().0.iter().enumerate() {
                 let stored = bricks.map(|brick| brick.map_or(&PRISTINE, Brick::samples));
-                let own = rows.start.max((z * 8).saturating_sub(7))..rows.end.min(z * 8 + 1);
-                for (row, heights) in own.clone().zip(heights.iter().skip(own.start)) {
+                let (first, last) = ((z * 8).saturating_sub(7).max(*rows.start()), (z * 8).min(*rows.end()));
+                for (row, heights) in (first..=last).zip(heights.iter().skip(first)) {
                     let at = y * 64 + (row + 7) % 8 * 8;
                     fill_row(&mut self.0[layer * AREA + row * SIDE..], stored, heights, height, at);
                 }

@@ -136,14 +136,11 @@ impl Mesher {
         let drawn = cubes.within(cells, brick);
         let filled = |y: &usize| drawn[*y] != 0;
         let (Some(bottom), Some(top)) = ((0..8).find(filled), (0..8).rfind(filled)) else { return };
-        // The apron starts one before the cells; the gradients at the corners beyond them look one further. So a layer
-        // shows in the cells of the three below it and of its own.
-        let rows = (bottom..=top + 3).map(|layer| {
-            let cells = drawn[layer.saturating_sub(3)..=layer.min(7)].iter().fold(0, |all, cells| all | cells);
-            let (near, far) = (cells.trailing_zeros() / Z, cells.checked_ilog2().unwrap_or(0) / Z);
-            if cells == 0 { 0..0 } else { near as usize..far as usize + 4 }
-        });
-        self.apron.fill(around, &stack.heights, bottom, rows);
+        let all = drawn.iter().fold(0, |all, layer| all | layer);
+        let (near, far) = (all.trailing_zeros() / Z, all.ilog2() / Z);
+        // The apron starts one before the cells; the gradients at the corners beyond them look one further.
+        let rows = near as usize..=far as usize + 3;
+        self.apron.fill(around, &stack.heights, bottom..=top + 3, rows);
         self.list_edges(&cubes.solid, &drawn, bottom, top);
         self.crossings.make(&self.apron, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);

@@ -90,7 +90,7 @@ pub(crate) struct Submission {
 /// to it. Committing by oneself, with [`apply`](Self::apply) say, works too, but then all of its meshes are made again.
 pub struct Terrain {
     world: Arc<World>,
-    engine: Engine,
+    engine: Option<Engine>,
     voxel_size: f32,
     queue: Vec<Submission>,
     in_flight: Option<InFlight>,
@@ -118,7 +118,7 @@ impl Terrain {
         let world = World::new(ground.into(), settings.chunk_size as i32);
         Ok(Self {
             world: Arc::new(world),
-            engine: Engine::default(),
+            engine: None,
             voxel_size: settings.voxel_size,
             queue: Vec::new(),
             in_flight: None,
@@ -126,10 +126,15 @@ impl Terrain {
         })
     }
 
-    /// From now on, transactions run on this engine. The world is the same whichever it is. A new terrain has one of the
-    /// CPU; the plugin gives every terrain its own.
+    /// From now on, transactions run on this engine. The world is the same whichever it is. Without one of its own a
+    /// terrain runs on the processor, or on whatever the plugin has.
     pub fn set_engine(&mut self, engine: Engine) {
-        self.engine = engine;
+        self.engine = Some(engine);
+    }
+
+    /// The engine of its own, if it has one.
+    pub fn engine(&self) -> Option<&Engine> {
+        self.engine.as_ref()
     }
 
     /// Metres along a voxel's side.
@@ -190,7 +195,8 @@ impl Terrain {
         let submissions: Arc<[Submission]> = std::mem::take(&mut self.queue).into();
         let ticket = unique();
         self.in_flight = Some(InFlight { ticket, submissions: Arc::clone(&submissions) });
-        Some(Transaction::new(ticket, self.snapshot(), submissions, self.engine.clone()))
+        let engine = self.engine.clone().unwrap_or_default();
+        Some(Transaction::new(ticket, self.snapshot(), submissions, engine))
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.

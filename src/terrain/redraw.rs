@@ -13,7 +13,9 @@ use super::transaction::Stages;
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos, sort_by_place};
+use crate::lattice::{
+    BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox, TilePos, order_of_places, sort_by_place,
+};
 use crate::surface::block::{self, Block, Parts};
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
@@ -306,16 +308,17 @@ fn assemble(world: &World, parts: &[Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)
     let fresh = |(block, vertices, indices): (Block, _, _)| {
         (block.chunk, Fresh { key: key(block.brick), vertices, indices })
     };
-    let mut all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
-    sort_by_place(&mut all, |(chunk, _)| chunk.as_ivec3().to_array());
+    let all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
+    let mut order = order_of_places(&all, |(chunk, _)| chunk.as_ivec3().to_array());
     let is_large = all.len() >= PARALLEL_BLOCKS;
-    let mut chunks: Vec<&mut [(ChunkPos, Fresh)]> = all.chunk_by_mut(|a, b| a.0 == b.0).collect();
-    let update = |parts: &mut &mut [(ChunkPos, Fresh)]| {
-        parts.sort_unstable_by_key(|(_, part)| part.key);
-        let chunk = parts[0].0;
+    let part = |number: u32| &all[number as usize];
+    let mut chunks: Vec<&mut [u32]> = order.chunk_by_mut(|&a, &b| part(a).0 == part(b).0).collect();
+    let update = |numbers: &mut &mut [u32]| {
+        numbers.sort_unstable_by_key(|&number| part(number).1.key);
+        let chunk = part(numbers[0]).0;
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
-        Some((chunk, Arc::new(old.updated(parts.iter().map(|part| part.1))?)))
+        Some((chunk, Arc::new(old.updated(numbers.iter().map(|&number| part(number).1))?)))
     };
     if is_large {
         chunks.par_iter_mut().filter_map(update).collect()

@@ -243,6 +243,11 @@ impl Commit {
         self.ticket
     }
 
+    /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
+    pub fn sample_hash(&self) -> u64 {
+        self.sample_hash
+    }
+
     /// What happens to fields when this is committed, by chunk.
     pub fn field_news(&self) -> &[(ChunkPos, FieldNews)] {
         &self.news

@@ -101,6 +101,7 @@ pub struct Brick {
     edited: Layers,
     /// `None` while all are [`MaterialId::GROUND`].
     materials: Option<Box<[MaterialId; LEN]>>,
+    #[cfg_attr(not(feature = "cuda"), expect(dead_code))]
     pub(crate) tag: Tag,
 }
 

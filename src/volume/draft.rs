@@ -142,7 +142,6 @@ impl<'a> EditWork<'a> {
     }
 
     /// Every brick that some edit may reach, once for each edit.
-    #[cfg(feature = "cuda")]
     pub(crate) fn jobs(&self) -> &[Job] {
         &self.jobs
     }

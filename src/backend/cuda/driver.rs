@@ -18,13 +18,20 @@ use super::layout::THREADS;
 /// The kernels, compiled ahead.
 const PTX: &str = include_str!("kernels.ptx");
 
+/// From how many blocks on a launch is timed; for small ones that would take longer than it tells.
+const TIMED: u32 = 64;
+
 /// A card with the kernels on it.
 pub(super) struct Card {
     context: Arc<CudaContext>,
     stream: Arc<CudaStream>,
-    /// Recorded before the first upload, before a kernel, and after what is to be waited for.
-    marks: [CudaEvent; 3],
+    /// Recorded after what is to be waited for.
+    done: CudaEvent,
+    /// Recorded before the first upload and before a long launch.
+    marks: [CudaEvent; 2],
     is_begun: bool,
+    /// Was the last launch a long one?
+    is_timed: bool,
     module: sys::CUmodule,
     kernels: [CUfunction; 3],
 }
@@ -75,8 +82,8 @@ impl Card {
         }
         let stream = context.new_stream().map_err(failed)?;
         let mark = || context.new_event(Some(sys::CUevent_flags::CU_EVENT_DEFAULT)).map_err(failed);
-        let marks = [mark()?, mark()?, mark()?];
-        Ok(Self { context, stream, marks, is_begun: false, module, kernels })
+        let (done, marks) = (mark()?, [mark()?, mark()?]);
+        Ok(Self { context, stream, done, marks, is_begun: false, is_timed: false, module, kernels })
     }
 
     fn bind(&self) -> Result<(), Fault> {
@@ -203,7 +210,10 @@ impl Device for Card {
             return Ok(());
         }
         self.bind()?;
-        self.marks[1].record(&self.stream).map_err(failed)?;
+        self.is_timed = blocks >= TIMED && self.is_begun;
+        if self.is_timed {
+            self.marks[1].record(&self.stream).map_err(failed)?;
+        }
         // The driver copies the one parameter during the call; its words are 64 bits wide.
         let mut words = vec![0u64; params.len().div_ceil(8)];
         bytemuck::cast_slice_mut(&mut words)[..params.len()].copy_from_slice(params);
@@ -216,9 +226,11 @@ impl Device for Card {
     }
 
     fn times(&mut self) -> [Duration; 2] {
-        let [begun, launched, done] = &self.marks;
-        [begun, launched].map(|start| {
-            let millis = start.elapsed_ms(done).unwrap_or_default();
+        if !self.is_timed {
+            return [Duration::ZERO; 2];
+        }
+        self.marks.each_ref().map(|start| {
+            let millis = start.elapsed_ms(&self.done).unwrap_or_default();
             Duration::try_from_secs_f32(millis / 1e3).unwrap_or_default()
         })
     }
@@ -226,15 +238,14 @@ impl Device for Card {
     fn wait(&mut self) -> Result<(), Fault> {
         self.bind()?;
         self.is_begun = false;
-        let done = &self.marks[2];
-        done.record(&self.stream).map_err(failed)?;
+        self.done.record(&self.stream).map_err(failed)?;
         // Small transactions take less time than a sleeping thread needs to wake.
         for _ in 0..20_000 {
-            if done.try_is_complete().map_err(failed)? {
+            if self.done.try_is_complete().map_err(failed)? {
                 return Ok(());
             }
             std::hint::spin_loop();
         }
-        done.synchronize().map_err(failed)
+        self.done.synchronize().map_err(failed)
     }
 }

@@ -7,10 +7,11 @@ use super::layout::{
     self, EditCount, EditJob, EditParams, EditPart, EditResult, MATERIAL_BYTES, MOST_JOBS, MOST_LIST, NONE,
     RECORD_BYTES,
 };
-use super::mail::{Outbox, Plan, map};
+use super::mail::{Outbox, Plan, fill, map};
 use super::session::{Session, Uploads};
+use super::slots::reference;
 use crate::ground::MaterialId;
-use crate::lattice::ChunkGrid;
+use crate::lattice::{BrickPos, ChunkGrid};
 use crate::volume::{Brick, Count, DraftedBrick, EditWork, Fate, Job, Ledger, PartEffect, Tool};
 
 /// What the edit kernel writes.
@@ -65,11 +66,39 @@ impl EditOutput {
         if is_copied { device.wait() } else { Ok(()) }
     }
 
-    fn totals(&self) -> Totals {
-        let mut totals = [0; 4];
-        totals.copy_from_slice(self.totals.entries::<u32>(4));
-        let [records, materials, parts, counts] = totals.map(|count: u32| count as usize);
-        Totals { records, materials, parts, counts }
+    /// How much of each list was written. Asking the device takes longer than a small launch; so where lists are in the
+    /// host's memory, they are wiped before, and end where no entry stands.
+    fn totals(&mut self, results: usize) -> Totals {
+        if !self.parts.is_mapped() {
+            let mut totals = [0; 4];
+            totals.copy_from_slice(self.totals.entries::<u32>(4));
+            let [records, materials, parts, counts] = totals.map(|count: u32| count as usize);
+            return Totals { records, materials, parts, counts };
+        }
+        let (parts, counts) = (self.parts.capacity() as usize, self.counts.capacity() as usize);
+        let parts = self.parts.entries::<EditPart>(parts).iter().take_while(|part| part.job != NONE).count();
+        let counts =
+            self.counts.entries::<EditCount>(counts).iter().take_while(|count| count.edit != NONE).count();
+        self.parts.wrote(parts);
+        self.counts.wrote(counts);
+        // A list that is full may have been too short; nobody knows by how much.
+        let wanted = |count: usize, list: &Outbox| match list.capacity() as usize {
+            full if full == count => 2 * count,
+            _ => count,
+        };
+        let mut totals = Totals {
+            records: 0,
+            materials: 0,
+            parts: wanted(parts, &self.parts),
+            counts: wanted(counts, &self.counts),
+        };
+        for result in self.results.entries::<EditResult>(results) {
+            let is = |flag: u32| result.flags & flag != 0;
+            let is_stored = is(EditResult::CHANGED) && !is(EditResult::UNIFORM);
+            totals.records += usize::from(is_stored);
+            totals.materials += usize::from(is_stored && is(EditResult::HAS_MATERIALS));
+        }
+        totals
     }
 }
 
@@ -79,11 +108,22 @@ const LONG: usize = 64;
 /// From how many bricks on they are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 256;
 
+/// Most passes: each gives twice the room where it is not known how much is needed.
+const PASSES: usize = 12;
+
 /// Bricks that one thread makes of what came back.
 const GROUP: usize = 64;
 
 /// A slot that is to hold a changed brick, with its tag.
 type Target = (u32, u64);
+
+/// A brick that edits may reach: what it is now, its stack, and where its edits begin in the list.
+struct Site {
+    pos: BrickPos,
+    base: u32,
+    stack: u32,
+    first: u32,
+}
 
 impl Session {
     /// Applies edits: what they changed, brick by brick.
@@ -109,30 +149,37 @@ impl Session {
         if bricks.len() > MOST_JOBS || work.jobs().len() > MOST_LIST {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
-        let mut jobs = self.edit_jobs(work, bricks, uploads, targets)?;
+        let sites = self.sites(work, bricks, uploads)?;
+        self.bricks.take_many(&mut *self.device, sites.len(), targets)?;
         let mut plan = Plan::default();
         uploads.plan(&mut plan);
-        let job_list = plan.section::<EditJob>(jobs.len());
+        let job_list = plan.section::<EditJob>(sites.len());
         let tool_list = plan.section::<layout::Tool>(work.tools.len());
-        let edits = plan.section::<u32>(bricks.iter().map(|jobs| jobs.len()).sum());
+        let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
         self.inbox.open(&mut *self.device, &plan)?;
-        let list = self.inbox.entries::<u32>(edits).iter_mut();
-        list.zip(bricks.iter().copied().flatten()).for_each(|(entry, job)| *entry = job.edit);
-        let mut first = 0;
-        for (job, own) in jobs.iter_mut().zip(bricks) {
-            (job.first, job.count) = (first, own.len() as u32);
-            first += job.count;
-        }
-        self.inbox.put(job_list, &jobs);
+        fill(work.jobs(), self.inbox.entries(edits), LONG, |_, job| job.edit);
+        let targets_of = &*targets;
+        fill(&sites, self.inbox.entries(job_list), LONG, |number, site| EditJob {
+            brick: site.pos.0.to_array(),
+            base: site.base,
+            target: targets_of[number].0,
+            stack: site.stack,
+            first: site.first,
+            count: bricks[number].len() as u32,
+            cuts: layout::cuts(work.grid, site.pos),
+            pad: [0; 3],
+        });
         let tools: Vec<layout::Tool> = work.tools.iter().map(tool).collect();
         self.inbox.put(tool_list, &tools);
         self.inbox.entries::<u32>(counters).fill(0);
-        let is_long = jobs.len() >= COPIED;
-        self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
+        let is_long = sites.len() >= COPIED;
+        self.edits.results.reserve(&mut *self.device, sites.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
 
-        for _ in 0..2 {
+        for _ in 0..PASSES {
+            self.edits.parts.wipe();
+            self.edits.counts.wipe();
             self.send(&plan, uploads)?;
             let params = EditParams {
                 bricks: self.bricks.base(),
@@ -151,35 +198,39 @@ impl Session {
                 part_capacity: self.edits.parts.capacity(),
                 count_capacity: self.edits.counts.capacity(),
             };
-            self.device.launch(Kernel::Edit, jobs.len() as u32, bytemuck::bytes_of(&params))?;
-            self.edits.results.fetch(&mut *self.device, jobs.len())?;
-            self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
+            self.device.launch(Kernel::Edit, sites.len() as u32, bytemuck::bytes_of(&params))?;
+            self.edits.results.fetch(&mut *self.device, sites.len())?;
+            if !self.edits.parts.is_mapped() {
+                self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
+            }
             self.device.wait()?;
             self.times = self.device.times();
-            let totals = self.edits.totals();
+            let totals = self.edits.totals(sites.len());
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
                 self.edits.fetch(&mut *self.device, totals)?;
                 self.free_targets(targets);
                 return Ok(self.edits.ledgers(work, bricks, targets, totals));
             }
-            // A second pass, with room for all.
+            // Once more, with room for all.
         }
         Err(Fault::Failed("results changed from one pass to the next".into()))
     }
 
-    /// A job for each brick, with slots for what it is and what it will be.
-    fn edit_jobs<'a>(
+    /// The bricks that edits may reach, as the device knows them.
+    fn sites<'a>(
         &mut self,
         work: &EditWork<'a>,
         bricks: &[&[Job]],
         uploads: &mut Uploads<'a>,
-        targets: &mut Vec<Target>,
-    ) -> Result<Vec<EditJob>, Fault> {
-        let base = |jobs: &&[Job]| jobs.first().and_then(|job| work.base.brick(job.pos()));
-        let bases = map(bricks, LONG, base);
-        let mut list = Vec::with_capacity(bricks.len());
+    ) -> Result<Vec<Site>, Fault> {
+        let slots = &self.bricks;
+        let stored = map(bricks, LONG, |jobs| {
+            let brick = work.base.brick(jobs.first()?.pos())?;
+            Some((brick, slots.find(brick.tag.get())))
+        });
+        let (mut sites, mut first) = (Vec::with_capacity(bricks.len()), 0);
         let mut last = None;
-        for (jobs, base) in bricks.iter().zip(bases) {
+        for (jobs, stored) in bricks.iter().zip(stored) {
             let Some(pos) = jobs.first().map(|job| job.pos()) else { continue };
             let place = (pos.0.x, pos.0.z);
             let stack = match last {
@@ -187,19 +238,15 @@ impl Session {
                 _ => self.need_stack(uploads, place)?,
             };
             last = Some((place, stack));
-            let base = base.map_or(Ok(NONE), |brick| self.need_brick(uploads, brick))?;
-            let target = self.bricks.take(&mut *self.device)?;
-            targets.push(target);
-            list.push(EditJob {
-                brick: pos.0.to_array(),
-                base,
-                target: target.0,
-                stack,
-                cuts: layout::cuts(work.grid, pos),
-                ..EditJob::default()
-            });
+            let base = match stored {
+                None => NONE,
+                Some((brick, Some(slot))) => reference(slot, brick),
+                Some((brick, None)) => self.need_brick(uploads, brick)?,
+            };
+            sites.push(Site { pos, base, stack, first });
+            first += jobs.len() as u32;
         }
-        Ok(list)
+        Ok(sites)
     }
 
     /// Gives slots back that no brick of its own will be in: of bricks that did not change, or are all alike.

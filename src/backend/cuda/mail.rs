@@ -81,6 +81,9 @@ impl Inbox {
     }
 }
 
+/// What [`Outbox::wipe`] writes: to kernels and host, the number of no entry.
+const WIPED: u8 = 0xff;
+
 /// A list that kernels write. Short ones go straight into the host's memory, where the device can do that; long ones into
 /// its own, and what is used of them is copied afterwards.
 pub(super) struct Outbox {
@@ -90,13 +93,15 @@ pub(super) struct Outbox {
     /// Address, and how many entries there is room for; none at first.
     own: Option<(u64, usize)>,
     is_long: bool,
+    /// Entries at the front of the host's memory that are not wiped.
+    stale: usize,
 }
 
 impl Outbox {
     /// A list of entries of so many bytes, with room for some.
     pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
         let host = device.alloc_host(entry * capacity)?;
-        Ok(Self { entry, host, capacity, own: None, is_long: false })
+        Ok(Self { entry, host, capacity, own: None, is_long: false, stale: capacity })
     }
 
     /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
@@ -108,6 +113,25 @@ impl Outbox {
     pub fn capacity(&self) -> u32 {
         let own = self.own.map_or(0, |(_, capacity)| capacity);
         (if self.is_own() { own } else { self.capacity }) as u32
+    }
+
+    /// Does the next kernel write it straight into the host's memory?
+    pub fn is_mapped(&self) -> bool {
+        !self.is_own()
+    }
+
+    /// Wipes whatever was written, before the next launch, if that writes here.
+    pub fn wipe(&mut self) {
+        if self.is_own() {
+            return;
+        }
+        self.host.bytes_mut()[..self.stale * self.entry].fill(WIPED);
+        self.stale = 0;
+    }
+
+    /// So many entries at the front are said to be written.
+    pub fn wrote(&mut self, entries: usize) {
+        self.stale = self.stale.max(entries.min(self.capacity));
     }
 
     /// Is it written on the device?
@@ -123,6 +147,7 @@ impl Outbox {
         if entries > self.capacity {
             let room = entries + entries / 4;
             (self.host, self.capacity) = (device.alloc_host(room * self.entry)?, room);
+            self.stale = room;
         }
         if self.is_own() && (is_short || self.own.is_none()) {
             if let Some((address, _)) = self.own.take() {
@@ -143,6 +168,7 @@ impl Outbox {
     pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
         match self.own {
             Some((address, _)) if entries > 0 && self.is_own() => {
+                self.wrote(entries);
                 device.download(address, &mut *self.host, 0..entries * self.entry).map(|()| true)
             }
             _ => Ok(false),

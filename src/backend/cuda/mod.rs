@@ -33,15 +33,11 @@ mod kernel_tests;
 #[cfg(test)]
 mod tests;
 
-use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
-use web_time::Instant;
-
-use super::choice::Costs;
-use super::{Choice, Compute, Cpu, EngineFigures, EngineState, Stage};
+use super::choice::{Costs, Load};
+use super::{Choice, EngineState, Stage};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
@@ -55,7 +51,6 @@ pub(super) struct Cuda {
     slot: Arc<Mutex<Place>>,
     /// What became of opening it, to be asked at any time.
     state: Arc<Mutex<EngineState>>,
-    record: Mutex<Record>,
 }
 
 /// Where the session is.
@@ -64,17 +59,6 @@ enum Place {
     Open(Box<Session>, Costs),
     Lost,
 }
-
-/// What was done.
-#[derive(Default)]
-struct Record {
-    cpu: u64,
-    cuda: u64,
-    choices: VecDeque<Choice>,
-}
-
-/// Choices that are remembered.
-const REMEMBERED: usize = 64;
 
 /// Of a device's free memory, the part that bricks and ground may take.
 const SHARE: usize = 4;
@@ -102,7 +86,6 @@ impl Cuda {
             is_auto,
             slot: Arc::new(Mutex::new(Place::Opening)),
             state: Arc::new(Mutex::new(EngineState::Opening)),
-            record: Mutex::default(),
         };
         let (slot, state) = (Arc::clone(&own.slot), Arc::clone(&own.state));
         let open = move || {
@@ -136,72 +119,64 @@ impl Cuda {
         lock(&self.state).clone()
     }
 
-    pub fn figures(&self) -> EngineFigures {
-        let record = lock(&self.record);
-        EngineFigures {
-            cpu: record.cpu,
-            cuda: record.cuda,
-            choices: record.choices.iter().copied().collect(),
-        }
-    }
-
-    /// Does a stage on the card if that is there, free and chosen. `None` means that the processor has to do it, together
-    /// with what is known of the choice.
+    /// Does a stage on the card if that is there, free and chosen; else the processor has to do it.
     fn offer<T>(
         &self,
-        stage: Stage,
-        amount: usize,
-        missing: impl FnOnce(&Session) -> usize,
+        choice: &mut Choice,
+        load: impl FnOnce(&Session) -> Load,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
-    ) -> (Option<T>, Choice) {
-        let mut choice = Choice {
-            stage,
-            amount,
-            missing: 0,
-            estimate: None,
-            is_cuda: false,
-            took: Duration::ZERO,
-            device: Duration::ZERO,
-            kernel: Duration::ZERO,
-        };
+    ) -> (Option<T>, Load) {
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
-        let Ok(mut place) = self.slot.try_lock() else { return (None, choice) };
-        let Place::Open(session, costs) = &mut *place else { return (None, choice) };
-        choice.missing = missing(session);
-        let estimate = match stage {
-            Stage::Edit => costs.edit(amount, choice.missing),
-            Stage::Mesh => costs.mesh(amount, choice.missing),
+        let Ok(mut place) = self.slot.try_lock() else { return (None, Load::default()) };
+        let Place::Open(session, costs) = &mut *place else { return (None, Load::default()) };
+        let load = load(session);
+        let estimate = match choice.stage {
+            Stage::Edit => costs.edit(load),
+            Stage::Mesh => costs.mesh(load),
         };
-        choice.estimate = Some(estimate);
-        if amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda {
-            return (None, choice);
+        (choice.missing, choice.estimate) = (load.missing, Some(estimate));
+        if load.amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda {
+            return (None, load);
         }
         match work(session) {
             Ok(done) => {
                 choice.is_cuda = true;
                 [choice.device, choice.kernel] = session.times();
-                (Some(done), choice)
+                (Some(done), load)
             }
             Err(fault) => {
                 if !fault.is_passing() {
                     lose(&mut place, &self.state, &fault);
                 }
-                (None, choice)
+                (None, load)
             }
         }
     }
 
-    fn remember(&self, choice: Choice) {
-        let mut record = lock(&self.record);
-        if choice.is_cuda {
-            record.cuda += 1
-        } else {
-            record.cpu += 1
+    /// Takes in how long a stage took.
+    pub fn learn(&self, choice: &Choice, load: Load) {
+        if choice.estimate.is_some()
+            && let Ok(mut place) = self.slot.try_lock()
+            && let Place::Open(_, costs) = &mut *place
+        {
+            costs.learn(choice.stage, load, choice.is_cuda, choice.took);
         }
-        if record.choices.len() == REMEMBERED {
-            record.choices.pop_front();
-        }
-        record.choices.push_back(choice);
+    }
+
+    /// Applies edits on the card, if that is chosen.
+    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Vec<Ledger>>, Load) {
+        self.offer(choice, |session| session.load_of_edits(work), |session| session.edit(work))
+    }
+
+    /// Meshes blocks on the card, if that is chosen.
+    pub fn mesh(
+        &self,
+        view: &WorldView,
+        blocks: &[Block],
+        choice: &mut Choice,
+    ) -> (Option<Vec<Parts>>, Load) {
+        let load = |session: &Session| session.load_of_mesh(view, blocks);
+        self.offer(choice, load, |session| session.mesh(view, blocks))
     }
 }
 
@@ -210,35 +185,4 @@ fn lose(place: &mut Place, state: &Mutex<EngineState>, fault: &Fault) {
     log::warn!("bevy_burrow goes on without CUDA: {fault}");
     *place = Place::Lost;
     *lock(state) = EngineState::Lost(fault.to_string());
-}
-
-impl Compute for Cuda {
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
-        let start = Instant::now();
-        let missing = |session: &Session| session.missing_for_edits(work);
-        let (done, mut choice) =
-            self.offer(Stage::Edit, work.jobs().len(), missing, |session| session.edit(work));
-        match done {
-            Some(ledgers) => ledgers.into_iter().for_each(each),
-            None => Cpu.edit(work, each),
-        }
-        choice.took = start.elapsed();
-        self.remember(choice);
-    }
-
-    fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts])) {
-        let start = Instant::now();
-        let missing = |session: &Session| session.missing_for_mesh(view, blocks);
-        let (done, mut choice) =
-            self.offer(Stage::Mesh, blocks.len(), missing, |session| session.mesh(view, blocks));
-        let mut then = |parts: &[Parts]| {
-            choice.took = start.elapsed();
-            then(parts);
-        };
-        match done {
-            Some(parts) => then(&parts),
-            None => Cpu.mesh(view, blocks, &mut then),
-        }
-        self.remember(choice);
-    }
 }

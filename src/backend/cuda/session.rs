@@ -10,10 +10,12 @@ use super::layout::{self, BRICK_BYTES, RECORD_BYTES, ScatterJob, ScatterParams, 
 use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
 use super::slots::{Slots, reference};
+use crate::backend::choice::Load;
 use crate::ground::Ground;
+use crate::lattice::BrickPos;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
-use crate::volume::{Brick, EditWork};
+use crate::volume::{Brick, EditWork, Job, SampleView};
 
 /// A device that works for terrains.
 pub(super) struct Session {
@@ -32,13 +34,26 @@ pub(super) struct Session {
 /// Stacks of the ground on the device. They never change.
 pub(super) struct Stacks {
     slots: Slots,
-    /// Tags by ground and place.
-    of: FxHashMap<(u64, (i32, i32)), u64>,
+    /// Tags by place, in pages of each ground.
+    pages: FxHashMap<(u64, i32, i32), Box<[u64; PAGE * PAGE]>>,
+}
+
+/// Stacks along a side of a page.
+const PAGE: usize = 64;
+
+/// Most pages that are kept; all are let go of when there are more, and found again.
+const MOST_PAGES: usize = 1 << 12;
+
+/// The page of a stack, and its number there.
+fn page(ground: &Ground, (x, z): (i32, i32)) -> ((u64, i32, i32), usize) {
+    let side = PAGE as i32;
+    let number = z.rem_euclid(side) * side + x.rem_euclid(side);
+    ((ground.hash(), x.div_euclid(side), z.div_euclid(side)), number as usize)
 }
 
 impl Stacks {
     fn new(budget: usize) -> Self {
-        Self { slots: Slots::new(size_of::<StackRecord>(), budget), of: FxHashMap::default() }
+        Self { slots: Slots::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
     }
 
     /// Where the first one is.
@@ -48,17 +63,18 @@ impl Stacks {
 
     /// The slot of a stack that is there.
     pub fn find(&self, ground: &Ground, place: (i32, i32)) -> Option<u32> {
-        self.slots.find(*self.of.get(&(ground.hash(), place))?)
+        let (page, number) = page(ground, place);
+        self.slots.find(self.pages.get(&page)?[number])
     }
 
     /// A slot for a stack that is not there.
     fn take(&mut self, device: &mut dyn Device, ground: &Ground, place: (i32, i32)) -> Result<u32, Fault> {
         let (slot, tag) = self.slots.take(device)?;
-        if self.of.len() > 2 * self.slots.len() {
-            let slots = &self.slots;
-            self.of.retain(|_, tag| slots.find(*tag).is_some());
+        if self.pages.len() > MOST_PAGES {
+            self.pages.clear();
         }
-        self.of.insert((ground.hash(), place), tag);
+        let (page, number) = page(ground, place);
+        self.pages.entry(page).or_insert_with(|| Box::new([0; PAGE * PAGE]))[number] = tag;
         Ok(slot)
     }
 }
@@ -146,22 +162,34 @@ impl Session {
         self.device.name()
     }
 
-    /// How many of the bricks that edits apply to are not on the device, roughly.
-    pub fn missing_for_edits(&self, work: &EditWork) -> usize {
-        self.missing(work.jobs().len(), |at| work.base.brick(work.jobs()[at].pos()))
+    /// What there is to do for edits.
+    pub fn load_of_edits(&self, work: &EditWork) -> Load {
+        let jobs = work.jobs();
+        let is_rough = |job: &&Job| work.tools[job.edit as usize].evaluator.is_rough();
+        Load {
+            amount: jobs.len(),
+            rough: jobs.iter().filter(is_rough).count(),
+            missing: self.missing(work.base, jobs.len(), |at| jobs[at].pos()),
+        }
     }
 
-    /// How many of the bricks of blocks are not on the device, roughly.
-    pub fn missing_for_mesh(&self, view: &WorldView, blocks: &[Block]) -> usize {
-        self.missing(blocks.len(), |at| view.samples.brick(blocks[at].brick))
+    /// What there is to do for blocks.
+    pub fn load_of_mesh(&self, view: &WorldView, blocks: &[Block]) -> Load {
+        let missing = self.missing(view.samples, blocks.len(), |at| blocks[at].brick);
+        Load { amount: blocks.len(), rough: 0, missing }
     }
 
-    /// How many of so many bricks are not here, judged by some of them.
-    fn missing<'a>(&self, count: usize, brick: impl Fn(usize) -> Option<&'a Brick>) -> usize {
+    /// How many of so many bricks are not here, with the stacks that they belong to; judged by some of them.
+    fn missing(&self, view: SampleView, count: usize, pos: impl Fn(usize) -> BrickPos) -> usize {
         let step = count.div_ceil(LOOKS).max(1);
-        let is_missing =
-            |at: &usize| brick(*at).is_some_and(|brick| self.bricks.find(brick.tag.get()).is_none());
-        (0..count).step_by(step).filter(is_missing).count() * step
+        let mut missing = 0;
+        for at in (0..count).step_by(step) {
+            let pos = pos(at);
+            let is_here = |brick: &Brick| self.bricks.find(brick.tag.get()).is_some();
+            missing += usize::from(view.brick(pos).is_some_and(|brick| !is_here(brick)));
+            missing += usize::from(self.stacks.find(view.ground(), (pos.0.x, pos.0.z)).is_none());
+        }
+        missing * step
     }
 
     /// Begins a launch: what it finds or takes stays where it is until the next one.

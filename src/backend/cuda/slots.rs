@@ -26,10 +26,10 @@ pub(super) struct Slots {
 /// Slots at the start.
 const FIRST: usize = 4096;
 
-/// A number that no other record of this process has.
-fn stamp() -> u64 {
+/// The first of so many numbers that no other record of this process has.
+fn stamps(count: usize) -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
+    NEXT.fetch_add(count as u64, Ordering::Relaxed)
 }
 
 /// Bits of a tag that are the slot; the rest is its stamp.
@@ -79,14 +79,32 @@ impl Slots {
     ///
     /// May move the records, and then waits for the device.
     pub fn take(&mut self, device: &mut dyn Device) -> Result<(u32, u64), Fault> {
-        if self.free.is_empty() && !self.grow(device)? {
-            self.evict();
+        let mut taken = Vec::with_capacity(1);
+        self.take_many(device, 1, &mut taken)?;
+        taken.pop().ok_or(Fault::Budget(self.most * self.record))
+    }
+
+    /// So many slots at once, all of them or none.
+    pub fn take_many(
+        &mut self,
+        device: &mut dyn Device,
+        count: usize,
+        out: &mut Vec<(u32, u64)>,
+    ) -> Result<(), Fault> {
+        while self.free.len() < count && self.grow(device, count)? {}
+        if self.free.len() < count {
+            self.evict(count);
         }
-        let Some(slot) = self.free.pop() else { return Err(Fault::Budget(self.most * self.record)) };
-        let stamp = stamp();
-        self.stamps[slot as usize] = stamp;
-        self.used[slot as usize].store(self.round, Ordering::Relaxed);
-        Ok((slot, stamp << SLOT_BITS | u64::from(slot)))
+        let Some(rest) = self.free.len().checked_sub(count) else {
+            return Err(Fault::Budget(self.most * self.record));
+        };
+        let first = stamps(count);
+        for (stamp, slot) in (first..).zip(self.free.drain(rest..).rev()) {
+            self.stamps[slot as usize] = stamp;
+            self.used[slot as usize].store(self.round, Ordering::Relaxed);
+            out.push((slot, stamp << SLOT_BITS | u64::from(slot)));
+        }
+        Ok(())
     }
 
     /// Gives a slot back.
@@ -95,10 +113,10 @@ impl Slots {
         self.free.push(slot);
     }
 
-    /// Twice as many slots, unless that is too many.
-    fn grow(&mut self, device: &mut dyn Device) -> Result<bool, Fault> {
+    /// Twice as many slots, and so many more at least, unless that is too many.
+    fn grow(&mut self, device: &mut dyn Device, more: usize) -> Result<bool, Fault> {
         let old = self.stamps.len();
-        let new = (old * 2).max(FIRST).min(self.most);
+        let new = (old * 2).max(old + more).max(FIRST).min(self.most);
         if new <= old {
             return Ok(false);
         }
@@ -116,11 +134,11 @@ impl Slots {
         Ok(true)
     }
 
-    /// Frees slots that were not used in this round: an eighth of all at most.
-    fn evict(&mut self) {
+    /// Frees slots that were not used in this round: as many as are wanted, and an eighth of all at least.
+    fn evict(&mut self, wanted: usize) {
         let all = self.stamps.len();
         for _ in 0..all {
-            if self.free.len() >= (all / 8).max(1) {
+            if self.free.len() >= wanted.max(all / 8) {
                 break;
             }
             self.hand = (self.hand + 1) % all;
@@ -129,11 +147,6 @@ impl Slots {
                 self.give_back(self.hand as u32);
             }
         }
-    }
-
-    /// How many records there are.
-    pub fn len(&self) -> usize {
-        self.stamps.len() - self.free.len()
     }
 }
 

@@ -3,6 +3,7 @@
 //! A card is used where there is one, else the emulator. `BURROW_WORLDS` says how many random worlds.
 
 use std::sync::Mutex;
+use std::time::Duration;
 
 use fastrand::Rng;
 
@@ -159,18 +160,40 @@ impl Device for Faulty {
     }
 }
 
+/// Keeps what is logged.
+struct Log(Mutex<Vec<String>>);
+
+impl log::Log for Log {
+    fn enabled(&self, _: &log::Metadata) -> bool {
+        true
+    }
+    fn log(&self, record: &log::Record) {
+        if record.level() <= log::Level::Warn {
+            lock(&self.0).push(record.args().to_string());
+        }
+    }
+    fn flush(&self) {}
+}
+
+static LOG: Log = Log(Mutex::new(Vec::new()));
+
 #[test]
-fn a_device_that_fails_at_any_call_is_given_up_and_nothing_is_lost() {
+fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_lost() {
+    log::set_logger(&LOG).expect("no other test logs");
+    log::set_max_level(log::LevelFilter::Warn);
     for calls in 0..40 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
         let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
         assert!(matches!(engine.state(), EngineState::Cuda(_)));
-        *lock(&plan) = Some((calls, Fault::Failed("CUDA_ERROR_LAUNCH_FAILED".into())));
+        let name = format!("CUDA_ERROR_LAUNCH_FAILED after {calls}.");
+        *lock(&plan) = Some((calls, Fault::Failed(name.clone())));
         let mut rng = Rng::with_seed(u64::from(calls));
         (0..2).for_each(|index| compare(&mut rng, index, &engine));
         let reached = lock(&plan).as_ref().is_some_and(|plan| plan.0 == 0);
         assert_eq!(reached, matches!(engine.state(), EngineState::Lost(_)), "after {calls} calls");
+        let warnings = lock(&LOG.0).iter().filter(|line| line.contains(&name)).count();
+        assert_eq!(warnings, usize::from(reached), "after {calls} calls");
     }
 }
 
@@ -188,6 +211,47 @@ fn a_device_that_can_not_be_opened_is_no_device() {
         assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(text));
         compare(&mut Rng::with_seed(3), 3, &engine);
     }
+}
+
+/// What the test below starts in a process of its own.
+#[test]
+#[ignore = "looks at the machine's driver"]
+fn tell_what_the_driver_says() {
+    let engine = Engine::new(crate::backend::Backend::Cuda);
+    println!("state: {:?}", engine.wait(Duration::from_secs(30)));
+    compare(&mut Rng::with_seed(3), 3, &engine);
+}
+
+/// A driver's library that knows errors only, each with its code.
+#[test]
+fn a_driver_without_a_device_is_no_device() {
+    let folder = std::env::temp_dir().join(format!("burrow-driver-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder for the library");
+    for (code, name) in [(100, "CUDA_ERROR_NO_DEVICE"), (35, "CUDA_ERROR_INSUFFICIENT_DRIVER")] {
+        let source = format!(
+            "int cuInit(unsigned flags) {{ (void)flags; return {code}; }}\n\
+             int cuGetErrorName(int code, const char** name) {{ (void)code; *name = \"{name}\"; return 0; }}\n"
+        );
+        std::fs::write(folder.join("driver.c"), source).expect("a source file");
+        let cc = std::process::Command::new("cc")
+            .args(["-shared", "-fPIC", "-o", "libcuda.so", "driver.c"])
+            .current_dir(&folder)
+            .status();
+        if !cc.is_ok_and(|status| status.success()) {
+            println!("no C compiler for a driver's library");
+            break;
+        }
+        std::fs::copy(folder.join("libcuda.so"), folder.join("libcuda.so.1")).expect("a copy");
+        let said = std::process::Command::new(std::env::current_exe().expect("this test"))
+            .args(["--exact", "backend::cuda::tests::tell_what_the_driver_says", "--ignored", "--nocapture"])
+            .env("LD_LIBRARY_PATH", &folder)
+            .output()
+            .expect("this test can be started again");
+        let text = String::from_utf8_lossy(&said.stdout).into_owned();
+        assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
+        assert!(text.contains(&format!("Lost(\"there is no CUDA device: {name}\")")), "{text}");
+    }
+    std::fs::remove_dir_all(&folder).expect("the folder can go");
 }
 
 #[test]

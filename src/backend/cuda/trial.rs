@@ -1,10 +1,11 @@
 //! A trial before a device is trusted: a piece of ground is dug on it and on the processor. Every bit is compared, and both
 //! are timed.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 use web_time::Instant;
 
 use super::device::Fault;
@@ -14,7 +15,7 @@ use crate::backend::choice::Costs;
 use crate::backend::{Compute, Cpu};
 use crate::brush::{Brush, Edit, Roughness, Shape};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{ChunkGrid, Column, ONE};
+use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, Vertex};
@@ -30,7 +31,7 @@ const REPEATS: usize = 3;
 pub(super) type Sizes = &'static [(i32, f32)];
 
 /// Enough to know how fast both are.
-pub(super) const FULL: Sizes = &[(1, 1.0), (1, 5.0), (4, 8.0), (16, 8.0), (64, 8.0)];
+pub(super) const FULL: Sizes = &[(1, 1.0), (1, 4.0), (4, 6.0), (16, 6.0), (64, 6.0)];
 
 /// Tries a device out and measures it beside the processor.
 ///
@@ -38,35 +39,27 @@ pub(super) const FULL: Sizes = &[(1, 1.0), (1, 5.0), (4, 8.0), (16, 8.0), (64, 8
 /// Where it fails, or differs from the processor in a single bit.
 pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
     let ground = ground()?;
-    let grid = ChunkGrid::new(32, SIDE, SIDE);
+    let none = Bricks::default();
+    let (samples, grid) = (SampleView::new(&ground, &none), ChunkGrid::new(32, SIDE, SIDE));
     let mut costs = Costs::default();
     for &(count, radius) in sizes {
-        let edits = edits(&ground, count, radius);
-        let edits: Vec<&Edit> = edits.iter().collect();
-        let none = Bricks::default();
-        let work = EditWork::new(SampleView::new(&ground, &none), grid, &edits);
-        let on_cpu = || {
-            let mut ledgers = Vec::new();
-            Cpu.edit(&work, &mut |ledger| ledgers.push(ledger));
-            ledgers
-        };
-        let ([cpu, cuda], drafted) = compare(
-            session,
-            on_cpu,
-            |session| session.edit(&work),
-            |cpu, cuda| summary(cpu) == summary(cuda),
-        )?;
-        costs.edit[0].push(work.jobs().len(), cpu);
-        costs.edit[1].push(work.jobs().len(), cuda);
+        let [smooth, rough] = [false, true].map(|is_rough| edits(&ground, count, radius, is_rough));
+        let work = EditWork::new(samples, grid, &smooth.iter().collect::<Vec<_>>());
+        let (times, ledgers) = compare_edits(session, &work)?;
+        let jobs = work.jobs().len();
+        costs.edit.iter_mut().zip(times).for_each(|(curve, time)| curve.push(jobs, time));
 
-        let drafted: Vec<DraftedBrick> = drafted.into_iter().flat_map(|ledger| ledger.bricks).collect();
+        let work = EditWork::new(samples, grid, &rough.iter().collect::<Vec<_>>());
+        let (rough, _) = compare_edits(session, &work)?;
+        let more = |on: usize| rough[on].saturating_sub(times[on]).as_secs_f64() / jobs as f64;
+        costs.rough = [more(0), more(1)];
+
+        let drafted: Vec<DraftedBrick> = ledgers.into_iter().flat_map(|ledger| ledger.bricks).collect();
         let bricks: Bricks =
             drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         let mask = Mask::default();
         let view = WorldView { samples: SampleView::new(&ground, &bricks), mask: MaskView::new(&mask), grid };
-        let block =
-            |drafted: &DraftedBrick| Block { brick: drafted.pos, chunk: grid.chunk_of(drafted.pos.origin()) };
-        let blocks: Vec<Block> = drafted.iter().map(block).collect();
+        let blocks = dirty(grid, &drafted);
         let on_cpu = || {
             let mut all = Vec::new();
             Cpu.mesh(&view, &blocks, &mut |parts| all.extend_from_slice(parts));
@@ -75,13 +68,37 @@ pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
         let start = Instant::now();
         session.mesh(&view, &blocks)?;
         let with_uploads = start.elapsed();
-        let ([cpu, cuda], _) =
+        let (times, _) =
             compare(session, on_cpu, |session| session.mesh(&view, &blocks), |cpu, cuda| same(cpu, cuda))?;
-        costs.mesh[0].push(blocks.len(), cpu);
-        costs.mesh[1].push(blocks.len(), cuda);
-        costs.upload = with_uploads.saturating_sub(cuda).as_secs_f64() / blocks.len().max(1) as f64;
+        costs.mesh.iter_mut().zip(times).for_each(|(curve, time)| curve.push(blocks.len(), time));
+        costs.upload = with_uploads.saturating_sub(times[1]).as_secs_f64() / drafted.len().max(1) as f64;
     }
     Ok(costs)
+}
+
+/// Edits on both.
+fn compare_edits(session: &mut Session, work: &EditWork) -> Result<([Duration; 2], Vec<Ledger>), Fault> {
+    let on_cpu = || {
+        let mut ledgers = Vec::new();
+        Cpu.edit(work, &mut |ledger| ledgers.push(ledger));
+        ledgers
+    };
+    let is_same = |cpu: &Vec<Ledger>, cuda: &Vec<Ledger>| summary(cpu) == summary(cuda);
+    compare(session, on_cpu, |session| session.edit(work), is_same)
+}
+
+/// The blocks that changed samples show in.
+fn dirty(grid: ChunkGrid, drafted: &[DraftedBrick]) -> Vec<Block> {
+    let near = |drafted: &DraftedBrick| {
+        let around = LatticeBox { min: drafted.changed.min - 2, max: drafted.changed.max + 1 };
+        BrickPos::covering(around).map(|pos| (pos.0.x, pos.0.z, pos.0.y))
+    };
+    let bricks: BTreeSet<_> = drafted.iter().flat_map(near).collect();
+    let block = |(x, z, y)| {
+        let brick = BrickPos(IVec3::new(x, y, z));
+        Block { brick, chunk: grid.chunk_of(brick.origin()) }
+    };
+    bricks.into_iter().map(block).collect()
 }
 
 /// Does a thing on both, several times: the shortest times, and what came out on the processor.
@@ -118,21 +135,20 @@ fn ground() -> Result<Ground, Fault> {
     made.map_err(|error| Fault::Failed(error.to_string()))
 }
 
-/// Brushes of all kinds at the surface, side by side.
-fn edits(ground: &Ground, count: i32, radius: f32) -> Vec<Edit> {
+/// Brushes at the surface, side by side.
+fn edits(ground: &Ground, count: i32, radius: f32, is_rough: bool) -> Vec<Edit> {
     let place = |i: i32| {
         let (x, z) = (16 + i % 8 * 31, 16 + i / 8 * 29);
         let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;
         Vec3::new(x as f32 + 0.3, height - 0.2 * radius, z as f32 - 0.4)
     };
     let brush = |i: i32| match (i % 4, place(i)) {
-        (0, center) => Brush::dig(Shape::sphere(center, radius)),
-        (1, center) => {
-            Brush::dig(Shape::sphere(center, radius)).with_roughness(Roughness::new(1.5, 4.0, i as u32))
-        }
         (2, base) => Brush::add(Shape::cone(base, Vec3::new(1.0, radius * 1.5, 2.0), radius), MaterialId(3)),
-        (_, from) => Brush::dig(Shape::capsule(from, from + Vec3::new(3.0, -radius, 4.0), radius * 0.7)),
+        (3, from) => Brush::dig(Shape::capsule(from, from + Vec3::new(3.0, -radius, 4.0), radius * 0.7)),
+        (_, center) => Brush::dig(Shape::sphere(center, radius)),
     };
+    let grain = |i: i32| Roughness::new(1.5, 4.0, i as u32);
+    let brush = |i: i32| if is_rough { brush(i).with_roughness(grain(i)) } else { brush(i) };
     (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
 }
 

@@ -1,0 +1,147 @@
+//! Much at once, on the processor and on a CUDA card: a meteor shower, a landscape cut into terraces, and a world of
+//! thousands of edits replayed as when it is loaded.
+//!
+//! `cargo run --release --no-default-features --features cuda --example bulk [-- --help]`
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bevy_burrow::backend::{Backend, Engine, EngineState};
+use bevy_burrow::lattice::Column;
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::Commit;
+use clap::Parser;
+use fastrand::Rng;
+use glam::{Quat, Vec3};
+
+/// Times large transactions on the processor and on a CUDA card.
+#[derive(Parser)]
+struct Arguments {
+    /// Cells along a side of the landscape.
+    #[arg(long, default_value_t = 1024, value_parser = clap::value_parser!(u32).range(256..=8192))]
+    side: u32,
+    /// How often each transaction is timed; medians are printed.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=100))]
+    repeats: u16,
+}
+
+/// Something large to do to a landscape.
+struct Scene {
+    name: &'static str,
+    brushes: fn(&Ground, &mut Rng) -> Vec<Brush>,
+}
+
+const SCENES: [Scene; 3] = [
+    Scene { name: "meteor shower", brushes: meteors },
+    Scene { name: "terraces", brushes: terraces },
+    Scene { name: "replay of 3,000 edits", brushes: replay },
+];
+
+/// A place on the ground.
+fn place(ground: &Ground, rng: &mut Rng) -> Vec3 {
+    let (x, z) = (rng.i32(16..ground.width() - 16), rng.i32(16..ground.depth() - 16));
+    Vec3::new(x as f32, ground.height(Column::new(x, z)) as f32 / 256.0, z as f32)
+}
+
+/// Craters of all sizes, the rims rough.
+fn meteors(ground: &Ground, rng: &mut Rng) -> Vec<Brush> {
+    let crater = |i: u32| {
+        let radius = 5.0 + 12.0 * rng.f32() * rng.f32();
+        let center = place(ground, rng) + Vec3::Y * radius * 0.3;
+        Brush::dig(Shape::sphere(center, radius)).with_roughness(Roughness::new(1.5, 5.0, i))
+    };
+    (0..600).map(crater).collect()
+}
+
+/// Steps cut into the whole landscape, a few voxels each.
+fn terraces(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
+    let step = 64;
+    let places = (0..ground.depth() / step).flat_map(|z| (0..ground.width() / step).map(move |x| (x, z)));
+    let cut = |(x, z): (i32, i32)| {
+        let (x, z) = (x * step + step / 2, z * step + step / 2);
+        let height = ground.height(Column::new(x, z)) as f32 / 256.0;
+        let floor = (height / 8.0).floor() * 8.0;
+        let half = Vec3::new(step as f32 * 0.5, 12.0, step as f32 * 0.5);
+        Brush::dig(Shape::cuboid(Vec3::new(x as f32, floor + 12.0, z as f32), half))
+    };
+    places.map(cut).collect()
+}
+
+/// What players may have left behind: holes, tunnels, walls, heaps.
+fn replay(ground: &Ground, rng: &mut Rng) -> Vec<Brush> {
+    let edit = |i: u32| {
+        let (at, radius) = (place(ground, rng), 2.0 + 4.0 * rng.f32());
+        let along = Quat::from_rotation_y(rng.f32() * 6.3) * Vec3::new(20.0, -6.0, 0.0);
+        match i % 5 {
+            0 => Brush::dig(Shape::capsule(at, at + along, radius * 0.7)),
+            1 => Brush::add(Shape::cuboid(at, Vec3::new(8.0, 4.0, 1.5)), MaterialId(3)),
+            2 => Brush::add(Shape::cone(at - Vec3::Y, Vec3::Y * radius, radius), MaterialId(2)),
+            _ => Brush::dig(Shape::sphere(at, radius)),
+        }
+    };
+    (0..3000).map(edit).collect()
+}
+
+/// The middle one of some times.
+fn median(mut times: Vec<Duration>) -> f64 {
+    times.sort_unstable();
+    times[times.len() / 2].as_secs_f64() * 1e3
+}
+
+/// What one engine made of a scene, and how long it took.
+struct Outcome {
+    commit: Commit,
+    hash: u64,
+    /// The stages that went to the card.
+    on_card: u64,
+}
+
+/// Runs a scene as one transaction on fresh ground.
+fn run(ground: &Arc<Ground>, brushes: &[Brush], engine: &Engine) -> Outcome {
+    let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
+    brushes.iter().for_each(|brush| terrain.submit(brush));
+    let before = engine.figures().cuda;
+    let commit = terrain.begin().expect("brushes wait").run_on(engine);
+    let on_card = engine.figures().cuda - before;
+    let hash = commit.sample_hash();
+    Outcome { commit, hash, on_card }
+}
+
+fn main() {
+    let arguments = Arguments::parse();
+    let noise = NoiseHeights { seed: 7, ..NoiseHeights::default() };
+    let ground = Arc::new(Ground::from_noise(arguments.side, arguments.side, &noise).expect("valid noise"));
+    let engines = [Backend::Cpu, Backend::Cuda, Backend::Auto].map(|backend| (backend, Engine::new(backend)));
+    for (backend, engine) in &engines {
+        match engine.wait(Duration::from_secs(30)) {
+            EngineState::Cuda(name) => println!("{backend:?}: {name} beside the processor"),
+            EngineState::Lost(why) => println!("{backend:?}: the processor; {why}"),
+            _ => println!("{backend:?}: the processor, {} threads", rayon::current_num_threads()),
+        }
+    }
+    let names = engines.each_ref().map(|(backend, _)| format!("{backend:?}"));
+    let [cpu, cuda, auto] = names.each_ref().map(|name| format!("{name:>9}"));
+    println!("\n{:<24}{:>9}{:>10}{cpu}{cuda}{auto}   ms, medians", "", "brushes", "vertices");
+    for scene in &SCENES {
+        let brushes = (scene.brushes)(&ground, &mut Rng::with_seed(1));
+        let mut times = [const { Vec::new() }; 3];
+        let (mut hashes, mut vertices, mut on_card) = (Vec::new(), 0, [0; 3]);
+        // The first round warms memory and threads.
+        for round in 0..=arguments.repeats {
+            for (i, (_, engine)) in engines.iter().enumerate() {
+                let outcome = run(&ground, &brushes, engine);
+                hashes.push(outcome.hash);
+                on_card[i] = outcome.on_card;
+                let meshes = outcome.commit.meshes.chunks.iter();
+                vertices = meshes.map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
+                if round > 0 {
+                    times[i].push(outcome.commit.stages.whole);
+                }
+            }
+        }
+        let [cpu, cuda, auto] = times.map(|times| format!("{:>9.2}", median(times)));
+        println!("{:<24}{:>9}{vertices:>10}{cpu}{cuda}{auto}", scene.name, brushes.len());
+        assert!(hashes.windows(2).all(|pair| pair[0] == pair[1]), "all engines make the same world");
+        println!("{:<24}stages on the card: {on_card:?}; samples {:016x} on all", "", hashes[0]);
+    }
+}
