@@ -21,6 +21,8 @@ mod grey_image;
 mod image_heights;
 mod material;
 mod noise_heights;
+#[cfg(feature = "cuda")]
+mod noise_terms;
 mod png;
 mod rules;
 mod sources;
@@ -33,5 +35,7 @@ pub use grey_image::{BitDepth, GreyImage, ImageLimits, RawFormat};
 pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
 pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
+#[cfg(feature = "cuda")]
+pub(crate) use noise_terms::NoiseTerms;
 pub use rules::MaterialRule;
 pub use world::Ground;

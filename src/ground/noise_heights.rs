@@ -69,9 +69,59 @@ pub(super) type ColumnNoise = Box<dyn Fn(i32, i32) -> f64 + Send + Sync>;
 
 /// Where column (0, 0) lies in the noise. Perlin noise is 0 at its own origin in every octave and for every seed, so
 /// all worlds would begin at the same height, and on a peak if they are ridged.
-const ORIGIN: [f64; 2] = [0.37, 0.71];
+pub(super) const ORIGIN: [f64; 2] = [0.37, 0.71];
 
-/// Checks parameters and makes noise of them. The amplitude is only checked; the noise stays within -1 to 1.
+/// A sum of octaves of Perlin's gradient noise, of checked parameters.
+pub(super) enum Octaves {
+    Fractal(Fbm<Perlin>),
+    /// It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every ridged noise has
+    /// at its own origin, counted from -1.
+    Ridged(RidgedMulti<Perlin>, f64),
+}
+
+impl Octaves {
+    /// Checks parameters and makes noise of them. The amplitude is only checked; the noise stays within -1 to 1.
+    pub(super) fn new(
+        kind: NoiseKind,
+        seed: u32,
+        octaves: u32,
+        scale: f64,
+        amplitude: f64,
+    ) -> Result<Self, GroundError> {
+        if !(1..=MAX_OCTAVES).contains(&octaves) {
+            let value = f64::from(octaves);
+            return Err(GroundError::Parameter { name: "noise octaves", value, allowed: "1 to 16" });
+        }
+        // Also keeps coordinates small enough for the noise crate, which panics on infinite ones.
+        if !(1.0..=MAX_SCALE).contains(&scale) {
+            return Err(GroundError::Parameter {
+                name: "noise scale",
+                value: scale,
+                allowed: "1 to 1048576 voxels",
+            });
+        }
+        check_voxels("noise amplitude", amplitude)?;
+        // The crate would count seeds on from the first one, and panic after the largest where overflow is checked.
+        let sources = seeds(seed, octaves).map(Perlin::new).collect();
+        Ok(match kind {
+            NoiseKind::Fractal => {
+                Self::Fractal(Fbm::new(0).set_octaves(octaves as usize).set_sources(sources))
+            }
+            NoiseKind::Ridged => {
+                let noise = RidgedMulti::new(0).set_octaves(octaves as usize).set_sources(sources);
+                let peak = noise.get([0.0, 0.0]) + 1.0;
+                Self::Ridged(noise, peak)
+            }
+        })
+    }
+}
+
+/// The seed of each octave.
+pub(super) fn seeds(seed: u32, octaves: u32) -> impl Iterator<Item = u32> {
+    (0..octaves).map(move |octave| seed.wrapping_add(octave))
+}
+
+/// Noise over columns, of parameters that are checked. The amplitude is only checked.
 pub(super) fn generator(
     kind: NoiseKind,
     seed: u32,
@@ -79,31 +129,11 @@ pub(super) fn generator(
     scale: f64,
     amplitude: f64,
 ) -> Result<ColumnNoise, GroundError> {
-    if !(1..=MAX_OCTAVES).contains(&octaves) {
-        let value = f64::from(octaves);
-        return Err(GroundError::Parameter { name: "noise octaves", value, allowed: "1 to 16" });
-    }
-    // Also keeps coordinates small enough for the noise crate, which panics on infinite ones.
-    if !(1.0..=MAX_SCALE).contains(&scale) {
-        return Err(GroundError::Parameter {
-            name: "noise scale",
-            value: scale,
-            allowed: "1 to 1048576 voxels",
-        });
-    }
-    check_voxels("noise amplitude", amplitude)?;
-    let octaves = octaves as usize;
+    let octaves = Octaves::new(kind, seed, octaves, scale, amplitude)?;
     let point = move |x, z| [f64::from(x) / scale + ORIGIN[0], f64::from(z) / scale + ORIGIN[1]];
-    Ok(match kind {
-        NoiseKind::Fractal => {
-            let noise = Fbm::<Perlin>::new(seed).set_octaves(octaves);
-            Box::new(move |x, z| noise.get(point(x, z)))
-        }
-        NoiseKind::Ridged => {
-            let noise = RidgedMulti::<Perlin>::new(seed).set_octaves(octaves);
-            // It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every
-            // ridged noise has at its own origin.
-            let peak = noise.get([0.0, 0.0]) + 1.0;
+    Ok(match octaves {
+        Octaves::Fractal(noise) => Box::new(move |x, z| noise.get(point(x, z))),
+        Octaves::Ridged(noise, peak) => {
             Box::new(move |x, z| (noise.get(point(x, z)) + 1.0) / peak * 2.0 - 1.0)
         }
     })
@@ -163,6 +193,13 @@ mod tests {
                 other => panic!("{bad:?} gave {other:?}"),
             }
         }
+    }
+
+    #[test]
+    fn seeds_go_on_from_zero_after_the_largest() {
+        let world = |seed| Ground::from_noise(32, 32, &NoiseHeights { seed, ..NoiseHeights::default() });
+        assert!(world(u32::MAX).is_ok());
+        assert_eq!(seeds(u32::MAX, 3).collect::<Vec<_>>(), [u32::MAX, 0, 1]);
     }
 
     #[test]
