@@ -7,6 +7,7 @@ use std::time::Duration;
 use web_time::Instant;
 
 use super::{Backend, Choice, Compute, Cpu, Stage};
+use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
@@ -99,6 +100,37 @@ impl Engine {
     /// What it did so far.
     pub fn figures(&self) -> EngineFigures {
         self.0.figures.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Ground of `width` x `depth` cells from noise: the same, bit by bit, as [`Ground::from_noise`] makes.
+    ///
+    /// The card makes it if it is there and free; with [`Backend::Auto`] only from 2^18 columns on, below which the
+    /// processor has it done sooner than the card could send it. In all other cases, and where the card fails, the processor
+    /// does. Large worlds gain most by waiting for the card first, see [`Self::wait`].
+    ///
+    /// # Errors
+    /// Those of [`Ground::from_noise`].
+    ///
+    /// ```
+    /// use bevy_burrow::backend::{Backend, Engine};
+    /// use bevy_burrow::prelude::*;
+    ///
+    /// let noise = NoiseHeights { kind: NoiseKind::Ridged, amplitude: 80.0, ..NoiseHeights::default() };
+    /// let ground = Engine::new(Backend::Auto).ground_from_noise(300, 200, &noise)?;
+    /// assert_eq!(ground, Ground::from_noise(300, 200, &noise)?);
+    /// # Ok::<(), GroundError>(())
+    /// ```
+    pub fn ground_from_noise(
+        &self,
+        width: u32,
+        depth: u32,
+        noise: &NoiseHeights,
+    ) -> Result<Ground, GroundError> {
+        #[cfg(feature = "cuda")]
+        if let Some(ground) = self.0.cuda.as_ref().and_then(|cuda| cuda.ground(width, depth, noise)) {
+            return Ok(ground);
+        }
+        Ground::from_noise(width, depth, noise)
     }
 
     pub(crate) fn compute(&self) -> &dyn Compute {

@@ -53,11 +53,13 @@ pub(super) enum Kernel {
     Edit,
     /// Meshes blocks.
     Mesh,
+    /// Makes heights of noise.
+    Heights,
 }
 
 impl Kernel {
     /// All of them, in order of their numbers.
-    pub const ALL: [Self; 3] = [Self::Scatter, Self::Edit, Self::Mesh];
+    pub const ALL: [Self; 4] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights];
 
     /// Its name in the source.
     pub const fn name(self) -> &'static str {
@@ -65,6 +67,7 @@ impl Kernel {
             Self::Scatter => "scatter",
             Self::Edit => "edit",
             Self::Mesh => "mesh",
+            Self::Heights => "heights",
         }
     }
 }

@@ -33,7 +33,7 @@ pub(super) struct Card {
     /// Was the last launch a long one?
     is_timed: bool,
     module: sys::CUmodule,
-    kernels: [CUfunction; 3],
+    kernels: [CUfunction; Kernel::ALL.len()],
 }
 
 // SAFETY: the module and its functions belong to the context, which any thread may use once it is bound there; every
@@ -74,7 +74,7 @@ impl Card {
         };
         // SAFETY: the image is PTX and ends with a zero byte.
         let module = unsafe { result::module::load_data(image.as_ptr().cast()) }.map_err(refused)?;
-        let mut kernels = [std::ptr::null_mut(); 3];
+        let mut kernels = [std::ptr::null_mut(); Kernel::ALL.len()];
         for (function, kernel) in kernels.iter_mut().zip(Kernel::ALL) {
             let name = CString::new(kernel.name()).map_err(|error| Fault::Refused(error.to_string()))?;
             // SAFETY: the module was just loaded.

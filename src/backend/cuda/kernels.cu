@@ -1,12 +1,13 @@
 // The work of a transaction on the device: bricks are brought there, edited, and meshed.
 //
-// Three kernels, a block of 128 threads for each job:
+// Four kernels, a block of 128 threads for each job:
 //
 //   scatter  copies what the host sent to where it belongs
 //   edit     applies edits to one brick        as volume/workpiece.rs does
 //   mesh     draws the cells of one brick      as surface/block.rs does
+//   heights  makes ground of noise              as ground/noise_heights.rs does, a block for every 1024 columns
 //
-// All give the very bits of the CPU. Densities are integers; floats are used in the same order of exactly rounded
+// All give the very bits of the CPU. Densities are integers; floats and doubles are used in the same order of exactly rounded
 // operations, which takes a compiler that fuses none of them (--fmad=false) and rounds divisions and roots exactly.
 //
 // Blocks share nothing but counters from which each reserves room for its output, so blocks come out in any order, while
@@ -16,6 +17,7 @@
 // The same sources are compiled for the CPU by tools/emulator, as plain C++, to be tested where there is no device.
 
 #include "kernels/edit.cuh"
+#include "kernels/heights.cuh"
 #include "kernels/mesh.cuh"
 
 extern "C" __global__ void __launch_bounds__(THREADS) scatter(ScatterParams params) {

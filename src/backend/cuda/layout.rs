@@ -296,6 +296,38 @@ pub(crate) struct SingleMix {
     pub weights: u32,
 }
 
+/// Columns of a block of `heights`.
+pub(crate) const COLUMNS: usize = 8 * THREADS as usize;
+
+/// The parameter of `heights`. See [`NoiseTerms`](crate::ground::NoiseTerms).
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct HeightsParams {
+    /// For each octave 256 `u8`.
+    pub tables: Address,
+    /// Out: an `i32` for each column, in 1/256 voxel; `i32::MIN` where that is beyond the lattice's limit.
+    pub heights: Address,
+    pub scale: f64,
+    pub origin: [f64; 2],
+    pub frequency: f64,
+    pub lacunarity: f64,
+    pub persistence: f64,
+    pub weighting: f64,
+    pub factor: f64,
+    pub peak: f64,
+    pub amplitude: f64,
+    pub base: f64,
+    /// Columns of the world, row by row: the first one, and how many.
+    pub first: u32,
+    pub count: u32,
+    /// Columns in a row.
+    pub row_len: u32,
+    pub octaves: u32,
+    /// 1 where it is; 0 otherwise.
+    pub is_ridged: u32,
+    pub pad: u32,
+}
+
 // kernels.cu says the same.
 const _: () = assert!(size_of::<BrickRecord>() == 1152 && BRICK_BYTES == 1664);
 const _: () = assert!(size_of::<StackRecord>() == 976 && size_of::<ScatterJob>() == 24);
@@ -306,6 +338,7 @@ const _: () =
 const _: () =
     assert!(size_of::<ColumnJob>() == 80 && size_of::<MeshJob>() == 24 && size_of::<MeshResult>() == 16);
 const _: () = assert!(size_of::<MeshParams>() == 128 && size_of::<ScatterParams>() == 8);
+const _: () = assert!(size_of::<HeightsParams>() == 128 && crate::ground::MAX_OCTAVES <= 16);
 
 /// Writes a brick as it is in a slot: [`BRICK_BYTES`], or [`RECORD_BYTES`] where `out` has no room for materials.
 pub(crate) fn brick_record(brick: &Brick, out: &mut [u8]) {

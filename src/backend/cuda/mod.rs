@@ -10,6 +10,7 @@
 //! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
 //! - [`session`](self::session) keeps bricks and heights on it, with a budget; `slots` says where, and which go first.
 //! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
+//! - `heights` makes new ground of noise.
 //! - `trial` compares the device with the processor, and measures both.
 //!
 //! A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
@@ -18,6 +19,7 @@
 mod device;
 mod driver;
 mod edit;
+mod heights;
 mod layout;
 mod mail;
 mod mesh;

@@ -198,6 +198,49 @@ fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_l
 }
 
 #[test]
+fn ground_is_made_by_the_processor_where_a_device_fails() {
+    // Two slices, the second one short.
+    let (width, depth, noise) = (1030, 1020, NoiseHeights { octaves: 1, ..NoiseHeights::default() });
+    let expected = Ground::from_noise(width, depth, &noise);
+    let mut failed = 0;
+    for calls in 0..13 {
+        let Some(own) = device() else { return };
+        let plan = Arc::new(Mutex::new(None));
+        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        assert!(matches!(engine.state(), EngineState::Cuda(_)));
+        *lock(&plan) = Some((calls, Fault::Failed("CUDA_ERROR_LAUNCH_FAILED".into())));
+        assert_eq!(engine.ground_from_noise(width, depth, &noise), expected, "after {calls} calls");
+        let reached = lock(&plan).as_ref().is_some_and(|plan| plan.0 == 0);
+        let is_lost = matches!(engine.state(), EngineState::Lost(_));
+        assert!(reached || !is_lost, "after {calls} calls");
+        failed += u32::from(is_lost);
+        assert_eq!(engine.ground_from_noise(9, 9, &noise), Ground::from_noise(9, 9, &noise));
+    }
+    assert_eq!(failed, 11, "calls that ground takes");
+}
+
+#[test]
+fn ground_that_can_not_be_made_gives_the_same_error_on_a_device() {
+    let Some(device) = device() else { return };
+    let (name, engine) = (device.name(), engine(device, 64 << 20));
+    let good = NoiseHeights::default();
+    for (width, noise) in [
+        (0, good),
+        (u32::MAX, good),
+        (40, NoiseHeights { octaves: 17, ..good }),
+        (40, NoiseHeights { scale: 0.5, ..good }),
+        (40, NoiseHeights { base: f64::INFINITY, ..good }),
+        (40, NoiseHeights { base: 32_768.0, ..good }),
+    ] {
+        let expected = Ground::from_noise(width, 30, &noise);
+        assert!(expected.is_err());
+        assert_eq!(engine.ground_from_noise(width, 30, &noise), expected);
+    }
+    // Refused heights are no fault of the device.
+    assert_eq!(engine.state(), EngineState::Cuda(name));
+}
+
+#[test]
 fn a_device_that_can_not_be_opened_is_no_device() {
     for fault in [
         Fault::NoDriver,

@@ -14,7 +14,7 @@ use super::session::Session;
 use crate::backend::choice::Costs;
 use crate::backend::{Compute, Cpu};
 use crate::brush::{Brush, Edit, Roughness, Shape};
-use crate::ground::{Ground, MaterialId};
+use crate::ground::{Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
@@ -38,6 +38,7 @@ pub(super) const FULL: Sizes = &[(1, 1.0), (1, 4.0), (4, 6.0), (16, 6.0), (64, 6
 /// # Errors
 /// Where it fails, or differs from the processor in a single bit.
 pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
+    compare_heights(session)?;
     let ground = ground()?;
     let none = Bricks::default();
     let (samples, grid) = (SampleView::new(&ground, &none), ChunkGrid::new(32, SIDE, SIDE));
@@ -74,6 +75,21 @@ pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
         costs.upload = with_uploads.saturating_sub(times[1]).as_secs_f64() / drafted.len().max(1) as f64;
     }
     Ok(costs)
+}
+
+/// Ground of noise on both, larger than a block of threads and not of whole ones.
+fn compare_heights(session: &mut Session) -> Result<(), Fault> {
+    for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
+        let noise = NoiseHeights { kind, seed: 3, scale: 21.5, ..NoiseHeights::default() };
+        let refused = |error: GroundError| Fault::Failed(error.to_string());
+        let terms = noise.terms(70, 40).map_err(refused)?;
+        let mut heights = vec![0; terms.columns()];
+        session.heights(&terms, &mut heights)?;
+        if terms.ground(heights) != Some(Ground::from_noise(70, 40, &noise).map_err(refused)?) {
+            return Err(Fault::SelfTest);
+        }
+    }
+    Ok(())
 }
 
 /// Edits on both.

@@ -154,8 +154,19 @@ struct MeshParams {
     u32 is_single, single_ids, single_weights, pad;
 };
 
+struct HeightsParams {
+    // For each octave 256 numbers of 8 bits.
+    const u32* tables;
+    i32* heights;
+    double scale, origin[2], frequency, lacunarity, persistence, weighting, factor, peak, amplitude, base;
+    // Columns of the world, x fastest: the first one, how many, how many in a row.
+    u32 first, count, row_len;
+    u32 octaves, is_ridged, pad;
+};
+
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout.rs");
 static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout.rs");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout.rs");
 static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout.rs");
 static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout.rs");
+static_assert(sizeof(HeightsParams) == 128, "see layout.rs");

@@ -1,0 +1,254 @@
+//! New ground from noise: heights are computed on the device and come back slice by slice.
+
+use rayon::prelude::*;
+
+use super::device::{Device, Fault, HostMemory, Kernel};
+use super::layout::{COLUMNS, HeightsParams};
+use super::mail::Plan;
+use super::session::Session;
+use super::{Cuda, Place, lose};
+use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
+
+/// Columns from which on the faster of both is the device; below, the processor's threads need about as long as a launch,
+/// and the memory that is pinned for it, take.
+const LEAST: usize = 1 << 18;
+
+/// Most columns of one launch: 4 MiB of heights, twice on the host. Long enough for a card to be busy, short enough for
+/// copies out of pinned memory to hide behind the next launch.
+const SLICE: usize = 1 << 20;
+
+/// Columns that a thread of the host copies at once.
+const PIECE: usize = 1 << 14;
+
+impl Cuda {
+    /// Ground from noise, if the card is there and free and does it; else the processor has to. Bad parameters are its
+    /// business too.
+    pub fn ground(&self, width: u32, depth: u32, noise: &NoiseHeights) -> Option<Ground> {
+        let terms = noise.terms(width, depth).ok()?;
+        if self.is_auto && terms.columns() < LEAST {
+            return None;
+        }
+        let heights = {
+            let mut place = self.slot.try_lock().ok()?;
+            let Place::Open(session, _) = &mut *place else { return None };
+            // Nobody touches this memory before the threads that fill it.
+            let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
+            if let Err(fault) = session.heights(&terms, &mut heights) {
+                if !fault.is_passing() {
+                    lose(&mut place, &self.state, &fault);
+                }
+                return None;
+            }
+            heights
+        };
+        terms.ground(heights)
+    }
+}
+
+/// Heights of one slice on the device, and two slices on the host: one that is copied from while the other is written.
+struct Buffers {
+    own: u64,
+    host: [Box<dyn HostMemory>; 2],
+}
+
+impl Buffers {
+    fn new(device: &mut dyn Device, bytes: usize) -> Result<Self, Fault> {
+        let host = [device.alloc_host(bytes)?, device.alloc_host(bytes)?];
+        Ok(Self { own: device.alloc(bytes)?, host })
+    }
+}
+
+impl Session {
+    /// Writes the heights of a world in 1/256 voxel, `i32::MIN` where one is beyond the lattice's limit.
+    pub(super) fn heights(&mut self, terms: &NoiseTerms, heights: &mut [i32]) -> Result<(), Fault> {
+        self.heights_in_slices(terms, heights, SLICE)
+    }
+
+    /// The same, so many columns at a time.
+    pub(super) fn heights_in_slices(
+        &mut self,
+        terms: &NoiseTerms,
+        heights: &mut [i32],
+        slice: usize,
+    ) -> Result<(), Fault> {
+        let mut plan = Plan::default();
+        let tables = plan.section::<[u8; 256]>(terms.tables.len());
+        self.inbox.open(&mut *self.device, &plan)?;
+        self.inbox.put(tables, &terms.tables);
+        self.inbox.send(&mut *self.device, &plan)?;
+        let mut params = params(terms, self.inbox.address(tables));
+        let mut buffers = Buffers::new(&mut *self.device, heights.len().min(slice) * size_of::<i32>())?;
+        params.heights = buffers.own;
+        let filled = fill(&mut *self.device, params, &mut buffers, heights, slice);
+        // Whatever is under way goes to buffers that are freed now.
+        let ended = self.device.wait();
+        self.device.free(buffers.own);
+        filled.and(ended)
+    }
+}
+
+/// Launches slice after slice, each while the one before is copied to where it belongs.
+fn fill(
+    device: &mut dyn Device,
+    mut params: HeightsParams,
+    buffers: &mut Buffers,
+    heights: &mut [i32],
+    slice: usize,
+) -> Result<(), Fault> {
+    let mut arrived: Option<&mut [i32]> = None;
+    let [mut next, mut last] = buffers.host.each_mut();
+    for part in heights.chunks_mut(slice) {
+        params.count = part.len() as u32;
+        let blocks = part.len().div_ceil(COLUMNS) as u32;
+        device.launch(Kernel::Heights, blocks, bytemuck::bytes_of(&params))?;
+        device.download(params.heights, &mut **next, 0..size_of_val(part))?;
+        params.first += params.count;
+        if let Some(part) = arrived.replace(part) {
+            copy(&**last, part);
+        }
+        device.wait()?;
+        std::mem::swap(&mut next, &mut last);
+    }
+    if let Some(part) = arrived {
+        copy(&**last, part);
+    }
+    Ok(())
+}
+
+/// Copies heights out of a buffer, many threads at once: most of the time goes into memory that was never touched.
+fn copy(from: &dyn HostMemory, to: &mut [i32]) {
+    let bytes = &from.bytes()[..size_of_val(to)];
+    let pieces = to.par_chunks_mut(PIECE).zip(bytes.par_chunks(PIECE * size_of::<i32>()));
+    pieces.for_each(|(to, from)| bytemuck::cast_slice_mut(to).copy_from_slice(from));
+}
+
+/// The parameter for the first slice, still without an address for its heights.
+fn params(terms: &NoiseTerms, tables: u64) -> HeightsParams {
+    HeightsParams {
+        tables,
+        heights: 0,
+        scale: terms.scale,
+        origin: terms.origin,
+        frequency: terms.frequency,
+        lacunarity: terms.lacunarity,
+        persistence: terms.persistence,
+        weighting: terms.weighting,
+        factor: terms.factor,
+        peak: terms.peak,
+        amplitude: terms.amplitude,
+        base: terms.base,
+        first: 0,
+        count: 0,
+        row_len: terms.row_len() as u32,
+        octaves: terms.tables.len() as u32,
+        is_ridged: (terms.kind == NoiseKind::Ridged).into(),
+        pad: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+
+    use super::super::tests::{device, worlds};
+    use super::*;
+    use crate::ground::{MAX_OCTAVES, MAX_SCALE, MAX_SIZE};
+
+    /// The device's ground must be the processor's, or none where that refuses a height.
+    fn compare(
+        session: &mut Session,
+        (width, depth): (u32, u32),
+        noise: &NoiseHeights,
+        slice: usize,
+    ) -> bool {
+        let terms = noise.terms(width, depth).expect("parameters in range");
+        let mut heights = vec![77; terms.columns()];
+        session.heights_in_slices(&terms, &mut heights, slice).expect("the device is fine");
+        let (found, expected) = (terms.ground(heights), Ground::from_noise(width, depth, noise).ok());
+        assert!(found == expected, "{width} x {depth}, {noise:?}: {found:?}, not {expected:?}");
+        found.is_some()
+    }
+
+    fn random_noise(rng: &mut Rng) -> NoiseHeights {
+        let sign = |rng: &mut Rng| if rng.bool() { 1.0 } else { -1.0 };
+        // From a thousandth of a voxel to beyond the lattice's limit once there are two of them.
+        let length = |rng: &mut Rng| match rng.u32(0..10) {
+            0 => 0.0,
+            1 => sign(rng) * 32_768.0,
+            2 => sign(rng) * 32_768.0 * rng.f64(),
+            _ => sign(rng) * f64::powf(10.0, rng.f64() * 7.5 - 3.0),
+        };
+        NoiseHeights {
+            seed: if rng.u32(0..8) == 0 { u32::MAX - rng.u32(0..16) } else { rng.u32(..) },
+            kind: if rng.bool() { NoiseKind::Fractal } else { NoiseKind::Ridged },
+            octaves: rng.u32(1..=MAX_OCTAVES),
+            scale: match rng.u32(0..6) {
+                0 => 1.0,
+                1 => MAX_SCALE,
+                2 => f64::from(1 << rng.u32(0..20)),
+                _ => MAX_SCALE.powf(rng.f64()),
+            },
+            amplitude: length(rng),
+            base: length(rng),
+        }
+    }
+
+    #[test]
+    fn ground_of_any_noise_is_that_of_the_processor() {
+        let Some(device) = device() else { return };
+        let mut session = Session::new(device, 1 << 20).expect("a session");
+        let mut rng = Rng::with_seed(23);
+        let (worlds, mut made) = (worlds::world_count(40) * 10, 0);
+        for _ in 0..worlds {
+            let noise = random_noise(&mut rng);
+            let size = (rng.u32(1..80), rng.u32(1..60));
+            // Slices of some rows, of parts of a row, of a column; and all at once.
+            let slice = [1 << 20, rng.usize(900..5000), rng.usize(30..200)][rng.usize(0..3)];
+            made += u64::from(compare(&mut session, size, &noise, slice));
+        }
+        println!("{made} of {worlds} worlds were within the limit");
+        assert!(made > worlds / 2 && made < worlds);
+    }
+
+    #[test]
+    fn every_kind_and_number_of_octaves_is_that_of_the_processor() {
+        let Some(device) = device() else { return };
+        let mut session = Session::new(device, 1 << 20).expect("a session");
+        for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
+            for octaves in 1..=MAX_OCTAVES {
+                let noise = NoiseHeights { kind, octaves, amplitude: 30_000.0, ..NoiseHeights::default() };
+                assert!(compare(&mut session, (63, 64), &noise, SLICE));
+            }
+        }
+    }
+
+    #[test]
+    fn the_far_ends_of_the_widest_worlds_are_those_of_the_processor() {
+        let Some(device) = device() else { return };
+        let mut session = Session::new(device, 1 << 20).expect("a session");
+        for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
+            let noise = NoiseHeights { kind, octaves: 16, scale: 1.0, ..NoiseHeights::default() };
+            assert!(compare(&mut session, (MAX_SIZE, 1), &noise, SLICE));
+            assert!(compare(&mut session, (1, MAX_SIZE), &noise, 10_000));
+        }
+    }
+
+    #[test]
+    fn a_card_makes_ground_where_that_pays_and_never_keeps_anyone_waiting() {
+        let open = |is_auto| {
+            let device = device()?;
+            let cuda = Cuda::open_with(is_auto, Some(64 << 20), &[(1, 2.0)], || Ok(device));
+            while cuda.state() == crate::backend::EngineState::Opening {
+                std::thread::sleep(std::time::Duration::from_millis(2));
+            }
+            Some(cuda)
+        };
+        let noise = NoiseHeights { octaves: 1, ..NoiseHeights::default() };
+        let (Some(auto), Some(always)) = (open(true), open(false)) else { return };
+        assert!(auto.ground(511, 510, &noise).is_none());
+        assert_eq!(auto.ground(511, 511, &noise), Ground::from_noise(511, 511, &noise).ok());
+        assert_eq!(always.ground(1, 1, &noise), Ground::from_noise(1, 1, &noise).ok());
+        let _taken = super::super::lock(&always.slot);
+        assert!(always.ground(1, 1, &noise).is_none());
+    }
+}
