@@ -1,10 +1,10 @@
-//! Much at once, on the processor and on a CUDA card: a meteor shower, a landscape cut into terraces, and a world of
+//! Much at once, on the processor and on a CUDA card: ground from noise, a meteor shower, a landscape cut into terraces, and a world of
 //! thousands of edits replayed as when it is loaded.
 //!
 //! `cargo run --release --no-default-features --features cuda --example bulk [-- --help]`
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::lattice::Column;
@@ -23,6 +23,9 @@ struct Arguments {
     /// How often each transaction is timed; medians are printed.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=100))]
     repeats: u16,
+    /// Cells along a side of the ground that is made of noise.
+    #[arg(long, default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    ground_side: u32,
 }
 
 /// Something large to do to a landscape.
@@ -88,6 +91,19 @@ fn median(mut times: Vec<Duration>) -> f64 {
     times[times.len() / 2].as_secs_f64() * 1e3
 }
 
+/// Times the making of ground from noise on some engine.
+fn time_ground(side: u32, repeats: u16, engine: &Engine) -> (f64, Ground) {
+    let noise = NoiseHeights { seed: 7, ..NoiseHeights::default() };
+    let make = || engine.ground_from_noise(side, side, &noise).expect("valid noise");
+    let mut ground = make();
+    let time = |_| {
+        let start = Instant::now();
+        ground = make();
+        start.elapsed()
+    };
+    (median((0..repeats).map(time).collect()), ground)
+}
+
 /// What one engine made of a scene, and how long it took.
 struct Outcome {
     commit: Commit,
@@ -119,6 +135,16 @@ fn main() {
             _ => println!("{backend:?}: the processor, {} threads", rayon::current_num_threads()),
         }
     }
+    let [(_, cpu), (_, cuda), _] = &engines;
+    let side = arguments.ground_side;
+    let [(cpu, expected), (cuda, found)] =
+        [cpu, cuda].map(|engine| time_ground(side, arguments.repeats, engine));
+    assert_eq!(expected, found, "both make the same ground");
+    println!(
+        "\nGround of {side} x {side} cells from noise: {cpu:.1} ms on Cpu, {cuda:.1} ms on Cuda; hash {:016x} on both",
+        found.hash()
+    );
+    drop((expected, found));
     let names = engines.each_ref().map(|(backend, _)| format!("{backend:?}"));
     let [cpu, cuda, auto] = names.each_ref().map(|name| format!("{name:>9}"));
     println!("\n{:<24}{:>9}{:>10}{cpu}{cuda}{auto}   ms, medians", "", "brushes", "vertices");
