@@ -141,7 +141,7 @@ fn main() {
         [cpu, cuda].map(|engine| time_ground(side, arguments.repeats, engine));
     assert_eq!(expected, found, "both make the same ground");
     println!(
-        "\nGround of {side} x {side} cells from noise: {cpu:.1} ms on Cpu, {cuda:.1} ms on Cuda; hash {:016x} on both",
+        "\nGround of {side} x {side} cells from noise: {cpu:.1} ms with Cpu, {cuda:.1} ms with Cuda; hash {:016x} of both",
         found.hash()
     );
     drop((expected, found));

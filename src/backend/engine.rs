@@ -104,9 +104,9 @@ impl Engine {
 
     /// Ground of `width` x `depth` cells from noise: the same, bit by bit, as [`Ground::from_noise`] makes.
     ///
-    /// The card makes it if it is there and free; with [`Backend::Auto`] only from 2^18 columns on, below which the
-    /// processor has it done sooner than the card could send it. In all other cases, and where the card fails, the processor
-    /// does. Large worlds gain most by waiting for the card first, see [`Self::wait`].
+    /// The card makes it if it is there and free; with [`Backend::Auto`] only from 2^18 columns on, as small worlds are made
+    /// faster than a card gets ready for them. In all other cases, and where the card fails, the processor makes it. Who
+    /// wants the card for the first world has to [`wait`](Self::wait) until it is open.
     ///
     /// # Errors
     /// Those of [`Ground::from_noise`].
@@ -118,7 +118,7 @@ impl Engine {
     /// let noise = NoiseHeights { kind: NoiseKind::Ridged, amplitude: 80.0, ..NoiseHeights::default() };
     /// let ground = Engine::new(Backend::Auto).ground_from_noise(300, 200, &noise)?;
     /// assert_eq!(ground, Ground::from_noise(300, 200, &noise)?);
-    /// # Ok::<(), GroundError>(())
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn ground_from_noise(
         &self,

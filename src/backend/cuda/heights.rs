@@ -9,8 +9,8 @@ use super::session::Session;
 use super::{Cuda, Place, lose};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
-/// Columns from which on the faster of both is the device; below, the processor's threads need about as long as a launch,
-/// and the memory that is pinned for it, take.
+/// Columns from which on the device is taken to be the faster of both. Estimated, not measured on a card: so many take 16
+/// threads some milliseconds, and memory that is pinned and freed for a launch should take the device about one.
 const LEAST: usize = 1 << 18;
 
 /// Most columns of one launch: 4 MiB of heights, twice on the host. Long enough for a card to be busy, short enough for

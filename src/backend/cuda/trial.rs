@@ -1,5 +1,5 @@
-//! A trial before a device is trusted: a piece of ground is dug on it and on the processor. Every bit is compared, and both
-//! are timed.
+//! A trial before a device is trusted: ground is made of noise, and a piece of ground is dug, on it and on the processor.
+//! Every bit is compared, and digging is timed on both.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
