@@ -141,6 +141,24 @@ impl<'a> EditWork<'a> {
         self.jobs.chunk_by(|a, b| a.brick == b.brick).collect()
     }
 
+    /// The same without bricks that no edit comes near.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn bricks_in_reach(&self) -> Vec<&[Job]> {
+        let (bricks, is_reached) = (self.bricks(), |jobs: &&[Job]| jobs.iter().any(|job| self.reaches(job)));
+        if bricks.len() < PARALLEL_BRICKS {
+            bricks.into_iter().filter(is_reached).collect()
+        } else {
+            bricks.into_par_iter().filter(is_reached).collect()
+        }
+    }
+
+    /// May the edit of a job change its brick? Where not, it is certain.
+    fn reaches(&self, job: &Job) -> bool {
+        let tool = &self.tools[job.edit as usize];
+        let reached = tool.reach.and_then(|reach| reach.intersection(job.pos().samples()));
+        reached.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples))
+    }
+
     /// Every brick that some edit may reach, once for each edit.
     pub(crate) fn jobs(&self) -> &[Job] {
         &self.jobs
@@ -223,12 +241,7 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
 /// Applies all edits of one brick and enters what they changed.
 fn finish(work: &EditWork, jobs: &[Job], ledger: &mut Ledger) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
-    let reaches = |job: &&Job| {
-        let tool = &work.tools[job.edit as usize];
-        let reached = tool.reach.and_then(|reach| reach.intersection(pos.samples()));
-        reached.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples))
-    };
-    let mut jobs = jobs.iter().filter(reaches).peekable();
+    let mut jobs = jobs.iter().filter(|job| work.reaches(job)).peekable();
     if jobs.peek().is_some() {
         Workpiece::new(work.base, work.grid, pos).take(&work.tools, jobs, ledger);
     }

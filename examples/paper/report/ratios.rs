@@ -143,7 +143,7 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
                 Some(paper(Backend::Cuda, run, at).total / paper(Backend::Cpu, run, at).total),
                 averages(Subject::Hybrid { backend: Backend::Cuda, chunk_size }, run),
                 averages(cpu(chunk_size), run),
-                None,
+                Some(Target::AtMost(1.0)),
             ));
         }
     }

@@ -129,7 +129,7 @@ impl Session {
     /// Applies edits: what they changed, brick by brick.
     pub fn edit(&mut self, work: &EditWork) -> Result<Vec<Ledger>, Fault> {
         self.begin();
-        let (bricks, mut uploads) = (work.bricks(), Uploads::new(work.base.ground()));
+        let (bricks, mut uploads) = (work.bricks_in_reach(), Uploads::new(work.base.ground()));
         let mut targets = Vec::with_capacity(bricks.len());
         let ledgers = self.run_edits(work, &bricks, &mut uploads, &mut targets);
         if ledgers.is_err() {
@@ -155,10 +155,11 @@ impl Session {
         uploads.plan(&mut plan);
         let job_list = plan.section::<EditJob>(sites.len());
         let tool_list = plan.section::<layout::Tool>(work.tools.len());
-        let edits = plan.section::<u32>(work.jobs().len());
+        let edits = plan.section::<u32>(bricks.iter().map(|jobs| jobs.len()).sum());
         let counters = plan.section::<u32>(4);
         self.inbox.open(&mut *self.device, &plan)?;
-        fill(work.jobs(), self.inbox.entries(edits), LONG, |_, job| job.edit);
+        let list = self.inbox.entries::<u32>(edits).iter_mut();
+        list.zip(bricks.iter().copied().flatten()).for_each(|(entry, job)| *entry = job.edit);
         let targets_of = &*targets;
         fill(&sites, self.inbox.entries(job_list), LONG, |number, site| EditJob {
             brick: site.pos.0.to_array(),

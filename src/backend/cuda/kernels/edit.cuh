@@ -272,6 +272,8 @@ __device__ inline u64 hash_change(
 ) {
     u64 place = mix((u64)(u32)(column.low[0] + column.x) | (u64)(u32)(column.low[2] + column.z) << 32);
     u64 change = 0;
+    // Not unrolled, here and in `sum_up`: fetching so many instructions takes longer than the loop.
+#pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         if (!(changed >> k & 1)) continue;
         i32 index = own_index(k), y = column.low[1] + own_y(column, k);
@@ -290,6 +292,7 @@ __device__ inline void sum_up(
 ) {
     Brick& brick = bench.brick;
     bool is_uniform = true, is_extended = false;
+#pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         i32 index = own_index(k), sample = brick.samples[index];
         bool is_edited = sample != PRISTINE, is_changed = changed >> k & 1;
