@@ -76,6 +76,15 @@ impl NoiseHeights {
     }
 }
 
+#[cfg(test)]
+impl NoiseHeights {
+    /// The processor's noise over columns, before it becomes heights.
+    pub(crate) fn by_column(&self) -> impl Fn(i32, i32) -> f64 {
+        let &Self { seed, kind, octaves, scale, amplitude, .. } = self;
+        super::noise_heights::generator(kind, seed, octaves, scale, amplitude).expect("parameters in range")
+    }
+}
+
 impl NoiseTerms {
     /// Columns in a row, of which there are as many as it takes.
     pub fn row_len(&self) -> usize {

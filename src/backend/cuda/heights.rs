@@ -211,6 +211,27 @@ mod tests {
     }
 
     #[test]
+    fn noise_is_that_of_the_processor_to_the_last_bit_of_a_double() {
+        let Some(device) = device() else { return };
+        let mut session = Session::new(device, 1 << 20).expect("a session");
+        let mut rng = Rng::with_seed(29);
+        // So much of it that heights, which are rounded, show the last bit.
+        let amplitude = 2.0_f64.powi(100);
+        for _ in 0..worlds::world_count(40) * 50 {
+            let noise = NoiseHeights { amplitude: 1.0, ..random_noise(&mut rng) };
+            let (width, depth) = (rng.u32(1..40), rng.u32(1..20));
+            let (x, z) = (rng.u32(0..=width), rng.u32(0..=depth));
+            let expected = noise.by_column()(x as i32, z as i32);
+            let mut terms = noise.terms(width, depth).expect("parameters in range");
+            (terms.amplitude, terms.base) = (amplitude, -amplitude * expected);
+            let mut heights = vec![77; terms.columns()];
+            session.heights(&terms, &mut heights).expect("the device is fine");
+            let found = heights[z as usize * terms.row_len() + x as usize];
+            assert_eq!(found, 0, "({x}, {z}) of {noise:?}");
+        }
+    }
+
+    #[test]
     fn every_kind_and_number_of_octaves_is_that_of_the_processor() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
