@@ -29,7 +29,8 @@ pub struct Choice {
     pub amount: usize,
     /// Bricks and stacks of the ground that the card does not have yet, roughly.
     pub missing: usize,
-    /// What was expected, for edits with the meshing that follows; `None` where the card is not there, or busy.
+    /// What was expected, for edits with the meshing that follows; `None` where the card is not there, busy, or
+    /// could not do it.
     pub estimate: Option<Estimate>,
     /// Was it the card?
     pub is_cuda: bool,

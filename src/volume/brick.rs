@@ -138,12 +138,12 @@ impl Brick {
         Self { samples: samples.map(Sample), solid, edited, materials, tag: Tag::default() }
     }
 
-    /// A brick all of whose samples were edited to the same.
+    /// A brick all of whose samples were edited to the same. `None`: no material was ever stored in it.
     #[cfg(feature = "cuda")]
-    pub(crate) fn of_one(sample: i16, material: MaterialId) -> Self {
+    pub(crate) fn of_one(sample: i16, material: Option<MaterialId>) -> Self {
         let sample = Sample::edited(sample.into());
         let solid = if sample.0 < 0 { [u64::MAX; 8] } else { [0; 8] };
-        let materials = (material != MaterialId::GROUND).then(|| Box::new([material; LEN]));
+        let materials = material.map(|material| Box::new([material; LEN]));
         Self { samples: [sample; LEN], solid, edited: [u64::MAX; 8], materials, tag: Tag::default() }
     }
 

@@ -40,7 +40,7 @@ pub enum Fault {
 impl Fault {
     /// Is the device fine, and only this transaction too large for it?
     pub(super) fn is_passing(&self) -> bool {
-        matches!(self, Self::Budget(_) | Self::TooLarge(_))
+        matches!(self, Self::Memory(_) | Self::Budget(_) | Self::TooLarge(_))
     }
 }
 

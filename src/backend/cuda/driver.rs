@@ -12,6 +12,8 @@ use std::time::Duration;
 use cudarc::driver::sys::{self, CUfunction};
 use cudarc::driver::{CudaContext, CudaEvent, CudaStream, DriverError, result};
 
+use rustc_hash::FxHashSet;
+
 use super::device::{Device, Fault, HostMemory, Kernel};
 use super::layout::THREADS;
 
@@ -34,6 +36,8 @@ pub(super) struct Card {
     is_timed: bool,
     module: sys::CUmodule,
     kernels: [CUfunction; Kernel::ALL.len()],
+    /// Memory that was not given back. The context may outlive this: all of the process have the same.
+    allocated: FxHashSet<u64>,
 }
 
 // SAFETY: the module and its functions belong to the context, which any thread may use once it is bound there; every
@@ -44,6 +48,14 @@ unsafe impl Send for Card {}
 fn failed(error: DriverError) -> Fault {
     let name = error.error_name().map_or("unknown error".into(), |name| name.to_string_lossy().into_owned());
     Fault::Failed(name)
+}
+
+/// The same, where so many bytes were asked for.
+fn no_memory(bytes: usize) -> impl Fn(DriverError) -> Fault {
+    move |error| match error.0 {
+        sys::CUresult::CUDA_ERROR_OUT_OF_MEMORY => Fault::Memory(bytes),
+        _ => failed(error),
+    }
 }
 
 impl Card {
@@ -83,7 +95,17 @@ impl Card {
         let stream = context.new_stream().map_err(failed)?;
         let mark = || context.new_event(Some(sys::CUevent_flags::CU_EVENT_DEFAULT)).map_err(failed);
         let (done, marks) = (mark()?, [mark()?, mark()?]);
-        Ok(Self { context, stream, done, marks, is_begun: false, is_timed: false, module, kernels })
+        Ok(Self {
+            context,
+            stream,
+            done,
+            marks,
+            is_begun: false,
+            is_timed: false,
+            module,
+            kernels,
+            allocated: FxHashSet::default(),
+        })
     }
 
     fn bind(&self) -> Result<(), Fault> {
@@ -96,6 +118,10 @@ impl Drop for Card {
         if self.bind().is_ok() {
             // What still runs may use the module and memory that goes next. A card that fails here is lost anyway.
             let _ = self.context.synchronize();
+            for address in self.allocated.drain() {
+                // SAFETY: nothing runs any more, and the address is from `alloc`, not freed yet.
+                let _ = unsafe { result::free_sync(address) };
+            }
             // SAFETY: nothing runs any more, and nobody else has the module.
             let _ = unsafe { result::module::unload(self.module) };
         }
@@ -135,7 +161,9 @@ impl HostMemory for Pinned {
 impl Drop for Pinned {
     fn drop(&mut self) {
         if self.context.bind_to_thread().is_ok() {
-            // SAFETY: the memory is this owner's; freeing it waits for copies that use it.
+            // After an error copies may be under way.
+            let _ = self.context.synchronize();
+            // SAFETY: the memory is this owner's, and no copy uses it any more.
             let _ = unsafe { result::free_host(self.start.cast()) };
         }
     }
@@ -153,12 +181,14 @@ impl Device for Card {
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
         self.bind()?;
         // SAFETY: a plain allocation.
-        unsafe { result::malloc_sync(bytes.max(1)) }.map_err(|_| Fault::Memory(bytes))
+        let address = unsafe { result::malloc_sync(bytes.max(1)) }.map_err(no_memory(bytes))?;
+        self.allocated.insert(address);
+        Ok(address)
     }
 
     fn free(&mut self, address: u64) {
-        if self.bind().is_ok() {
-            // SAFETY: the address is from `alloc`; freeing waits for whatever uses it.
+        if self.allocated.remove(&address) && self.bind().is_ok() {
+            // SAFETY: the address is from `alloc`, not freed yet; freeing waits for whatever uses it.
             let _ = unsafe { result::free_sync(address) };
         }
     }
@@ -168,8 +198,7 @@ impl Device for Card {
         let len = bytes.max(1);
         let flags = sys::CU_MEMHOSTALLOC_PORTABLE | sys::CU_MEMHOSTALLOC_DEVICEMAP;
         // SAFETY: a plain allocation, cleared before anyone looks at it.
-        let start =
-            unsafe { result::malloc_host(len, flags) }.map_err(|_| Fault::Memory(bytes))?.cast::<u8>();
+        let start = unsafe { result::malloc_host(len, flags) }.map_err(no_memory(bytes))?.cast::<u8>();
         // SAFETY: `start` has `len` bytes.
         unsafe { start.write_bytes(0, len) };
         let mut pinned = Pinned { context: Arc::clone(&self.context), start, len, address: 0 };

@@ -295,15 +295,16 @@ impl EditOutput {
 
     /// The brick of a result, whose place on the device has this tag.
     fn brick<'a>(&'a self, result: &EditResult, tag: u64) -> Option<Brick> {
+        let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
         if result.flags & EditResult::UNIFORM != 0 {
             let [low, high, material, _] = result.uniform.to_le_bytes();
-            return Some(Brick::of_one(i16::from_le_bytes([low, high]), MaterialId(material)));
+            let material = has_materials.then_some(MaterialId(material));
+            return Some(Brick::of_one(i16::from_le_bytes([low, high]), material));
         }
         let entry = |list: &'a Outbox, number: u32, bytes: usize| {
             list.entries::<u8>((number as usize + 1) * bytes).get(number as usize * bytes..)
         };
         let record = entry(&self.records, result.record, RECORD_BYTES).unwrap_or_default();
-        let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
         let materials = has_materials.then(|| entry(&self.materials, result.material, MATERIAL_BYTES));
         let brick = layout::brick_of(record, materials.flatten())?;
         brick.tag.set(tag);

@@ -145,7 +145,8 @@ impl Outbox {
         self.is_long = is_long;
         let is_short = entries > self.capacity() as usize;
         if entries > self.capacity {
-            let room = entries + entries / 4;
+            // Kernels count in 32 bits.
+            let room = (entries + entries / 4).min(u32::MAX as usize);
             (self.host, self.capacity) = (device.alloc_host(room * self.entry)?, room);
             self.stale = room;
         }

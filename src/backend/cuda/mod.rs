@@ -33,6 +33,8 @@ mod emulator;
 #[cfg(test)]
 mod kernel_tests;
 #[cfg(test)]
+mod mapped;
+#[cfg(test)]
 mod tests;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -140,13 +142,18 @@ impl Cuda {
         if load.amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda {
             return (None, load);
         }
-        match work(session) {
+        // A driver may do anything, and nobody else would finish the transaction.
+        let done = catch_unwind(AssertUnwindSafe(|| work(session)))
+            .unwrap_or_else(|_| Err(Fault::Failed("panic while it was used".into())));
+        match done {
             Ok(done) => {
                 choice.is_cuda = true;
                 [choice.device, choice.kernel] = session.times();
                 (Some(done), load)
             }
             Err(fault) => {
+                // What was lost on trying is not the processor's time to be learnt from.
+                choice.estimate = None;
                 if !fault.is_passing() {
                     lose(&mut place, &self.state, &fault);
                 }

@@ -91,6 +91,9 @@ impl Slots {
         count: usize,
         out: &mut Vec<(u32, u64)>,
     ) -> Result<(), Fault> {
+        if count > self.most {
+            return Err(Fault::Budget(self.most * self.record));
+        }
         while self.free.len() < count && self.grow(device, count)? {}
         if self.free.len() < count {
             self.evict(count);

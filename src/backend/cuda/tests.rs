@@ -10,6 +10,7 @@ use fastrand::Rng;
 use super::device::{Device, Fault, HostMemory, Kernel};
 use super::driver::Card;
 use super::emulator::Emulator;
+use super::mapped::Mapped;
 use super::*;
 use crate::backend::Engine;
 use crate::prelude::*;
@@ -65,7 +66,11 @@ fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
         let brushes: Vec<Brush> = (0..rng.u32(1..6)).map(|_| brush(rng)).collect();
         assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
     }
-    let (expected, found) = (expected.world(), found.world());
+    assert_same(expected.world(), found.world(), index);
+}
+
+/// Worlds are the same, bit by bit.
+fn assert_same(expected: &World, found: &World, index: u64) {
     assert_eq!(expected.hash(), found.hash(), "world {index}");
     assert!(drawn(expected) == drawn(found), "world {index}");
     // What bricks hold, bits and materials included; and as much memory.
@@ -97,14 +102,22 @@ fn worlds_of_a_device_are_those_of_the_processor() {
 /// A device that fails when it is told to.
 struct Faulty {
     own: Box<dyn Device>,
-    /// Calls to go until it fails, and how.
+    /// Calls to go until it fails, and how; for lack of memory, only calls that ask for some.
     plan: Arc<Mutex<Option<(u32, Fault)>>>,
 }
 
+/// A fault that is a panic.
+const PANIC: Fault = Fault::SelfTest;
+
 impl Faulty {
     fn call(&self) -> Result<(), Fault> {
+        if matches!(&*lock(&self.plan), Some((_, Fault::Memory(_)))) { Ok(()) } else { self.ask() }
+    }
+
+    fn ask(&self) -> Result<(), Fault> {
         let mut plan = lock(&self.plan);
         match &mut *plan {
+            Some((0, PANIC)) => panic!("as planned"),
             Some((0, fault)) => Err(fault.clone()),
             Some((left, _)) => {
                 *left -= 1;
@@ -123,14 +136,14 @@ impl Device for Faulty {
         self.own.free_memory()
     }
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-        self.call()?;
+        self.ask()?;
         self.own.alloc(bytes)
     }
     fn free(&mut self, address: u64) {
         self.own.free(address);
     }
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
-        self.call()?;
+        self.ask()?;
         self.own.alloc_host(bytes)
     }
     fn upload(&mut self, from: &dyn HostMemory, bytes: std::ops::Range<usize>, to: u64) -> Result<(), Fault> {
@@ -358,10 +371,163 @@ fn a_device_that_computes_something_else_is_not_trusted() {
 fn a_small_budget_is_kept_and_nothing_is_lost() {
     let Some(device) = device() else { return };
     // Bricks for a handful of brushes; larger transactions go to the processor.
-    let engine = engine(device, 6 << 20);
+    let engine = engine(device, 1 << 20);
     let mut rng = Rng::with_seed(5);
     (0..worlds::world_count(40) / 4).for_each(|index| compare(&mut rng, index, &engine));
-    assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+    let ball = |x: f32, z: f32, radius| vec![Brush::dig(Shape::sphere(glam::Vec3::new(x, 30.0, z), radius))];
+    let mut transactions = vec![ball(80.0, 80.0, 45.0)];
+    for i in 0..24 {
+        transactions.push(ball(10.0 + (i % 6 * 28) as f32, 12.0 + (i / 6 * 44) as f32, 6.0));
+    }
+    transactions.insert(12, ball(70.0, 90.0, 50.0));
+    compare_on(Ground::flat(160, 160, 30.0).expect("valid"), 32, &[&engine], &transactions);
     let figures = engine.figures();
     assert!(figures.cuda > 0, "{figures:?}");
+    // What the processor took is not expected of it, where the card was tried before.
+    let mut given_up =
+        figures.choices.iter().filter(|choice| !choice.is_cuda && choice.amount > 0).peekable();
+    assert!(given_up.peek().is_some() && given_up.all(|choice| choice.estimate.is_none()), "{figures:?}");
+}
+
+#[test]
+fn a_device_that_panics_is_given_up_and_nothing_is_lost() {
+    for calls in [0, 3, 9] {
+        let Some(own) = device() else { return };
+        let plan = Arc::new(Mutex::new(None));
+        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        *lock(&plan) = Some((calls, PANIC));
+        (0..2).for_each(|index| compare(&mut Rng::with_seed(8), index, &engine));
+        assert!(matches!(engine.state(), EngineState::Lost(_)), "{:?}", engine.state());
+    }
+}
+
+#[test]
+fn a_device_without_memory_for_a_transaction_does_the_next_one() {
+    let ball = |x: f32, radius| Brush::dig(Shape::sphere(glam::Vec3::new(x, 30.0, 60.0), radius));
+    for allocations in 0..12 {
+        let Some(own) = device() else { return };
+        let plan = Arc::new(Mutex::new(None));
+        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let ground = Arc::new(Ground::flat(120, 120, 30.0).expect("valid"));
+        let [mut expected, mut found] = [0, 1]
+            .map(|_| Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings"));
+        found.set_engine(engine.clone());
+        *lock(&plan) = Some((allocations, Fault::Memory(1)));
+        assert_eq!(expected.apply([ball(60.0, 40.0)]), found.apply([ball(60.0, 40.0)]));
+        *lock(&plan) = None;
+        let done = engine.figures().cuda;
+        for x in [14.0, 106.0, 20.0] {
+            assert_eq!(expected.apply([ball(x, 6.0)]), found.apply([ball(x, 6.0)]), "after {allocations}");
+        }
+        assert_eq!(engine.figures().cuda, done + 6, "after {allocations}");
+        assert_same(expected.world(), found.world(), u64::from(allocations));
+    }
+}
+
+/// Transactions on the processor and on engines that take turns, on ground that is given.
+fn compare_on(ground: Ground, chunk_size: u32, engines: &[&Engine], transactions: &[Vec<Brush>]) {
+    let settings = TerrainSettings { chunk_size, ..Default::default() };
+    let ground = Arc::new(ground);
+    let [mut expected, mut found] =
+        [0, 1].map(|_| Terrain::new(Arc::clone(&ground), &settings).expect("valid settings"));
+    for (number, brushes) in transactions.iter().enumerate() {
+        found.set_engine(engines[number % engines.len()].clone());
+        assert_eq!(expected.apply(brushes), found.apply(brushes), "transaction {number}");
+        assert_same(expected.world(), found.world(), number as u64);
+    }
+    for engine in engines {
+        assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+    }
+}
+
+/// An engine whose kernels write short lists to the host's memory, as those of a card do.
+fn mapped() -> Option<Engine> {
+    Some(engine(Box::new(Mapped::new(Box::new(Emulator::start()?))), 64 << 20))
+}
+
+#[test]
+fn kernels_that_reach_the_hosts_memory_make_the_same_worlds() {
+    let Some(engine) = mapped() else { return };
+    let mut rng = Rng::with_seed(12);
+    (0..worlds::world_count(40) / 2).for_each(|index| compare(&mut rng, index, &engine));
+    assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+}
+
+#[test]
+fn a_brick_all_of_whose_materials_are_gone_is_the_processors() {
+    let Some(device) = device() else { return };
+    let engine = engine(device, 64 << 20);
+    let sphere = |radius| Shape::sphere(glam::Vec3::new(48.0, 80.0, 48.0), radius);
+    let transactions = [
+        vec![Brush::add(sphere(24.0), MaterialId(3))],
+        vec![Brush::dig(sphere(25.0))],
+        vec![Brush::paint(sphere(30.0), MaterialId(3)), Brush::dig(sphere(26.0))],
+        vec![Brush::add(sphere(20.0), MaterialId::GROUND)],
+    ];
+    compare_on(Ground::flat(96, 96, 40.0).expect("valid"), 32, &[&engine], &transactions);
+}
+
+#[test]
+fn short_and_long_transactions_take_turns() {
+    let small = |i: i32| {
+        let center = glam::Vec3::new(20.0 + 7.0 * i as f32, 30.0, 30.0);
+        [Brush::dig(Shape::sphere(center, 5.0)), Brush::add(Shape::sphere(center, 3.0), MaterialId(i as u8))]
+    };
+    let large = |y: f32| {
+        let half = glam::Vec3::new(44.0, 13.0, 40.0);
+        let center = glam::Vec3::new(60.0, y, 60.0);
+        let cuboid = Shape::Cuboid { center, half, rotation: Default::default() };
+        Brush::dig(cuboid).with_roughness(Roughness::new(2.0, 3.0, 5))
+    };
+    // Many edits of few bricks: short lists that overflow.
+    let many = |n: i32| (0..n).flat_map(|i| small(i % 9)).collect::<Vec<_>>();
+    let transactions = [
+        small(0).to_vec(),
+        many(150),
+        small(1).to_vec(),
+        vec![large(20.0)],
+        small(2).to_vec(),
+        many(40),
+        vec![],
+        vec![large(10.0), large(30.0)],
+        vec![Brush::dig(Shape::sphere(glam::Vec3::splat(-900.0), 5.0))],
+        small(3).to_vec(),
+    ];
+    for engine in [mapped(), device().map(|device| engine(device, 64 << 20))] {
+        let Some(engine) = engine else { return };
+        let ground = || Ground::from_fn(120, 120, |x, z| 30.0 + f64::from(x * z % 7)).expect("valid");
+        compare_on(ground(), 32, &[&engine], &transactions);
+        let rule = MaterialRule { overlay: MaterialId(2), height: (0.0, 33.0), ..Default::default() };
+        let control = MaterialControl::Rules { base: MaterialId(1), rules: vec![rule] };
+        let ground = ground().with_materials(&control).expect("valid");
+        compare_on(ground, 25, &[&engine], &transactions);
+    }
+}
+
+#[test]
+fn engines_take_turns_with_the_same_bricks() {
+    let Some(first) = mapped() else { return };
+    let Some(second) = device() else { return };
+    let second = engine(second, 1 << 20);
+    let mut rng = Rng::with_seed(21);
+    let (ground, chunk_size) = worlds::random_ground(&mut rng, 3);
+    let transactions: Vec<Vec<Brush>> =
+        (0..24).map(|_| (0..3).map(|_| worlds::random_brush(&mut rng, &ground)).collect()).collect();
+    compare_on(ground, chunk_size, &[&first, &second], &transactions);
+}
+
+#[test]
+fn a_high_cliff_at_the_end_of_the_lattice_is_the_processors() {
+    let Some(device) = device() else { return };
+    let engine = engine(device, 64 << 20);
+    let top = f64::from(crate::lattice::LIMIT);
+    let low = top - 1500.0;
+    let ground = Ground::from_fn(24, 20, |x, _| if x < 20 { low } else { top }).expect("valid");
+    let at = |x: f32, y: f64, z: f32| glam::Vec3::new(x, y as f32, z);
+    let transactions = [
+        vec![Brush::dig(Shape::sphere(at(21.0, top - 700.0, 8.0), 4.0))],
+        vec![Brush::add(Shape::sphere(at(24.0, top, 20.0), 6.0), MaterialId(4))],
+        vec![Brush::paint(Shape::sphere(at(21.0, low, 0.0), 9.0), MaterialId(1))],
+    ];
+    compare_on(ground, 8, &[&engine], &transactions);
 }
