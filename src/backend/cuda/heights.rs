@@ -1,5 +1,7 @@
 //! New ground from noise: heights are computed on the device and come back slice by slice.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use rayon::prelude::*;
 
 use super::device::{Device, Fault, HostMemory, Kernel};
@@ -33,7 +35,10 @@ impl Cuda {
             let Place::Open(session, _) = &mut *place else { return None };
             // Nobody touches this memory before the threads that fill it.
             let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
-            if let Err(fault) = session.heights(&terms, &mut heights) {
+            // As transactions have it: a driver may do anything.
+            let done = catch_unwind(AssertUnwindSafe(|| session.heights(&terms, &mut heights)))
+                .unwrap_or_else(|_| Err(Fault::Failed("panic while it was used".into())));
+            if let Err(fault) = done {
                 if !fault.is_passing() {
                     lose(&mut place, &self.state, &fault);
                 }
@@ -74,12 +79,12 @@ impl Session {
         let mut plan = Plan::default();
         let tables = plan.section::<[u8; 256]>(terms.tables.len());
         self.inbox.open(&mut *self.device, &plan)?;
-        self.inbox.put(tables, &terms.tables);
-        self.inbox.send(&mut *self.device, &plan)?;
-        let mut params = params(terms, self.inbox.address(tables));
+        // Where memory is short, that must show before anything is under way.
         let mut buffers = Buffers::new(&mut *self.device, heights.len().min(slice) * size_of::<i32>())?;
-        params.heights = buffers.own;
-        let filled = fill(&mut *self.device, params, &mut buffers, heights, slice);
+        self.inbox.put(tables, &terms.tables);
+        let params = HeightsParams { heights: buffers.own, ..params(terms, self.inbox.address(tables)) };
+        let sent = self.inbox.send(&mut *self.device, &plan);
+        let filled = sent.and_then(|()| fill(&mut *self.device, params, &mut buffers, heights, slice));
         // Whatever is under way goes to buffers that are freed now.
         let ended = self.device.wait();
         self.device.free(buffers.own);

@@ -233,6 +233,23 @@ fn ground_is_made_by_the_processor_where_a_device_fails() {
 }
 
 #[test]
+fn a_device_without_memory_for_ground_is_kept() {
+    let noise = NoiseHeights::default();
+    let expected = Ground::from_noise(70, 50, &noise);
+    let Some(own) = device() else { return };
+    let plan = Arc::new(Mutex::new(None));
+    let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+    // Memory of the host twice, then of the device.
+    for calls in 0..3 {
+        *lock(&plan) = Some((calls, Fault::Memory(1 << 20)));
+        assert_eq!(engine.ground_from_noise(70, 50, &noise), expected, "after {calls} calls");
+        assert_eq!(lock(&plan).take(), Some((0, Fault::Memory(1 << 20))), "after {calls} calls");
+        assert_eq!(engine.ground_from_noise(70, 50, &noise), expected, "after {calls} calls");
+        assert!(matches!(engine.state(), EngineState::Cuda(_)));
+    }
+}
+
+#[test]
 fn ground_that_can_not_be_made_gives_the_same_error_on_a_device() {
     let Some(device) = device() else { return };
     let (name, engine) = (device.name(), engine(device, 64 << 20));
