@@ -95,8 +95,9 @@ impl Times {
         ];
         parts.into_iter().for_each(|(sample, time)| sample.push(time.as_secs_f64()));
         for (at, stage) in [Stage::Edit, Stage::Mesh].into_iter().enumerate() {
-            if let Some(choice) = choices.iter().rev().find(|choice| choice.stage == stage && choice.is_cuda)
-            {
+            let Some(choice) = choices.iter().rev().find(|choice| choice.stage == stage) else { continue };
+            self.backend[at].push(choice.took.as_secs_f64());
+            if !choice.device.is_zero() {
                 self.device[at].push(choice.device.as_secs_f64());
                 self.kernel[at].push(choice.kernel.as_secs_f64());
             }
