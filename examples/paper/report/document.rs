@@ -217,9 +217,8 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
              every test because each call sent the whole field over and the mesh back, and waited. Here bricks and heights \
              stay on the card: an edit sends a list of jobs, some kilobytes, and two launches write what changed, samples, \
              vertices and indices, straight into memory that the processor reads. What is left of the old cost are two \
-             round trips, some 30 us an edit in all: less than the largest of these edits take on a processor, and more \
-             than the smallest. A game leaves that choice to `Backend::Auto`; here it is not made, so that the columns \
-             compare."
+             round trips an edit, which large edits are worth and small ones are not; the ratios below tell what that comes \
+             to. A game leaves that choice to `Backend::Auto`; here it is not made, so that the columns compare."
         )?;
     }
     for (backend, reason) in &measurements.missing {
