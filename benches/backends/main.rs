@@ -131,6 +131,11 @@ fn header(what: &str) {
     println!("  {what:<28}{names}  edits, blocks: on the card (kernels)   us, medians but for p99");
 }
 
+/// Who goes first, second and third in a round: whoever comes later finds caches warm.
+fn turns(round: usize) -> [usize; 3] {
+    [0, 1, 2].map(|turn| (turn + round) % 3)
+}
+
 /// One transaction on an engine.
 fn run(transaction: Transaction, engine: &Engine, times: &mut Times) -> Commit {
     let commit = transaction.run_on(engine);
@@ -146,15 +151,17 @@ fn bulk(engines: &Engines, are_rough: bool) {
     let mut vertices = 0;
     for round in 0..12 {
         let mut hashes = Vec::new();
-        let mut wholes = Vec::new();
-        for (engine, times) in [(&engines.cpu, &mut cpu), (&engines.cuda, &mut cuda)] {
+        let mut wholes = [[0.0; 2]; 2];
+        let mut contenders = [(0, &engines.cpu, &mut cpu), (1, &engines.cuda, &mut cuda)];
+        contenders.rotate_left(round % 2);
+        for (who, engine, times) in contenders {
             let mut terrain = level.terrain();
             for (pass, times) in times.iter_mut().enumerate() {
                 level.brushes(pass, are_rough).for_each(|brush| terrain.submit(&brush));
                 let mut discarded = Times::default();
                 let transaction = terrain.begin().expect("brushes wait");
                 let commit = run(transaction, engine, if round < 2 { &mut discarded } else { times });
-                wholes.push(commit.stages.whole.as_secs_f64());
+                wholes[who][pass] = commit.stages.whole.as_secs_f64();
                 vertices = commit.meshes.chunks.iter().map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
                 terrain.commit(commit).expect("nothing else commits");
             }
@@ -165,7 +172,7 @@ fn bulk(engines: &Engines, are_rough: bool) {
             ratios
                 .iter_mut()
                 .enumerate()
-                .for_each(|(pass, ratio)| ratio.push(wholes[pass] / wholes[pass + 2]));
+                .for_each(|(pass, ratio)| ratio.push(wholes[0][pass] / wholes[1][pass]));
         }
     }
     header("512 fields");
@@ -186,14 +193,17 @@ fn one_field(engines: &Engines) {
         for round in 0..30 {
             let mut discarded = [(); 3].map(|()| Times::default());
             let kept = if round < 5 { &mut discarded } else { &mut samples };
-            let [alone, cpu, cuda] = kept;
             let dig_all = |engine: &Engine, times: &mut Times| {
                 let mut terrain = level::one_field(size, round);
                 run(terrain.begin().expect("a brush waits"), engine, times);
             };
-            one.install(|| dig_all(&engines.cpu, alone));
-            dig_all(&engines.cpu, cpu);
-            dig_all(&engines.cuda, cuda);
+            for who in turns(round as usize) {
+                match who {
+                    0 => one.install(|| dig_all(&engines.cpu, &mut kept[0])),
+                    1 => dig_all(&engines.cpu, &mut kept[1]),
+                    _ => dig_all(&engines.cuda, &mut kept[2]),
+                }
+            }
         }
         for (times, who) in samples.iter().zip(["1 thread", "CPU", "CUDA"]) {
             times.print(&format!("{size}^3, {who}"));
@@ -210,9 +220,9 @@ fn brush(engines: &Engines) {
         terrain.apply([dig(at, 4.0)]);
         terrain.submit(&dig(at + Vec3::splat(2.0), 4.0));
         let transaction = terrain.begin().expect("a brush waits");
-        for ((_, engine), times) in engines.named().into_iter().zip(&mut times) {
-            let mut discarded = Times::default();
-            run(transaction.clone(), engine, if round < 100 { &mut discarded } else { times });
+        for who in turns(round) {
+            let (mut discarded, (_, engine)) = (Times::default(), engines.named()[who]);
+            run(transaction.clone(), engine, if round < 100 { &mut discarded } else { &mut times[who] });
         }
         terrain.commit(transaction.run()).expect("nothing else commits");
     }
@@ -240,10 +250,10 @@ fn sweep(engines: &Engines) {
             own.for_each(|&place| terrain.submit(&dig(place + Vec3::splat(round as f32 * 0.1), radius)));
             let transaction = terrain.begin().expect("brushes wait");
             let mut taken = [0.0; 3];
-            for (i, (_, engine)) in engines.named().into_iter().enumerate() {
-                let mut discarded = Times::default();
-                let kept = if round < 5 { &mut discarded } else { &mut times[i] };
-                taken[i] = run(transaction.clone(), engine, kept).stages.whole.as_secs_f64();
+            for who in turns(round) {
+                let (mut discarded, (_, engine)) = (Times::default(), engines.named()[who]);
+                let kept = if round < 5 { &mut discarded } else { &mut times[who] };
+                taken[who] = run(transaction.clone(), engine, kept).stages.whole.as_secs_f64();
             }
             blocks = engines.auto.figures().choices.back().map_or(blocks, |choice| choice.amount);
             if round >= 5 {

@@ -18,8 +18,7 @@ mod cuda;
 mod engine;
 
 pub use choice::{Choice, Estimate, Stage};
-use cpu::Cpu;
-pub(crate) use cpu::PARALLEL_BLOCKS;
+pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
 pub use engine::{Engine, EngineFigures, EngineState};
 
 use crate::surface::block::{Block, Parts};

@@ -195,8 +195,7 @@ impl Terrain {
         let submissions: Arc<[Submission]> = std::mem::take(&mut self.queue).into();
         let ticket = unique();
         self.in_flight = Some(InFlight { ticket, submissions: Arc::clone(&submissions) });
-        let engine = self.engine.clone().unwrap_or_default();
-        Some(Transaction::new(ticket, self.snapshot(), submissions, engine))
+        Some(Transaction::new(ticket, self.snapshot(), submissions, self.engine.clone()))
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.

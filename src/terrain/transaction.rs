@@ -16,7 +16,7 @@ use super::receipt::{Applied, ChunkScenario, Receipt, Rejection};
 use super::redraw::{self, MeshUpdates};
 use super::surface::ChunkSurface;
 use super::world::World;
-use crate::backend::Engine;
+use crate::backend::{Compute, Cpu, Engine};
 use crate::brush::Edit;
 use crate::lattice::{ChunkPos, LatticeBox, TilePos};
 use crate::surface::tile::Rings;
@@ -46,7 +46,8 @@ pub struct Transaction {
     ticket: u64,
     world: Arc<World>,
     submissions: Arc<[Submission]>,
-    engine: Engine,
+    /// Without one, the processor.
+    engine: Option<Engine>,
 }
 
 /// The result of a transaction: only what changed.
@@ -99,7 +100,7 @@ impl Transaction {
         ticket: u64,
         world: Arc<World>,
         submissions: Arc<[Submission]>,
-        engine: Engine,
+        engine: Option<Engine>,
     ) -> Self {
         Self { ticket, world, submissions, engine }
     }
@@ -116,7 +117,7 @@ impl Transaction {
 
     /// Computes the commit on another engine than the terrain's own.
     pub fn run_on(self, engine: &Engine) -> Commit {
-        Self { engine: engine.clone(), ..self }.run()
+        Self { engine: Some(engine.clone()), ..self }.run()
     }
 
     /// Computes the commit. Runs on any thread; large transactions use the threads of the current rayon pool, and the
@@ -124,7 +125,7 @@ impl Transaction {
     pub fn run(self) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = self.submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
-        let backend = self.engine.compute();
+        let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
         let draft = Stages::time(&mut stages.edit, || {
             let mut draft = Draft::new(edits.len(), world.sample_hash);
             let work = EditWork::new(world.samples(), world.grid, &edits);
