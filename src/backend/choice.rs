@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+#[cfg(feature = "cuda")]
+use crate::volume::{EditWork, Job};
+
 /// A stage of a transaction that a backend does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
@@ -27,7 +30,8 @@ pub struct Choice {
     pub stage: Stage,
     /// Bricks that edits may reach, or blocks to be meshed.
     pub amount: usize,
-    /// Bricks and stacks of the ground that the card does not have yet, roughly.
+    /// Bricks and stacks of the ground that the card does not have yet, roughly; 0 where the card would be slower even
+    /// if it had them all.
     pub missing: usize,
     /// What was expected, for edits with the meshing that follows; `None` where the card is not there, busy, or
     /// could not do it.
@@ -101,6 +105,16 @@ pub(super) struct Load {
     pub rough: usize,
     /// Bricks and stacks of the ground that the card does not have.
     pub missing: usize,
+}
+
+#[cfg(feature = "cuda")]
+impl Load {
+    /// What edits are to do, as if the card had all bricks.
+    pub fn of_edits(work: &EditWork) -> Self {
+        let is_rough = |job: &&Job| work.tools[job.edit as usize].evaluator.is_rough();
+        let jobs = work.jobs();
+        Self { amount: jobs.len(), rough: jobs.iter().filter(is_rough).count(), missing: 0 }
+    }
 }
 
 /// What both backends take, by measurement: the processor first, then the card.

@@ -53,6 +53,13 @@ impl TileUpdate {
     }
 }
 
+/// From how many boxes, bricks or stacks on what is cheap for each is spread over threads: waking these takes as long as
+/// some hundred of them.
+const PARALLEL_PLACES: usize = 512;
+
+/// From how many parts on chunks are put together side by side.
+const PARALLEL_PARTS: usize = 256;
+
 /// Rule 2 for the cells around changed samples. Edited samples stay edited, so cells only ever join the mask.
 fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
     // A sample is a corner of the cells one below it.
@@ -77,7 +84,7 @@ fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
         }
         found
     };
-    let cells: Vec<_> = if near.len() < PARALLEL_BLOCKS {
+    let cells: Vec<_> = if near.len() < PARALLEL_PLACES {
         windows.iter().flat_map(disturbed).collect()
     } else {
         windows.par_iter().flat_map_iter(disturbed).collect()
@@ -154,7 +161,7 @@ fn in_world(view: &WorldView, low: IVec3, high: IVec3) -> Option<LatticeBox> {
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
 fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block> {
-    let is_large = dirty.len() >= PARALLEL_BLOCKS;
+    let is_large = dirty.len() >= PARALLEL_PLACES;
     let sheets = sheets_near(view, added);
     if !sheets.is_empty() {
         dirty.extend(by_brick(&sheets));
@@ -194,7 +201,7 @@ fn sheets_near(view: &WorldView, added: &Mask) -> Vec<(i32, LatticeBox)> {
         Some((stack.0, in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))?))
     };
     let stacks = |a: &((i32, i32), u64), b: &((i32, i32), u64)| a.0 == b.0;
-    if near.len() < PARALLEL_BLOCKS {
+    if near.len() < PARALLEL_PLACES {
         near.chunk_by(stacks).filter_map(sheet).collect()
     } else {
         near.par_chunk_by(stacks).filter_map(sheet).collect()
@@ -213,7 +220,7 @@ const PLACES: u64 = 64;
 /// whose x, in bricks, stands beside it, at most one brick away; by that number they are sorted.
 fn by_brick(boxes: &[(i32, LatticeBox)]) -> ByBrick {
     let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return ByBrick::new() };
-    if boxes.len() < PARALLEL_BLOCKS {
+    if boxes.len() < PARALLEL_PLACES {
         return those_within(first.0 - 1..=last.0 + 1, boxes);
     }
     let slab = |x: i32| {
@@ -310,7 +317,7 @@ fn assemble(world: &World, parts: &[Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)
     };
     let all: Vec<(ChunkPos, Fresh)> = parts.iter().flat_map(|parts| parts.iter().map(fresh)).collect();
     let mut order = order_of_places(&all, |(chunk, _)| chunk.as_ivec3().to_array());
-    let is_large = all.len() >= PARALLEL_BLOCKS;
+    let is_large = all.len() >= PARALLEL_PARTS;
     let part = |number: u32| &all[number as usize];
     let mut chunks: Vec<&mut [u32]> = order.chunk_by_mut(|&a, &b| part(a).0 == part(b).0).collect();
     let update = |numbers: &mut &mut [u32]| {

@@ -103,7 +103,7 @@ impl EditOutput {
 }
 
 /// From how many bricks on they are dealt with side by side.
-const LONG: usize = 64;
+const LONG: usize = 1024;
 
 /// From how many bricks on they are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 256;

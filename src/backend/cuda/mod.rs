@@ -127,19 +127,27 @@ impl Cuda {
     fn offer<T>(
         &self,
         choice: &mut Choice,
-        load: impl FnOnce(&Session) -> Load,
+        mut load: Load,
+        missing: impl FnOnce(&Session) -> usize,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
     ) -> (Option<T>, Load) {
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
-        let Ok(mut place) = self.slot.try_lock() else { return (None, Load::default()) };
-        let Place::Open(session, costs) = &mut *place else { return (None, Load::default()) };
-        let load = load(session);
-        let estimate = match choice.stage {
-            Stage::Edit => costs.edit(load),
-            Stage::Mesh => costs.mesh(load),
+        let Ok(mut place) = self.slot.try_lock() else { return (None, load) };
+        let Place::Open(session, costs) = &mut *place else { return (None, load) };
+        let mut is_slower = |load: Load| {
+            let estimate = match choice.stage {
+                Stage::Edit => costs.edit(load),
+                Stage::Mesh => costs.mesh(load),
+            };
+            (choice.missing, choice.estimate) = (load.missing, Some(estimate));
+            load.amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda
         };
-        (choice.missing, choice.estimate) = (load.missing, Some(estimate));
-        if load.amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda {
+        // Whatever is missing only makes the card slower, so small transactions need not look for it.
+        if is_slower(load) {
+            return (None, load);
+        }
+        load.missing = missing(session);
+        if is_slower(load) {
             return (None, load);
         }
         // A driver may do anything, and nobody else would finish the transaction.
@@ -174,7 +182,8 @@ impl Cuda {
 
     /// Applies edits on the card, if that is chosen.
     pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Vec<Ledger>>, Load) {
-        self.offer(choice, |session| session.load_of_edits(work), |session| session.edit(work))
+        let load = Load::of_edits(work);
+        self.offer(choice, load, |session| session.missing_edits(work), |session| session.edit(work))
     }
 
     /// Meshes blocks on the card, if that is chosen.
@@ -184,8 +193,9 @@ impl Cuda {
         blocks: &[Block],
         choice: &mut Choice,
     ) -> (Option<Vec<Parts>>, Load) {
-        let load = |session: &Session| session.load_of_mesh(view, blocks);
-        self.offer(choice, load, |session| session.mesh(view, blocks))
+        let load = Load { amount: blocks.len(), ..Load::default() };
+        let missing = |session: &Session| session.missing_blocks(view, blocks);
+        self.offer(choice, load, missing, |session| session.mesh(view, blocks))
     }
 }
 

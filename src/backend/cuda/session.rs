@@ -10,12 +10,11 @@ use super::layout::{self, BRICK_BYTES, RECORD_BYTES, ScatterJob, ScatterParams, 
 use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
 use super::slots::{Slots, reference};
-use crate::backend::choice::Load;
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
-use crate::volume::{Brick, EditWork, Job, SampleView};
+use crate::volume::{Brick, EditWork, SampleView};
 
 /// A device that works for terrains.
 pub(super) struct Session {
@@ -162,21 +161,15 @@ impl Session {
         self.device.name()
     }
 
-    /// What there is to do for edits.
-    pub fn load_of_edits(&self, work: &EditWork) -> Load {
+    /// How much of what edits need is not here.
+    pub fn missing_edits(&self, work: &EditWork) -> usize {
         let jobs = work.jobs();
-        let is_rough = |job: &&Job| work.tools[job.edit as usize].evaluator.is_rough();
-        Load {
-            amount: jobs.len(),
-            rough: jobs.iter().filter(is_rough).count(),
-            missing: self.missing(work.base, jobs.len(), |at| jobs[at].pos()),
-        }
+        self.missing(work.base, jobs.len(), |at| jobs[at].pos())
     }
 
-    /// What there is to do for blocks.
-    pub fn load_of_mesh(&self, view: &WorldView, blocks: &[Block]) -> Load {
-        let missing = self.missing(view.samples, blocks.len(), |at| blocks[at].brick);
-        Load { amount: blocks.len(), rough: 0, missing }
+    /// How much of what blocks need is not here.
+    pub fn missing_blocks(&self, view: &WorldView, blocks: &[Block]) -> usize {
+        self.missing(view.samples, blocks.len(), |at| blocks[at].brick)
     }
 
     /// How many of so many bricks are not here, with the stacks that they belong to; judged by some of them.
