@@ -265,6 +265,7 @@ impl Witness {
             match news {
                 FieldNews::Created(id) => assert!(self.fields.insert((chunk, id)), "{what}: created twice"),
                 FieldNews::Changed(id) => assert!(self.fields.contains(&(chunk, id)), "{what}: unknown"),
+                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: removed twice"),
                 FieldNews::Merged { gone, into } => {
                     assert!(self.fields.remove(&(chunk, gone)), "{what}: gone twice");
                     assert!(world.fields_of(chunk).is_some_and(|f| f.get(into).is_some()), "{what}: into");
