@@ -6,9 +6,13 @@
 //! meshes, entities, [`BrushApplied`] receipts and entity events. Without an `Assets<Mesh>`, on a server with
 //! `MinimalPlugins`, all of that happens but the meshes.
 //!
+//! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
+//! commit: see [`Companion`].
+//!
 //! Bevy's `multi_threaded` feature keeps transactions off the main thread; without it they run within the frame.
 
 mod commit;
+mod companion;
 mod components;
 mod entities;
 mod heightmap;
@@ -19,7 +23,8 @@ mod messages;
 mod query;
 mod settings;
 
-pub use components::{Chunk, Field, MaterialColors, Tile};
+pub use companion::{Attachment, Companion, Companions, Part};
+pub use components::{Chunk, Field, MaterialColors, ShownSurface, Tile};
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
@@ -79,6 +84,7 @@ impl Plugin for TerrainPlugin {
         app.init_resource::<BurrowSettings>()
             .init_resource::<BurrowFigures>()
             .init_resource::<BurrowEngine>()
+            .init_resource::<Companions>()
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()
