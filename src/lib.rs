@@ -124,6 +124,8 @@ pub mod backend;
 pub mod brush;
 pub mod ground;
 pub mod lattice;
+#[cfg(feature = "avian")]
+pub mod physics;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 pub mod surface;

@@ -1,5 +1,6 @@
 //! Transactions: started in tasks, committed whole in one frame.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use bevy::camera::visibility::NoAutoAabb;
@@ -7,15 +8,15 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
+use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
 use super::intake::tell_steps;
 use super::load::Loading;
-use super::meshes::{self, Ready};
+use super::meshes::Ready;
 use super::{
-    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
-    MaterialColors,
+    Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Companions,
+    HistoryMoved, MaterialColors, Part, ShownSurface,
 };
-use crate::surface::SurfaceMesh;
 use crate::terrain::{Commit, Drawn, Terrain};
 
 /// The transaction that a terrain waits for.
@@ -27,10 +28,10 @@ pub(super) struct InFlight {
     done: Option<Prepared>,
 }
 
-/// A commit with its meshes, as they come from the task.
+/// A commit with its meshes and what goes with them, as they come from the task.
 struct Prepared {
     commit: Commit,
-    meshes: Vec<(Drawn, Ready)>,
+    parts: Vec<Fresh>,
     took: Duration,
 }
 
@@ -42,6 +43,7 @@ pub(super) fn begin_transactions(
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
+    companions: Res<Companions>,
     engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
     mut moved: MessageWriter<HistoryMoved>,
@@ -57,20 +59,26 @@ pub(super) fn begin_transactions(
         let transaction = terrain.begin();
         tell_steps(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
-        let (colors, engine) = (colors.clone(), terrain.engine().unwrap_or(&engine).clone());
+        let engine = terrain.engine().unwrap_or(&engine).clone();
+        let workshop = Workshop { colors: draws.then(|| colors.clone()), companions: companions.clone() };
+        let (size, grid) = (terrain.voxel_size(), terrain.world().grid());
+        let revision = terrain.world().revision() + 1;
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let start = Instant::now();
             let mut commit = transaction.run_on(&engine);
-            let build = |surface: &SurfaceMesh| if draws { meshes::build(surface, &colors) } else { None };
+            let part = |drawn| Part::new(entity, size, grid, revision, drawn);
             // Taken out, so that they are dropped here and not on the main thread.
             let updates = std::mem::take(&mut commit.meshes);
-            let tiles = updates
-                .tiles
-                .iter()
-                .map(|(tile, update)| (Drawn::Tile(*tile), if draws { build(&update.mesh()) } else { None }));
-            let chunks = updates.chunks.iter().map(|(at, chunk)| (Drawn::Chunk(*at), build(chunk.mesh())));
-            let meshes = tiles.chain(chunks).collect();
-            Prepared { commit, meshes, took: start.elapsed() }
+            let tiles = updates.tiles.iter().map(|(tile, update)| {
+                let part = part(Drawn::Tile(*tile));
+                workshop.make(&part, update.indices.is_empty(), || Cow::Owned(update.mesh()))
+            });
+            let chunks = updates.chunks.iter().map(|(at, chunk)| {
+                let part = part(Drawn::Chunk(*at));
+                workshop.make(&part, chunk.is_empty(), || Cow::Borrowed(chunk.mesh()))
+            });
+            let parts = tiles.chain(chunks).collect();
+            Prepared { commit, parts, took: start.elapsed() }
         });
         *number += 1;
         commands.entity(entity).try_insert(InFlight { number: *number, task, done: None });
@@ -103,11 +111,11 @@ pub(super) fn commit_transactions(
     let mut swapped = 0;
     for (_, entity) in done {
         let Ok((_, mut terrain, mut entities, mut transaction)) = terrains.get_mut(entity) else { continue };
-        let swaps = transaction.done.as_ref().map_or(0, |prepared| prepared.meshes.len());
+        let swaps = transaction.done.as_ref().map_or(0, |prepared| prepared.parts.len());
         if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
             continue;
         }
-        let Some(Prepared { commit, meshes, took }) = transaction.done.take() else { continue };
+        let Some(Prepared { commit, parts, took }) = transaction.done.take() else { continue };
         commands.entity(entity).try_remove::<InFlight>();
         let start = Instant::now();
         let news = commit.field_news().to_vec();
@@ -121,24 +129,27 @@ pub(super) fn commit_transactions(
         let world = terrain.world();
         entities.shown = world.version();
         let with_fields = news.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
-        let with_meshes = meshes.into_iter().map(|(drawn, ready)| (drawn, Some(ready)));
+        let with_surfaces = parts.into_iter().map(|fresh| (fresh.drawn, Some(fresh)));
         let mut touched = Vec::new();
-        for (drawn, ready) in with_meshes.chain(with_fields) {
+        for (drawn, fresh) in with_surfaces.chain(with_fields) {
             if let Drawn::Chunk(chunk) = drawn {
                 touched.push(chunk);
             }
             let child = entities.get(&mut commands, drawn);
             let is_new = child.is_none();
-            if is_new && matches!(ready, Some(None)) {
+            if is_new && fresh.as_ref().is_some_and(|fresh| fresh.shown.is_empty) {
                 continue;
             }
             let child = child.unwrap_or_else(|| entities.spawn(&mut commands, entity, world, drawn));
-            if let (Some(ready), Some(assets)) = (ready, &mut assets) {
-                swap(&mut commands, assets, child, shown.get(child).ok(), ready);
-                figures.swaps += 1;
-                if let (Drawn::Chunk(_), false) = (drawn, is_new) {
-                    tell(&mut commands, ChunkChanged { entity: child });
+            if let Some(fresh) = fresh {
+                if let Some(assets) = &mut assets {
+                    swap(&mut commands, assets, child, shown.get(child).ok(), fresh.mesh);
+                    figures.swaps += 1;
+                    if let (Drawn::Chunk(_), false) = (drawn, is_new) {
+                        tell(&mut commands, ChunkChanged { entity: child });
+                    }
                 }
+                attach(&mut commands, child, fresh.shown, fresh.attachments);
             }
             if let (Drawn::Chunk(_), true) = (drawn, is_new) {
                 tell(&mut commands, ChunkCreated { entity: child });
@@ -154,6 +165,20 @@ pub(super) fn commit_transactions(
         let took = start.elapsed();
         figures.last_commit = took;
         figures.main_thread += took;
+    }
+}
+
+/// Tells which surface an entity shows, and does to it what goes with that.
+pub(super) fn attach(
+    commands: &mut Commands,
+    child: Entity,
+    shown: ShownSurface,
+    attachments: Vec<Attachment>,
+) {
+    let Ok(mut child) = commands.get_entity(child) else { return };
+    child.try_insert(shown);
+    for attachment in attachments {
+        attachment(&mut child);
     }
 }
 

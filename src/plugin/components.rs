@@ -38,6 +38,16 @@ pub struct Chunk {
     pub z: i32,
 }
 
+/// Which surface a tile or chunk shows, where one was made of it: the plugin writes it in the frame of the swap.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct ShownSurface {
+    /// The revision of the world that it is of; it stays while other parts change.
+    pub revision: u64,
+    /// Is it known to have no triangles?
+    pub is_empty: bool,
+}
+
 /// A region of edits: child of its [`Chunk`]. It is data; the chunk draws it.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]

@@ -1,5 +1,6 @@
 //! New terrains: all their meshes are made in a task, and shown in one frame when all of them are there.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -10,10 +11,10 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
-use super::commit::InFlight;
+use super::commit::{InFlight, attach};
+use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
-use super::meshes::{self, Ready};
-use super::{BurrowSettings, ChunkCreated, MaterialColors};
+use super::{BurrowSettings, ChunkCreated, Companions, MaterialColors, Part};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
 
@@ -28,9 +29,15 @@ pub struct TerrainReady {
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
-    task: Option<Task<Vec<(Drawn, Ready)>>>,
-    waiting: Vec<(Drawn, Ready)>,
-    uploaded: HashMap<Drawn, (Handle<Mesh>, Aabb)>,
+    task: Option<Task<Vec<Fresh>>>,
+    waiting: Vec<Fresh>,
+    ready: HashMap<Drawn, Loaded>,
+}
+
+/// A part whose mesh, if it has one, is with the renderer.
+struct Loaded {
+    mesh: Option<(Handle<Mesh>, Aabb)>,
+    fresh: Fresh,
 }
 
 /// Terrains that no task works for.
@@ -42,6 +49,7 @@ pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<(Entity, &Terrain, &MaterialColors, &mut Transform, Option<&TerrainEntities>), Idle>,
     assets: Option<Res<Assets<Mesh>>>,
+    companions: Res<Companions>,
 ) {
     for (entity, terrain, colors, mut transform, entities) in &mut terrains {
         if entities.is_some_and(|entities| entities.shown == terrain.world().version()) {
@@ -52,11 +60,14 @@ pub(super) fn start_loading(
             transform.scale = scale;
         }
         let world = terrain.snapshot();
-        let task = assets.is_some().then(|| {
-            let (world, colors) = (Arc::clone(&world), colors.clone());
-            AsyncComputeTaskPool::get().spawn(async move { mesh_all(&world, &colors) })
+        let workshop =
+            Workshop { colors: assets.is_some().then(|| colors.clone()), companions: companions.clone() };
+        let task = (!workshop.is_idle()).then(|| {
+            let (world, voxel_size) = (Arc::clone(&world), terrain.voxel_size());
+            AsyncComputeTaskPool::get()
+                .spawn(async move { make_all(&world, &workshop, (entity, voxel_size)) })
         });
-        let loading = Loading { world, task, waiting: Vec::new(), uploaded: HashMap::default() };
+        let loading = Loading { world, task, waiting: Vec::new(), ready: HashMap::default() };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -75,18 +86,15 @@ pub(super) fn place_terrains(
     }
 }
 
-/// Everything that a world draws.
-fn mesh_all(world: &World, colors: &MaterialColors) -> Vec<(Drawn, Ready)> {
+/// Everything that a world draws, and what goes with it.
+fn make_all(world: &World, workshop: &Workshop, (terrain, voxel_size): (Entity, f32)) -> Vec<Fresh> {
     let chunks = world.drawn_chunks().map(Drawn::Chunk);
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
-    let mesh = |&drawn: &Drawn| {
-        let surface = match drawn {
-            Drawn::Tile(tile) => world.tile_mesh(tile),
-            Drawn::Chunk(chunk) => world.chunk_mesh(chunk),
-        };
-        (drawn, meshes::build(&surface, colors))
+    let make = |&drawn: &Drawn| {
+        let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
+        workshop.make(&part, false, || Cow::Owned(part.surface_in(world)))
     };
-    all.par_iter().map(mesh).collect()
+    all.par_iter().map(make).collect()
 }
 
 /// Hands meshes to the renderer, a budget's worth per frame, and shows all of them once none waits; what was shown
@@ -99,19 +107,19 @@ pub(super) fn finish_loading(
 ) {
     for (entity, mut loading, old) in &mut terrains {
         if let Some(task) = &mut loading.task {
-            let Some(meshes) = check_ready(task) else { continue };
-            (loading.task, loading.waiting) = (None, meshes);
+            let Some(parts) = check_ready(task) else { continue };
+            (loading.task, loading.waiting) = (None, parts);
         }
-        if let Some(assets) = &mut assets {
-            let rest = loading.waiting.len().saturating_sub(settings.loads_per_frame.max(1));
-            for (drawn, ready) in loading.waiting.split_off(rest) {
-                if let Some((mesh, bounds)) = ready {
-                    loading.uploaded.insert(drawn, (assets.add(mesh), bounds));
-                }
-            }
-            if !loading.waiting.is_empty() {
-                continue;
-            }
+        let budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
+        let rest = loading.waiting.len().saturating_sub(budget);
+        for mut fresh in loading.waiting.split_off(rest) {
+            let mesh = assets
+                .as_mut()
+                .and_then(|assets| fresh.mesh.take().map(|(mesh, bounds)| (assets.add(mesh), bounds)));
+            loading.ready.insert(fresh.drawn, Loaded { mesh, fresh });
+        }
+        if !loading.waiting.is_empty() {
+            continue;
         }
         for child in old.into_iter().flat_map(TerrainEntities::drawn) {
             commands.entity(child).try_despawn();
@@ -127,15 +135,14 @@ fn show(commands: &mut Commands, terrain: Entity, loading: &mut Loading) -> Terr
     let world = Arc::clone(&loading.world);
     let mut entities = TerrainEntities::new(world.version());
     let with_fields = world.fields().map(|(chunk, _)| chunk);
-    let with_meshes = loading.uploaded.keys().filter_map(|drawn| match drawn {
-        Drawn::Chunk(chunk) => Some(*chunk),
-        Drawn::Tile(_) => None,
-    });
-    let chunks: BTreeSet<ChunkPos> = with_fields.chain(with_meshes).collect();
+    let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     for drawn in world.grid().tiles().map(Drawn::Tile).chain(chunks.into_iter().map(Drawn::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
-        if let Some((handle, bounds)) = loading.uploaded.remove(&drawn) {
-            commands.entity(child).try_insert((Mesh3d(handle), bounds, NoAutoAabb));
+        if let Some(Loaded { mesh, fresh }) = loading.ready.remove(&drawn) {
+            if let Some((handle, bounds)) = mesh {
+                commands.entity(child).try_insert((Mesh3d(handle), bounds, NoAutoAabb));
+            }
+            attach(commands, child, fresh.shown, fresh.attachments);
         }
         if let Drawn::Chunk(_) = drawn {
             tell(commands, ChunkCreated { entity: child });

@@ -8,9 +8,13 @@
 //!
 //! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
 //!
+//! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
+//! commit: see [`Companion`].
+//!
 //! Bevy's `multi_threaded` feature keeps transactions off the main thread; without it they run within the frame.
 
 mod commit;
+mod companion;
 mod components;
 mod entities;
 mod heightmap;
@@ -21,7 +25,8 @@ mod messages;
 mod query;
 mod settings;
 
-pub use components::{Chunk, Field, MaterialColors, Tile};
+pub use companion::{Attachment, Companion, Companions, Part};
+pub use components::{Chunk, Field, MaterialColors, ShownSurface, Tile};
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
@@ -82,6 +87,7 @@ impl Plugin for TerrainPlugin {
         app.init_resource::<BurrowSettings>()
             .init_resource::<BurrowFigures>()
             .init_resource::<BurrowEngine>()
+            .init_resource::<Companions>()
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()

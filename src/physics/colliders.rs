@@ -1,0 +1,189 @@
+//! Colliders of tiles and chunks: made with the meshes, put in their place with them.
+
+use std::sync::{Arc, PoisonError, RwLock};
+
+use avian3d::parry::shape::SharedShape;
+use avian3d::prelude::*;
+use bevy::platform::collections::HashMap;
+use bevy::prelude::*;
+
+use super::PhysicsFigures;
+use super::near::Neighbourhood;
+use super::shape::GroundShape;
+use super::wake::{Change, GroundChanges};
+use crate::plugin::{Attachment, Companion, Part, ShownSurface};
+use crate::surface::SurfaceMesh;
+use crate::terrain::Drawn;
+
+/// A tile's or chunk's collider: on the entity of the tile or chunk, while it has one.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroundCollider {
+    /// The entity with the [`Collider`], a child of this one; `None` for a surface without triangles.
+    pub body: Option<Entity>,
+    /// The revision of the world that it was made from.
+    pub revision: u64,
+}
+
+/// The body of a tile or chunk: on the entity with the [`Collider`].
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroundBody {
+    /// The terrain's entity.
+    pub terrain: Entity,
+    /// The tile's or chunk's entity.
+    pub part: Entity,
+    /// Which tile or chunk that is.
+    pub drawn: Drawn,
+}
+
+/// What ground is to bodies. Changes count for colliders that come later.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct GroundMaterial {
+    /// How slippery it is; avian's `DefaultFriction` if nothing is said.
+    pub friction: Option<Friction>,
+    /// How bouncy it is; avian's `DefaultRestitution` if nothing is said.
+    pub restitution: Option<Restitution>,
+    /// What collides with it.
+    pub layers: CollisionLayers,
+}
+
+/// What tasks and the main thread know of ground.
+#[derive(Default)]
+struct Known {
+    near: RwLock<Neighbourhood>,
+    shapes: RwLock<HashMap<(Entity, Drawn), Arc<GroundShape>>>,
+}
+
+/// Where colliders are wanted, and which there are; tasks look at it too.
+#[derive(Resource, Clone, Default)]
+pub(super) struct Grounds(Arc<Known>);
+
+impl Grounds {
+    /// Is ground wanted here?
+    pub fn is_near(&self, part: &Part) -> bool {
+        self.0.near.read().unwrap_or_else(PoisonError::into_inner).is_near(part, 0.0)
+    }
+
+    /// A copy, for the main thread.
+    pub fn near(&self) -> Neighbourhood {
+        self.0.near.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub fn set_near(&self, near: Neighbourhood) {
+        *self.0.near.write().unwrap_or_else(PoisonError::into_inner) = near;
+    }
+
+    fn shape(&self, part: &Part) -> Option<Arc<GroundShape>> {
+        let shapes = self.0.shapes.read().unwrap_or_else(PoisonError::into_inner);
+        shapes.get(&(part.terrain, part.drawn)).cloned()
+    }
+
+    fn set_shape(&self, part: &Part, shape: Option<Arc<GroundShape>>) {
+        let mut shapes = self.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
+        match shape {
+            Some(shape) => shapes.insert((part.terrain, part.drawn), shape),
+            None => shapes.remove(&(part.terrain, part.drawn)),
+        };
+    }
+
+    /// Makes a collider, in a task.
+    pub fn prepare(&self, part: &Part, surface: &SurfaceMesh) -> Prepared {
+        let shape = GroundShape::new(surface, part.voxel_size).map(Arc::new);
+        let changed = GroundShape::difference(self.shape(part).as_deref(), shape.as_deref());
+        Prepared { grounds: self.clone(), part: *part, shape, changed }
+    }
+}
+
+impl Companion for Grounds {
+    fn wants(&self, part: &Part) -> bool {
+        self.is_near(part)
+    }
+
+    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
+        let prepared = self.prepare(part, surface);
+        Some(Box::new(move |entity| {
+            entity.queue_silenced(move |part: EntityWorldMut| prepared.attach(part));
+        }))
+    }
+}
+
+/// A collider on its way to its tile or chunk.
+pub(super) struct Prepared {
+    grounds: Grounds,
+    part: Part,
+    shape: Option<Arc<GroundShape>>,
+    /// Where it differs from the one before, in metres from the part's origin.
+    changed: Option<(Vec3, Vec3)>,
+}
+
+impl Prepared {
+    /// Puts the collider in place of the old one, unless the surface has changed since it was made.
+    pub fn attach(self, mut part: EntityWorldMut) {
+        let owner = part.id();
+        let is_newer = |revision: u64| revision > self.part.revision;
+        let shown = part.get::<ShownSurface>().is_some_and(|shown| is_newer(shown.revision));
+        let old = part.get::<GroundCollider>().copied();
+        if shown || old.is_some_and(|old| is_newer(old.revision)) {
+            part.world_scope(|world| world.resource_mut::<PhysicsFigures>().stale += 1);
+            return;
+        }
+        let old = old.and_then(|old| old.body);
+        let place = part.get::<GlobalTransform>().copied().unwrap_or_default();
+        self.grounds.set_shape(&self.part, self.shape.clone());
+        let body = part.world_scope(|world| {
+            if let Some((low, high)) = self.changed {
+                let change = Change::new(self.part.terrain, &place, self.part.voxel_size, low, high);
+                world.resource_mut::<GroundChanges>().0.push(change);
+            }
+            world.resource_mut::<PhysicsFigures>().swaps += 1;
+            match (self.shape, old.and_then(|old| world.get_entity_mut(old).ok())) {
+                (None, None) => None,
+                (None, Some(old)) => {
+                    old.despawn();
+                    None
+                }
+                (Some(shape), Some(mut old)) => {
+                    // Under the same entity: who touches it keeps touching it.
+                    old.insert(Collider::from(SharedShape(shape)));
+                    Some(old.id())
+                }
+                (Some(shape), None) => {
+                    let material = world.resource::<GroundMaterial>().clone();
+                    let mut body = world.spawn((
+                        GroundBody { terrain: self.part.terrain, part: owner, drawn: self.part.drawn },
+                        RigidBody::Static,
+                        // Shapes are in metres already.
+                        Transform::from_scale(Vec3::splat(self.part.voxel_size.recip())),
+                        ChildOf(owner),
+                        material.layers,
+                        Collider::from(SharedShape(shape)),
+                    ));
+                    if let Some(friction) = material.friction {
+                        body.insert(friction);
+                    }
+                    if let Some(restitution) = material.restitution {
+                        body.insert(restitution);
+                    }
+                    Some(body.id())
+                }
+            }
+        });
+        part.insert(GroundCollider { body, revision: self.part.revision });
+    }
+}
+
+/// Takes a tile's or chunk's collider away.
+pub(super) fn detach(mut part: EntityWorldMut) {
+    let Some(old) = part.take::<GroundCollider>() else { return };
+    part.world_scope(|world| {
+        if let Some(Ok(body)) = old.body.map(|body| world.get_entity_mut(body)) {
+            body.despawn();
+        }
+    });
+}
+
+/// Lets go of a shape whose collider is gone, whoever despawned it.
+pub(super) fn forget(gone: On<Remove, GroundBody>, bodies: Query<&GroundBody>, grounds: Res<Grounds>) {
+    let Ok(body) = bodies.get(gone.entity) else { return };
+    let mut shapes = grounds.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
+    shapes.remove(&(body.terrain, body.drawn));
+}

@@ -1,0 +1,143 @@
+//! Ground for [avian](https://docs.rs/avian3d): colliders of tiles and chunks, and a body that walks on them.
+//!
+//! ```no_run
+//! use avian3d::prelude::*;
+//! use bevy::prelude::*;
+//! use bevy_burrow::prelude::*;
+//! use bevy_burrow::physics::{ColliderSource, TerrainPhysicsPlugin};
+//!
+//! App::new()
+//!     .add_plugins((DefaultPlugins, BurrowPlugins, PhysicsPlugins::default(), TerrainPhysicsPlugin::default()))
+//!     .add_systems(Startup, |mut commands: Commands| {
+//!         // Ground within 60 m of this has colliders; any entity with a Transform will do.
+//!         commands.spawn((Camera3d::default(), ColliderSource { radius: 60.0 }));
+//!         commands.spawn((RigidBody::Dynamic, Collider::sphere(0.5), Transform::from_xyz(0.0, 30.0, 0.0)));
+//!     })
+//!     .run();
+//! ```
+//!
+//! # What is where
+//!
+//! | a game wants | it uses |
+//! | --- | --- |
+//! | ground that can be stood on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on whatever moves about |
+//! | a first-person body | [`Character`], steered by [`CharacterSteering`], moved by [`CharacterPlugin`] |
+//! | a body for a loose piece of ground | [`debris_collider`] |
+//! | to know whose collider was hit | [`GroundBody`] on the collider's entity |
+//! | to know what goes on | [`PhysicsFigures`] |
+//!
+//! # What holds
+//!
+//! - **One commit.** A collider is made from the same arrays as the mesh, in the same task, and swapped in the same frame.
+//!   It has exactly the triangles that are drawn: none where the tile is dug away, none twice. Servers without meshes have
+//!   the same colliders.
+//! - **No bump.** Triangles know their neighbours, those of other tiles and chunks included, see [`GroundShape`]; a body
+//!   that rolls over a border or a seam feels the surface, and not where it is cut.
+//! - **Nothing falls through.** An old collider stays until the new one takes its place; a collider that was made from an
+//!   older world than the one that is shown is thrown away. Colliders are made within the radius of a source, and where it
+//!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has.
+//! - **Dug ground lets go.** Bodies that sleep where a surface changed are woken. Bodies that were built over are lifted to
+//!   the nearest air, for ground has one side only.
+//!
+//! Avian optimises its trees in tasks on the pool that also runs transactions, and waits for them: a large transaction
+//! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.
+//!
+//! Bodies are ordinary bodies of avian, and ground is `RigidBody::Static`. Put `Friction`, `CollisionLayers` and the like
+//! into [`GroundMaterial`].
+
+mod character;
+mod colliders;
+mod cone;
+mod debris;
+mod hold;
+mod near;
+mod shape;
+mod upkeep;
+mod wake;
+mod walking;
+
+pub use character::{Character, CharacterMotion, CharacterPlugin, CharacterSteering, CharacterSystems};
+pub use colliders::{GroundBody, GroundCollider, GroundMaterial};
+pub use debris::debris_collider;
+pub use hold::HeldByGround;
+pub use near::ColliderSource;
+pub use shape::GroundShape;
+
+use avian3d::collider_tree::ColliderTreeOptimization;
+use bevy::prelude::*;
+
+use crate::plugin::{BurrowSystems, Companions};
+
+/// Colliders for terrains. Needs avian's `PhysicsPlugins`, and the crate's own `BurrowPlugins`.
+#[derive(Default)]
+pub struct TerrainPhysicsPlugin;
+
+/// What the plugin does, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TerrainPhysicsSystems {
+    /// In `Update`: where colliders are wanted.
+    Near,
+    /// In `Update`, after commits: colliders that are missing are made in tasks, those far away removed.
+    Upkeep,
+    /// In `PostUpdate`: bodies over ground without colliders are held, others let go.
+    Hold,
+    /// In `FixedPreUpdate`: bodies where ground changed are woken, or lifted out of it.
+    Wake,
+}
+
+/// What the plugin has, and did lately.
+#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Default)]
+pub struct PhysicsFigures {
+    /// Tiles and chunks that have a collider.
+    pub colliders: usize,
+    /// Tiles and chunks that wait for one.
+    pub missing: usize,
+    /// Colliders swapped in so far, with commits and without.
+    pub swaps: u64,
+    /// Colliders that came too late, for their surface had changed again.
+    pub stale: u64,
+    /// Bodies that are held.
+    pub held: usize,
+    /// Bodies woken so far.
+    pub woken: u64,
+    /// Bodies lifted out of the ground so far.
+    pub lifted: u64,
+}
+
+impl Plugin for TerrainPhysicsPlugin {
+    fn build(&self, app: &mut App) {
+        let grounds = colliders::Grounds::default();
+        app.init_resource::<Companions>()
+            .init_resource::<PhysicsFigures>()
+            .init_resource::<GroundMaterial>()
+            .init_resource::<wake::GroundChanges>()
+            .init_resource::<upkeep::Work>()
+            .init_resource::<upkeep::ReadyColumns>();
+        app.world_mut().resource_mut::<Companions>().add(grounds.clone());
+        app.insert_resource(grounds)
+            .configure_sets(
+                Update,
+                (
+                    TerrainPhysicsSystems::Near.before(BurrowSystems::Load),
+                    TerrainPhysicsSystems::Upkeep.after(BurrowSystems::Dress),
+                ),
+            )
+            .add_observer(colliders::forget)
+            .add_systems(Update, near::find_near.in_set(TerrainPhysicsSystems::Near))
+            .add_systems(
+                Update,
+                (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep),
+            )
+            .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
+            .add_systems(FixedPreUpdate, wake::wake.in_set(TerrainPhysicsSystems::Wake));
+    }
+
+    fn finish(&self, app: &mut App) {
+        if let Some(mut settings) = app.world_mut().get_resource_mut::<ColliderTreeOptimization>()
+            && *settings == ColliderTreeOptimization::default()
+        {
+            settings.use_async_tasks = false;
+        }
+    }
+}

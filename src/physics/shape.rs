@@ -1,0 +1,247 @@
+//! The shape of a tile's or chunk's ground, as avian's collisions see it.
+
+use avian3d::parry::bounding_volume::{Aabb, BoundingSphere};
+use avian3d::parry::mass_properties::MassProperties;
+use avian3d::parry::math::{Pose, Real, Vector};
+use avian3d::parry::partitioning::Bvh;
+use avian3d::parry::query::details::NormalConstraints;
+use avian3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
+use avian3d::parry::shape::{CompositeShape, FeatureId, Shape, ShapeType, TriMesh, Triangle, TypedShape};
+use glam::{IVec3, Vec3};
+use rustc_hash::FxHashMap;
+
+use super::cone::NormalCone;
+use crate::lattice::SNAP;
+use crate::surface::SurfaceMesh;
+
+/// A triangle mesh whose triangles know their neighbours, those in other tiles and chunks included.
+///
+/// Triangles are exactly those that are drawn, in metres from the part's origin. Within the mesh a triangle's neighbours
+/// are known; across its border stands what the vertices' normals say of them, which both sides share bit by bit. So no
+/// mesh has to be made again because another one changed, and no border is felt.
+#[derive(Clone, Debug)]
+pub struct GroundShape {
+    mesh: TriMesh,
+    /// For each triangle, the neighbours over its sides: a triangle's number, or a number from [`BORDER`] on.
+    neighbours: Vec<[u32; 3]>,
+    /// Normals of the ground across the border.
+    beyond: Vec<Vector>,
+}
+
+/// From here on, numbers of neighbours count [`GroundShape::beyond`].
+const BORDER: u32 = 1 << 31;
+
+impl GroundShape {
+    /// The shape of a surface, in metres; `None` where it has no triangles with an area.
+    pub fn new(surface: &SurfaceMesh, voxel_size: f32) -> Option<Self> {
+        let welded = Welded::new(surface);
+        let scale = voxel_size / SNAP as f32;
+        let vertices: Vec<Vector> = welded.places.iter().map(|place| place.as_vec3() * scale).collect();
+        let (neighbours, beyond) = welded.neighbours(&vertices);
+        let mesh = TriMesh::new(vertices, welded.triangles).ok()?;
+        Some(Self { mesh, neighbours, beyond })
+    }
+
+    /// How many triangles there are.
+    pub fn triangles(&self) -> usize {
+        self.neighbours.len()
+    }
+
+    /// Bytes of all buffers.
+    pub fn bytes(&self) -> usize {
+        self.mesh.heap_memory_size()
+            + size_of_val(self.neighbours.as_slice())
+            + size_of_val(self.beyond.as_slice())
+    }
+
+    /// The box around all triangles that only one of two shapes has, in metres from the origin; `None` where they are
+    /// alike.
+    pub(super) fn difference(old: Option<&Self>, new: Option<&Self>) -> Option<(Vec3, Vec3)> {
+        type Corners = [[u32; 3]; 3];
+        let corners = |shape: &Self, triangle: usize| -> Corners {
+            let Triangle { a, b, c } = shape.mesh.triangle(triangle as u32);
+            let mut corners = [a, b, c].map(|corner| corner.to_array().map(f32::to_bits));
+            corners.sort_unstable();
+            corners
+        };
+        let all = |shape: Option<&'_ Self>| -> Vec<Corners> {
+            shape
+                .map_or_else(Vec::new, |shape| (0..shape.triangles()).map(|t| corners(shape, t)).collect())
+        };
+        let mut seen: FxHashMap<Corners, bool> = FxHashMap::default();
+        seen.extend(all(old).into_iter().map(|corners| (corners, false)));
+        let mut found: Option<(Vec3, Vec3)> = None;
+        let mut include = |corners: &Corners| {
+            for corner in corners.map(|corner| Vec3::from(corner.map(f32::from_bits))) {
+                let (low, high) = found.unwrap_or((corner, corner));
+                found = Some((low.min(corner), high.max(corner)));
+            }
+        };
+        for corners in all(new) {
+            match seen.get_mut(&corners) {
+                Some(is_kept) => *is_kept = true,
+                None => include(&corners),
+            }
+        }
+        seen.iter().filter(|(_, is_kept)| !**is_kept).for_each(|(corners, _)| include(corners));
+        found
+    }
+
+    fn cone(&self, triangle: u32, corners: &Triangle) -> Option<NormalCone> {
+        let face = corners.normal()?;
+        let sides = [(corners.a, corners.b), (corners.b, corners.c), (corners.c, corners.a)];
+        let neighbours = *self.neighbours.get(triangle as usize)?;
+        let side = |number: usize| {
+            let ((from, to), neighbour) = (sides[number], neighbours[number]);
+            let beyond = match neighbour.checked_sub(BORDER) {
+                Some(border) => self.beyond.get(border as usize).copied(),
+                None => self.mesh.triangle(neighbour).normal(),
+            };
+            ((to - from).cross(face).normalize_or_zero(), beyond.unwrap_or(face))
+        };
+        Some(NormalCone { face, sides: [side(0), side(1), side(2)] })
+    }
+}
+
+/// A surface without repeated vertices and without triangles that have no area.
+struct Welded {
+    places: Vec<IVec3>,
+    normals: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Welded {
+    fn new(surface: &SurfaceMesh) -> Self {
+        let mut numbers: FxHashMap<IVec3, u32> = FxHashMap::default();
+        numbers.reserve(surface.vertices.len());
+        let (mut places, mut normals) = (Vec::new(), Vec::new());
+        let welded: Vec<u32> = surface
+            .vertices
+            .iter()
+            .map(|vertex| {
+                *numbers.entry(vertex.position).or_insert_with(|| {
+                    places.push(vertex.position);
+                    normals.push(vertex.normal);
+                    places.len() as u32 - 1
+                })
+            })
+            .collect();
+        let corner = |index: u32| welded.get(index as usize).copied().unwrap_or_default();
+        let has_area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|corner| places[corner as usize].as_i64vec3());
+            (b - a).cross(c - a) != glam::I64Vec3::ZERO
+        };
+        let triangles = surface.indices.chunks_exact(3).map(|t| [corner(t[0]), corner(t[1]), corner(t[2])]);
+        let triangles = triangles.filter(has_area).collect();
+        Self { places, normals, triangles }
+    }
+
+    /// Who lies across each triangle's sides, and the normals across the border.
+    fn neighbours(&self, vertices: &[Vector]) -> (Vec<[u32; 3]>, Vec<Vector>) {
+        let sides = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+        let mut owners: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+        owners.reserve(self.triangles.len() * 3);
+        for (number, triangle) in self.triangles.iter().enumerate() {
+            owners.extend(sides(triangle).map(|side| (side, number as u32)));
+        }
+        let mut beyond = Vec::new();
+        let neighbours = self.triangles.iter().map(|triangle| {
+            sides(triangle).map(|(from, to)| {
+                owners.get(&(to, from)).copied().unwrap_or_else(|| {
+                    beyond.push(self.across(vertices, triangle, from, to));
+                    BORDER + (beyond.len() as u32 - 1)
+                })
+            })
+        });
+        (neighbours.collect(), beyond)
+    }
+
+    /// The normal across a border: that of the triangle, mirrored at what the vertices say of the edge.
+    fn across(&self, vertices: &[Vector], triangle: &[u32; 3], from: u32, to: u32) -> Vector {
+        let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
+        let face = (b - a).cross(c - a).normalize_or_zero();
+        let along = (vertices[to as usize] - vertices[from as usize]).normalize_or_zero();
+        let middle = self.normals[from as usize] + self.normals[to as usize];
+        // Across an edge normals only turn about the edge.
+        let middle = (middle - along * middle.dot(along)).normalize_or(face);
+        middle * (2.0 * middle.dot(face)) - face
+    }
+}
+
+impl CompositeShape for GroundShape {
+    fn map_part_at(
+        &self,
+        number: u32,
+        f: &mut dyn FnMut(Option<&Pose>, &dyn Shape, Option<&dyn NormalConstraints>),
+    ) {
+        let triangle = self.mesh.triangle(number);
+        // Too thin for a normal is too thin to stand on.
+        if let Some(cone) = self.cone(number, &triangle) {
+            f(None, &triangle, Some(&cone));
+        }
+    }
+
+    fn bvh(&self) -> &Bvh {
+        self.mesh.bvh()
+    }
+}
+
+impl RayCast for GroundShape {
+    fn cast_local_ray_and_get_normal(&self, ray: &Ray, longest: Real, solid: bool) -> Option<RayIntersection> {
+        self.mesh.cast_local_ray_and_get_normal(ray, longest, solid)
+    }
+}
+
+impl PointQuery for GroundShape {
+    fn project_local_point(&self, point: Vector, solid: bool) -> PointProjection {
+        self.mesh.project_local_point(point, solid)
+    }
+
+    fn project_local_point_and_get_feature(&self, point: Vector) -> (PointProjection, FeatureId) {
+        self.mesh.project_local_point_and_get_feature(point)
+    }
+}
+
+impl Shape for GroundShape {
+    fn compute_local_aabb(&self) -> Aabb {
+        self.mesh.local_aabb()
+    }
+
+    fn compute_local_bounding_sphere(&self) -> BoundingSphere {
+        self.mesh.compute_local_bounding_sphere()
+    }
+
+    fn clone_dyn(&self) -> Box<dyn Shape> {
+        Box::new(self.clone())
+    }
+
+    fn scale_dyn(&self, scale: Vector, _: u32) -> Option<Box<dyn Shape>> {
+        Some(Box::new(self.mesh.clone().scaled(scale)))
+    }
+
+    fn mass_properties(&self, _: Real) -> MassProperties {
+        MassProperties::new(Vector::ZERO, 0.0, Vector::ZERO)
+    }
+
+    /// Not that of a mesh: by it collisions would look for a mesh's own idea of its neighbours.
+    fn shape_type(&self) -> ShapeType {
+        ShapeType::Custom
+    }
+
+    /// That of a mesh, for those who draw it.
+    fn as_typed_shape(&self) -> TypedShape<'_> {
+        TypedShape::TriMesh(&self.mesh)
+    }
+
+    fn ccd_thickness(&self) -> Real {
+        0.0
+    }
+
+    fn ccd_angular_thickness(&self) -> Real {
+        std::f32::consts::FRAC_PI_4
+    }
+
+    fn as_composite_shape(&self) -> Option<&dyn CompositeShape> {
+        Some(self)
+    }
+}

@@ -1,0 +1,122 @@
+//! Bodies where ground changed: those that sleep are woken, those that were built over are lifted.
+
+use avian3d::dynamics::solver::islands::WakeBody;
+use avian3d::prelude::*;
+use bevy::prelude::*;
+
+use super::PhysicsFigures;
+use super::character::{Character, CharacterMotion};
+use crate::terrain::Terrain;
+
+/// How far from a change a body may sleep on, in metres.
+const NEAR: f32 = 0.2;
+
+/// How high above the ground a lifted body starts, in metres.
+const GAP: f32 = 0.02;
+
+/// Where a collider changed, in world space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Change {
+    terrain: Entity,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Change {
+    /// A box in metres from the origin of a part that stands at `place`.
+    pub fn new(terrain: Entity, place: &GlobalTransform, voxel_size: f32, low: Vec3, high: Vec3) -> Self {
+        let corner = |number: usize| {
+            let pick = |axis: usize| if number >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            place.transform_point(Vec3::from_array([pick(0), pick(1), pick(2)]) / voxel_size)
+        };
+        let (low, high) = (1..8)
+            .map(corner)
+            .fold((corner(0), corner(0)), |(low, high), corner| (low.min(corner), high.max(corner)));
+        Self { terrain, low: low - NEAR, high: high + NEAR }
+    }
+
+    fn meets(&self, bounds: &ColliderAabb) -> bool {
+        self.low.cmple(bounds.max).all() && self.high.cmpge(bounds.min).all()
+    }
+}
+
+/// Changes that bodies have not been told of.
+#[derive(Resource, Default)]
+pub(super) struct GroundChanges(pub Vec<Change>);
+
+/// Wakes and lifts bodies.
+pub(super) fn wake(
+    mut commands: Commands,
+    mut changes: ResMut<GroundChanges>,
+    mut bodies: Query<
+        (
+            Entity,
+            &RigidBody,
+            &RigidBodyColliders,
+            Has<Sleeping>,
+            &mut Position,
+            &mut LinearVelocity,
+            &mut Transform,
+            Option<&mut CharacterMotion>,
+            Has<ChildOf>,
+        ),
+        Without<super::GroundBody>,
+    >,
+    colliders: Query<&ColliderAabb>,
+    terrains: Query<(&Terrain, &GlobalTransform)>,
+    characters: Query<(), With<Character>>,
+    mut figures: ResMut<PhysicsFigures>,
+) {
+    if changes.0.is_empty() {
+        return;
+    }
+    let changes = std::mem::take(&mut changes.0);
+    for (entity, body, own, sleeps, mut position, mut velocity, mut transform, motion, is_child) in &mut bodies {
+        let is_character = characters.contains(entity);
+        if !(body.is_dynamic() || is_character) {
+            continue;
+        }
+        let Some(bounds) = colliders.iter_many(own).copied().reduce(|a, b| a.merged(b)) else { continue };
+        let mut near = changes.iter().filter(|change| change.meets(&bounds)).peekable();
+        if near.peek().is_none() {
+            continue;
+        }
+        if sleeps {
+            commands.queue_silenced(WakeBody(entity));
+            figures.woken += 1;
+        }
+        let lift = near.find_map(|change| {
+            let (terrain, place) = terrains.get(change.terrain).ok()?;
+            lift(terrain, place, position.0, &bounds)
+        });
+        if let Some(lift) = lift {
+            position.0.y += lift;
+            if !is_child {
+                transform.translation.y += lift;
+            }
+            velocity.0.y = velocity.0.y.max(0.0);
+            if let Some(mut motion) = motion {
+                motion.velocity.y = motion.velocity.y.max(0.0);
+            }
+            figures.lifted += 1;
+        }
+    }
+}
+
+/// How far up a body must go to be in the air: none if its middle is.
+fn lift(terrain: &Terrain, place: &GlobalTransform, middle: Vec3, bounds: &ColliderAabb) -> Option<f32> {
+    let affine = place.affine();
+    let local = affine.inverse().transform_point3(middle).as_dvec3();
+    let world = terrain.world();
+    if !local.is_finite() || !world.is_solid(local) {
+        return None;
+    }
+    let size = f64::from(terrain.voxel_size());
+    let tall = f64::from(bounds.max.y - bounds.min.y) / size;
+    let below = f64::from(middle.y - bounds.min.y) / size;
+    let fits = |floor: f64, ceiling: Option<f64>| ceiling.is_none_or(|ceiling| ceiling - floor >= tall);
+    let spans = world.spans(local.x, local.z);
+    let above = spans.iter().filter(|span| span.floor >= local.y && fits(span.floor, span.ceiling));
+    let floor = above.map(|span| span.floor).next()?;
+    Some(((floor + below - local.y) * size) as f32 + GAP)
+}

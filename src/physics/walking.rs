@@ -1,0 +1,159 @@
+//! One step of a walking body.
+
+use std::time::Duration;
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+
+use super::character::{Character, CharacterMotion, CharacterSteering};
+
+/// The distance that is always kept from everything, in metres.
+const SKIN: f32 = 0.01;
+
+/// How far below the soles the ground may sink for the body to stay on it, as a share of the step height.
+const CLING: f32 = 1.0;
+
+/// A body about to walk, and what is around it.
+pub(super) struct Walk<'a, 'w, 's> {
+    mover: &'a MoveAndSlide<'w, 's>,
+    collider: &'a Collider,
+    character: &'a Character,
+    filter: SpatialQueryFilter,
+    /// The cosine of the steepest slope.
+    level: f32,
+}
+
+impl<'a, 'w, 's> Walk<'a, 'w, 's> {
+    pub(super) fn new(
+        mover: &'a MoveAndSlide<'w, 's>,
+        collider: &'a Collider,
+        character: &'a Character,
+        entity: Entity,
+    ) -> Self {
+        let filter = SpatialQueryFilter::from_excluded_entities([entity]);
+        Self { mover, collider, character, filter, level: character.steepest.clamp(0.0, 1.5).cos() }
+    }
+
+    /// Where the body is after `dt` seconds, and how it moves then.
+    pub(super) fn advance(
+        &self,
+        from: Vec3,
+        before: CharacterMotion,
+        steering: &CharacterSteering,
+        dt: f32,
+    ) -> (Vec3, CharacterMotion) {
+        let Character { walk_speed, run_speed, grip, air_grip, gravity, jump_height, .. } = *self.character;
+        let CharacterMotion { mut velocity, mut grounded, ground_normal } = before;
+        let wish = steering.direction.clamp_length_max(1.0) * if steering.run { run_speed } else { walk_speed };
+        let follow = 1.0 - (-(if grounded { grip } else { air_grip }) * dt).exp();
+        let level = velocity.xz().lerp(wish, follow);
+        let jumps = steering.jump && grounded;
+        if jumps {
+            velocity.y = (2.0 * gravity * jump_height).max(0.0).sqrt();
+            grounded = false;
+        } else if grounded {
+            velocity.y = 0.0;
+        } else {
+            velocity.y = (velocity.y - gravity * dt).max(-self.character.fastest_fall);
+        }
+        velocity = Vec3::new(level.x, velocity.y, level.y);
+
+        let (mut place, slid) = if grounded {
+            self.stride(from, velocity, ground_normal, dt)
+        } else {
+            self.slide(from, velocity, &[], dt)
+        };
+        velocity = if grounded { Vec3::new(slid.x, 0.0, slid.z) } else { slid };
+
+        let mut after = CharacterMotion { velocity, grounded: false, ground_normal: Vec3::ZERO };
+        if velocity.y <= 0.0 {
+            let reach = if grounded { self.character.step_height * CLING } else { 2.0 * SKIN };
+            if let Some((down, normal)) = self.floor(place, reach)
+                && normal.y >= self.level
+            {
+                place.y -= down;
+                after.velocity.y = 0.0;
+                (after.grounded, after.ground_normal) = (true, normal);
+            }
+        }
+        (place, after)
+    }
+
+    /// Along the ground, at the same speed over ground uphill and downhill; up a step where one is in the way.
+    fn stride(&self, from: Vec3, velocity: Vec3, normal: Vec3, dt: f32) -> (Vec3, Vec3) {
+        // Over the ground's plane: as far as asked in x and z.
+        let rise = if normal.y > 0.1 { -(normal.x * velocity.x + normal.z * velocity.z) / normal.y } else { 0.0 };
+        let along = velocity.with_y(rise);
+        let planes: Vec<Dir3> = Dir3::new(normal).into_iter().collect();
+        let (place, slid) = self.slide(from, along, &planes, dt);
+        let wanted = velocity.xz() * dt;
+        let went = (place - from).xz().dot(wanted.normalize_or_zero());
+        if wanted.length() > 1e-4
+            && went < 0.9 * wanted.length()
+            && let Some((up, speed)) = self.step(from, velocity, dt)
+            && (up - from).xz().dot(wanted.normalize_or_zero()) > went + 1e-4
+        {
+            return (up, speed);
+        }
+        (place, slid)
+    }
+
+    /// Up, ahead and down again, if that leads onto ground to stand on.
+    fn step(&self, from: Vec3, velocity: Vec3, dt: f32) -> Option<(Vec3, Vec3)> {
+        let height = self.character.step_height;
+        let cast = |place: Vec3, way: Vec3| {
+            self.mover.cast_move(self.collider, place, Quat::IDENTITY, way, SKIN, &self.filter)
+        };
+        let up = cast(from, Vec3::Y * height).map_or(height, |hit| hit.distance);
+        let above = from + Vec3::Y * up;
+        let (ahead, slid) = self.slide(above, velocity.with_y(0.0), &[], dt);
+        // A step is looked for a little ahead: the capsule's round foot would stand on its edge.
+        let (down, normal) = self.floor(ahead, up + SKIN)?;
+        let toes = velocity.with_y(0.0).normalize_or_zero() * (self.character.radius * 0.75);
+        let is_flat = |place: Vec3| self.floor_below(place, up + height).is_some_and(|n| n.y >= self.level);
+        (normal.y >= self.level || is_flat(ahead + toes)).then_some((ahead - Vec3::Y * down, slid.with_y(0.0)))
+    }
+
+    /// Moves and slides along what is in the way. What is too steep to stand on is a wall for those on the ground.
+    fn slide(&self, from: Vec3, velocity: Vec3, planes: &[Dir3], dt: f32) -> (Vec3, Vec3) {
+        let config = MoveAndSlideConfig { skin_width: SKIN, planes: planes.to_vec(), ..default() };
+        let is_walking = !planes.is_empty();
+        let level = self.level;
+        let out = self.mover.move_and_slide(
+            self.collider,
+            from,
+            Quat::IDENTITY,
+            velocity,
+            Duration::from_secs_f32(dt),
+            &config,
+            &self.filter,
+            |hit| {
+                let is_steep = hit.normal.y < level && hit.normal.y > -0.1;
+                if is_walking
+                    && is_steep
+                    && let Ok(wall) = Dir3::new(hit.normal.with_y(0.0))
+                {
+                    *hit.normal = wall;
+                }
+                MoveAndSlideHitResponse::Accept
+            },
+        );
+        let place = if out.position.is_finite() { out.position } else { from };
+        let velocity = if out.projected_velocity.is_finite() { out.projected_velocity } else { Vec3::ZERO };
+        (place, velocity)
+    }
+
+    /// How far the body may sink until it stands, within `reach`, and the normal of what it stands on.
+    fn floor(&self, place: Vec3, reach: f32) -> Option<(f32, Vec3)> {
+        let way = Vec3::NEG_Y * reach;
+        let hit = self.mover.cast_move(self.collider, place, Quat::IDENTITY, way, SKIN, &self.filter)?;
+        Some((hit.distance, hit.normal1))
+    }
+
+    /// The normal of the ground below a place's soles, within `reach`.
+    fn floor_below(&self, place: Vec3, reach: f32) -> Option<Vec3> {
+        let soles = place - Vec3::Y * (self.character.height / 2.0 - SKIN);
+        let hit = self.mover.spatial_query.cast_ray(soles, Dir3::NEG_Y, reach, true, &self.filter)?;
+        Some(hit.normal)
+    }
+}

@@ -1,0 +1,159 @@
+//! What else is made from surfaces: in the same task as the meshes, and shown in the same commit.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use bevy::prelude::*;
+
+use super::meshes::{self, Ready};
+use super::{MaterialColors, ShownSurface};
+use crate::lattice::ChunkGrid;
+use crate::surface::SurfaceMesh;
+use crate::terrain::{Drawn, World};
+
+/// A tile or chunk that a task works on.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// The terrain's entity.
+    pub terrain: Entity,
+    /// Which tile or chunk.
+    pub drawn: Drawn,
+    /// The lattice point that positions of its surface count from, in voxels of the terrain.
+    pub origin: IVec3,
+    /// Cells along its sides.
+    pub size: i32,
+    /// Metres along a voxel's side.
+    pub voxel_size: f32,
+    /// The revision of the world that its surface is of.
+    pub revision: u64,
+}
+
+impl Part {
+    pub(crate) fn new(
+        terrain: Entity,
+        voxel_size: f32,
+        grid: ChunkGrid,
+        revision: u64,
+        drawn: Drawn,
+    ) -> Self {
+        let origin = match drawn {
+            Drawn::Tile(tile) => grid.tile_cells(tile).0.at(0),
+            Drawn::Chunk(chunk) => grid.origin(chunk),
+        };
+        Self { terrain, drawn, origin, size: grid.size(), voxel_size, revision }
+    }
+
+    /// The surface of this part in a world of the right revision.
+    pub(crate) fn surface_in(&self, world: &World) -> SurfaceMesh {
+        match self.drawn {
+            Drawn::Tile(tile) => world.tile_mesh(tile),
+            Drawn::Chunk(chunk) => world.chunk_mesh(chunk),
+        }
+    }
+}
+
+/// What a companion does to the entity of a tile or chunk, in the frame in which that shows its new surface.
+pub type Attachment = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
+
+/// Something that goes with the surfaces of tiles and chunks: colliders, a navigation mesh, grass.
+///
+/// A companion is asked in the task that also makes the meshes, off the main thread, whenever a terrain loads and
+/// whenever a transaction changes a surface. What it hands back is done to the tile's or chunk's entity in the commit, in
+/// one frame with the meshes or not at all. That holds on a server without meshes too.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::plugin::{Attachment, Companion, Companions, Part};
+/// # use bevy_burrow::surface::SurfaceMesh;
+/// #[derive(Component)]
+/// struct Triangles(usize);
+///
+/// struct Counter;
+///
+/// impl Companion for Counter {
+///     fn build(&self, _: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
+///         let count = surface.indices.len() / 3;
+///         Some(Box::new(move |entity| {
+///             entity.try_insert(Triangles(count));
+///         }))
+///     }
+/// }
+///
+/// # let mut app = App::new();
+/// app.init_resource::<Companions>();
+/// app.world_mut().resource_mut::<Companions>().add(Counter);
+/// ```
+pub trait Companion: Send + Sync + 'static {
+    /// Is there anything to build for this part? Without a taker, a server does not assemble the surface.
+    fn wants(&self, part: &Part) -> bool {
+        let _ = part;
+        true
+    }
+
+    /// Builds what goes with a new surface, which is relative to the part's origin and may be empty.
+    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment>;
+}
+
+/// Everything that goes with surfaces. Terrains that have loaded already do not call late-comers.
+#[derive(Resource, Clone, Default)]
+pub struct Companions(Vec<Arc<dyn Companion>>);
+
+impl Companions {
+    /// Adds one more.
+    pub fn add(&mut self, companion: impl Companion) {
+        self.0.push(Arc::new(companion));
+    }
+
+    /// Is there none?
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+/// What a task makes of surfaces.
+#[derive(Clone)]
+pub(super) struct Workshop {
+    /// The colours of meshes, where meshes are made at all.
+    pub colors: Option<MaterialColors>,
+    pub companions: Companions,
+}
+
+/// A tile or chunk, ready to be swapped in.
+pub(super) struct Fresh {
+    pub drawn: Drawn,
+    pub mesh: Ready,
+    pub shown: ShownSurface,
+    pub attachments: Vec<Attachment>,
+}
+
+impl Workshop {
+    /// Is there nothing to make?
+    pub fn is_idle(&self) -> bool {
+        self.colors.is_none() && self.companions.is_empty()
+    }
+
+    /// Makes everything for a part whose surface `surface` gives. `is_empty` tells whether there are triangles, as far as
+    /// that is known without it.
+    pub fn make<'a>(
+        &self,
+        part: &Part,
+        is_empty: bool,
+        surface: impl FnOnce() -> Cow<'a, SurfaceMesh>,
+    ) -> Fresh {
+        let takers: Vec<_> = self.companions.0.iter().filter(|companion| companion.wants(part)).collect();
+        let mut fresh = Fresh {
+            drawn: part.drawn,
+            mesh: None,
+            shown: ShownSurface { revision: part.revision, is_empty },
+            attachments: Vec::new(),
+        };
+        if self.colors.is_none() && takers.is_empty() {
+            return fresh;
+        }
+        let surface = &*surface();
+        fresh.shown.is_empty = surface.is_empty();
+        fresh.mesh = self.colors.as_ref().and_then(|colors| meshes::build(surface, colors));
+        fresh.attachments = takers.into_iter().filter_map(|taker| taker.build(part, surface)).collect();
+        fresh
+    }
+}

@@ -1,0 +1,141 @@
+//! Bumps: what a rolling ball and a walking capsule feel of seams and of chunk borders, beside flat ground of one piece.
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{STEP, Stage, level, pit};
+
+/// How rough a way was, in voxels: of one voxel to the metre.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ride {
+    /// The largest step from one frame to the next, up or down, beyond what the step before it led to.
+    jump: f32,
+    /// The farthest from the height that the ground has.
+    off: f32,
+    /// How far it went, along x.
+    went: f32,
+}
+
+/// Rides along heights, one for each frame.
+fn ride(heights: &[f32], ground: f32) -> Ride {
+    let jump = heights.windows(3).map(|y| (y[2] - 2.0 * y[1] + y[0]).abs()).fold(0.0, f32::max);
+    let off = heights.iter().map(|y| (y - ground).abs()).fold(0.0, f32::max);
+    Ride { jump, off, went: 0.0 }
+}
+
+/// Ground whose surface is level at height 8, cut in many ways, from x = 0 to 96.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ground8 {
+    /// One box: no terrain at all.
+    OnePiece,
+    /// Tiles only: borders every 16 m.
+    Tiles,
+    /// Tiles, and patches that marching cubes draws: seams every few metres.
+    Seams,
+    /// All of it drawn by marching cubes: borders of chunks and of their inner blocks.
+    Chunks,
+}
+
+fn lay(ground: Ground8, voxel_size: f32) -> Stage {
+    if ground == Ground8::OnePiece {
+        let mut stage = Stage::new();
+        let slab = Collider::cuboid(200.0, 2.0, 100.0);
+        let middle = Transform::from_xyz(50.0, 8.0 * voxel_size - 1.0, 30.0);
+        stage.app.world_mut().spawn((RigidBody::Static, slab, middle));
+        stage.frames(2);
+        return stage;
+    }
+    let cells = (96.0 / voxel_size) as u32;
+    let (mut stage, _) = Stage::with_ground(level(cells, voxel_size));
+    let painted = |shape| Brush::paint(shape, MaterialId(2));
+    let top = 8.0 * voxel_size;
+    match ground {
+        Ground8::Seams => {
+            let patch = |number: u32| {
+                let place = Vec3::new(7.0 + 11.0 * number as f32, top, 31.0);
+                painted(Shape::sphere(place, 3.3 * voxel_size.max(0.5)))
+            };
+            stage.dig((0..8).map(patch));
+        }
+        Ground8::Chunks => {
+            let all = Shape::cuboid(Vec3::new(48.0, top, 48.0), Vec3::new(48.0, 3.0, 48.0));
+            stage.dig([painted(all)]);
+        }
+        _ => {}
+    }
+    stage
+}
+
+/// A ball rolls along x.
+fn roll(ground: Ground8, voxel_size: f32, speed: f32, lane: f32, radius: f32) -> Ride {
+    let mut stage = lay(ground, voxel_size);
+    let top = 8.0 * voxel_size;
+    let ball = stage.ball(Vec3::new(2.0, top + radius, lane), radius, Vec3::X * speed);
+    // At first it settles on the ground.
+    stage.frames(20);
+    let mut heights = Vec::new();
+    while stage.place(ball).x < 92.0 && heights.len() < 2000 {
+        stage.frame();
+        heights.push(stage.place(ball).y / voxel_size);
+    }
+    Ride { went: stage.place(ball).x, ..ride(&heights, (top + radius) / voxel_size) }
+}
+
+/// A character walks along x.
+fn walk(ground: Ground8, voxel_size: f32, lane: f32) -> Ride {
+    let mut stage = lay(ground, voxel_size);
+    let top = 8.0 * voxel_size;
+    let character = stage.character(Vec3::new(2.0, top + 0.02, lane), Vec2::X);
+    stage.frames(20);
+    let mut heights = Vec::new();
+    while stage.place(character).x < 92.0 && heights.len() < 2000 {
+        stage.frame();
+        heights.push(stage.feet(character).y / voxel_size);
+    }
+    Ride { went: stage.place(character).x, ..ride(&heights, top / voxel_size) }
+}
+
+#[test]
+fn a_ball_feels_neither_seams_nor_borders() {
+    for voxel_size in [1.0, 0.5] {
+        for speed in [3.0, 12.0] {
+            let plain = roll(Ground8::OnePiece, voxel_size, speed, 30.3, 0.5);
+            println!("ball at {speed} m/s, voxels of {voxel_size} m, one piece: {plain:?}");
+            for ground in [Ground8::Tiles, Ground8::Seams, Ground8::Chunks] {
+                for lane in [30.3, 32.0] {
+                    let cut = roll(ground, voxel_size, speed, lane, 0.5);
+                    println!("ball at {speed} m/s, voxels of {voxel_size} m, {ground:?}, z = {lane}: {cut:?}");
+                    assert!(cut.jump < 0.05 && cut.off < 0.05, "{ground:?}, {lane}: {cut:?}");
+                    assert!(cut.went > 0.98 * plain.went, "{ground:?}, {lane}: {cut:?} of {plain:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_walker_feels_neither_seams_nor_borders() {
+    for voxel_size in [1.0, 0.5] {
+        let plain = walk(Ground8::OnePiece, voxel_size, 30.3);
+        println!("walker, voxels of {voxel_size} m, one piece: {plain:?}");
+        for ground in [Ground8::Tiles, Ground8::Seams, Ground8::Chunks] {
+            for lane in [30.3, 32.0] {
+                let cut = walk(ground, voxel_size, lane);
+                println!("walker, voxels of {voxel_size} m, {ground:?}, z = {lane}: {cut:?}");
+                assert!(cut.jump < 0.05 && cut.off < 0.05, "{ground:?}, {lane}: {cut:?}");
+                assert!(cut.went > 0.98 * plain.went, "{ground:?}, {lane}: {cut:?} of {plain:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_comes_to_rest_in_a_pit_and_not_below_it() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    stage.dig([pit(32.0, 8.0, 32.0, 5.0)]);
+    let ball = stage.ball(Vec3::new(29.0, 12.0, 31.0), 0.5, Vec3::ZERO);
+    stage.frames((20.0 / STEP) as usize);
+    let place = stage.place(ball);
+    assert!((3.3..4.2).contains(&place.y) && place.xz().distance(Vec2::splat(32.0)) < 2.0, "{place}");
+}

@@ -1,0 +1,156 @@
+//! What changing ground does to bodies that rest on it, hang on it, or stand where it comes.
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy_burrow::physics::{Character, GroundBody, GroundShape, debris_collider};
+use bevy_burrow::prelude::*;
+
+use crate::stage::{STEP, Stage, level, pit};
+
+fn seconds(count: f32) -> usize {
+    (count / STEP) as usize
+}
+
+fn sleeps(stage: &Stage, body: Entity) -> bool {
+    stage.app.world().get::<Sleeping>(body).is_some()
+}
+
+#[test]
+fn a_sleeping_ball_falls_when_it_is_dug_away_under_it_and_others_sleep_on() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let near = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+    let far = stage.ball(Vec3::new(27.0, 8.5, 27.0), 0.5, Vec3::ZERO);
+    stage.frames(seconds(4.0));
+    assert!(sleeps(&stage, near) && sleeps(&stage, far));
+    stage.dig([pit(20.0, 8.0, 20.0, 3.0)]);
+    stage.frames(4);
+    assert!(!sleeps(&stage, near) && sleeps(&stage, far));
+    stage.frames(seconds(2.0));
+    assert!((5.0..6.0).contains(&stage.place(near).y), "{}", stage.place(near));
+    assert_eq!(stage.figures().lifted, 0);
+}
+
+#[test]
+fn who_is_built_over_comes_out_on_top() {
+    let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
+    let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+    let person = stage.character(Vec3::new(21.0, 8.0, 22.0), Vec2::ZERO);
+    stage.frames(seconds(1.0));
+    stage.dig([Brush::add(Shape::sphere(Vec3::new(20.5, 8.0, 21.0), 4.0), MaterialId(2))]);
+    stage.frames(seconds(0.5));
+    let model = stage.terrain(terrain).world();
+    for body in [ball, person] {
+        assert!(!model.is_solid(stage.place(body).as_dvec3()), "{}", stage.place(body));
+    }
+    assert!(stage.feet(person).y > 10.0 && stage.figures().lifted >= 2);
+}
+
+#[test]
+fn colliders_are_the_surface_that_the_model_has_at_every_scale() {
+    for voxel_size in [0.125, 1.0, 4.0] {
+        let (mut stage, terrain) = Stage::with_ground(level(32, voxel_size));
+        stage.dig([pit(14.0 * voxel_size, 8.0 * voxel_size, 16.0 * voxel_size, 4.3 * voxel_size)]);
+        let ground = stage.ground();
+        for at in 0..200u32 {
+            let (x, z) = (1.0 + (at * 37 % 300) as f32 / 10.0, 1.0 + (at * 53 % 300) as f32 / 10.0);
+            let model = stage.terrain(terrain).world().height(x.into(), z.into()).expect("in the world") as f32;
+            let ray = |collider: &Collider, position: &Position, rotation: &Rotation| {
+                let from = Vec3::new(x, 30.0, z) * voxel_size;
+                collider.cast_ray(*position, *rotation, from, Vec3::NEG_Y, 60.0 * voxel_size, true)
+            };
+            let world = stage.app.world();
+            let hits = ground.iter().filter_map(|&body| {
+                let part = |error| format!("{error}");
+                let collider = world.get::<Collider>(body).ok_or("no collider").map_err(part).expect("a body");
+                ray(collider, world.get::<Position>(body)?, world.get::<Rotation>(body)?)
+            });
+            let hits: Vec<f32> = hits.map(|(distance, _)| 30.0 - distance / voxel_size).collect();
+            let highest = hits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            assert!((highest - model).abs() < 1e-3, "at ({x}, {z}): {highest} for {model}, of {hits:?}");
+        }
+    }
+}
+
+#[test]
+fn hidden_triangles_are_no_colliders() {
+    let (mut stage, terrain) = Stage::with_ground(level(48, 1.0));
+    stage.dig([pit(16.0, 8.0, 16.0, 4.0), pit(30.0, 5.0, 24.0, 4.0)]);
+    let drawn: usize = stage.terrain(terrain).world().drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
+    let world = stage.app.world_mut();
+    let mut bodies = world.query_filtered::<&Collider, With<GroundBody>>();
+    let shapes = bodies.iter(world).map(|body| body.shape().as_shape::<GroundShape>().expect("ground"));
+    // Only triangles without any area are left out.
+    let colliding: usize = shapes.map(GroundShape::triangles).sum();
+    assert!(colliding <= drawn && colliding > drawn * 99 / 100, "{colliding} of {drawn}");
+}
+
+#[test]
+fn a_ball_that_is_dug_down_stays_on_the_ground_all_the_way() {
+    let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
+    let ball = stage.ball(Vec3::new(32.0, 8.5, 32.0), 0.5, Vec3::ZERO);
+    for step in 0..seconds(8.0) {
+        if step % 6 == 0 {
+            let place = stage.place(ball);
+            stage.send(pit(place.x + 0.3, place.y - 1.0, place.z - 0.2, 2.0));
+        }
+        stage.frame();
+        let place = stage.place(ball).as_dvec3();
+        assert!(!stage.terrain(terrain).world().is_solid(place), "step {step}: {place}");
+    }
+    assert!(stage.place(ball).y < 2.0, "{}", stage.place(ball));
+}
+
+#[test]
+fn a_walker_climbs_steps_and_hills_and_stops_at_walls() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let built = |x: f32, z: f32, height: f32| {
+        let (half, top) = (Vec3::new(4.0, 2.0, 3.0), 8.0 + height);
+        Brush::add(Shape::cuboid(Vec3::new(x, top - 2.0, z), half), MaterialId(2))
+    };
+    stage.dig([built(30.0, 10.0, 0.4), built(30.0, 20.0, 2.0)]);
+    let up = stage.character(Vec3::new(20.0, 8.0, 10.0), Vec2::X);
+    let stopped = stage.character(Vec3::new(20.0, 8.0, 20.0), Vec2::X);
+    stage.frames(seconds(2.0));
+    assert!((8.3..8.6).contains(&stage.feet(up).y), "{}", stage.feet(up));
+    stage.frames(seconds(2.0));
+    assert!(stage.feet(up).x > 36.0, "{}", stage.feet(up));
+    assert!(stage.feet(stopped).x < 26.0 && stage.feet(stopped).y < 8.2, "{}", stage.feet(stopped));
+    assert!(stage.motion(up).grounded && stage.motion(stopped).grounded);
+}
+
+#[test]
+fn a_walker_jumps_as_high_as_it_should_and_stands_still_when_told_nothing() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let person = stage.character(Vec3::new(20.0, 8.0, 10.0), Vec2::ZERO);
+    stage.frames(seconds(1.0));
+    let before = stage.feet(person);
+    stage.frames(seconds(2.0));
+    assert_eq!(stage.feet(person), before);
+    let steering = bevy_burrow::physics::CharacterSteering { jump: true, ..default() };
+    stage.app.world_mut().entity_mut(person).insert(steering);
+    stage.frame();
+    stage.app.world_mut().entity_mut(person).insert(bevy_burrow::physics::CharacterSteering::default());
+    let mut highest = f32::NEG_INFINITY;
+    for _ in 0..seconds(1.5) {
+        stage.frame();
+        highest = highest.max(stage.feet(person).y);
+    }
+    let jump = Character::default().jump_height;
+    assert!((highest - before.y - jump).abs() < 0.2, "{} for {jump}", highest - before.y);
+    assert!((stage.feet(person).y - before.y).abs() < 0.02 && stage.motion(person).grounded);
+}
+
+#[test]
+fn a_loose_piece_becomes_a_body_with_its_volume() {
+    let mut terrain = level(64, 1.0);
+    // A ball in the air: its surface is a closed mesh.
+    terrain.apply([Brush::add(Shape::sphere(Vec3::new(24.0, 24.0, 24.0), 4.0), MaterialId(2))]);
+    let chunk = terrain.world().grid().chunk_of(IVec3::new(24, 24, 24));
+    let piece = terrain.world().chunk_mesh(chunk);
+    for voxel_size in [1.0, 0.5] {
+        let collider = debris_collider(&piece, voxel_size).expect("a ball has volume");
+        let volume = collider.mass_properties(1.0).mass / voxel_size.powi(3);
+        assert!((volume / 268.0 - 1.0).abs() < 0.06, "{volume}");
+    }
+    assert!(debris_collider(&Default::default(), 1.0).is_none());
+}

@@ -1,0 +1,274 @@
+//! Many bodies on ground that is dug and built under their feet.
+//!
+//! `BURROW_CROWD=1000` has so many balls, a tenth as many walkers, and goes on for a minute; else it is a tenth of that,
+//! for a few seconds.
+
+use std::collections::HashMap;
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy_burrow::physics::{Character, CharacterSteering};
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::World as Model;
+use fastrand::Rng;
+
+use crate::stage::{STEP, Stage};
+
+/// Cells along a side of the landscape.
+const SIDE: u32 = 128;
+
+/// How large the crowd is.
+fn crowd() -> usize {
+    std::env::var("BURROW_CROWD").ok().and_then(|count| count.parse().ok()).unwrap_or(100)
+}
+
+fn landscape(amplitude: f64, scale: f64) -> Terrain {
+    let noise = NoiseHeights { seed: 11, kind: NoiseKind::Fractal, octaves: 3, scale, amplitude, base: 4.0 };
+    let ground = Ground::from_noise(SIDE, SIDE, &noise).expect("valid hills");
+    Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size: 1.0 }).expect("valid settings")
+}
+
+/// Walls around the world, for bodies to stay in it.
+fn fence(stage: &mut Stage) {
+    let side = SIDE as f32;
+    for (x, z, width, depth) in [
+        (-1.0, side / 2.0, 4.0, side + 8.0),
+        (side + 1.0, side / 2.0, 4.0, side + 8.0),
+        (side / 2.0, -1.0, side + 8.0, 4.0),
+        (side / 2.0, side + 1.0, side + 8.0, 4.0),
+    ] {
+        let wall = Collider::cuboid(width, 400.0, depth);
+        stage.app.world_mut().spawn((RigidBody::Static, wall, Transform::from_xyz(x, 0.0, z)));
+    }
+}
+
+/// A place over the world, off its walls.
+fn somewhere(rng: &mut Rng) -> Vec2 {
+    let mut along = || 3.0 + rng.f32() * (SIDE as f32 - 6.0);
+    Vec2::new(along(), along())
+}
+
+fn height(model: &Model, place: Vec2) -> f32 {
+    model.height(place.x.into(), place.y.into()).expect("in the world") as f32
+}
+
+/// Tunnels through the hills, along all chunks.
+fn tunnels() -> impl Iterator<Item = Brush> {
+    let side = SIDE as f32;
+    (0..4).flat_map(move |number| {
+        let (at, y) = (20.0 + 29.0 * number as f32, 2.0 - number as f32);
+        [
+            Brush::dig(Shape::capsule(Vec3::new(8.0, y, at), Vec3::new(side - 8.0, y + 2.0, at), 3.0)),
+            Brush::dig(Shape::capsule(Vec3::new(at, y + 1.0, 8.0), Vec3::new(at, y, side - 8.0), 3.0)),
+        ]
+    })
+}
+
+/// A brush near the ground, as players send them.
+fn edit(rng: &mut Rng, model: &Model) -> Brush {
+    let place = somewhere(rng);
+    let center = Vec3::new(place.x, height(model, place) + rng.f32() * 4.0 - 3.0, place.y);
+    let radius = 1.5 + 2.5 * rng.f32();
+    match rng.u8(0..4) {
+        0 => Brush::add(Shape::sphere(center, radius), MaterialId(2)),
+        1 => Brush::dig(Shape::cuboid(center, Vec3::new(radius, 2.0 * radius, radius))),
+        _ => Brush::dig(Shape::sphere(center, radius)),
+    }
+}
+
+/// Who is inside the ground, and for how many frames in a row.
+#[derive(Default)]
+struct Buried {
+    frames: HashMap<Entity, u32>,
+    longest: u32,
+    through: usize,
+    worst: f64,
+}
+
+impl Buried {
+    /// Looks at a body. Built over, it may be in the ground for the frame of the commit and no longer.
+    fn look(&mut self, model: &Model, body: Entity, place: Vec3) {
+        let is_under = !place.is_finite() || model.is_solid(place.as_dvec3());
+        if !is_under {
+            self.frames.remove(&body);
+            return;
+        }
+        let frames = self.frames.entry(body).or_default();
+        *frames += 1;
+        self.longest = self.longest.max(*frames);
+        if *frames == 3 {
+            self.through += 1;
+        }
+        let top = model.height(place.x.into(), place.z.into()).unwrap_or_default();
+        self.worst = self.worst.max(top - f64::from(place.y));
+    }
+}
+
+#[test]
+fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
+    let (balls, walkers) = (crowd(), crowd() / 10);
+    let seconds = if balls >= 1000 { 60.0 } else { 8.0 };
+    let (mut stage, terrain) = Stage::with_ground(landscape(14.0, 40.0));
+    fence(&mut stage);
+    stage.dig(tunnels());
+    let mut rng = Rng::with_seed(3);
+
+    let mut bodies = Vec::new();
+    for _ in 0..balls {
+        let place = somewhere(&mut rng);
+        // Half of them start below the open sky, the others wherever there is air: in tunnels too.
+        let spans = stage.terrain(terrain).world().spans(place.x.into(), place.y.into());
+        let span = if rng.bool() { spans.last() } else { rng.choice(spans.iter()) };
+        let Some(span) = span else { continue };
+        let room = span.ceiling.map_or(12.0, |top| (top - span.floor - 1.0).max(0.0)) as f32;
+        let y = span.floor as f32 + 0.5 + rng.f32() * room;
+        let push = Vec3::new(rng.f32() - 0.5, 0.0, rng.f32() - 0.5) * 10.0;
+        bodies.push(stage.ball(Vec3::new(place.x, y, place.y), 0.25 + 0.25 * rng.f32(), push));
+    }
+    let mut people = Vec::new();
+    for _ in 0..walkers {
+        let place = somewhere(&mut rng);
+        let feet = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + 0.1, place.y);
+        people.push(stage.character(feet, Vec2::from_angle(rng.f32() * 6.3)));
+    }
+    let mut buried = Buried::default();
+    let (mut sent, mut steps) = (0, 0);
+    let start = std::time::Instant::now();
+    for frame in 0..(seconds / STEP) as u32 {
+        // Ten a second, on average.
+        if frame * 10 / 64 != (frame + 1) * 10 / 64 {
+            let brush = edit(&mut rng, stage.terrain(terrain).world());
+            stage.send(brush);
+            sent += 1;
+        }
+        if frame % 32 == 0 {
+            for &person in &people {
+                let mut steering = stage.app.world_mut().get_mut::<CharacterSteering>(person).expect("is there");
+                steering.direction = Vec2::from_angle(rng.f32() * 6.3);
+                steering.jump = rng.u8(0..4) == 0;
+                steering.run = rng.bool();
+            }
+        }
+        stage.frame();
+        steps += 1;
+        let model = stage.terrain(terrain).world();
+        for &body in bodies.iter().chain(&people) {
+            buried.look(model, body, stage.place(body));
+        }
+    }
+    let took = start.elapsed();
+    stage.settle();
+    let model = stage.terrain(terrain).world();
+    let below = bodies.iter().chain(&people).filter(|&&body| model.is_solid(stage.place(body).as_dvec3())).count();
+    let awake = bodies.len() - bodies.iter().filter(|&&body| stage.app.world().get::<Sleeping>(body).is_some()).count();
+    println!(
+        "{} balls, {} walkers, {sent} edits in {steps} steps ({seconds} s; took {took:.1?}): {} fell through, {below} \
+         below at the end; longest inside {} frames, deepest {:.2}; {awake} awake; {:?}",
+        bodies.len(),
+        people.len(),
+        buried.through,
+        buried.longest,
+        buried.worst,
+        stage.figures(),
+    );
+    assert_eq!((buried.through, below), (0, 0));
+    assert!(stage.receipts() >= sent, "{} receipts", stage.receipts());
+    let spread = people.iter().filter(|&&person| stage.feet(person).is_finite()).count();
+    assert_eq!(spread, walkers);
+}
+
+/// The tile or chunk that draws the ground under a place.
+fn drawn_below(model: &Model, place: Vec3) -> (bool, IVec3) {
+    let cell = place.floor().as_ivec3();
+    let is_dug = model.mask().contains(bevy_burrow::lattice::Column::new(cell.x, cell.z));
+    let chunk = cell.div_euclid(IVec3::splat(16));
+    (is_dug, if is_dug { chunk } else { chunk.with_y(0) })
+}
+
+/// Jumps: how far each step up or down differs from the one before, in voxels.
+#[derive(Default)]
+struct Jumps {
+    all: Vec<f32>,
+}
+
+impl Jumps {
+    fn figures(&mut self) -> (usize, f32, f32) {
+        self.all.sort_by(f32::total_cmp);
+        let at = |share: f32| self.all.get(((self.all.len() as f32 - 1.0) * share) as usize).copied().unwrap_or(0.0);
+        (self.all.len(), at(0.99), at(1.0))
+    }
+}
+
+/// On gentle hills nothing but a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere.
+#[test]
+fn bodies_on_gentle_hills_do_not_jump_at_seams() {
+    let (balls, walkers) = (crowd(), crowd() / 10);
+    let (mut stage, terrain) = Stage::with_ground(landscape(7.0, 90.0));
+    fence(&mut stage);
+    let mut rng = Rng::with_seed(4);
+    let model = stage.terrain(terrain).world();
+    // Patches that marching cubes draws and that look as before, on chunk borders and off them.
+    let patches: Vec<Brush> = (0..120)
+        .map(|number| {
+            let mut place = somewhere(&mut rng);
+            if number % 2 == 0 {
+                place.x = (place.x / 16.0).round() * 16.0;
+            }
+            let center = Vec3::new(place.x, height(model, place), place.y);
+            Brush::paint(Shape::sphere(center, 2.0 + 4.0 * rng.f32()), MaterialId(2))
+        })
+        .collect();
+    stage.dig(patches);
+    // Bodies do not meet each other here: only ground counts.
+    let layers = CollisionLayers::new(LayerMask(2), LayerMask(1));
+    let mut bodies = Vec::new();
+    for _ in 0..balls {
+        let (place, radius) = (somewhere(&mut rng), 0.3 + 0.4 * rng.f32());
+        let middle = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + radius + 0.05, place.y);
+        let push = Vec2::from_angle(rng.f32() * 6.3) * (2.0 + 6.0 * rng.f32());
+        let ball = stage.ball(middle, radius, Vec3::new(push.x, 0.0, push.y));
+        stage.app.world_mut().entity_mut(ball).insert(layers);
+        bodies.push((ball, radius));
+    }
+    for _ in 0..walkers {
+        let place = somewhere(&mut rng);
+        let feet = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + 0.05, place.y);
+        let person = stage.character(feet, Vec2::from_angle(rng.f32() * 6.3));
+        stage.app.world_mut().entity_mut(person).insert(layers);
+        bodies.push((person, Character::default().height / 2.0));
+    }
+    stage.frames(32);
+    let mut before: HashMap<Entity, Vec<Vec3>> = HashMap::new();
+    let (mut at_seams, mut elsewhere) = ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
+    for _ in 0..(6.0 / STEP) as u32 {
+        stage.frame();
+        for (number, &(body, reach)) in bodies.iter().enumerate() {
+            let place = stage.place(body);
+            let way = before.entry(body).or_default();
+            way.push(place);
+            let inside = place.xz().cmpgt(Vec2::splat(4.0)).all() && place.xz().cmplt(Vec2::splat(SIDE as f32 - 4.0)).all();
+            let model = stage.terrain(terrain).world();
+            let &[.., a, b, c] = &way[..] else { continue };
+            if !inside || c.y - reach > height(model, c.xz()) + 1.0 {
+                continue;
+            }
+            let jump = (c.y - 2.0 * b.y + a.y).abs();
+            // The body touches the border with all of its width.
+            let around = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::NEG_X, Vec2::NEG_Y];
+            let mut drawn = around.map(|side| {
+                let side = c + Vec3::new(side.x, 0.0, side.y) * 0.3 - Vec3::Y * reach;
+                drawn_below(model, side)
+            });
+            drawn.sort_by_key(|(is_dug, chunk)| (*is_dug, chunk.to_array()));
+            let kind = usize::from(number >= balls);
+            let jumps = if drawn[0] == drawn[4] { &mut elsewhere } else { &mut at_seams };
+            jumps[kind].all.push(jump);
+        }
+    }
+    for (kind, name) in ["balls", "walkers"].iter().enumerate() {
+        let (seams, plain) = (at_seams[kind].figures(), elsewhere[kind].figures());
+        println!("{name}: (samples, p99, highest) at seams and borders {seams:?}, elsewhere {plain:?}");
+        assert!(seams.0 > 100, "{name} met {} seams", seams.0);
+        assert!(seams.2 < 0.05, "{name} jump: {seams:?}");
+    }
+}

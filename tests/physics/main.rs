@@ -1,0 +1,8 @@
+//! Bodies on ground that is dug and built: in an app with avian, frame by frame, at a fixed time step.
+#![cfg(feature = "avian")]
+
+mod bumps;
+mod changes;
+mod crowd;
+mod sources;
+mod stage;

@@ -1,0 +1,102 @@
+//! Colliders come with sources and go with them, and nothing falls where they are missing.
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy_burrow::physics::{ColliderSource, GroundBody};
+use bevy_burrow::prelude::*;
+
+use crate::stage::{STEP, Stage, level, pit};
+
+#[test]
+fn ground_has_colliders_near_sources_only_and_they_move_along() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    let source = stage.app.world_mut().spawn((Transform::from_xyz(40.0, 20.0, 40.0), ColliderSource { radius: 20.0 })).id();
+    stage.settle();
+    let near = |stage: &mut Stage, middle: Vec2| {
+        let ground = stage.ground();
+        let world = stage.app.world();
+        let places = ground.iter().map(|&body| world.get::<Position>(body).expect("a body").xz() + 8.0);
+        let far = places.map(|place| place.distance(middle)).fold(0.0, f32::max);
+        (ground.len(), far)
+    };
+    let (count, far) = near(&mut stage, Vec2::splat(40.0));
+    assert!((9..40).contains(&count) && far < 50.0, "{count} colliders, up to {far} m away");
+    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x = 200.0;
+    stage.frame();
+    stage.settle();
+    let (count, far) = near(&mut stage, Vec2::new(200.0, 40.0));
+    assert!((9..40).contains(&count) && far < 50.0, "{count} colliders, up to {far} m away");
+    stage.app.world_mut().despawn(source);
+    stage.frames_until("all colliders go", |stage| stage.ground().is_empty());
+}
+
+#[test]
+fn a_body_without_ground_is_held_until_a_source_comes() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    let ball = stage.ball(Vec3::new(120.0, 9.0, 120.0), 0.5, Vec3::new(0.0, -3.0, 0.0));
+    let person = stage.character(Vec3::new(125.0, 8.3, 120.0), Vec2::ZERO);
+    let high = stage.ball(Vec3::new(130.0, 90.0, 120.0), 0.5, Vec3::ZERO);
+    stage.frames(200);
+    assert!(stage.is_held(ball) && stage.is_held(person) && !stage.is_held(high));
+    assert!(stage.place(ball).y > 8.5 && stage.feet(person).y > 8.0 && stage.place(high).y < 60.0);
+    stage.app.world_mut().spawn((Transform::from_xyz(120.0, 0.0, 120.0), ColliderSource { radius: 20.0 }));
+    stage.settle();
+    stage.frames((4.0 / STEP) as usize);
+    assert!(!stage.is_held(ball) && !stage.is_held(person) && !stage.is_held(high));
+    for body in [ball, high] {
+        assert!((stage.place(body).y - 8.5).abs() < 0.05, "{}", stage.place(body));
+    }
+    assert!((stage.feet(person).y - 8.0).abs() < 0.05, "{}", stage.feet(person));
+}
+
+#[test]
+fn a_source_that_races_along_never_leaves_its_body_without_ground() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(512, 1.0));
+    let ball = stage.ball(Vec3::new(10.0, 8.6, 250.0), 0.5, Vec3::X * 60.0);
+    stage.app.world_mut().entity_mut(ball).insert(ColliderSource { radius: 8.0 });
+    let mut lowest = f32::INFINITY;
+    stage.frames_until("it crosses the world", |stage| {
+        lowest = lowest.min(stage.place(ball).y);
+        stage.place(ball).x > 490.0
+    });
+    assert!(lowest > 8.4, "{lowest}");
+}
+
+#[test]
+fn edits_far_from_all_sources_are_there_when_one_comes() {
+    let mut stage = Stage::new();
+    let terrain = stage.app.world_mut().spawn(level(256, 1.0)).id();
+    let source = stage.app.world_mut().spawn((Transform::from_xyz(40.0, 8.0, 40.0), ColliderSource { radius: 20.0 })).id();
+    stage.settle();
+    stage.dig([pit(200.0, 8.0, 200.0, 5.0), pit(40.0, 8.0, 40.0, 3.0)]);
+    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation = Vec3::new(200.0, 8.0, 200.0);
+    stage.frame();
+    stage.settle();
+    let ball = stage.ball(Vec3::new(200.0, 6.0, 200.0), 0.5, Vec3::ZERO);
+    stage.frames((3.0 / STEP) as usize);
+    assert!((3.3..4.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
+    // And back to what was dug meanwhile.
+    stage.dig([pit(40.0, 5.0, 40.0, 3.0)]);
+    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation = Vec3::new(40.0, 8.0, 40.0);
+    stage.frame();
+    stage.settle();
+    let ball = stage.ball(Vec3::new(40.0, 7.0, 40.0), 0.5, Vec3::ZERO);
+    stage.frames((3.0 / STEP) as usize);
+    assert!((2.2..3.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
+    assert!(stage.terrain(terrain).world().check_seams().is_flawless());
+}
+
+#[test]
+fn colliders_go_with_their_terrain() {
+    let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
+    assert!(!stage.ground().is_empty());
+    stage.app.world_mut().entity_mut(terrain).insert(level(32, 1.0));
+    stage.frames_until("the new world's colliders are there", |stage| stage.ground().len() == 4);
+    stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
+    stage.frames_until("all colliders go", |stage| stage.ground().is_empty());
+    let world = stage.app.world_mut();
+    assert_eq!(world.query::<&GroundBody>().iter(world).count(), 0);
+}

@@ -1,0 +1,164 @@
+//! The app that the tests play on: a terrain, bodies, and one step of physics per frame.
+
+use std::time::Duration;
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::physics::{
+    Character, CharacterMotion, CharacterPlugin, CharacterSteering, ColliderSource, GroundBody,
+    HeldByGround, PhysicsFigures, TerrainPhysicsPlugin,
+};
+use bevy_burrow::prelude::*;
+
+/// Seconds of a step.
+pub const STEP: f32 = 1.0 / 64.0;
+
+/// Frames that a stage waits for something before it gives up; each of them sleeps for [`NAP`].
+const PATIENCE: usize = 60_000;
+
+/// How long a stage sleeps between two frames, so that tasks get on.
+const NAP: Duration = Duration::from_micros(500);
+
+/// The receipts so far.
+#[derive(Resource, Default)]
+struct Receipts(usize);
+
+/// An app with the plugin, as a dedicated server has it: no meshes, no assets.
+pub struct Stage {
+    /// The app itself.
+    pub app: App,
+}
+
+impl Stage {
+    pub fn new() -> Self {
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins,
+            PhysicsPlugins::default(),
+            BurrowPlugins,
+            TerrainPhysicsPlugin,
+            CharacterPlugin::default(),
+        ))
+        .init_resource::<Receipts>()
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(STEP)))
+        .add_systems(Last, |mut new: MessageReader<BrushApplied>, mut kept: ResMut<Receipts>| {
+            kept.0 += new.read().count();
+        });
+        app.finish();
+        app.cleanup();
+        Self { app }
+    }
+
+    /// Spawns a terrain, and a source that reaches all of it.
+    pub fn with_ground(terrain: Terrain) -> (Self, Entity) {
+        let mut stage = Self::new();
+        let entity = stage.app.world_mut().spawn(terrain).id();
+        stage.app.world_mut().spawn((Transform::default(), ColliderSource { radius: 1e4 }));
+        stage.settle();
+        (stage, entity)
+    }
+
+    pub fn frame(&mut self) {
+        self.app.update();
+    }
+
+    pub fn frames(&mut self, count: usize) {
+        (0..count).for_each(|_| self.frame());
+    }
+
+    /// Frames until something is so. Panics when it never comes.
+    pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
+        for _ in 0..PATIENCE {
+            self.frame();
+            if is_so(self) {
+                return;
+            }
+            std::thread::sleep(NAP);
+        }
+        panic!("waited in vain: {what}");
+    }
+
+    /// Frames until no edit is on its way and no collider is missing. Time stands still meanwhile.
+    pub fn settle(&mut self) {
+        self.app.world_mut().resource_mut::<Time<Physics>>().pause();
+        self.frames_until("the ground settles", |stage| {
+            let world = stage.app.world_mut();
+            let mut terrains = world.query::<&Terrain>();
+            let is_idle = terrains.iter(world).all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
+            is_idle && stage.figures().colliders > 0 && stage.figures().missing == 0
+        });
+        self.frames(2);
+        self.app.world_mut().resource_mut::<Time<Physics>>().unpause();
+    }
+
+    pub fn figures(&self) -> &PhysicsFigures {
+        self.app.world().resource()
+    }
+
+    pub fn receipts(&self) -> usize {
+        self.app.world().resource::<Receipts>().0
+    }
+
+    pub fn send(&mut self, brush: Brush) {
+        self.app.world_mut().write_message(brush).expect("the plugin added the message");
+    }
+
+    /// Sends brushes and waits until they are dug, with time standing still.
+    pub fn dig(&mut self, brushes: impl IntoIterator<Item = Brush>) {
+        brushes.into_iter().for_each(|brush| self.send(brush));
+        self.frame();
+        self.settle();
+    }
+
+    /// A ball that moves.
+    pub fn ball(&mut self, place: Vec3, radius: f32, velocity: Vec3) -> Entity {
+        let body = (RigidBody::Dynamic, Collider::sphere(radius), Transform::from_translation(place));
+        let turn = Vec3::new(velocity.z, 0.0, -velocity.x) / radius;
+        self.app.world_mut().spawn((body, LinearVelocity(velocity), AngularVelocity(turn))).id()
+    }
+
+    /// A character that stands.
+    pub fn character(&mut self, feet: Vec3, direction: Vec2) -> Entity {
+        let character = Character::default();
+        let place = character.standing_at(feet);
+        self.app.world_mut().spawn((character, place, CharacterSteering { direction, ..default() })).id()
+    }
+
+    pub fn place(&self, body: Entity) -> Vec3 {
+        self.app.world().get::<Transform>(body).expect("the body is there").translation
+    }
+
+    pub fn feet(&self, character: Entity) -> Vec3 {
+        Character::default().feet(self.place(character))
+    }
+
+    pub fn motion(&self, character: Entity) -> CharacterMotion {
+        *self.app.world().get(character).expect("the character is there")
+    }
+
+    pub fn is_held(&self, body: Entity) -> bool {
+        self.app.world().get::<HeldByGround>(body).is_some()
+    }
+
+    pub fn terrain(&self, entity: Entity) -> &Terrain {
+        self.app.world().get(entity).expect("the terrain is there")
+    }
+
+    /// All bodies of ground.
+    pub fn ground(&mut self) -> Vec<Entity> {
+        let world = self.app.world_mut();
+        world.query_filtered::<Entity, With<GroundBody>>().iter(world).collect()
+    }
+}
+
+/// Level ground at height 8.
+pub fn level(cells: u32, voxel_size: f32) -> Terrain {
+    let ground = Ground::flat(cells, cells, 8.0).expect("valid ground");
+    Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size }).expect("valid settings")
+}
+
+/// A ball that is dug out.
+pub fn pit(x: f32, y: f32, z: f32, radius: f32) -> Brush {
+    Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius))
+}
