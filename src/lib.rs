@@ -47,6 +47,7 @@
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
+//! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
@@ -145,6 +146,9 @@ pub mod prelude {
     };
     pub use crate::terrain::{Applied, Receipt, Rejection, ScenarioCounts, Span, Terrain, TerrainSettings};
     #[cfg(feature = "render")]
-    pub use crate::view::TerrainMaterialPlugin;
+    pub use crate::view::{
+        GroundLayer, GroundLayerKind, GroundLoading, GroundLook, GroundMaterial, GroundQuality, GroundStrata,
+        GroundTextures, TerrainMaterialPlugin,
+    };
     pub use crate::volume::Scenario;
 }
