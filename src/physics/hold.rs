@@ -77,7 +77,9 @@ pub(super) fn hold(
     }
     figures.held = held;
     if held > 0 && sources.is_empty() {
-        warn_once!("bodies over a terrain are held still: there is no ColliderSource, so ground has no colliders");
+        warn_once!(
+            "bodies over a terrain are held still: there is no ColliderSource, so ground has no colliders"
+        );
     }
 }
 

@@ -12,10 +12,10 @@ use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
 use super::intake::tell_steps;
 use super::load::Loading;
-use super::meshes::Ready;
+use super::meshes::{Ready, Wardrobe};
 use super::{
-    Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Companions,
-    HistoryMoved, MaterialColors, Part, ShownSurface,
+    Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
+    Companions, HistoryMoved, MaterialColors, Part, ShownSurface,
 };
 use crate::terrain::{Commit, Drawn, Terrain};
 
@@ -60,7 +60,8 @@ pub(super) fn begin_transactions(
         tell_steps(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
         let engine = terrain.engine().unwrap_or(&engine).clone();
-        let workshop = Workshop { colors: draws.then(|| colors.clone()), companions: companions.clone() };
+        let wardrobe = draws.then(|| Wardrobe::new(terrain.world(), colors));
+        let workshop = Workshop { wardrobe, companions: companions.clone() };
         let (size, grid) = (terrain.voxel_size(), terrain.world().grid());
         let revision = terrain.world().revision() + 1;
         let task = AsyncComputeTaskPool::get().spawn(async move {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::meshes::{self, Ready};
-use super::{MaterialColors, ShownSurface};
+use super::ShownSurface;
+use super::meshes::{Ready, Wardrobe};
 use crate::lattice::ChunkGrid;
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, World};
@@ -113,8 +113,8 @@ impl Companions {
 /// What a task makes of surfaces.
 #[derive(Clone)]
 pub(super) struct Workshop {
-    /// The colours of meshes, where meshes are made at all.
-    pub colors: Option<MaterialColors>,
+    /// What meshes are made with, where meshes are made at all.
+    pub wardrobe: Option<Wardrobe>,
     pub companions: Companions,
 }
 
@@ -129,7 +129,7 @@ pub(super) struct Fresh {
 impl Workshop {
     /// Is there nothing to make?
     pub fn is_idle(&self) -> bool {
-        self.colors.is_none() && self.companions.is_empty()
+        self.wardrobe.is_none() && self.companions.is_empty()
     }
 
     /// Makes everything for a part whose surface `surface` gives. `is_empty` tells whether there are triangles, as far as
@@ -147,12 +147,12 @@ impl Workshop {
             shown: ShownSurface { revision: part.revision, is_empty },
             attachments: Vec::new(),
         };
-        if self.colors.is_none() && takers.is_empty() {
+        if self.wardrobe.is_none() && takers.is_empty() {
             return fresh;
         }
         let surface = &*surface();
         fresh.shown.is_empty = surface.is_empty();
-        fresh.mesh = self.colors.as_ref().and_then(|colors| meshes::build(surface, colors));
+        fresh.mesh = self.wardrobe.as_ref().and_then(|wardrobe| wardrobe.build(part.drawn, surface));
         fresh.attachments = takers.into_iter().filter_map(|taker| taker.build(part, surface)).collect();
         fresh
     }

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::commit::{InFlight, attach};
 use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
+use super::meshes::Wardrobe;
 use super::{BurrowSettings, ChunkCreated, Companions, MaterialColors, Part};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
@@ -60,8 +61,10 @@ pub(super) fn start_loading(
             transform.scale = scale;
         }
         let world = terrain.snapshot();
-        let workshop =
-            Workshop { colors: assets.is_some().then(|| colors.clone()), companions: companions.clone() };
+        let workshop = Workshop {
+            wardrobe: assets.is_some().then(|| Wardrobe::new(&world, colors)),
+            companions: companions.clone(),
+        };
         let task = (!workshop.is_idle()).then(|| {
             let (world, voxel_size) = (Arc::clone(&world), terrain.voxel_size());
             AsyncComputeTaskPool::get()

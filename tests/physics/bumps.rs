@@ -105,7 +105,9 @@ fn a_ball_feels_neither_seams_nor_borders() {
             for ground in [Ground8::Tiles, Ground8::Seams, Ground8::Chunks] {
                 for lane in [30.3, 32.0] {
                     let cut = roll(ground, voxel_size, speed, lane, 0.5);
-                    println!("ball at {speed} m/s, voxels of {voxel_size} m, {ground:?}, z = {lane}: {cut:?}");
+                    println!(
+                        "ball at {speed} m/s, voxels of {voxel_size} m, {ground:?}, z = {lane}: {cut:?}"
+                    );
                     assert!(cut.jump < 0.05 && cut.off < 0.05, "{ground:?}, {lane}: {cut:?}");
                     assert!(cut.went > 0.98 * plain.went, "{ground:?}, {lane}: {cut:?} of {plain:?}");
                 }

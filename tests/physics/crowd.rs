@@ -143,7 +143,8 @@ fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
         }
         if frame % 32 == 0 {
             for &person in &people {
-                let mut steering = stage.app.world_mut().get_mut::<CharacterSteering>(person).expect("is there");
+                let mut steering =
+                    stage.app.world_mut().get_mut::<CharacterSteering>(person).expect("is there");
                 steering.direction = Vec2::from_angle(rng.f32() * 6.3);
                 steering.jump = rng.u8(0..4) == 0;
                 steering.run = rng.bool();
@@ -159,8 +160,10 @@ fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
     let took = start.elapsed();
     stage.settle();
     let model = stage.terrain(terrain).world();
-    let below = bodies.iter().chain(&people).filter(|&&body| model.is_solid(stage.place(body).as_dvec3())).count();
-    let awake = bodies.len() - bodies.iter().filter(|&&body| stage.app.world().get::<Sleeping>(body).is_some()).count();
+    let below =
+        bodies.iter().chain(&people).filter(|&&body| model.is_solid(stage.place(body).as_dvec3())).count();
+    let awake = bodies.len()
+        - bodies.iter().filter(|&&body| stage.app.world().get::<Sleeping>(body).is_some()).count();
     println!(
         "{} balls, {} walkers, {sent} edits in {steps} steps ({seconds} s; took {took:.1?}): {} fell through, {below} \
          below at the end; longest inside {} frames, deepest {:.2}; {awake} awake; {:?}",
@@ -194,7 +197,9 @@ struct Jumps {
 impl Jumps {
     fn figures(&mut self) -> (usize, f32, f32) {
         self.all.sort_by(f32::total_cmp);
-        let at = |share: f32| self.all.get(((self.all.len() as f32 - 1.0) * share) as usize).copied().unwrap_or(0.0);
+        let at = |share: f32| {
+            self.all.get(((self.all.len() as f32 - 1.0) * share) as usize).copied().unwrap_or(0.0)
+        };
         (self.all.len(), at(0.99), at(1.0))
     }
 }
@@ -224,7 +229,8 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams() {
     let mut bodies = Vec::new();
     for _ in 0..balls {
         let (place, radius) = (somewhere(&mut rng), 0.3 + 0.4 * rng.f32());
-        let middle = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + radius + 0.05, place.y);
+        let middle =
+            Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + radius + 0.05, place.y);
         let push = Vec2::from_angle(rng.f32() * 6.3) * (2.0 + 6.0 * rng.f32());
         let ball = stage.ball(middle, radius, Vec3::new(push.x, 0.0, push.y));
         stage.app.world_mut().entity_mut(ball).insert(layers);
@@ -239,14 +245,16 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams() {
     }
     stage.frames(32);
     let mut before: HashMap<Entity, Vec<Vec3>> = HashMap::new();
-    let (mut at_seams, mut elsewhere) = ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
+    let (mut at_seams, mut elsewhere) =
+        ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
     for _ in 0..(6.0 / STEP) as u32 {
         stage.frame();
         for (number, &(body, reach)) in bodies.iter().enumerate() {
             let place = stage.place(body);
             let way = before.entry(body).or_default();
             way.push(place);
-            let inside = place.xz().cmpgt(Vec2::splat(4.0)).all() && place.xz().cmplt(Vec2::splat(SIDE as f32 - 4.0)).all();
+            let inside = place.xz().cmpgt(Vec2::splat(4.0)).all()
+                && place.xz().cmplt(Vec2::splat(SIDE as f32 - 4.0)).all();
             let model = stage.terrain(terrain).world();
             let &[.., a, b, c] = &way[..] else { continue };
             if !inside || c.y - reach > height(model, c.xz()) + 1.0 {
