@@ -24,6 +24,7 @@ mod meshes;
 mod messages;
 mod query;
 mod settings;
+mod times;
 
 pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, MaterialColors, ShownSurface, Tile};
@@ -40,6 +41,7 @@ pub use messages::{
 };
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings};
+pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
