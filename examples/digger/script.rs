@@ -13,7 +13,7 @@ use crate::Options;
 use crate::places::{Hillside, Places, Ravine, TUNNEL_RADIUS};
 use crate::report::{Logbook, Report};
 use crate::studio::Studio;
-use crate::tools::Tools;
+use crate::tools::Hand;
 use crate::wires::Wires;
 use crate::works;
 
@@ -211,7 +211,7 @@ impl Stage {
     }
 
     fn preview(&mut self, on: bool) {
-        self.studio.world().resource_mut::<Tools>().preview = on;
+        self.studio.world().resource_mut::<Hand>().preview = on;
     }
 
     fn report(&mut self, places: &Places, start: Instant) -> Result<Report> {

@@ -15,11 +15,16 @@ use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_dis
 use bevy_burrow::prelude::*;
 
 use crate::Options;
+use crate::day::Clock;
 use crate::headless::build_app;
+use crate::held::ShowHand;
+use crate::hud::ShowHud;
 use crate::light::{Eyes, LampSwitch};
 use crate::mover::{Body, Steering};
-use crate::player::{Drone, Player};
+use crate::phase::Phase;
+use crate::player::{Drone, Player, Scripted};
 use crate::report::{EditTime, FrameTimes, Logbook};
+use crate::tools::Hand;
 
 /// Longest wait for the landscape.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -72,6 +77,15 @@ impl Studio {
         let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
         let player = wait_for_player(&mut app)?;
+        let world = app.world_mut();
+        world.entity_mut(player).insert(Scripted);
+        // A bright afternoon that lasts, and no title.
+        world.resource_mut::<Clock>().runs = false;
+        world.resource_mut::<ShowHud>().0 = false;
+        world.resource_mut::<ShowHand>().0 = false;
+        world.resource_mut::<Hand>().preview = false;
+        world.resource_mut::<NextState<Phase>>().set(Phase::Playing);
+        app.update();
         let film = renders.then_some(film);
         let mut studio = Self {
             app,
