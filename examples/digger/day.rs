@@ -162,7 +162,7 @@ impl Plugin for DayPlugin {
     }
 }
 
-fn tick(time: Res<Time>, settings: Res<Settings>, mut clock: ResMut<Clock>) {
+pub fn tick(time: Res<Time>, settings: Res<Settings>, mut clock: ResMut<Clock>) {
     if clock.runs && settings.day_minutes > 0.0 {
         clock.hour = (clock.hour + time.delta_secs() / (settings.day_minutes * 60.0) * 24.0).rem_euclid(24.0);
     }

@@ -37,12 +37,14 @@
 //! | `landscape.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
-//! | `script.rs`, `tour.rs`, `studio.rs`, `headless.rs` | two stories, who plays them, and the app without a window |
+//! | `script.rs`, `tour.rs` | two stories |
+//! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
 //! | `wires.rs`, `report.rs` | lines of a seam; receipts, times and the summary |
 
 mod art;
 mod bombs;
 mod day;
+mod film;
 mod frames;
 mod headless;
 mod held;
@@ -64,6 +66,7 @@ mod settings;
 mod sky;
 mod studio;
 mod tools;
+mod tour;
 mod ui;
 mod wires;
 mod work;
@@ -85,6 +88,15 @@ pub struct Options {
     /// Play the script and write pictures, even where a window could be opened.
     #[arg(long)]
     headless: bool,
+    /// Film a minute of play instead, frame by frame.
+    #[arg(long)]
+    tour: bool,
+    /// Frames of the tour that are drawn, evenly spread; all of them without it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
+    frames: Option<u32>,
+    /// Frames in a second of the tour.
+    #[arg(long, value_name = "F", default_value_t = 30, value_parser = clap::value_parser!(u32).range(10..=120))]
+    fps: u32,
     /// Folder for the script's pictures and summary.
     #[arg(long, value_name = "DIR", default_value = "out/digger")]
     out: PathBuf,
@@ -123,6 +135,9 @@ impl Computer {
 fn main() -> ExitCode {
     let options = Options::parse();
     let renderer = headless::find_renderer();
+    if options.tour {
+        return tour::run(&options, renderer);
+    }
     if options.headless || !has_display() || renderer.is_none() {
         return script::run(&options, renderer);
     }

@@ -87,3 +87,7 @@ fn pause(
         page.set(if help { Page::Help } else { Page::Menu });
     }
 }
+
+#[cfg(test)]
+#[path = "phase_tests.rs"]
+mod tests;
