@@ -280,7 +280,8 @@ fn golden_script(ground: &Ground) -> Vec<Brush> {
             Shape::cone(at(4) - Vec3::Y * 4.0, Vec3::new(-2.0, 11.0, 1.0), 4.0),
         ];
         for (k, shape) in shapes.into_iter().enumerate() {
-            let smooth = Brush { shape, operation, roughness: None, tag: (10 * i + k) as u64 };
+            let smooth =
+                Brush { operation: operation.clone(), ..Brush::dig(shape) }.with_tag((10 * i + k) as u64);
             let rough = Roughness::new(0.75 + 0.25 * k as f32, 2.0 + 1.5 * i as f32, 77 + k as u32);
             let moved = Shape::sphere(at(k) + Vec3::new(1.5, 1.0, 3.0), 3.0);
             brushes.push(Brush { shape: moved, ..smooth.clone() }.with_roughness(rough));

@@ -23,7 +23,9 @@ use crate::brush::Edit;
 use crate::lattice::LatticeBox;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, Draft, DraftedBrick, EditWork, Fields, Replaced, UniformBricks, pristine_brick};
+use crate::volume::{
+    Bricks, Draft, DraftedBrick, EditWork, Fields, Ledger, Replaced, UniformBricks, pristine_brick,
+};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.
@@ -73,10 +75,8 @@ impl Transaction {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
         let draft = Stages::time(&mut stages.edit, || {
-            let mut draft = Draft::new(edits.len(), world.sample_hash);
-            let work = EditWork::new(world.samples(), world.grid, &edits);
-            backend.edit(&work, &mut |ledger| draft.add(ledger, &world.uniform));
-            draft
+            let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| backend.edit(work, each);
+            Draft::make(world.samples(), world.grid, &edits, world.sample_hash, &world.uniform, apply)
         });
         let bricks: Bricks =
             draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
