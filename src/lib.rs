@@ -123,8 +123,12 @@ extern crate self as bevy_burrow;
 
 pub mod backend;
 pub mod brush;
+#[cfg(feature = "debug")]
+pub mod debug;
 pub mod ground;
 pub mod lattice;
+#[cfg(feature = "egui")]
+pub mod panel;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 pub mod surface;

@@ -155,10 +155,12 @@ pub(super) fn commit_transactions(
         figures.commits += 1;
         figures.brushes += committed.len() as u64;
         figures.last_transaction = took;
+        figures.transactions.push(took);
         let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
         receipts.write_batch(committed.into_iter().map(applied));
         let took = start.elapsed();
         figures.last_commit = took;
+        figures.commit_times.push(took);
         figures.main_thread += took;
     }
 }

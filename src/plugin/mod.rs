@@ -20,6 +20,7 @@ mod meshes;
 mod messages;
 mod query;
 mod settings;
+mod times;
 
 pub use components::{Chunk, Field, MaterialColors, Tile};
 pub use heightmap::{
@@ -35,6 +36,7 @@ pub use messages::{
 };
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings};
+pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use bevy::prelude::*;
 
+use super::Times;
 use crate::backend::{Backend, Engine};
 
 /// What terrains without an engine of their own run their transactions on. [`Backend::Auto`] unless the game inserts
@@ -55,6 +56,10 @@ pub struct BurrowFigures {
     pub last_transaction: Duration,
     /// How long the last commit took on the main thread.
     pub last_commit: Duration,
+    /// How long the latest transactions took in their tasks.
+    pub transactions: Times,
+    /// How long the latest commits took on the main thread.
+    pub commit_times: Times,
     /// What this frame's intake, commits and starts of transactions took together on the main thread.
     pub main_thread: Duration,
 }

@@ -1,0 +1,100 @@
+//! `sculpt`: a landscape like in an editor, with the panel, a free camera and every operation.
+//!
+//! ```text
+//! cargo run --release --features examples --example sculpt
+//! cargo run --release --features examples --example sculpt -- --headless --out out/sculpt
+//! ```
+//!
+//! | control | does |
+//! | --- | --- |
+//! | left button, held | a stroke with the panel's brush under the mouse |
+//! | right button, held | looks around |
+//! | `W` `A` `S` `D`, `Q`, `E`, `Shift` | flies, down, up, faster |
+//! | wheel, `[`, `]` | size of the brush |
+//! | `Tab` | next operation |
+//! | `F1` | shows and hides the panel |
+//! | `F12` | saves a picture |
+//! | `Esc` | quits |
+//!
+//! With `--headless`, or without a display, a script sculpts instead and leaves pictures in `--out`, the panel in them.
+//! Each stroke's receipt is a line on standard output.
+//!
+//! | file | subject |
+//! | --- | --- |
+//! | `scene.rs` | landscape, sun, camera |
+//! | `stroke.rs` | aim, preview, strokes, keys |
+//! | `journal.rs` | a line for each receipt |
+//! | `script.rs` | what it does without a window |
+
+mod journal;
+mod scene;
+mod script;
+mod stroke;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use bevy::prelude::*;
+use bevy_burrow::panel::BurrowPanelPlugin;
+use bevy_burrow::prelude::*;
+use clap::Parser;
+
+/// A landscape like in an editor, with a panel.
+#[derive(Parser, Clone, Debug)]
+struct Options {
+    /// Sculpt by script and write pictures, even where a window could be opened.
+    #[arg(long)]
+    headless: bool,
+    /// Folder for pictures.
+    #[arg(long, value_name = "DIR", default_value = "out/sculpt")]
+    out: PathBuf,
+    /// Width of the window or the pictures, in pixels.
+    #[arg(long, default_value_t = 1280, value_parser = clap::value_parser!(u32).range(64..=8192))]
+    width: u32,
+    /// Height of the window or the pictures, in pixels.
+    #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
+    height: u32,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    if options.headless || !has_display() {
+        return match script::play(&options) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("sculpt: {error}");
+                ExitCode::FAILURE
+            }
+        };
+    }
+    let window = Window {
+        title: "bevy_burrow: sculpt".into(),
+        resolution: (options.width, options.height).into(),
+        ..default()
+    };
+    let mut app = App::new();
+    app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
+    editor(&mut app, &options);
+    app.add_plugins(stroke::MousePlugin);
+    match app.run() {
+        AppExit::Success => ExitCode::SUCCESS,
+        AppExit::Error(code) => ExitCode::from(code.get()),
+    }
+}
+
+/// Everything that needs no window.
+fn editor(app: &mut App, options: &Options) {
+    app.add_plugins((
+        BurrowPlugins,
+        BurrowPanelPlugin,
+        scene::ScenePlugin,
+        stroke::StrokePlugin,
+        journal::JournalPlugin,
+    ));
+    app.world_mut().resource_mut::<bevy_burrow::panel::BurrowPanel>().pictures = options.out.clone();
+}
+
+/// Can a window be opened? The examples are built for X11 on Linux; elsewhere there is always a desktop.
+fn has_display() -> bool {
+    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
+}

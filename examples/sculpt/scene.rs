@@ -1,0 +1,61 @@
+//! Landscape, sun and camera.
+
+use bevy::camera_controller::free_camera::{FreeCamera, FreeCameraPlugin};
+use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::light::CascadeShadowConfigBuilder;
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+/// Cells along the landscape's sides.
+const SIDE: u32 = 256;
+const SKY: Color = Color::srgb(0.62, 0.74, 0.88);
+
+/// Where the script works, and where the camera looks at first.
+pub const MIDDLE: Vec3 = Vec3::new(128.0, 0.0, 128.0);
+
+pub struct ScenePlugin;
+
+impl Plugin for ScenePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins(FreeCameraPlugin)
+            .insert_resource(ClearColor(SKY))
+            .insert_resource(GlobalAmbientLight { brightness: 900.0, ..default() })
+            .add_systems(Startup, (landscape, sun_and_camera));
+    }
+}
+
+fn landscape(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+    let noise = NoiseHeights {
+        seed: 4,
+        kind: NoiseKind::Fractal,
+        octaves: 5,
+        scale: 150.0,
+        amplitude: 46.0,
+        base: 0.0,
+    };
+    let grass = MaterialRule { overlay: MaterialId(1), slope: (0.0, 0.7), slope_fade: 0.35, ..default() };
+    let rules = MaterialControl::Rules { base: MaterialId(0), rules: vec![grass] };
+    let ground = Ground::from_noise(SIDE, SIDE, &noise)?.with_materials(&rules)?;
+    let terrain = Terrain::new(ground, &TerrainSettings::default())?;
+    let earth = StandardMaterial { perceptual_roughness: 0.95, reflectance: 0.15, ..default() };
+    commands.spawn((Name::new("Hills"), terrain, MeshMaterial3d(materials.add(earth))));
+    Ok(())
+}
+
+fn sun_and_camera(mut commands: Commands) {
+    commands.spawn((
+        DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: true, ..default() },
+        CascadeShadowConfigBuilder { maximum_distance: 260.0, first_cascade_far_bound: 40.0, ..default() }
+            .build(),
+        Transform::from_xyz(-0.6, 0.7, 0.45).looking_at(Vec3::ZERO, Vec3::Y),
+    ));
+    commands.spawn((
+        Camera3d::default(),
+        Tonemapping::AcesFitted,
+        Msaa::Off,
+        DistanceFog { color: SKY, falloff: FogFalloff::Linear { start: 180.0, end: 420.0 }, ..default() },
+        FreeCamera { walk_speed: 24.0, run_speed: 80.0, scroll_factor: 0.0, ..default() },
+        Transform::from_translation(MIDDLE + Vec3::new(-38.0, 46.0, 62.0))
+            .looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y),
+    ));
+}

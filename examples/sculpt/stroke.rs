@@ -1,0 +1,157 @@
+//! Strokes: where the brush is, how it looks there, and what the mouse and keys do with it.
+
+use std::time::Duration;
+
+use bevy::camera_controller::free_camera::FreeCameraState;
+use bevy::input::mouse::{AccumulatedMouseScroll, MouseScrollUnit};
+use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
+use bevy_burrow::debug::draw_shape;
+use bevy_burrow::panel::{
+    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolOperation, keyboard_is_free, pointer_is_free,
+};
+use bevy_burrow::prelude::*;
+
+/// How far the brush reaches, in metres.
+const REACH: f32 = 400.0;
+
+/// Where the pointer meets the ground, if it does.
+#[derive(Resource, Default)]
+pub struct Aim(pub Option<TerrainHit>);
+
+/// Strokes so far.
+#[derive(Resource, Default)]
+struct Strokes {
+    count: u64,
+    rest: Timer,
+}
+
+/// The brush's preview.
+pub struct StrokePlugin;
+
+impl Plugin for StrokePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Aim>().add_systems(Startup, show_through_ground).add_systems(Update, preview);
+    }
+}
+
+/// Strokes by mouse and keys.
+pub struct MousePlugin;
+
+impl Plugin for MousePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Strokes>()
+            .add_systems(PreUpdate, hold_camera.after(bevy::input::InputSystems))
+            .add_systems(
+                Update,
+                (
+                    (aim, stroke.run_if(pointer_is_free))
+                        .chain()
+                        .before(BurrowSystems::Collect)
+                        .before(preview),
+                    resize.run_if(pointer_is_free),
+                    keys.run_if(keyboard_is_free),
+                ),
+            );
+    }
+}
+
+fn aim(
+    window: Single<&Window, With<PrimaryWindow>>,
+    camera: Single<(&Camera, &GlobalTransform), With<Camera3d>>,
+    terrains: Terrains,
+    panel: Option<Res<PanelInput>>,
+    mut aim: ResMut<Aim>,
+) {
+    let (camera, place) = *camera;
+    let cursor = window.cursor_position().filter(|_| pointer_is_free(panel));
+    let ray = cursor.and_then(|cursor| camera.viewport_to_world(place, cursor).ok());
+    aim.0 = ray.and_then(|ray| terrains.raycast(ray, REACH));
+}
+
+/// A brush at the first press, then at the tool's rate.
+fn stroke(
+    time: Res<Time>,
+    mouse: Res<ButtonInput<MouseButton>>,
+    tool: Res<BrushTool>,
+    aim: Res<Aim>,
+    mut strokes: ResMut<Strokes>,
+    mut brushes: MessageWriter<Brush>,
+) {
+    strokes.rest.tick(time.delta());
+    let is_first = mouse.just_pressed(MouseButton::Left);
+    if !(is_first || mouse.pressed(MouseButton::Left) && strokes.rest.is_finished()) {
+        return;
+    }
+    let Some(hit) = &aim.0 else { return };
+    strokes.count += 1;
+    brushes.write(tool.brush_at(hit).with_tag(strokes.count));
+    strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
+}
+
+fn resize(wheel: Res<AccumulatedMouseScroll>, mut tool: ResMut<BrushTool>) {
+    let lines = match wheel.unit {
+        MouseScrollUnit::Line => wheel.delta.y,
+        MouseScrollUnit::Pixel => wheel.delta.y / MouseScrollUnit::SCROLL_UNIT_CONVERSION_FACTOR,
+    };
+    if lines != 0.0 {
+        tool.grow(1.1f32.powf(lines));
+    }
+}
+
+fn keys(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut tool: ResMut<BrushTool>,
+    mut panel: ResMut<BurrowPanel>,
+    mut actions: MessageWriter<PanelAction>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    if keys.just_pressed(KeyCode::BracketRight) {
+        tool.grow(1.25);
+    }
+    if keys.just_pressed(KeyCode::BracketLeft) {
+        tool.grow(0.8);
+    }
+    if keys.just_pressed(KeyCode::Tab) {
+        let all: Vec<ToolOperation> = ToolOperation::all().collect();
+        let next = all.iter().position(|&operation| operation == tool.operation).map_or(0, |at| at + 1);
+        tool.operation = all.get(next).copied().unwrap_or_default();
+    }
+    if keys.just_pressed(KeyCode::F1) {
+        panel.is_open = !panel.is_open;
+    }
+    if keys.just_pressed(KeyCode::F12) {
+        actions.write(PanelAction::SavePicture);
+    }
+    if keys.just_pressed(KeyCode::Escape) {
+        exit.write(AppExit::Success);
+    }
+}
+
+/// The camera stands still while the panel has pointer or keyboard.
+fn hold_camera(
+    input: Res<PanelInput>,
+    mouse: Res<ButtonInput<MouseButton>>,
+    mut cameras: Query<&mut FreeCameraState>,
+) {
+    for mut camera in &mut cameras {
+        // A look around that began outside goes on over the panel.
+        let goes_on =
+            camera.enabled && mouse.pressed(MouseButton::Right) && !mouse.just_pressed(MouseButton::Right);
+        camera.enabled = goes_on || !input.has_pointer && !input.has_keyboard;
+    }
+}
+
+/// A brush is half inside the ground, and all of it should be seen.
+fn show_through_ground(mut store: ResMut<GizmoConfigStore>) {
+    let (config, _) = store.config_mut::<DefaultGizmoConfigGroup>();
+    config.depth_bias = -1.0;
+    config.line.width = 1.5;
+}
+
+fn preview(aim: Res<Aim>, tool: Res<BrushTool>, mut gizmos: Gizmos) {
+    let Some(hit) = &aim.0 else { return };
+    draw_shape(&mut gizmos, &tool.shape_at(hit), Color::srgb(1.0, 0.80, 0.30));
+    let normal = hit.normal * (0.5 * tool.radius).max(1.0);
+    gizmos.line(hit.position, hit.position + normal, Color::srgb(1.0, 1.0, 1.0));
+}

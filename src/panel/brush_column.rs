@@ -1,0 +1,160 @@
+//! The left column: operation, shape, sizes, material, surface of the brush.
+
+use bevy_egui::egui::{self, Color32, CornerRadius, Pos2, Rect, Shape, Stroke, StrokeKind, Ui, Vec2};
+
+use super::operations::OPERATIONS;
+use super::theme::{ACCENT, FAINT};
+use super::widgets::{choice, section, slider, swatches, switch, tiles};
+use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolShape};
+
+/// Draws the column.
+pub fn show(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) {
+    section(ui, "Operation", true, |ui| operations(ui, tool));
+    section(ui, "Shape", true, |ui| shape(ui, tool));
+    let needs = tool.operation.row().needs;
+    if needs.material {
+        section(ui, "Material", true, |ui| material(ui, tool, materials));
+    }
+    section(ui, "Surface", true, |ui| surface(ui, tool));
+    section(ui, "Stroke", true, |ui| {
+        slider(ui, "Rate", &mut tool.rate, 1.0..=30.0, |slider| slider.max_decimals(0).suffix(" /s"));
+    });
+}
+
+fn operations(ui: &mut Ui, tool: &mut BrushTool) {
+    let names: Vec<&str> = OPERATIONS.iter().map(|row| row.name).collect();
+    let chosen = OPERATIONS.iter().position(|row| row.tool == tool.operation).unwrap_or_default();
+    let clicked = tiles(ui, 4, &names, chosen, |ui, at, rect, color| {
+        let Some(row) = OPERATIONS.get(at) else { return };
+        let place =
+            |x: f32, y: f32| Pos2::new(rect.left() + rect.width() * x, rect.bottom() - rect.height() * y);
+        let steps = (0..=32).map(|step| step as f32 / 32.0);
+        let (before, after): (Vec<Pos2>, Vec<Pos2>) = steps
+            .map(|x| {
+                let (before, after) = (row.profile)(x);
+                (place(x, before), place(x, after))
+            })
+            .unzip();
+        ui.painter().extend(Shape::dashed_line(&before, Stroke::new(1.0, FAINT), 2.0, 2.0));
+        ui.painter().line(after, Stroke::new(2.0, if at == chosen { ACCENT } else { color }));
+    });
+    if let Some(row) = clicked.and_then(|at| OPERATIONS.get(at)) {
+        tool.operation = row.tool;
+    }
+    let row = tool.operation.row();
+    ui.label(egui::RichText::new(row.help).color(FAINT).size(11.0));
+    if row.needs.strength {
+        slider(ui, "Strength", &mut tool.strength, 0.0..=1.0, percent);
+    }
+    if row.needs.hardness {
+        slider(ui, "Hardness", &mut tool.hardness, 0.0..=1.0, percent);
+    }
+    if let Some(name) = row.needs.height {
+        slider(ui, name, &mut tool.height, -64.0..=256.0, |slider| slider.max_decimals(1).suffix(" m"));
+    }
+}
+
+fn percent(slider: egui::Slider<'_>) -> egui::Slider<'_> {
+    slider
+        .custom_formatter(|value, _| format!("{:.0} %", value * 100.0))
+        .custom_parser(|text| text.trim().trim_end_matches('%').trim().parse::<f64>().ok().map(|v| v / 100.0))
+}
+
+fn shape(ui: &mut Ui, tool: &mut BrushTool) {
+    let names = ToolShape::ALL.map(ToolShape::name);
+    let chosen = ToolShape::ALL.iter().position(|&shape| shape == tool.shape).unwrap_or_default();
+    let clicked = tiles(ui, 5, &names, chosen, |ui, at, rect, color| {
+        let color = if at == chosen { ACCENT } else { color };
+        if let Some(&shape) = ToolShape::ALL.get(at) {
+            draw_shape(ui, shape, rect, Stroke::new(1.5, color));
+        }
+    });
+    if let Some(&shape) = clicked.and_then(|at| ToolShape::ALL.get(at)) {
+        tool.shape = shape;
+    }
+    let radii = RADII.0..=RADII.1;
+    if tool.shape == ToolShape::Box {
+        slider(ui, "Half width", &mut tool.half.x, radii.clone(), length);
+        slider(ui, "Half height", &mut tool.half.y, radii.clone(), length);
+        slider(ui, "Half depth", &mut tool.half.z, radii, length);
+        slider(ui, "Turn", &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
+    } else {
+        slider(ui, "Radius", &mut tool.radius, radii, length);
+    }
+    if tool.shape.is_long() {
+        slider(ui, "Length", &mut tool.length, LENGTHS.0..=LENGTHS.1, length);
+    }
+    slider(ui, "Sink", &mut tool.sink, -1.0..=1.0, percent);
+    let aligns = [ToolAlign::Upright, ToolAlign::Surface];
+    let chosen = usize::from(tool.align == ToolAlign::Surface);
+    if tool.shape != ToolShape::Sphere
+        && let Some(&align) =
+            choice(ui, &["Upright", "Along the surface"], chosen).and_then(|at| aligns.get(at))
+    {
+        tool.align = align;
+    }
+}
+
+fn length(slider: egui::Slider<'_>) -> egui::Slider<'_> {
+    slider.logarithmic(true).fixed_decimals(1).suffix(" m")
+}
+
+fn material(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) {
+    let all: Vec<(Color32, &str)> = materials.iter().map(|(color, name)| (*color, name.as_str())).collect();
+    if let Some(at) = swatches(ui, &all, usize::from(tool.material)) {
+        tool.material = u8::try_from(at).unwrap_or(u8::MAX);
+    }
+    let name = materials.get(usize::from(tool.material)).map_or("?", |(_, name)| name);
+    ui.label(egui::RichText::new(name).size(12.0));
+}
+
+fn surface(ui: &mut Ui, tool: &mut BrushTool) {
+    switch(ui, "Rough", &mut tool.is_rough);
+    if tool.is_rough {
+        slider(ui, "Bumps", &mut tool.bump, 0.0..=4.0, |slider| slider.fixed_decimals(2).suffix(" m"));
+        slider(ui, "Width", &mut tool.bump_width, 1.0..=32.0, length);
+        slider(ui, "Pattern", &mut tool.seed, 0..=99, |slider| slider);
+    }
+}
+
+/// A drawing of a shape in the middle of a rectangle.
+fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
+    let (painter, middle, r) = (ui.painter(), rect.center(), rect.height() / 2.0);
+    let at = |x: f32, y: f32| middle + Vec2::new(x, y) * r;
+    let ellipse = |y: f32, width: f32| {
+        let points = (0..24).map(|step| {
+            let (sin, cos) = (step as f32 / 24.0 * std::f32::consts::TAU).sin_cos();
+            at(width * cos, y + 0.3 * width * sin)
+        });
+        Shape::closed_line(points.collect(), stroke)
+    };
+    match shape {
+        ToolShape::Sphere => {
+            painter.circle_stroke(middle, r, stroke);
+            painter.add(ellipse(0.0, 1.0));
+        }
+        ToolShape::Box => {
+            let front = Rect::from_min_max(at(-0.9, -0.45), at(0.45, 0.95));
+            painter.rect_stroke(front, CornerRadius::ZERO, stroke, StrokeKind::Middle);
+            painter.line(vec![at(-0.9, -0.45), at(-0.45, -0.95), at(0.9, -0.95), at(0.45, -0.45)], stroke);
+            painter.line(vec![at(0.9, -0.95), at(0.9, 0.5), at(0.45, 0.95)], stroke);
+        }
+        ToolShape::Cylinder => {
+            painter.add(ellipse(-0.72, 0.8));
+            let half = (0..=12).map(|step| {
+                let (sin, cos) = (step as f32 / 12.0 * std::f32::consts::PI).sin_cos();
+                at(0.8 * cos, 0.72 + 0.24 * sin)
+            });
+            let sides = [at(0.8, -0.72)].into_iter().chain(half).chain([at(-0.8, -0.72)]);
+            painter.line(sides.collect(), stroke);
+        }
+        ToolShape::Capsule => {
+            let body = Rect::from_center_size(middle, Vec2::new(1.1, 2.0) * r);
+            painter.rect_stroke(body, CornerRadius::same((0.55 * r) as u8), stroke, StrokeKind::Middle);
+        }
+        ToolShape::Cone => {
+            painter.add(ellipse(0.7, 0.9));
+            painter.line(vec![at(-0.9, 0.7), at(0.0, -1.0), at(0.9, 0.7)], stroke);
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! The panel: a brush to choose, settings, live figures, in two columns over the game (feature `egui`).
+//!
+//! ```no_run
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::panel::{BrushTool, BurrowPanelPlugin, pointer_is_free};
+//! # use bevy_burrow::prelude::*;
+//! # fn dig() {}
+//! App::new()
+//!     .add_plugins((DefaultPlugins, BurrowPlugins, BurrowPanelPlugin))
+//!     .add_systems(Update, dig.before(BurrowSystems::Collect).run_if(pointer_is_free));
+//! ```
+//!
+//! | resource | what it is |
+//! | --- | --- |
+//! | [`BrushTool`] | the brush in hand: [`brush_at`](BrushTool::brush_at) makes the [`Brush`](crate::brush::Brush) |
+//! | [`BurrowPanel`] | what is shown, names of materials, where pictures go |
+//! | [`PanelInput`] | who has the pointer and the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
+//!
+//! [`PanelAction`] messages are its buttons, for keys of the game. It is drawn by the camera that has egui's primary
+//! context: the first one, unless the game says otherwise; a camera that draws into an image is as good as one with a
+//! window. With no terrain the panel says so; with several it shows one of them at a time.
+
+mod brush_column;
+mod operations;
+mod picture;
+mod plot;
+mod state;
+mod survey;
+mod theme;
+mod tool;
+mod widgets;
+mod world_column;
+
+pub use operations::ToolOperation;
+pub use state::{BurrowPanel, PanelAction, PanelInput, keyboard_is_free, pointer_is_free};
+pub use tool::{BrushTool, ToolAlign, ToolShape};
+
+use bevy::camera::RenderTarget;
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Align2, Color32, Id, Order, RichText, ScrollArea, Ui, Vec2};
+use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
+
+use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, MaterialColors};
+use crate::terrain::Terrain;
+use survey::Survey;
+use world_column::{Content, TerrainLine};
+
+/// The least and the greatest radius that the panel offers, in metres.
+const RADII: (f32, f32) = (0.5, 32.0);
+/// The least and the greatest length.
+const LENGTHS: (f32, f32) = (1.0, 64.0);
+
+/// Adds the panel to a game that has `BurrowPlugins`, and egui if it is not there. A game that adds egui by itself does so
+/// before.
+pub struct BurrowPanelPlugin;
+
+impl Plugin for BurrowPanelPlugin {
+    fn build(&self, app: &mut App) {
+        if !app.is_plugin_added::<EguiPlugin>() {
+            app.add_plugins(EguiPlugin::default());
+        }
+        app.init_resource::<BrushTool>()
+            .init_resource::<BurrowPanel>()
+            .init_resource::<PanelInput>()
+            .init_resource::<Survey>()
+            .add_message::<PanelAction>()
+            .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
+            .add_systems(
+                Update,
+                (survey::follow_frames, survey::count_terrain, survey::finish_seam_check, act)
+                    .chain()
+                    .after(BurrowSystems::Begin),
+            )
+            .add_systems(EguiPrimaryContextPass, draw);
+    }
+}
+
+/// Does what the buttons say.
+fn act(
+    mut commands: Commands,
+    mut actions: MessageReader<PanelAction>,
+    mut panel: ResMut<BurrowPanel>,
+    check: Option<Res<survey::SeamCheck>>,
+    terrains: Query<(Entity, &Terrain)>,
+    cameras: Query<&RenderTarget, With<PrimaryEguiContext>>,
+) {
+    for action in actions.read() {
+        match action {
+            PanelAction::CheckSeams => {
+                let terrain = survey::chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok());
+                if let (Some((_, terrain)), None) = (terrain, &check) {
+                    survey::start_seam_check(&mut commands, &mut panel, terrain);
+                }
+            }
+            PanelAction::SavePicture => picture::save(&mut commands, &mut panel, cameras.iter().next()),
+        }
+    }
+}
+
+/// Draws both columns.
+fn draw(
+    mut contexts: EguiContexts,
+    mut tool: ResMut<BrushTool>,
+    mut panel: ResMut<BurrowPanel>,
+    mut settings: ResMut<BurrowSettings>,
+    figures: Res<BurrowFigures>,
+    survey: Res<Survey>,
+    terrains: Query<(Entity, &Terrain)>,
+    looks: Query<(Option<&Name>, &MaterialColors)>,
+    mut actions: MessageWriter<PanelAction>,
+) {
+    let Ok(context) = contexts.ctx_mut() else { return };
+    if !panel.is_open {
+        return;
+    }
+    let chosen = survey::chosen(&panel, &terrains);
+    let colors = chosen.and_then(|entity| looks.get(entity).ok()).map(|(_, colors)| colors.clone());
+    let materials = materials(&panel, &colors.unwrap_or_default());
+    let mut lines: Vec<TerrainLine> = terrains
+        .iter()
+        .map(|(entity, terrain)| {
+            let name = looks.get(entity).ok().and_then(|(name, _)| name);
+            let name = name.map_or_else(|| format!("Terrain {entity}"), |name| name.to_string());
+            TerrainLine { entity, name, terrain }
+        })
+        .collect();
+    lines.sort_unstable_by_key(|line| line.entity);
+
+    let (mut new_tool, mut new_panel, mut new_settings) = (tool.clone(), panel.clone(), settings.clone());
+    let mut pressed = Vec::new();
+    if panel.shows_brush {
+        column(context, "burrow brush", Align2::LEFT_TOP, "Brush", |ui| {
+            brush_column::show(ui, &mut new_tool, &materials);
+        });
+    }
+    if panel.shows_world {
+        column(context, "burrow world", Align2::RIGHT_TOP, "World", |ui| {
+            let mut content = Content {
+                terrains: &lines,
+                chosen,
+                figures: &figures,
+                survey: &survey,
+                settings: &mut new_settings,
+                actions: &mut pressed,
+            };
+            world_column::show(ui, &mut new_panel, &mut content);
+        });
+    }
+    // Whoever watches them for changes is told of real ones only.
+    tool.set_if_neq(new_tool);
+    panel.set_if_neq(new_panel);
+    settings.set_if_neq(new_settings);
+    actions.write_batch(pressed);
+}
+
+/// Colours and names by id, as many as there are of both.
+fn materials(panel: &BurrowPanel, colors: &MaterialColors) -> Vec<(Color32, String)> {
+    let last = colors.0.last().copied().unwrap_or(LinearRgba::WHITE);
+    let color = |at: usize| {
+        let [r, g, b, _] = Srgba::from(colors.0.get(at).copied().unwrap_or(last)).to_u8_array();
+        Color32::from_rgb(r, g, b)
+    };
+    panel.materials.iter().enumerate().map(|(at, name)| (color(at), name.clone())).collect()
+}
+
+/// A card along one side of the window, as high as its content or the window.
+fn column(
+    context: &egui::Context,
+    id: &'static str,
+    side: Align2,
+    title: &str,
+    content: impl FnOnce(&mut Ui),
+) {
+    let height = context.viewport_rect().height() - 2.0 * theme::GAP;
+    let offset = Vec2::new(if side == Align2::LEFT_TOP { theme::GAP } else { -theme::GAP }, theme::GAP);
+    egui::Area::new(Id::new(id)).order(Order::Middle).anchor(side, offset).show(context, |ui| {
+        ui.set_style(theme::style());
+        let card = theme::card();
+        let inside = theme::COLUMN - card.inner_margin.sum().x;
+        card.show(ui, |ui| {
+            ui.set_width(inside);
+            ui.label(RichText::new(title).heading().color(theme::BRIGHT));
+            let rest = (height - card.inner_margin.sum().y - 30.0).max(80.0);
+            ScrollArea::vertical().max_height(rest).auto_shrink([false, true]).show(ui, |ui| {
+                ui.set_width(inside);
+                content(ui);
+            });
+        });
+    });
+}

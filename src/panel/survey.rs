@@ -1,0 +1,161 @@
+//! What the right column says about terrains: counted in tasks, so that no frame waits for it.
+
+use std::time::Duration;
+
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+
+use super::plot::Line;
+use super::state::{BurrowPanel, Note};
+use crate::backend::{Choice, EngineState};
+use crate::plugin::{BurrowEngine, BurrowFigures};
+use crate::surface::SeamReport;
+use crate::terrain::{Memory, Terrain, Version, World};
+
+/// How often a terrain is looked at, and the engine.
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// What was counted of the terrain that the panel is about.
+#[derive(Clone, Debug, Default)]
+pub struct Counts {
+    pub fields: usize,
+    pub chunks: usize,
+    pub bricks: usize,
+    /// Cells that marching cubes draws.
+    pub cells: usize,
+    pub memory: Memory,
+    pub hash: u64,
+}
+
+/// The figures on the panel.
+#[derive(Resource, Default)]
+pub struct Survey {
+    /// Whose counts these are, and of which commit.
+    of: Option<(Entity, Version)>,
+    counting: Option<(Entity, Version, Task<Counts>)>,
+    since: Duration,
+    pub counts: Option<Counts>,
+    /// The engine: its state, stages on processor and card, the last choice.
+    pub engine: Option<(EngineState, [u64; 2], Option<Choice>)>,
+    /// One value for each frame.
+    pub frame_ms: Line,
+    pub swaps: Line,
+    pub queue: Line,
+    pub main_thread_us: Line,
+    pub swaps_now: u64,
+    pub queued: usize,
+    last_swaps: u64,
+}
+
+/// The terrain that the panel is about: the chosen one, or else the first.
+pub fn chosen(panel: &BurrowPanel, terrains: &Query<(Entity, &Terrain)>) -> Option<Entity> {
+    let is_there = |&entity: &Entity| terrains.contains(entity);
+    panel.terrain.filter(is_there).or_else(|| terrains.iter().map(|(entity, _)| entity).min())
+}
+
+/// Takes down the figures of a frame.
+pub(super) fn follow_frames(
+    time: Res<Time<Real>>,
+    figures: Res<BurrowFigures>,
+    terrains: Query<(Entity, &Terrain)>,
+    mut survey: ResMut<Survey>,
+) {
+    let survey = &mut *survey;
+    survey.swaps_now = figures.swaps.saturating_sub(survey.last_swaps);
+    survey.last_swaps = figures.swaps;
+    survey.queued = terrains.iter().map(|(_, terrain)| terrain.queued()).sum();
+    survey.frame_ms.push(time.delta_secs() * 1e3);
+    survey.swaps.push(survey.swaps_now as f32);
+    survey.queue.push(survey.queued as f32);
+    survey.main_thread_us.push(figures.main_thread.as_secs_f32() * 1e6);
+}
+
+/// Counts what the chosen terrain holds, in a task, when it has changed and at most twice a second.
+pub(super) fn count_terrain(
+    time: Res<Time<Real>>,
+    panel: Res<BurrowPanel>,
+    engine: Res<BurrowEngine>,
+    terrains: Query<(Entity, &Terrain)>,
+    mut survey: ResMut<Survey>,
+) {
+    let survey = &mut *survey;
+    if let Some((entity, version, task)) = &mut survey.counting
+        && let Some(counts) = check_ready(task)
+    {
+        (survey.of, survey.counts) = (Some((*entity, *version)), Some(counts));
+        survey.counting = None;
+    }
+    let chosen = chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok());
+    if survey.of.is_some_and(|(of, _)| chosen.is_none_or(|(entity, _)| entity != of)) {
+        (survey.of, survey.counts) = (None, None);
+    }
+    survey.since += time.delta();
+    if !panel.is_open || survey.since < PERIOD && survey.counts.is_some() {
+        return;
+    }
+    survey.since = Duration::ZERO;
+    let engine = chosen.and_then(|(_, terrain)| terrain.engine()).unwrap_or(&engine);
+    let figures = engine.figures();
+    survey.engine = Some((engine.state(), [figures.cpu, figures.cuda], figures.choices.back().copied()));
+    let Some((entity, terrain)) = chosen.filter(|_| survey.counting.is_none()) else { return };
+    let version = terrain.world().version();
+    if survey.of == Some((entity, version)) {
+        return;
+    }
+    let world = terrain.snapshot();
+    let task = AsyncComputeTaskPool::get().spawn(async move { count(&world) });
+    survey.counting = Some((entity, version, task));
+}
+
+fn count(world: &World) -> Counts {
+    Counts {
+        fields: world.fields().map(|(_, fields)| fields.len()).sum(),
+        chunks: world.drawn_chunks().count(),
+        bricks: world.bricks().count(),
+        cells: world.mask().len(),
+        memory: world.memory(),
+        hash: world.hash(),
+    }
+}
+
+/// A seam check under way.
+#[derive(Resource)]
+pub(super) struct SeamCheck(Task<SeamReport>);
+
+/// Starts a check of a terrain as it is now.
+pub(super) fn start_seam_check(commands: &mut Commands, panel: &mut BurrowPanel, terrain: &Terrain) {
+    let world = terrain.snapshot();
+    let task = AsyncComputeTaskPool::get().spawn(async move { world.check_seams() });
+    panel.note = Some(Note::Busy("checking every seam ...".into()));
+    commands.insert_resource(SeamCheck(task));
+}
+
+/// Says what a check found.
+pub(super) fn finish_seam_check(
+    mut commands: Commands,
+    check: Option<ResMut<SeamCheck>>,
+    mut panel: ResMut<BurrowPanel>,
+) {
+    let Some(report) = check.and_then(|mut check| check_ready(&mut check.0)) else { return };
+    commands.remove_resource::<SeamCheck>();
+    let note = seam_note(&report);
+    match &note {
+        Note::Bad(text) => warn!("seam check: {text}"),
+        Note::Good(text) | Note::Busy(text) => info!("seam check: {text}"),
+    }
+    panel.note = Some(note);
+}
+
+fn seam_note(report: &SeamReport) -> Note {
+    let triangles = super::widgets::count(report.triangles);
+    if report.is_flawless() {
+        return Note::Good(format!("closed: no open edge in {triangles} triangles"));
+    }
+    let (open, unbalanced) = (report.open, report.unbalanced);
+    let touching = report.nonmanifold_edges + report.nonmanifold_vertices;
+    let (flat, jump) = (report.degenerate, report.worst_normal_jump);
+    Note::Bad(format!(
+        "{open} open, {unbalanced} unbalanced, {touching} non-manifold, {flat} flat of {triangles} triangles; \
+         normals differ by up to {jump:.1}°"
+    ))
+}

@@ -1,0 +1,284 @@
+//! The brush in hand: what the panel's left column sets and games read.
+
+use bevy::prelude::*;
+
+use super::operations::ToolOperation;
+use crate::brush::{Brush, Roughness, Shape};
+use crate::ground::MaterialId;
+use crate::plugin::TerrainHit;
+
+/// The brush in hand, in metres of the world. The panel changes it, keys of the game may too, and the game reads it:
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// # use bevy_burrow::panel::{BrushTool, pointer_is_free};
+/// fn sculpt(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes: MessageWriter<Brush>) {
+///     if let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 200.0) {
+///         brushes.write(tool.brush_at(&hit));
+///     }
+/// }
+/// # App::new().add_systems(Update, sculpt.before(BurrowSystems::Collect).run_if(pointer_is_free));
+/// ```
+#[derive(Resource, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Resource, Default)]
+pub struct BrushTool {
+    /// What it does.
+    pub operation: ToolOperation,
+    /// Its form.
+    pub shape: ToolShape,
+    /// Of spheres, cylinders, capsules and cones.
+    pub radius: f32,
+    /// Half the sides of a box.
+    pub half: Vec3,
+    /// Of cylinders and cones; of capsules between the middles of their round ends.
+    pub length: f32,
+    /// Where its axis points.
+    pub align: ToolAlign,
+    /// Turns it about its axis, in degrees: boxes show it.
+    pub turn: f32,
+    /// How far it is pushed into the ground: 0 half, 1 all of it, -1 not at all.
+    pub sink: f32,
+    /// What it builds or paints with: a [`MaterialId`].
+    pub material: u8,
+    /// How much of its work one stroke does, 0 to 1, for operations that can do a part.
+    pub strength: f32,
+    /// Where its rim begins to fade, as a part of its radius: 0 fades from the middle, 1 has a hard rim. For operations
+    /// with a soft rim.
+    pub hardness: f32,
+    /// The height that some operations aim at, or how high steps are, in metres.
+    pub height: f32,
+    /// Has it bumps on its surface?
+    pub is_rough: bool,
+    /// Height of the bumps.
+    pub bump: f32,
+    /// Width of the bumps.
+    pub bump_width: f32,
+    /// Which of the patterns of bumps.
+    pub seed: u32,
+    /// Strokes a second while a button is held; the game's clock.
+    pub rate: f32,
+}
+
+impl Default for BrushTool {
+    fn default() -> Self {
+        Self {
+            operation: ToolOperation::Dig,
+            shape: ToolShape::Sphere,
+            radius: 4.0,
+            half: Vec3::splat(4.0),
+            length: 8.0,
+            align: ToolAlign::Upright,
+            turn: 0.0,
+            sink: 0.0,
+            material: 0,
+            strength: 0.5,
+            hardness: 0.4,
+            height: 4.0,
+            is_rough: false,
+            bump: 0.5,
+            bump_width: 4.0,
+            seed: 1,
+            rate: 8.0,
+        }
+    }
+}
+
+/// The form of a [`BrushTool`].
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default)]
+pub enum ToolShape {
+    /// A ball.
+    #[default]
+    Sphere,
+    /// A box.
+    Box,
+    /// A cylinder with flat ends.
+    Cylinder,
+    /// A cylinder with round ends.
+    Capsule,
+    /// A cone on its base.
+    Cone,
+}
+
+/// Where the axis of a [`BrushTool`] points.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default)]
+pub enum ToolAlign {
+    /// Straight up.
+    #[default]
+    Upright,
+    /// Away from the ground, as the surface lies.
+    Surface,
+}
+
+impl ToolShape {
+    /// All of them, in the panel's order.
+    pub const ALL: [Self; 5] = [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone];
+
+    /// Its name on the panel.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sphere => "Sphere",
+            Self::Box => "Box",
+            Self::Cylinder => "Cylinder",
+            Self::Capsule => "Capsule",
+            Self::Cone => "Cone",
+        }
+    }
+
+    /// Has it a length?
+    pub fn is_long(self) -> bool {
+        matches!(self, Self::Cylinder | Self::Capsule | Self::Cone)
+    }
+}
+
+impl BrushTool {
+    /// The brush that this tool makes where a ray met the ground, in world space.
+    pub fn brush_at(&self, hit: &TerrainHit) -> Brush {
+        let mut brush = Brush::dig(self.shape_at(hit));
+        brush.operation = self.operation.row().operation(self, hit);
+        brush.roughness = self.roughness();
+        brush
+    }
+
+    /// The shape of that brush alone: for a preview.
+    pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
+        let axis = match self.align {
+            ToolAlign::Upright => Vec3::Y,
+            ToolAlign::Surface => hit.normal.try_normalize().unwrap_or(Vec3::Y),
+        };
+        let middle = hit.position - axis * self.sink * self.reach();
+        let end = middle - axis * self.length / 2.0;
+        match self.shape {
+            ToolShape::Sphere => Shape::sphere(middle, self.radius),
+            ToolShape::Box => {
+                let turn = Quat::from_rotation_y(self.turn.to_radians());
+                Shape::turned_cuboid(middle, self.half, Quat::from_rotation_arc(Vec3::Y, axis) * turn)
+            }
+            ToolShape::Cylinder => Shape::cylinder(end, axis * self.length, self.radius),
+            ToolShape::Capsule => Shape::capsule(end, end + axis * self.length, self.radius),
+            ToolShape::Cone => Shape::cone(end, axis * self.length, self.radius),
+        }
+    }
+
+    /// What it builds or paints with.
+    pub fn material_id(&self) -> MaterialId {
+        MaterialId(self.material)
+    }
+
+    /// Its bumps, if it has any.
+    pub fn roughness(&self) -> Option<Roughness> {
+        self.is_rough.then(|| Roughness::new(self.bump, self.bump_width, self.seed))
+    }
+
+    /// From its middle to its end along its axis.
+    fn reach(&self) -> f32 {
+        match self.shape {
+            ToolShape::Sphere => self.radius,
+            ToolShape::Box => self.half.y,
+            ToolShape::Cylinder | ToolShape::Cone => self.length / 2.0,
+            ToolShape::Capsule => self.length / 2.0 + self.radius,
+        }
+    }
+
+    /// Makes it larger or smaller by a factor, whatever its shape, within what the panel's sliders allow: for a mouse wheel.
+    pub fn grow(&mut self, factor: f32) {
+        let (least, most) = super::RADII;
+        let grow = |size: f32| (size * factor).clamp(least, most);
+        match self.shape {
+            ToolShape::Box => self.half = self.half.map(grow),
+            _ => self.radius = grow(self.radius),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brush::{Edit, Operation};
+
+    fn hit() -> TerrainHit {
+        TerrainHit {
+            terrain: Entity::PLACEHOLDER,
+            distance: 9.0,
+            position: Vec3::new(10.0, 20.0, 30.0),
+            normal: Vec3::X,
+            material: MaterialId(1),
+            from_inside: false,
+        }
+    }
+
+    #[test]
+    fn every_setting_reaches_the_brush() {
+        let tool = BrushTool::default();
+        assert_eq!(tool.brush_at(&hit()), Brush::dig(Shape::sphere(hit().position, 4.0)));
+
+        let tool = BrushTool {
+            operation: ToolOperation::Add,
+            shape: ToolShape::Cylinder,
+            align: ToolAlign::Surface,
+            length: 6.0,
+            radius: 2.0,
+            sink: 1.0,
+            material: 7,
+            is_rough: true,
+            bump: 0.25,
+            bump_width: 3.0,
+            seed: 9,
+            ..BrushTool::default()
+        };
+        let brush = tool.brush_at(&hit());
+        // All of it in the ground: its far end lies where the ray met the surface.
+        let Shape::Cylinder { base, axis, radius } = brush.shape else { panic!("a cylinder") };
+        assert_eq!((base, axis, radius), (Vec3::new(4.0, 20.0, 30.0), Vec3::X * 6.0, 2.0));
+        assert_eq!(brush.operation, Operation::Add { material: MaterialId(7) });
+        assert_eq!(brush.roughness, Some(Roughness::new(0.25, 3.0, 9)));
+    }
+
+    #[test]
+    fn each_shape_is_pushed_in_by_its_own_depth() {
+        for shape in ToolShape::ALL {
+            for (sink, highest) in [(1.0, 20.0), (0.0, 23.0), (-1.0, 26.0)] {
+                let tool =
+                    BrushTool { shape, sink, radius: 3.0, half: Vec3::splat(3.0), ..BrushTool::default() };
+                let tool = match shape {
+                    ToolShape::Capsule => BrushTool { radius: 1.0, length: 4.0, ..tool },
+                    _ => BrushTool { length: 6.0, ..tool },
+                };
+                let top = match tool.shape_at(&hit()) {
+                    Shape::Sphere { center, radius } => center.y + radius,
+                    Shape::Cuboid { center, half, .. } => center.y + half.y,
+                    Shape::Cylinder { base, axis, .. } | Shape::Cone { base, axis, .. } => (base + axis).y,
+                    Shape::Capsule { from, to, radius } => from.y.max(to.y) + radius,
+                };
+                assert!((top - highest).abs() < 1e-4, "{shape:?} {sink}: {top}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_operation_and_shape_makes_a_valid_edit() {
+        for row in super::super::operations::OPERATIONS {
+            for shape in ToolShape::ALL {
+                for align in [ToolAlign::Upright, ToolAlign::Surface] {
+                    let tool = BrushTool { operation: row.tool, shape, align, ..BrushTool::default() };
+                    let brush = tool.brush_at(&hit());
+                    assert!(Edit::quantize(&brush).is_ok(), "{tool:?}: {:?}", Edit::quantize(&brush));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn growing_has_ends() {
+        for shape in ToolShape::ALL {
+            let mut tool = BrushTool { shape, ..BrushTool::default() };
+            (0..100).for_each(|_| tool.grow(1.5));
+            let most = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
+            (0..200).for_each(|_| tool.grow(0.5));
+            let least = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
+            assert_eq!((least, most), super::super::RADII);
+        }
+    }
+}

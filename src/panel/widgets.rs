@@ -1,0 +1,242 @@
+//! The panel's own widgets: sections, tiles with icons, sliders with names, lines of figures.
+
+use std::ops::RangeInclusive;
+
+use bevy_egui::egui::{
+    Align, Align2, Button, Color32, CornerRadius, CursorIcon, FontId, Id, Layout, Pos2, Rect, Response,
+    RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2, emath::Numeric,
+};
+
+use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
+
+/// A heading that opens and closes what follows.
+pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl FnOnce(&mut Ui)) {
+    let id = Id::new(("burrow section", name));
+    let mut is_open = ui.data(|data| data.get_temp(id)).unwrap_or(is_open_at_first);
+    ui.add_space(4.0);
+    let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 20.0), Sense::click());
+    let response = response.on_hover_cursor(CursorIcon::PointingHand);
+    if response.clicked() {
+        is_open = !is_open;
+        ui.data_mut(|data| data.insert_temp(id, is_open));
+    }
+    let color = if response.hovered() { BRIGHT } else { FAINT };
+    let painter = ui.painter();
+    let font = FontId::proportional(11.0);
+    let text = painter.text(rect.left_center(), Align2::LEFT_CENTER, name.to_uppercase(), font, color);
+    painter.hline(text.right() + 8.0..=rect.right() - 16.0, rect.center().y, Stroke::new(1.0, SLATE));
+    let tip = Pos2::new(rect.right() - 5.0, rect.center().y);
+    let (a, b) = if is_open {
+        (Vec2::new(-4.0, -2.0), Vec2::new(4.0, -2.0))
+    } else {
+        (Vec2::new(2.0, -4.0), Vec2::new(2.0, 4.0))
+    };
+    let point = if is_open { Vec2::new(0.0, 2.5) } else { Vec2::new(-2.5, 0.0) };
+    painter.line(vec![tip + a, tip + point, tip + b], Stroke::new(1.5, color));
+    if is_open {
+        content(ui);
+    }
+}
+
+/// Tiles side by side, so many in a row; says which one was clicked.
+pub fn tiles(
+    ui: &mut Ui,
+    columns: usize,
+    names: &[&str],
+    chosen: usize,
+    icon: impl Fn(&Ui, usize, Rect, Color32),
+) -> Option<usize> {
+    let gap = 6.0;
+    let width = (ui.available_width() - gap * (columns - 1) as f32) / columns as f32;
+    let mut clicked = None;
+    for (row, line) in names.chunks(columns).enumerate() {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = gap;
+            for (column, name) in line.iter().enumerate() {
+                let at = row * columns + column;
+                let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 48.0), Sense::click());
+                let color = frame_tile(ui, rect, &response, at == chosen);
+                let area = Rect::from_min_max(
+                    rect.min + Vec2::new(10.0, 6.0),
+                    Pos2::new(rect.right() - 10.0, rect.bottom() - 19.0),
+                );
+                icon(ui, at, area, color);
+                let foot = Pos2::new(rect.center().x, rect.bottom() - 4.0);
+                ui.painter().text(foot, Align2::CENTER_BOTTOM, name, FontId::proportional(11.0), color);
+                if response.clicked() {
+                    clicked = Some(at);
+                }
+            }
+        });
+    }
+    clicked
+}
+
+/// The ground of a tile; returns the colour of what is on it.
+fn frame_tile(ui: &Ui, rect: Rect, response: &Response, is_chosen: bool) -> Color32 {
+    let (fill, edge, color) = match (is_chosen, response.hovered()) {
+        (true, _) => (ACCENT.gamma_multiply(0.22), ACCENT, BRIGHT),
+        (false, true) => (SLATE, FAINT, BRIGHT),
+        (false, false) => (SLATE.gamma_multiply(0.7), Color32::TRANSPARENT, TEXT),
+    };
+    ui.painter().rect(rect, CornerRadius::same(6), fill, Stroke::new(1.0, edge), StrokeKind::Inside);
+    color
+}
+
+/// Words side by side, of which one is chosen; says which one was clicked.
+pub fn choice(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
+    let width = (ui.available_width() - 6.0 * (names.len().max(1) - 1) as f32) / names.len().max(1) as f32;
+    let mut clicked = None;
+    ui.horizontal(|ui| {
+        for (at, name) in names.iter().enumerate() {
+            let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 24.0), Sense::click());
+            let color = frame_tile(ui, rect, &response, at == chosen);
+            ui.painter().text(rect.center(), Align2::CENTER_CENTER, name, FontId::proportional(12.0), color);
+            if response.clicked() {
+                clicked = Some(at);
+            }
+        }
+    });
+    clicked
+}
+
+/// Coloured squares, of which one is chosen; says which one was clicked. Names show when hovered.
+pub fn swatches(ui: &mut Ui, colors: &[(Color32, &str)], chosen: usize) -> Option<usize> {
+    const COLUMNS: usize = 8;
+    let gap = 5.0;
+    let side = (ui.available_width() - gap * (COLUMNS - 1) as f32) / COLUMNS as f32;
+    let mut clicked = None;
+    for (row, line) in colors.chunks(COLUMNS).enumerate() {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = gap;
+            for (column, (color, name)) in line.iter().enumerate() {
+                let at = row * COLUMNS + column;
+                let (rect, response) = ui.allocate_exact_size(Vec2::splat(side), Sense::click());
+                let edge = match (at == chosen, response.hovered()) {
+                    (true, _) => Stroke::new(2.0, BRIGHT),
+                    (false, true) => Stroke::new(1.0, FAINT),
+                    (false, false) => Stroke::NONE,
+                };
+                ui.painter().rect(rect, CornerRadius::same(5), *color, edge, StrokeKind::Inside);
+                if response.on_hover_text(*name).clicked() {
+                    clicked = Some(at);
+                }
+            }
+        });
+    }
+    clicked
+}
+
+/// A slider with its name before it.
+pub fn slider<N: Numeric>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut N,
+    range: RangeInclusive<N>,
+    format: impl FnOnce(Slider<'_>) -> Slider<'_>,
+) -> Response {
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(Vec2::new(70.0, 20.0), Sense::hover());
+        let font = FontId::proportional(13.0);
+        ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font, TEXT);
+        ui.spacing_mut().slider_width = (ui.available_width() - 62.0).max(40.0);
+        let slider = Slider::new(value, range).clamping(SliderClamping::Always);
+        ui.add(format(slider))
+    })
+    .inner
+}
+
+/// A name at the left and a figure at the right.
+pub fn figure(ui: &mut Ui, name: &str, value: impl Into<String>) {
+    figure_in(ui, name, value, BRIGHT);
+}
+
+/// The same in a colour.
+pub fn figure_in(ui: &mut Ui, name: &str, value: impl Into<String>, color: Color32) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(name).color(FAINT).size(12.0));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.add(bevy_egui::egui::Label::new(RichText::new(value).color(color).size(12.0)).truncate());
+        });
+    });
+}
+
+/// A switch with its name.
+pub fn switch(ui: &mut Ui, name: &str, is_on: &mut bool) -> Response {
+    let (rect, mut response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 20.0), Sense::click());
+    if response.clicked() {
+        *is_on = !*is_on;
+        response.mark_changed();
+    }
+    let painter = ui.painter();
+    let color = if response.hovered() { BRIGHT } else { TEXT };
+    painter.text(rect.left_center(), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
+    let track = Rect::from_min_max(
+        Pos2::new(rect.right() - 28.0, rect.center().y - 7.0),
+        rect.right_center() + Vec2::new(0.0, 7.0),
+    );
+    let (fill, x) = if *is_on { (ACCENT, track.right() - 7.0) } else { (SLATE, track.left() + 7.0) };
+    painter.rect_filled(track, CornerRadius::same(7), fill);
+    painter.circle_filled(Pos2::new(x, track.center().y), 5.0, if *is_on { BRIGHT } else { FAINT });
+    response
+}
+
+/// A button as wide as its share of a row.
+pub fn button(ui: &mut Ui, text: &str, width: f32, is_enabled: bool) -> Response {
+    ui.add_enabled(is_enabled, Button::new(text).min_size(Vec2::new(width, 26.0)))
+}
+
+/// Width of one of `count` buttons in a row.
+pub fn share(ui: &Ui, count: usize) -> f32 {
+    (ui.available_width().min(COLUMN) - ui.spacing().item_spacing.x * (count.max(1) - 1) as f32)
+        / count.max(1) as f32
+}
+
+/// Bytes in words.
+pub fn bytes(count: usize) -> String {
+    let count = count as f64;
+    match count {
+        _ if count < 1e4 => format!("{count:.0} B"),
+        _ if count < 1e6 => format!("{:.1} KB", count / 1e3),
+        _ if count < 1e9 => format!("{:.2} MB", count / 1e6),
+        _ => format!("{:.2} GB", count / 1e9),
+    }
+}
+
+/// A count with thin gaps between thousands.
+pub fn count(number: usize) -> String {
+    let digits = number.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A time in words.
+pub fn time(time: Option<std::time::Duration>) -> String {
+    match time.map(|time| time.as_secs_f64() * 1e3) {
+        None => "-".into(),
+        Some(ms) if ms < 1.0 => format!("{:.0} µs", ms * 1e3),
+        Some(ms) if ms < 100.0 => format!("{ms:.2} ms"),
+        Some(ms) => format!("{ms:.0} ms"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    #[test]
+    fn figures_are_written_short() {
+        let bytes = [0, 9_999, 12_345, 3_456_789, 12_345_678_901].map(super::bytes);
+        assert_eq!(bytes, ["0 B", "9999 B", "12.3 KB", "3.46 MB", "12.35 GB"]);
+        assert_eq!([0, 999, 1000, 1234567].map(super::count), ["0", "999", "1 000", "1 234 567"]);
+        let times =
+            [None, Some(250), Some(2_500), Some(123_456)].map(|t| super::time(t.map(Duration::from_micros)));
+        assert_eq!(times, ["-", "250 µs", "2.50 ms", "123 ms"]);
+    }
+}

@@ -1,0 +1,170 @@
+//! The right column: buttons, terrain, figures, memory, engine, settings.
+
+use bevy::prelude::Entity;
+use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
+
+use super::plot;
+use super::state::{BurrowPanel, Note, PanelAction};
+use super::survey::{Counts, Survey};
+use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
+use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
+use crate::backend::{Choice, EngineState, Stage};
+use crate::plugin::{BurrowFigures, BurrowSettings};
+use crate::terrain::Terrain;
+
+/// A terrain on the list.
+pub struct TerrainLine<'a> {
+    pub entity: Entity,
+    pub name: String,
+    pub terrain: &'a Terrain,
+}
+
+/// What the column is about.
+pub struct Content<'a> {
+    pub terrains: &'a [TerrainLine<'a>],
+    pub chosen: Option<Entity>,
+    pub figures: &'a BurrowFigures,
+    pub survey: &'a Survey,
+    pub settings: &'a mut BurrowSettings,
+    pub actions: &'a mut Vec<PanelAction>,
+}
+
+/// Draws the column.
+pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
+    let chosen = content.terrains.iter().find(|line| Some(line.entity) == content.chosen);
+    buttons(ui, panel, content.actions, chosen.is_some());
+    section(ui, "Terrain", true, |ui| terrain(ui, panel, content.terrains, chosen));
+    section(ui, "Live", true, |ui| live(ui, content.figures, content.survey));
+    if let Some(counts) = &content.survey.counts {
+        section(ui, "Memory", true, |ui| memory(ui, counts));
+    }
+    if let Some((state, stages, last)) = &content.survey.engine {
+        section(ui, "Engine", true, |ui| engine(ui, state, *stages, last.as_ref()));
+    }
+    section(ui, "Settings", false, |ui| settings(ui, content.settings));
+}
+
+fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, has_terrain: bool) {
+    let is_busy = matches!(panel.note, Some(Note::Busy(_)));
+    let width = share(ui, 2);
+    ui.horizontal(|ui| {
+        let seams = button(ui, "Check seams", width, has_terrain && !is_busy);
+        if seams.on_hover_text("Looks at every triangle of the terrain").clicked() {
+            actions.push(PanelAction::CheckSeams);
+        }
+        if button(ui, "Save picture", width, true).clicked() {
+            actions.push(PanelAction::SavePicture);
+        }
+    });
+    let (color, text) = match &panel.note {
+        None => return,
+        Some(Note::Good(text)) => (GOOD, text),
+        Some(Note::Bad(text)) => (BAD, text),
+        Some(Note::Busy(text)) => (FAINT, text),
+    };
+    ui.label(RichText::new(text).color(color).size(12.0));
+}
+
+fn terrain(ui: &mut Ui, panel: &mut BurrowPanel, terrains: &[TerrainLine], chosen: Option<&TerrainLine>) {
+    let Some(line) = chosen else {
+        ui.label(RichText::new("There is no terrain.").color(FAINT).size(12.0));
+        return;
+    };
+    if terrains.len() > 1 {
+        let at = terrains.iter().position(|other| other.entity == line.entity).unwrap_or_default();
+        let names: Vec<&str> = terrains.iter().map(|line| line.name.as_str()).collect();
+        for (row, names) in names.chunks(2).enumerate() {
+            let here = at.checked_sub(row * 2).unwrap_or(usize::MAX);
+            if let Some(other) = choice(ui, names, here).and_then(|at| terrains.get(row * 2 + at)) {
+                panel.terrain = Some(other.entity);
+            }
+        }
+    } else {
+        ui.label(RichText::new(&line.name).color(BRIGHT).size(13.0));
+    }
+    let (grid, voxel) = (line.terrain.world().grid(), line.terrain.voxel_size());
+    let metres = |voxels: i32| voxels as f32 * voxel;
+    figure(ui, "Size", format!("{} x {} m", metres(grid.width()), metres(grid.depth())));
+    figure(ui, "Voxel, chunk", format!("{voxel} m, {} voxels", grid.size()));
+    figure(ui, "Revision", count(line.terrain.world().revision() as usize));
+}
+
+fn live(ui: &mut Ui, figures: &BurrowFigures, survey: &Survey) {
+    let of = |percent| time(figures.transactions.percentile(percent));
+    let recent = figures.transactions.iter().map(|took| took.as_secs_f32() * 1e3);
+    let recent: Vec<f32> = recent.skip(figures.transactions.len().saturating_sub(180)).collect();
+    plot::line(ui, recent.into_iter(), 1.0, ACCENT, "transaction", &time(figures.transactions.iter().last()));
+    figure(ui, "p50, p95, p99", format!("{}, {}, {}", of(50), of(95), of(99)));
+    let now = survey.swaps_now.to_string();
+    plot::line(ui, survey.swaps.iter(), 8.0, BLUE, "meshes swapped per frame", &now);
+    let last = survey.frame_ms.iter().last().unwrap_or_default();
+    plot::line(ui, survey.frame_ms.iter(), 16.7, GOOD, "frame", &format!("{last:.1} ms"));
+    let own = time(Some(figures.main_thread));
+    plot::line(ui, survey.main_thread_us.iter(), 100.0, PARTS[4], "own work on the main thread", &own);
+    figure(ui, "Queue", format!("{} waiting", survey.queued));
+    figure(
+        ui,
+        "Brushes, commits",
+        format!("{}, {}", count(figures.brushes as usize), count(figures.commits as usize)),
+    );
+}
+
+fn memory(ui: &mut Ui, counts: &Counts) {
+    let memory = counts.memory;
+    let kinds = [
+        ("Ground", memory.ground),
+        ("Samples", memory.samples),
+        ("Materials", memory.materials),
+        ("Meshes", memory.meshes),
+        ("Parts", memory.parts),
+        ("Index", memory.index),
+    ];
+    let parts: Vec<(usize, Color32)> =
+        kinds.iter().zip(PARTS).map(|(&(_, size), color)| (size, color)).collect();
+    plot::parts(ui, &parts);
+    for pair in kinds.iter().zip(PARTS).collect::<Vec<_>>().chunks(2) {
+        ui.horizontal(|ui| {
+            let width = share(ui, 2);
+            for ((name, size), color) in pair {
+                ui.allocate_ui(Vec2::new(width, 16.0), |ui| {
+                    ui.set_min_width(width);
+                    figure_in(ui, name, bytes(*size), *color);
+                });
+            }
+        });
+    }
+    figure(ui, "All, edits", format!("{}, {}", bytes(memory.total()), bytes(memory.edits())));
+    figure(ui, "Fields, chunks", format!("{}, {}", count(counts.fields), count(counts.chunks)));
+    figure(ui, "Bricks, mask cells", format!("{}, {}", count(counts.bricks), count(counts.cells)));
+    figure(ui, "Hash", format!("{:016x}", counts.hash));
+}
+
+fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<&Choice>) {
+    match state {
+        EngineState::Cpu => figure(ui, "Backend", "processor"),
+        EngineState::Opening => figure(ui, "Backend", "processor, opening a card"),
+        EngineState::Cuda(name) => figure_in(ui, "Backend", name, GOOD),
+        EngineState::Lost(why) => {
+            figure_in(ui, "Backend", "processor, the card is lost", BAD);
+            ui.label(RichText::new(why).color(FAINT).size(11.0));
+        }
+    }
+    figure(ui, "Stages", format!("{} processor, {} card", count(cpu as usize), count(cuda as usize)));
+    let Some(choice) = last else { return };
+    let what = match choice.stage {
+        Stage::Edit => "bricks edited",
+        Stage::Mesh => "blocks meshed",
+    };
+    figure(ui, "Last", format!("{} {what} in {}", count(choice.amount), time(Some(choice.took))));
+    if let Some(estimate) = choice.estimate {
+        let (cpu, cuda) = (time(Some(estimate.cpu)), time(Some(estimate.cuda)));
+        figure(ui, "Expected", format!("{cpu} processor, {cuda} card"));
+    }
+}
+
+fn settings(ui: &mut Ui, settings: &mut BurrowSettings) {
+    slider(ui, "Swaps", &mut settings.swaps_per_frame, 1..=4096, |slider| slider.logarithmic(true))
+        .on_hover_text("Meshes swapped per frame, at most");
+    slider(ui, "Loads", &mut settings.loads_per_frame, 1..=4096, |slider| slider.logarithmic(true))
+        .on_hover_text("Tile meshes handed to the renderer per frame while a terrain loads");
+}
