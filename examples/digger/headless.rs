@@ -15,6 +15,8 @@ use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use bevy_burrow::prelude::*;
 
+use crate::settings::SettingsFile;
+
 /// The script's time from frame to frame.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
@@ -50,7 +52,7 @@ pub fn build_app(renderer: Option<RenderResources>, engine: BurrowEngine) -> App
             .disable::<PipelinedRenderingPlugin>(),
     )
     .insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-    crate::game(&mut app, engine);
+    crate::game(&mut app, engine, SettingsFile::default());
     while app.plugins_state() == PluginsState::Adding {
         bevy::tasks::tick_global_task_pools_on_main_thread();
     }

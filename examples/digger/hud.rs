@@ -1,121 +1,323 @@
-//! What is written on the window: crosshair, figures, help, and a word while the landscape loads.
+//! What is written over the game: crosshair, tools, materials, the hour, and what was just dug.
 
-use bevy::diagnostic::{DiagnosticsStore, FrameTimeDiagnosticsPlugin};
+use std::collections::VecDeque;
+
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
-use crate::landscape::MATERIALS;
-use crate::player::{Player, mouse_is_captured};
-use crate::tools::Tools;
+use crate::art::Art;
+use crate::day::Clock;
+use crate::input::Action;
+use crate::inventory::{Inventory, StockChanged};
+use crate::landscape::{self, MATERIALS};
+use crate::light::{Eyes, LampSwitch};
+use crate::phase::Phase;
+use crate::player::Drone;
+use crate::settings::Settings;
+use crate::tools::{Hand, Tool};
+use crate::ui;
 
-const HELP: &str = "\
-click: take the mouse    Esc: let go    Q: quit
-W A S D: walk    Shift: run    Space: jump
-left: dig    right: build    middle or G: paint
-wheel: radius    1..8: material    C: form
-F: headlamp    H: this help";
+/// Seconds that a hint or a find stays.
+const STAY: f32 = 2.6;
+/// Finds that are seen at once.
+const FINDS: usize = 4;
 
-/// Writes on the window.
+/// Something to tell the player.
+#[derive(Message, Clone, Debug)]
+pub struct Hint(String);
+
+impl Hint {
+    pub fn new(words: impl Into<String>) -> Self {
+        Self(words.into())
+    }
+}
+
+/// Is anything written at all? Not on pictures of the landscape.
+#[derive(Resource)]
+pub struct ShowHud(pub bool);
+
+/// Writes over the game.
 pub struct HudPlugin;
 
 impl Plugin for HudPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins(FrameTimeDiagnosticsPlugin::default())
-            .add_systems(Startup, write_all)
-            .add_systems(Update, (write_figures, toggle_help, wipe_loading, tools_follow_mouse));
+        app.insert_resource(ShowHud(true)).add_message::<Hint>().add_systems(Startup, write_all).add_systems(
+            Update,
+            (show, mark_tool, count_materials, aim, tell_hour, tell_hints, tell_finds, tell_keys)
+                .after(BurrowSystems::Dress),
+        );
     }
 }
 
 #[derive(Component)]
-struct Figures;
-
-#[derive(Component)]
-struct Help;
-
-/// There until the player arrives.
-#[derive(Component)]
-struct LoadingWord;
+struct Hud;
 
 #[derive(Component)]
 struct Crosshair;
 
-fn write_all(mut commands: Commands) {
-    let shade = BackgroundColor(Color::srgba(0.0, 0.0, 0.0, 0.45));
-    let font = |size: f32| TextFont { font_size: FontSize::Px(size), ..default() };
-    let corner = Node {
-        position_type: PositionType::Absolute,
-        left: px(10),
-        padding: UiRect::all(px(8)),
-        border_radius: BorderRadius::all(px(6)),
-        ..default()
-    };
-    let top = Node { top: px(10), ..corner.clone() };
-    let bottom = Node { bottom: px(10), ..corner };
-    commands.spawn((Figures, Text::new(""), font(15.0), top, shade));
-    commands.spawn((Help, Text::new(HELP), font(14.0), bottom, shade));
-    let centre = Node {
-        width: percent(100),
-        height: percent(100),
-        position_type: PositionType::Absolute,
-        align_items: AlignItems::Center,
-        justify_content: JustifyContent::Center,
-        ..default()
-    };
-    let dot = Node { width: px(5), height: px(5), border_radius: BorderRadius::all(px(3)), ..default() };
-    let white = BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.85));
-    commands.spawn((Crosshair, centre.clone(), Visibility::Hidden, children![(dot, white)]));
-    commands.spawn((LoadingWord, centre, children![(Text::new("loading the landscape ..."), font(28.0))]));
+#[derive(Component)]
+struct Slot(Tool);
+
+#[derive(Component)]
+struct ToolName;
+
+/// A material's row, and its count.
+#[derive(Component)]
+struct Row(MaterialId);
+
+#[derive(Component)]
+struct Count(MaterialId);
+
+#[derive(Component)]
+struct Hour;
+
+#[derive(Component)]
+struct Hints;
+
+#[derive(Component)]
+struct Find(usize);
+
+#[derive(Component)]
+struct KeyLine;
+
+fn write_all(mut commands: Commands, art: Res<Art>) {
+    commands.spawn((Hud, ui::full(), Visibility::Hidden)).with_children(|hud| {
+        spawn_crosshair(hud);
+        spawn_slots(hud, &art);
+        spawn_materials(hud, &art);
+        let corner = Node { position_type: PositionType::Absolute, right: px(16), top: px(12), ..default() };
+        hud.spawn((corner, children![(Hour, ui::text("", 17.0, ui::WHITE))]));
+        let top = Node {
+            position_type: PositionType::Absolute,
+            width: percent(100),
+            top: px(92),
+            justify_content: JustifyContent::Center,
+            ..default()
+        };
+        hud.spawn((top, children![(Hints, ui::text("", 19.0, ui::GOLD))]));
+        let keys = Node { position_type: PositionType::Absolute, left: px(16), bottom: px(14), ..default() };
+        hud.spawn((keys, children![(KeyLine, ui::text("", 13.0, ui::GREY))]));
+    });
 }
 
-fn wipe_loading(
-    mut commands: Commands,
-    arrived: Query<(), Added<Player>>,
-    words: Query<Entity, With<LoadingWord>>,
-    mut crosshairs: Query<&mut Visibility, With<Crosshair>>,
+fn spawn_crosshair(hud: &mut ChildSpawnerCommands) {
+    let centre = Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
+    let dot = Node {
+        width: px(6),
+        height: px(6),
+        border: UiRect::all(px(1)),
+        border_radius: BorderRadius::all(px(3)),
+        ..default()
+    };
+    let colors = (BackgroundColor(ui::WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
+    hud.spawn((centre, children![(Crosshair, dot, colors)]));
+}
+
+/// The tools along the lower edge, with the name of the chosen one above.
+fn spawn_slots(hud: &mut ChildSpawnerCommands, art: &Art) {
+    let bottom = Node {
+        position_type: PositionType::Absolute,
+        width: percent(100),
+        bottom: px(12),
+        flex_direction: FlexDirection::Column,
+        align_items: AlignItems::Center,
+        row_gap: px(6),
+        ..default()
+    };
+    hud.spawn(bottom).with_children(|bottom| {
+        bottom.spawn((ToolName, ui::text("", 15.0, ui::WHITE)));
+        bottom.spawn(Node { column_gap: px(5), ..default() }).with_children(|bar| {
+            for (at, tool) in Tool::ALL.into_iter().enumerate() {
+                let slot = Node {
+                    width: px(52),
+                    height: px(52),
+                    border: UiRect::all(px(2)),
+                    border_radius: BorderRadius::all(px(6)),
+                    align_items: AlignItems::Center,
+                    justify_content: JustifyContent::Center,
+                    ..default()
+                };
+                let icon = Node { width: px(36), height: px(36), ..default() };
+                let number = Node { position_type: PositionType::Absolute, left: px(4), top: px(1), ..default() };
+                bar.spawn((
+                    Slot(tool),
+                    slot,
+                    BackgroundColor(ui::SHADE),
+                    BorderColor::all(ui::EDGE),
+                    children![
+                        (ImageNode::new(art.tools[at].clone()), icon),
+                        (number, ui::text((at + 1).to_string(), 11.0, ui::GREY)),
+                    ],
+                ));
+            }
+        });
+    });
+}
+
+/// What was dug, at the right, with the latest finds above.
+fn spawn_materials(hud: &mut ChildSpawnerCommands, art: &Art) {
+    let right = Node {
+        position_type: PositionType::Absolute,
+        right: px(14),
+        bottom: px(12),
+        flex_direction: FlexDirection::Column,
+        align_items: AlignItems::End,
+        row_gap: px(3),
+        ..default()
+    };
+    hud.spawn(right).with_children(|right| {
+        for at in (0..FINDS).rev() {
+            right.spawn((Find(at), ui::text("", 15.0, ui::WHITE)));
+        }
+        let list = Node {
+            width: px(158),
+            padding: UiRect::all(px(5)),
+            margin: UiRect::top(px(4)),
+            flex_direction: FlexDirection::Column,
+            row_gap: px(1),
+            ..default()
+        };
+        right.spawn(ui::panel(list)).with_children(|list| {
+            for (material, name) in MATERIALS {
+                let row = Node {
+                    height: px(22),
+                    padding: UiRect::horizontal(px(5)),
+                    border_radius: BorderRadius::all(px(4)),
+                    align_items: AlignItems::Center,
+                    column_gap: px(8),
+                    ..default()
+                };
+                let swatch = Node { width: px(14), height: px(14), ..default() };
+                let color = Color::from(landscape::colour(material));
+                list.spawn((Row(material), row, BackgroundColor::DEFAULT)).with_children(|row| {
+                    row.spawn((ImageNode::new(art.swatch.clone()).with_color(brighter(color)), swatch));
+                    let grow = Node { flex_grow: 1.0, ..default() };
+                    row.spawn((ui::text(name, 13.0, ui::WHITE), grow));
+                    row.spawn((Count(material), ui::text("", 13.0, ui::GREY)));
+                });
+            }
+        });
+    });
+}
+
+/// Ground is lit by the sun, swatches by nothing.
+fn brighter(color: Color) -> Color {
+    let color = color.to_linear() * 1.9;
+    Color::linear_rgb(color.red.min(1.0), color.green.min(1.0), color.blue.min(1.0))
+}
+
+fn show(
+    shown: Res<ShowHud>,
+    phase: Res<State<Phase>>,
+    eyes: Single<Has<Drone>, With<Eyes>>,
+    mut hud: Single<&mut Visibility, With<Hud>>,
 ) {
-    if !arrived.is_empty() {
-        for word in &words {
-            commands.entity(word).despawn();
-        }
-        for mut crosshair in &mut crosshairs {
-            *crosshair = Visibility::Inherited;
-        }
+    let is_shown = shown.0 && *phase.get() == Phase::Playing && !*eyes;
+    hud.set_if_neq(if is_shown { Visibility::Inherited } else { Visibility::Hidden });
+}
+
+fn mark_tool(
+    hand: Res<Hand>,
+    mut slots: Query<(&Slot, &mut BorderColor, &mut BackgroundColor)>,
+    mut name: Single<&mut Text, With<ToolName>>,
+) {
+    for (slot, mut edge, mut ground) in &mut slots {
+        let chosen = slot.0 == hand.tool;
+        edge.set_if_neq(BorderColor::all(if chosen { ui::GOLD } else { ui::EDGE }));
+        let lit = Color::srgba(0.24, 0.20, 0.10, 0.82);
+        ground.set_if_neq(BackgroundColor(if chosen { lit } else { ui::SHADE }));
+    }
+    let radius = hand.radius(hand.tool);
+    let words = match hand.tool {
+        Tool::Builder => format!("builder  {} of {}  {radius:.2} m", hand.form.label(), landscape::name(hand.material)),
+        Tool::Painter => format!("painter  {}  {radius:.2} m", landscape::name(hand.material)),
+        Tool::Bomb | Tool::Lamp => hand.tool.label().into(),
+        tool => format!("{}  {radius:.2} m", tool.label()),
+    };
+    name.set_if_neq(Text::new(words));
+}
+
+fn count_materials(
+    hand: Res<Hand>,
+    inventory: Res<Inventory>,
+    mut rows: Query<(&Row, &mut BackgroundColor)>,
+    mut counts: Query<(&Count, &mut Text, &mut TextColor)>,
+) {
+    for (row, mut ground) in &mut rows {
+        let chosen = row.0 == hand.material;
+        let lit = Color::srgba(1.0, 0.80, 0.32, 0.22);
+        ground.set_if_neq(BackgroundColor(if chosen { lit } else { Color::NONE }));
+    }
+    for (count, mut text, mut color) in &mut counts {
+        let stock = inventory.stock(count.0);
+        text.set_if_neq(Text::new(stock.to_string()));
+        color.set_if_neq(TextColor(if stock > 0 { ui::WHITE } else { ui::GREY }));
     }
 }
 
-/// Who has not taken the mouse does not dig, and needs no preview.
-fn tools_follow_mouse(
-    mut tools: ResMut<Tools>,
-    cursors: Query<&bevy::window::CursorOptions, With<bevy::window::PrimaryWindow>>,
-) {
-    tools.preview = mouse_is_captured(cursors);
+/// The crosshair fades where the tool does not reach.
+fn aim(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Crosshair>>) {
+    let reaches = hand.aim.is_some() || hand.tool == Tool::Bomb;
+    dot.set_if_neq(BackgroundColor(ui::WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
 }
 
-fn write_figures(
-    diagnostics: Res<DiagnosticsStore>,
-    tools: Res<Tools>,
-    burrow: Res<BurrowFigures>,
-    fields: Query<(), With<Field>>,
-    chunks: Query<(), With<Chunk>>,
-    mut text: Single<&mut Text, With<Figures>>,
-) {
-    let fps = diagnostics.get(&FrameTimeDiagnosticsPlugin::FPS).and_then(|fps| fps.smoothed()).unwrap_or(0.0);
-    let material = MATERIALS.iter().find(|(id, _)| *id == tools.material).map_or("?", |(_, name)| name);
-    text.0 = format!(
-        "{fps:.0} fps\n{:?}, radius {:.1}, {material}\n{} edits, {} fields, {} chunks\nlast transaction {:.1} ms",
-        tools.form,
-        tools.radius,
-        burrow.brushes,
-        fields.iter().count(),
-        chunks.iter().count(),
-        burrow.last_transaction.as_secs_f64() * 1e3,
-    );
+fn tell_hour(clock: Res<Clock>, lamp: Res<LampSwitch>, mut hour: Single<&mut Text, With<Hour>>) {
+    let lamp = if lamp.0 { "lamp on   " } else { "" };
+    hour.set_if_neq(Text::new(format!("{lamp}{}", clock.face())));
 }
 
-fn toggle_help(keys: Res<ButtonInput<KeyCode>>, mut help: Query<&mut Visibility, With<Help>>) {
-    if keys.just_pressed(KeyCode::KeyH) {
-        for mut visibility in &mut help {
-            visibility.toggle_inherited_hidden();
+fn tell_hints(
+    time: Res<Time>,
+    mut hints: MessageReader<Hint>,
+    mut line: Single<(&mut Text, &mut TextColor), With<Hints>>,
+    mut left: Local<f32>,
+) {
+    let (text, color) = &mut *line;
+    if let Some(hint) = hints.read().last() {
+        text.set_if_neq(Text::new(hint.0.clone()));
+        *left = STAY;
+    }
+    *left -= time.delta_secs();
+    color.set_if_neq(TextColor(ui::GOLD.with_alpha((2.0 * *left).clamp(0.0, 1.0))));
+}
+
+/// What was dug lately, the same materials added up while they keep coming.
+fn tell_finds(
+    time: Res<Time>,
+    mut changes: MessageReader<StockChanged>,
+    mut lines: Query<(&Find, &mut Text, &mut TextColor)>,
+    mut finds: Local<VecDeque<(MaterialId, i64, f32)>>,
+) {
+    for change in changes.read().filter(|change| change.by != 0) {
+        let same = finds.iter_mut().find(|find| find.0 == change.material && (find.1 > 0) == (change.by > 0));
+        match same {
+            Some(find) => (find.1, find.2) = (find.1 + change.by, STAY),
+            None => finds.push_front((change.material, change.by, STAY)),
         }
+    }
+    for find in finds.iter_mut() {
+        find.2 -= time.delta_secs();
+    }
+    finds.retain(|find| find.2 > 0.0);
+    finds.truncate(FINDS);
+    for (line, mut text, mut color) in &mut lines {
+        let (words, alpha) = finds.get(line.0).map_or((String::new(), 0.0), |&(material, by, left)| {
+            (format!("{by:+} {}", landscape::name(material)), (2.0 * left).clamp(0.0, 1.0))
+        });
+        text.set_if_neq(Text::new(words));
+        color.set_if_neq(TextColor(ui::WHITE.with_alpha(alpha)));
+    }
+}
+
+fn tell_keys(settings: Res<Settings>, mut line: Single<&mut Text, With<KeyLine>>) {
+    if settings.is_changed() {
+        let key = |action| settings.bindings.first(action);
+        line.0 = format!(
+            "{} help   {} headlamp   {} undo   {} pause",
+            key(Action::Help),
+            key(Action::Headlamp),
+            key(Action::Undo),
+            key(Action::Pause)
+        );
     }
 }

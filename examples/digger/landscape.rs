@@ -34,6 +34,16 @@ pub const MATERIALS: [(MaterialId, &str); 8] = [
     (GOLD, "gold"),
 ];
 
+/// What a material is called.
+pub fn name(material: MaterialId) -> &'static str {
+    MATERIALS.iter().find(|(id, _)| *id == material).map_or("ground", |(_, name)| name)
+}
+
+/// What a material looks like.
+pub fn colour(material: MaterialId) -> LinearRgba {
+    MaterialColors::default().0.get(usize::from(material.0)).copied().unwrap_or(LinearRgba::WHITE)
+}
+
 /// Heights of 403 x 344 samples, 16 bit.
 const SURVEY: &[u8] = include_bytes!("../../assets/jacksboro_fault.png");
 const SURVEY_PATH: &str = "digger/jacksboro_fault.png";

@@ -1,57 +1,70 @@
-//! Eyes and light: the camera, the sun and its shadows, haze, the dark of caves and the headlamp.
+//! Eyes and light: the camera, the sun and its shadows, the dark of caves and the headlamp.
 
 use bevy::anti_alias::smaa::Smaa;
-use bevy::camera::ShadowLodOrigin;
+use bevy::camera::{Hdr, ShadowLodOrigin};
 use bevy::core_pipeline::{prepass::DepthPrepass, tonemapping::Tonemapping};
-use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, light_consts::lux};
+use bevy::light::{CascadeShadowConfig, CascadeShadowConfigBuilder, DirectionalLightShadowMap};
+use bevy::post_process::bloom::Bloom;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy_burrow::prelude::*;
 
-use crate::sky::HAZE;
+use crate::input::{Action, Actions};
+use crate::phase::Phase;
+use crate::settings::{Quality, Settings};
 
-/// The way to the sun, of length 1: from the south-west, on a late afternoon.
+/// The way to the sun on a late afternoon, of length 1: from the south-west.
 pub const SUN: Vec3 = Vec3::new(-0.58, 0.64, 0.504);
 
-/// Brightness of the sky's light on everything, out of doors and deep in a cave.
-const SKYLIGHT: (f32, f32) = (1250.0, 30.0);
 /// Luminous power of the headlamp in lumens, as a game needs it and not as a shop sells it.
 const LAMP: f32 = 18_000_000.0;
-/// Metres to the far end of what is seen.
-const FAR: f32 = 3000.0;
+/// The same of the little light that shows the player's own hands then.
+const HANDS: f32 = 9_000.0;
+/// Brightness of the sky's light deep in a cave.
+const DARK: f32 = 30.0;
 
 /// The camera that looks through the player's eyes.
 #[derive(Component)]
 pub struct Eyes;
 
-/// The lamp on the player's forehead; a child of [`Eyes`].
+/// What lights the land: the sun, or by night the moon.
 #[derive(Component)]
-pub struct Headlamp;
+pub struct Sun;
+
+/// A lamp on the player's forehead, and how bright it is; a child of [`Eyes`].
+#[derive(Component)]
+pub struct Headlamp(f32);
 
 /// Is the headlamp on?
 #[derive(Resource, Default)]
 pub struct LampSwitch(pub bool);
+
+/// The sky's light out of doors.
+#[derive(Resource, Clone, Copy, Debug)]
+pub struct Skylight {
+    pub color: Color,
+    pub brightness: f32,
+}
 
 /// The camera, the sun, and what they need.
 pub struct LightPlugin;
 
 impl Plugin for LightPlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(ClearColor(haze()))
-            .insert_resource(DirectionalLightShadowMap { size: 2048 })
-            .insert_resource(GlobalAmbientLight {
-                color: Color::srgb(0.78, 0.88, 1.0),
-                brightness: SKYLIGHT.0,
-                ..default()
-            })
+        app.insert_resource(Skylight { color: Color::WHITE, brightness: 1000.0 })
+            .insert_resource(GlobalAmbientLight { brightness: 1000.0, ..default() })
             .init_resource::<LampSwitch>()
             .add_systems(Startup, (open_eyes, let_there_be_sun))
-            .add_systems(Update, (switch_lamp, darken_caves));
+            .add_systems(
+                Update,
+                (
+                    apply_settings.run_if(resource_exists_and_changed::<Settings>),
+                    press_switch.run_if(in_state(Phase::Playing)),
+                    (switch_lamps, darken_caves),
+                )
+                    .chain(),
+            );
     }
-}
-
-fn haze() -> Color {
-    Color::linear_rgb(HAZE.x, HAZE.y, HAZE.z)
 }
 
 /// Is there no graphics card, so that the processor draws? (Bevy does not re-export the type that tells.)
@@ -59,13 +72,7 @@ fn draws_in_software(adapter: &RenderAdapterInfo) -> bool {
     format!("{:?}", adapter.device_type) == "Cpu"
 }
 
-fn open_eyes(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
-    let fog = DistanceFog {
-        color: haze(),
-        directional_light_color: Color::linear_rgba(1.0, 0.82, 0.58, 0.35),
-        directional_light_exponent: 12.0,
-        falloff: FogFalloff::from_visibility_squared(2100.0),
-    };
+fn open_eyes(mut commands: Commands) {
     let lamp = SpotLight {
         color: Color::srgb(1.0, 0.93, 0.80),
         intensity: 0.0,
@@ -76,59 +83,94 @@ fn open_eyes(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
         shadow_maps_enabled: true,
         ..default()
     };
-    // Four samples for each pixel cost a software renderer three times the time of one.
-    let msaa =
-        if adapter.is_some_and(|adapter| draws_in_software(&adapter)) { Msaa::Off } else { Msaa::Sample4 };
-    let mut eyes = commands.spawn((
+    let hands = PointLight { color: lamp.color, intensity: 0.0, range: 1.6, ..default() };
+    commands.spawn((
         Name::new("eyes"),
         Eyes,
+        IsDefaultUiCamera,
         Camera3d::default(),
         ShadowLodOrigin,
-        Projection::Perspective(PerspectiveProjection {
-            fov: 70f32.to_radians(),
-            near: 0.08,
-            far: FAR,
-            ..default()
-        }),
+        Projection::Perspective(PerspectiveProjection { near: 0.06, ..default() }),
         Transform::from_xyz(0.0, 400.0, 0.0),
         Tonemapping::TonyMcMapface,
-        msaa,
         // Ridge lies behind ridge: only what is seen in the end is shaded.
         DepthPrepass,
-        fog,
-        // A little to the side of the eyes, so that its shadows are seen.
-        children![(Headlamp, lamp, Transform::from_xyz(0.25, 0.12, 0.0))],
+        DistanceFog { directional_light_exponent: 12.0, ..default() },
+        children![
+            // A little to the side of the eyes, so that its shadows are seen, and before the hands, which it would burn.
+            (Headlamp(LAMP), lamp, Transform::from_xyz(0.22, 0.12, -0.34)),
+            (Headlamp(HANDS), hands, Transform::from_xyz(-0.05, 0.16, -0.12)),
+        ],
     ));
-    if msaa == Msaa::Off {
-        eyes.insert(Smaa::default());
-    }
 }
 
 fn let_there_be_sun(mut commands: Commands) {
-    commands.spawn((
-        Name::new("sun"),
-        DirectionalLight {
-            color: Color::srgb(1.0, 0.94, 0.84),
-            illuminance: lux::AMBIENT_DAYLIGHT * 1.05,
-            shadow_maps_enabled: true,
-            ..default()
-        },
-        Transform::IDENTITY.looking_to(-SUN, Vec3::Y),
-        CascadeShadowConfigBuilder {
-            num_cascades: 4,
-            minimum_distance: 0.1,
-            first_cascade_far_bound: 25.0,
-            maximum_distance: 900.0,
-            ..default()
-        }
-        .build(),
-    ));
+    let light = DirectionalLight { shadow_maps_enabled: true, ..default() };
+    commands.spawn((Name::new("sun"), Sun, light, Transform::IDENTITY.looking_to(-SUN, Vec3::Y)));
 }
 
-fn switch_lamp(switch: Res<LampSwitch>, mut lamps: Query<&mut SpotLight, With<Headlamp>>) {
+/// Field of view, distances and quality.
+fn apply_settings(
+    mut commands: Commands,
+    settings: Res<Settings>,
+    adapter: Option<Res<RenderAdapterInfo>>,
+    mut eyes: Single<(Entity, &mut Projection, &mut DistanceFog), With<Eyes>>,
+    sun: Single<Entity, With<Sun>>,
+) {
+    let (entity, projection, fog) = &mut *eyes;
+    if let Projection::Perspective(lens) = &mut **projection {
+        lens.fov = settings.field_of_view.to_radians();
+        lens.far = settings.view_distance;
+    }
+    fog.falloff = FogFalloff::from_visibility_squared(0.7 * settings.view_distance);
+    let (map, cascades, first, last) = match settings.quality {
+        Quality::Low => (1024, 2, 20.0, 200.0),
+        Quality::Medium => (2048, 4, 25.0, 900.0),
+        Quality::High => (4096, 4, 30.0, 1200.0),
+    };
+    commands.insert_resource(DirectionalLightShadowMap { size: map });
+    let shadows: CascadeShadowConfig = CascadeShadowConfigBuilder {
+        num_cascades: cascades,
+        minimum_distance: 0.1,
+        first_cascade_far_bound: first,
+        maximum_distance: last,
+        ..default()
+    }
+    .build();
+    commands.entity(*sun).insert(shadows);
+    let mut eyes = commands.entity(*entity);
+    // Four samples for each pixel cost a software renderer three times the time of one.
+    let in_software = adapter.is_some_and(|adapter| draws_in_software(&adapter));
+    if in_software || settings.quality == Quality::Low {
+        eyes.insert((Msaa::Off, Smaa::default()));
+    } else {
+        eyes.insert(Msaa::Sample4).remove::<Smaa>();
+    }
+    if settings.quality == Quality::High {
+        eyes.insert((Hdr, Bloom { intensity: 0.12, ..Bloom::NATURAL }));
+    } else {
+        eyes.remove::<(Hdr, Bloom)>();
+    }
+}
+
+fn press_switch(actions: Res<Actions>, mut switch: ResMut<LampSwitch>) {
+    if actions.just_pressed(Action::Headlamp) {
+        switch.0 = !switch.0;
+    }
+}
+
+fn switch_lamps(
+    switch: Res<LampSwitch>,
+    mut spots: Query<(&Headlamp, &mut SpotLight)>,
+    mut points: Query<(&Headlamp, &mut PointLight)>,
+) {
     if switch.is_changed() {
-        for mut lamp in &mut lamps {
-            lamp.intensity = if switch.0 { LAMP } else { 0.0 };
+        let power = |lamp: &Headlamp| if switch.0 { lamp.0 } else { 0.0 };
+        for (lamp, mut light) in &mut spots {
+            light.intensity = power(lamp);
+        }
+        for (lamp, mut light) in &mut points {
+            light.intensity = power(lamp);
         }
     }
 }
@@ -138,10 +180,10 @@ fn switch_lamp(switch: Res<LampSwitch>, mut lamps: Query<&mut SpotLight, With<He
 fn darken_caves(
     time: Res<Time>,
     terrains: Terrains,
-    eyes: Query<&GlobalTransform, With<Eyes>>,
-    mut skylight: ResMut<GlobalAmbientLight>,
+    eyes: Single<&GlobalTransform, With<Eyes>>,
+    skylight: Res<Skylight>,
+    mut ambient: ResMut<GlobalAmbientLight>,
 ) {
-    let Ok(eyes) = eyes.single() else { return };
     let places = (-1..=1).flat_map(|x| (-1..=1).map(move |z| Vec3::new(x as f32, 0.0, z as f32) * 3.0));
     let is_open = |place: Vec3| {
         let spans = terrains.spans(place.x, place.z);
@@ -149,7 +191,8 @@ fn darken_caves(
         air.is_none_or(|span| span.ceiling.is_none())
     };
     let open = places.filter(|&offset| is_open(eyes.translation() + offset)).count() as f32 / 9.0;
-    let (day, dark) = SKYLIGHT;
-    let brightness = dark + (day - dark) * open * open;
-    skylight.brightness += (brightness - skylight.brightness) * (1.0 - (-4.0 * time.delta_secs()).exp());
+    let dark = DARK.min(skylight.brightness);
+    let brightness = dark + (skylight.brightness - dark) * open * open;
+    ambient.color = skylight.color;
+    ambient.brightness += (brightness - ambient.brightness) * (1.0 - (-4.0 * time.delta_secs()).exp());
 }

@@ -5,46 +5,71 @@
 //! cargo run --release --features examples --example digger -- --headless --out out/digger
 //! ```
 //!
+//! A title, a menu and a game: `H` shows its keys, and all of them can be bound anew. Settings are kept in the user's
+//! folder of settings, in `bevy_burrow/digger.json`.
+//!
 //! | control | does |
 //! | --- | --- |
-//! | click, `Esc` | take the mouse, let go of it |
 //! | `W` `A` `S` `D` or arrows, `Shift`, `Space` | walk, run, jump |
-//! | left button | dig |
-//! | right button | build with the chosen material |
-//! | middle button or `G` | paint with it |
-//! | wheel | radius, 1 to 12 metres |
-//! | `1` to `8` | rock, grass, sand, snow, clay, concrete, coal, gold |
-//! | `C` | form: sphere, cube, capsule |
-//! | `F` | headlamp |
-//! | `H` | help |
-//! | `Q` | quit |
+//! | left button | uses the tool in hand; held, again and again |
+//! | right button | builds with the chosen material, as far as what was dug allows |
+//! | wheel | size of the brush |
+//! | `1` to `7` | pickaxe, shovel, drill, builder, painter, bomb, lamp |
+//! | `Q` `E`, `C` | material, form of what is built |
+//! | `F`, `Z` `Y` | headlamp; undo, redo |
+//! | `F1` `F2` `F3` | panel, lines of the ground, frame times |
+//! | `H`, `Esc` | help, pause |
+//!
+//! A gamepad does all of that too, with `--features examples,gamepad`.
 //!
 //! Without a display or a graphics adapter, or with `--headless`, it plays a script instead: a walk up to a hillside, a
-//! tunnel with a bend and a room, a bridge, a pit across a chunk corner. Pictures and a summary go to `--out`.
+//! tunnel with a bend and a room, a bridge, a pit across a chunk corner. Pictures and a summary go to `--out`. With
+//! `--tour` it films a minute of play, frame by frame.
 //!
 //! | file | subject |
 //! | --- | --- |
-//! | `landscape.rs` | heights and materials: the terrain |
-//! | `sky.rs`, `light.rs` | sky, sun, haze, caves, headlamp, camera |
-//! | `mover.rs`, `player.rs` | the walker's body; keys, mouse and eyes |
-//! | `tools.rs`, `hud.rs` | dig, build, paint; what is written on the window |
-//! | `places.rs`, `works.rs` | where the script digs, and what |
-//! | `script.rs`, `studio.rs`, `headless.rs` | the story; who plays it; the app without a window |
+//! | `phase.rs`, `menu.rs` and `menu/`, `ui.rs`, `art.rs` | title, pause, settings, controls, help |
+//! | `input.rs`, `settings.rs` | actions and their keys; what the player may set |
+//! | `player.rs`, `mover.rs` | the player's eyes and body |
+//! | `tools.rs`, `held.rs` | the tools, and how they look in hand |
+//! | `work.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
+//! | `bombs.rs`, `lamps.rs`, `particles.rs` | what flies, what shines, what crumbles |
+//! | `landscape.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
+//! | `hud.rs`, `frames.rs` | what is written over it all |
+//! | `places.rs`, `works.rs` | where scripts dig, and what |
+//! | `script.rs`, `tour.rs` | two stories |
+//! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
 //! | `wires.rs`, `report.rs` | lines of a seam; receipts, times and the summary |
 
+mod art;
+mod bombs;
+mod day;
+mod film;
+mod frames;
 mod headless;
+mod held;
 mod hud;
+mod input;
+mod inventory;
+mod lamps;
 mod landscape;
 mod light;
+mod menu;
 mod mover;
+mod particles;
+mod phase;
 mod places;
 mod player;
 mod report;
 mod script;
+mod settings;
 mod sky;
 mod studio;
 mod tools;
+mod tour;
+mod ui;
 mod wires;
+mod work;
 mod works;
 
 use std::path::PathBuf;
@@ -55,12 +80,23 @@ use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
 use clap::Parser;
 
+use crate::settings::SettingsFile;
+
 /// First person on a real landscape, with a shovel.
 #[derive(Parser, Clone, Debug)]
 pub struct Options {
     /// Play the script and write pictures, even where a window could be opened.
     #[arg(long)]
     headless: bool,
+    /// Film a minute of play instead, frame by frame.
+    #[arg(long)]
+    tour: bool,
+    /// Frames of the tour that are drawn, evenly spread; all of them without it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
+    frames: Option<u32>,
+    /// Frames in a second of the tour.
+    #[arg(long, value_name = "F", default_value_t = 30, value_parser = clap::value_parser!(u32).range(10..=120))]
+    fps: u32,
     /// Folder for the script's pictures and summary.
     #[arg(long, value_name = "DIR", default_value = "out/digger")]
     out: PathBuf,
@@ -99,6 +135,9 @@ impl Computer {
 fn main() -> ExitCode {
     let options = Options::parse();
     let renderer = headless::find_renderer();
+    if options.tour {
+        return tour::run(&options, renderer);
+    }
     if options.headless || !has_display() || renderer.is_none() {
         return script::run(&options, renderer);
     }
@@ -110,29 +149,48 @@ fn main() -> ExitCode {
     }
 }
 
-/// Everything of the game that needs no window.
-pub fn game(app: &mut App, engine: BurrowEngine) {
-    app.insert_resource(engine).add_plugins((
-        BurrowPlugins,
-        landscape::LandscapePlugin,
-        sky::SkyPlugin,
-        light::LightPlugin,
-        player::PlayerPlugin,
-        tools::ToolsPlugin,
-        report::LogbookPlugin,
-    ));
+/// Everything of the game, in a window or not.
+pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
+    app.insert_resource(engine)
+        .add_plugins((
+            BurrowPlugins,
+            settings::SettingsPlugin(settings),
+            input::InputPlugin,
+            phase::PhasePlugin,
+            landscape::LandscapePlugin,
+            sky::SkyPlugin,
+            day::DayPlugin,
+            light::LightPlugin,
+        ))
+        .add_plugins((
+            player::PlayerPlugin,
+            tools::ToolsPlugin,
+            held::HeldPlugin,
+            work::WorkPlugin,
+            inventory::InventoryPlugin,
+            particles::ParticlesPlugin,
+            bombs::BombsPlugin,
+            lamps::LampsPlugin,
+        ))
+        .add_plugins((
+            art::ArtPlugin,
+            ui::UiPlugin,
+            menu::MenuPlugin,
+            hud::HudPlugin,
+            frames::FramesPlugin,
+            report::LogbookPlugin,
+        ));
 }
 
 fn open_window(options: &Options) -> App {
     let window = Window {
-        title: "bevy_burrow: digger".into(),
+        title: "Digger".into(),
         resolution: (options.width, options.height).into(),
         ..default()
     };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
-    game(&mut app, options.backend.engine());
-    app.add_plugins(hud::HudPlugin);
+    game(&mut app, options.backend.engine(), SettingsFile::of_user());
     app
 }
 

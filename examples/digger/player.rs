@@ -1,16 +1,14 @@
-//! The player: keys and mouse steer a [`Body`], and the camera looks through its eyes.
+//! The player: actions steer a [`Body`], and the camera looks through its eyes.
 
-use bevy::input::mouse::AccumulatedMouseMotion;
 use bevy::prelude::*;
-use bevy::window::{CursorGrabMode, CursorOptions, PrimaryWindow};
 use bevy_burrow::prelude::*;
 
-use crate::light::{Eyes, LampSwitch};
+use crate::input::{Action, Actions};
+use crate::light::Eyes;
 use crate::mover::{Body, Steering};
+use crate::phase::Phase;
 use crate::places::Places;
-
-/// Radians for each pixel that the mouse moves.
-const SENSITIVITY: f32 = 0.0024;
+use crate::settings::Settings;
 
 /// Who digs here.
 #[derive(Component, Clone, Copy, Debug, Default)]
@@ -28,26 +26,38 @@ pub struct Player {
 #[derive(Component)]
 pub struct Drone;
 
-/// Systems that obey the mouse once it is captured; all of them come before [`BurrowSystems::Collect`].
+/// How hard the eyes are shaken by blows and blasts, 0 to 1.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct Tremor(f32);
+
+impl Tremor {
+    /// A shake more.
+    pub fn nudge(&mut self, by: f32) {
+        self.0 = (self.0 + by).min(1.2);
+    }
+}
+
+/// Systems that obey the player; all of them come before [`BurrowSystems::Collect`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct UsesMouse;
+pub struct Playing;
 
 /// Spawns the player when the terrain is there, and moves it.
 pub struct PlayerPlugin;
 
 impl Plugin for PlayerPlugin {
     fn build(&self, app: &mut App) {
-        app.configure_sets(Update, UsesMouse.before(BurrowSystems::Collect))
+        app.init_resource::<Tremor>()
+            .configure_sets(Update, Playing.before(BurrowSystems::Collect))
             .add_observer(arrive)
             .add_systems(
                 Update,
                 (
-                    capture_mouse.before(UsesMouse),
-                    (look, steer, press_keys).run_if(mouse_is_captured).in_set(UsesMouse),
+                    (look, steer).run_if(in_state(Phase::Playing)).in_set(Playing),
                     // After a commit, so that who was built over gets out in the same frame.
                     (walk, see).chain().after(BurrowSystems::Commit),
                 ),
-            );
+            )
+            .add_systems(OnExit(Phase::Playing), stand_still);
     }
 }
 
@@ -64,11 +74,6 @@ impl Player {
     }
 }
 
-/// Does the mouse belong to the game? Never where there is no window.
-pub fn mouse_is_captured(cursor: Query<&CursorOptions, With<PrimaryWindow>>) -> bool {
-    cursor.single().is_ok_and(|cursor| cursor.grab_mode != CursorGrabMode::None)
-}
-
 fn arrive(ready: On<TerrainReady>, mut commands: Commands, terrains: Query<&Terrain>, places: Res<Places>) {
     let Ok(terrain) = terrains.get(ready.entity) else { return };
     let start = places.hillside.start().as_dvec2();
@@ -78,58 +83,38 @@ fn arrive(ready: On<TerrainReady>, mut commands: Commands, terrains: Query<&Terr
     commands.spawn((Name::new("player"), Player::looking(body.eye(), hill), body));
 }
 
-/// A click takes the mouse, and does nothing else; Escape lets go of it.
-fn capture_mouse(
-    mut mouse: ResMut<ButtonInput<MouseButton>>,
-    keys: Res<ButtonInput<KeyCode>>,
-    mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>,
-) {
-    let Ok(mut cursor) = cursors.single_mut() else { return };
-    let is_free = cursor.grab_mode == CursorGrabMode::None;
-    if mouse.just_pressed(MouseButton::Left) && is_free {
-        (cursor.visible, cursor.grab_mode) = (false, CursorGrabMode::Locked);
-        mouse.reset(MouseButton::Left);
-    }
-    if keys.just_pressed(KeyCode::Escape) {
-        (cursor.visible, cursor.grab_mode) = (true, CursorGrabMode::None);
-    }
-}
-
-fn look(motion: Res<AccumulatedMouseMotion>, mut players: Query<&mut Player>) {
+fn look(actions: Res<Actions>, settings: Res<Settings>, mut players: Query<&mut Player>) {
+    let up = if settings.invert_y { -1.0 } else { 1.0 };
     for mut player in &mut players {
-        player.yaw -= motion.delta.x * SENSITIVITY;
-        player.pitch = (player.pitch - motion.delta.y * SENSITIVITY).clamp(-1.54, 1.54);
+        let turn = actions.look * settings.sensitivity;
+        player.yaw -= turn.x;
+        player.pitch = (player.pitch - up * turn.y).clamp(-1.54, 1.54);
     }
 }
 
-fn steer(keys: Res<ButtonInput<KeyCode>>, mut players: Query<(&Player, &mut Steering)>) {
-    let axis = |plus: [KeyCode; 2], minus: [KeyCode; 2]| {
-        f32::from(u8::from(keys.any_pressed(plus))) - f32::from(u8::from(keys.any_pressed(minus)))
-    };
-    let ahead = axis([KeyCode::KeyW, KeyCode::ArrowUp], [KeyCode::KeyS, KeyCode::ArrowDown]);
-    let aside = axis([KeyCode::KeyD, KeyCode::ArrowRight], [KeyCode::KeyA, KeyCode::ArrowLeft]);
+/// Steered by nobody: a script has put down its own way.
+#[derive(Component)]
+pub struct Scripted;
+
+fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut Steering), Without<Scripted>>) {
     for (player, mut steering) in &mut players {
-        let way = Quat::from_rotation_y(player.yaw) * Vec3::new(aside, 0.0, -ahead);
-        steering.direction = way.xz().clamp_length_max(1.0);
-        steering.run = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-        steering.jump = keys.pressed(KeyCode::Space);
+        let way = Quat::from_rotation_y(player.yaw) * Vec3::new(actions.walk.x, 0.0, -actions.walk.y);
+        steering.direction = way.xz();
+        steering.run = actions.pressed(Action::Run);
+        steering.jump = actions.pressed(Action::Jump);
     }
 }
 
-fn press_keys(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut lamp: ResMut<LampSwitch>,
-    mut exit: MessageWriter<AppExit>,
-) {
-    if keys.just_pressed(KeyCode::KeyF) {
-        lamp.0 = !lamp.0;
-    }
-    if keys.just_pressed(KeyCode::KeyQ) {
-        exit.write(AppExit::Success);
+fn stand_still(mut players: Query<&mut Steering, Without<Scripted>>) {
+    for mut steering in &mut players {
+        *steering = default();
     }
 }
 
 fn walk(time: Res<Time>, terrains: Terrains, mut players: Query<(&mut Player, &mut Body, &Steering)>) {
+    if time.delta_secs() == 0.0 {
+        return;
+    }
     for (mut player, mut body, steering) in &mut players {
         let before = body.feet.y;
         body.advance(&terrains, steering, time.delta_secs());
@@ -140,10 +125,19 @@ fn walk(time: Res<Time>, terrains: Terrains, mut players: Query<(&mut Player, &m
     }
 }
 
-fn see(players: Query<(&Player, &Body)>, mut eyes: Query<&mut Transform, (With<Eyes>, Without<Drone>)>) {
+fn see(
+    time: Res<Time>,
+    mut tremor: ResMut<Tremor>,
+    players: Query<(&Player, &Body)>,
+    mut eyes: Query<&mut Transform, (With<Eyes>, Without<Drone>)>,
+) {
+    tremor.0 *= (-6.5 * time.delta_secs()).exp();
     let Ok((player, body)) = players.single() else { return };
+    // Three sines that never meet: nobody sees that it is no chance.
+    let (t, strength) = (time.elapsed_secs(), 0.022 * tremor.0 * tremor.0.max(0.35));
+    let shake = Vec3::new((t * 61.0).sin(), (t * 47.0 + 1.0).sin(), (t * 39.0 + 2.0).sin()) * strength;
     for mut eyes in &mut eyes {
         eyes.translation = body.eye() - Vec3::Y * player.lag;
-        eyes.rotation = player.rotation();
+        eyes.rotation = player.rotation() * Quat::from_euler(EulerRot::YXZ, shake.x, shake.y, shake.z);
     }
 }

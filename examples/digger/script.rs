@@ -13,7 +13,7 @@ use crate::Options;
 use crate::places::{Hillside, Places, Ravine, TUNNEL_RADIUS};
 use crate::report::{Logbook, Report};
 use crate::studio::Studio;
-use crate::tools::Tools;
+use crate::tools::{Hand, Tool};
 use crate::wires::Wires;
 use crate::works;
 
@@ -210,8 +210,12 @@ impl Stage {
         Ok(place.with_y(height as f32 + metres))
     }
 
+    /// The builder's ball, where it would be put.
     fn preview(&mut self, on: bool) {
-        self.studio.world().resource_mut::<Tools>().preview = on;
+        let mut hand = self.studio.world().resource_mut::<Hand>();
+        hand.preview = on;
+        hand.tool = if on { Tool::Builder } else { Tool::Pickaxe };
+        hand.set_radius(Tool::Builder, 3.0);
     }
 
     fn report(&mut self, places: &Places, start: Instant) -> Result<Report> {

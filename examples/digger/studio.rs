@@ -3,6 +3,7 @@
 //! The script is an ordinary player: it steers the same body with the same [`Steering`] and sends the same [`Brush`]
 //! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
 
+use std::f32::consts::PI;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -15,27 +16,34 @@ use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_dis
 use bevy_burrow::prelude::*;
 
 use crate::Options;
+use crate::day::Clock;
 use crate::headless::build_app;
+use crate::held::ShowHand;
+use crate::hud::ShowHud;
+use crate::input::{Action, Actions};
 use crate::light::{Eyes, LampSwitch};
 use crate::mover::{Body, Steering};
-use crate::player::{Drone, Player};
+use crate::phase::Phase;
+use crate::player::{Drone, Player, Scripted};
 use crate::report::{EditTime, FrameTimes, Logbook};
+use crate::tools::Hand;
 
 /// Longest wait for the landscape.
-const PATIENCE: Duration = Duration::from_secs(300);
+pub const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Pictures that lie on the disk, as far as the renderer told.
 #[derive(Resource, Default)]
-struct Developed(usize);
+pub struct Developed(pub usize);
 
 /// An app without a window, and what came of its edits and pictures.
 pub struct Studio {
-    app: App,
+    pub app: App,
     eyes: Entity,
     player: Entity,
     /// Where pictures are drawn; `None` without a renderer.
-    film: Option<Handle<Image>>,
-    folder: PathBuf,
+    pub film: Option<Handle<Image>>,
+    /// Where they are written.
+    pub folder: PathBuf,
     is_warm: bool,
     /// Is every frame drawn, and not only the pictures?
     draws_all: bool,
@@ -72,6 +80,15 @@ impl Studio {
         let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
         let player = wait_for_player(&mut app)?;
+        let world = app.world_mut();
+        world.entity_mut(player).insert(Scripted);
+        // A bright afternoon that lasts, and no title.
+        world.resource_mut::<Clock>().runs = false;
+        world.resource_mut::<ShowHud>().0 = false;
+        world.resource_mut::<ShowHand>().0 = false;
+        world.resource_mut::<Hand>().preview = false;
+        world.resource_mut::<NextState<Phase>>().set(Phase::Playing);
+        app.update();
         let film = renders.then_some(film);
         let mut studio = Self {
             app,
@@ -153,6 +170,52 @@ impl Studio {
         self.put(Body::at(Vec3::new(place.x, height as f32, place.y)))?;
         self.wait(10);
         Ok(())
+    }
+
+    /// Puts the player's feet to a place, as only a script can.
+    pub fn stand_at(&mut self, feet: Vec3) -> Result {
+        self.put(Body::at(feet))
+    }
+
+    /// Where the player's feet are.
+    pub fn feet(&self) -> Result<Vec3> {
+        Ok(self.body()?.feet)
+    }
+
+    /// Where the player walks from now on, at most 1 long.
+    pub fn walk(&mut self, direction: Vec2) {
+        if let Some(mut steering) = self.app.world_mut().get_mut::<Steering>(self.player) {
+            *steering = Steering { direction, run: false, jump: false };
+        }
+    }
+
+    /// Turns the player's head some part of the way to a place.
+    pub fn gaze(&mut self, place: Vec3, part: f32) -> Result {
+        let eye = self.body()?.eye();
+        let mut player = self.app.world_mut().get_mut::<Player>(self.player).ok_or("there is no player")?;
+        let goal = Player::looking(eye, place);
+        let turn = (goal.yaw - player.yaw + PI).rem_euclid(2.0 * PI) - PI;
+        player.yaw += turn * part;
+        player.pitch += (goal.pitch - player.pitch) * part;
+        Ok(())
+    }
+
+    /// What the player holds down from now on.
+    pub fn hold(&mut self, actions: &[Action]) {
+        let mut held = self.app.world_mut().resource_mut::<Actions>();
+        held.puppet.clear();
+        held.puppet.extend_from_slice(actions);
+    }
+
+    /// The camera leaves the player.
+    pub fn fly_to(&mut self, eye: Vec3, at: Vec3) {
+        let place = Transform::from_translation(eye).looking_at(at, Vec3::Y);
+        self.app.world_mut().entity_mut(self.eyes).insert((Drone, place));
+    }
+
+    /// The camera is back in the player's head.
+    pub fn land(&mut self) {
+        self.app.world_mut().entity_mut(self.eyes).remove::<Drone>();
     }
 
     /// Turns the player's head.
@@ -255,13 +318,15 @@ impl Studio {
         shot
     }
 
-    fn film_runs(&mut self, runs: bool) {
+    /// Does the camera draw?
+    pub fn film_runs(&mut self, runs: bool) {
         if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.eyes) {
             camera.is_active = runs;
         }
     }
 
-    fn step_and_draw(&mut self) {
+    /// One frame, drawn to its end.
+    pub fn step_and_draw(&mut self) {
         let start = Instant::now();
         self.app.update();
         self.finish_drawing();

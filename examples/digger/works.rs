@@ -71,6 +71,38 @@ pub fn room(hillside: &Hillside) -> Vec<Brush> {
     ]
 }
 
+/// Seams of clay and coal around the second leg of the tunnel, a little tilted, and nests of gold.
+pub fn strata(hillside: &Hillside) -> Vec<Brush> {
+    let [_, bend, end] = hillside.floor();
+    let onward = Vec3::new(hillside.onward.x, 0.0, hillside.onward.y);
+    let aside = onward.cross(Vec3::Y);
+    let middle = bend.midpoint(end);
+    let turn = Quat::from_rotation_arc(Vec3::X, onward) * Quat::from_euler(EulerRot::ZYX, 0.10, 0.0, 0.06);
+    let seam = |up: f32, thickness: f32, material, seed| {
+        let half = Vec3::new(onward_half(bend, end), thickness, 9.0);
+        let shape = Shape::turned_cuboid(middle + Vec3::Y * up, half, turn);
+        Brush::paint(shape, material).with_roughness(Roughness::new(0.7, 6.0, seed))
+    };
+    let nest = |along: f32, across: f32, up: f32, radius: f32| {
+        let place = bend + onward * along + aside * across + Vec3::Y * up;
+        Brush::paint(Shape::sphere(place, radius), GOLD).with_roughness(Roughness::new(0.8, 2.0, 31))
+    };
+    vec![
+        seam(0.2, 0.8, CLAY, 7),
+        seam(2.6, 0.7, COAL, 8),
+        seam(4.6, 0.6, CLAY, 9),
+        nest(6.0, 2.2, 1.6, 1.0),
+        nest(10.0, -2.4, 1.0, 1.2),
+        nest(14.0, 1.8, 3.0, 1.1),
+        nest(19.0, -1.6, 2.2, 1.3),
+    ]
+}
+
+/// Half the length of a seam that reaches past both ends.
+fn onward_half(bend: Vec3, end: Vec3) -> f32 {
+    bend.distance(end) / 2.0 + 6.0
+}
+
 /// An arch of blocks from bank to bank, posts on it, a deck on those, two parapets, and a ramp at either end.
 pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
     const WIDTH: f32 = 2.6;

@@ -1,0 +1,101 @@
+//! Facts about bombs.
+
+use std::time::Duration;
+
+use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::plugin::TerrainPlugin;
+
+use super::*;
+
+/// A flat world, 64 wide and 20 high, with bombs in it and nobody to throw them.
+fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, TransformPlugin, TerrainPlugin))
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)))
+        .init_resource::<Inventory>()
+        .init_resource::<Blows>()
+        .init_resource::<Tremor>()
+        .add_message::<Burst>()
+        .add_systems(Update, (move_bombs, burn_fuses).chain().before(BurrowSystems::Collect))
+        .add_observer(explode)
+        .add_observer(shake);
+    let ground = Ground::from_fn(64, 64, |_, _| 20.0).expect("a small world");
+    app.world_mut().spawn(Terrain::new(ground, &TerrainSettings::default()).expect("default settings"));
+    let is_ready = |app: &mut App| {
+        app.world_mut().run_system_cached(|terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0)))
+    };
+    for _ in 0..1000 {
+        app.update();
+        if is_ready(&mut app).is_ok_and(|ready| ready) {
+            return app;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    panic!("the world did not load");
+}
+
+fn throw_from(app: &mut App, place: Vec3, velocity: Vec3) -> Entity {
+    app.world_mut().spawn((Bomb { velocity, fuse: FUSE }, Transform::from_translation(place))).id()
+}
+
+#[test]
+fn a_bomb_bounces_and_never_gets_into_the_ground() {
+    let mut app = app();
+    let throws = [Vec3::new(3.0, -20.0, 0.0), Vec3::new(6.0, 4.0, 2.0), Vec3::ZERO];
+    let bombs = throws.map(|velocity| throw_from(&mut app, Vec3::new(30.0, 24.0, 30.0), velocity));
+    let mut bounced = false;
+    for _ in 0..120 {
+        app.update();
+        for bomb in bombs {
+            let (place, bomb) = (app.world().get::<Transform>(bomb), app.world().get::<Bomb>(bomb));
+            let (Some(place), Some(bomb)) = (place, bomb) else { panic!("it went off early") };
+            assert!(place.translation.y > 20.0, "{place:?}");
+            bounced |= bomb.velocity.y > 1.0 && place.translation.y < 21.0;
+        }
+    }
+    assert!(bounced);
+}
+
+#[test]
+fn a_blast_takes_a_hole_and_what_it_took_is_in_the_inventory() {
+    let mut app = app();
+    app.add_systems(
+        Update,
+        (|mut receipts: MessageReader<BrushApplied>, mut inventory: ResMut<Inventory>| {
+            for receipt in receipts.read() {
+                inventory.enter(&receipt.receipt);
+            }
+        })
+        .after(BurrowSystems::Commit),
+    );
+    let bomb = throw_from(&mut app, Vec3::new(30.0, 21.0, 30.0), Vec3::ZERO);
+    for _ in 0..(FUSE / 0.016) as u32 + 400 {
+        app.update();
+        if app.world().resource::<Inventory>().stock(MaterialId(0)) > 0 {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(app.world().get_entity(bomb).is_err(), "it went off");
+    let height = app.world_mut().run_system_cached(|terrains: Terrains| terrains.height(30.0, 30.0));
+    assert!(height.is_ok_and(|height| height.is_some_and(|height| height < 17.0)), "{height:?}");
+    // Half a ball, more or less.
+    let dug = app.world().resource::<Inventory>().stock(MaterialId(0));
+    assert!((150..700).contains(&dug), "{dug}");
+}
+
+#[test]
+fn bombs_set_each_other_off() {
+    let mut app = app();
+    let first = throw_from(&mut app, Vec3::new(30.0, 21.0, 30.0), Vec3::ZERO);
+    let second = throw_from(&mut app, Vec3::new(33.0, 21.0, 30.0), Vec3::ZERO);
+    let far = throw_from(&mut app, Vec3::new(55.0, 21.0, 55.0), Vec3::ZERO);
+    let fuse = |app: &mut App, bomb: Entity| app.world_mut().get_mut::<Bomb>(bomb).map(|bomb| bomb.fuse);
+    if let Some(mut bomb) = app.world_mut().get_mut::<Bomb>(first) {
+        bomb.fuse = 0.01;
+    }
+    app.update();
+    assert!(app.world().get_entity(first).is_err());
+    assert!(fuse(&mut app, second).is_some_and(|fuse| fuse < 0.5));
+    assert!(fuse(&mut app, far).is_some_and(|fuse| fuse > 2.0));
+}

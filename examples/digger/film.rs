@@ -1,0 +1,145 @@
+//! A camera for films: every frame takes the same time, shows every edit that was sent before it, and becomes a
+//! picture. The same script gives the same film on every machine, however slow it draws.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use bevy::prelude::*;
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
+use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::prelude::*;
+
+use crate::studio::{Developed, PATIENCE, Studio};
+
+/// A film that is being made.
+pub struct Film {
+    pub studio: Studio,
+    /// Frames in a second of film.
+    pub fps: u32,
+    /// Every so many frames one is drawn.
+    every: f64,
+    /// Frames that were played, and drawn.
+    played: usize,
+    drawn: usize,
+    /// Was the frame before this one drawn?
+    is_warm: bool,
+}
+
+impl Film {
+    /// `drawn` of all `frames` are drawn, evenly spread.
+    pub fn new(studio: Studio, fps: u32, frames: usize, drawn: usize) -> Self {
+        let every = frames as f64 / drawn.clamp(1, frames.max(1)) as f64;
+        Self { studio, fps, every, played: 0, drawn: 0, is_warm: false }
+    }
+
+    /// Frames that were drawn so far.
+    pub fn drawn(&self) -> usize {
+        self.drawn
+    }
+
+    /// Plays so many seconds. `direct` is called before each frame, with how far the scene is, 0 to 1.
+    ///
+    /// # Errors
+    /// What `direct` says, or when edits or pictures get lost.
+    pub fn play(&mut self, seconds: f32, mut direct: impl FnMut(&mut Studio, f32) -> Result) -> Result {
+        let frames = (seconds * self.fps as f32).round() as usize;
+        for frame in 0..frames {
+            direct(&mut self.studio, frame as f32 / frames as f32)?;
+            self.settle()?;
+            self.frame()?;
+        }
+        Ok(())
+    }
+
+    /// Lets edits come home without any time passing.
+    ///
+    /// # Errors
+    /// When they don't.
+    pub fn settle(&mut self) -> Result {
+        self.pass(Duration::ZERO);
+        let start = Instant::now();
+        loop {
+            let far = Vec3::splat(1.0e5);
+            let is_ready = self
+                .studio
+                .world()
+                .run_system_cached(move |terrains: Terrains| terrains.is_ready(-far, far))
+                .map_err(|error| error.to_string())?;
+            if is_ready {
+                return Ok(());
+            }
+            if start.elapsed() > PATIENCE {
+                return Err("an edit did not come home".into());
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            self.studio.app.update();
+        }
+    }
+
+    fn pass(&mut self, time: Duration) {
+        self.studio.world().insert_resource(TimeUpdateStrategy::ManualDuration(time));
+    }
+
+    fn frame(&mut self) -> Result {
+        let is_drawn = self.played as f64 >= self.drawn as f64 * self.every;
+        self.played += 1;
+        self.studio.film_runs(is_drawn);
+        if is_drawn && !self.is_warm {
+            // Lights need a few frames to find what they shine on.
+            for _ in 0..4 {
+                self.studio.step_and_draw();
+            }
+        }
+        self.is_warm = is_drawn;
+        self.pass(Duration::from_secs(1) / self.fps);
+        if is_drawn {
+            self.expose()?;
+        } else {
+            self.studio.app.update();
+        }
+        Ok(())
+    }
+
+    /// Draws a frame into a file.
+    fn expose(&mut self) -> Result {
+        let Some(image) = self.studio.film.clone() else {
+            self.studio.app.update();
+            self.drawn += 1;
+            return Ok(());
+        };
+        let path = self.path(self.drawn);
+        let mut save = save_to_disk(path);
+        let develop = move |picture: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| {
+            save(picture);
+            developed.0 += 1;
+        };
+        self.studio.world().spawn(Screenshot::image(image)).observe(develop);
+        self.studio.step_and_draw();
+        self.drawn += 1;
+        // Some pictures may be on their way, but not all of them.
+        self.develop(3)
+    }
+
+    /// Waits until no more than some pictures are on their way to the disk.
+    ///
+    /// # Errors
+    /// When they don't come.
+    pub fn develop(&mut self, on_their_way: usize) -> Result {
+        if self.studio.film.is_none() {
+            return Ok(());
+        }
+        let start = Instant::now();
+        while self.studio.world().resource::<Developed>().0 + on_their_way < self.drawn {
+            if start.elapsed() > PATIENCE {
+                return Err("a picture was not written".into());
+            }
+            self.pass(Duration::ZERO);
+            self.studio.app.update();
+        }
+        Ok(())
+    }
+
+    fn path(&self, number: usize) -> PathBuf {
+        self.studio.folder.join(format!("frame_{number:05}.png"))
+    }
+}

@@ -1,0 +1,58 @@
+//! The pages of the menus: title, pause, settings, controls and help.
+
+mod controls;
+mod help;
+mod knobs;
+mod pause;
+mod title;
+
+use bevy::prelude::*;
+
+use crate::phase::Page;
+use crate::ui::{self, Chosen};
+
+/// All pages.
+pub struct MenuPlugin;
+
+impl Plugin for MenuPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins((
+            title::TitlePlugin,
+            pause::PausePlugin,
+            knobs::KnobsPlugin,
+            controls::ControlsPlugin,
+            help::HelpPlugin,
+        ));
+    }
+}
+
+/// A page in the middle of the window, with a headline and whatever `fill` puts below it; gone when the page is left.
+fn open(
+    commands: &mut Commands,
+    page: Page,
+    headline: &str,
+    width: f32,
+    fill: impl FnOnce(&mut ChildSpawnerCommands),
+) {
+    let middle = Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
+    let column = Node {
+        width: px(width),
+        padding: UiRect::axes(px(26), px(22)),
+        flex_direction: FlexDirection::Column,
+        row_gap: px(4),
+        ..default()
+    };
+    let veil = BackgroundColor(Color::srgba(0.0, 0.0, 0.02, 0.42));
+    commands.spawn((DespawnOnExit(page), middle, veil)).with_children(|middle| {
+        middle.spawn(ui::panel(column)).with_children(|column| {
+            let below = Node { margin: UiRect::bottom(px(12)), ..default() };
+            column.spawn((ui::text(headline, 30.0, ui::GOLD), below));
+            fill(column);
+        });
+    });
+}
+
+/// What an item that leads to another page does.
+fn go_to(page: Page) -> impl FnMut(On<Chosen>, ResMut<NextState<Page>>) {
+    move |_, mut next| next.set(page)
+}

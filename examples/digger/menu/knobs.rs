@@ -1,0 +1,144 @@
+//! The page of settings: a row for each, with its value between two arrows.
+
+use bevy::prelude::*;
+
+use super::go_to;
+use crate::phase::Page;
+use crate::settings::{Quality, Settings};
+use crate::ui::{self, Arrow, Chosen, Item, Turned};
+
+/// The page of settings.
+pub struct KnobsPlugin;
+
+impl Plugin for KnobsPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(OnEnter(Page::Settings), open)
+            .add_systems(Update, show_values.run_if(in_state(Page::Settings)));
+    }
+}
+
+/// One row: what it is called, what it says, and what turning it does.
+#[derive(Clone, Copy)]
+struct Knob {
+    label: &'static str,
+    value: fn(&Settings) -> String,
+    turn: fn(&mut Settings, i32),
+}
+
+const KNOBS: [Knob; 9] = [
+    Knob {
+        label: "Mouse and stick speed",
+        value: |settings| format!("{:.1}", settings.sensitivity),
+        turn: |settings, by| step(&mut settings.sensitivity, by, 0.1, 0.1, 5.0),
+    },
+    Knob {
+        label: "Invert up and down",
+        value: |settings| yes(settings.invert_y),
+        turn: |settings, _| settings.invert_y = !settings.invert_y,
+    },
+    Knob {
+        label: "Field of view",
+        value: |settings| format!("{:.0} degrees", settings.field_of_view),
+        turn: |settings, by| step(&mut settings.field_of_view, by, 5.0, 40.0, 110.0),
+    },
+    Knob {
+        label: "View distance",
+        value: |settings| format!("{:.0} m", settings.view_distance),
+        turn: |settings, by| step(&mut settings.view_distance, by, 200.0, 200.0, 6000.0),
+    },
+    Knob {
+        label: "Quality",
+        value: |settings| format!("{:?}", settings.quality).to_lowercase(),
+        turn: |settings, by| {
+            let all = [Quality::Low, Quality::Medium, Quality::High];
+            settings.quality = all[(settings.quality as usize).saturating_add_signed(by as isize).min(2)];
+        },
+    },
+    Knob {
+        label: "Length of a day",
+        value: |settings| match settings.day_minutes {
+            0.0 => "the sun stands still".into(),
+            minutes => format!("{minutes:.0} min"),
+        },
+        turn: |settings, by| step(&mut settings.day_minutes, by, 5.0, 0.0, 120.0),
+    },
+    Knob {
+        label: "Brush, at first",
+        value: |settings| format!("{:.1} m", settings.radius),
+        turn: |settings, by| step(&mut settings.radius, by, 0.5, 1.0, 12.0),
+    },
+    Knob {
+        label: "Form, at first",
+        value: |settings| settings.form.label().into(),
+        turn: |settings, by| settings.form = if by < 0 { settings.form.next().next() } else { settings.form.next() },
+    },
+    Knob {
+        label: "Build only what was dug",
+        value: |settings| yes(settings.survival),
+        turn: |settings, _| settings.survival = !settings.survival,
+    },
+];
+
+fn yes(is: bool) -> String {
+    if is { "yes" } else { "no" }.into()
+}
+
+fn step(number: &mut f32, by: i32, width: f32, low: f32, high: f32) {
+    // From mark to mark, whatever stood in the file.
+    *number = (((*number / width).round() + by as f32) * width).clamp(low, high);
+}
+
+/// The text that shows a knob's value.
+#[derive(Component)]
+struct Value(usize);
+
+fn open(mut commands: Commands) {
+    super::open(&mut commands, Page::Settings, "Settings", 600.0, |column| {
+        for (at, knob) in KNOBS.into_iter().enumerate() {
+            let row = Node {
+                padding: UiRect::axes(px(14), px(6)),
+                border: UiRect::left(px(4)),
+                border_radius: BorderRadius::all(px(4)),
+                justify_content: JustifyContent::SpaceBetween,
+                align_items: AlignItems::Center,
+                ..default()
+            };
+            let item = (Item(at), row, BackgroundColor::DEFAULT, BorderColor::all(Color::NONE));
+            column
+                .spawn(item)
+                .with_children(|row| {
+                    row.spawn(ui::text(knob.label, 18.0, ui::WHITE));
+                    let side = Node { align_items: AlignItems::Center, column_gap: px(4), ..default() };
+                    row.spawn(side).with_children(|side| {
+                        side.spawn(arrow("<", -1));
+                        let middle = Node { width: px(190), justify_content: JustifyContent::Center, ..default() };
+                        side.spawn((middle, children![(Value(at), ui::text("", 18.0, ui::GOLD))]));
+                        side.spawn(arrow(">", 1));
+                    });
+                })
+                .observe(move |turned: On<Turned>, mut settings: ResMut<Settings>| {
+                    (knob.turn)(&mut settings, turned.by);
+                });
+        }
+        let gap = Node { height: px(10), ..default() };
+        column.spawn(gap);
+        column.spawn(ui::button(KNOBS.len(), "As it was made", 540.0)).observe(reset);
+        column.spawn(ui::button(KNOBS.len() + 1, "Back", 540.0)).observe(go_to(Page::Menu));
+    });
+}
+
+fn arrow(sign: &str, by: i32) -> impl Bundle {
+    let node = Node { padding: UiRect::axes(px(10), px(2)), border_radius: BorderRadius::all(px(4)), ..default() };
+    (Arrow(by), node, BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.08)), children![ui::text(sign, 18.0, ui::WHITE)])
+}
+
+/// All but the keys, which have a page of their own.
+fn reset(_: On<Chosen>, mut settings: ResMut<Settings>) {
+    *settings = Settings { bindings: settings.bindings.clone(), ..default() };
+}
+
+fn show_values(settings: Res<Settings>, mut values: Query<(&Value, &mut Text)>) {
+    for (value, mut text) in &mut values {
+        text.set_if_neq(Text::new((KNOBS[value.0].value)(&settings)));
+    }
+}

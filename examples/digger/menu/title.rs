@@ -1,0 +1,121 @@
+//! The title: the name of the game and its menu, over a landscape that slowly turns.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use super::go_to;
+use crate::art::Art;
+use crate::light::Eyes;
+use crate::phase::{Page, Phase};
+use crate::places::Places;
+use crate::player::{Drone, Player};
+use crate::ui::{self, Chosen};
+
+/// Seconds for one turn around the landscape.
+const TURN: f32 = 150.0;
+
+/// The title's page and its camera.
+pub struct TitlePlugin;
+
+impl Plugin for TitlePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(OnEnter(Phase::Title), open_menu)
+            .add_systems(OnEnter(Page::Menu), open.run_if(in_state(Phase::Title)))
+            .add_systems(OnExit(Phase::Title), land)
+            .add_systems(
+                Update,
+                (fly.run_if(resource_exists::<Places>), tell_progress).run_if(in_state(Phase::Title)),
+            );
+    }
+}
+
+/// Says that the landscape is on its way; gone when it is there.
+#[derive(Component)]
+struct Progress;
+
+fn open_menu(mut page: ResMut<NextState<Page>>) {
+    page.set(Page::Menu);
+}
+
+fn open(mut commands: Commands, art: Option<Res<Art>>) {
+    let Some(art) = art else { return };
+    let left = Node {
+        padding: UiRect::left(px(84)),
+        flex_direction: FlexDirection::Column,
+        justify_content: JustifyContent::Center,
+        row_gap: px(6),
+        ..ui::full()
+    };
+    let shade = LinearGradient::new(
+        LinearGradient::TO_RIGHT,
+        vec![
+            ColorStop::new(Color::srgba(0.0, 0.0, 0.02, 0.78), percent(0)),
+            ColorStop::new(Color::srgba(0.0, 0.0, 0.02, 0.45), percent(36)),
+            ColorStop::new(Color::srgba(0.0, 0.0, 0.02, 0.0), percent(64)),
+        ],
+    );
+    let page = (DespawnOnExit(Page::Menu), left, BackgroundGradient::from(shade));
+    commands.spawn(page).with_children(|left| {
+        let logo = Node { width: px(424), height: px(88), margin: UiRect::bottom(px(4)), ..default() };
+        left.spawn((ImageNode::new(art.logo.clone()), logo));
+        let below = Node { margin: UiRect::bottom(px(34)), ..default() };
+        left.spawn((ui::text("real land, and all of it can be dug", 17.0, ui::GREY), below));
+        left.spawn(ui::button(0, "Dig", 260.0)).observe(start);
+        left.spawn(ui::button(1, "Settings", 260.0)).observe(go_to(Page::Settings));
+        left.spawn(ui::button(2, "Controls", 260.0)).observe(go_to(Page::Controls));
+        left.spawn(ui::button(3, "Help", 260.0)).observe(go_to(Page::Help));
+        left.spawn(ui::button(4, "Quit", 260.0)).observe(quit);
+        let word = Node { margin: UiRect::top(px(26)), ..default() };
+        left.spawn((Progress, ui::text("", 15.0, ui::GOLD), word));
+    });
+}
+
+/// Once there is someone to play.
+fn start(_: On<Chosen>, players: Query<(), With<Player>>, mut phase: ResMut<NextState<Phase>>) {
+    if !players.is_empty() {
+        phase.set(Phase::Playing);
+    }
+}
+
+fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
+    exit.write(AppExit::Success);
+}
+
+fn tell_progress(players: Query<(), With<Player>>, mut words: Query<&mut Text, With<Progress>>) {
+    let word = if players.is_empty() { "the landscape is being surveyed ..." } else { "" };
+    for mut text in &mut words {
+        text.set_if_neq(Text::new(word));
+    }
+}
+
+/// Around the tunnel's hill, over the ridges.
+fn fly(
+    mut commands: Commands,
+    time: Res<Time>,
+    places: Res<Places>,
+    terrains: Terrains,
+    mut eyes: Query<(Entity, &mut Transform), With<Eyes>>,
+    mut height: Local<Option<f32>>,
+) {
+    let centre = places.hillside.mouth + Vec3::Y * 12.0;
+    let angle = 0.9 + std::f32::consts::TAU * time.elapsed_secs() / TURN;
+    let out = Vec2::from_angle(angle) * 190.0;
+    let place = centre + Vec3::new(out.x, 0.0, out.y);
+    let Some(ground) = terrains.height(place.x, place.z) else { return };
+    let wish = (ground + 34.0).max(centre.y + 30.0);
+    let height = height.get_or_insert(wish);
+    *height += (wish - *height) * (1.0 - (-0.7 * time.delta_secs()).exp());
+    // The hill is seen to the right of the menu.
+    let aside = (centre - place).cross(Vec3::Y).normalize() * -55.0;
+    for (entity, mut eyes) in &mut eyes {
+        *eyes = Transform::from_translation(place.with_y(*height)).looking_at(centre + aside, Vec3::Y);
+        commands.entity(entity).insert_if_new(Drone);
+    }
+}
+
+/// Back into the player's head.
+fn land(mut commands: Commands, eyes: Query<Entity, With<Eyes>>) {
+    for eyes in &eyes {
+        commands.entity(eyes).remove::<Drone>();
+    }
+}

@@ -1,0 +1,93 @@
+//! Where the game stands: title, play, pause, and which page of a menu is open.
+
+use bevy::prelude::*;
+use bevy::window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused};
+
+use crate::input::{Action, Actions};
+
+/// What goes on.
+#[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Phase {
+    /// The landscape turns behind the menu.
+    #[default]
+    Title,
+    /// The player digs.
+    Playing,
+    /// Time stands still.
+    Paused,
+}
+
+/// Which menu is open.
+#[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Page {
+    /// None: the player plays.
+    None,
+    /// The title's menu, or that of the pause.
+    #[default]
+    Menu,
+    Settings,
+    Controls,
+    Help,
+}
+
+/// Goes from phase to phase; time and the mouse follow.
+pub struct PhasePlugin;
+
+impl Plugin for PhasePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_state::<Phase>()
+            .init_state::<Page>()
+            .add_systems(OnEnter(Phase::Playing), (close_menus, run_time, take_mouse, listen))
+            .add_systems(OnEnter(Phase::Paused), (stop_time, leave_mouse))
+            .add_systems(OnEnter(Phase::Title), (run_time, leave_mouse))
+            .add_systems(Update, pause.run_if(in_state(Phase::Playing)));
+    }
+}
+
+fn close_menus(mut page: ResMut<NextState<Page>>) {
+    page.set(Page::None);
+}
+
+/// The click that chose "dig" digs nothing.
+fn listen(mut actions: ResMut<Actions>) {
+    actions.forget();
+}
+
+fn run_time(mut time: ResMut<Time<Virtual>>) {
+    time.unpause();
+}
+
+fn stop_time(mut time: ResMut<Time<Virtual>>) {
+    time.pause();
+}
+
+fn take_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
+    for mut cursor in &mut cursors {
+        (cursor.visible, cursor.grab_mode) = (false, CursorGrabMode::Locked);
+    }
+}
+
+fn leave_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
+    for mut cursor in &mut cursors {
+        (cursor.visible, cursor.grab_mode) = (true, CursorGrabMode::None);
+    }
+}
+
+/// The pause key, the help key, and whatever takes the window away.
+fn pause(
+    actions: Res<Actions>,
+    mut focus: MessageReader<WindowFocused>,
+    mut phase: ResMut<NextState<Phase>>,
+    mut page: ResMut<NextState<Page>>,
+) {
+    let lost = focus.read().any(|event| !event.focused);
+    let help = actions.just_pressed(Action::Help);
+    if actions.just_pressed(Action::Pause) || help || lost {
+        phase.set(Phase::Paused);
+        page.set(if help { Page::Help } else { Page::Menu });
+    }
+}
+
+#[cfg(test)]
+#[path = "phase_tests.rs"]
+mod tests;

@@ -1,0 +1,72 @@
+//! Facts about the pause.
+
+use std::time::Duration;
+
+use bevy::input::InputPlugin as DevicePlugin;
+use bevy::state::app::StatesPlugin;
+use bevy::time::TimeUpdateStrategy;
+
+use super::*;
+use crate::day::Clock;
+use crate::input::InputPlugin;
+use crate::settings::Settings;
+
+fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PhasePlugin))
+        .add_message::<WindowFocused>()
+        .init_resource::<Settings>()
+        .init_resource::<Clock>()
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)))
+        .add_systems(Update, crate::day::tick);
+    app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
+    app.update();
+    app.update();
+    app
+}
+
+fn phase(app: &App) -> (Phase, Page) {
+    (**app.world().resource::<State<Phase>>(), **app.world().resource::<State<Page>>())
+}
+
+/// Holds an action for a frame, as a key would.
+fn press(app: &mut App, action: Action) {
+    app.world_mut().resource_mut::<Actions>().puppet.push(action);
+    app.update();
+    app.world_mut().resource_mut::<Actions>().puppet.clear();
+    app.update();
+}
+
+#[test]
+fn a_pause_stops_time_and_its_end_lets_it_run() {
+    let mut app = app();
+    let hour = |app: &App| app.world().resource::<Clock>().hour;
+    let before = hour(&app);
+    app.update();
+    assert!(hour(&app) > before);
+    press(&mut app, Action::Pause);
+    assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
+    let stopped = hour(&app);
+    for _ in 0..10 {
+        app.update();
+    }
+    assert_eq!(hour(&app), stopped);
+    app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
+    app.update();
+    app.update();
+    assert!(hour(&app) > stopped);
+    assert_eq!(phase(&app), (Phase::Playing, Page::None));
+}
+
+#[test]
+fn help_and_a_lost_window_pause_too() {
+    let mut app = app();
+    press(&mut app, Action::Help);
+    assert_eq!(phase(&app), (Phase::Paused, Page::Help));
+    app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
+    app.update();
+    app.world_mut().write_message(WindowFocused { window: Entity::PLACEHOLDER, focused: false });
+    app.update();
+    app.update();
+    assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
+}

@@ -1,0 +1,170 @@
+//! Settings of the player, in a small file in the folder where programs keep such things.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::input::Bindings;
+use crate::phase::Page;
+use crate::tools::Form;
+
+/// What the player may set. A file without some of it has the rest by default; what it does not know is ignored.
+#[derive(Resource, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// Times as fast as usual.
+    pub sensitivity: f32,
+    /// Does pushing the mouse away look down?
+    pub invert_y: bool,
+    /// Vertical field of view in degrees.
+    pub field_of_view: f32,
+    /// Metres to the far end of what is seen.
+    pub view_distance: f32,
+    pub quality: Quality,
+    /// Minutes from sunrise to sunrise; 0 stops the sun.
+    pub day_minutes: f32,
+    /// Of the pickaxe and the builder, in metres.
+    pub radius: f32,
+    /// Of what is built.
+    pub form: Form,
+    /// Does the inventory limit what is built?
+    pub survival: bool,
+    pub bindings: Bindings,
+}
+
+/// How much is spent on a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    Low,
+    #[default]
+    Medium,
+    High,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            sensitivity: 1.0,
+            invert_y: false,
+            field_of_view: 70.0,
+            view_distance: 3000.0,
+            quality: Quality::default(),
+            day_minutes: 20.0,
+            radius: 2.0,
+            form: Form::default(),
+            survival: true,
+            bindings: Bindings::default(),
+        }
+    }
+}
+
+/// Why a file of settings was not read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SettingsError {
+    #[error("{}: {error}", path.display())]
+    File { path: PathBuf, error: io::Error },
+    #[error("{}: {error}", path.display())]
+    Content { path: PathBuf, error: serde_json::Error },
+}
+
+impl Settings {
+    /// Reads a file; a missing one means defaults.
+    ///
+    /// # Errors
+    /// When it can't be read or understood.
+    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(error) => return Err(SettingsError::File { path: path.into(), error }),
+        };
+        let read: Self = serde_json::from_str(&text)
+            .map_err(|error| SettingsError::Content { path: path.into(), error })?;
+        Ok(read.within_reason())
+    }
+
+    /// Writes a file, whole or not at all.
+    ///
+    /// # Errors
+    /// When the folder or the file can't be written.
+    pub fn write(&self, path: &Path) -> Result<(), SettingsError> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| SettingsError::Content { path: path.into(), error })?;
+        let fresh = path.with_extension("new");
+        let write = || {
+            path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+            std::fs::write(&fresh, text)?;
+            std::fs::rename(&fresh, path)
+        };
+        write().map_err(|error| SettingsError::File { path: path.into(), error })
+    }
+
+    /// Numbers that someone wrote into the file by hand, as far as they make sense.
+    fn within_reason(mut self) -> Self {
+        let all = [
+            (&mut self.sensitivity, 0.1, 5.0),
+            (&mut self.field_of_view, 40.0, 110.0),
+            (&mut self.view_distance, 200.0, 6000.0),
+            (&mut self.day_minutes, 0.0, 120.0),
+            (&mut self.radius, 1.0, 12.0),
+        ];
+        for (number, low, high) in all {
+            *number = number.clamp(low, high);
+        }
+        self.bindings.complete();
+        self
+    }
+}
+
+/// Where the settings are kept; nowhere for scripts.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct SettingsFile(pub Option<PathBuf>);
+
+impl SettingsFile {
+    /// In the user's folder of settings.
+    pub fn of_user() -> Self {
+        let folder = |name: &str| std::env::var_os(name).filter(|folder| !folder.is_empty()).map(PathBuf::from);
+        let settings = if cfg!(windows) {
+            folder("APPDATA")
+        } else if cfg!(target_os = "macos") {
+            folder("HOME").map(|home| home.join("Library/Application Support"))
+        } else {
+            folder("XDG_CONFIG_HOME").or_else(|| folder("HOME").map(|home| home.join(".config")))
+        };
+        Self(settings.map(|settings| settings.join("bevy_burrow").join("digger.json")))
+    }
+}
+
+/// Reads the settings before anything else, and writes them when the player leaves their page.
+pub struct SettingsPlugin(pub SettingsFile);
+
+impl Plugin for SettingsPlugin {
+    fn build(&self, app: &mut App) {
+        let read = self.0.0.as_deref().map_or_else(|| Ok(Settings::default()), Settings::read);
+        let settings = read.unwrap_or_else(|error| {
+            // A broken file costs nobody the game.
+            warn!("the settings are ignored: {error}");
+            Settings::default()
+        });
+        app.insert_resource(settings)
+            .insert_resource(self.0.clone())
+            .add_systems(OnExit(Page::Settings), save)
+            .add_systems(OnExit(Page::Controls), save);
+    }
+}
+
+fn save(settings: Res<Settings>, file: Res<SettingsFile>) {
+    if let Some(path) = &file.0
+        && let Err(error) = settings.write(path)
+    {
+        warn!("the settings are not kept: {error}");
+    }
+}
+
+#[cfg(test)]
+#[path = "settings_tests.rs"]
+mod tests;

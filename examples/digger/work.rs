@@ -1,0 +1,151 @@
+//! What pickaxe, shovel, drill, builder and painter do to the ground: each hit is a [`Brush`] message, the game's only
+//! way into it. What the receipt says was broken flies off as chips.
+
+use std::collections::VecDeque;
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::hud::Hint;
+use crate::inventory::Inventory;
+use crate::particles::{Burst, Matter};
+use crate::player::Tremor;
+use crate::settings::Settings;
+use crate::tools::{Aim, Hand, Strike, Tool};
+
+/// Hits whose receipts are awaited at most; older ones are forgotten.
+const AWAITED: usize = 64;
+
+/// Lets tools work.
+pub struct WorkPlugin;
+
+impl Plugin for WorkPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Blows>()
+            .add_observer(dig)
+            .add_observer(build)
+            .add_observer(paint)
+            .add_systems(Update, throw_chips.after(BurrowSystems::Commit));
+    }
+}
+
+/// Where the hand hit, until the receipt comes.
+#[derive(Resource, Default)]
+pub struct Blows(VecDeque<Blow>);
+
+#[derive(Clone, Copy)]
+struct Blow {
+    tag: u64,
+    place: Vec3,
+    /// Where chips fly.
+    out: Vec3,
+    chips: f32,
+}
+
+impl Blows {
+    /// Chips will fly from there once the receipt of a brush is in: `chips` for each voxel that it took.
+    pub fn await_receipt(&mut self, tag: u64, place: Vec3, out: Vec3, chips: f32) {
+        if self.0.len() == AWAITED {
+            self.0.pop_front();
+        }
+        self.0.push_back(Blow { tag, place, out, chips });
+    }
+}
+
+/// Bumps as large as the tool allows make walls look broken, not milled.
+fn broken(brush: Brush, radius: f32) -> Brush {
+    brush.with_roughness(Roughness::new(0.14 * radius.min(6.0), 1.2 + 0.8 * radius, 1))
+}
+
+fn dig(
+    strike: On<Strike>,
+    hand: Res<Hand>,
+    mut inventory: ResMut<Inventory>,
+    mut blows: ResMut<Blows>,
+    mut tremor: ResMut<Tremor>,
+    mut brushes: MessageWriter<Brush>,
+) {
+    let Some(Aim { place, along, normal, .. }) = strike.aim else { return };
+    let radius = hand.radius(strike.tool);
+    let (brush, chips) = match strike.tool {
+        Tool::Pickaxe => (broken(Brush::dig(Shape::sphere(place + along * 0.3 * radius, radius)), radius), 0.8),
+        // Shaves off what stands out.
+        Tool::Shovel => (Brush::dig(Shape::sphere(place + normal * 0.8 * radius, radius)), 0.4),
+        Tool::Drill => {
+            let (from, to) = (place - along * 0.5, place + along * 1.4);
+            (broken(Brush::dig(Shape::capsule(from, to, radius)), radius), 0.25)
+        }
+        _ => return,
+    };
+    let tag = inventory.tag();
+    brushes.write(brush.with_tag(tag));
+    blows.await_receipt(tag, place, (normal - 0.4 * along).normalize_or(Vec3::Y), chips);
+    tremor.nudge(if strike.tool == Tool::Drill { 0.12 } else { 0.3 });
+}
+
+fn build(
+    strike: On<Strike>,
+    hand: Res<Hand>,
+    settings: Res<Settings>,
+    mut inventory: ResMut<Inventory>,
+    mut brushes: MessageWriter<Brush>,
+    mut hints: MessageWriter<Hint>,
+    mut bursts: MessageWriter<Burst>,
+) {
+    if strike.tool != Tool::Builder {
+        return;
+    }
+    let Some(aim) = strike.aim else { return };
+    let mut radius = hand.radius(Tool::Builder);
+    let tag = inventory.tag();
+    if settings.survival {
+        // As large as what is left allows.
+        let free = inventory.free(hand.material);
+        radius = radius.min((free.max(0) as f32 / hand.form.volume()).cbrt());
+        if radius < Tool::Builder.radii().0 * 0.8 {
+            hints.write(Hint::new(format!("not enough {}: dig some first", crate::landscape::name(hand.material))));
+            return;
+        }
+        let voxels = (hand.form.volume() * radius.powi(3)).ceil() as i64;
+        inventory.pledge(tag, hand.material, voxels.min(free));
+    }
+    brushes.write(Brush::add(hand.form.shape(&aim, radius), hand.material).with_tag(tag));
+    bursts.write(Burst {
+        place: aim.place + aim.normal * 0.5,
+        out: aim.normal,
+        count: 3,
+        speed: 1.5,
+        matter: Matter::Dust(hand.material),
+    });
+}
+
+fn paint(
+    strike: On<Strike>,
+    hand: Res<Hand>,
+    mut inventory: ResMut<Inventory>,
+    mut brushes: MessageWriter<Brush>,
+) {
+    let Some(aim) = strike.aim.filter(|_| strike.tool == Tool::Painter) else { return };
+    let shape = Shape::sphere(aim.place, hand.radius(Tool::Painter));
+    brushes.write(Brush::paint(shape, hand.material).with_tag(inventory.tag()));
+}
+
+/// Chips of each material that was broken, as many as it was.
+fn throw_chips(
+    mut receipts: MessageReader<BrushApplied>,
+    mut blows: ResMut<Blows>,
+    mut bursts: MessageWriter<Burst>,
+) {
+    for BrushApplied { receipt, .. } in receipts.read() {
+        let Some(at) = blows.0.iter().position(|blow| blow.tag == receipt.tag) else { continue };
+        let Some(blow) = blows.0.remove(at) else { continue };
+        let Ok(applied) = &receipt.outcome else { continue };
+        for (material, voxels) in applied.removed.iter() {
+            let count = (voxels as f32 * blow.chips).clamp(1.0, 40.0) as usize;
+            let burst = Burst { place: blow.place, out: blow.out, count, speed: 4.5, matter: Matter::Chips(material) };
+            bursts.write(burst.clone());
+            let puffs = (count / 10).clamp(1, 4);
+            bursts.write(Burst { count: puffs, speed: 1.2, matter: Matter::Dust(material), ..burst });
+        }
+    }
+}
