@@ -235,13 +235,20 @@ fn logo() -> Image {
     };
     image(width, 7 * DOT + 1, |x, y| {
         let (column, row) = (x as i32, y as i32);
-        let noise = (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35) >> 24;
+        let noise =
+            (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35) >> 24;
         if is_ink(column, row) {
             let shade = 1.0 - 0.18 * (noise as f32 / 255.0);
             let depth = y / DOT;
             let [r, g, b] = match depth {
                 0 => [132, 190, 76],
-                1 => if noise < 90 { [132, 190, 76] } else { [150, 104, 66] },
+                1 => {
+                    if noise < 90 {
+                        [132, 190, 76]
+                    } else {
+                        [150, 104, 66]
+                    }
+                }
                 2 => [158, 108, 68],
                 3 => [132, 116, 102],
                 _ if noise > 236 => [255, 208, 84],
@@ -262,8 +269,15 @@ fn logo() -> Image {
 
 fn swatch() -> Image {
     image(8, 8, |x, y| {
-        let noise = (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35) >> 24;
-        let edge = if y == 0 || x == 0 { 30 } else if y == 7 || x == 7 { -40 } else { 0 };
+        let noise =
+            (x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B)).wrapping_mul(0xC2B2_AE35) >> 24;
+        let edge = if y == 0 || x == 0 {
+            30
+        } else if y == 7 || x == 7 {
+            -40
+        } else {
+            0
+        };
         let grey = (200 + noise as i32 / 6 + edge).clamp(0, 255) as u8;
         [grey, grey, grey, 255]
     })

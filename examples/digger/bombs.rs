@@ -54,10 +54,7 @@ pub struct BombsPlugin;
 impl Plugin for BombsPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(Startup, found)
-            .add_systems(
-                Update,
-                (move_bombs, burn_fuses).chain().before(BurrowSystems::Collect),
-            )
+            .add_systems(Update, (move_bombs, burn_fuses).chain().before(BurrowSystems::Collect))
             .add_systems(Update, fade_flashes)
             .add_observer(throw)
             .add_observer(explode)
@@ -197,7 +194,11 @@ fn shake(blast: On<Blast>, mut tremor: ResMut<Tremor>, mut bodies: Query<&mut Bo
     }
 }
 
-fn fade_flashes(mut commands: Commands, time: Res<Time>, mut flashes: Query<(Entity, &mut Flash, &mut PointLight)>) {
+fn fade_flashes(
+    mut commands: Commands,
+    time: Res<Time>,
+    mut flashes: Query<(Entity, &mut Flash, &mut PointLight)>,
+) {
     for (entity, mut flash, mut light) in &mut flashes {
         flash.0 -= 2.4 * time.delta_secs();
         light.intensity = 60_000_000.0 * flash.0.max(0.0).powi(2);

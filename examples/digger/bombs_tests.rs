@@ -22,7 +22,8 @@ fn app() -> App {
     let ground = Ground::from_fn(64, 64, |_, _| 20.0).expect("a small world");
     app.world_mut().spawn(Terrain::new(ground, &TerrainSettings::default()).expect("default settings"));
     let is_ready = |app: &mut App| {
-        app.world_mut().run_system_cached(|terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0)))
+        app.world_mut()
+            .run_system_cached(|terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0)))
     };
     for _ in 0..1000 {
         app.update();

@@ -235,7 +235,9 @@ mod tests {
 
     #[test]
     fn the_sun_is_up_by_day_and_the_moon_by_night() {
-        for (hour, day) in [(0.0, false), (5.5, false), (6.5, true), (12.0, true), (17.5, true), (18.6, false)] {
+        for (hour, day) in
+            [(0.0, false), (5.5, false), (6.5, true), (12.0, true), (17.5, true), (18.6, false)]
+        {
             let clock = Clock { hour, runs: true };
             assert_eq!(clock.sun().y > 0.0, day, "at {hour}");
             assert!(clock.sun().y.max(clock.moon().y) > 0.0, "at {hour}");

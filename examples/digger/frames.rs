@@ -116,7 +116,13 @@ fn draw(
             [255, 120, 70, 255]
         } else if above <= rows(frame) {
             let ms = frame.as_secs_f32() * 1e3;
-            if ms <= 17.5 { [120, 200, 110, 255] } else if ms <= 34.0 { [235, 195, 85, 255] } else { [225, 95, 75, 255] }
+            if ms <= 17.5 {
+                [120, 200, 110, 255]
+            } else if ms <= 34.0 {
+                [235, 195, 85, 255]
+            } else {
+                [225, 95, 75, 255]
+            }
         } else if lines.contains(&y) {
             [255, 255, 255, 70]
         } else {

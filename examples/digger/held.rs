@@ -53,7 +53,12 @@ fn grip(
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
     let mut dye = |color: Color, roughness: f32, metallic: f32| {
-        materials.add(StandardMaterial { base_color: color, perceptual_roughness: roughness, metallic, ..default() })
+        materials.add(StandardMaterial {
+            base_color: color,
+            perceptual_roughness: roughness,
+            metallic,
+            ..default()
+        })
     };
     let wood = dye(Color::srgb(0.45, 0.29, 0.16), 0.85, 0.0);
     let steel = dye(Color::srgb(0.52, 0.55, 0.58), 0.42, 0.55);
@@ -61,7 +66,11 @@ fn grip(
     let red = dye(Color::srgb(0.66, 0.16, 0.10), 0.6, 0.0);
     let bristle = dye(Color::srgb(0.80, 0.72, 0.52), 0.95, 0.0);
     let sample = dye(Color::WHITE, 0.95, 0.0);
-    let glow = materials.add(StandardMaterial { base_color: Color::linear_rgb(2.6, 1.7, 0.6), unlit: true, ..default() });
+    let glow = materials.add(StandardMaterial {
+        base_color: Color::linear_rgb(2.6, 1.7, 0.6),
+        unlit: true,
+        ..default()
+    });
 
     let rod = meshes.add(Cylinder::new(0.010, 0.34));
     let spike = meshes.add(Cone::new(0.017, 0.13));
@@ -97,9 +106,25 @@ fn grip(
         (
             Tool::Drill,
             vec![
-                part(&tube, &red, at(0.0, 0.06, 0.03).with_rotation(pitch(FRAC_PI_2)).with_scale(Vec3::new(0.052, 0.15, 0.052))),
-                part(&tube, &dark, at(0.0, 0.06, -0.062).with_rotation(pitch(FRAC_PI_2)).with_scale(Vec3::new(0.036, 0.04, 0.036))),
-                part(&block, &dark, at(0.0, -0.02, 0.06).with_rotation(pitch(0.25)).with_scale(Vec3::new(0.03, 0.12, 0.04))),
+                part(
+                    &tube,
+                    &red,
+                    at(0.0, 0.06, 0.03)
+                        .with_rotation(pitch(FRAC_PI_2))
+                        .with_scale(Vec3::new(0.052, 0.15, 0.052)),
+                ),
+                part(
+                    &tube,
+                    &dark,
+                    at(0.0, 0.06, -0.062)
+                        .with_rotation(pitch(FRAC_PI_2))
+                        .with_scale(Vec3::new(0.036, 0.04, 0.036)),
+                ),
+                part(
+                    &block,
+                    &dark,
+                    at(0.0, -0.02, 0.06).with_rotation(pitch(0.25)).with_scale(Vec3::new(0.03, 0.12, 0.04)),
+                ),
             ],
         ),
         (Tool::Builder, vec![]),
@@ -128,29 +153,35 @@ fn grip(
             ],
         ),
     ];
-    let piece = |(mesh, material, place): Part| (Mesh3d(mesh), MeshMaterial3d(material), place, NotShadowCaster);
+    let piece =
+        |(mesh, material, place): Part| (Mesh3d(mesh), MeshMaterial3d(material), place, NotShadowCaster);
     commands.entity(*eyes).with_children(|eyes| {
-        eyes.spawn((Name::new("hand"), Held, Transform::from_translation(REST), Visibility::Hidden)).with_children(|hand| {
-            for (tool, parts) in models {
-                let mut model = hand.spawn((Model(tool), Transform::IDENTITY, Visibility::Hidden));
-                model.with_children(|model| {
-                    for part in parts {
-                        model.spawn(piece(part));
-                    }
-                    if tool == Tool::Drill {
-                        let place = at(0.0, 0.06, -0.15).with_rotation(pitch(-FRAC_PI_2)).with_scale(Vec3::new(0.030, 0.15, 0.030));
-                        model.spawn((Bit, piece(part(&cone, &steel, place))));
-                    }
-                    if matches!(tool, Tool::Builder | Tool::Painter) {
-                        let place = match tool {
-                            Tool::Builder => at(0.0, 0.07, 0.0).with_scale(Vec3::splat(0.10)).with_rotation(Quat::from_rotation_y(0.6)),
-                            _ => at(0.0, 0.21, 0.0).with_scale(Vec3::new(0.070, 0.018, 0.020)),
-                        };
-                        model.spawn((Sample, piece(part(&block, &sample, place))));
-                    }
-                });
-            }
-        });
+        eyes.spawn((Name::new("hand"), Held, Transform::from_translation(REST), Visibility::Hidden))
+            .with_children(|hand| {
+                for (tool, parts) in models {
+                    let mut model = hand.spawn((Model(tool), Transform::IDENTITY, Visibility::Hidden));
+                    model.with_children(|model| {
+                        for part in parts {
+                            model.spawn(piece(part));
+                        }
+                        if tool == Tool::Drill {
+                            let place = at(0.0, 0.06, -0.15)
+                                .with_rotation(pitch(-FRAC_PI_2))
+                                .with_scale(Vec3::new(0.030, 0.15, 0.030));
+                            model.spawn((Bit, piece(part(&cone, &steel, place))));
+                        }
+                        if matches!(tool, Tool::Builder | Tool::Painter) {
+                            let place = match tool {
+                                Tool::Builder => at(0.0, 0.07, 0.0)
+                                    .with_scale(Vec3::splat(0.10))
+                                    .with_rotation(Quat::from_rotation_y(0.6)),
+                                _ => at(0.0, 0.21, 0.0).with_scale(Vec3::new(0.070, 0.018, 0.020)),
+                            };
+                            model.spawn((Sample, piece(part(&block, &sample, place))));
+                        }
+                    });
+                }
+            });
     });
 }
 
@@ -184,7 +215,8 @@ fn carry(
     mut sink: Local<(f32, Option<Tool>)>,
 ) {
     let dt = time.delta_secs();
-    let speed = bodies.iter().filter(|body| body.grounded).map(|body| body.velocity.xz().length()).sum::<f32>();
+    let speed =
+        bodies.iter().filter(|body| body.grounded).map(|body| body.velocity.xz().length()).sum::<f32>();
     *steps += dt * speed * 1.35;
     let stride = (speed / 6.0).min(1.0);
     let bob = Vec3::new((*steps).sin() * 0.006, -(2.0 * *steps).sin().abs() * 0.006, 0.0) * stride;
@@ -218,7 +250,9 @@ fn pose(tool: Tool, phase: Option<f32>) -> (Quat, Vec3) {
     let lean = Quat::from_rotation_z(0.16) * Quat::from_rotation_y(0.22);
     match tool {
         Tool::Pickaxe => (
-            Quat::from_rotation_y(0.18 * through) * lean * Quat::from_rotation_x(-0.22 + 0.75 * back - 1.05 * through),
+            Quat::from_rotation_y(0.18 * through)
+                * lean
+                * Quat::from_rotation_x(-0.22 + 0.75 * back - 1.05 * through),
             Vec3::new(-0.05 * through, 0.06 * back - 0.01 * through, 0.03 * back - 0.05 * through),
         ),
         Tool::Shovel | Tool::Painter => (

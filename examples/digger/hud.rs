@@ -101,7 +101,8 @@ fn write_all(mut commands: Commands, art: Res<Art>) {
 }
 
 fn spawn_crosshair(hud: &mut ChildSpawnerCommands) {
-    let centre = Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
+    let centre =
+        Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
     let dot = Node {
         width: px(6),
         height: px(6),
@@ -138,7 +139,8 @@ fn spawn_slots(hud: &mut ChildSpawnerCommands, art: &Art) {
                     ..default()
                 };
                 let icon = Node { width: px(36), height: px(36), ..default() };
-                let number = Node { position_type: PositionType::Absolute, left: px(4), top: px(1), ..default() };
+                let number =
+                    Node { position_type: PositionType::Absolute, left: px(4), top: px(1), ..default() };
                 bar.spawn((
                     Slot(tool),
                     slot,
@@ -229,7 +231,9 @@ fn mark_tool(
     }
     let radius = hand.radius(hand.tool);
     let words = match hand.tool {
-        Tool::Builder => format!("builder  {} of {}  {radius:.2} m", hand.form.label(), landscape::name(hand.material)),
+        Tool::Builder => {
+            format!("builder  {} of {}  {radius:.2} m", hand.form.label(), landscape::name(hand.material))
+        }
         Tool::Painter => format!("painter  {}  {radius:.2} m", landscape::name(hand.material)),
         Tool::Bomb | Tool::Lamp => hand.tool.label().into(),
         tool => format!("{}  {radius:.2} m", tool.label()),

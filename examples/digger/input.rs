@@ -11,8 +11,8 @@ use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseSc
 use bevy::prelude::*;
 use bevy::reflect::Typed;
 use bevy::reflect::enums::{DynamicEnum, DynamicVariant, VariantType};
-use serde::de::value::StringDeserializer;
 use serde::de::IntoDeserializer;
+use serde::de::value::StringDeserializer;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Something that the player can want.
@@ -170,7 +170,8 @@ fn known_bindings<'de, D: Deserializer<'de>>(reader: D) -> Result<BTreeMap<Actio
         let name: StringDeserializer<D::Error> = name.into_deserializer();
         Action::deserialize(name).ok()
     };
-    let known = |texts: Vec<String>| texts.into_iter().filter_map(|text| Binding::try_from(text).ok()).collect();
+    let known =
+        |texts: Vec<String>| texts.into_iter().filter_map(|text| Binding::try_from(text).ok()).collect();
     Ok(texts.into_iter().filter_map(|(name, texts)| Some((action(name)?, known(texts)))).collect())
 }
 

@@ -1,6 +1,5 @@
 //! Facts about what was dug and what is left of it.
 
-
 use super::*;
 use crate::landscape::{CLAY, GRASS, ROCK};
 

@@ -54,7 +54,11 @@ fn open_workshop(
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    let iron = StandardMaterial { base_color: Color::srgb(0.16, 0.15, 0.14), perceptual_roughness: 0.6, ..default() };
+    let iron = StandardMaterial {
+        base_color: Color::srgb(0.16, 0.15, 0.14),
+        perceptual_roughness: 0.6,
+        ..default()
+    };
     let glow = StandardMaterial { base_color: Color::linear_rgb(3.2, 2.2, 0.9), unlit: true, ..default() };
     commands.insert_resource(Workshop {
         post: (meshes.add(Cylinder::new(0.035, 0.36)), materials.add(iron)),
@@ -85,7 +89,12 @@ fn place(
 fn lamp(workshop: &Workshop, place: Vec3, normal: Vec3) -> impl Bundle {
     let upright = Quat::from_rotation_arc(Vec3::Y, normal.normalize_or(Vec3::Y));
     let part = |mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, y: f32| {
-        (Mesh3d(mesh.clone()), MeshMaterial3d(material.clone()), Transform::from_xyz(0.0, y, 0.0), NotShadowCaster)
+        (
+            Mesh3d(mesh.clone()),
+            MeshMaterial3d(material.clone()),
+            Transform::from_xyz(0.0, y, 0.0),
+            NotShadowCaster,
+        )
     };
     let light = PointLight {
         color: Color::srgb(1.0, 0.80, 0.52),

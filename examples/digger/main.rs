@@ -183,11 +183,8 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
 }
 
 fn open_window(options: &Options) -> App {
-    let window = Window {
-        title: "Digger".into(),
-        resolution: (options.width, options.height).into(),
-        ..default()
-    };
+    let window =
+        Window { title: "Digger".into(), resolution: (options.width, options.height).into(), ..default() };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());

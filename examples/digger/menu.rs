@@ -34,7 +34,8 @@ fn open(
     width: f32,
     fill: impl FnOnce(&mut ChildSpawnerCommands),
 ) {
-    let middle = Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
+    let middle =
+        Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
     let column = Node {
         width: px(width),
         padding: UiRect::axes(px(26), px(22)),

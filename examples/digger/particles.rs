@@ -112,8 +112,7 @@ fn fill_pools(
         })
     };
     let pale = |at: usize| color(at).mix(&LinearRgba::rgb(0.62, 0.57, 0.5), 0.55);
-    let dust =
-        (0..MATERIALS.len()).flat_map(|at| (0..FADES).map(move |fade| (at, fade))).collect::<Vec<_>>();
+    let dust = (0..MATERIALS.len()).flat_map(|at| (0..FADES).map(move |fade| (at, fade))).collect::<Vec<_>>();
     let dust = dust.into_iter().map(|(at, fade)| puff(pale(at), fade, false)).collect();
     let fire = (0..FADES)
         .map(|fade| {
@@ -132,7 +131,11 @@ fn fill_pools(
                 Transform::default(),
                 NotShadowCaster,
             ));
-            if is_chip { mote.insert(Chip) } else { mote.insert((Puff, NotShadowReceiver)) };
+            if is_chip {
+                mote.insert(Chip)
+            } else {
+                mote.insert((Puff, NotShadowReceiver))
+            };
             mote.id()
         };
         (0..count).map(mote).collect()
@@ -237,7 +240,8 @@ fn fly(
             let next = place.translation + mote.velocity * dt;
             if terrains.is_solid(next) {
                 // No normal is looked for: a chip is too small for anyone to see where it bounces to.
-                mote.velocity = Vec3::new(mote.velocity.x * 0.5, mote.velocity.y.abs() * 0.35, mote.velocity.z * 0.5);
+                mote.velocity =
+                    Vec3::new(mote.velocity.x * 0.5, mote.velocity.y.abs() * 0.35, mote.velocity.z * 0.5);
                 mote.spin *= 0.4;
             } else {
                 place.translation = next;
@@ -260,7 +264,10 @@ fn fly(
 }
 
 /// Puffs are flat, and nobody is to notice.
-fn face_eyes(eyes: Single<&Transform, With<Eyes>>, mut puffs: Query<(&Mote, &mut Transform), (With<Puff>, Without<Eyes>)>) {
+fn face_eyes(
+    eyes: Single<&Transform, With<Eyes>>,
+    mut puffs: Query<(&Mote, &mut Transform), (With<Puff>, Without<Eyes>)>,
+) {
     for (mote, mut place) in &mut puffs {
         if mote.flies() {
             place.rotation = eyes.rotation;

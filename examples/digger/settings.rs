@@ -127,7 +127,8 @@ pub struct SettingsFile(pub Option<PathBuf>);
 impl SettingsFile {
     /// In the user's folder of settings.
     pub fn of_user() -> Self {
-        let folder = |name: &str| std::env::var_os(name).filter(|folder| !folder.is_empty()).map(PathBuf::from);
+        let folder =
+            |name: &str| std::env::var_os(name).filter(|folder| !folder.is_empty()).map(PathBuf::from);
         let settings = if cfg!(windows) {
             folder("APPDATA")
         } else if cfg!(target_os = "macos") {

@@ -39,7 +39,9 @@ fn what_is_written_is_read_again() {
 
 #[test]
 fn a_broken_file_is_reported_and_ignored() {
-    for (name, text) in [("empty", ""), ("half", r#"{ "sensitivity": 1."#), ("other", r#"{ "invert_y": "often" }"#)] {
+    for (name, text) in
+        [("empty", ""), ("half", r#"{ "sensitivity": 1."#), ("other", r#"{ "invert_y": "often" }"#)]
+    {
         let path = file(name);
         write_text(&path, text);
         let error = Settings::read(&path).expect_err(name).to_string();

@@ -11,9 +11,7 @@ use bevy::camera::visibility::NoFrustumCulling;
 use bevy::image::{ImageAddressMode, ImageFilterMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::prelude::*;
-use bevy::render::render_resource::{
-    AsBindGroup, Extent3d, ShaderType, TextureDimension, TextureFormat,
-};
+use bevy::render::render_resource::{AsBindGroup, Extent3d, ShaderType, TextureDimension, TextureFormat};
 use bevy::shader::ShaderRef;
 
 const SHADER: &str = "embedded://digger/sky.wgsl";
@@ -86,7 +84,15 @@ fn raise(
     let material = SkyMaterial { look: default(), noise: images.add(noise()) };
     commands.spawn((
         Name::new("sky"),
-        Mesh3d(meshes.add(Cuboid::from_length(2.0).mesh().build().with_inverted_winding().unwrap_or(Cuboid::from_length(2.0).into()))),
+        Mesh3d(
+            meshes.add(
+                Cuboid::from_length(2.0)
+                    .mesh()
+                    .build()
+                    .with_inverted_winding()
+                    .unwrap_or(Cuboid::from_length(2.0).into()),
+            ),
+        ),
         MeshMaterial3d(materials.add(material)),
         NoFrustumCulling,
         NotShadowCaster,
@@ -97,7 +103,8 @@ fn raise(
 /// Value noise in six octaves; its edges fit together.
 fn noise() -> Image {
     let lattice = |x: u32, y: u32, octave: u32| {
-        let mut bits = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B) ^ octave.wrapping_mul(0xC2B2_AE35);
+        let mut bits =
+            x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA6B) ^ octave.wrapping_mul(0xC2B2_AE35);
         bits = (bits ^ (bits >> 15)).wrapping_mul(0x2C1B_3C6D);
         bits = (bits ^ (bits >> 12)).wrapping_mul(0x297A_2D39);
         (bits >> 8) as f32 / 16_777_216.0
@@ -109,7 +116,8 @@ fn noise() -> Image {
             let [i, j] = [u, v].map(|c| c as u32);
             let [s, t] = [u.fract(), v.fract()].map(|t| t * t * (3.0 - 2.0 * t));
             let row = |j: u32| {
-                let (left, right) = (lattice(i, j % cells, octave), lattice((i + 1) % cells, j % cells, octave));
+                let (left, right) =
+                    (lattice(i, j % cells, octave), lattice((i + 1) % cells, j % cells, octave));
                 left + (right - left) * s
             };
             (row(j) + (row(j + 1) - row(j)) * t) * 0.55f32.powi(octave as i32)
@@ -118,8 +126,13 @@ fn noise() -> Image {
     };
     let texels = (0..SIDE * SIDE).map(|i| (at(i % SIDE, i / SIDE) * 255.0) as u8).collect();
     let size = Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 };
-    let mut image =
-        Image::new(size, TextureDimension::D2, texels, TextureFormat::R8Unorm, RenderAssetUsages::RENDER_WORLD);
+    let mut image = Image::new(
+        size,
+        TextureDimension::D2,
+        texels,
+        TextureFormat::R8Unorm,
+        RenderAssetUsages::RENDER_WORLD,
+    );
     image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
         address_mode_u: ImageAddressMode::Repeat,
         address_mode_v: ImageAddressMode::Repeat,

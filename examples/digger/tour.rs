@@ -44,7 +44,11 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     }
     match film(options, renderer) {
         Ok((frames, took)) => {
-            println!("tour: {frames} frames of {ALL} s in {:.0} s, in {}", took.as_secs_f64(), options.out.display());
+            println!(
+                "tour: {frames} frames of {ALL} s in {:.0} s, in {}",
+                took.as_secs_f64(),
+                options.out.display()
+            );
             join(&options.out, options.fps, frames);
             ExitCode::SUCCESS
         }
@@ -120,7 +124,8 @@ impl Tour {
     fn hang_curtain(&mut self) {
         let logo = self.studio().world().resource::<Art>().logo.clone();
         let world = self.studio().world();
-        let middle = Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
+        let middle =
+            Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
         let size = Node { width: percent(46), ..default() };
         world.spawn((middle, GlobalZIndex(9), children![(Signature, ImageNode::new(logo), size)]));
         world.spawn((Curtain, ui::full(), GlobalZIndex(10), BackgroundColor(Color::BLACK)));
@@ -214,10 +219,20 @@ impl Tour {
             let seconds = t * PICKAXE;
             let digs = seconds > 1.6;
             // Up to the wall, then into what was dug.
-            let pace = if seconds < 1.5 { 0.75 } else if digs && seconds > 4.0 { 0.14 } else { 0.0 };
+            let pace = if seconds < 1.5 {
+                0.75
+            } else if digs && seconds > 4.0 {
+                0.14
+            } else {
+                0.0
+            };
             studio.walk(inward * pace);
-            let sweep = aside * ((seconds - 1.6) * 1.9).sin() * 1.3 + Vec3::Y * ((seconds * 1.3).cos() * 0.8 + 1.5);
-            studio.gaze(wall + flat(inward) * (0.5 * seconds) + if digs { sweep } else { Vec3::Y * 2.4 }, 0.12)?;
+            let sweep =
+                aside * ((seconds - 1.6) * 1.9).sin() * 1.3 + Vec3::Y * ((seconds * 1.3).cos() * 0.8 + 1.5);
+            studio.gaze(
+                wall + flat(inward) * (0.5 * seconds) + if digs { sweep } else { Vec3::Y * 2.4 },
+                0.12,
+            )?;
             studio.hold(if digs { &[Action::Use] } else { &[] });
             Ok(())
         })?;
@@ -293,17 +308,26 @@ impl Tour {
         // From the east, so that the evening is behind it.
         let aside = along.cross(Vec3::Y) * (along.cross(Vec3::Y).x + 0.01).signum();
         let swing = |angle: f32, out: f32| middle + Quat::from_rotation_y(angle) * aside * out;
-        let way = [(swing(0.75, 40.0), 12.0), (swing(0.40, 37.0), 9.0), (swing(0.12, 34.0), 7.0), (swing(-0.1, 33.0), 6.5)];
+        let way = [
+            (swing(0.75, 40.0), 12.0),
+            (swing(0.40, 37.0), 9.0),
+            (swing(0.12, 34.0), 7.0),
+            (swing(-0.1, 33.0), 6.5),
+        ];
         let way = self.over_ground(&way)?;
         let mut sent = 0;
         self.scene("the bridge", BRIDGE + SUNSET, |studio, t| {
             let seconds = t * (BRIDGE + SUNSET);
-            studio.fly_to(at(&way, (seconds / (BRIDGE + SUNSET)).powf(0.8)), middle - Vec3::Y * 3.0 + Vec3::Y * (2.0 * t));
+            studio.fly_to(
+                at(&way, (seconds / (BRIDGE + SUNSET)).powf(0.8)),
+                middle - Vec3::Y * 3.0 + Vec3::Y * (2.0 * t),
+            );
             let due = ((seconds - 0.5) / (BRIDGE - 2.0) * brushes.len() as f32) as usize;
             while sent < due.min(brushes.len()) {
                 let brush = brushes[sent].clone();
                 let place = centre(&brush.shape);
-                let dust = Burst { place, out: Vec3::ZERO, count: 5, speed: 2.0, matter: Matter::Dust(CONCRETE) };
+                let dust =
+                    Burst { place, out: Vec3::ZERO, count: 5, speed: 2.0, matter: Matter::Dust(CONCRETE) };
                 studio.world().write_message(dust);
                 studio.world().write_message(brush);
                 sent += 1;
@@ -338,7 +362,11 @@ impl Tour {
             let target = spots.get(at).copied().unwrap_or(room);
             studio.gaze(target, 0.16)?;
             let within = seconds - 1.35 * at as f32;
-            studio.hold(if at < spots.len() && (0.75..0.85).contains(&within) { &[Action::Use] } else { &[] });
+            studio.hold(if at < spots.len() && (0.75..0.85).contains(&within) {
+                &[Action::Use]
+            } else {
+                &[]
+            });
             studio.walk(if (0.6..4.6).contains(&seconds) { hillside.onward * 0.32 } else { Vec2::ZERO });
             sign(studio, ((seconds - (LAMPS - 1.6)) / 0.6).clamp(0.0, 1.0));
             Ok(())

@@ -16,7 +16,12 @@ pub const RED: Color = Color::srgb(1.0, 0.45, 0.35);
 
 /// A line of text.
 pub fn text(words: impl Into<String>, size: f32, color: Color) -> impl Bundle {
-    (Text::new(words), TextFont::from_font_size(size), TextColor(color), TextShadow { offset: vec2(1.0, 1.0), color: Color::srgba(0.0, 0.0, 0.0, 0.6) })
+    (
+        Text::new(words),
+        TextFont::from_font_size(size),
+        TextColor(color),
+        TextShadow { offset: vec2(1.0, 1.0), color: Color::srgba(0.0, 0.0, 0.0, 0.6) },
+    )
 }
 
 /// A dark box with an edge, around whatever lies in it.
@@ -70,7 +75,13 @@ pub fn button(order: usize, words: &str, width: f32) -> impl Bundle {
         border_radius: BorderRadius::all(px(4)),
         ..default()
     };
-    (Item(order), node, BackgroundColor::DEFAULT, BorderColor::all(Color::NONE), children![text(words, 22.0, WHITE)])
+    (
+        Item(order),
+        node,
+        BackgroundColor::DEFAULT,
+        BorderColor::all(Color::NONE),
+        children![text(words, 22.0, WHITE)],
+    )
 }
 
 /// Makes menus answer.
@@ -94,7 +105,6 @@ impl Plugin for UiPlugin {
 fn forget_focus(mut focus: ResMut<Focus>) {
     focus.0 = 0;
 }
-
 
 /// The mouse.
 fn point(
@@ -153,10 +163,9 @@ fn press_keys(
     if pressed(&[K::Enter, K::NumpadEnter, K::Space], G::South) {
         commands.trigger(Chosen { entity });
     }
-    for (keys, button, by) in [
-        (&[K::ArrowRight, K::KeyD], G::DPadRight, 1),
-        (&[K::ArrowLeft, K::KeyA], G::DPadLeft, -1),
-    ] {
+    for (keys, button, by) in
+        [(&[K::ArrowRight, K::KeyD], G::DPadRight, 1), (&[K::ArrowLeft, K::KeyA], G::DPadLeft, -1)]
+    {
         if pressed(keys, button) {
             commands.trigger(Turned { entity, by });
         }
@@ -167,7 +176,11 @@ fn press_keys(
 fn light_up(focus: Res<Focus>, mut items: Query<(&Item, &mut BackgroundColor, &mut BorderColor)>) {
     for (item, mut ground, mut edge) in &mut items {
         let lit = item.0 == focus.0;
-        ground.set_if_neq(BackgroundColor(if lit { Color::srgba(1.0, 0.80, 0.32, 0.16) } else { Color::NONE }));
+        ground.set_if_neq(BackgroundColor(if lit {
+            Color::srgba(1.0, 0.80, 0.32, 0.16)
+        } else {
+            Color::NONE
+        }));
         edge.set_if_neq(BorderColor::all(if lit { GOLD } else { Color::NONE }));
     }
 }

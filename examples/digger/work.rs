@@ -68,7 +68,9 @@ fn dig(
     let Some(Aim { place, along, normal, .. }) = strike.aim else { return };
     let radius = hand.radius(strike.tool);
     let (brush, chips) = match strike.tool {
-        Tool::Pickaxe => (broken(Brush::dig(Shape::sphere(place + along * 0.3 * radius, radius)), radius), 0.8),
+        Tool::Pickaxe => {
+            (broken(Brush::dig(Shape::sphere(place + along * 0.3 * radius, radius)), radius), 0.8)
+        }
         // Shaves off what stands out.
         Tool::Shovel => (Brush::dig(Shape::sphere(place + normal * 0.8 * radius, radius)), 0.4),
         Tool::Drill => {
@@ -103,7 +105,10 @@ fn build(
         let free = inventory.free(hand.material);
         radius = radius.min((free.max(0) as f32 / hand.form.volume()).cbrt());
         if radius < Tool::Builder.radii().0 * 0.8 {
-            hints.write(Hint::new(format!("not enough {}: dig some first", crate::landscape::name(hand.material))));
+            hints.write(Hint::new(format!(
+                "not enough {}: dig some first",
+                crate::landscape::name(hand.material)
+            )));
             return;
         }
         let voxels = (hand.form.volume() * radius.powi(3)).ceil() as i64;
@@ -142,7 +147,13 @@ fn throw_chips(
         let Ok(applied) = &receipt.outcome else { continue };
         for (material, voxels) in applied.removed.iter() {
             let count = (voxels as f32 * blow.chips).clamp(1.0, 40.0) as usize;
-            let burst = Burst { place: blow.place, out: blow.out, count, speed: 4.5, matter: Matter::Chips(material) };
+            let burst = Burst {
+                place: blow.place,
+                out: blow.out,
+                count,
+                speed: 4.5,
+                matter: Matter::Chips(material),
+            };
             bursts.write(burst.clone());
             let puffs = (count / 10).clamp(1, 4);
             bursts.write(Burst { count: puffs, speed: 1.2, matter: Matter::Dust(material), ..burst });

@@ -56,7 +56,11 @@ fn open(mut commands: Commands) {
             }
         });
         let line = Node { height: px(20), margin: UiRect::axes(px(14), px(8)), ..default() };
-        column.spawn((Note, ui::text("choose an action, then press its new key or button", 15.0, ui::GREY), line));
+        column.spawn((
+            Note,
+            ui::text("choose an action, then press its new key or button", 15.0, ui::GREY),
+            line,
+        ));
         column.spawn(ui::button(Action::ALL.len(), "As they were made", 950.0)).observe(reset);
         column.spawn(ui::button(Action::ALL.len() + 1, "Back", 950.0)).observe(go_to(Page::Menu));
     });

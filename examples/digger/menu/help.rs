@@ -23,7 +23,16 @@ fn open(mut commands: Commands, settings: Res<Settings>, art: Option<Res<Art>>) 
     let Some(art) = art else { return };
     let key = |action: Action| settings.bindings.first(action);
     let lines = [
-        (format!("{} {} {} {}", key(Action::Forward), key(Action::Left), key(Action::Back), key(Action::Right)), "walk"),
+        (
+            format!(
+                "{} {} {} {}",
+                key(Action::Forward),
+                key(Action::Left),
+                key(Action::Back),
+                key(Action::Right)
+            ),
+            "walk",
+        ),
         (key(Action::Run), "run"),
         (key(Action::Jump), "jump"),
         (key(Action::Use), "use the tool in hand; hold to go on"),
@@ -42,7 +51,8 @@ fn open(mut commands: Commands, settings: Res<Settings>, art: Option<Res<Art>>) 
         column.spawn((ui::text(words, 17.0, ui::WHITE), below));
         let columns = Node { column_gap: px(28), ..default() };
         column.spawn(columns).with_children(|columns| {
-            let rows = Node { flex_direction: FlexDirection::Column, row_gap: px(7), width: px(465), ..default() };
+            let rows =
+                Node { flex_direction: FlexDirection::Column, row_gap: px(7), width: px(465), ..default() };
             columns.spawn(rows.clone()).with_children(|rows| {
                 for (keys, what) in lines {
                     rows.spawn(Node { column_gap: px(14), ..default() }).with_children(|row| {

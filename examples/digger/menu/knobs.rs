@@ -70,7 +70,9 @@ const KNOBS: [Knob; 9] = [
     Knob {
         label: "Form, at first",
         value: |settings| settings.form.label().into(),
-        turn: |settings, by| settings.form = if by < 0 { settings.form.next().next() } else { settings.form.next() },
+        turn: |settings, by| {
+            settings.form = if by < 0 { settings.form.next().next() } else { settings.form.next() }
+        },
     },
     Knob {
         label: "Build only what was dug",
@@ -111,7 +113,8 @@ fn open(mut commands: Commands) {
                     let side = Node { align_items: AlignItems::Center, column_gap: px(4), ..default() };
                     row.spawn(side).with_children(|side| {
                         side.spawn(arrow("<", -1));
-                        let middle = Node { width: px(190), justify_content: JustifyContent::Center, ..default() };
+                        let middle =
+                            Node { width: px(190), justify_content: JustifyContent::Center, ..default() };
                         side.spawn((middle, children![(Value(at), ui::text("", 18.0, ui::GOLD))]));
                         side.spawn(arrow(">", 1));
                     });
@@ -128,8 +131,14 @@ fn open(mut commands: Commands) {
 }
 
 fn arrow(sign: &str, by: i32) -> impl Bundle {
-    let node = Node { padding: UiRect::axes(px(10), px(2)), border_radius: BorderRadius::all(px(4)), ..default() };
-    (Arrow(by), node, BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.08)), children![ui::text(sign, 18.0, ui::WHITE)])
+    let node =
+        Node { padding: UiRect::axes(px(10), px(2)), border_radius: BorderRadius::all(px(4)), ..default() };
+    (
+        Arrow(by),
+        node,
+        BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.08)),
+        children![ui::text(sign, 18.0, ui::WHITE)],
+    )
 }
 
 /// All but the keys, which have a page of their own.

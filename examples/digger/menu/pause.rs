@@ -14,7 +14,10 @@ impl Plugin for PausePlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(OnEnter(Page::Menu), open.run_if(in_state(Phase::Paused))).add_systems(
             PreUpdate,
-            go_back.after(ReadsDevices).run_if(not(in_state(Page::None))).run_if(not(resource_exists::<Deaf>)),
+            go_back
+                .after(ReadsDevices)
+                .run_if(not(in_state(Page::None)))
+                .run_if(not(resource_exists::<Deaf>)),
         );
     }
 }
