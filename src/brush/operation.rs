@@ -27,7 +27,8 @@ pub enum Operation {
         /// The new material.
         material: MaterialId,
     },
-    /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are.
+    /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are;
+    /// hollows and towers of a radius r are gone after about r x r times, as it is with averages.
     Smooth,
     /// Deepens bumps and edges, by at most a quarter of a voxel each time.
     Sharpen,

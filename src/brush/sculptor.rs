@@ -73,7 +73,7 @@ impl Around {
         let nearest =
             self.faces().map(|(other, is_cut)| if is_cut { DEPTH } else { other * own.signum() }).min()?;
         let is_known = self.faces().any(|(_, is_cut)| !is_cut);
-        is_known.then(|| own.signum() * (nearest.max(0) + ONE).min(DEPTH))
+        is_known.then(|| own.signum() * (nearest.max(0) + ONE))
     }
 
     /// 64 times the way from the middle, which is `own`, to the average of all.
@@ -257,7 +257,7 @@ mod tests {
         (cave.densities[below], cave.cut) = (500, cave.cut & !(1 << below));
         assert_eq!(cave.middle(), Some(756));
         cave.densities[below] = 1000;
-        assert_eq!(cave.middle(), Some(DEPTH));
+        assert_eq!(cave.middle(), Some(1000 + ONE));
         cave.densities[below] = -300;
         assert_eq!(cave.middle(), Some(ONE));
         // A wall that is cut off on its far side stays where it is.

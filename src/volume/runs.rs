@@ -60,7 +60,7 @@ mod tests {
         assert_eq!(of(&[smooth(20.0), dig(60.0), smooth(100.0), dig(20.0), dig(100.0)]), [0..5]);
         assert_eq!(of(&[dig(20.0), smooth(25.0), dig(25.0), smooth(90.0), smooth(20.0)]), [0..1, 1..4, 4..5]);
         assert_eq!(of(&[smooth(20.0), smooth(20.0), smooth(20.0)]), [0..1, 1..2, 2..3]);
-        // New ground looks for its material 64 voxels down, unless it is told one.
+        // New ground looks for its material 64 voxels down and up, unless it is told one.
         let above = Shape::sphere(Vec3::new(20.0, 60.0, 50.0), 4.0);
         assert_eq!(of(&[dig(20.0), Brush::raise(above, 1.0)]), [0..1, 1..2]);
         assert_eq!(of(&[dig(20.0), Brush::raise(above, 1.0).with_material(MaterialId(1))]), [0..2]);

@@ -11,8 +11,8 @@ use crate::brush::Sculptor;
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 
-/// How far below itself new ground looks for what it is to be made of, in voxels.
-pub(super) const LOOK_DOWN: i32 = 64;
+/// How far below and above itself new ground looks for what it is to be made of, in voxels.
+const LOOK: i32 = 64;
 
 impl Workpiece<'_> {
     /// Applies an edit that sculpts to some samples; returns those that changed.
@@ -79,28 +79,29 @@ struct Seen {
 }
 
 impl Below {
-    /// What a point is made of that becomes solid: what lies straight below, else what touches it.
+    /// What a point is made of that becomes solid: what lies straight below, else straight above, else beside it.
     fn material(&mut self, view: &SampleView, point: IVec3) -> MaterialId {
         let known = &mut self.0[((point.z & 7) * 8 + (point.x & 7)) as usize];
-        let end = known.map_or(point.y - LOOK_DOWN, |seen| seen.from);
+        let end = known.map_or(point.y - LOOK, |seen| seen.from);
         let fresh = (end..point.y).rev().map(|y| point.with_y(y)).find(|&at| view.is_solid(at));
         let solid = match fresh {
             Some(at) => Some((at.y, view.stored_material(at))),
             None => known.and_then(|seen| seen.solid),
         };
         *known = Some(Seen { from: point.y, solid });
-        if let Some((_, material)) = solid.filter(|(y, _)| point.y - y <= LOOK_DOWN) {
+        if let Some((_, material)) = solid.filter(|(y, _)| point.y - y <= LOOK) {
             return material;
         }
-        let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z, IVec3::Y];
-        let beside = beside.into_iter().map(|step| point + step).find(|&at| view.is_solid(at));
-        beside.map_or(MaterialId::GROUND, |at| view.stored_material(at))
+        let above = (1..=LOOK).map(|up| point + IVec3::Y * up);
+        let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|step| point + step);
+        let other = above.chain(beside).find(|&at| view.is_solid(at));
+        other.map_or(MaterialId::GROUND, |at| view.stored_material(at))
     }
 }
 
 /// The samples that an edit reads which sculpts and reaches these.
 pub(super) fn reads(sculptor: &Sculptor, reach: LatticeBox) -> LatticeBox {
     let all = reach.grown(1);
-    let down = if sculptor.material().is_none() { LOOK_DOWN } else { 0 };
-    LatticeBox { min: all.min.with_y(all.min.y - down), ..all }
+    let look = IVec3::Y * if sculptor.material().is_none() { LOOK } else { 0 };
+    LatticeBox { min: all.min - look, max: all.max + look }
 }
