@@ -146,5 +146,5 @@ pub mod prelude {
     pub use crate::terrain::{Applied, Receipt, Rejection, ScenarioCounts, Span, Terrain, TerrainSettings};
     #[cfg(feature = "render")]
     pub use crate::view::TerrainMaterialPlugin;
-    pub use crate::volume::Scenario;
+    pub use crate::volume::{DiggingRules, Refused, Scenario};
 }

@@ -132,6 +132,16 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
+    /// What [`Operation::apply`] gives.
+    pub fn apply(self, before: i32, outside: i32) -> i32 {
+        let outside = outside.max(-DEPTH);
+        match self {
+            Self::Dig => before.max(-outside),
+            Self::Add { .. } => before.min(outside),
+            Self::Paint { .. } | Self::Sculpt => before,
+        }
+    }
+
     /// The material that an add or a paint brings along.
     pub fn material(self) -> Option<MaterialId> {
         match self {

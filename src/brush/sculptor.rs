@@ -58,6 +58,17 @@ impl Around {
         self.cut >> index & 1 == 1
     }
 
+    /// The density in the middle.
+    pub fn own(&self) -> i32 {
+        self.densities[Self::MIDDLE]
+    }
+
+    /// Where there is a solid neighbour across a face.
+    pub fn solid_faces(&self) -> impl Iterator<Item = IVec3> {
+        let ways = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+        ways.filter(|way| self.densities[Self::index(way.to_array())] < 0)
+    }
+
     /// The six neighbours across faces.
     fn faces(&self) -> impl Iterator<Item = (i32, bool)> {
         [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], self.is_cut(index))).into_iter()

@@ -128,7 +128,8 @@ impl Transaction {
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
         let draft = Stages::time(&mut stages.edit, || {
             let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| backend.edit(work, each);
-            Draft::make(world.samples(), world.grid, &edits, world.sample_hash, &world.uniform, apply)
+            let (base, hash, rules) = (world.samples(), world.sample_hash, world.rules());
+            Draft::make(base, world.grid, &edits, hash, &world.uniform, rules, apply)
         });
         let bricks: Bricks =
             draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
@@ -193,7 +194,8 @@ impl<'a> FieldLog<'a> {
             LatticeBox::include(&mut bounds, part.bounds);
             chunks.push(self.absorb(part.chunk, part.bounds));
         }
-        Ok(Applied { chunks, bounds, removed: effect.removed, added: effect.added, painted: effect.painted })
+        let EditEffect { removed, added, painted, refused, .. } = effect;
+        Ok(Applied { chunks, bounds, removed, added, painted, refused })
     }
 
     fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {

@@ -5,11 +5,12 @@
 //! read the same numbers there, and the samples of a world do not depend on its chunk size.
 
 mod brick;
+mod careful;
 mod draft;
 mod field;
 mod ledger;
+mod rules;
 mod runs;
-mod sculpt;
 mod surroundings;
 mod tally;
 mod view;
@@ -24,5 +25,6 @@ pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
 pub(crate) use ledger::{Count, Fate, PartEffect};
+pub use rules::{DiggingRules, Refused};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};
