@@ -153,8 +153,8 @@ pub mod prelude {
         Terrains, Tile, Undo,
     };
     pub use crate::terrain::{
-        Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored,
-        ScenarioCounts, Span, Terrain, TerrainSettings,
+        Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
+        PieceFate, Receipt, Rejection, Restored, ScenarioCounts, Span, Terrain, TerrainSettings,
     };
     #[cfg(feature = "render")]
     pub use crate::view::{
