@@ -18,8 +18,7 @@ const RESOLUTION: u32 = 24;
 /// It takes milliseconds, and tens of them for a large piece that is not convex: call it in a task.
 pub fn debris_collider(piece: &SurfaceMesh, voxel_size: f32) -> Option<Collider> {
     let scale = voxel_size / SNAP as f32;
-    let vertices: Vec<Vec3> =
-        piece.vertices.iter().map(|vertex| vertex.position.as_vec3() * scale).collect();
+    let vertices: Vec<Vec3> = piece.vertices.iter().map(|vertex| vertex.position.as_vec3() * scale).collect();
     let triangles: Vec<[u32; 3]> = piece
         .indices
         .chunks_exact(3)

@@ -125,10 +125,7 @@ impl Plugin for TerrainPhysicsPlugin {
             )
             .add_observer(colliders::forget)
             .add_systems(Update, near::find_near.in_set(TerrainPhysicsSystems::Near))
-            .add_systems(
-                Update,
-                (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep),
-            )
+            .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
             .add_systems(FixedPreUpdate, wake::wake.in_set(TerrainPhysicsSystems::Wake));
     }

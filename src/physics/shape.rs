@@ -65,8 +65,7 @@ impl GroundShape {
             corners
         };
         let all = |shape: Option<&'_ Self>| -> Vec<Corners> {
-            shape
-                .map_or_else(Vec::new, |shape| (0..shape.triangles()).map(|t| corners(shape, t)).collect())
+            shape.map_or_else(Vec::new, |shape| (0..shape.triangles()).map(|t| corners(shape, t)).collect())
         };
         let mut seen: FxHashMap<Corners, bool> = FxHashMap::default();
         seen.extend(all(old).into_iter().map(|corners| (corners, false)));
@@ -187,7 +186,12 @@ impl CompositeShape for GroundShape {
 }
 
 impl RayCast for GroundShape {
-    fn cast_local_ray_and_get_normal(&self, ray: &Ray, longest: Real, solid: bool) -> Option<RayIntersection> {
+    fn cast_local_ray_and_get_normal(
+        &self,
+        ray: &Ray,
+        longest: Real,
+        solid: bool,
+    ) -> Option<RayIntersection> {
         self.mesh.cast_local_ray_and_get_normal(ray, longest, solid)
     }
 }

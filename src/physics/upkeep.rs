@@ -96,10 +96,11 @@ pub(super) fn tend(
     let mut missing: Vec<(f32, Entity, Part)> = Vec::new();
     let mut count = 0;
     for (entity, shown, ground, parent, tile, chunk) in &parts {
-        let (Some(drawn), Ok(terrain)) = (drawn(tile, chunk), terrains.get(parent.parent())) else { continue };
+        let (Some(drawn), Ok(terrain)) = (drawn(tile, chunk), terrains.get(parent.parent())) else {
+            continue;
+        };
         let world = terrain.world();
-        let part =
-            Part::new(parent.parent(), terrain.voxel_size(), world.grid(), world.revision(), drawn);
+        let part = Part::new(parent.parent(), terrain.voxel_size(), world.grid(), world.revision(), drawn);
         let distance = near.distance(&part).unwrap_or(f32::INFINITY);
         let mut has_collider = ground.as_ref().is_some_and(|ground| ground.body.is_some());
         let is_outdated = ground.as_ref().is_none_or(|ground| ground.revision < shown.revision);
@@ -137,9 +138,8 @@ fn begin(
         .take(BATCH)
         .collect();
     Some(AsyncComputeTaskPool::get().spawn(async move {
-        let prepare = |&(entity, part): &(Entity, Part)| {
-            (entity, grounds.prepare(&part, &part.surface_in(&world)))
-        };
+        let prepare =
+            |&(entity, part): &(Entity, Part)| (entity, grounds.prepare(&part, &part.surface_in(&world)));
         batch.par_iter().map(prepare).collect()
     }))
 }

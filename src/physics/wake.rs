@@ -71,7 +71,9 @@ pub(super) fn wake(
         return;
     }
     let changes = std::mem::take(&mut changes.0);
-    for (entity, body, own, sleeps, mut position, mut velocity, mut transform, motion, is_child) in &mut bodies {
+    for (entity, body, own, sleeps, mut position, mut velocity, mut transform, motion, is_child) in
+        &mut bodies
+    {
         let is_character = characters.contains(entity);
         if !(body.is_dynamic() || is_character) {
             continue;

@@ -27,10 +27,12 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     pub(super) fn new(
         mover: &'a MoveAndSlide<'w, 's>,
         collider: &'a Collider,
+        layers: Option<&CollisionLayers>,
         character: &'a Character,
         entity: Entity,
     ) -> Self {
-        let filter = SpatialQueryFilter::from_excluded_entities([entity]);
+        let filter = SpatialQueryFilter::from_excluded_entities([entity])
+            .with_mask(layers.copied().unwrap_or_default().filters);
         Self { mover, collider, character, filter, level: character.steepest.clamp(0.0, 1.5).cos() }
     }
 
@@ -44,7 +46,8 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     ) -> (Vec3, CharacterMotion) {
         let Character { walk_speed, run_speed, grip, air_grip, gravity, jump_height, .. } = *self.character;
         let CharacterMotion { mut velocity, mut grounded, ground_normal } = before;
-        let wish = steering.direction.clamp_length_max(1.0) * if steering.run { run_speed } else { walk_speed };
+        let wish =
+            steering.direction.clamp_length_max(1.0) * if steering.run { run_speed } else { walk_speed };
         let follow = 1.0 - (-(if grounded { grip } else { air_grip }) * dt).exp();
         let level = velocity.xz().lerp(wish, follow);
         let jumps = steering.jump && grounded;
@@ -82,7 +85,8 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     /// Along the ground, at the same speed over ground uphill and downhill; up a step where one is in the way.
     fn stride(&self, from: Vec3, velocity: Vec3, normal: Vec3, dt: f32) -> (Vec3, Vec3) {
         // Over the ground's plane: as far as asked in x and z.
-        let rise = if normal.y > 0.1 { -(normal.x * velocity.x + normal.z * velocity.z) / normal.y } else { 0.0 };
+        let rise =
+            if normal.y > 0.1 { -(normal.x * velocity.x + normal.z * velocity.z) / normal.y } else { 0.0 };
         let along = velocity.with_y(rise);
         let planes: Vec<Dir3> = Dir3::new(normal).into_iter().collect();
         let (place, slid) = self.slide(from, along, &planes, dt);
@@ -111,7 +115,8 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         let (down, normal) = self.floor(ahead, up + SKIN)?;
         let toes = velocity.with_y(0.0).normalize_or_zero() * (self.character.radius * 0.75);
         let is_flat = |place: Vec3| self.floor_below(place, up + height).is_some_and(|n| n.y >= self.level);
-        (normal.y >= self.level || is_flat(ahead + toes)).then_some((ahead - Vec3::Y * down, slid.with_y(0.0)))
+        (normal.y >= self.level || is_flat(ahead + toes))
+            .then_some((ahead - Vec3::Y * down, slid.with_y(0.0)))
     }
 
     /// Moves and slides along what is in the way. What is too steep to stand on is a wall for those on the ground.

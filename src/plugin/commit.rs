@@ -13,8 +13,8 @@ use super::entities::{TerrainEntities, tell};
 use super::load::Loading;
 use super::meshes::Ready;
 use super::{
-    Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, Companions,
-    MaterialColors, Part, ShownSurface,
+    Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
+    Companions, MaterialColors, Part, ShownSurface,
 };
 use crate::terrain::{Commit, Drawn, Terrain};
 

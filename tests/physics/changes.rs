@@ -53,7 +53,8 @@ fn colliders_are_the_surface_that_the_model_has_at_every_scale() {
         let ground = stage.ground();
         for at in 0..200u32 {
             let (x, z) = (1.0 + (at * 37 % 300) as f32 / 10.0, 1.0 + (at * 53 % 300) as f32 / 10.0);
-            let model = stage.terrain(terrain).world().height(x.into(), z.into()).expect("in the world") as f32;
+            let model =
+                stage.terrain(terrain).world().height(x.into(), z.into()).expect("in the world") as f32;
             let ray = |collider: &Collider, position: &Position, rotation: &Rotation| {
                 let from = Vec3::new(x, 30.0, z) * voxel_size;
                 collider.cast_ray(*position, *rotation, from, Vec3::NEG_Y, 60.0 * voxel_size, true)
@@ -61,7 +62,8 @@ fn colliders_are_the_surface_that_the_model_has_at_every_scale() {
             let world = stage.app.world();
             let hits = ground.iter().filter_map(|&body| {
                 let part = |error| format!("{error}");
-                let collider = world.get::<Collider>(body).ok_or("no collider").map_err(part).expect("a body");
+                let collider =
+                    world.get::<Collider>(body).ok_or("no collider").map_err(part).expect("a body");
                 ray(collider, world.get::<Position>(body)?, world.get::<Rotation>(body)?)
             });
             let hits: Vec<f32> = hits.map(|(distance, _)| 30.0 - distance / voxel_size).collect();
@@ -147,7 +149,7 @@ fn a_loose_piece_becomes_a_body_with_its_volume() {
     terrain.apply([Brush::add(Shape::sphere(Vec3::new(24.0, 24.0, 24.0), 4.0), MaterialId(2))]);
     let chunk = terrain.world().grid().chunk_of(IVec3::new(24, 24, 24));
     let piece = terrain.world().chunk_mesh(chunk);
-    for voxel_size in [1.0, 0.5] {
+    for voxel_size in [1.0f32, 0.5] {
         let collider = debris_collider(&piece, voxel_size).expect("a ball has volume");
         let volume = collider.mass_properties(1.0).mass / voxel_size.powi(3);
         assert!((volume / 268.0 - 1.0).abs() < 0.06, "{volume}");

@@ -81,11 +81,22 @@ fn edit(rng: &mut Rng, model: &Model) -> Brush {
 struct Buried {
     frames: HashMap<Entity, u32>,
     longest: u32,
+    /// Bodies that were in the ground for three frames.
     through: usize,
+    /// Bodies that got into the ground in a frame that did not change it.
+    sank: usize,
     worst: f64,
+    revision: u64,
+    is_same: bool,
 }
 
 impl Buried {
+    /// Begins a frame.
+    fn begin(&mut self, model: &Model) {
+        self.is_same = model.revision() == self.revision;
+        self.revision = model.revision();
+    }
+
     /// Looks at a body. Built over, it may be in the ground for the frame of the commit and no longer.
     fn look(&mut self, model: &Model, body: Entity, place: Vec3) {
         let is_under = !place.is_finite() || model.is_solid(place.as_dvec3());
@@ -94,6 +105,7 @@ impl Buried {
             return;
         }
         let frames = self.frames.entry(body).or_default();
+        self.sank += usize::from(*frames == 0 && self.is_same);
         *frames += 1;
         self.longest = self.longest.max(*frames);
         if *frames == 3 {
@@ -143,7 +155,8 @@ fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
         }
         if frame % 32 == 0 {
             for &person in &people {
-                let mut steering = stage.app.world_mut().get_mut::<CharacterSteering>(person).expect("is there");
+                let mut steering =
+                    stage.app.world_mut().get_mut::<CharacterSteering>(person).expect("is there");
                 steering.direction = Vec2::from_angle(rng.f32() * 6.3);
                 steering.jump = rng.u8(0..4) == 0;
                 steering.run = rng.bool();
@@ -152,6 +165,7 @@ fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
         stage.frame();
         steps += 1;
         let model = stage.terrain(terrain).world();
+        buried.begin(model);
         for &body in bodies.iter().chain(&people) {
             buried.look(model, body, stage.place(body));
         }
@@ -159,19 +173,22 @@ fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
     let took = start.elapsed();
     stage.settle();
     let model = stage.terrain(terrain).world();
-    let below = bodies.iter().chain(&people).filter(|&&body| model.is_solid(stage.place(body).as_dvec3())).count();
-    let awake = bodies.len() - bodies.iter().filter(|&&body| stage.app.world().get::<Sleeping>(body).is_some()).count();
+    let below =
+        bodies.iter().chain(&people).filter(|&&body| model.is_solid(stage.place(body).as_dvec3())).count();
+    let awake = bodies.len()
+        - bodies.iter().filter(|&&body| stage.app.world().get::<Sleeping>(body).is_some()).count();
     println!(
-        "{} balls, {} walkers, {sent} edits in {steps} steps ({seconds} s; took {took:.1?}): {} fell through, {below} \
-         below at the end; longest inside {} frames, deepest {:.2}; {awake} awake; {:?}",
+        "{} balls, {} walkers, {sent} edits in {steps} steps ({seconds} s; took {took:.1?}): {} fell through, {} sank in, \
+         {below} below at the end; longest inside {} frames, deepest {:.2}; {awake} awake; {:?}",
         bodies.len(),
         people.len(),
         buried.through,
+        buried.sank,
         buried.longest,
         buried.worst,
         stage.figures(),
     );
-    assert_eq!((buried.through, below), (0, 0));
+    assert_eq!((buried.through, buried.sank, below), (0, 0, 0));
     assert!(stage.receipts() >= sent, "{} receipts", stage.receipts());
     let spread = people.iter().filter(|&&person| stage.feet(person).is_finite()).count();
     assert_eq!(spread, walkers);
@@ -194,7 +211,9 @@ struct Jumps {
 impl Jumps {
     fn figures(&mut self) -> (usize, f32, f32) {
         self.all.sort_by(f32::total_cmp);
-        let at = |share: f32| self.all.get(((self.all.len() as f32 - 1.0) * share) as usize).copied().unwrap_or(0.0);
+        let at = |share: f32| {
+            self.all.get(((self.all.len() as f32 - 1.0) * share) as usize).copied().unwrap_or(0.0)
+        };
         (self.all.len(), at(0.99), at(1.0))
     }
 }
@@ -224,7 +243,8 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams() {
     let mut bodies = Vec::new();
     for _ in 0..balls {
         let (place, radius) = (somewhere(&mut rng), 0.3 + 0.4 * rng.f32());
-        let middle = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + radius + 0.05, place.y);
+        let middle =
+            Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + radius + 0.05, place.y);
         let push = Vec2::from_angle(rng.f32() * 6.3) * (2.0 + 6.0 * rng.f32());
         let ball = stage.ball(middle, radius, Vec3::new(push.x, 0.0, push.y));
         stage.app.world_mut().entity_mut(ball).insert(layers);
@@ -239,14 +259,16 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams() {
     }
     stage.frames(32);
     let mut before: HashMap<Entity, Vec<Vec3>> = HashMap::new();
-    let (mut at_seams, mut elsewhere) = ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
+    let (mut at_seams, mut elsewhere) =
+        ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
     for _ in 0..(6.0 / STEP) as u32 {
         stage.frame();
         for (number, &(body, reach)) in bodies.iter().enumerate() {
             let place = stage.place(body);
             let way = before.entry(body).or_default();
             way.push(place);
-            let inside = place.xz().cmpgt(Vec2::splat(4.0)).all() && place.xz().cmplt(Vec2::splat(SIDE as f32 - 4.0)).all();
+            let inside = place.xz().cmpgt(Vec2::splat(4.0)).all()
+                && place.xz().cmplt(Vec2::splat(SIDE as f32 - 4.0)).all();
             let model = stage.terrain(terrain).world();
             let &[.., a, b, c] = &way[..] else { continue };
             if !inside || c.y - reach > height(model, c.xz()) + 1.0 {

@@ -11,7 +11,11 @@ use crate::stage::{STEP, Stage, level, pit};
 fn ground_has_colliders_near_sources_only_and_they_move_along() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(256, 1.0));
-    let source = stage.app.world_mut().spawn((Transform::from_xyz(40.0, 20.0, 40.0), ColliderSource { radius: 20.0 })).id();
+    let source = stage
+        .app
+        .world_mut()
+        .spawn((Transform::from_xyz(40.0, 20.0, 40.0), ColliderSource { radius: 20.0 }))
+        .id();
     stage.settle();
     let near = |stage: &mut Stage, middle: Vec2| {
         let ground = stage.ground();
@@ -69,10 +73,15 @@ fn a_source_that_races_along_never_leaves_its_body_without_ground() {
 fn edits_far_from_all_sources_are_there_when_one_comes() {
     let mut stage = Stage::new();
     let terrain = stage.app.world_mut().spawn(level(256, 1.0)).id();
-    let source = stage.app.world_mut().spawn((Transform::from_xyz(40.0, 8.0, 40.0), ColliderSource { radius: 20.0 })).id();
+    let source = stage
+        .app
+        .world_mut()
+        .spawn((Transform::from_xyz(40.0, 8.0, 40.0), ColliderSource { radius: 20.0 }))
+        .id();
     stage.settle();
     stage.dig([pit(200.0, 8.0, 200.0, 5.0), pit(40.0, 8.0, 40.0, 3.0)]);
-    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation = Vec3::new(200.0, 8.0, 200.0);
+    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation =
+        Vec3::new(200.0, 8.0, 200.0);
     stage.frame();
     stage.settle();
     let ball = stage.ball(Vec3::new(200.0, 6.0, 200.0), 0.5, Vec3::ZERO);
@@ -80,7 +89,8 @@ fn edits_far_from_all_sources_are_there_when_one_comes() {
     assert!((3.3..4.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
     // And back to what was dug meanwhile.
     stage.dig([pit(40.0, 5.0, 40.0, 3.0)]);
-    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation = Vec3::new(40.0, 8.0, 40.0);
+    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation =
+        Vec3::new(40.0, 8.0, 40.0);
     stage.frame();
     stage.settle();
     let ball = stage.ball(Vec3::new(40.0, 7.0, 40.0), 0.5, Vec3::ZERO);

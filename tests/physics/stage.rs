@@ -6,8 +6,8 @@ use avian3d::prelude::*;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::physics::{
-    Character, CharacterMotion, CharacterPlugin, CharacterSteering, ColliderSource, GroundBody,
-    HeldByGround, PhysicsFigures, TerrainPhysicsPlugin,
+    Character, CharacterMotion, CharacterPlugin, CharacterSteering, ColliderSource, GroundBody, HeldByGround,
+    PhysicsFigures, TerrainPhysicsPlugin,
 };
 use bevy_burrow::prelude::*;
 
