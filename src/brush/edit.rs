@@ -323,7 +323,7 @@ mod tests {
             (r#"{"limited":{"power":255,"operation":"dig"}}"#.into(), "limit of power"),
             (
                 r#"{"limited":{"power":1,"operation":{"limited":{"power":2,"operation":"dig"}}}}"#.into(),
-                "limit",
+                "no variants",
             ),
         ] {
             let error = parse(&operation).unwrap_err();
