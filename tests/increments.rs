@@ -125,8 +125,110 @@ impl Witness {
         }
     }
 
+    fn distance(&self, point: IVec3) -> i32 {
+        let stored = self.samples.get(&point);
+        stored.map_or_else(|| self.terrain.world().ground().distance(point), |&(distance, _)| distance)
+    }
+
+    /// What an operation that sculpts makes of a sample, straight from what the crate's documentation says.
+    fn sculpted(&self, brush: &Brush, point: IVec3, outside: i32) -> Option<i32> {
+        let units = |voxels: f32| (voxels * 256.0).round_ties_even() as i32;
+        let deepest = match brush.shape {
+            Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => units(radius),
+            Shape::Cuboid { half, .. } => units(half.min_element()),
+            _ => panic!("no such shape is sculpted here"),
+        };
+        let (strength, falloff) = (units(brush.blend.strength), units(brush.blend.falloff).min(deepest));
+        let weight = match -outside {
+            inside if inside < 0 || inside == 0 && falloff > 0 => return None,
+            inside if inside >= falloff => strength,
+            inside => {
+                let t = inside * 256 / falloff;
+                ((t * t * (768 - 2 * t) / 65_536) * strength + 128) / 256
+            }
+        };
+        let (own, depth) = (self.distance(point), bevy_burrow::brush::DEPTH);
+        let is_cut = |at: IVec3| self.samples.get(&at).is_some_and(|&(distance, _)| distance.abs() == depth);
+        let away = |whole: i64| (whole.signum() * ((whole.abs() * i64::from(weight) + 255) / 256)) as i32;
+        let to = |target: i32| own + away(i64::from(target) - i64::from(own));
+        let faces = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+        let faces: Vec<IVec3> = faces.map(|step| point + step).collect();
+        if weight == 0 {
+            return None;
+        }
+        if let Operation::Level { height } = brush.operation {
+            return Some(to(point.y * 256 - units(height)));
+        }
+        // Of what was cut off, no more is known than that it is a voxel farther than what is not.
+        let mut middle = own;
+        if is_cut(point) {
+            let sign = own.signum();
+            let known = faces.iter().filter(|&&face| !is_cut(face));
+            let nearest = known.map(|&face| self.distance(face) * sign).min()?;
+            let others = faces.iter().filter(|&&face| is_cut(face)).map(|_| depth).min();
+            middle = sign * (nearest.min(others.unwrap_or(i32::MAX)).max(0) + 256);
+        }
+        // 64 times the change that the average of 27 samples would be.
+        let average = || {
+            let mut sum = 0;
+            let steps = (0..27).map(|i| IVec3::new(i % 3, i / 3 % 3, i / 9) - 1);
+            for step in steps.filter(|&step| step != IVec3::ZERO) {
+                let length = (256.0 * step.as_dvec3().length()).round() as i32;
+                let weight = [8, 4, 2, 1][step.abs().element_sum() as usize];
+                let is_known = |at: IVec3| !is_cut(at) || middle.abs() + length <= depth;
+                if is_known(point + step) && is_known(point - step) {
+                    sum += weight * (self.distance(point + step) - middle).clamp(-512, 512);
+                }
+            }
+            sum
+        };
+        let attached = |after: i32| {
+            let same = |at: &IVec3| (self.distance(*at) < 0) == (after < 0);
+            if (own < 0) == (after < 0) || faces.iter().any(same) { after } else { -i32::from(own < 0) }
+        };
+        let shift = |voxels: f32| (units(voxels) * weight + 128) / 256;
+        match brush.operation {
+            Operation::Smooth => match average() * weight / (64 * 256) {
+                0 => None,
+                by => Some(attached(middle + by)),
+            },
+            Operation::Sharpen => match (average() * weight / (64 * 256)).clamp(-64, 64) {
+                0 => None,
+                by => {
+                    let around = LatticeBox::point(point).grown(1);
+                    let all: Vec<i32> = around.points().map(|at| self.distance(at)).collect();
+                    let (low, high) = (all.iter().min()?, all.iter().max()?);
+                    Some(attached((middle - by).clamp(*low, *high)))
+                }
+            },
+            Operation::Raise { amount } => (shift(amount) != 0).then(|| middle - shift(amount)),
+            Operation::Lower { amount } => (shift(amount) != 0).then(|| middle + shift(amount)),
+            Operation::Terrace { step, base } => {
+                let (step, base) = (units(step), units(base));
+                let surface = point.y * 256 - middle;
+                let tread = (surface - base).div_euclid(step) * step;
+                let riser = ((surface - base - tread - step * 3 / 8) * 4).clamp(0, step);
+                let by = away(i64::from(surface) - i64::from(base + tread + riser));
+                (by != 0).then_some(middle + by)
+            }
+            _ => panic!("{brush:?}"),
+        }
+    }
+
+    /// What a sample is made of that becomes solid.
+    fn new_material(&self, brush: &Brush, point: IVec3) -> MaterialId {
+        if let Some(material) = brush.blend.material {
+            return material;
+        }
+        let column = (1..=64).map(|by| -by).chain(1..=64).map(|by| point + IVec3::Y * by);
+        let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|step| point + step);
+        let solid = column.chain(beside).find(|&at| self.distance(at) < 0);
+        let stored = solid.and_then(|at| self.samples.get(&at));
+        stored.map_or(MaterialId::GROUND, |&(_, material)| material)
+    }
+
     /// Applies a brush to the naive samples.
-    fn naive(&mut self, edit: &Edit) -> Effect {
+    fn naive(&mut self, brush: &Brush, edit: &Edit) -> Effect {
         let (grid, ground) = (self.terrain.world().grid(), self.terrain.world().ground());
         let mut effect = Effect::default();
         let mut changes = Vec::new();
@@ -145,6 +247,19 @@ impl Witness {
                 let after = edit.operation().apply(before, outside);
                 let number = after.clamp(-32767, 32767);
                 match edit.operation() {
+                    operation if operation.is_sculpting() => {
+                        let after =
+                            self.sculpted(brush, point, outside).map(|after| after.clamp(-32767, 32767));
+                        let Some(after) = after.filter(|&after| after != before.clamp(-32767, 32767)) else {
+                            continue;
+                        };
+                        let material = match (before < 0, after < 0) {
+                            (true, false) => MaterialId::GROUND,
+                            (false, true) => self.new_material(brush, point),
+                            _ => own,
+                        };
+                        changes.push((point, before, (after, material)));
+                    }
                     Operation::Paint { material } => {
                         if outside <= 0 && before < 0 && (stored.is_none() || own != material) {
                             changes.push((point, before, (number, material)));
@@ -185,7 +300,7 @@ impl Witness {
             assert!(matches!(receipt.outcome, Err(Rejection::Brush(_))), "{what}: {receipt:?}");
             return;
         };
-        let expected = self.naive(&edit);
+        let expected = self.naive(brush, &edit);
         let Ok(applied) = &receipt.outcome else {
             assert_eq!(expected, Effect::default(), "{what}: {receipt:?}");
             return;
@@ -415,10 +530,24 @@ fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
         0 => MaterialId::GROUND,
         _ => MaterialId(rng.u8(0..4)),
     };
-    let brush = match rng.u32(0..8) {
-        0..=2 => Brush::paint(shape, material),
-        3..=5 => Brush::dig(shape),
-        _ => Brush::add(shape, material),
+    let has_depth = matches!(shape, Shape::Sphere { .. } | Shape::Cuboid { .. } | Shape::Capsule { .. });
+    let by = [0.1, 1.0, 3.5, 20.0][rng.usize(0..4)];
+    let brush = match rng.u32(0..16) {
+        0..=3 => Brush::paint(shape, material),
+        4..=7 => Brush::dig(shape),
+        8..=9 => Brush::add(shape, material),
+        _ if !has_depth => Brush::add(shape, material),
+        10 => Brush::smooth(shape, 1.0),
+        11 => Brush::sharpen(shape, 0.7),
+        12 => Brush::raise(shape, by),
+        13 => Brush::lower(shape, by),
+        14 => Brush::level(shape, place.y),
+        _ => Brush::terrace(shape, by.max(1.0)),
+    };
+    let brush = match rng.u32(0..3) {
+        0 if brush.operation.is_sculpting() => brush.with_falloff(rng.f32() * 3.0).with_material(material),
+        1 => brush.with_strength(rng.f32()),
+        _ => brush,
     };
     match rng.u32(0..4) {
         0 => brush.with_roughness(Roughness::new(rng.f32() * 8.0, 1.0 + rng.f32() * 9.0, rng.u32(..))),

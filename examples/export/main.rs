@@ -11,6 +11,7 @@
 //! ```json
 //! {"shape":"sphere","center":[64,40,64],"radius":6,"op":"dig"}
 //! {"shape":"capsule","from":[64,40,64],"to":[100,38,80],"radius":4,"op":"dig"}
+//! {"shape":"sphere","center":[64,40,64],"radius":9,"op":"smooth","strength":0.5}
 //! {"shape":"box","center":[90,50,90],"half":[6,1,3],"rotation":[0,0.383,0,0.924],"op":"add","material":5}
 //! {"shape":"cone","base":[20,60,20],"axis":[0,9,0],"radius":5,"op":"paint","material":3}
 //! ```

@@ -75,8 +75,8 @@ impl Fade {
 }
 
 /// Is there any limit to this power?
-pub(super) fn is_full(power: &u8) -> bool {
-    *power == FULL_POWER
+pub(super) fn is_full(power: u8) -> bool {
+    power == FULL_POWER
 }
 
 #[cfg(test)]

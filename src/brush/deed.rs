@@ -21,9 +21,11 @@ const AMOUNT: f32 = 64.0;
 const STEP: (f32, f32) = (1.0, 256.0);
 
 /// An [`Operation`] with its [`Blend`](super::Blend), in integers. Lengths are in 1/256 voxel.
+///
+/// Written, a deed may be limited in power, but only once: that is a variant which no edit holds.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Deed {
+pub(super) enum Deed<L = Never> {
     Dig,
     Add {
         material: MaterialId,
@@ -64,10 +66,53 @@ pub(super) enum Deed {
         fade: Fade,
     },
     /// Only as edits are written: an operation of a brush with less than full power.
-    Limited {
-        power: u8,
-        operation: Box<Deed>,
-    },
+    Limited(L),
+}
+
+/// A deed as it is written.
+pub(super) type WrittenDeed = Deed<Limit>;
+
+/// A deed of a brush with less than full power.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Limit {
+    power: u8,
+    operation: Box<Deed>,
+}
+
+/// Of this there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub(super) enum Never {}
+
+impl<L> Deed<L> {
+    /// The same deed; the limit, if it has one, becomes another thing.
+    fn try_map<M, E>(self, limited: impl FnOnce(L) -> Result<M, E>) -> Result<Deed<M>, E> {
+        Ok(match self {
+            Self::Dig => Deed::Dig,
+            Self::Add { material } => Deed::Add { material },
+            Self::Paint { material } => Deed::Paint { material },
+            Self::Smooth { fade } => Deed::Smooth { fade },
+            Self::Sharpen { fade } => Deed::Sharpen { fade },
+            Self::Flatten { point, normal, fade } => Deed::Flatten { point, normal, fade },
+            Self::Level { height, fade } => Deed::Level { height, fade },
+            Self::Raise { amount, fade } => Deed::Raise { amount, fade },
+            Self::Lower { amount, fade } => Deed::Lower { amount, fade },
+            Self::Stamp { stamp, fade } => Deed::Stamp { stamp, fade },
+            Self::Terrace { step, base, fade } => Deed::Terrace { step, base, fade },
+            Self::Limited(limit) => Deed::Limited(limited(limit)?),
+        })
+    }
+}
+
+impl WrittenDeed {
+    /// The operation and its power.
+    pub fn unlimited(self) -> Result<(Deed, u8), BrushError> {
+        match self {
+            Self::Limited(Limit { power: FULL_POWER, .. }) => Err(BrushError::Power),
+            Self::Limited(Limit { power, operation }) => Ok((*operation, power)),
+            plain => Ok((plain.try_map(|_| Err(BrushError::Power))?, FULL_POWER)),
+        }
+    }
 }
 
 impl Deed {
@@ -116,7 +161,6 @@ impl Deed {
                 in_range("step", units(*step), STEP.0, STEP.1)?;
                 check_point("base", [*base, 0, 0])?;
             }
-            Self::Limited { .. } => return Err(BrushError::Power),
             _ => {}
         }
         self.fade().map_or(Ok(()), Fade::check)
@@ -125,7 +169,7 @@ impl Deed {
     /// How it fades, if it sculpts.
     pub fn fade(&self) -> Option<Fade> {
         match self {
-            Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Limited { .. } => None,
+            Self::Dig | Self::Add { .. } | Self::Paint { .. } => None,
             Self::Smooth { fade }
             | Self::Sharpen { fade }
             | Self::Flatten { fade, .. }
@@ -134,6 +178,7 @@ impl Deed {
             | Self::Lower { fade, .. }
             | Self::Stamp { fade, .. }
             | Self::Terrace { fade, .. } => Some(*fade),
+            Self::Limited(never) => match *never {},
         }
     }
 
@@ -155,21 +200,19 @@ impl Deed {
             Self::Lower { amount, .. } => Operation::Lower { amount: units(*amount) },
             Self::Stamp { stamp, .. } => Operation::Stamp(stamp.stamp()),
             Self::Terrace { step, base, .. } => Operation::Terrace { step: units(*step), base: units(*base) },
-            Self::Limited { operation, .. } => operation.operation(),
+            Self::Limited(never) => match *never {},
         }
     }
 
     /// The operation and its power as one, for writing: full power is not written, so that it reads as it always did.
-    pub fn limited(self, power: u8) -> Self {
-        if is_full(&power) { self } else { Self::Limited { power, operation: Box::new(self) } }
-    }
-
-    /// The operation and its power as they are written.
-    pub fn unlimited(self) -> Result<(Self, u8), BrushError> {
-        match self {
-            Self::Limited { power: FULL_POWER, .. } => Err(BrushError::Power),
-            Self::Limited { power, operation } => Ok((*operation, power)),
-            plain => Ok((plain, FULL_POWER)),
+    pub fn limited(self, power: u8) -> WrittenDeed {
+        let limit = |operation| Deed::Limited(Limit { power, operation: Box::new(operation) });
+        if !is_full(power) {
+            return limit(self);
+        }
+        match self.try_map(|never| -> Result<Limit, Never> { match never {} }) {
+            Ok(written) => written,
+            Err(never) => match never {},
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
 use super::blend::Fade;
-use super::deed::Deed;
+use super::deed::{Deed, WrittenDeed};
 use super::roughness::Grain;
 use super::sculptor::Sculptor;
 use super::solid::Solid;
@@ -46,7 +46,7 @@ pub struct Edit {
 #[serde(rename = "Edit", deny_unknown_fields)]
 struct Unchecked {
     shape: Solid,
-    operation: Deed,
+    operation: WrittenDeed,
     roughness: Option<Grain>,
     tag: u64,
 }
@@ -160,11 +160,11 @@ impl From<Edit> for Unchecked {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Quat, Vec3};
+    use glam::{Quat, Vec2, Vec3};
 
-    use super::super::{Roughness, Shape};
+    use super::super::{Roughness, Shape, Stamp};
     use super::*;
-    use crate::ground::MaterialId;
+    use crate::ground::{GreyImage, MaterialId};
     use crate::lattice::LIMIT;
 
     fn error(shape: Shape) -> BrushError {
@@ -233,6 +233,102 @@ mod tests {
         let json = r#"{"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0}"#;
         assert_eq!(serde_json::to_string(&edit).unwrap(), json);
         assert_eq!(serde_json::from_str::<Edit>(json).unwrap(), edit);
+    }
+
+    #[test]
+    fn the_form_of_every_operation_stays() {
+        let image = GreyImage::from_samples(2, 2, vec![0, 1, 2, 65535]).unwrap();
+        let shape = Shape::sphere(Vec3::ZERO, 2.0);
+        let stamp = Stamp::new(image, Vec3::X, Vec2::new(4.0, 6.0), 3.0);
+        let fade = r#""fade":{"strength":256,"falloff":1024,"material":null}"#;
+        for (brush, form) in [
+            (Brush::dig(shape), r#""dig""#.to_string()),
+            (Brush::dig(shape).with_power(40), r#"{"limited":{"power":40,"operation":"dig"}}"#.into()),
+            (Brush::paint(shape, MaterialId(2)), r#"{"paint":{"material":2}}"#.into()),
+            (Brush::smooth(shape, 0.5), format!(r#"{{"smooth":{{{}}}}}"#, fade.replace("256", "128"))),
+            (Brush::sharpen(shape, 1.0), format!(r#"{{"sharpen":{{{fade}}}}}"#)),
+            (
+                Brush::flatten(shape, Vec3::X, Vec3::Y * 5.0),
+                format!(r#"{{"flatten":{{"point":[256,0,0],"normal":[0,32767,0],{fade}}}}}"#),
+            ),
+            (Brush::level(shape, -2.0), format!(r#"{{"level":{{"height":-512,{fade}}}}}"#)),
+            (
+                Brush::raise(shape, 0.5).with_material(MaterialId(9)),
+                format!(r#"{{"raise":{{"amount":128,{}}}}}"#, fade.replace("null", "9")),
+            ),
+            (Brush::lower(shape, 64.0), format!(r#"{{"lower":{{"amount":16384,{fade}}}}}"#)),
+            (
+                Brush::stamp(shape, stamp),
+                format!(
+                    r#"{{"stamp":{{"stamp":{{"center":[256,0,0],"rotation":[0,0,0,32767],"half":[512,768],"height":768,"relief":{{"width":2,"height":2,"samples":[0,1,2,65535]}}}},{}}}}}"#,
+                    fade.replace("1024", "256")
+                ),
+            ),
+            (
+                Brush::terrace(shape, 3.0).with_power(7),
+                format!(
+                    r#"{{"limited":{{"power":7,"operation":{{"terrace":{{"step":768,"base":0,{fade}}}}}}}}}"#
+                ),
+            ),
+        ] {
+            let edit = Edit::quantize(&brush).unwrap();
+            let json = serde_json::to_string(&edit).unwrap();
+            let expected = format!(
+                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":512}}}},"operation":{form},"roughness":null,"tag":0}}"#
+            );
+            assert_eq!(json, expected);
+            assert_eq!(serde_json::from_str::<Edit>(&json).unwrap(), edit);
+        }
+    }
+
+    #[test]
+    fn sculpting_beyond_its_limits_is_refused_by_its_name() {
+        let shape = Shape::sphere(Vec3::ZERO, 2.0);
+        let error = |brush: Brush| Edit::quantize(&brush).unwrap_err().to_string();
+        for (brush, message) in [
+            (Brush::smooth(shape, 1.01), "`strength` is 1.01, but it must be 0 to 1"),
+            (Brush::smooth(shape, f32::NAN), "`strength` must be finite"),
+            (Brush::raise(shape, 1.0).with_falloff(64.5), "`falloff` is 64.5, but it must be 0 to 64"),
+            (Brush::raise(shape, -1.0), "`amount` is -1, but it must be 0 to 64"),
+            (Brush::lower(shape, f32::INFINITY), "`amount` must be finite"),
+            (Brush::level(shape, 40_000.0), "`height` is 40000, but it must be -32768 to 32768"),
+            (Brush::flatten(shape, Vec3::ZERO, Vec3::ZERO), "`normal` is 0 long"),
+            (Brush::flatten(shape, Vec3::ZERO, Vec3::NAN), "`normal` must be finite"),
+            (Brush::flatten(shape, Vec3::X * 1e9, Vec3::Y), "beyond +-32768"),
+            (Brush::terrace(shape, 0.5), "`step` is 0.5, but it must be 1 to 256"),
+        ] {
+            assert!(error(brush.clone()).contains(message), "{}", error(brush));
+        }
+    }
+
+    #[test]
+    fn sculpting_from_outside_is_checked() {
+        let parse = |operation: &str| {
+            let json = format!(
+                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":64}}}},"operation":{operation},"roughness":null,"tag":1}}"#
+            );
+            serde_json::from_str::<Edit>(&json).map_err(|error| error.to_string())
+        };
+        let fade = r#""fade":{"strength":256,"falloff":1024,"material":null}"#;
+        parse(&format!(r#"{{"smooth":{{{fade}}}}}"#)).unwrap();
+        for (operation, message) in [
+            (format!(r#"{{"smooth":{{{}}}}}"#, fade.replace("256", "257")), "`strength`"),
+            (format!(r#"{{"smooth":{{{}}}}}"#, fade.replace("1024", "-1")), "`falloff`"),
+            (format!(r#"{{"raise":{{"amount":-2147483648,{fade}}}}}"#), "`amount`"),
+            (format!(r#"{{"level":{{"height":2147483647,{fade}}}}}"#), "`height`"),
+            (format!(r#"{{"terrace":{{"step":0,"base":0,{fade}}}}}"#), "`step`"),
+            (format!(r#"{{"terrace":{{"step":256,"base":-2147483648,{fade}}}}}"#), "`base`"),
+            (format!(r#"{{"flatten":{{"point":[0,0,0],"normal":[0,0,0],{fade}}}}}"#), "`normal`"),
+            (format!(r#"{{"flatten":{{"point":[0,0,0],"normal":[-32768,-32768,9],{fade}}}}}"#), "`normal`"),
+            (r#"{"limited":{"power":255,"operation":"dig"}}"#.into(), "limit of power"),
+            (
+                r#"{"limited":{"power":1,"operation":{"limited":{"power":2,"operation":"dig"}}}}"#.into(),
+                "no variants",
+            ),
+        ] {
+            let error = parse(&operation).unwrap_err();
+            assert!(error.contains(message), "{operation}: {error}");
+        }
     }
 
     #[test]

@@ -121,8 +121,8 @@ pub enum BrushError {
         /// Samples given.
         actual: usize,
     },
-    /// A deserialised edit holds an operation of limited power inside another one, or a full power as a limit.
-    #[error("a limit of power holds another limit, or none")]
+    /// A deserialised edit is limited to full power, which [`Edit::quantize`](super::Edit::quantize) never writes.
+    #[error("a limit of power that is none")]
     Power,
 }
 

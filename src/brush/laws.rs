@@ -1,10 +1,10 @@
 //! Laws of edits, for any brush.
 
-use glam::{DQuat, DVec3, IVec3, Quat, Vec3};
+use glam::{DQuat, DVec3, IVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::ground::MaterialId;
+use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LatticeBox, hash::mix};
 
 fn vector(most: f32) -> impl Strategy<Value = Vec3> {
@@ -68,10 +68,44 @@ fn wild_brush() -> impl Strategy<Value = Brush> {
         _ => Shape::cone(a, b, radius),
     });
     let roughness = (wild(), wild(), any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed));
-    (shape, prop::option::of(roughness), any::<u64>()).prop_map(|(shape, roughness, tag)| Brush {
-        roughness,
-        ..Brush::paint(shape, MaterialId(1)).with_tag(tag)
-    })
+    let blend = (wild(), wild(), prop::option::of(any::<u8>().prop_map(MaterialId)))
+        .prop_map(|(strength, falloff, material)| Blend { strength, falloff, material });
+    let blend = prop_oneof![Just(Blend::default()), blend];
+    (shape, wild_operation(), blend, prop::option::of(roughness), any::<u64>(), any::<u8>()).prop_map(
+        |(shape, operation, blend, roughness, tag, power)| Brush {
+            shape,
+            operation,
+            blend,
+            roughness,
+            tag,
+            power,
+        },
+    )
+}
+
+fn wild_operation() -> impl Strategy<Value = Operation> {
+    let vector = || prop::array::uniform3(wild()).prop_map(Vec3::from_array);
+    let image = (1..5u32, 1..5u32).prop_map(|(width, height)| {
+        let samples = (0..width * height).map(|at| at as u16 * 3001).collect();
+        GreyImage::from_samples(width, height, samples).unwrap()
+    });
+    let turn = prop_oneof![rotation(), prop::array::uniform4(wild()).prop_map(Quat::from_array)];
+    let stamp =
+        (image, vector(), turn, wild(), wild(), wild()).prop_map(|(image, center, turn, x, y, height)| {
+            Operation::Stamp(Stamp::new(image, center, Vec2::new(x, y), height).with_rotation(turn))
+        });
+    prop_oneof![
+        Just(Operation::Dig),
+        any::<u8>().prop_map(|material| Operation::Add { material: MaterialId(material) }),
+        Just(Operation::Smooth),
+        Just(Operation::Sharpen),
+        (vector(), vector()).prop_map(|(point, normal)| Operation::Flatten { point, normal }),
+        wild().prop_map(|height| Operation::Level { height }),
+        wild().prop_map(|amount| Operation::Raise { amount }),
+        wild().prop_map(|amount| Operation::Lower { amount }),
+        (wild(), wild()).prop_map(|(step, base)| Operation::Terrace { step, base }),
+        stamp,
+    ]
 }
 
 /// Distance by another road: f64, polygons instead of formulas, the brush's own numbers instead of the edit's.
@@ -225,6 +259,22 @@ proptest! {
                 let _ = evaluator.is_out_of_reach(LatticeBox { min: p, max: IVec3::MAX });
                 let _ = evaluator.is_out_of_reach(LatticeBox { min: IVec3::MIN, max: p });
                 prop_assert!(!evaluator.is_out_of_reach(edit.reach()));
+                // What the edit says of itself makes the same edit again, and any sample may be asked about.
+                let again = Brush {
+                    operation: edit.operation(),
+                    blend: edit.blend().unwrap_or_default(),
+                    ..brush.clone()
+                };
+                prop_assert_eq!(Edit::quantize(&again), Ok(edit.clone()));
+                if let Some(sculptor) = edit.sculptor() {
+                    for (density, cut) in [(0, 0), (-1024, (1 << 27) - 1), (1 << 24, 5), (-(1 << 24), 0)] {
+                        let around = || Around { densities: [density; 27], cut };
+                        let near = (edit.reach().min + edit.reach().max) / 2;
+                        for (at, outside) in [(near, -5000), (near + 3, -1), (near, i32::MIN + 1)] {
+                            let _ = sculptor.density(at, outside, around);
+                        }
+                    }
+                }
             }
         }
         let _ = Edit::quantize(&brush.transformed(Quat::from_xyzw(0.6, 0.0, 0.0, 0.8), Vec3::ONE, 0.5));

@@ -77,10 +77,9 @@ impl Operation {
     /// ground nor an add removes it.
     #[inline]
     pub fn apply(&self, before: i32, outside: i32) -> i32 {
-        let outside = outside.max(-DEPTH);
         match self {
-            Self::Dig => before.max(-outside),
-            Self::Add { .. } => before.min(outside),
+            Self::Dig => Kind::Dig.apply(before, outside),
+            Self::Add { material } => Kind::Add { material: *material }.apply(before, outside),
             _ => before,
         }
     }
@@ -133,6 +132,7 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// What [`Operation::apply`] gives.
+    #[inline]
     pub fn apply(self, before: i32, outside: i32) -> i32 {
         let outside = outside.max(-DEPTH);
         match self {

@@ -88,7 +88,7 @@ impl Around {
     }
 
     /// 64 times the way from the middle, which is `own`, to the average of all.
-    fn to_average(&self, own: i32) -> i32 {
+    fn way_to_average(&self, own: i32) -> i32 {
         let pair = |&(way, weight, length): &([i32; 3], i32, i32)| {
             let one = |way: [i32; 3]| {
                 let index = Self::index(way);
@@ -168,11 +168,11 @@ impl Sculptor {
         let middle = around.middle()?;
         match &self.deed {
             Deed::Smooth { .. } => {
-                let by = around.to_average(middle) * weight / (64 * ONE);
+                let by = around.way_to_average(middle) * weight / (64 * ONE);
                 (by != 0).then(|| around.attached(middle + by))
             }
             Deed::Sharpen { .. } => {
-                let by = (around.to_average(middle) * weight / (64 * ONE)).clamp(-SHARPER, SHARPER);
+                let by = (around.way_to_average(middle) * weight / (64 * ONE)).clamp(-SHARPER, SHARPER);
                 let all = &around.densities;
                 let (low, high) = all.iter().fold((own, own), |(low, high), &d| (low.min(d), high.max(d)));
                 (by != 0).then(|| around.attached((middle - by).clamp(low, high)))
@@ -238,7 +238,7 @@ mod tests {
             slope in prop::array::uniform3(-3000..3000i32), middle in -900..900i32,
         ) {
             let slope = around(|x, y, z| middle + slope[0] * x + slope[1] * y + slope[2] * z);
-            prop_assert_eq!(slope.to_average(middle), 0);
+            prop_assert_eq!(slope.way_to_average(middle), 0);
         }
 
         #[test]
@@ -274,7 +274,7 @@ mod tests {
         // A wall that is cut off on its far side stays where it is.
         let mut wall = around(|x, _, _| (x * 256 + 900).min(DEPTH));
         wall.cut = (0..27).filter(|i| i % 3 == 2).fold(0, |cut, i| cut | 1 << i);
-        assert_eq!(wall.to_average(900), 0);
+        assert_eq!(wall.way_to_average(900), 0);
     }
 
     #[test]

@@ -23,10 +23,11 @@ use crate::lattice::{LatticeBox, ONE};
 /// terrain.set_rules(DiggingRules::default().with_hardness(MaterialId(0), 100).with_bedrock(4));
 /// let dig = Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0));
 /// let receipts = terrain.apply([dig.clone().with_power(50), dig.clone().with_power(75), dig]);
-/// let refused = |at: usize| receipts[at].outcome.as_ref().map(|applied| applied.refused.clone());
-/// assert!(refused(0)?.too_hard.total() > 100);
-/// assert!(refused(1)?.slowed.total() > 10);
-/// assert!(refused(2)?.is_empty());
+/// let outcomes = receipts.into_iter().filter_map(|receipt| receipt.outcome.ok());
+/// let refused: Vec<Refused> = outcomes.map(|applied| applied.refused).collect();
+/// assert!(refused[0].too_hard.total() > 100);
+/// assert!(refused[1].slowed.total() > 10);
+/// assert!(refused[2].is_empty());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
