@@ -47,6 +47,7 @@
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
+//! | cut off ground to fall | the `LooseGround` component, `LoosePieceFound` messages; [`LooseSettings`](terrain::LooseSettings) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
@@ -142,8 +143,8 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, HeightmapImage, HistoryMoved, MaterialColors, Redo, TargetedBrush, TerrainHit, TerrainReady,
-        Terrains, Tile, Undo,
+        Field, HeightmapImage, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Redo,
+        TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile, Undo,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,

@@ -8,12 +8,12 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::entities::{TerrainEntities, tell};
-use super::intake::tell_steps;
+use super::intake::{pieces, tell_steps};
 use super::load::Loading;
 use super::meshes::{self, Ready};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
-    MaterialColors,
+    LooseGround, LoosePieceFound, MaterialColors,
 };
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Commit, Drawn, Terrain};
@@ -38,7 +38,7 @@ struct Prepared {
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &TerrainEntities, &MaterialColors),
+        (Entity, &mut Terrain, &TerrainEntities, &MaterialColors, Option<&LooseGround>),
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -49,10 +49,13 @@ pub(super) fn begin_transactions(
 ) {
     let start = Instant::now();
     let draws = assets.is_some();
-    for (entity, mut terrain, entities, colors) in &mut terrains {
+    for (entity, mut terrain, entities, colors, loose) in &mut terrains {
         // A world that the game changed by itself is loaded again first.
         if terrain.queued() == 0 || terrain.world().version() != entities.shown {
             continue;
+        }
+        if let Some(&loose) = loose {
+            terrain.set_loose(Some(loose.into()));
         }
         let transaction = terrain.begin();
         tell_steps(entity, &mut terrain, &mut moved);
@@ -88,6 +91,7 @@ pub(super) fn commit_transactions(
     shown: Query<&Mesh3d>,
     mut receipts: MessageWriter<BrushApplied>,
     mut moved: MessageWriter<HistoryMoved>,
+    mut found: MessageWriter<LoosePieceFound>,
 ) {
     let mut done = Vec::new();
     for (entity, _, _, mut transaction) in &mut terrains {
@@ -116,6 +120,7 @@ pub(super) fn commit_transactions(
         if !waste.is_empty() {
             AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
         }
+        let is_step = terrain.has_history_receipts();
         tell_steps(entity, &mut terrain, &mut moved);
         swapped += swaps;
         let world = terrain.world();
@@ -124,7 +129,7 @@ pub(super) fn commit_transactions(
         let with_meshes = meshes.into_iter().map(|(drawn, ready)| (drawn, Some(ready)));
         let mut touched = Vec::new();
         for (drawn, ready) in with_meshes.chain(with_fields) {
-            if let Drawn::Chunk(chunk) = drawn {
+            if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
             let child = entities.get(&mut commands, drawn);
@@ -149,6 +154,7 @@ pub(super) fn commit_transactions(
         figures.commits += 1;
         figures.brushes += committed.len() as u64;
         figures.last_transaction = took;
+        found.write_batch(pieces(entity, &committed));
         let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
         receipts.write_batch(committed.into_iter().map(applied));
         let took = start.elapsed();

@@ -7,6 +7,7 @@
 //! `MinimalPlugins`, all of that happens but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
+//! On [`LooseGround`], [`LoosePieceFound`] tells what a brush cut off.
 //!
 //! Bevy's `multi_threaded` feature keeps transactions off the main thread; without it they run within the frame.
 
@@ -28,11 +29,11 @@ pub use heightmap::{
 pub use load::TerrainReady;
 pub use meshes::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
-    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved, Redo,
-    TargetedBrush, Undo,
+    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
+    LoosePieceFound, Redo, TargetedBrush, Undo,
 };
 pub use query::{TerrainHit, Terrains};
-pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings};
+pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings, LooseGround};
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
@@ -88,10 +89,12 @@ impl Plugin for TerrainPlugin {
             .add_message::<Undo>()
             .add_message::<Redo>()
             .add_message::<HistoryMoved>()
+            .add_message::<LoosePieceFound>()
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
             .add_observer(intake::answer_with_terrain)
+            .add_observer(intake::stop_looking)
             .add_observer(entities::remove_with_terrain)
             .configure_sets(
                 Update,
