@@ -269,6 +269,7 @@ impl Witness {
                     assert!(self.fields.remove(&(chunk, gone)), "{what}: gone twice");
                     assert!(world.fields_of(chunk).is_some_and(|f| f.get(into).is_some()), "{what}: into");
                 }
+                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: gone twice"),
             }
         }
         let all = world.fields().flat_map(|(chunk, fields)| fields.iter().map(move |f| (chunk, f.id)));

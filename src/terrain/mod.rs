@@ -364,7 +364,8 @@ impl Terrain {
         })
     }
 
-    /// Is nothing on its way to these samples? A step through history that waits may reach all that history does.
+    /// Is nothing on its way to these samples? A step through history that waits may reach all that history does. Pieces
+    /// that an edit will cut off nobody knows yet; they may reach further than the edit.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
         let misses = |submission: &Submission| {
             submission.edit.as_ref().map_or(true, |edit| edit.reach().intersection(bounds).is_none())
