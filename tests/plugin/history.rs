@@ -91,11 +91,11 @@ fn every_step_is_answered_by_every_terrain_that_it_is_for() {
     stage.tell(ALL);
     stage.settle();
     stage.frames(1);
-    let mut heard = stage.heard::<HistoryMoved>();
-    heard.sort_by_key(|moved| moved.terrain);
-    assert_eq!(heard.iter().map(|moved| moved.terrain).collect::<Vec<_>>(), [Some(a), Some(b)]);
-    assert!(heard[0].receipt.outcome.is_ok());
-    assert_eq!(heard[1].receipt.outcome, Err(HistoryRejection::NothingToUndo));
+    let heard = stage.heard::<HistoryMoved>();
+    assert_eq!(heard.len(), 2);
+    let of = |terrain| heard.iter().find(|moved| moved.terrain == Some(terrain)).map(|m| &m.receipt.outcome);
+    assert!(of(a).is_some_and(|outcome| outcome.is_ok()));
+    assert_eq!(of(b), Some(&Err(HistoryRejection::NothingToUndo)));
 
     // One that goes while a step waits, and one that is gone already.
     stage.send(dig(20.0, 8.0, 20.0, 4.0));
