@@ -639,7 +639,7 @@ fn memory_is_what_the_world_gives_back() {
         let settings = TerrainSettings { chunk_size, ..Default::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
         brushes.iter().for_each(|brush| drop(terrain.apply([brush])));
-        let told = terrain.world().memory();
+        let told = terrain.memory();
         let blocks = told.samples / Brick::BYTES + terrain.world().drawn().count() + 2;
         let given_back = allocation_counter::measure(|| drop(terrain)).bytes_current.unsigned_abs() as usize;
         // Two counts of references stand before whatever is shared.

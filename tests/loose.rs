@@ -146,8 +146,8 @@ fn pieces_are_those_of_brute_force() {
             for piece in &pieces {
                 check_piece(world, piece, &format!("world {index}"));
                 let fate = match piece.voxels {
-                    ..=5 => PieceFate::Removed,
-                    ..=90 => PieceFate::BrokeOff,
+                    0..=5 => PieceFate::Removed,
+                    6..=90 => PieceFate::BrokeOff,
                     _ => PieceFate::Left,
                 };
                 assert_eq!(piece.fate, fate);
