@@ -49,6 +49,7 @@
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
+//! | cut off ground to fall | the `LooseGround` component, `LoosePieceFound` messages; [`LooseSettings`](terrain::LooseSettings) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
@@ -154,8 +155,8 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, HeightmapImage, HistoryMoved, MaterialColors, Redo, TargetedBrush, TerrainHit, TerrainReady,
-        Terrains, Tile, Undo,
+        Field, HeightmapImage, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Redo,
+        TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile, Undo,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,

@@ -380,11 +380,11 @@ impl Witness {
             match news {
                 FieldNews::Created(id) => assert!(self.fields.insert((chunk, id)), "{what}: created twice"),
                 FieldNews::Changed(id) => assert!(self.fields.contains(&(chunk, id)), "{what}: unknown"),
-                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: removed twice"),
                 FieldNews::Merged { gone, into } => {
                     assert!(self.fields.remove(&(chunk, gone)), "{what}: gone twice");
                     assert!(world.fields_of(chunk).is_some_and(|f| f.get(into).is_some()), "{what}: into");
                 }
+                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: gone twice"),
             }
         }
         let all = world.fields().flat_map(|(chunk, fields)| fields.iter().map(move |f| (chunk, f.id)));
@@ -768,7 +768,7 @@ fn memory_is_what_the_world_gives_back() {
         let settings = TerrainSettings { chunk_size, ..Default::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
         brushes.iter().for_each(|brush| drop(terrain.apply([brush])));
-        let told = terrain.world().memory();
+        let told = terrain.memory();
         let blocks = told.samples / Brick::BYTES + terrain.world().drawn().count() + 2;
         let given_back = allocation_counter::measure(|| drop(terrain)).bytes_current.unsigned_abs() as usize;
         // Two counts of references stand before whatever is shared.

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
+use bevy_burrow::surface::cases;
 use bevy_burrow::surface::vertex::crossing;
 use bevy_burrow::terrain::World;
 use bevy_burrow::volume::Tally;
@@ -145,8 +146,8 @@ fn pieces_are_those_of_brute_force() {
             for piece in &pieces {
                 check_piece(world, piece, &format!("world {index}"));
                 let fate = match piece.voxels {
-                    ..=5 => PieceFate::Removed,
-                    ..=90 => PieceFate::BrokeOff,
+                    0..=5 => PieceFate::Removed,
+                    6..=90 => PieceFate::BrokeOff,
                     _ => PieceFate::Left,
                 };
                 assert_eq!(piece.fate, fate);
@@ -308,19 +309,11 @@ fn what_falls_does_not_depend_on_how_edits_are_batched() {
                 .collect();
             fallen += loose.iter().map(Vec::len).sum::<usize>();
             assert!(terrain.world().check_seams().is_flawless(), "world {index}");
-            results.push((terrain.world().hash(), pieces_without_normals(loose)));
+            results.push((terrain.world().hash(), loose));
         }
         assert!(results.windows(2).all(|pair| pair[0] == pair[1]), "world {index}");
     }
     assert!(fallen > 100, "{fallen} pieces");
-}
-
-/// Positions decide what falls; normals on the mask's border may be those of the mask as it was committed.
-fn pieces_without_normals(all: Vec<Vec<LoosePiece>>) -> Vec<Vec<(Piece, Vec<IVec3>)>> {
-    let positions = |piece: &LoosePiece| {
-        piece.mesh.iter().flat_map(|mesh| mesh.vertices.iter().map(|vertex| vertex.position)).collect()
-    };
-    all.iter().map(|own| own.iter().map(|piece| (samples_of(piece), positions(piece))).collect()).collect()
 }
 
 /// A table: a pillar of 3 x 3 voxels that carries a slab.
@@ -374,6 +367,33 @@ fn paint_and_add_cut_nothing_off_and_what_is_large_is_tied() {
     assert_eq!(receipt.loose.iter().map(|piece| piece.fate).collect::<Vec<_>>(), [PieceFate::Removed]);
     assert!(receipt.loose[0].materials.of(MaterialId(7)) > 0);
     assert_eq!(terrain.world().height(36.0, 36.0), Some(8.0));
+}
+
+#[test]
+fn the_surface_connects_what_neighbours_do() {
+    // Whatever a triangle hangs on is one part of its cube, by steps along solid corners.
+    for (case, drawn) in cases::table().iter().enumerate() {
+        let part = |corner: usize| {
+            let mut reached = 1 << corner;
+            loop {
+                let beside = (0..8).filter(|at| (0..3).any(|axis| reached >> (at ^ 1 << axis) & 1 == 1));
+                let next = beside.fold(reached, |all, at| all | 1 << at) & (case | 1 << corner);
+                if next == reached {
+                    break reached;
+                }
+                reached = next;
+            }
+        };
+        for triangle in drawn.triangles() {
+            let parts = triangle.map(|edge| {
+                let (low, axis) = cases::edge_corners(edge);
+                let ends = [low, low | 1 << axis].map(|corner| case >> corner & 1 == 1);
+                assert_ne!(ends[0], ends[1], "case {case}: a vertex between two solid corners");
+                part(if ends[0] { low } else { low | 1 << axis })
+            });
+            assert!(parts[0] == parts[1] && parts[1] == parts[2], "case {case} joins two parts");
+        }
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@
 
 mod beside_peer;
 mod landscape;
+mod loose;
 mod stages;
 mod statistics;
 mod threads;
@@ -18,13 +19,14 @@ use glam::Vec3;
 use landscape::{Places, dig, landscape, one_thread};
 use statistics::{Sample, header, row};
 
-const SECTIONS: [(&str, fn()); 6] = [
+const SECTIONS: [(&str, fn()); 7] = [
     ("radius", by_radius),
     ("chunk-size", by_chunk_size),
     ("batch", by_batch),
     ("peer", beside_peer::section),
     ("threads", threads::section),
     ("tiles", index_lists),
+    ("loose", loose::section),
 ];
 
 fn main() {

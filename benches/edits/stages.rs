@@ -40,7 +40,7 @@ impl Played {
 pub fn header(what: &str) {
     let names = ["whole", "p99", "edit", "meshing", "assembly", "ring", "commit"];
     let names: String = names.iter().map(|name| format!("{name:>9}")).collect();
-    println!("  {what:<32}{names}   us, medians but for p99");
+    println!("  {what:<64}{names}   us, medians but for p99");
 }
 
 /// One line: the whole transaction, its stages, and the commit.
@@ -53,5 +53,5 @@ pub fn row(what: &str, played: &Played) {
         .chain(stages.map(|stage| played.stage(stage).median()))
         .chain([played.commits.median()]);
     let figures: String = figures.map(|seconds| format!("{:>9.1}", seconds * 1e6)).collect();
-    println!("  {what:<32}{figures}");
+    println!("  {what:<64}{figures}");
 }

@@ -10,12 +10,12 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
-use super::intake::tell_steps;
+use super::intake::{pieces, tell_steps};
 use super::load::Loading;
 use super::meshes::{Ready, Wardrobe};
 use super::{
     Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
-    Companions, HistoryMoved, MaterialColors, Part, ShownSurface,
+    Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface,
 };
 use crate::terrain::{Commit, Drawn, Terrain};
 
@@ -39,7 +39,7 @@ struct Prepared {
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &TerrainEntities, &MaterialColors),
+        (Entity, &mut Terrain, &TerrainEntities, &MaterialColors, Option<&LooseGround>),
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -51,10 +51,13 @@ pub(super) fn begin_transactions(
 ) {
     let start = Instant::now();
     let draws = assets.is_some();
-    for (entity, mut terrain, entities, colors) in &mut terrains {
+    for (entity, mut terrain, entities, colors, loose) in &mut terrains {
         // A world that the game changed by itself is loaded again first.
         if terrain.queued() == 0 || terrain.world().version() != entities.shown {
             continue;
+        }
+        if let Some(&loose) = loose {
+            terrain.set_loose(Some(loose.into()));
         }
         let transaction = terrain.begin();
         tell_steps(entity, &mut terrain, &mut moved);
@@ -97,6 +100,7 @@ pub(super) fn commit_transactions(
     shown: Query<&Mesh3d>,
     mut receipts: MessageWriter<BrushApplied>,
     mut moved: MessageWriter<HistoryMoved>,
+    mut found: MessageWriter<LoosePieceFound>,
 ) {
     let mut done = Vec::new();
     for (entity, _, _, mut transaction) in &mut terrains {
@@ -125,6 +129,7 @@ pub(super) fn commit_transactions(
         if !waste.is_empty() {
             AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
         }
+        let is_step = terrain.has_history_receipts();
         tell_steps(entity, &mut terrain, &mut moved);
         swapped += swaps;
         let world = terrain.world();
@@ -133,7 +138,7 @@ pub(super) fn commit_transactions(
         let with_surfaces = parts.into_iter().map(|fresh| (fresh.drawn, Some(fresh)));
         let mut touched = Vec::new();
         for (drawn, fresh) in with_surfaces.chain(with_fields) {
-            if let Drawn::Chunk(chunk) = drawn {
+            if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
             let child = entities.get(&mut commands, drawn);
@@ -162,6 +167,7 @@ pub(super) fn commit_transactions(
         figures.brushes += committed.len() as u64;
         figures.last_transaction = took;
         figures.transactions.push(took);
+        found.write_batch(pieces(entity, &committed));
         let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
         receipts.write_batch(committed.into_iter().map(applied));
         let took = start.elapsed();

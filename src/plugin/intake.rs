@@ -3,7 +3,9 @@
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::{BrushApplied, BurrowFigures, HistoryMoved, Redo, TargetedBrush, Undo};
+use super::{
+    BrushApplied, BurrowFigures, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush, Undo,
+};
 use crate::brush::Brush;
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain};
 
@@ -14,13 +16,16 @@ pub(super) fn collect_brushes(
     mut terrains: Query<(Entity, &mut Terrain)>,
     places: TransformHelper,
     mut answers: MessageWriter<BrushApplied>,
+    mut found: MessageWriter<LoosePieceFound>,
     mut figures: ResMut<BurrowFigures>,
 ) {
     let start = Instant::now();
     for (entity, mut terrain) in &mut terrains {
         if terrain.has_answered() {
-            let answered = terrain.take_answered().into_iter();
-            answers.write_batch(answered.map(|receipt| BrushApplied { terrain: Some(entity), receipt }));
+            let answered = terrain.take_answered();
+            found.write_batch(pieces(entity, &answered));
+            let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
+            answers.write_batch(answered.into_iter().map(applied));
         }
     }
     let mut reject = |brush: &Brush, terrain, rejection| {
@@ -82,6 +87,21 @@ pub(super) fn collect_steps(
         }
     }
     figures.main_thread += start.elapsed();
+}
+
+/// The pieces that the brushes of these receipts cut off.
+pub(super) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Item = LoosePieceFound> {
+    receipts.iter().flat_map(move |receipt| {
+        let pieces = receipt.outcome.iter().flat_map(|applied| &applied.loose);
+        pieces.map(move |piece| LoosePieceFound { terrain, tag: receipt.tag, piece: piece.clone() })
+    })
+}
+
+/// A terrain that is no [`LooseGround`] any more looks for nothing.
+pub(super) fn stop_looking(gone: On<Remove, LooseGround>, mut terrains: Query<&mut Terrain>) {
+    if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
+        terrain.set_loose(None);
+    }
 }
 
 /// Hands out what became of a terrain's steps.

@@ -2,8 +2,9 @@
 
 use bevy::prelude::*;
 
+use super::{MaterialColors, meshes};
 use crate::brush::Brush;
-use crate::terrain::{HistoryReceipt, Receipt};
+use crate::terrain::{HistoryReceipt, LoosePiece, Receipt};
 
 /// A brush in world space: every terrain that it reaches obeys it.
 impl Message for Brush {}
@@ -52,6 +53,31 @@ pub struct HistoryMoved {
     pub terrain: Option<Entity>,
     /// Back or forth, and what it changed; bounds count in voxels of the terrain.
     pub receipt: HistoryReceipt,
+}
+
+/// A brush cut a piece of ground off, on a terrain with [`LooseGround`](super::LooseGround). What was taken out of the
+/// ground is gone in the frame of this message. The brush's receipt lists its pieces as well.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct LoosePieceFound {
+    /// The terrain; below it the piece is at home, counted in voxels.
+    pub terrain: Entity,
+    /// The brush's tag.
+    pub tag: u64,
+    /// Its bounds, voxels, materials and, where it broke off, its surface.
+    pub piece: LoosePiece,
+}
+
+impl LoosePieceFound {
+    /// Where the piece's mesh counts from, in voxels of the terrain: the translation of an entity below it that shows it.
+    pub fn origin(&self) -> Vec3 {
+        self.piece.bounds.min.as_vec3()
+    }
+
+    /// The piece as a mesh like those of chunks; `None` unless it broke off.
+    pub fn mesh(&self, colors: &MaterialColors) -> Option<Mesh> {
+        let surface = self.piece.mesh.as_ref()?;
+        meshes::build(surface, colors).map(|(mesh, _)| mesh)
+    }
 }
 
 /// A chunk got its entity.

@@ -7,6 +7,7 @@
 //! `MinimalPlugins`, all of that happens but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
+//! On [`LooseGround`], [`LoosePieceFound`] tells what a brush cut off.
 //!
 //! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
 //! commit: see [`Companion`].
@@ -36,11 +37,11 @@ pub use meshes::{
     ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };
 pub use messages::{
-    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved, Redo,
-    TargetedBrush, Undo,
+    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
+    LoosePieceFound, Redo, TargetedBrush, Undo,
 };
 pub use query::{TerrainHit, Terrains};
-pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings};
+pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings, LooseGround};
 pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
@@ -101,10 +102,12 @@ impl Plugin for TerrainPlugin {
             .add_message::<Undo>()
             .add_message::<Redo>()
             .add_message::<HistoryMoved>()
+            .add_message::<LoosePieceFound>()
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
             .add_observer(intake::answer_with_terrain)
+            .add_observer(intake::stop_looking)
             .add_observer(entities::remove_with_terrain)
             .configure_sets(
                 Update,

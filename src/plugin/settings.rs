@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 use super::Times;
 use crate::backend::{Backend, Engine};
+use crate::terrain::LooseSettings;
 
 /// What terrains without an engine of their own run their transactions on. [`Backend::Auto`] unless the game inserts
 /// another one, best before the plugins; [`Engine::state`] and [`Engine::figures`] tell what it does.
@@ -39,6 +40,44 @@ pub struct BurrowSettings {
 impl Default for BurrowSettings {
     fn default() -> Self {
         Self { swaps_per_frame: 256, loads_per_frame: 256 }
+    }
+}
+
+/// Put on a terrain's entity, brushes look for pieces of ground that they cut off, and [`LoosePieceFound`] tells of each;
+/// take it off, and they stop.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// # fn system(mut commands: Commands, terrain: Terrain) {
+/// // Crumbs vanish, larger pieces break off, and what has more than 4096 voxels hangs on.
+/// commands.spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
+/// # }
+/// ```
+///
+/// [`LoosePieceFound`]: super::LoosePieceFound
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component, Default)]
+pub struct LooseGround {
+    /// The largest piece to look for, in voxels; whatever is larger counts as tied. Bounds the time of a search.
+    pub largest: u32,
+    /// Pieces up to so many voxels vanish.
+    pub crumbs: u32,
+    /// Larger ones, up to so many voxels, are taken out of the ground and come with a closed mesh. Others stay.
+    pub debris: u32,
+}
+
+impl Default for LooseGround {
+    /// Pieces are told of, and stay.
+    fn default() -> Self {
+        let LooseSettings { largest, crumbs, debris } = LooseSettings::default();
+        Self { largest, crumbs, debris }
+    }
+}
+
+impl From<LooseGround> for LooseSettings {
+    fn from(LooseGround { largest, crumbs, debris }: LooseGround) -> Self {
+        Self { largest, crumbs, debris }
     }
 }
 

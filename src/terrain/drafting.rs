@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::loose::{self, LoosePiece, LooseSettings, Samples};
+use super::loose::{self, LoosePiece, LooseSettings};
 use super::world::World;
 use crate::backend::Compute;
 use crate::brush::{Edit, Operation};
-use crate::lattice::BrickPos;
 use crate::volume::{
-    Bricks, ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, Ledger, TakenOut, UniformBricks,
+    Bricks, ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, Ledger, SampleView, TakenOut,
+    UniformBricks,
 };
 
 /// Who drafts, over what.
@@ -32,25 +32,19 @@ fn can_remove(edit: &Edit) -> bool {
     !matches!(edit.operation(), Operation::Add { .. } | Operation::Paint { .. })
 }
 
-/// A brick's place in a draft.
-fn key(pos: BrickPos) -> [i32; 3] {
-    [pos.0.x, pos.0.z, pos.0.y]
-}
-
 impl Drafting<'_> {
-    /// What edits make of the world with newer bricks over it; each kind of uniform brick in `known` is shared.
-    fn draft(&self, over: Option<&Bricks>, edits: &[&Edit], hash: u64, known: &UniformBricks) -> Draft {
-        let (world, samples) = (self.world, self.world.samples());
-        let base = over.map_or(samples, |over| samples.over(over));
-        let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| self.backend.edit(work, each);
-        Draft::make(base, world.grid, edits, hash, known, world.rules(), apply)
-    }
-
     /// All edits at once: each brick takes all of its edits.
     pub fn together(&self, edits: &[&Edit]) -> Drafted {
-        let draft = self.draft(None, edits, self.world.sample_hash, &self.world.uniform);
+        let world = self.world;
+        let draft = self.draft(world.samples(), edits, world.sample_hash, &world.uniform);
         let over = draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         Drafted { draft, over, pieces: BTreeMap::new() }
+    }
+
+    /// What edits make of samples of this hash; bricks of a `known` kind are shared.
+    fn draft(&self, base: SampleView, edits: &[&Edit], hash: u64, known: &UniformBricks) -> Draft {
+        let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| self.backend.edit(work, each);
+        Draft::make(base, self.world.grid, edits, hash, known, self.world.rules(), apply)
     }
 
     /// The same world, but each edit that can remove ground comes by itself, and what it cuts off falls before the next.
@@ -63,37 +57,31 @@ impl Drafting<'_> {
         // Under rules an edit looks at what those before it left, so each comes by itself.
         let is_free = |edit: &Edit| world.rules().is_none() && !can_remove(edit);
         for group in edits.chunk_by(|a, b| is_free(a) && is_free(b)) {
-            let mut draft = self.draft(Some(&over), group, all.hash, &known);
-            known.extend(std::mem::take(&mut draft.uniform));
-            let drafted = std::mem::take(&mut draft.bricks);
-            let seeds = if group.iter().any(|edit| can_remove(edit)) {
-                loose::seeds(world, &over, &drafted)
-            } else {
-                Samples::default()
-            };
+            let base = world.samples().over(&over);
+            let Draft { bricks: mut drafted, mut effects, hash, uniform } =
+                self.draft(base, group, all.hash, &known);
+            all.hash = hash;
+            known.extend(uniform);
+            let is_looked_after = group.iter().any(|edit| can_remove(edit));
+            let seeds = is_looked_after.then(|| loose::seeds(world, &over, &drafted));
             lay(&mut over, &drafted);
-            if !seeds.is_empty() {
+            if let Some(seeds) = seeds {
                 let fallen = loose::fall(world, &over, &seeds, settings);
-                for TakenOut { mut drafted, hash, chunks } in fallen.taken {
-                    draft.hash = draft.hash.wrapping_add(hash);
-                    if let Some(effect) = draft.effects.last_mut() {
+                for TakenOut { drafted: mut taken, hash, chunks } in fallen.taken {
+                    all.hash = all.hash.wrapping_add(hash);
+                    if let Some(effect) = effects.last_mut() {
                         chunks.into_iter().for_each(|chunk| reach(effect, chunk));
                     }
-                    share(&mut known, &mut drafted);
-                    lay(&mut over, [&drafted]);
-                    merge(&mut bricks, drafted);
+                    share(&mut known, &mut taken);
+                    lay(&mut over, [&taken]);
+                    drafted.push(taken);
                 }
                 if !fallen.pieces.is_empty() {
                     pieces.insert(all.effects.len() + group.len() - 1, fallen.pieces);
                 }
             }
             drafted.into_iter().for_each(|drafted| merge(&mut bricks, drafted));
-            all.hash = draft.hash;
-            all.effects.append(&mut draft.effects);
-        }
-        for drafted in bricks.values_mut() {
-            // What came last is what it is.
-            over.get(&drafted.pos).into_iter().for_each(|brick| drafted.brick = Arc::clone(brick));
+            all.effects.append(&mut effects);
         }
         all.bricks = bricks.into_values().collect();
         let kinds = all.bricks.iter().filter_map(|drafted| drafted.brick.uniform());
@@ -108,15 +96,14 @@ fn lay<'d>(over: &mut Bricks, drafted: impl IntoIterator<Item = &'d DraftedBrick
     over.extend(drafted.into_iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))));
 }
 
-/// Takes in what changed in a brick, beside what did before.
-fn merge(bricks: &mut BTreeMap<[i32; 3], DraftedBrick>, drafted: DraftedBrick) {
-    match bricks.get_mut(&key(drafted.pos)) {
-        Some(own) => {
-            own.changed = own.changed.union(drafted.changed);
-            own.is_extended |= drafted.is_extended;
-        }
-        None => drop(bricks.insert(key(drafted.pos), drafted)),
+/// Takes in what a brick is now, and what changed in it beside what did before.
+fn merge(bricks: &mut BTreeMap<[i32; 3], DraftedBrick>, mut drafted: DraftedBrick) {
+    let key = [drafted.pos.0.x, drafted.pos.0.z, drafted.pos.0.y];
+    if let Some(own) = bricks.get(&key) {
+        drafted.changed = drafted.changed.union(own.changed);
+        drafted.is_extended |= own.is_extended;
     }
+    bricks.insert(key, drafted);
 }
 
 /// A brick that is all alike is replaced by the one of its kind.

@@ -23,6 +23,7 @@ mod query;
 mod ray;
 mod receipt;
 mod redraw;
+mod steps;
 mod surface;
 mod transaction;
 mod world;
@@ -110,9 +111,6 @@ enum Work {
     Step(HistoryStep, Arc<Step>),
 }
 
-/// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
-const UNDO_BUDGET: usize = 64 << 20;
-
 /// A world, the edits that wait for it, and the one transaction that may be under way.
 ///
 /// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
@@ -156,7 +154,7 @@ impl Terrain {
             in_flight: None,
             answered: Vec::new(),
             loose: None,
-            timeline: Timeline::new(UNDO_BUDGET),
+            timeline: Timeline::new(steps::UNDO_BUDGET),
             moves: Vec::new(),
         })
     }
@@ -221,25 +219,6 @@ impl Terrain {
         self.queue.push(Request::Edit(Submission { tag, edit }));
     }
 
-    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last transaction
-    /// that changed the world. Its [`HistoryReceipt`] says what came of it.
-    ///
-    /// What is undone is a transaction: all edits that waited together when it [began](Self::begin), or that one call of
-    /// [`apply`](Self::apply) was given. One that changed nothing is no step.
-    ///
-    /// Afterwards all is as it was before that transaction, bit by bit: [`World::hash`], samples, materials, fields with
-    /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`], which counts
-    /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
-    pub fn submit_undo(&mut self) {
-        self.queue.push(Request::Step(HistoryStep::Undo));
-    }
-
-    /// Queues a step forth: it does again what was undone last. An edit that changes something in between forgets what
-    /// there was to redo.
-    pub fn submit_redo(&mut self) {
-        self.queue.push(Request::Step(HistoryStep::Redo));
-    }
-
     /// From the next transaction on, edits look for pieces of ground that they cut off, and receipts list them; `None`
     /// turns that off, as it is at first. A terrain whose world has to be the same elsewhere needs the same settings there.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
@@ -249,23 +228,6 @@ impl Terrain {
     /// What edits look for, if they do.
     pub fn loose(&self) -> Option<&LooseSettings> {
         self.loose.as_ref()
-    }
-
-    /// What can be undone and redone, and what it takes.
-    pub fn history(&self) -> History {
-        self.timeline.figures()
-    }
-
-    /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
-    /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
-    /// some thousand digs of radius 8.
-    pub fn set_undo_budget(&mut self, bytes: usize) {
-        self.timeline.set_budget(bytes);
-    }
-
-    /// Bytes that the terrain takes: its world, and its history.
-    pub fn memory(&self) -> Memory {
-        Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
     }
 
     /// Brushes, and steps through history, that wait for their transaction.
@@ -372,25 +334,6 @@ impl Terrain {
         own
     }
 
-    /// Undoes the last transaction at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
-    pub fn undo(&mut self) -> HistoryReceipt {
-        self.step(HistoryStep::Undo)
-    }
-
-    /// Does again at once what was undone last, after everything that waits.
-    pub fn redo(&mut self) -> HistoryReceipt {
-        self.step(HistoryStep::Redo)
-    }
-
-    fn step(&mut self, step: HistoryStep) -> HistoryReceipt {
-        self.abandon();
-        self.queue.push(Request::Step(step));
-        let mut receipts = self.finish();
-        self.answered.append(&mut receipts);
-        // It was the last one.
-        self.moves.pop().unwrap_or_else(|| step.nothing())
-    }
-
     /// Runs and commits everything that waits.
     fn finish(&mut self) -> Vec<Receipt> {
         let mut receipts = Vec::new();
@@ -410,16 +353,6 @@ impl Terrain {
         !self.answered.is_empty()
     }
 
-    /// What became of steps through history that were submitted, in order; each is handed out once.
-    pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
-        std::mem::take(&mut self.moves)
-    }
-
-    /// Is there any to [take](Self::take_history_receipts)?
-    pub fn has_history_receipts(&self) -> bool {
-        !self.moves.is_empty()
-    }
-
     /// Tags of all brushes without a receipt, in order.
     #[cfg(feature = "plugin")]
     pub(crate) fn unanswered(&self) -> impl Iterator<Item = u64> {
@@ -430,20 +363,6 @@ impl Terrain {
         self.submissions_in_flight().chain(queued).map(|submission| submission.tag)
     }
 
-    /// All steps through history without a receipt, in order.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
-        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
-            Work::Step(step, _) => Some(step),
-            Work::Edits(_) => None,
-        });
-        let queued = self.queue.iter().filter_map(|request| match request {
-            Request::Step(step) => Some(*step),
-            Request::Edit(_) => None,
-        });
-        in_flight.chain(queued)
-    }
-
     #[cfg(feature = "plugin")]
     fn submissions_in_flight(&self) -> impl Iterator<Item = &Submission> {
         self.in_flight.iter().flat_map(|waiting| match &waiting.work {
@@ -452,7 +371,8 @@ impl Terrain {
         })
     }
 
-    /// Is nothing on its way to these samples? A step through history that waits may reach all that history does.
+    /// Is nothing on its way to these samples? A step through history that waits may reach all that history does. Pieces
+    /// that an edit will cut off nobody knows yet; they may reach further than the edit.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
         let misses = |submission: &Submission| {
             submission.edit.as_ref().map_or(true, |edit| edit.reach().intersection(bounds).is_none())

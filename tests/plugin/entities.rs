@@ -70,7 +70,7 @@ fn fields(stage: &mut Stage) -> BTreeMap<u64, (Entity, Field, Chunk)> {
 }
 
 /// Fails unless entities are what the model has: tiles, chunks and fields, in their hierarchy and places.
-fn assert_entities(stage: &mut Stage, terrain: Entity) {
+pub fn assert_entities(stage: &mut Stage, terrain: Entity) {
     let shown = fields(stage);
     let world = stage.terrain(terrain).world();
     let mut expected = BTreeMap::new();

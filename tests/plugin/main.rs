@@ -4,8 +4,10 @@
 mod despawning;
 mod entities;
 mod heightmaps;
+mod history;
 mod holes;
 mod loading;
+mod loose;
 #[cfg(feature = "render")]
 mod materials;
 mod queries;

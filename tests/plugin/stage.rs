@@ -22,6 +22,10 @@ const REST: Duration = Duration::from_millis(60);
 #[derive(Resource, Default)]
 struct Receipts(Vec<BrushApplied>);
 
+/// Every message of one kind so far.
+#[derive(Resource)]
+struct Heard<M: Message>(Vec<M>);
+
 /// The terrains that said they are ready.
 #[derive(Resource, Default)]
 struct ReadyTerrains(Vec<Entity>);
@@ -59,6 +63,26 @@ impl Stage {
         app.finish();
         app.cleanup();
         Self { app }
+    }
+
+    /// The same app, which writes down messages of one more kind.
+    pub fn hearing<M: Message + Clone>(mut self) -> Self {
+        self.app
+            .insert_resource(Heard::<M>(Vec::new()))
+            .add_systems(Last, |mut new: MessageReader<M>, mut heard: ResMut<Heard<M>>| {
+                heard.0.extend(new.read().cloned())
+            });
+        self
+    }
+
+    /// What it heard since it was asked last.
+    pub fn heard<M: Message>(&mut self) -> Vec<M> {
+        std::mem::take(&mut self.app.world_mut().resource_mut::<Heard<M>>().0)
+    }
+
+    /// Writes any message, to be read in the next frame.
+    pub fn tell<M: Message>(&mut self, message: M) {
+        self.app.world_mut().write_message(message).expect("the plugin added the message");
     }
 
     /// The same app with other settings.

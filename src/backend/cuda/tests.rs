@@ -99,6 +99,36 @@ fn worlds_of_a_device_are_those_of_the_processor() {
     println!("{worlds} worlds, {} stages on the device", figures.cuda);
 }
 
+#[test]
+fn history_and_loose_pieces_of_a_device_are_those_of_the_processor() {
+    let Some(device) = device() else { return };
+    let engine = engine(device, 64 << 20);
+    for index in 0..worlds::world_count(12) {
+        let mut rng = Rng::with_seed(1700 + index);
+        let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
+        let (settings, ground) = (TerrainSettings { chunk_size, ..Default::default() }, Arc::new(ground));
+        let [mut expected, mut found] =
+            [(); 2].map(|()| Terrain::new(Arc::clone(&ground), &settings).expect("valid settings"));
+        found.set_engine(engine.clone());
+        for terrain in [&mut expected, &mut found] {
+            terrain.set_loose(Some(LooseSettings { largest: 4000, crumbs: 20, debris: 4000 }));
+        }
+        for _ in 0..8 {
+            match rng.u32(0..5) {
+                0 => assert_eq!(expected.undo(), found.undo(), "world {index}"),
+                1 => assert_eq!(expected.redo(), found.redo(), "world {index}"),
+                _ => {
+                    let brushes = [(); 3].map(|()| worlds::random_brush(&mut rng, &ground));
+                    assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
+                }
+            }
+            assert_same(expected.world(), found.world(), index);
+        }
+        assert_eq!(expected.history(), found.history(), "world {index}");
+    }
+    assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+}
+
 /// A device that fails when it is told to.
 struct Faulty {
     own: Box<dyn Device>,

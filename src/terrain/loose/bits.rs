@@ -7,7 +7,7 @@ use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::Layers;
 
 /// Some samples of some bricks.
-pub(in crate::terrain) type Samples = FxHashMap<BrickPos, Layers>;
+pub(super) type Samples = FxHashMap<BrickPos, Layers>;
 
 /// No sample of a brick.
 pub(super) const NONE: Layers = [0; 8];

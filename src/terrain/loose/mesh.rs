@@ -6,17 +6,19 @@ use rustc_hash::FxHashMap;
 use super::bits::Samples;
 use super::search::{self, Component};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BrickPos, Column, ONE};
+use crate::lattice::{BrickPos, ChunkGrid, Column, ONE};
 use crate::surface::SurfaceMesh;
 use crate::surface::cases;
-use crate::surface::vertex::{Lattice, WorldView, vertex};
+use crate::surface::vertex::{Lattice, vertex};
+use crate::volume::SampleView;
 
 /// Density of what lies beyond the world's sides. The piece ends at its last sample there, not halfway to the next.
 const BEYOND: i32 = i32::MAX / 4;
 
 /// The world as it is, but with air around the piece.
 struct Piece<'a> {
-    view: &'a WorldView<'a>,
+    view: SampleView<'a>,
+    grid: ChunkGrid,
     samples: Samples,
 }
 
@@ -27,8 +29,7 @@ impl Piece<'_> {
     }
 
     fn is_in_world(&self, point: IVec3) -> bool {
-        let grid = self.view.grid;
-        (0..=grid.width()).contains(&point.x) && (0..=grid.depth()).contains(&point.z)
+        (0..=self.grid.width()).contains(&point.x) && (0..=self.grid.depth()).contains(&point.z)
     }
 }
 
@@ -50,15 +51,16 @@ impl Lattice for Piece<'_> {
     fn ground(&self) -> &Ground {
         self.view.ground()
     }
-    fn is_volumetric(&self, cell: Column) -> Option<bool> {
-        self.view.is_volumetric(cell)
+    /// A piece has no border to a heightmap.
+    fn is_volumetric(&self, _: Column) -> Option<bool> {
+        None
     }
 }
 
-/// What marching cubes draws of a piece alone: closed, with the vertices that the world has there.
-pub(super) fn closed(view: &WorldView, piece: &Component, origin: IVec3) -> SurfaceMesh {
+/// What marching cubes draws of a piece alone: closed, with its vertices where the world has them.
+pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origin: IVec3) -> SurfaceMesh {
     let samples = piece.iter().map(|(&key, &layers)| (search::brick(key), layers)).collect();
-    let piece_view = Piece { view, samples };
+    let piece_view = Piece { view, grid, samples };
     let mut mesh = SurfaceMesh::default();
     let mut numbers: FxHashMap<(IVec3, usize), u32> = FxHashMap::default();
     for (&key, layers) in piece {

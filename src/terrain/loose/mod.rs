@@ -24,10 +24,8 @@ use glam::IVec3;
 use super::world::World;
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::SurfaceMesh;
-use crate::surface::vertex::WorldView;
 use crate::volume::{Bricks, DiggingRules, DraftedBrick, SampleView, TakenOut, Tally, take_out};
-pub(super) use bits::Samples;
-use bits::{NONE, SIDES};
+use bits::{NONE, SIDES, Samples};
 use search::{Component, Solid};
 
 /// What to look for after a dig, and what to do with it.
@@ -148,8 +146,7 @@ pub(super) fn fall(world: &World, over: &Bricks, seeds: &Samples, settings: &Loo
             component.iter().for_each(|(&key, layers)| bits::include(&mut gone, search::brick(key), layers));
         }
         if piece.fate == PieceFate::BrokeOff {
-            let view = WorldView { samples, ..world.view() };
-            piece.mesh = Some(Arc::new(mesh::closed(&view, component, piece.bounds.min)));
+            piece.mesh = Some(Arc::new(mesh::closed(samples, world.grid, component, piece.bounds.min)));
         }
         fallen.pieces.push(piece);
     }

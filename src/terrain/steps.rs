@@ -1,0 +1,89 @@
+//! A terrain's steps through its history.
+
+#[cfg(feature = "plugin")]
+use super::Work;
+use super::{History, HistoryReceipt, HistoryStep, Memory, Request, Terrain};
+
+/// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
+pub(super) const UNDO_BUDGET: usize = 64 << 20;
+
+impl Terrain {
+    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last transaction
+    /// that changed the world. Its [`HistoryReceipt`] says what came of it.
+    ///
+    /// What is undone is a transaction: all edits that waited together when it [began](Self::begin), or that one call of
+    /// [`apply`](Self::apply) was given. One that changed nothing is no step.
+    ///
+    /// Afterwards all is as it was before that transaction, bit by bit: [`World::hash`](super::World::hash), samples, materials, fields with
+    /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`](super::World::revision), which counts
+    /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
+    pub fn submit_undo(&mut self) {
+        self.queue.push(Request::Step(HistoryStep::Undo));
+    }
+
+    /// Queues a step forth: it does again what was undone last. An edit that changes something in between forgets what
+    /// there was to redo.
+    pub fn submit_redo(&mut self) {
+        self.queue.push(Request::Step(HistoryStep::Redo));
+    }
+
+    /// What can be undone and redone, and what it takes.
+    pub fn history(&self) -> History {
+        self.timeline.figures()
+    }
+
+    /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
+    /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
+    /// some thousand digs of radius 8.
+    pub fn set_undo_budget(&mut self, bytes: usize) {
+        self.timeline.set_budget(bytes);
+    }
+
+    /// Bytes that the terrain takes: its world, and its history.
+    pub fn memory(&self) -> Memory {
+        Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
+    }
+
+    /// Undoes the last transaction at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
+    pub fn undo(&mut self) -> HistoryReceipt {
+        self.step(HistoryStep::Undo)
+    }
+
+    /// Does again at once what was undone last, after everything that waits.
+    pub fn redo(&mut self) -> HistoryReceipt {
+        self.step(HistoryStep::Redo)
+    }
+
+    fn step(&mut self, step: HistoryStep) -> HistoryReceipt {
+        self.abandon();
+        self.queue.push(Request::Step(step));
+        let mut receipts = self.finish();
+        self.answered.append(&mut receipts);
+        // It was the last one.
+        self.moves.pop().unwrap_or_else(|| step.nothing())
+    }
+
+    /// What became of steps through history that were submitted, in order; each is handed out once.
+    pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
+        std::mem::take(&mut self.moves)
+    }
+
+    /// Is there any to [take](Self::take_history_receipts)?
+    pub fn has_history_receipts(&self) -> bool {
+        !self.moves.is_empty()
+    }
+
+    /// All steps through history without a receipt, in order.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
+        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
+            Work::Step(step, _) => Some(step),
+            Work::Edits(_) => None,
+        });
+        let queued = self.queue.iter().filter_map(|request| match request {
+            Request::Step(step) => Some(*step),
+            Request::Edit(_) => None,
+        });
+        in_flight.chain(queued)
+    }
+}

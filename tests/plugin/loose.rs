@@ -1,0 +1,54 @@
+//! Loose ground: a component turns it on, and messages tell what broke off.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::stage::{Stage, level};
+
+/// A slab on a pillar, on level ground at 8.
+fn table() -> Terrain {
+    let mut terrain = level(1.0);
+    let pillar = Shape::cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(1.2, 8.0, 1.2));
+    let slab = Shape::cuboid(Vec3::new(32.0, 22.0, 32.0), Vec3::new(6.2, 2.2, 6.2));
+    terrain.apply([Brush::add(pillar, MaterialId(2)), Brush::add(slab, MaterialId(3))]);
+    terrain
+}
+
+fn saw() -> Brush {
+    Brush::dig(Shape::cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(4.0, 1.2, 4.0))).with_tag(9)
+}
+
+#[test]
+fn what_breaks_off_is_told_with_its_mesh() {
+    let mut model = table();
+    model.set_loose(Some(LooseGround { debris: 9000, ..default() }.into()));
+    model.apply([saw()]);
+    for (is_drawing, stage) in [(true, Stage::drawing()), (false, Stage::server())] {
+        let mut stage = stage.hearing::<LoosePieceFound>();
+        let terrain = stage.show(table());
+        stage.app.world_mut().entity_mut(terrain).insert(LooseGround { debris: 9000, ..default() });
+        stage.send(saw());
+        stage.settle();
+        assert_eq!(stage.hash(terrain), model.world().hash());
+        let heard = stage.heard::<LoosePieceFound>();
+        let [found] = &heard[..] else { panic!("one piece: {heard:?}") };
+        assert_eq!((found.terrain, found.tag, found.piece.fate), (terrain, 9, PieceFate::BrokeOff));
+        assert_eq!(found.origin(), found.piece.bounds.min.as_vec3());
+        let mesh = found.mesh(&MaterialColors::default()).expect("it broke off");
+        assert!(mesh.count_vertices() > 100);
+        let receipt = &stage.receipts()[0].receipt;
+        assert_eq!(receipt.outcome.as_ref().map(|applied| applied.loose.len()), Ok(1));
+        if is_drawing {
+            stage.assert_whole(terrain, "without the slab");
+        }
+        // It comes back with what cut it off.
+        stage.tell(Undo { terrain: None });
+        stage.settle();
+        assert_eq!(stage.hash(terrain), table().world().hash());
+        stage.app.world_mut().entity_mut(terrain).remove::<LooseGround>();
+        stage.send(saw());
+        stage.settle();
+        assert!(stage.heard::<LoosePieceFound>().is_empty(), "nobody looks any more");
+        assert_ne!(stage.hash(terrain), model.world().hash());
+    }
+}
