@@ -129,14 +129,21 @@ impl Painter {
         }
     }
 
-    /// Says which blocks are drawn, and where their surfaces are in the lists.
-    pub fn list(&mut self, blocks: &[Block], ranges: impl Iterator<Item = BlockRange>) {
+    /// Says which blocks are drawn, and where their surfaces are in the lists. Indices are counted from the buffer's start:
+    /// lavapipe's indirect draws know nothing of an index buffer that begins elsewhere.
+    pub fn list(
+        &mut self,
+        blocks: &[Block],
+        ranges: impl Iterator<Item = BlockRange>,
+        layout: &SurfaceLayout,
+    ) {
         let (mut draws, mut origins) = (Vec::new(), Vec::new());
+        let first = (layout.indices.start / size_of::<u16>() as u64) as u32;
         for (block, range) in blocks.iter().zip(ranges).filter(|(_, range)| range.indices > 0) {
             draws.push(DrawIndexedIndirectArgs {
                 index_count: range.indices,
                 instance_count: 1,
-                first_index: range.index,
+                first_index: first + range.index,
                 base_vertex: range.vertex as i32,
                 first_instance: draws.len() as u32,
             });
@@ -184,7 +191,7 @@ impl Painter {
         pass.set_vertex_buffer(0, surfaces.slice(layout.positions.clone()));
         pass.set_vertex_buffer(1, surfaces.slice(layout.normals.clone()));
         pass.set_vertex_buffer(2, self.origins.slice(..));
-        pass.set_index_buffer(surfaces.slice(layout.indices.clone()), wgpu::IndexFormat::Uint16);
+        pass.set_index_buffer(surfaces.slice(..), wgpu::IndexFormat::Uint16);
         pass.multi_draw_indexed_indirect(&self.draws, 0, self.count);
         drop(pass);
         self.queue.submit([encoder.finish()]);

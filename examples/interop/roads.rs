@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     for scene in &scenes {
         let Reference { positions, normals, indices, ranges } = &scene.surfaces;
         let layout = scene.surfaces.layout();
-        painter.list(&scene.blocks, ranges.iter().copied());
+        painter.list(&scene.blocks, ranges.iter().copied(), &layout);
         painter.upload(&host, &layout, positions, normals, indices);
         painter.draw(&host, &layout)?;
         references.push(painter.pixels()?);
@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         let start = Instant::now();
         let mut surfaces = card.mesh(&scene.world.view(), &scene.blocks)?;
         let meshed = Instant::now();
-        painter.list(&scene.blocks, surfaces.ranges());
+        painter.list(&scene.blocks, surfaces.ranges(), &surfaces.layout());
         painter.settle()?;
         if is_timed {
             meshing.push((meshed - start).as_secs_f64());
