@@ -355,8 +355,8 @@ mod tests {
     fn surfaces_that_stay_on_a_device_are_those_that_come_back() {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 64 << 20).expect("there is memory");
-        let ground =
-            Ground::from_fn(64, 64, |x, z| 12.0 + (x * 0.3).sin() + z * 0.1).expect("finite heights");
+        let ground = Ground::from_fn(64, 64, |x, z| 12.0 + (f64::from(x) * 0.3).sin() + f64::from(z) * 0.1)
+            .expect("finite heights");
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         terrain.apply([
             Brush::dig(Shape::sphere(Vec3::new(30.0, 12.0, 33.0), 9.0)),

@@ -263,3 +263,71 @@ impl SharedBuffer {
         self.queue.submit([encoder.finish()]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::pin::pin;
+    use std::task::{Context, Poll, Waker};
+
+    use super::*;
+
+    /// A Vulkan device, lavapipe's included, if there is any.
+    fn device() -> Option<(wgpu::Device, wgpu::Queue)> {
+        fn ready<F: Future>(future: F) -> F::Output {
+            match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+                Poll::Ready(ready) => ready,
+                Poll::Pending => panic!("native devices are ready at once"),
+            }
+        }
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::VULKAN;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = ready(instance.request_adapter(&Default::default())).ok()?;
+        ready(adapter.request_device(&Default::default())).ok()
+    }
+
+    #[test]
+    fn a_buffer_is_handed_over_and_taken_back() {
+        let Some((device, queue)) = device() else { return println!("no Vulkan") };
+        match uuid(&device) {
+            Err(error @ InteropError::CannotShare(_)) => return println!("{error}"),
+            found => assert_ne!(found, Ok([0; 16])),
+        }
+        let memory = SharedMemory::new(&device, 1000).expect("memory is there");
+        assert!(memory.allocated() >= 1000);
+        let [first, second] = [(); 2].map(|()| memory.descriptor().expect("memory can be exported"));
+        let mut shared = memory.into_buffer(&device, &queue, 1000).expect("it is Vulkan's");
+        drop(first);
+        let target = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 1000,
+            usage: wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        shared.acquire().expect("the device lives");
+        for _ in 0..3 {
+            shared.copy_to(0..1000, &target, 0);
+            shared.release().expect("the device lives");
+            shared.acquire().expect("the device lives");
+        }
+        // Whoever has a descriptor, or the buffer, keeps the memory.
+        let buffer = shared.buffer().clone();
+        drop(shared);
+        drop(second);
+        assert_eq!((buffer.size(), buffer.usage()), (1000, USAGES));
+    }
+
+    #[test]
+    fn a_lost_device_hands_nothing_over() {
+        let Some((device, queue)) = device() else { return println!("no Vulkan") };
+        if uuid(&device).is_err() {
+            return println!("nothing to share");
+        }
+        let memory = SharedMemory::new(&device, 64).expect("memory is there");
+        let mut shared = memory.into_buffer(&device, &queue, 64).expect("it is Vulkan's");
+        shared.acquire().expect("the device lives");
+        device.destroy();
+        let _ = device.poll(wgpu::PollType::wait_indefinitely());
+        assert_eq!(shared.release(), Err(InteropError::Lost));
+    }
+}
