@@ -401,12 +401,12 @@ mod tests {
             let layout = SurfaceLayout::new(vertices, indices);
             let ranges = [&layout.positions, &layout.normals, &layout.indices];
             assert!(ranges.windows(2).all(|pair| pair[0].end <= pair[1].start));
-            assert!(ranges.iter().all(|range| range.start % 16 == 0));
+            assert!(ranges.iter().all(|range| range.start.is_multiple_of(16)));
             assert_eq!(
                 ranges.map(|range| range.end - range.start),
                 [vertices * 8, vertices * 12, indices * 2]
             );
-            assert!(layout.bytes() >= layout.indices.end && layout.bytes() % 4 == 0);
+            assert!(layout.bytes() >= layout.indices.end && layout.bytes().is_multiple_of(4));
         }
     }
 }
