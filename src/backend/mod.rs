@@ -17,6 +17,9 @@ mod cpu;
 mod cuda;
 mod engine;
 
+#[cfg(all(feature = "interop", target_os = "linux"))]
+pub use cuda::interop;
+
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
 pub use engine::{Engine, EngineFigures, EngineState};

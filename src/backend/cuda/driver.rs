@@ -1,6 +1,6 @@
 //! A CUDA card, through its driver.
 //!
-//! All of the crate's unsafe code is here. Addresses come from the driver and are handed back to it alone; what kernels do
+//! All of the crate's unsafe code is here, and in `interop` where that is built. Addresses come from the driver and are handed back to it alone; what kernels do
 //! with them is bounded by the capacities they are given.
 #![allow(unsafe_code)]
 
@@ -66,6 +66,38 @@ impl Card {
 
     /// The same with other kernels.
     pub fn open_with(ptx: &str) -> Result<Self, Fault> {
+        Self::open_number(0, ptx)
+    }
+
+    /// Opens the card that has this UUID.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn open_uuid(uuid: [u8; 16]) -> Result<Self, Fault> {
+        // SAFETY: as in `open_number`.
+        if !unsafe { sys::is_culib_present() } {
+            return Err(Fault::NoDriver);
+        }
+        let no_device = |error: DriverError| match failed(error) {
+            Fault::Failed(name) => Fault::NoDevice(name),
+            fault => fault,
+        };
+        let count = CudaContext::device_count().map_err(no_device)?;
+        for number in 0..count {
+            let device = result::device::get(number).map_err(no_device)?;
+            let own = result::device::get_uuid(device).map_err(no_device)?;
+            if own.bytes.map(|byte| byte as u8) == uuid {
+                return Self::open_number(number as usize, PTX);
+            }
+        }
+        Err(Fault::NoDevice(format!("none of {count} is the one asked for")))
+    }
+
+    /// What belongs to the card's context may be made in it.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn context(&self) -> Arc<CudaContext> {
+        Arc::clone(&self.context)
+    }
+
+    fn open_number(number: usize, ptx: &str) -> Result<Self, Fault> {
         // SAFETY: loads the driver's library to see whether it is there, as every later call does.
         if !unsafe { sys::is_culib_present() } {
             return Err(Fault::NoDriver);
@@ -74,7 +106,7 @@ impl Card {
             Fault::Failed(name) => Fault::NoDevice(name),
             fault => fault,
         };
-        let context = CudaContext::new(0).map_err(no_device)?;
+        let context = CudaContext::new(number).map_err(no_device)?;
         let (major, minor) = context.compute_capability().map_err(failed)?;
         if (major, minor) < (7, 5) {
             return Err(Fault::OldDevice(major, minor));
@@ -230,7 +262,8 @@ impl Device for Card {
 
     fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
         self.bind()?;
-        // SAFETY: both addresses are from `alloc`, with so many bytes each, and do not overlap.
+        // SAFETY: both addresses are from `alloc`, or memory that was imported and is kept until the copy is waited for,
+        // with so many bytes each, and do not overlap.
         unsafe { result::memcpy_dtod_async(to, from, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 

@@ -22,6 +22,10 @@ pub(super) struct MeshOutput {
     indices: Outbox,
 }
 
+/// Positions, normals and indices.
+#[cfg(all(feature = "interop", target_os = "linux"))]
+pub(super) type Lists<'a> = (&'a [[u16; 4]], &'a [[f32; 3]], &'a [u16]);
+
 /// Vertices that there is room for at the start; indices are six times as many.
 const FIRST_VERTICES: usize = 1 << 14;
 
@@ -75,9 +79,40 @@ impl MeshOutput {
         if is_copied { device.wait() } else { Ok(()) }
     }
 
+    /// Where positions, normals and indices are on the device.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn there(&self) -> [u64; 3] {
+        [&self.positions, &self.normals, &self.indices].map(Outbox::address)
+    }
+
+    /// Where the surfaces of so many blocks are in these lists.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn results(&self, blocks: usize) -> &[MeshResult] {
+        self.results.entries(blocks)
+    }
+
+    /// Copies positions, normals and indices to the host.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn download(
+        &mut self,
+        device: &mut dyn Device,
+        (vertices, indices): (usize, usize),
+    ) -> Result<Lists<'_>, Fault> {
+        self.fetch(device, (vertices, indices), false)?;
+        Ok((self.positions.entries(vertices), self.normals.entries(vertices), self.indices.entries(indices)))
+    }
+
     fn vertex_capacity(&self) -> u32 {
         self.positions.capacity().min(self.normals.capacity()).min(self.mixes.capacity())
     }
+}
+
+/// What a launch wrote.
+struct Meshed {
+    /// Vertices and indices.
+    totals: (usize, usize),
+    /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
+    plain: Option<MaterialMix>,
 }
 
 /// From how many things on they are dealt with side by side.
@@ -94,19 +129,38 @@ impl Session {
     pub fn mesh(&mut self, view: &WorldView, blocks: &[Block]) -> Result<Vec<Parts>, Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let parts = self.run_mesh(view, blocks, &mut uploads);
+        let parts = self.run_mesh(view, blocks, &mut uploads, blocks.len() >= COPIED).and_then(|meshed| {
+            self.meshes.fetch(&mut *self.device, meshed.totals, meshed.plain.is_none())?;
+            Ok(self.meshes.parts(view, blocks, meshed.totals, meshed.plain))
+        });
         if parts.is_err() {
             self.give_up(&uploads);
         }
         parts
     }
 
+    /// Meshes blocks and leaves their surfaces on the device, however few they are: how many vertices and indices there
+    /// are, in [`MeshOutput::there`].
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn mesh_there(&mut self, view: &WorldView, blocks: &[Block]) -> Result<(usize, usize), Fault> {
+        self.begin();
+        let mut uploads = Uploads::new(view.samples.ground());
+        let meshed = self.run_mesh(view, blocks, &mut uploads, true);
+        if meshed.is_err() {
+            self.give_up(&uploads);
+        }
+        meshed.map(|meshed| meshed.totals)
+    }
+
+    /// Has blocks meshed; their [`MeshResult`]s are here then, and surfaces not yet. `is_long`: they are written on the
+    /// device and to be copied, instead of straight to the host's memory.
     fn run_mesh<'a>(
         &mut self,
         view: &WorldView<'a>,
         blocks: &[Block],
         uploads: &mut Uploads<'a>,
-    ) -> Result<Vec<Parts>, Fault> {
+        is_long: bool,
+    ) -> Result<Meshed, Fault> {
         if blocks.len() > MOST_JOBS {
             return Err(Fault::TooLarge(blocks.len()));
         }
@@ -134,7 +188,6 @@ impl Session {
         let job = |number: usize, block: &Block| mesh_job(view, &windows, number, block, numbers[number]);
         fill(blocks, self.inbox.entries(job_list), LONG, job);
         self.inbox.entries::<u32>(counters).fill(0);
-        let is_long = blocks.len() >= COPIED;
         self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
         self.meshes.reserve(&mut *self.device, (0, 0), is_long)?;
 
@@ -166,8 +219,7 @@ impl Session {
             self.times = self.device.times();
             let totals = self.meshes.totals(blocks.len());
             if !self.meshes.reserve(&mut *self.device, totals, is_long)? {
-                self.meshes.fetch(&mut *self.device, totals, plain.is_none())?;
-                return Ok(self.meshes.parts(view, blocks, totals, plain));
+                return Ok(Meshed { totals, plain });
             }
             // A second pass, with room for all.
         }

@@ -20,6 +20,8 @@ mod device;
 mod driver;
 mod edit;
 mod heights;
+#[cfg(all(feature = "interop", target_os = "linux"))]
+pub mod interop;
 mod layout;
 mod mail;
 mod mesh;
