@@ -2,7 +2,6 @@
 
 use bevy::prelude::*;
 use bevy_burrow::plugin::{Attachment, Companion, Companions, Part, ShownSurface};
-use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::Drawn;
 
