@@ -58,11 +58,6 @@ struct Known {
 pub(super) struct Grounds(Arc<Known>);
 
 impl Grounds {
-    /// Is ground wanted here?
-    pub fn is_near(&self, part: &Part) -> bool {
-        self.0.near.read().unwrap_or_else(PoisonError::into_inner).is_near(part, 0.0)
-    }
-
     /// A copy, for the main thread.
     pub fn near(&self) -> Neighbourhood {
         self.0.near.read().unwrap_or_else(PoisonError::into_inner).clone()
@@ -94,8 +89,12 @@ impl Grounds {
 }
 
 impl Companion for Grounds {
+    /// Near sources, and a little farther off where there is a collider that has not gone yet.
     fn wants(&self, part: &Part) -> bool {
-        self.is_near(part)
+        let distance = self.0.near.read().unwrap_or_else(PoisonError::into_inner).distance(part);
+        distance.is_some_and(|distance| {
+            distance <= 0.0 || (!is_far(part, distance) && self.shape(part).is_some())
+        })
     }
 
     fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
@@ -169,6 +168,11 @@ impl Prepared {
         });
         part.insert(GroundCollider { body, revision: self.part.revision });
     }
+}
+
+/// Is a part so far from all sources that its collider goes? Those who walk along a border are not to make it come and go.
+pub(super) fn is_far(part: &Part, distance: f32) -> bool {
+    distance > part.size as f32
 }
 
 /// Takes a tile's or chunk's collider away.

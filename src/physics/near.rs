@@ -37,11 +37,6 @@ impl Default for ColliderSource {
 pub(super) struct Neighbourhood(HashMap<Entity, Vec<(Vec2, f32)>>);
 
 impl Neighbourhood {
-    /// Is some source within its radius, and `slack` voxels more, of a part's column?
-    pub fn is_near(&self, part: &Part, slack: f32) -> bool {
-        self.distance(part).is_some_and(|distance| distance <= slack)
-    }
-
     /// How far the nearest source's radius ends from a part's column, in voxels; negative within it.
     pub fn distance(&self, part: &Part) -> Option<f32> {
         let size = part.size as f32;

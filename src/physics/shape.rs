@@ -125,12 +125,15 @@ impl Welded {
                 })
             })
             .collect();
-        let corner = |index: u32| welded.get(index as usize).copied().unwrap_or_default();
+        let corner = |index: u32| welded.get(index as usize).copied();
         let has_area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|corner| places[corner as usize].as_i64vec3());
             (b - a).cross(c - a) != glam::I64Vec3::ZERO
         };
-        let triangles = surface.indices.chunks_exact(3).map(|t| [corner(t[0]), corner(t[1]), corner(t[2])]);
+        let triangles = surface
+            .indices
+            .chunks_exact(3)
+            .filter_map(|t| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]));
         let triangles = triangles.filter(has_area).collect();
         Self { places, normals, triangles }
     }

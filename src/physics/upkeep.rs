@@ -6,7 +6,7 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
 use super::PhysicsFigures;
-use super::colliders::{GroundBody, GroundCollider, Grounds, Prepared, detach};
+use super::colliders::{GroundBody, GroundCollider, Grounds, Prepared, detach, is_far};
 use super::near::Neighbourhood;
 use crate::lattice::{ChunkPos, TilePos};
 use crate::plugin::{Chunk, Part, ShownSurface, Tile};
@@ -104,14 +104,15 @@ pub(super) fn tend(
         let distance = near.distance(&part).unwrap_or(f32::INFINITY);
         let mut has_collider = ground.as_ref().is_some_and(|ground| ground.body.is_some());
         let is_outdated = ground.as_ref().is_none_or(|ground| ground.revision < shown.revision);
-        if ground.is_some() && (distance > part.size as f32 || is_outdated && shown.is_empty) {
+        let goes = is_far(&part, distance);
+        if ground.is_some() && (goes || is_outdated && shown.is_empty) {
             commands.entity(entity).queue_silenced(detach);
             has_collider = false;
-        } else if is_outdated && distance <= 0.0 && !shown.is_empty {
+        } else if is_outdated && !shown.is_empty && (distance <= 0.0 || ground.is_some()) {
             missing.push((distance, entity, part));
         }
         count += usize::from(has_collider);
-        let is_there = ground.as_ref().is_some_and(|_| distance <= part.size as f32) || shown.is_empty;
+        let is_there = ground.is_some() && !goes || shown.is_empty;
         *columns.entry((part.terrain, column(drawn))).or_insert(true) &= is_there;
     }
     ready.0 = columns.into_iter().filter(|(_, is_ready)| *is_ready).map(|(column, _)| column).collect();

@@ -1,6 +1,7 @@
 //! The Bevy plugin from outside: brushes go in as messages, and what is shown, told and kept is looked at frame by frame.
 #![cfg(feature = "plugin")]
 
+mod companions;
 mod despawning;
 mod entities;
 mod heightmaps;

@@ -1,0 +1,60 @@
+//! Companions: what goes with surfaces comes with them, in the same frame, with meshes and without.
+
+use bevy::prelude::*;
+use bevy_burrow::plugin::{Attachment, Companion, Companions, Part, ShownSurface};
+use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::terrain::Drawn;
+
+use crate::stage::{Stage, random_brushes, steep};
+
+/// How many triangles a tile or chunk has.
+#[derive(Component)]
+struct Triangles(usize, Drawn);
+
+struct Counter;
+
+impl Companion for Counter {
+    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
+        let count = Triangles(surface.indices.len() / 3, part.drawn);
+        Some(Box::new(move |entity| {
+            entity.try_insert(count);
+        }))
+    }
+}
+
+/// Fails unless every part has what belongs to the world that is committed.
+fn assert_counted(stage: &mut Stage, terrain: Entity) {
+    let world = stage.app.world_mut();
+    let counted: Vec<(usize, Drawn)> = world.query::<&Triangles>().iter(world).map(|t| (t.0, t.1)).collect();
+    let model = stage.terrain(terrain).world();
+    for (drawn, mesh) in model.drawn() {
+        assert!(counted.contains(&(mesh.indices.len() / 3, drawn)), "{drawn:?} has not what belongs to it");
+    }
+    let all: usize = counted.iter().map(|(count, _)| count).sum();
+    assert_eq!(all, model.drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum::<usize>());
+}
+
+#[test]
+fn companions_come_with_every_commit() {
+    for mut stage in [Stage::drawing(), Stage::server()] {
+        stage.app.world_mut().resource_mut::<Companions>().add(Counter);
+        let terrain = stage.show(steep());
+        assert_counted(&mut stage, terrain);
+        let mut revision = stage.terrain(terrain).world().revision();
+        for brush in random_brushes(21, 12) {
+            let answered = stage.receipts().len();
+            stage.send(brush);
+            stage.frames_until("a brush is answered", |stage| {
+                let now = stage.terrain(terrain).world().revision();
+                // In whatever frame the commit comes, all of it is there.
+                if now != revision {
+                    assert_counted(stage, terrain);
+                }
+                revision = now;
+                stage.receipts().len() > answered
+            });
+        }
+        let world = stage.app.world_mut();
+        assert!(world.query::<&ShownSurface>().iter(world).any(|shown| shown.revision == revision));
+    }
+}
