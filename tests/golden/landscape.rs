@@ -7,8 +7,8 @@ use crate::album::Album;
 use crate::studio::Studio;
 
 /// Where the camera stands: x, metres above the ground, z; and what it looks at, from the pit.
-const EYE: Vec3 = Vec3::new(160.0, 14.0, 178.0);
-const AT: Vec3 = Vec3::new(-6.0, 4.0, -8.0);
+const EYE: Vec3 = Vec3::new(128.0, 22.0, 60.0);
+const AT: Vec3 = Vec3::new(-8.0, 2.0, 22.0);
 
 /// Hills with snow on the tops and sand in the valleys.
 pub fn hills(side: u32) -> Ground {

@@ -32,12 +32,20 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     };
     studio.app.world_mut().entity_mut(camera).insert((NormalPrepass, MotionVectorPrepass));
     check(studio, "prepasses");
+    // A deferred material wants a deferred camera, before and after.
     studio.app.world_mut().entity_mut(camera).insert(DeferredPrepass);
-    let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
-    materials.iter_mut().for_each(|(_, mut material)| {
-        material.base.opaque_render_method = OpaqueRendererMethod::Deferred;
-    });
+    studio.app.update();
+    draw_by(studio, OpaqueRendererMethod::Deferred);
     check(studio, "deferred");
+    draw_by(studio, OpaqueRendererMethod::Forward);
+    studio.app.update();
     let mut camera = studio.app.world_mut().entity_mut(camera);
     camera.remove::<(NormalPrepass, MotionVectorPrepass, DeferredPrepass)>();
+}
+
+fn draw_by(studio: &mut Studio, method: OpaqueRendererMethod) {
+    let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
+    for (_, mut material) in materials.iter_mut() {
+        material.base.opaque_render_method = method;
+    }
 }

@@ -210,7 +210,7 @@ fn fetch_pieces(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair
     // Narrow borders: what is mixed loses contrast, and most pixels need one piece only.
     weights = weights * weights;
     weights = weights * weights * weights;
-    weights = max(weights / (weights.x + weights.y + weights.z) - 0.04, vec3(0.0));
+    weights = max(weights / (weights.x + weights.y + weights.z) - 0.07, vec3(0.0));
     weights /= weights.x + weights.y + weights.z;
     var sum = Pair(vec4(0.0), vec4(0.0));
     for (var i = 0; i < 3; i++) {
@@ -326,7 +326,11 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
     let cover = in.origin.y;
     let sunk = max(in.origin.x, 0.0);
     // Borders between strata are ragged, but not at the surface itself.
-    let depth = max(sunk + (0.45 * fine.x + 0.5 * broad.x) * min(sunk, 1.0), 0.0);
+    var depth = sunk;
+    if sunk > 0.0 {
+        let grit = noise_at(site.place, 5.0).x;
+        depth = max(sunk + (0.7 * grit + 0.35 * fine.x + 0.5 * broad.x) * min(1.4 * sunk, 1.0), 0.0);
+    }
     let steep = 1.0 - smoothstep(ground.far.x, ground.far.y, site.normal.y + 0.08 * fine.y);
     let bare = own * max(steep, smoothstep(0.10, 0.40, depth));
     // What the strata fill: under turf, and where the ground itself shows. A layer's kind is 1 for a skin, 2 for strata.
@@ -434,7 +438,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     sides = sides * sides;
     // The weakest side is left out, but where all are alike.
     sides = max(sides - 0.995 * min(sides.x, min(sides.y, sides.z)), vec3(0.0));
-    sides = max(sides / (sides.x + sides.y + sides.z) - 0.03, vec3(0.0));
+    sides = max(sides / (sides.x + sides.y + sides.z) - 0.06, vec3(0.0));
     site.sides = sides / (sides.x + sides.y + sides.z);
     let distance = length(view.world_position - in.world_position.xyz);
     site.far = smoothstep(ground.far.z, ground.far.w, distance);
