@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use bevy::app::PluginsState;
 use bevy::camera::RenderTarget;
-use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::ecs::component::Mutable;
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::log::{Level, LogPlugin};

@@ -45,7 +45,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
 
 fn draw_by(studio: &mut Studio, method: OpaqueRendererMethod) {
     let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
-    for (_, mut material) in materials.iter_mut() {
+    for (_, material) in materials.iter_mut() {
         material.base.opaque_render_method = method;
     }
 }
