@@ -24,12 +24,11 @@ fn main() -> AppExit {
         .run()
 }
 
-fn set_up(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+fn set_up(mut commands: Commands) -> Result {
     let grass_on_rock = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
     let ground = Ground::from_noise(512, 512, &NoiseHeights { amplitude: 40.0, scale: 300.0, ..default() })?
         .with_materials(&MaterialControl::Uniform(grass_on_rock))?;
-    let material = materials.add(StandardMaterial { perceptual_roughness: 1.0, ..default() });
-    commands.spawn((Terrain::new(ground, &TerrainSettings::default())?, MeshMaterial3d(material)));
+    commands.spawn((Terrain::new(ground, &TerrainSettings::default())?, GroundLook::default()));
     commands.spawn((
         DirectionalLight { shadow_maps_enabled: true, ..default() },
         Transform::from_xyz(1.0, 0.8, 0.3).looking_at(Vec3::ZERO, Vec3::Y),

@@ -23,10 +23,10 @@
 //!         .run()
 //! }
 //!
-//! fn landscape(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+//! fn landscape(mut commands: Commands) -> Result {
 //!     let ground = Ground::from_noise(512, 512, &NoiseHeights::default())?;
 //!     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
-//!     commands.spawn((terrain, MeshMaterial3d(materials.add(StandardMaterial::default()))));
+//!     commands.spawn((terrain, GroundLook::default()));
 //!     Ok(())
 //! }
 //!

@@ -81,7 +81,8 @@ impl From<&volume::Field> for Field {
 }
 
 /// The colour of each material id, for the vertex colours of a terrain's meshes; put it on the terrain's entity. Ids past
-/// its end have the last colour. Materials that sample textures by id ignore it.
+/// its end have the last colour. Materials that sample textures by id ignore it, `GroundMaterial` among them; without any
+/// colour in it, meshes have none, which saves 16 bytes a vertex.
 ///
 /// Meshes made after a change have the new colours.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]

@@ -140,3 +140,88 @@ fn blend(mix: MaterialMix, colors: &MaterialColors) -> [f32; 4] {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::{ColumnMaterial, MaterialControl, MaterialId, NoiseHeights};
+    use crate::terrain::{Terrain, TerrainSettings};
+
+    const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
+
+    fn dug(ground: Ground, brushes: &[Brush]) -> Terrain {
+        let ground = ground.with_materials(&MaterialControl::Uniform(SKIN)).unwrap();
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).unwrap();
+        assert!(terrain.apply(brushes).iter().all(|receipt| receipt.outcome.is_ok()));
+        terrain
+    }
+
+    /// All vertices that are drawn, with their place in 1/4096 voxel.
+    fn drawn(world: &World) -> Vec<(bool, IVec3, Vertex)> {
+        let tiles = world.grid().tiles().map(Drawn::Tile);
+        let all = tiles.chain(world.drawn_chunks().map(Drawn::Chunk));
+        let vertices = all.flat_map(|drawn| {
+            let (is_tile, mesh) = match drawn {
+                Drawn::Tile(tile) => (true, world.tile_mesh(tile)),
+                Drawn::Chunk(chunk) => (false, world.chunk_mesh(chunk)),
+            };
+            let origin = world.origin(drawn) * SNAP;
+            mesh.vertices.into_iter().map(move |vertex| (is_tile, origin, vertex))
+        });
+        vertices.collect()
+    }
+
+    #[test]
+    fn depth_is_measured_from_the_ground_as_it_was() {
+        let terrain = dug(
+            Ground::flat(64, 64, 10.5).unwrap(),
+            &[Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 6.0))],
+        );
+        let mut deepest: f32 = 0.0;
+        for (is_tile, origin, vertex) in drawn(terrain.world()) {
+            let found = Origin::of(terrain.world().ground(), origin, &vertex);
+            let y = (origin.y + vertex.position.y) as f32 / SNAP as f32;
+            assert_eq!(found.depth, 10.5 - y);
+            assert_eq!((found.cover, found.own), (255, 255));
+            assert!(!is_tile || found.depth == 0.0);
+            deepest = deepest.max(found.depth);
+        }
+        assert!((6.0..7.0).contains(&deepest), "{deepest}");
+    }
+
+    #[test]
+    fn tiles_and_chunks_agree_on_the_depth_of_what_they_share() {
+        let noise = NoiseHeights { seed: 8, scale: 20.0, amplitude: 14.0, ..NoiseHeights::default() };
+        let ground = Ground::from_noise(64, 64, &noise).unwrap();
+        let place = Vec3::new(31.0, ground.height(Column::new(31, 30)) as f32 / ONE as f32, 30.0);
+        let terrain = dug(ground, &[Brush::dig(Shape::sphere(place, 7.0))]);
+        let bits = |origin: Origin| (origin.depth.to_bits(), origin.cover, origin.own);
+        let vertices = drawn(terrain.world());
+        let of = |wanted: bool| {
+            vertices.iter().filter(move |(is_tile, ..)| *is_tile == wanted).map(|(_, origin, vertex)| {
+                let found = Origin::of(terrain.world().ground(), *origin, vertex);
+                ((*origin + vertex.position).to_array(), found)
+            })
+        };
+        let tiles: std::collections::BTreeMap<[i32; 3], Origin> = of(true).collect();
+        let shared: Vec<_> =
+            of(false).filter_map(|(at, own)| tiles.get(&at).map(|other| (own, *other))).collect();
+        assert!(shared.len() > 30, "only {} shared vertices", shared.len());
+        for (own, other) in shared {
+            assert_eq!(bits(own), bits(other));
+            assert!(own.depth.abs() < 1.0 / 64.0, "{own:?} is on the surface");
+        }
+    }
+
+    #[test]
+    fn what_was_painted_is_not_the_grounds_own() {
+        let spot = Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0);
+        let terrain = dug(Ground::flat(64, 64, 10.5).unwrap(), &[Brush::paint(spot, MaterialId(5))]);
+        for (_, origin, vertex) in drawn(terrain.world()) {
+            let found = Origin::of(terrain.world().ground(), origin, &vertex);
+            let is_painted = vertex.materials.ids[0] == 5;
+            assert_eq!(found.own, if is_painted { 0 } else { 255 });
+        }
+    }
+}

@@ -20,6 +20,7 @@ mod landscape;
 mod sameness;
 mod studio;
 mod tunnel;
+mod ways;
 
 use album::Album;
 use studio::Studio;
@@ -31,5 +32,6 @@ fn ground_looks_as_approved() {
     landscape::shoot(&mut studio, &mut album);
     tunnel::shoot(&mut studio, &mut album);
     sameness::shoot(&mut studio, &mut album);
+    ways::shoot(&mut studio, &mut album);
     album.close();
 }

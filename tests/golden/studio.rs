@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use bevy::app::PluginsState;
 use bevy::camera::RenderTarget;
-use bevy::light::CascadeShadowConfigBuilder;
+use bevy::ecs::component::Mutable;
+use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::log::{Level, LogPlugin};
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
@@ -73,6 +74,7 @@ impl Studio {
             brightness: 900.0,
             ..default()
         })
+        .insert_resource(DirectionalLightShadowMap { size: 1024 })
         .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
         add(&mut app);
         while app.plugins_state() == PluginsState::Adding {
@@ -100,7 +102,7 @@ impl Studio {
         let sun = world
             .spawn((
                 DirectionalLight { illuminance: 10_000.0, shadow_maps_enabled: true, ..default() },
-                CascadeShadowConfigBuilder { maximum_distance: 250.0, ..default() }.build(),
+                CascadeShadowConfigBuilder { num_cascades: 2, maximum_distance: 120.0, ..default() }.build(),
             ))
             .id();
         let mut studio = Self { app, camera, sun, film, _only: only };
@@ -140,11 +142,15 @@ impl Studio {
         self.app.world_mut().resource_mut::<GlobalAmbientLight>().brightness = brightness;
     }
 
+    /// The component of a type that is there once.
+    pub fn one<C: Component<Mutability = Mutable>>(&mut self) -> Mut<'_, C> {
+        let world = self.app.world_mut();
+        world.query::<&mut C>().single_mut(world).expect("one of its kind")
+    }
+
     /// The ground's height over a place, in metres.
     pub fn height(&mut self, x: f32, z: f32) -> f32 {
-        let world = self.app.world_mut();
-        let terrain = world.query::<&Terrain>().single(world).expect("one terrain");
-        terrain.world().height(f64::from(x), f64::from(z)).expect("within the world") as f32
+        self.one::<Terrain>().world().height(f64::from(x), f64::from(z)).expect("within the world") as f32
     }
 
     /// Sends brushes and waits until all are shown.
@@ -168,9 +174,9 @@ impl Studio {
         self.film_runs(true);
     }
 
-    /// A picture, once lights and shaders have come in.
+    /// A picture, once lights have found what they shine on.
     pub fn picture(&mut self) -> RgbImage {
-        for _ in 0..3 {
+        for _ in 0..2 {
             self.app.update();
         }
         let taken = Arc::new(Mutex::new(None));

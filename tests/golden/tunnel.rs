@@ -6,7 +6,8 @@ use bevy_burrow::prelude::*;
 use crate::album::Album;
 use crate::studio::Studio;
 
-pub fn shoot(studio: &mut Studio, album: &mut Album) {
+/// Digs a cutting, and a gallery on into the ground: mouth, bend and end.
+pub fn dig(studio: &mut Studio) -> [Vec3; 3] {
     let noise = NoiseHeights { seed: 3, scale: 90.0, amplitude: 10.0, octaves: 4, ..default() };
     let skin = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
     let ground = Ground::from_noise(128, 128, &noise)
@@ -14,7 +15,6 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         .expect("valid ground");
     studio.terrain(ground, GroundLook::default());
     let top = studio.height(64.0, 30.0);
-    // A cutting, and a gallery on into the ground.
     let mouth = Vec3::new(64.0, top + 1.0, 30.0);
     let deep = Vec3::new(64.0, top - 16.0, 74.0);
     let end = Vec3::new(84.0, top - 22.0, 104.0);
@@ -23,6 +23,11 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         Brush::dig(Shape::capsule(deep, end, 5.0)),
         Brush::dig(Shape::sphere(end, 8.0)),
     ]);
+    [mouth, deep, end]
+}
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    let [mouth, deep, end] = dig(studio);
     studio.look(mouth + Vec3::new(-7.0, 6.0, -10.0), mouth + Vec3::new(2.0, -7.0, 14.0));
     album.compare("cutting", &studio.picture());
     let lamp = PointLight { intensity: 3_000_000.0, range: 60.0, shadow_maps_enabled: false, ..default() };

@@ -24,8 +24,6 @@
 #import bevy_pbr::pbr_functions::visibility_range_dither;
 #endif
 
-const LAYERS: u32 = 16u;
-
 struct Ground {
     place: mat4x4<f32>,
     layers: array<vec4<f32>, 16>,
@@ -82,6 +80,37 @@ struct Varying {
 #endif
 }
 
+// The weight of each of sixteen layers. No arrays: with an index that is known only at run time, they live in memory.
+struct Mass {
+    a: vec4<f32>,
+    b: vec4<f32>,
+    c: vec4<f32>,
+    d: vec4<f32>,
+}
+
+// `weight` at `layer` of four layers from `first` on.
+fn at_layer(layer: u32, first: u32, weight: f32) -> vec4<f32> {
+    return select(vec4(0.0), vec4(weight), vec4(layer) == vec4(first, first + 1u, first + 2u, first + 3u));
+}
+
+fn put(mass: Mass, layer: u32, weight: f32) -> Mass {
+    return Mass(
+        mass.a + at_layer(layer, 0u, weight),
+        mass.b + at_layer(layer, 4u, weight),
+        mass.c + at_layer(layer, 8u, weight),
+        mass.d + at_layer(layer, 12u, weight),
+    );
+}
+
+fn kinds_from(first: u32) -> vec4<f32> {
+    return vec4(
+        ground.layers[first].w,
+        ground.layers[first + 1u].w,
+        ground.layers[first + 2u].w,
+        ground.layers[first + 3u].w,
+    );
+}
+
 @vertex
 fn vertex(in: Vertex) -> Varying {
     var out: Varying;
@@ -97,16 +126,16 @@ fn vertex(in: Vertex) -> Varying {
 #ifdef GROUND_ATTRIBUTES
     out.origin = vec3(in.depth * ground.detail.z, in.cover.xy);
     // Ids can't be blended between vertices; weights of layers can.
-    var weights: array<vec4<f32>, 4>;
-    let last = u32(ground.detail.w) - 1u;
-    for (var i = 0u; i < 4u; i++) {
-        let layer = min(in.ids[i], last);
-        weights[layer / 4u][layer % 4u] += in.weights[i];
-    }
-    out.weights_0 = weights[0];
-    out.weights_1 = weights[1];
-    out.weights_2 = weights[2];
-    out.weights_3 = weights[3];
+    let ids = min(in.ids, vec4(u32(ground.detail.w) - 1u));
+    var mass = Mass(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+    mass = put(mass, ids.x, in.weights.x);
+    mass = put(mass, ids.y, in.weights.y);
+    mass = put(mass, ids.z, in.weights.z);
+    mass = put(mass, ids.w, in.weights.w);
+    out.weights_0 = mass.a;
+    out.weights_1 = mass.b;
+    out.weights_2 = mass.c;
+    out.weights_3 = mass.d;
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -177,17 +206,18 @@ fn fetch_pieces(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair
     let rest = 1.0 - part.x - part.y;
     let upper = select(0.0, 1.0, rest < 0.0);
     let sign = 2.0 * upper - 1.0;
-    let corners = array(base + vec2(upper), base + vec2(upper, 1.0 - upper), base + vec2(1.0 - upper, upper));
     var weights = vec3(-rest * sign, upper - part.y * sign, upper - part.x * sign);
     // Narrow borders: what is mixed loses contrast, and most pixels need one piece only.
     weights = weights * weights;
     weights = weights * weights * weights;
-    weights = max(weights / (weights.x + weights.y + weights.z) - 0.04, vec3(0.0));
+    weights = max(weights / (weights.x + weights.y + weights.z) - 0.07, vec3(0.0));
     weights /= weights.x + weights.y + weights.z;
     var sum = Pair(vec4(0.0), vec4(0.0));
     for (var i = 0; i < 3; i++) {
-        if weights[i] > 0.0 {
-            sum = add(sum, fetch(layer, uv + shift_of(corners[i], layer), dx, dy), weights[i]);
+        let weight = select(select(weights.z, weights.y, i == 1), weights.x, i == 0);
+        if weight > 0.0 {
+            let across = vec2(select(upper, 1.0 - upper, i == 2), select(upper, 1.0 - upper, i == 1));
+            sum = add(sum, fetch(layer, uv + shift_of(base + across, layer), dx, dy), weight);
         }
     }
     return sum;
@@ -226,26 +256,22 @@ fn layer_at(layer: u32, site: Site) -> Texels {
     let dx = site.dx * settings.x;
     let dy = site.dy * settings.x;
     var texels = Texels(vec4(0.0), vec2(0.0), vec3(0.0));
-    if site.sides.x > 0.0 {
-        let pair = fetch_side(i32(layer), vec2(place.z, -place.y), vec2(dx.z, -dx.y), vec2(dy.z, -dy.y), site.far);
-        let lean = lean_of(pair.relief);
-        texels.color += pair.albedo * site.sides.x;
-        texels.finish += pair.relief.zw * site.sides.x;
-        texels.lean += vec3(0.0, -lean.y, lean.x) * site.sides.x;
-    }
-    if site.sides.y > 0.0 {
-        let pair = fetch_side(i32(layer), place.xz, dx.xz, dy.xz, site.far);
-        let lean = lean_of(pair.relief);
-        texels.color += pair.albedo * site.sides.y;
-        texels.finish += pair.relief.zw * site.sides.y;
-        texels.lean += vec3(lean.x, 0.0, lean.y) * site.sides.y;
-    }
-    if site.sides.z > 0.0 {
-        let pair = fetch_side(i32(layer), vec2(place.x, -place.y), vec2(dx.x, -dx.y), vec2(dy.x, -dy.y), site.far);
-        let lean = lean_of(pair.relief);
-        texels.color += pair.albedo * site.sides.z;
-        texels.finish += pair.relief.zw * site.sides.z;
-        texels.lean += vec3(lean.x, -lean.y, 0.0) * site.sides.z;
+    for (var side = 0; side < 3; side++) {
+        let is_x = side == 0;
+        let is_y = side == 1;
+        let weight = select(select(site.sides.z, site.sides.y, is_y), site.sides.x, is_x);
+        if weight > 0.0 {
+            // Upright on walls: v runs down.
+            let uv = select(select(vec2(place.x, -place.y), place.xz, is_y), vec2(place.z, -place.y), is_x);
+            let uv_dx = select(select(vec2(dx.x, -dx.y), dx.xz, is_y), vec2(dx.z, -dx.y), is_x);
+            let uv_dy = select(select(vec2(dy.x, -dy.y), dy.xz, is_y), vec2(dy.z, -dy.y), is_x);
+            let pair = fetch_side(i32(layer), uv, uv_dx, uv_dy, site.far);
+            let lean = lean_of(pair.relief);
+            texels.color += pair.albedo * weight;
+            texels.finish += pair.relief.zw * weight;
+            let up = select(vec3(lean.x, -lean.y, 0.0), vec3(lean.x, 0.0, lean.y), is_y);
+            texels.lean += select(up, vec3(0.0, -lean.y, lean.x), is_x) * weight;
+        }
     }
     texels.color = vec4(texels.color.rgb * ground.tints[layer].rgb, texels.color.a);
     texels.lean *= settings.y;
@@ -257,96 +283,124 @@ fn noise_at(place: vec3<f32>, metres: f32) -> vec4<f32> {
     return textureSampleLevel(noise_texture, noise_sampler, place / metres, 0.0) * 2.0 - 1.0;
 }
 
-// The strongest layers, and how strong.
+// The strongest layers, and how strong; the last weight is that of the first one that is left out.
 struct Choice {
     layers: vec3<u32>,
-    weights: vec3<f32>,
+    weights: vec4<f32>,
+}
+
+fn offer(choice: Choice, layer: u32, weight: f32) -> Choice {
+    let w = choice.weights;
+    let l = choice.layers;
+    if weight <= w.w {
+        return choice;
+    }
+    let above = vec3(weight) > w.xyz;
+    let weights = vec4(
+        select(w.x, weight, above.x),
+        select(select(w.y, weight, above.y), w.x, above.x),
+        select(select(w.z, weight, above.z), w.y, above.y),
+        select(weight, w.z, above.z),
+    );
+    let layers = vec3(
+        select(l.x, layer, above.x),
+        select(select(l.y, layer, above.y), l.x, above.x),
+        select(select(l.z, layer, above.z), l.y, above.y),
+    );
+    return Choice(layers, weights);
+}
+
+fn offer_four(choice: Choice, first: u32, weights: vec4<f32>) -> Choice {
+    var best = offer(choice, first, weights.x);
+    best = offer(best, first + 1u, weights.y);
+    best = offer(best, first + 2u, weights.z);
+    return offer(best, first + 3u, weights.w);
 }
 
 // Weights of layers: what vertices say, and below the surface what lies there.
 fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice {
-    var weights: array<f32, 16>;
+    var mass = Mass(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 #ifdef GROUND_ATTRIBUTES
-    let given = array(in.weights_0, in.weights_1, in.weights_2, in.weights_3);
-    for (var i = 0u; i < LAYERS; i++) {
-        weights[i] = given[i / 4u][i % 4u];
-    }
+    mass = Mass(in.weights_0, in.weights_1, in.weights_2, in.weights_3);
     let own = in.origin.z;
     let cover = in.origin.y;
     let sunk = max(in.origin.x, 0.0);
     // Borders between strata are ragged, but not at the surface itself.
-    let depth = max(sunk + (0.45 * fine.x + 0.5 * broad.x) * min(sunk, 1.0), 0.0);
+    var depth = sunk;
+    if sunk > 0.0 {
+        let grit = noise_at(site.place, 5.0).x;
+        depth = max(sunk + (0.7 * grit + 0.35 * fine.x + 0.5 * broad.x) * min(1.4 * sunk, 1.0), 0.0);
+    }
     let steep = 1.0 - smoothstep(ground.far.x, ground.far.y, site.normal.y + 0.08 * fine.y);
     let bare = own * max(steep, smoothstep(0.10, 0.40, depth));
-    // What the strata fill: under turf, and where the ground itself shows.
-    var under_skin = 0.0;
-    var body = 0.0;
-    for (var i = 0u; i < LAYERS; i++) {
-        let kind = ground.layers[i].w;
-        if kind > 1.5 {
-            body += weights[i] * own;
-            weights[i] -= weights[i] * own;
-        } else if kind > 0.5 {
-            under_skin += weights[i] * bare;
-            weights[i] -= weights[i] * bare;
-        }
-    }
-    if body + under_skin > 0.0 {
-        let all = body + under_skin;
-        let soil_depth = ground.soil.z * max(cover, under_skin / all) * (1.0 + 0.5 * broad.y);
+    // What the strata fill: under turf, and where the ground itself shows. A layer's kind is 1 for a skin, 2 for strata.
+    let kinds = Mass(kinds_from(0u), kinds_from(4u), kinds_from(8u), kinds_from(12u));
+    let given = mass;
+    mass.a *= 1.0 - select(step(vec4(0.5), kinds.a) * bare, vec4(own), kinds.a > vec4(1.5));
+    mass.b *= 1.0 - select(step(vec4(0.5), kinds.b) * bare, vec4(own), kinds.b > vec4(1.5));
+    mass.c *= 1.0 - select(step(vec4(0.5), kinds.c) * bare, vec4(own), kinds.c > vec4(1.5));
+    mass.d *= 1.0 - select(step(vec4(0.5), kinds.d) * bare, vec4(own), kinds.d > vec4(1.5));
+    let taken = given.a + given.b + given.c + given.d - (mass.a + mass.b + mass.c + mass.d);
+    let all = dot(taken, vec4(1.0));
+    if all > 0.001 {
+        let body = own * (
+            dot(given.a, step(vec4(1.5), kinds.a)) + dot(given.b, step(vec4(1.5), kinds.b))
+            + dot(given.c, step(vec4(1.5), kinds.c)) + dot(given.d, step(vec4(1.5), kinds.d)));
+        let under_skin = max(all - body, 0.0);
+        let covered = max(cover, under_skin / all);
+        let soil_depth = ground.soil.z * covered * (1.0 + 0.5 * broad.y);
         let in_soil = 1.0 - smoothstep(0.75 * soil_depth, soil_depth + 0.02, depth);
         // Bare rock has no soil on its face.
-        let soil = in_soil * (under_skin + body * smoothstep(0.02, 0.30, depth));
-        let subsoil_depth = soil_depth + ground.soil.w * max(cover, under_skin / all) * (1.0 + 0.5 * broad.w);
+        let below = smoothstep(0.02, 0.30, depth);
+        let soil = in_soil * (under_skin + body * below);
+        let subsoil_depth = soil_depth + ground.soil.w * covered * (1.0 + 0.5 * broad.w);
         let in_subsoil = (1.0 - in_soil) * (1.0 - smoothstep(0.85 * subsoil_depth, subsoil_depth + 0.05, depth));
-        let subsoil = in_subsoil * all * smoothstep(0.02, 0.30, depth);
+        let subsoil = in_subsoil * all * below;
+        mass = put(mass, u32(ground.soil.x), soil);
+        mass = put(mass, u32(ground.soil.y), subsoil);
         var rock = max(all - soil - subsoil, 0.0);
-        weights[u32(ground.soil.x)] += soil;
-        weights[u32(ground.soil.y)] += subsoil;
         if rock > 0.0 {
             let up = site.place.y + ground.rock.y * (0.7 * broad.z + 0.12 * fine.z);
             let within = fract(up / ground.rock.x);
             let seam_off = abs(within - 0.61) * ground.rock.x + 0.15 * fine.x;
-            let seam = smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
+            let seam = rock * smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
                 * (1.0 - smoothstep(0.42, 0.5, seam_off / max(ground.rock.w, 0.001)));
-            weights[u32(ground.rock.z)] += rock * seam;
-            rock -= rock * seam;
+            mass = put(mass, u32(ground.rock.z), seam);
+            rock -= seam;
             // Veins are where two kinds of noise cross 0 together: threads in space.
             let thread = length(fine.yw + 0.25 * broad.yw);
             let width = 0.30 * ground.vein.z * smoothstep(-0.1, 0.25, broad.x);
-            let vein = smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01)) * (1.0 - smoothstep(0.7, 1.0, thread / max(width, 0.001)));
-            weights[u32(ground.vein.y)] += rock * vein;
-            rock -= rock * vein;
+            let vein = rock * smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01))
+                * (1.0 - smoothstep(0.7, 1.0, thread / max(width, 0.001)));
+            mass = put(mass, u32(ground.vein.y), vein);
+            rock -= vein;
             let bed = within * 4.0;
-            let number = u32(bed) % 4u;
-            let next = smoothstep(0.93, 1.0, fract(bed));
-            weights[u32(ground.beds[number])] += rock * (1.0 - next);
-            weights[u32(ground.beds[(number + 1u) % 4u])] += rock * next;
+            let beds = ground.beds;
+            let here = select(select(beds.x, beds.y, bed >= 1.0), select(beds.z, beds.w, bed >= 3.0), bed >= 2.0);
+            let next = select(select(beds.y, beds.z, bed >= 1.0), select(beds.w, beds.x, bed >= 3.0), bed >= 2.0);
+            let passed = smoothstep(0.93, 1.0, fract(bed));
+            mass = put(mass, u32(here), rock * (1.0 - passed));
+            mass = put(mass, u32(next), rock * passed);
         }
     }
 #else
-    weights[0] = 1.0;
+    mass.a.x = 1.0;
 #endif
-    var layers = vec3<u32>(0u);
-    var strongest = vec4(0.0);
-    for (var i = 0u; i < LAYERS; i++) {
-        let weight = weights[i];
-        if weight > strongest.x {
-            strongest = vec4(weight, strongest.xyz);
-            layers = vec3(i, layers.xy);
-        } else if weight > strongest.y {
-            strongest = vec4(strongest.x, weight, strongest.yz);
-            layers = vec3(layers.x, i, layers.y);
-        } else if weight > strongest.z {
-            strongest = vec4(strongest.xy, weight, strongest.z);
-            layers.z = i;
-        } else if weight > strongest.w {
-            strongest.w = weight;
-        }
+    // Where layers meet, they do so in patches, and not along the lattice.
+    let most = max(max(mass.a, mass.b), max(mass.c, mass.d));
+    if max(max(most.x, most.y), max(most.z, most.w)) < 0.985 {
+        let patches = 1.0 + 0.75 * noise_at(site.place, 7.0);
+        mass = Mass(mass.a * patches, mass.b * patches, mass.c * patches, mass.d * patches);
     }
+    var best = Choice(vec3(0u), vec4(0.0));
+    best = offer_four(best, 0u, mass.a);
+    best = offer_four(best, 4u, mass.b);
+    best = offer_four(best, 8u, mass.c);
+    best = offer_four(best, 12u, mass.d);
     // Less what the first one that is left out has, so that none comes or goes with a jump.
-    let left_out = select(strongest.z, strongest.w, is_fine());
-    return Choice(layers, max(strongest.xyz - left_out, vec3(0.0)));
+    let left_out = select(best.weights.z, best.weights.w, is_fine());
+    best.weights = max(best.weights - left_out, vec4(0.0));
+    return best;
 }
 
 @fragment
@@ -384,7 +438,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     sides = sides * sides;
     // The weakest side is left out, but where all are alike.
     sides = max(sides - 0.995 * min(sides.x, min(sides.y, sides.z)), vec3(0.0));
-    sides = max(sides / (sides.x + sides.y + sides.z) - 0.03, vec3(0.0));
+    sides = max(sides / (sides.x + sides.y + sides.z) - 0.06, vec3(0.0));
     site.sides = sides / (sides.x + sides.y + sides.z);
     let distance = length(view.world_position - in.world_position.xyz);
     site.far = smoothstep(ground.far.z, ground.far.w, distance);
@@ -394,27 +448,27 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     let choice = choose(in, site, broad, fine);
 
     // What stands high covers what lies low.
-    var texels = array<Texels, 3>();
-    var scores = vec3(0.0);
+    var sum = Texels(vec4(0.0), vec2(0.0), vec3(0.0));
+    var metallic = 0.0;
+    var total = 0.0001;
     for (var i = 0; i < 3; i++) {
-        if choice.weights[i] > 0.004 {
-            texels[i] = layer_at(choice.layers[i], site);
-            scores[i] = choice.weights[i] * (0.3 + texels[i].color.a);
+        let weight = select(select(choice.weights.z, choice.weights.y, i == 1), choice.weights.x, i == 0);
+        if weight > 0.01 {
+            let layer = select(select(choice.layers.z, choice.layers.y, i == 1), choice.layers.x, i == 0);
+            let texels = layer_at(layer, site);
+            var score = weight * (0.3 + texels.color.a);
+            score *= score * score;
+            sum.color += texels.color * score;
+            sum.finish += texels.finish * score;
+            sum.lean += texels.lean * score;
+            metallic += ground.layers[layer].z * score;
+            total += score;
         }
     }
-    let highest = max(scores.x, max(scores.y, scores.z));
-    scores = max(scores - 0.55 * highest, vec3(0.0));
-    scores /= max(scores.x + scores.y + scores.z, 0.0001);
-    var color = vec3(0.0);
-    var finish = vec2(0.0);
-    var lean = vec3(0.0);
-    var metallic = 0.0;
-    for (var i = 0; i < 3; i++) {
-        color += texels[i].color.rgb * scores[i];
-        finish += texels[i].finish * scores[i];
-        lean += texels[i].lean * scores[i];
-        metallic += ground.layers[choice.layers[i]].z * scores[i];
-    }
+    var color = sum.color.rgb / total;
+    let finish = sum.finish / total;
+    var lean = sum.lean / total;
+    metallic /= total;
     // No two places have quite the same tint.
     let mood = clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0) * ground.detail.x;
     color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(mood, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-mood, 0.0));

@@ -140,7 +140,7 @@ impl Default for GroundLook {
             ],
             strata: GroundStrata::default(),
             cliffs: (0.9, 1.5),
-            distance: (25.0, 110.0),
+            distance: (35.0, 80.0),
             variety: 0.5,
             quality: GroundQuality::High,
         }

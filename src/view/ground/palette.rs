@@ -49,7 +49,7 @@ pub(super) const RECIPES: [Recipe; 12] = [
         scatter: Some(Scatter {
             count: 26_000,
             size: [0.045, 0.0028],
-            colors: [[0.16, 0.25, 0.07], [0.50, 0.58, 0.22]],
+            colors: [[0.13, 0.19, 0.07], [0.44, 0.48, 0.21]],
         }),
     },
     Recipe { name: "sand", relief: 0.07, metres: 4.0, paint: sand, scatter: None },
@@ -98,7 +98,7 @@ fn rock(u: f32, v: f32) -> Point {
 /// What lies between the blades of grass.
 fn turf(u: f32, v: f32) -> Point {
     let clump = octaves(u, v, 10, 4, 21);
-    let color = mix([0.13, 0.17, 0.06], [0.24, 0.27, 0.11], 0.5 + 0.5 * clump);
+    let color = mix([0.12, 0.14, 0.06], [0.23, 0.24, 0.11], 0.5 + 0.5 * clump);
     Point { color, height: 0.18 + 0.12 * clump, roughness: 0.95 }
 }
 
@@ -136,7 +136,7 @@ fn clay(u: f32, v: f32) -> Point {
     let grain = octaves(u, v, 60, 2, 55);
     let height = (0.62 + 0.22 * smear + 0.05 * grain) * (0.55 + 0.45 * crack);
     let tone = (0.5 + 0.35 * smear + 0.12 * grain + 0.2 * (plate.name - 0.5)).clamp(0.0, 1.0);
-    let color = mix([0.42, 0.24, 0.15], [0.66, 0.42, 0.28], tone);
+    let color = mix([0.35, 0.215, 0.145], [0.57, 0.385, 0.275], tone);
     Point {
         color: lit(color, 0.6 + 0.4 * crack),
         height: height.clamp(0.0, 1.0),
@@ -189,9 +189,9 @@ fn coal(u: f32, v: f32) -> Point {
 fn gold(u: f32, v: f32) -> Point {
     let (tilt, edge, name) = facets(u, v, 8, 81);
     let (wu, wv) = (u + 0.05 * octaves(u, v, 4, 3, 85), v + 0.05 * octaves(u, v, 4, 3, 86));
-    let vein = smooth(0.70, 0.86, ridges(wu, wv, 4, 2, 87));
+    let vein = smooth(0.84, 0.93, ridges(wu, wv, 4, 2, 87));
     let nugget = cells(u, v, 16, 88);
-    let lump = if nugget.name > 0.45 { 1.0 - smooth(0.18, 0.42, nugget.nearest) } else { 0.0 };
+    let lump = if nugget.name > 0.6 { 1.0 - smooth(0.14, 0.36, nugget.nearest) } else { 0.0 };
     let metal = (vein + lump).min(1.0);
     let stone = mix([0.24, 0.21, 0.20], [0.46, 0.42, 0.40], name * 0.7 + 0.3 * tilt);
     let shine =
@@ -237,8 +237,8 @@ fn sandstone(u: f32, v: f32) -> Point {
     let height = ((0.35 + 0.45 * bed) * (0.55 + 0.45 * ledge) + 0.10 * fine + 0.16 * worn + 0.04 * grain)
         .clamp(0.0, 1.0);
     let tone = (0.25 + 0.35 * bed + 0.22 * fine + 0.14 * worn + 0.10 * grain).clamp(0.0, 1.0);
-    let color = mix([0.55, 0.37, 0.22], [0.82, 0.66, 0.44], tone);
-    let color = mix(color, [0.62, 0.30, 0.17], 0.5 * smooth(0.75, 0.95, bed));
+    let color = mix([0.47, 0.36, 0.26], [0.76, 0.66, 0.50], tone);
+    let color = mix(color, [0.56, 0.33, 0.22], 0.5 * smooth(0.75, 0.95, bed));
     Point { color: lit(color, 0.72 + 0.28 * ledge), height, roughness: 0.92 }
 }
 
