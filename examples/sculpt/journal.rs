@@ -1,7 +1,7 @@
 //! A line on standard output for whatever happened: what was done can be followed, and checked by a script.
 
 use bevy::prelude::*;
-use bevy_burrow::panel::BrushTool;
+use bevy_burrow::panel::{BrushTool, PanelPlaces};
 use bevy_burrow::prelude::*;
 
 pub struct JournalPlugin;
@@ -13,7 +13,7 @@ impl Plugin for JournalPlugin {
                 println!("ready hash={:016x}", terrain.world().hash());
             }
         })
-        .add_systems(Update, (tell_receipts, tell_tool).after(BurrowSystems::Commit));
+        .add_systems(Update, (tell_receipts, tell_tool, tell_places).after(BurrowSystems::Commit));
     }
 }
 
@@ -43,3 +43,20 @@ fn tell_tool(tool: Res<BrushTool>) {
         );
     }
 }
+
+/// Where the panel's widgets are, whenever that changes: `tools/drive.py` clicks on them.
+fn tell_places(places: Res<PanelPlaces>, told: Res<TellPlaces>) {
+    if !told.0 || !places.is_changed() {
+        return;
+    }
+    for (name, place) in &places.0 {
+        println!(
+            "place {name:?} {:.0} {:.0} {:.0} {:.0}",
+            place.min.x, place.min.y, place.max.x, place.max.y
+        );
+    }
+}
+
+/// Should it be told where the panel's widgets are?
+#[derive(Resource, Default)]
+pub struct TellPlaces(pub bool);

@@ -30,7 +30,7 @@ fn landscape(mut commands: Commands, mut materials: ResMut<Assets<StandardMateri
         kind: NoiseKind::Fractal,
         octaves: 5,
         scale: 150.0,
-        amplitude: 46.0,
+        amplitude: 34.0,
         base: 0.0,
     };
     let grass = MaterialRule { overlay: MaterialId(1), slope: (0.0, 0.7), slope_fade: 0.35, ..default() };
@@ -55,7 +55,7 @@ fn sun_and_camera(mut commands: Commands) {
         Msaa::Off,
         DistanceFog { color: SKY, falloff: FogFalloff::Linear { start: 180.0, end: 420.0 }, ..default() },
         FreeCamera { walk_speed: 24.0, run_speed: 80.0, scroll_factor: 0.0, ..default() },
-        Transform::from_translation(MIDDLE + Vec3::new(-38.0, 46.0, 62.0))
+        Transform::from_translation(MIDDLE + Vec3::new(-26.0, 62.0, 58.0))
             .looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y),
     ));
 }

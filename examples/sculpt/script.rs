@@ -100,6 +100,7 @@ impl Stage {
         app.update();
         let camera = app.world_mut().query_filtered::<Entity, With<Camera3d>>().single(app.world())?;
         let mut stage = Self { app, camera, folder: options.out.clone(), strokes: 0, pictures: 0 };
+        stage.film_runs(false);
         stage.resize(options.width, options.height);
         Ok(stage)
     }
@@ -109,6 +110,13 @@ impl Stage {
         let image = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
         let image = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
         self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(image));
+    }
+
+    /// Only pictures are drawn: in software a frame takes long.
+    fn film_runs(&mut self, runs: bool) {
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
+            camera.is_active = runs;
+        }
     }
 
     fn frames(&mut self, count: usize) {
@@ -166,8 +174,12 @@ impl Stage {
     fn shoot(&mut self, name: &str) -> Result {
         let path = self.folder.join(format!("{name}.png"));
         let target = self.app.world().get::<RenderTarget>(self.camera);
-        let Some(RenderTarget::Image(image)) = target else { return Err("the camera draws nowhere".into()) };
+        let Some(RenderTarget::Image(image)) = target.cloned() else {
+            return Err("the camera draws nowhere".into());
+        };
         let screenshot = Screenshot::image(image.handle.clone());
+        self.film_runs(true);
+        self.frames(2);
         self.app
             .world_mut()
             .spawn(screenshot)
@@ -176,6 +188,7 @@ impl Stage {
         self.pictures += 1;
         let pictures = self.pictures;
         self.wait_until(|world| world.resource::<Developed>().0 >= pictures)?;
+        self.film_runs(false);
         println!("picture {}", path.display());
         Ok(())
     }

@@ -152,6 +152,6 @@ fn show_through_ground(mut store: ResMut<GizmoConfigStore>) {
 fn preview(aim: Res<Aim>, tool: Res<BrushTool>, mut gizmos: Gizmos) {
     let Some(hit) = &aim.0 else { return };
     draw_shape(&mut gizmos, &tool.shape_at(hit), Color::srgb(1.0, 0.80, 0.30));
-    let normal = hit.normal * (0.5 * tool.radius).max(1.0);
+    let normal = hit.normal * f32::max(0.5 * tool.radius, 1.0);
     gizmos.line(hit.position, hit.position + normal, Color::srgb(1.0, 1.0, 1.0));
 }

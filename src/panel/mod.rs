@@ -14,6 +14,7 @@
 //! | --- | --- |
 //! | [`BrushTool`] | the brush in hand: [`brush_at`](BrushTool::brush_at) makes the [`Brush`](crate::brush::Brush) |
 //! | [`BurrowPanel`] | what is shown, names of materials, where pictures go |
+//! | [`PanelPlaces`] | where its widgets are on the screen: for tutorials that point at one, and for tests |
 //! | [`PanelInput`] | who has the pointer and the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
 //!
 //! [`PanelAction`] messages are its buttons, for keys of the game. It is drawn by the camera that has egui's primary
@@ -32,7 +33,7 @@ mod widgets;
 mod world_column;
 
 pub use operations::ToolOperation;
-pub use state::{BurrowPanel, PanelAction, PanelInput, keyboard_is_free, pointer_is_free};
+pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
 pub use tool::{BrushTool, ToolAlign, ToolShape};
 
 use bevy::camera::RenderTarget;
@@ -62,6 +63,7 @@ impl Plugin for BurrowPanelPlugin {
         app.init_resource::<BrushTool>()
             .init_resource::<BurrowPanel>()
             .init_resource::<PanelInput>()
+            .init_resource::<PanelPlaces>()
             .init_resource::<Survey>()
             .add_message::<PanelAction>()
             .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
@@ -107,6 +109,7 @@ fn draw(
     survey: Res<Survey>,
     terrains: Query<(Entity, &Terrain)>,
     looks: Query<(Option<&Name>, &MaterialColors)>,
+    mut places: ResMut<PanelPlaces>,
     mut actions: MessageWriter<PanelAction>,
 ) {
     let Ok(context) = contexts.ctx_mut() else { return };
@@ -150,6 +153,7 @@ fn draw(
     tool.set_if_neq(new_tool);
     panel.set_if_neq(new_panel);
     settings.set_if_neq(new_settings);
+    places.set_if_neq(widgets::places(context));
     actions.write_batch(pressed);
 }
 
@@ -175,12 +179,14 @@ fn column(
     let offset = Vec2::new(if side == Align2::LEFT_TOP { theme::GAP } else { -theme::GAP }, theme::GAP);
     egui::Area::new(Id::new(id)).order(Order::Middle).anchor(side, offset).show(context, |ui| {
         ui.set_style(theme::style());
+        ui.set_max_height(height);
         let card = theme::card();
         let inside = theme::COLUMN - card.inner_margin.sum().x;
         card.show(ui, |ui| {
             ui.set_width(inside);
             ui.label(RichText::new(title).heading().color(theme::BRIGHT));
             let rest = (height - card.inner_margin.sum().y - 30.0).max(80.0);
+            ui.set_max_height(rest + 30.0);
             ScrollArea::vertical().max_height(rest).auto_shrink([false, true]).show(ui, |ui| {
                 ui.set_width(inside);
                 content(ui);

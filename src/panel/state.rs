@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 
@@ -68,6 +69,12 @@ pub struct PanelInput {
     /// Something is being typed into it.
     pub has_keyboard: bool,
 }
+
+/// Where the panel's widgets were drawn in the last frame, by name, in logical pixels from the window's upper left corner.
+/// Of a slider it is the rail.
+#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Resource, Default)]
+pub struct PanelPlaces(pub HashMap<String, Rect>);
 
 /// Run condition: nothing of egui has the pointer, so that a click means the world. Without the panel it always holds.
 pub fn pointer_is_free(input: Option<Res<PanelInput>>) -> bool {
