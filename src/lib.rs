@@ -137,7 +137,7 @@ pub mod volume;
 
 /// What most games import.
 pub mod prelude {
-    pub use crate::brush::{Brush, BrushError, Edit, Operation, Roughness, Shape};
+    pub use crate::brush::{Blend, Brush, BrushError, Edit, Operation, Roughness, Shape, Stamp};
     pub use crate::ground::{
         ColumnMaterial, Detail, GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialId,
         MaterialRule, NoiseHeights, NoiseKind,

@@ -12,7 +12,9 @@ use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
 use fastrand::Rng;
 use glam::{I64Vec3, Quat, Vec3};
-use worlds::{random_brush, random_brush_at_a_face, random_ground, steep_real_ground};
+use worlds::{
+    random_brush, random_brush_at_a_face, random_ground, random_sculpting_brush, steep_real_ground,
+};
 
 /// A vertex without floats, so that it can be compared bit for bit.
 type Bits = ([i64; 3], [u32; 3], [[u8; 4]; 2]);
@@ -22,8 +24,9 @@ fn random_script(seed: u64) -> (Ground, Vec<Brush>) {
     let mut rng = Rng::with_seed(seed);
     let (ground, _) = random_ground(&mut rng, seed);
     let brushes = (0..rng.u32(6..14))
-        .map(|_| match rng.u32(0..3) {
-            0 => {
+        .map(|_| match rng.u32(0..5) {
+            0 | 1 => random_sculpting_brush(&mut rng, &ground),
+            2 => {
                 let chunk_size = [8, 25, 32, 64, 100][rng.usize(0..5)];
                 random_brush_at_a_face(&mut rng, &ground, chunk_size)
             }
@@ -280,7 +283,8 @@ fn golden_script(ground: &Ground) -> Vec<Brush> {
             Shape::cone(at(4) - Vec3::Y * 4.0, Vec3::new(-2.0, 11.0, 1.0), 4.0),
         ];
         for (k, shape) in shapes.into_iter().enumerate() {
-            let smooth = Brush { shape, operation, roughness: None, tag: (10 * i + k) as u64 };
+            let smooth =
+                Brush { operation: operation.clone(), ..Brush::dig(shape) }.with_tag((10 * i + k) as u64);
             let rough = Roughness::new(0.75 + 0.25 * k as f32, 2.0 + 1.5 * i as f32, 77 + k as u32);
             let moved = Shape::sphere(at(k) + Vec3::new(1.5, 1.0, 3.0), 3.0);
             brushes.push(Brush { shape: moved, ..smooth.clone() }.with_roughness(rough));

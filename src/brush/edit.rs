@@ -3,9 +3,12 @@
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
+use super::blend::Fade;
+use super::deed::Deed;
 use super::roughness::Grain;
+use super::sculptor::Sculptor;
 use super::solid::Solid;
-use super::{BAND, Brush, BrushError, Evaluator, Operation};
+use super::{BAND, Blend, Brush, BrushError, Evaluator, Kind, Operation};
 use crate::lattice::{LatticeBox, ONE};
 
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
@@ -22,21 +25,28 @@ use crate::lattice::{LatticeBox, ONE};
 /// {"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},
 ///  "roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0}
 /// ```
+///
+/// The operation of a brush with less than full power stands in a wrapping of its own:
+///
+/// ```json
+/// {"limited":{"power":40,"operation":"dig"}}
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked")]
+#[serde(try_from = "Unchecked", into = "Unchecked")]
 pub struct Edit {
     shape: Solid,
-    operation: Operation,
+    deed: Deed,
+    power: u8,
     roughness: Option<Grain>,
     tag: u64,
 }
 
-/// An edit as it comes from a file or a network; the same fields in the same order.
-#[derive(Deserialize)]
+/// An edit as it stands in a file or comes from a network.
+#[derive(Serialize, Deserialize)]
 #[serde(rename = "Edit", deny_unknown_fields)]
 struct Unchecked {
     shape: Solid,
-    operation: Operation,
+    operation: Deed,
     roughness: Option<Grain>,
     tag: u64,
 }
@@ -53,7 +63,8 @@ impl Edit {
         let roughness = brush.roughness.as_ref().map(Grain::quantize).transpose()?;
         Ok(Self {
             shape: Solid::quantize(&brush.shape)?,
-            operation: brush.operation,
+            deed: Deed::quantize(brush)?,
+            power: brush.power,
             roughness: roughness.filter(|grain| grain.amplitude != 0),
             tag: brush.tag,
         })
@@ -66,12 +77,38 @@ impl Edit {
     /// A [`BrushError`] that says which limit is broken.
     pub fn check(&self) -> Result<(), BrushError> {
         self.shape.check()?;
+        self.deed.check()?;
         self.roughness.map_or(Ok(()), |grain| grain.check())
     }
 
-    /// What the edit does.
+    /// What the edit does, in the brush's own numbers.
     pub fn operation(&self) -> Operation {
-        self.operation
+        self.deed.operation()
+    }
+
+    /// How the edit blends in, if it sculpts.
+    pub fn blend(&self) -> Option<Blend> {
+        self.deed.fade().map(Fade::blend)
+    }
+
+    /// How hard the material may be that it takes away.
+    pub fn power(&self) -> u8 {
+        self.power
+    }
+
+    /// Which way it is applied.
+    pub(crate) fn kind(&self) -> Kind {
+        match self.deed {
+            Deed::Dig => Kind::Dig,
+            Deed::Add { material } => Kind::Add { material },
+            Deed::Paint { material } => Kind::Paint { material },
+            _ => Kind::Sculpt,
+        }
+    }
+
+    /// What it makes of samples, if it sculpts.
+    pub(crate) fn sculptor(&self) -> Option<Sculptor> {
+        Sculptor::of(&self.deed, &self.shape)
     }
 
     /// The number that the brush carried.
@@ -108,9 +145,16 @@ impl TryFrom<Unchecked> for Edit {
     type Error = BrushError;
 
     fn try_from(Unchecked { shape, operation, roughness, tag }: Unchecked) -> Result<Self, BrushError> {
-        let edit = Self { shape, operation, roughness, tag };
+        let (deed, power) = operation.unlimited()?;
+        let edit = Self { shape, deed, power, roughness, tag };
         edit.check()?;
         Ok(edit)
+    }
+}
+
+impl From<Edit> for Unchecked {
+    fn from(Edit { shape, deed, power, roughness, tag }: Edit) -> Self {
+        Self { shape, operation: deed.limited(power), roughness, tag }
     }
 }
 

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::lattice::ONE;
+
 /// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -79,4 +81,58 @@ pub enum BrushError {
         /// The largest value.
         most: f32,
     },
+    /// A number of an operation that sculpts is out of its range.
+    #[error("`{what}` is {value}, but it must be {least} to {most}")]
+    OutOfBounds {
+        /// The number.
+        what: &'static str,
+        /// The value given.
+        value: f32,
+        /// The least value.
+        least: f32,
+        /// The largest value.
+        most: f32,
+    },
+    /// The normal of a plane has no direction.
+    #[error("`normal` is {length} long, but it must have a direction")]
+    ZeroNormal {
+        /// Its length.
+        length: f32,
+    },
+    /// The image of a stamp has too few or too many samples along a side.
+    #[error("the stamp is {width} x {height} samples, but a side must have {least} to {most}")]
+    StampSize {
+        /// Samples in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Least samples along a side.
+        least: u32,
+        /// Most samples along a side.
+        most: u32,
+    },
+    /// The image of a deserialised stamp does not have as many samples as its sides say.
+    #[error("a stamp of {width} x {height} takes {} samples, but {actual} were given", u64::from(*width) * u64::from(*height))]
+    StampSamples {
+        /// Samples in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Samples given.
+        actual: usize,
+    },
+    /// A deserialised edit holds an operation of limited power inside another one, or a full power as a limit.
+    #[error("a limit of power holds another limit, or none")]
+    Power,
+}
+
+/// A number rounded to 1/256, if it is within its range.
+pub(super) fn in_range(what: &'static str, value: f32, least: f32, most: f32) -> Result<i32, BrushError> {
+    if !value.is_finite() {
+        return Err(BrushError::NotFinite { what, value });
+    }
+    if value < least || value > most {
+        return Err(BrushError::OutOfBounds { what, value, least, most });
+    }
+    Ok((value * ONE as f32).round_ties_even() as i32)
 }

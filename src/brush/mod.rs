@@ -24,6 +24,36 @@
 //! | volume of the shape itself | | 2^25 voxels |
 //! | roughness amplitude | 0 | 8 voxels |
 //! | roughness scale | 1 voxel | 256 voxels |
+//! | strength of sculpting | 0 | 1 |
+//! | falloff of sculpting | 0 | 64 voxels |
+//! | amount of a raise or lower | 0 | 64 voxels |
+//! | step of a terrace | 1 voxel | 256 voxels |
+//! | samples along a side of a stamp | 2 | 256 |
+//! | height of a stamp | -256 voxels | 256 voxels |
+//!
+//! # Sculpting
+//!
+//! Dig and add know their shape's distance and nothing else. [`Operation::Smooth`], [`Sharpen`](Operation::Sharpen),
+//! [`Flatten`](Operation::Flatten), [`Level`](Operation::Level), [`Raise`](Operation::Raise), [`Lower`](Operation::Lower),
+//! [`Stamp`](Operation::Stamp) and [`Terrace`](Operation::Terrace) *sculpt*: they change the densities that are there,
+//! with a weight that rises from 0 at the shape's surface to the [`Blend`]'s strength over its falloff, so that nothing
+//! jumps at the rim. On ground that nobody touched a density is the height above the surface, and so all of them do what
+//! the same tool does to a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls
+//! and ceilings too. A sample whose density stays as it is is not edited.
+//!
+//! What becomes solid is of the blend's material; without one, of the first solid voxel straight below within 64 voxels,
+//! else straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
+//!
+//! ```
+//! use bevy_burrow::prelude::*;
+//! use glam::Vec3;
+//!
+//! let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+//! let at = Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 8.0);
+//! let receipts = terrain.apply([Brush::raise(at, 3.0), Brush::smooth(at, 0.5), Brush::terrace(at, 2.0)]);
+//! assert!(receipts[0].outcome.as_ref().is_ok_and(|applied| applied.added.total() > 50));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Why the bits agree
 //!
@@ -43,6 +73,8 @@
 //!
 //! [`LIMIT`]: crate::lattice::LIMIT
 
+mod blend;
+mod deed;
 mod distance;
 mod edit;
 mod error;
@@ -53,19 +85,28 @@ mod operation;
 mod record;
 mod request;
 mod roughness;
+mod sculptor;
 mod shape;
 mod solid;
+mod stamp;
 
+pub use blend::Blend;
 pub use edit::Edit;
 pub use error::BrushError;
 pub use evaluator::Evaluator;
+pub(crate) use operation::Kind;
 pub use operation::Operation;
 pub use record::{BrushRecord, OperationName, RecordError, ShapeName};
 pub use request::Brush;
 pub use roughness::Roughness;
+pub(crate) use sculptor::{Around, Sculptor};
 pub use shape::Shape;
+pub use stamp::{ImageRecord, Stamp, StampRecord};
 
 use crate::lattice::ONE;
+
+/// The power of a brush that takes away whatever can be taken away, as each does unless told otherwise.
+pub const FULL_POWER: u8 = u8::MAX;
 
 /// How far outside its shape an edit still changes samples, in 1/256 voxel (rule 6).
 pub const BAND: i32 = 2 * ONE;

@@ -1,13 +1,15 @@
 //! What a brush does to the samples it reaches.
 
-use serde::{Deserialize, Serialize};
+use glam::{Quat, Vec3};
 
-use super::DEPTH;
+use super::{DEPTH, Stamp};
 use crate::ground::MaterialId;
 
 /// What happens inside the shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+///
+/// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All others
+/// *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change nothing outside.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Operation {
     /// Takes ground away.
     Dig,
@@ -25,30 +27,116 @@ pub enum Operation {
         /// The new material.
         material: MaterialId,
     },
+    /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are;
+    /// hollows and towers of a radius r are gone after about r x r times, as it is with averages.
+    Smooth,
+    /// Deepens bumps and edges, by at most a quarter of a voxel each time.
+    Sharpen,
+    /// Makes the surface a plane: ground on the one side, air on the side that the normal points to.
+    Flatten {
+        /// A point of the plane, in voxels.
+        point: Vec3,
+        /// From the ground to the air; any length but 0.
+        normal: Vec3,
+    },
+    /// Makes the surface level.
+    Level {
+        /// Its height in voxels.
+        height: f32,
+    },
+    /// Moves the surface outwards, which is up on ground that nobody dug. Where a dig or an add was, distances are known
+    /// to [`DEPTH`] only, and one application moves the surface by about that at most.
+    Raise {
+        /// How far, in voxels: 0 to 64.
+        amount: f32,
+    },
+    /// Moves the surface inwards: the opposite of [`Raise`](Self::Raise).
+    Lower {
+        /// How far, in voxels: 0 to 64.
+        amount: f32,
+    },
+    /// Gives the surface the relief of an image.
+    Stamp(Stamp),
+    /// Cuts slopes into steps: treads at `base` and every `step` above and below it, with a riser of a quarter of the
+    /// step's slope between them. More applications make risers steeper.
+    Terrace {
+        /// Height of a step in voxels: 1 to 256.
+        step: f32,
+        /// Height of one of the treads in voxels.
+        base: f32,
+    },
 }
 
 impl Operation {
-    /// The density of a sample after the operation, from its density `before` and its signed distance to the shape,
-    /// `outside`. All in 1/256 voxel, negative is solid, and inside for the distance.
+    /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
+    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt look
+    /// at more than that: for them, it gives `before`.
     ///
     /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
     /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds
     /// ground nor an add removes it.
     #[inline]
-    pub fn apply(self, before: i32, outside: i32) -> i32 {
+    pub fn apply(&self, before: i32, outside: i32) -> i32 {
         let outside = outside.max(-DEPTH);
         match self {
             Self::Dig => before.max(-outside),
             Self::Add { .. } => before.min(outside),
-            Self::Paint { .. } => before,
+            _ => before,
         }
     }
 
-    /// The material that the operation brings along; none for a dig.
+    /// The material that an add or a paint brings along.
+    pub fn material(&self) -> Option<MaterialId> {
+        match self {
+            Self::Add { material } | Self::Paint { material } => Some(*material),
+            _ => None,
+        }
+    }
+
+    /// Does it sculpt? Only then the brush's [`Blend`](super::Blend) counts.
+    pub fn is_sculpting(&self) -> bool {
+        !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. })
+    }
+
+    /// The operation after every point p moved to `turn * (p * scale) + shift`. Heights follow along y.
+    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+        let point = |p: Vec3| turn * (p * scale) + shift;
+        let height = |y: f32| y * scale + shift.y;
+        match self {
+            Self::Flatten { point: at, normal } => {
+                Self::Flatten { point: point(*at), normal: turn * *normal }
+            }
+            Self::Level { height: at } => Self::Level { height: height(*at) },
+            Self::Raise { amount } => Self::Raise { amount: amount * scale },
+            Self::Lower { amount } => Self::Lower { amount: amount * scale },
+            Self::Terrace { step, base } => Self::Terrace { step: step * scale, base: height(*base) },
+            Self::Stamp(stamp) => Self::Stamp(Stamp {
+                center: point(stamp.center),
+                rotation: turn * stamp.rotation,
+                size: stamp.size * scale,
+                height: stamp.height * scale,
+                ..stamp.clone()
+            }),
+            same => same.clone(),
+        }
+    }
+}
+
+/// Which way an edit is applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Dig,
+    Add { material: MaterialId },
+    Paint { material: MaterialId },
+    Sculpt,
+}
+
+impl Kind {
+    /// The material that an add or a paint brings along.
     pub fn material(self) -> Option<MaterialId> {
         match self {
-            Self::Dig => None,
             Self::Add { material } | Self::Paint { material } => Some(material),
+            _ => None,
         }
     }
 }
@@ -74,7 +162,7 @@ mod tests {
             assert_eq!(Operation::Dig.apply(before, outside), dug);
             assert_eq!(add.apply(before, outside), added);
             assert_eq!(paint.apply(before, outside), before);
-            for operation in [Operation::Dig, add, paint] {
+            for operation in [&Operation::Dig, &add, &paint] {
                 let once = operation.apply(before, outside);
                 assert_eq!(operation.apply(once, outside), once);
             }

@@ -5,13 +5,16 @@
 //! {"shape":"box","center":[8,0,8],"half":[2,3,2],"rotation":[0,0,0,1],"op":"add","material":3,"tag":7}
 //! {"shape":"cone","base":[0,0,0],"axis":[0,9,0],"radius":4,"op":"paint","material":1,
 //!  "roughness":{"amplitude":1,"scale":6,"seed":5}}
+//! {"shape":"sphere","center":[8,0,8],"radius":6,"op":"flatten","point":[8,0,8],"normal":[0,1,0.2],"falloff":2}
+//! {"shape":"sphere","center":[8,0,8],"radius":6,"op":"smooth","strength":0.5}
 //! ```
 
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Brush, Operation, Roughness, Shape};
+use super::stamp::StampRecord;
+use super::{Blend, Brush, FULL_POWER, Operation, Roughness, Shape};
 use crate::ground::MaterialId;
 
 /// A brush as one flat object. Lengths are in voxels of terrain space.
@@ -23,8 +26,19 @@ use crate::ground::MaterialId;
 /// | `cylinder`, `cone` | `base`, `axis`, `radius` |
 /// | `capsule` | `from`, `to`, `radius` |
 ///
-/// `op` is `dig`, `add` or `paint`, the latter two with `material`; `roughness` and `tag` may be left out. Deserialising
-/// refuses fields of any other name, and turning the record into a [`Brush`] refuses those that its shape and operation
+/// | `op` | its fields |
+/// | --- | --- |
+/// | `dig` | |
+/// | `add`, `paint` | `material` |
+/// | `smooth`, `sharpen` | |
+/// | `flatten` | `point`, `normal` |
+/// | `level` | `height` |
+/// | `raise`, `lower` | `amount` |
+/// | `stamp` | `stamp`: `image` (`width`, `height`, `samples` from 0 to 65535), `center`, `size`, `height`, perhaps `rotation` |
+/// | `terrace` | `step`, perhaps `height` (of a tread, else 0) |
+///
+/// All but the first three may have `strength`, `falloff` and `material`, which are those of a [`Blend`]; `roughness`,
+/// `power` and `tag` may be left out. Deserialising refuses fields of any other name, and turning the record into a [`Brush`] refuses those that its shape and operation
 /// do not have. The numbers themselves are checked by [`Edit::quantize`](super::Edit::quantize).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -54,6 +68,24 @@ pub struct BrushRecord {
     pub roughness: Option<Roughness>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point: Option<[f32; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f32; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub amount: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stamp: Option<StampRecord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strength: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub falloff: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power: Option<u8>,
 }
 
 /// Name of a [`Shape`] in a record.
@@ -82,7 +114,61 @@ pub enum OperationName {
     Add,
     /// [`Operation::Paint`].
     Paint,
+    /// [`Operation::Smooth`].
+    Smooth,
+    /// [`Operation::Sharpen`].
+    Sharpen,
+    /// [`Operation::Flatten`].
+    Flatten,
+    /// [`Operation::Level`].
+    Level,
+    /// [`Operation::Raise`].
+    Raise,
+    /// [`Operation::Lower`].
+    Lower,
+    /// [`Operation::Stamp`].
+    Stamp,
+    /// [`Operation::Terrace`].
+    Terrace,
 }
+
+impl OperationName {
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Dig => "dig",
+            Self::Add => "add",
+            Self::Paint => "paint",
+            Self::Smooth => "smooth",
+            Self::Sharpen => "sharpen",
+            Self::Flatten => "flatten",
+            Self::Level => "level",
+            Self::Raise => "raise",
+            Self::Lower => "lower",
+            Self::Stamp => "stamp",
+            Self::Terrace => "terrace",
+        }
+    }
+
+    /// The fields that the operation may have, beside those that all may have which sculpt.
+    fn fields(self) -> &'static [&'static str] {
+        match self {
+            Self::Dig | Self::Smooth | Self::Sharpen => &[],
+            Self::Add | Self::Paint => &["material"],
+            Self::Flatten => &["point", "normal"],
+            Self::Level => &["height"],
+            Self::Raise | Self::Lower => &["amount"],
+            Self::Stamp => &["stamp"],
+            Self::Terrace => &["step", "height"],
+        }
+    }
+
+    fn is_sculpting(self) -> bool {
+        !matches!(self, Self::Dig | Self::Add | Self::Paint)
+    }
+}
+
+/// The fields of a [`Blend`].
+const BLEND: [&str; 3] = ["strength", "falloff", "material"];
 
 /// Why a record is no brush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -104,6 +190,9 @@ pub enum RecordError {
         /// The field too many.
         field: &'static str,
     },
+    /// The image of a stamp does not have as many samples as its sides say, or too many by far.
+    #[error("the `image` of `stamp` does not have `width` x `height` samples")]
+    Image,
 }
 
 impl ShapeName {
@@ -144,6 +233,15 @@ impl BrushRecord {
             material: None,
             roughness: None,
             tag: None,
+            point: None,
+            normal: None,
+            height: None,
+            amount: None,
+            step: None,
+            stamp: None,
+            strength: None,
+            falloff: None,
+            power: None,
         }
     }
 
@@ -185,14 +283,57 @@ impl BrushRecord {
     }
 
     fn read_operation(&self) -> Result<Operation, RecordError> {
-        let material = |owner| self.material.ok_or(RecordError::Missing { owner, field: "material" });
-        match self.op {
-            OperationName::Dig if self.material.is_some() => {
-                Err(RecordError::Foreign { owner: "dig", field: "material" })
+        let owner = self.op.as_str();
+        for (field, is_given) in [
+            ("material", self.material.is_some()),
+            ("strength", self.strength.is_some()),
+            ("falloff", self.falloff.is_some()),
+            ("point", self.point.is_some()),
+            ("normal", self.normal.is_some()),
+            ("height", self.height.is_some()),
+            ("amount", self.amount.is_some()),
+            ("step", self.step.is_some()),
+            ("stamp", self.stamp.is_some()),
+        ] {
+            let is_own =
+                self.op.fields().contains(&field) || self.op.is_sculpting() && BLEND.contains(&field);
+            if is_given && !is_own {
+                return Err(RecordError::Foreign { owner, field });
             }
-            OperationName::Dig => Ok(Operation::Dig),
-            OperationName::Add => Ok(Operation::Add { material: material("add")? }),
-            OperationName::Paint => Ok(Operation::Paint { material: material("paint")? }),
+        }
+        let missing = |field| RecordError::Missing { owner, field };
+        let vector =
+            |field, value: Option<[f32; 3]>| value.map(Vec3::from_array).ok_or_else(|| missing(field));
+        let number = |field, value: Option<f32>| value.ok_or_else(|| missing(field));
+        let material = || self.material.ok_or_else(|| missing("material"));
+        Ok(match self.op {
+            OperationName::Dig => Operation::Dig,
+            OperationName::Add => Operation::Add { material: material()? },
+            OperationName::Paint => Operation::Paint { material: material()? },
+            OperationName::Smooth => Operation::Smooth,
+            OperationName::Sharpen => Operation::Sharpen,
+            OperationName::Flatten => Operation::Flatten {
+                point: vector("point", self.point)?,
+                normal: vector("normal", self.normal)?,
+            },
+            OperationName::Level => Operation::Level { height: number("height", self.height)? },
+            OperationName::Raise => Operation::Raise { amount: number("amount", self.amount)? },
+            OperationName::Lower => Operation::Lower { amount: number("amount", self.amount)? },
+            OperationName::Stamp => {
+                let stamp = self.stamp.as_ref().ok_or_else(|| missing("stamp"))?;
+                Operation::Stamp(stamp.stamp().ok_or(RecordError::Image)?)
+            }
+            OperationName::Terrace => {
+                Operation::Terrace { step: number("step", self.step)?, base: self.height.unwrap_or_default() }
+            }
+        })
+    }
+
+    fn read_blend(&self, like: Blend) -> Blend {
+        Blend {
+            strength: self.strength.unwrap_or(like.strength),
+            falloff: self.falloff.unwrap_or(like.falloff),
+            material: self.material.filter(|_| self.op.is_sculpting()),
         }
     }
 }
@@ -201,24 +342,52 @@ impl TryFrom<BrushRecord> for Brush {
     type Error = RecordError;
 
     fn try_from(record: BrushRecord) -> Result<Self, RecordError> {
+        let brush = Self::plain(record.read_shape()?, record.read_operation()?);
         Ok(Self {
-            shape: record.read_shape()?,
-            operation: record.read_operation()?,
             roughness: record.roughness,
             tag: record.tag.unwrap_or(0),
+            blend: record.read_blend(brush.blend),
+            power: record.power.unwrap_or(FULL_POWER),
+            ..brush
         })
     }
 }
 
 impl From<&Brush> for BrushRecord {
     fn from(brush: &Brush) -> Self {
-        let (op, material) = match brush.operation {
-            Operation::Dig => (OperationName::Dig, None),
-            Operation::Add { material } => (OperationName::Add, Some(material)),
-            Operation::Paint { material } => (OperationName::Paint, Some(material)),
-        };
         let vector = |v: Vec3| Some(v.to_array());
-        let shaped = |shape| Self::empty(shape, op);
+        let of = |op| Self::empty(ShapeName::Sphere, op);
+        let record = match &brush.operation {
+            Operation::Dig => of(OperationName::Dig),
+            Operation::Add { material } => Self { material: Some(*material), ..of(OperationName::Add) },
+            Operation::Paint { material } => Self { material: Some(*material), ..of(OperationName::Paint) },
+            Operation::Smooth => of(OperationName::Smooth),
+            Operation::Sharpen => of(OperationName::Sharpen),
+            Operation::Flatten { point, normal } => {
+                Self { point: vector(*point), normal: vector(*normal), ..of(OperationName::Flatten) }
+            }
+            Operation::Level { height } => Self { height: Some(*height), ..of(OperationName::Level) },
+            Operation::Raise { amount } => Self { amount: Some(*amount), ..of(OperationName::Raise) },
+            Operation::Lower { amount } => Self { amount: Some(*amount), ..of(OperationName::Lower) },
+            Operation::Stamp(stamp) => Self { stamp: Some(stamp.into()), ..of(OperationName::Stamp) },
+            Operation::Terrace { step, base } => Self {
+                step: Some(*step),
+                height: (*base != 0.0).then_some(*base),
+                ..of(OperationName::Terrace)
+            },
+        };
+        let record = if brush.operation.is_sculpting() {
+            let like = Brush::plain(brush.shape, brush.operation.clone()).blend;
+            Self {
+                strength: (brush.blend.strength != like.strength).then_some(brush.blend.strength),
+                falloff: (brush.blend.falloff != like.falloff).then_some(brush.blend.falloff),
+                material: brush.blend.material,
+                ..record
+            }
+        } else {
+            record
+        };
+        let shaped = |shape| Self { shape, ..record.clone() };
         let record = match brush.shape {
             Shape::Sphere { center, radius } => {
                 Self { center: vector(center), radius: Some(radius), ..shaped(ShapeName::Sphere) }
@@ -246,13 +415,22 @@ impl From<&Brush> for BrushRecord {
                 ..shaped(ShapeName::Cone)
             },
         };
-        Self { material, roughness: brush.roughness, tag: (brush.tag != 0).then_some(brush.tag), ..record }
+        Self {
+            roughness: brush.roughness,
+            tag: (brush.tag != 0).then_some(brush.tag),
+            power: (brush.power != FULL_POWER).then_some(brush.power),
+            ..record
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec2;
+
     use super::*;
+    use crate::brush::Stamp;
+    use crate::ground::GreyImage;
 
     fn parse(json: &str) -> Result<Brush, String> {
         let record: BrushRecord = serde_json::from_str(json).map_err(|error| error.to_string())?;
@@ -262,6 +440,8 @@ mod tests {
     #[test]
     fn every_shape_comes_back_from_its_line() {
         let (a, b) = (Vec3::new(1.5, -2.0, 0.1), Vec3::new(0.0, 7.25, 3.0));
+        let image = GreyImage::from_samples(3, 2, vec![0, 1, 700, 65535, 4, 5]).unwrap();
+        let stamp = Stamp::new(image, b, Vec2::new(4.0, 6.5), -2.0);
         for shape in [
             Shape::sphere(a, 4.1),
             Shape::cuboid(a, b),
@@ -274,6 +454,19 @@ mod tests {
                 Brush::dig(shape),
                 Brush::add(shape, MaterialId(255)).with_tag(u64::MAX),
                 Brush::paint(shape, MaterialId(0)).with_roughness(Roughness::new(0.3, 5.0, u32::MAX)),
+                Brush::smooth(shape, 0.25).with_power(3),
+                Brush::sharpen(shape, 1.0).with_falloff(0.0),
+                Brush::flatten(shape, a, b).with_material(MaterialId(4)),
+                Brush::level(shape, -3.5).with_strength(0.1),
+                Brush::raise(shape, 2.0).with_tag(3),
+                Brush::lower(shape, 0.125),
+                Brush::terrace(shape, 2.5),
+                Brush {
+                    operation: Operation::Terrace { step: 3.0, base: 1.5 },
+                    ..Brush::terrace(shape, 3.0)
+                },
+                Brush::stamp(shape, stamp.clone()),
+                Brush::stamp(shape, stamp.clone().onto(Vec3::X)).with_falloff(4.0),
             ] {
                 let line = serde_json::to_string(&BrushRecord::from(&brush)).unwrap();
                 assert_eq!(parse(&line).unwrap(), brush, "{line}");
@@ -310,6 +503,22 @@ mod tests {
                 "field `material` does not belong to `dig`",
             ),
             (r#"{"shape":"sphere","center":[0,0,0],"radius":1,"op":"add","material":300}"#, "300"),
+            (
+                r#"{"shape":"sphere","center":[0,0,0],"radius":1,"op":"dig","strength":1}"#,
+                "field `strength` does not belong to `dig`",
+            ),
+            (
+                r#"{"shape":"sphere","center":[0,0,0],"radius":1,"op":"level","amount":1}"#,
+                "field `amount` does not belong to `level`",
+            ),
+            (
+                r#"{"shape":"sphere","center":[0,0,0],"radius":1,"op":"flatten","point":[0,0,0]}"#,
+                "missing field `normal`, which `flatten` needs",
+            ),
+            (
+                r#"{"shape":"sphere","center":[0,0,0],"radius":1,"op":"stamp","stamp":{"center":[0,0,0],"size":[2,2],"height":1,"image":{"width":3,"height":3,"samples":[1,2]}}}"#,
+                "does not have `width` x `height` samples",
+            ),
             (r#"{"shape":"sphere","center":[0,0,0],"radius":1}"#, "missing field `op`"),
             (r#"{"center":[0,0,0],"radius":1,"op":"dig"}"#, "missing field `shape`"),
             (r#"{"shape":"sphere","center":[0,0,0],"radios":1,"op":"dig"}"#, "unknown field `radios`"),

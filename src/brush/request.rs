@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{Operation, Roughness, Shape};
+use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
 /// A wish to change the ground, in voxels of terrain space.
@@ -18,11 +18,24 @@ pub struct Brush {
     pub roughness: Option<Roughness>,
     /// Any number of the game's own; the receipt carries it back.
     pub tag: u64,
+    /// How operations that sculpt fade, and what they build of.
+    pub blend: Blend,
+    /// How hard the material may be that it takes away, where the terrain has rules for that: [`FULL_POWER`] takes away
+    /// all that can be.
+    pub power: u8,
 }
 
 impl Brush {
     fn new(shape: Shape, operation: Operation) -> Self {
-        Self { shape, operation, roughness: None, tag: 0 }
+        Self { shape, operation, roughness: None, tag: 0, blend: Blend::default(), power: FULL_POWER }
+    }
+
+    /// The brush of an operation, as the functions below make it.
+    pub(super) fn plain(shape: Shape, operation: Operation) -> Self {
+        match operation {
+            Operation::Stamp(stamp) => Self::stamp(shape, stamp),
+            operation => Self::new(shape, operation),
+        }
     }
 
     /// A brush that takes ground away.
@@ -38,6 +51,68 @@ impl Brush {
     /// A brush that changes the material of the ground in its shape.
     pub fn paint(shape: Shape, material: MaterialId) -> Self {
         Self::new(shape, Operation::Paint { material })
+    }
+
+    /// A brush that evens out its shape; `strength` is 0 to 1.
+    pub fn smooth(shape: Shape, strength: f32) -> Self {
+        Self::new(shape, Operation::Smooth).with_strength(strength)
+    }
+
+    /// A brush that deepens bumps and edges; `strength` is 0 to 1.
+    pub fn sharpen(shape: Shape, strength: f32) -> Self {
+        Self::new(shape, Operation::Sharpen).with_strength(strength)
+    }
+
+    /// A brush that makes its surface a plane through `point`, with the air where `normal` points to: floors, walls and
+    /// ceilings.
+    pub fn flatten(shape: Shape, point: Vec3, normal: Vec3) -> Self {
+        Self::new(shape, Operation::Flatten { point, normal })
+    }
+
+    /// A brush that makes the ground level at a height.
+    pub fn level(shape: Shape, height: f32) -> Self {
+        Self::new(shape, Operation::Level { height })
+    }
+
+    /// A brush that raises the ground by so many voxels.
+    pub fn raise(shape: Shape, amount: f32) -> Self {
+        Self::new(shape, Operation::Raise { amount })
+    }
+
+    /// A brush that lowers the ground by so many voxels.
+    pub fn lower(shape: Shape, amount: f32) -> Self {
+        Self::new(shape, Operation::Lower { amount })
+    }
+
+    /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of the
+    /// image and of the shape, unless told otherwise.
+    pub fn stamp(shape: Shape, stamp: Stamp) -> Self {
+        Self::new(shape, Operation::Stamp(stamp)).with_falloff(1.0)
+    }
+
+    /// A brush that cuts slopes into steps of a height, with a tread at height 0.
+    pub fn terrace(shape: Shape, step: f32) -> Self {
+        Self::new(shape, Operation::Terrace { step, base: 0.0 })
+    }
+
+    /// The brush with another strength, if it sculpts: 0 to 1.
+    pub fn with_strength(self, strength: f32) -> Self {
+        Self { blend: Blend { strength, ..self.blend }, ..self }
+    }
+
+    /// The brush with another falloff, if it sculpts: over so many voxels its change fades in.
+    pub fn with_falloff(self, falloff: f32) -> Self {
+        Self { blend: Blend { falloff, ..self.blend }, ..self }
+    }
+
+    /// The brush with a material for the ground that it builds, if it sculpts.
+    pub fn with_material(self, material: MaterialId) -> Self {
+        Self { blend: Blend { material: Some(material), ..self.blend }, ..self }
+    }
+
+    /// The brush with less than full power: what the terrain's rules call harder takes longer, or can't be dug.
+    pub fn with_power(self, power: u8) -> Self {
+        Self { power, ..self }
     }
 
     /// The brush with bumps on its surface.
@@ -59,13 +134,15 @@ impl Brush {
     pub fn transformed(&self, rotation: Quat, translation: Vec3, scale: f32) -> Self {
         Self {
             shape: self.shape.transformed(rotation, translation, scale),
-            operation: self.operation,
+            operation: self.operation.transformed(rotation, translation, scale),
             roughness: self.roughness.map(|roughness| Roughness {
                 amplitude: roughness.amplitude * scale,
                 scale: roughness.scale * scale,
                 ..roughness
             }),
             tag: self.tag,
+            blend: Blend { falloff: self.blend.falloff * scale, ..self.blend },
+            power: self.power,
         }
     }
 }

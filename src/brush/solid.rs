@@ -128,6 +128,21 @@ impl Solid {
         }
     }
 
+    /// How deep inside the shape its middle lies, rounded down: at least 1.
+    pub(super) fn deepest(&self) -> i32 {
+        let deepest = match *self {
+            Self::Sphere { radius, .. } | Self::Capsule { radius, .. } => radius,
+            Self::Cuboid { half, .. } => half.into_iter().fold(i32::MAX, i32::min),
+            Self::Cylinder { axis, radius, .. } => radius.min((length(axis) / 2.0) as i32),
+            Self::Cone { axis, radius, .. } => {
+                let (height, radius) = (length(axis), f64::from(radius));
+                let slant = (height * height + radius * radius).sqrt();
+                (radius * height / (radius + slant)) as i32
+            }
+        };
+        deepest.max(1)
+    }
+
     /// Volume in cubic voxels.
     fn volume(&self) -> f64 {
         use std::f64::consts::PI;
@@ -207,7 +222,7 @@ fn round(length: f32) -> i32 {
     (length * ONE as f32).round_ties_even() as i32
 }
 
-fn point(what: &'static str, at: Vec3) -> Result<[i32; 3], BrushError> {
+pub(super) fn point(what: &'static str, at: Vec3) -> Result<[i32; 3], BrushError> {
     for value in at.to_array() {
         if finite(what, value)?.abs() > LIMIT as f32 {
             return Err(BrushError::OutOfRange { what, value, most: LIMIT as f32 });
@@ -216,21 +231,21 @@ fn point(what: &'static str, at: Vec3) -> Result<[i32; 3], BrushError> {
     Ok(at.to_array().map(round))
 }
 
-fn check_point(what: &'static str, at: [i32; 3]) -> Result<(), BrushError> {
+pub(super) fn check_point(what: &'static str, at: [i32; 3]) -> Result<(), BrushError> {
     match at.into_iter().find(|v| v.unsigned_abs() > (LIMIT * ONE) as u32) {
         Some(v) => Err(BrushError::OutOfRange { what, value: voxels(v), most: LIMIT as f32 }),
         None => Ok(()),
     }
 }
 
-fn size(what: &'static str, value: f32) -> Result<i32, BrushError> {
+pub(super) fn size(what: &'static str, value: f32) -> Result<i32, BrushError> {
     if finite(what, value)? > voxels(LONGEST) {
         return Err(too_large(what, value, voxels(LONGEST)));
     }
     if value < 0.0 || round(value) < LEAST { Err(too_small(what, value)) } else { Ok(round(value)) }
 }
 
-fn check_size(what: &'static str, value: i32) -> Result<(), BrushError> {
+pub(super) fn check_size(what: &'static str, value: i32) -> Result<(), BrushError> {
     if value > LONGEST {
         return Err(too_large(what, voxels(value), voxels(LONGEST)));
     }
@@ -258,7 +273,7 @@ fn check_arrow(axis: [i32; 3]) -> Result<(), BrushError> {
     Ok(())
 }
 
-fn turn(rotation: Quat) -> Result<[i16; 4], BrushError> {
+pub(super) fn turn(rotation: Quat) -> Result<[i16; 4], BrushError> {
     for value in rotation.to_array() {
         finite("rotation", value)?;
     }
@@ -271,7 +286,7 @@ fn turn(rotation: Quat) -> Result<[i16; 4], BrushError> {
     Ok(if is_positive(parts) { parts } else { parts.map(|v| v.saturating_neg()) })
 }
 
-fn check_turn(rotation: [i16; 4]) -> Result<(), BrushError> {
+pub(super) fn check_turn(rotation: [i16; 4]) -> Result<(), BrushError> {
     let length = rotation.map(f64::from).iter().map(|v| v * v).sum::<f64>().sqrt() / UNIT;
     if (length - 1.0).abs() > 0.01 {
         return Err(BrushError::ZeroRotation { length: length as f32 });

@@ -22,7 +22,7 @@ use crate::lattice::{ChunkPos, LatticeBox, TilePos};
 use crate::surface::tile::Rings;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, Draft, EditEffect, EditWork, FieldId, Fields, UniformBricks, reach};
+use crate::volume::{Bricks, Draft, EditEffect, EditWork, FieldId, Fields, Ledger, UniformBricks, reach};
 
 /// Something that happened to a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,10 +127,8 @@ impl Transaction {
         let edits: Vec<&Edit> = self.submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
         let draft = Stages::time(&mut stages.edit, || {
-            let mut draft = Draft::new(edits.len(), world.sample_hash);
-            let work = EditWork::new(world.samples(), world.grid, &edits);
-            backend.edit(&work, &mut |ledger| draft.add(ledger, &world.uniform));
-            draft
+            let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| backend.edit(work, each);
+            Draft::make(world.samples(), world.grid, &edits, world.sample_hash, &world.uniform, apply)
         });
         let bricks: Bricks =
             draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();

@@ -180,6 +180,12 @@ impl Brick {
         }
     }
 
+    /// Stores the sample with this index; [`Self::set_bits`] says what it is.
+    #[inline]
+    pub(crate) fn set_sample(&mut self, index: usize, sample: Sample) {
+        self.samples[index] = sample;
+    }
+
     /// Enters which samples of a layer are edited now, beside those that are already, and which of them are solid.
     #[inline]
     pub(crate) fn set_bits(&mut self, y: usize, edited: u64, solid: u64) {

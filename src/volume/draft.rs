@@ -3,17 +3,22 @@
 //! Edits are sorted by the bricks they reach. Then each brick takes its edits in their order, on its own: bricks share
 //! no samples, so threads share no work, and whatever an edit changed is added up afterwards. A [`backend`](crate::backend)
 //! does the middle part.
+//!
+//! Edits that sculpt read what is around a sample, in other bricks too. So they stand in `runs`, one after the other: what
+//! an edit of a run reads, no earlier one of the same run changes.
 
 use std::sync::Arc;
 
 use glam::IVec3;
 use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::brick::UniformBricks;
 use super::ledger::{Fate, Ledger};
+use super::runs::runs;
 use super::workpiece::Workpiece;
-use super::{Brick, SampleView, Tally};
-use crate::brush::{Edit, Evaluator, Operation};
+use super::{Brick, Bricks, SampleView, Tally};
+use crate::brush::{Edit, Evaluator, Kind, Sculptor};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, sort_by_place};
 
 /// What one edit changed in one chunk.
@@ -104,8 +109,9 @@ impl Job {
 pub(crate) struct Tool {
     /// The part of the edit's reach that lies in the world.
     pub reach: Option<LatticeBox>,
-    pub operation: Operation,
+    pub operation: Kind,
     pub evaluator: Evaluator,
+    pub sculptor: Option<Sculptor>,
 }
 
 /// The part of an edit's reach that lies in the world; `None` when it lies outside.
@@ -128,12 +134,19 @@ impl<'a> EditWork<'a> {
     pub fn new(base: SampleView<'a>, grid: ChunkGrid, edits: &[&Edit]) -> Self {
         let tool = |edit: &&Edit| Tool {
             reach: reach(grid, edit),
-            operation: edit.operation(),
+            operation: edit.kind(),
             evaluator: edit.evaluator(),
+            sculptor: edit.sculptor(),
         };
         let tools: Vec<Tool> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
         Self { base, grid, tools, jobs }
+    }
+
+    /// Is there nothing but digs, adds and paint? Cards know no more.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn is_plain(&self) -> bool {
+        self.tools.iter().all(|tool| tool.sculptor.is_none())
     }
 
     /// The jobs of each brick, in order of the edits.
@@ -184,22 +197,73 @@ impl<'a> EditWork<'a> {
     }
 }
 
+/// Bricks that some runs have changed.
+#[derive(Default)]
+struct Changes {
+    newer: Bricks,
+    /// Where they changed, and whether a sample was edited for the first time.
+    notes: FxHashMap<BrickPos, (LatticeBox, bool)>,
+}
+
+impl Changes {
+    fn take(&mut self, bricks: Vec<DraftedBrick>) {
+        for DraftedBrick { pos, brick, changed, is_extended } in bricks {
+            self.newer.insert(pos, brick);
+            let note = self.notes.entry(pos).or_insert((changed, is_extended));
+            *note = (note.0.union(changed), note.1 | is_extended);
+        }
+    }
+
+    /// All of them, by position.
+    fn bricks(self) -> Vec<DraftedBrick> {
+        let drafted = |(pos, brick)| {
+            let &(changed, is_extended) = self.notes.get(&pos)?;
+            Some(DraftedBrick { pos, brick, changed, is_extended })
+        };
+        let mut bricks: Vec<_> = self.newer.into_iter().filter_map(drafted).collect();
+        bricks.sort_unstable_by_key(|drafted| (drafted.pos.0.x, drafted.pos.0.z, drafted.pos.0.y));
+        bricks
+    }
+}
+
 impl Draft {
-    /// A draft of so many edits on samples of this hash, without what they did.
-    pub fn new(edits: usize, hash: u64) -> Self {
+    /// What edits make of samples of this hash. Whoever applies them gets them run by run.
+    pub(crate) fn make(
+        base: SampleView,
+        grid: ChunkGrid,
+        edits: &[&Edit],
+        hash: u64,
+        uniform: &UniformBricks,
+        mut apply: impl FnMut(&EditWork, &mut dyn FnMut(Ledger)),
+    ) -> Self {
         let mut draft = Self { hash, ..Self::default() };
-        draft.effects.resize_with(edits, EditEffect::default);
+        draft.effects.resize_with(edits.len(), EditEffect::default);
+        let (mut earlier, mut rest) = (Changes::default(), runs(grid, edits).into_iter().peekable());
+        while let Some(run) = rest.next() {
+            let work = EditWork::new(base.over(&earlier.newer), grid, &edits[run.clone()]);
+            apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
+            if run.start > 0 || rest.peek().is_some() {
+                earlier.take(std::mem::take(&mut draft.bricks));
+            }
+        }
+        if !earlier.newer.is_empty() {
+            draft.bricks = earlier.bricks();
+            // Kinds that came and went.
+            let kinds: FxHashSet<_> =
+                draft.bricks.iter().filter_map(|drafted| drafted.brick.uniform()).collect();
+            draft.uniform.retain(|kind, _| kinds.contains(kind));
+        }
         draft
     }
 
-    /// Takes in what was done to some bricks; one that is all alike is replaced by the one of its kind.
-    pub(crate) fn add(&mut self, ledger: Ledger, uniform: &UniformBricks) {
+    /// Takes in what edits from this one on did to some bricks; one that is all alike is replaced by the one of its kind.
+    fn add(&mut self, ledger: Ledger, first: usize, uniform: &UniformBricks) {
         self.hash = self.hash.wrapping_add(ledger.hash);
         for part in &ledger.parts {
-            self.effects[part.edit].reach(part.chunk, part.bounds);
+            self.effects[first + part.edit].reach(part.chunk, part.bounds);
         }
         for count in &ledger.counts {
-            let effect = &mut self.effects[count.edit];
+            let effect = &mut self.effects[first + count.edit];
             let tally = match count.fate {
                 Fate::Removed => &mut effect.removed,
                 Fate::Added => &mut effect.added,

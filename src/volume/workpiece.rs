@@ -8,17 +8,18 @@ use wide::{i16x8, i32x8};
 use super::brick::{PRISTINE, row, solid_layers};
 use super::draft::{Job, Tool};
 use super::ledger::{Counts, Fate, Ledger, PartEffect};
+use super::surroundings::Surroundings;
 use super::view::resolve;
 use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
-use crate::brush::{BAND, DEPTH, Operation};
+use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE, hash};
 
 /// A brick under work.
 pub(super) struct Workpiece<'a> {
-    view: SampleView<'a>,
+    pub(super) view: SampleView<'a>,
     grid: ChunkGrid,
-    pos: BrickPos,
+    pub(super) pos: BrickPos,
     /// What it was before.
     base: Option<&'a Brick>,
     /// What it is now; `None` until its first sample changes.
@@ -31,12 +32,12 @@ pub(super) struct Workpiece<'a> {
 
 /// Samples of a layer that changed: a bit each, as in [`Layers`].
 #[derive(Clone, Copy, Default)]
-struct Changed {
-    all: u64,
+pub(super) struct Changed {
+    pub all: u64,
     /// Those that were solid.
-    was: u64,
+    pub was: u64,
     /// Those that are solid now.
-    is: u64,
+    pub is: u64,
 }
 
 impl<'a> Workpiece<'a> {
@@ -59,9 +60,17 @@ impl<'a> Workpiece<'a> {
             tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
             let first = ledger.counts.len();
             let mut counts = Counts { edit, first, list: &mut ledger.counts };
+            let around = tool.sculptor.is_some().then(|| Surroundings::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
-                if let Some(bounds) = self.apply(tool.operation, samples, &distances, &mut counts) {
+                let changed = match (&tool.sculptor, &around) {
+                    (Some(sculptor), Some(around)) => {
+                        self.sculpt(sculptor, samples, &distances, around, &mut counts)
+                    }
+                    _ => self.apply(tool.operation, samples, &distances, &mut counts),
+                };
+                self.changed.iter_mut().zip(&changed).for_each(|(all, layer)| *all |= layer);
+                if let Some(bounds) = bounds(&changed, low) {
                     ledger.parts.push(PartEffect { edit, chunk, bounds });
                 }
             }
@@ -81,7 +90,7 @@ impl<'a> Workpiece<'a> {
     }
 
     /// The brick, to be changed.
-    fn brick(&mut self) -> &mut Brick {
+    pub(super) fn brick(&mut self) -> &mut Brick {
         let (base, heights, y) = (self.base, &self.heights, self.pos.origin().y);
         self.brick.get_or_insert_with(|| match base {
             Some(base) => base.clone(),
@@ -89,14 +98,14 @@ impl<'a> Workpiece<'a> {
         })
     }
 
-    /// Applies an operation to some samples; returns the box of those that changed.
+    /// Applies an operation to some samples; returns those that changed.
     fn apply(
         &mut self,
-        operation: Operation,
+        operation: Kind,
         samples: LatticeBox,
         distances: &[i16x8; 64],
         counts: &mut Counts<'_>,
-    ) -> Option<LatticeBox> {
+    ) -> Layers {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
         let lanes = i16x8::new(std::array::from_fn(|x| -i16::from((from.x..=to.x).contains(&x))));
@@ -104,15 +113,14 @@ impl<'a> Workpiece<'a> {
         for (y, layer) in (from.y..=to.y).zip(&mut changed[from.y..]) {
             let rows = (from.z..=to.z).zip(&distances[y * 8 + from.z..]);
             *layer = match operation {
-                Operation::Paint { material } => rows.fold(0, |layer, (z, &outside)| {
+                Kind::Paint { material } => rows.fold(0, |layer, (z, &outside)| {
                     let row = self.paint((y, z), outside, lanes, material, counts);
                     layer | u64::from(row) << (z * 8)
                 }),
                 _ => self.carve(y, rows, lanes, operation, counts),
             };
         }
-        self.changed.iter_mut().zip(&changed).for_each(|(all, layer)| *all |= layer);
-        bounds(&changed, low)
+        changed
     }
 
     /// Digs or adds in rows of a layer; returns the samples that changed.
@@ -124,7 +132,7 @@ impl<'a> Workpiece<'a> {
         y: usize,
         rows: impl Iterator<Item = (usize, &'d i16x8)>,
         lanes: i16x8,
-        operation: Operation,
+        operation: Kind,
         counts: &mut Counts<'_>,
     ) -> u64 {
         let mut changed = Changed::default();
@@ -139,7 +147,7 @@ impl<'a> Workpiece<'a> {
             let pristine = i16x8::from_i32x8_saturate(height - i32x8::new(self.heights[z]));
             let before = raw.simd_eq(i16x8::splat(i16::MIN)).select(pristine, raw);
             let depth = outside.max(i16x8::splat(-DEPTH as i16));
-            let after = if operation == Operation::Dig { before.max(-depth) } else { before.min(depth) };
+            let after = if operation == Kind::Dig { before.max(-depth) } else { before.min(depth) };
             let changes = in_reach & !after.simd_eq(before);
             let lanes = bits(changes);
             if lanes != 0 {
@@ -152,13 +160,20 @@ impl<'a> Workpiece<'a> {
         }
         if changed.all != 0 {
             self.brick().set_bits(y, changed.all, changed.is);
-            self.count(y, changed, operation, counts);
+            let material = operation.material().unwrap_or(MaterialId::GROUND);
+            self.count(y, changed, Some(material), counts);
         }
         changed.all
     }
 
-    /// Counts voxels of a layer that changed sides, and gives new ones their material.
-    fn count(&mut self, y: usize, changed: Changed, operation: Operation, counts: &mut Counts<'_>) {
+    /// Counts voxels of a layer that changed sides, and gives new ones this material if they have none yet.
+    pub(super) fn count(
+        &mut self,
+        y: usize,
+        changed: Changed,
+        material: Option<MaterialId>,
+        counts: &mut Counts<'_>,
+    ) {
         let (removed, added) = (changed.was & !changed.is, changed.is & !changed.was);
         if removed != 0 {
             self.tally(Fate::Removed, y, removed, counts);
@@ -166,11 +181,12 @@ impl<'a> Workpiece<'a> {
             self.brick().set_materials(y, removed, MaterialId::GROUND);
         }
         if added != 0 {
-            let material = operation.material().unwrap_or(MaterialId::GROUND);
-            self.brick().set_materials(y, added, material);
+            if let Some(material) = material {
+                self.brick().set_materials(y, added, material);
+            }
             match material {
-                MaterialId::GROUND => self.tally(Fate::Added, y, added, counts),
-                _ => counts.add(Fate::Added, material, added.count_ones().into()),
+                None | Some(MaterialId::GROUND) => self.tally(Fate::Added, y, added, counts),
+                Some(material) => counts.add(Fate::Added, material, added.count_ones().into()),
             }
         }
     }
@@ -293,7 +309,7 @@ fn bits(lanes: i16x8) -> u8 {
 
 /// Positions of the bits that are set, lowest first.
 #[inline(always)]
-fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
+pub(super) fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);

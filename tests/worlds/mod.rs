@@ -130,6 +130,61 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     }
 }
 
+/// A random brush that sculpts, mostly where the surface is.
+pub fn random_sculpting_brush(rng: &mut Rng, ground: &Ground) -> Brush {
+    let like = random_brush(rng, ground);
+    let (x, z) = (rng.i32(-1..=ground.width() + 1), rng.i32(-1..=ground.depth() + 1));
+    let height = ground.height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
+    let jitter = Vec3::new(rng.f32() - 0.5, rng.f32() * 6.0 - 3.0, rng.f32() - 0.5);
+    let place = Vec3::new(x as f32, height, z as f32) + if rng.bool() { jitter } else { Vec3::ZERO };
+    let radius = [1.5, 3.0, 4.3, 6.0][rng.usize(0..4)];
+    let shape = match rng.u32(0..5) {
+        0 => like.shape,
+        1 => Shape::cuboid(place, Vec3::new(radius, radius * 1.5, radius)),
+        2 => Shape::cylinder(place - Vec3::Y * radius, Vec3::Y * 2.0 * radius, radius),
+        _ => Shape::sphere(place, radius),
+    };
+    sculpting_brush(rng, shape, place)
+}
+
+/// A random brush that sculpts, around a place.
+pub fn sculpting_brush(rng: &mut Rng, shape: Shape, place: Vec3) -> Brush {
+    let by = [0.25, 1.0, 2.5, 9.0][rng.usize(0..4)];
+    let up = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.2, rng.f32() - 0.5);
+    let brush = match rng.u32(0..10) {
+        0 | 1 => Brush::smooth(shape, 0.2 + 0.8 * rng.f32()),
+        2 => Brush::sharpen(shape, 1.0),
+        3 => Brush::flatten(shape, place + rng.f32(), if up.length() < 0.1 { Vec3::X } else { up }),
+        4 => Brush::level(shape, (place.y + 3.0 * rng.f32() - 1.5).clamp(-32_768.0, 32_768.0)),
+        5 => Brush::raise(shape, by),
+        6 => Brush::lower(shape, by),
+        7 => Brush::terrace(shape, by.max(1.0)),
+        _ => {
+            let (width, height) = (rng.u32(2..7), rng.u32(2..7));
+            let samples = (0..width * height).map(|_| rng.u16(..)).collect();
+            let image = GreyImage::from_samples(width, height, samples).expect("as many samples as it has");
+            let size = glam::Vec2::new(1.0 + 9.0 * rng.f32(), 1.0 + 9.0 * rng.f32());
+            let stamp = bevy_burrow::brush::Stamp::new(image, place, size, 8.0 * (rng.f32() - 0.5));
+            Brush::stamp(shape, if rng.bool() { stamp.onto(up) } else { stamp })
+        }
+    };
+    let brush = match rng.u32(0..4) {
+        0 => brush.with_falloff([0.0, 0.5, 2.0, 64.0][rng.usize(0..4)]),
+        _ => brush,
+    };
+    match rng.u32(0..4) {
+        0 => brush.with_material(MaterialId(rng.u8(0..6))),
+        1 => brush.with_strength(rng.f32()),
+        2 => brush.with_roughness(Roughness::new(rng.f32(), 1.0 + rng.f32() * 6.0, rng.u32(..))),
+        _ => brush,
+    }
+}
+
+/// A random brush of any kind.
+pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
+    if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) }
+}
+
 fn random_rotation(rng: &mut Rng) -> Quat {
     let angles = [rng.f32() * 6.3, rng.f32() * 6.3, rng.f32() * 6.3];
     if rng.bool() {
@@ -158,10 +213,10 @@ pub fn random_brush_at_a_face(rng: &mut Rng, ground: &Ground, chunk_size: u32) -
 pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
     let (ground, chunk_size) = random_ground(rng, index);
     let mut brushes = Vec::new();
-    for _ in 0..rng.u32(1..6) {
+    for _ in 0..rng.u32(2..8) {
         if rng.u32(0..4) == 0 {
             // A run of balls: a tunnel, a dam.
-            let first = random_brush(rng, &ground);
+            let first = any_random_brush(rng, &ground);
             let (from, to) = (random_center(rng, &ground, true, 3.0), random_center(rng, &ground, true, 3.0));
             for step in 0..12 {
                 let shape = Shape::sphere(from.lerp(to, step as f32 / 11.0), 3.0);
@@ -170,7 +225,7 @@ pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
         } else if rng.u32(0..4) == 0 {
             brushes.push(random_brush_at_a_face(rng, &ground, chunk_size));
         } else {
-            brushes.push(random_brush(rng, &ground));
+            brushes.push(any_random_brush(rng, &ground));
         }
     }
     let mut terrain =

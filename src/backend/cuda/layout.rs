@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
 
-use crate::brush::{Evaluator, Operation};
+use crate::brush::{Evaluator, Kind};
 use crate::ground::{ColumnMaterial, Ground, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox};
 use crate::surface::vertex::WorldView;
@@ -386,18 +386,18 @@ pub(crate) fn stack_record(ground: &Ground, (x, z): (i32, i32)) -> StackRecord {
     record
 }
 
-/// An edit that reaches these samples of the world; `None`: it reaches none.
-pub(crate) fn tool(reach: Option<LatticeBox>, operation: Operation, evaluator: &Evaluator) -> Tool {
+/// An edit that reaches these samples of the world; `None`: it reaches none. One that sculpts is no work for a card.
+pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> Tool {
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
-    let LatticeBox { min, max } = reach.unwrap_or(nothing);
+    let LatticeBox { min, max } = reach.filter(|_| operation != Kind::Sculpt).unwrap_or(nothing);
     let (amplitude, scale, seed) = of.grain.unwrap_or((0, 1, 0));
     Tool {
         kind: of.kind,
         operation: match operation {
-            Operation::Dig => 0,
-            Operation::Add { .. } => 1,
-            Operation::Paint { .. } => 2,
+            Kind::Dig => 0,
+            Kind::Add { .. } => 1,
+            Kind::Paint { .. } | Kind::Sculpt => 2,
         },
         material: operation.material().map_or(0, |material| material.0.into()),
         is_rough: of.grain.is_some().into(),

@@ -1,0 +1,102 @@
+//! How a sculpting brush fades towards the rim of its shape.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::in_range;
+use super::{BrushError, FULL_POWER};
+use crate::ground::MaterialId;
+use crate::lattice::ONE;
+
+/// How an operation that sculpts blends in. Dig, add and paint have no use for it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Blend {
+    /// How much of the change is made: 0 for nothing, 1 for all of it.
+    pub strength: f32,
+    /// Over how many voxels from the shape's surface inwards the change fades in: 0 to 64. One that is wider than the
+    /// shape is deep ends in its middle. With 0 the change ends in a step at the shape's surface.
+    pub falloff: f32,
+    /// What new ground is made of; `None`: the first ground straight below it, else straight above,
+    /// within 64 voxels, else beside it.
+    pub material: Option<MaterialId>,
+}
+
+impl Default for Blend {
+    fn default() -> Self {
+        Self { strength: 1.0, falloff: 4.0, material: None }
+    }
+}
+
+/// Most voxels of falloff.
+const MOST: i32 = 64;
+
+/// A quantised [`Blend`]: strength in 1/256, falloff in 1/256 voxel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Fade {
+    pub strength: i32,
+    pub falloff: i32,
+    pub material: Option<MaterialId>,
+}
+
+impl Fade {
+    pub fn quantize(blend: &Blend) -> Result<Self, BrushError> {
+        let strength = in_range("strength", blend.strength, 0.0, 1.0)?;
+        let falloff = in_range("falloff", blend.falloff, 0.0, MOST as f32)?;
+        Ok(Self { strength, falloff, material: blend.material })
+    }
+
+    pub fn check(self) -> Result<(), BrushError> {
+        in_range("strength", self.strength as f32 / ONE as f32, 0.0, 1.0)?;
+        in_range("falloff", self.falloff as f32 / ONE as f32, 0.0, MOST as f32)?;
+        Ok(())
+    }
+
+    pub fn blend(self) -> Blend {
+        let units = |value: i32| value as f32 / ONE as f32;
+        Blend { strength: units(self.strength), falloff: units(self.falloff), material: self.material }
+    }
+
+    /// How much of the change is made at a distance from the shape, in 1/256; the falloff is at most `deep` wide.
+    pub fn weight(self, outside: i32, deep: i32) -> i32 {
+        let inside = -outside;
+        let falloff = self.falloff.min(deep);
+        if inside < 0 || inside == 0 && falloff > 0 {
+            return 0;
+        }
+        if inside >= falloff {
+            return self.strength;
+        }
+        // 3 t^2 - 2 t^3: no kink at either end.
+        let t = inside * ONE / falloff;
+        let faded = (t * t * (3 * ONE - 2 * t)) >> 16;
+        (faded * self.strength + ONE / 2) >> 8
+    }
+}
+
+/// Is there any limit to this power?
+pub(super) fn is_full(power: &u8) -> bool {
+    *power == FULL_POWER
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_rise_from_nothing_at_the_rim_to_the_strength() {
+        for (strength, falloff) in [(256, 1024), (256, 0), (77, 300), (256, 1)] {
+            let fade = Fade { strength, falloff, material: None };
+            let weights: Vec<i32> = (-20_000..600).rev().map(|outside| fade.weight(outside, 9000)).collect();
+            assert!(weights.is_sorted());
+            assert_eq!((weights[0], weights.last()), (0, Some(&strength)));
+            assert_eq!(fade.weight(1, 9000), 0);
+            assert_eq!(fade.weight(0, 9000), if falloff == 0 { strength } else { 0 });
+        }
+        // As wide as the shape is deep: all of it in the middle, and no sudden step on the way.
+        let soft = Fade { strength: 256, falloff: 64 * ONE, material: None };
+        assert_eq!((soft.weight(-5 * ONE, 5 * ONE), soft.weight(-5 * ONE / 2, 5 * ONE)), (256, 128));
+        let all: Vec<i32> = (0..5 * ONE).map(|inside| soft.weight(-inside, 5 * ONE)).collect();
+        assert!(all.windows(2).all(|pair| (0..=2).contains(&(pair[1] - pair[0]))));
+    }
+}

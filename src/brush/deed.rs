@@ -1,0 +1,224 @@
+//! An operation in integers, as edits hold it and as it is written.
+
+use glam::{IVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::blend::{Fade, is_full};
+use super::error::in_range;
+use super::solid::{check_point, point};
+use super::stamp::Press;
+use super::{Brush, BrushError, FULL_POWER, Operation};
+use crate::ground::MaterialId;
+use crate::lattice::{LIMIT, ONE};
+
+/// What an integer normal's length means 1 by.
+const UNIT: f64 = 32767.0;
+
+/// Most voxels that a raise or a lower moves the surface.
+const AMOUNT: f32 = 64.0;
+
+/// Least and most height of a terrace's steps.
+const STEP: (f32, f32) = (1.0, 256.0);
+
+/// An [`Operation`] with its [`Blend`](super::Blend), in integers. Lengths are in 1/256 voxel.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum Deed {
+    Dig,
+    Add {
+        material: MaterialId,
+    },
+    Paint {
+        material: MaterialId,
+    },
+    Smooth {
+        fade: Fade,
+    },
+    Sharpen {
+        fade: Fade,
+    },
+    Flatten {
+        point: [i32; 3],
+        normal: [i16; 3],
+        fade: Fade,
+    },
+    Level {
+        height: i32,
+        fade: Fade,
+    },
+    Raise {
+        amount: i32,
+        fade: Fade,
+    },
+    Lower {
+        amount: i32,
+        fade: Fade,
+    },
+    Stamp {
+        stamp: Press,
+        fade: Fade,
+    },
+    Terrace {
+        step: i32,
+        base: i32,
+        fade: Fade,
+    },
+    /// Only as edits are written: an operation of a brush with less than full power.
+    Limited {
+        power: u8,
+        operation: Box<Deed>,
+    },
+}
+
+impl Deed {
+    /// Rounds an operation to integers and checks it.
+    pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
+        let fade = || Fade::quantize(&brush.blend);
+        let height = |what, height| in_range(what, height, -LIMIT as f32, LIMIT as f32);
+        Ok(match &brush.operation {
+            Operation::Dig => Self::Dig,
+            Operation::Add { material } => Self::Add { material: *material },
+            Operation::Paint { material } => Self::Paint { material: *material },
+            Operation::Smooth => Self::Smooth { fade: fade()? },
+            Operation::Sharpen => Self::Sharpen { fade: fade()? },
+            Operation::Flatten { point: at, normal } => {
+                Self::Flatten { point: point("point", *at)?, normal: direction(*normal)?, fade: fade()? }
+            }
+            Operation::Level { height: at } => Self::Level { height: height("height", *at)?, fade: fade()? },
+            Operation::Raise { amount: by } => Self::Raise { amount: amount(*by)?, fade: fade()? },
+            Operation::Lower { amount: by } => Self::Lower { amount: amount(*by)?, fade: fade()? },
+            Operation::Stamp(stamp) => Self::Stamp { stamp: Press::quantize(stamp)?, fade: fade()? },
+            Operation::Terrace { step, base } => Self::Terrace {
+                step: in_range("step", *step, STEP.0, STEP.1)?,
+                base: height("base", *base)?,
+                fade: fade()?,
+            },
+        })
+    }
+
+    /// Is it within every limit?
+    pub fn check(&self) -> Result<(), BrushError> {
+        let units = |value: i32| value as f32 / ONE as f32;
+        match self {
+            Self::Flatten { point, normal, .. } => {
+                check_point("point", *point)?;
+                let length = length(*normal) / UNIT;
+                if (length - 1.0).abs() > 0.01 {
+                    return Err(BrushError::ZeroNormal { length: length as f32 });
+                }
+            }
+            Self::Level { height, .. } => check_point("height", [*height, 0, 0])?,
+            Self::Raise { amount: by, .. } | Self::Lower { amount: by, .. } => {
+                amount(units(*by))?;
+            }
+            Self::Stamp { stamp, .. } => stamp.check()?,
+            Self::Terrace { step, base, .. } => {
+                in_range("step", units(*step), STEP.0, STEP.1)?;
+                check_point("base", [*base, 0, 0])?;
+            }
+            Self::Limited { .. } => return Err(BrushError::Power),
+            _ => {}
+        }
+        self.fade().map_or(Ok(()), Fade::check)
+    }
+
+    /// How it fades, if it sculpts.
+    pub fn fade(&self) -> Option<Fade> {
+        match self {
+            Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Limited { .. } => None,
+            Self::Smooth { fade }
+            | Self::Sharpen { fade }
+            | Self::Flatten { fade, .. }
+            | Self::Level { fade, .. }
+            | Self::Raise { fade, .. }
+            | Self::Lower { fade, .. }
+            | Self::Stamp { fade, .. }
+            | Self::Terrace { fade, .. } => Some(*fade),
+        }
+    }
+
+    /// The operation as a brush has it.
+    pub fn operation(&self) -> Operation {
+        let units = |value: i32| value as f32 / ONE as f32;
+        match self {
+            Self::Dig => Operation::Dig,
+            Self::Add { material } => Operation::Add { material: *material },
+            Self::Paint { material } => Operation::Paint { material: *material },
+            Self::Smooth { .. } => Operation::Smooth,
+            Self::Sharpen { .. } => Operation::Sharpen,
+            Self::Flatten { point, normal, .. } => Operation::Flatten {
+                point: Vec3::from_array(point.map(units)),
+                normal: Vec3::from_array(normal.map(f32::from)).normalize_or(Vec3::Y),
+            },
+            Self::Level { height, .. } => Operation::Level { height: units(*height) },
+            Self::Raise { amount, .. } => Operation::Raise { amount: units(*amount) },
+            Self::Lower { amount, .. } => Operation::Lower { amount: units(*amount) },
+            Self::Stamp { stamp, .. } => Operation::Stamp(stamp.stamp()),
+            Self::Terrace { step, base, .. } => Operation::Terrace { step: units(*step), base: units(*base) },
+            Self::Limited { operation, .. } => operation.operation(),
+        }
+    }
+
+    /// The operation and its power as one, for writing: full power is not written, so that it reads as it always did.
+    pub fn limited(self, power: u8) -> Self {
+        if is_full(&power) { self } else { Self::Limited { power, operation: Box::new(self) } }
+    }
+
+    /// The operation and its power as they are written.
+    pub fn unlimited(self) -> Result<(Self, u8), BrushError> {
+        match self {
+            Self::Limited { power: FULL_POWER, .. } => Err(BrushError::Power),
+            Self::Limited { power, operation } => Ok((*operation, power)),
+            plain => Ok((plain, FULL_POWER)),
+        }
+    }
+}
+
+fn amount(by: f32) -> Result<i32, BrushError> {
+    in_range("amount", by, 0.0, AMOUNT)
+}
+
+fn direction(normal: Vec3) -> Result<[i16; 3], BrushError> {
+    let parts = normal.to_array();
+    if let Some(&value) = parts.iter().find(|value| !value.is_finite()) {
+        return Err(BrushError::NotFinite { what: "normal", value });
+    }
+    let parts = parts.map(f64::from);
+    let length = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
+    if length < 1e-6 {
+        return Err(BrushError::ZeroNormal { length: length as f32 });
+    }
+    Ok(parts.map(|part| (part / length * UNIT).round_ties_even() as i16))
+}
+
+fn length(normal: [i16; 3]) -> f64 {
+    normal.map(f64::from).iter().map(|part| part * part).sum::<f64>().sqrt()
+}
+
+/// How far a lattice point lies from a plane, on the side of its normal, in 1/256 voxel. Needs a normal that is not zero.
+pub(super) fn above_plane(at: IVec3, point: [i32; 3], normal: [i16; 3]) -> i32 {
+    let from = at.as_i64vec3() * i64::from(ONE) - IVec3::from_array(point).as_i64vec3();
+    let along: i64 = from.to_array().iter().zip(normal).map(|(&from, n)| from * i64::from(n)).sum();
+    // Both are integers that f64 holds exactly; root, quotient and rounding are exact to the last bit.
+    ((along as f64 / length(normal)).round_ties_even() as i64).clamp(-(1 << 25), 1 << 25) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_from_planes_derived_by_hand() {
+        for (at, normal, above) in [
+            ([0, 7, 0], Vec3::Y, 512),
+            ([9, 5, -4], Vec3::Y * 9.0, 0),
+            ([3, 5, 0], Vec3::X, 768),
+            ([3, 9, 0], Vec3::new(3.0, 4.0, 0.0), 5 * 256),
+            ([0, 7, 0], -Vec3::Y, -512),
+        ] {
+            let normal = direction(normal).unwrap();
+            let found = above_plane(IVec3::from_array(at), [0, 5 * 256, 0], normal);
+            assert!((found - above).abs() <= 1, "{at:?}: {found} instead of {above}");
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! What operations that sculpt make of a sample: integers throughout.
+//!
+//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], so exactly that number says
+//! "at least as far". Operations that move a surface have to know how far away it is, or the whole middle of a cave would
+//! turn solid at once. So a sample that was *cut off* counts as one voxel farther than its nearest face neighbour, and is
+//! left alone while all of those were cut off too.
+
+use glam::IVec3;
+
+use super::DEPTH;
+use super::blend::Fade;
+use super::deed::{Deed, above_plane};
+use super::solid::Solid;
+use crate::ground::MaterialId;
+use crate::lattice::ONE;
+
+/// How far neighbours count as denser or thinner at most, in 1/256 voxel: of the far side of a cliff nobody knows more.
+const CONTRAST: i32 = 2 * ONE;
+
+/// By how much sharpening changes a sample at most, in 1/256 voxel.
+const SHARPER: i32 = ONE / 4;
+
+/// The opposite neighbours of a sample, their weight in a binomial average (1 2 1 along each axis), and what the way to
+/// them measures in 1/256 voxel.
+const PAIRS: [([i32; 3], i32, i32); 13] = [
+    ([1, 0, 0], 4, 256),
+    ([0, 1, 0], 4, 256),
+    ([0, 0, 1], 4, 256),
+    ([1, 1, 0], 2, 362),
+    ([1, -1, 0], 2, 362),
+    ([1, 0, 1], 2, 362),
+    ([1, 0, -1], 2, 362),
+    ([0, 1, 1], 2, 362),
+    ([0, 1, -1], 2, 362),
+    ([1, 1, 1], 1, 443),
+    ([1, 1, -1], 1, 443),
+    ([1, -1, 1], 1, 443),
+    ([1, -1, -1], 1, 443),
+];
+
+/// A sample with the 26 around it, as they were before the operation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Around {
+    /// Densities in 1/256 voxel: x fastest, then z, then y.
+    pub densities: [i32; 27],
+    /// A bit for each that was cut off.
+    pub cut: u32,
+}
+
+impl Around {
+    const MIDDLE: usize = 13;
+
+    fn index([x, y, z]: [i32; 3]) -> usize {
+        ((y + 1) * 9 + (z + 1) * 3 + x + 1) as usize
+    }
+
+    fn is_cut(&self, index: usize) -> bool {
+        self.cut >> index & 1 == 1
+    }
+
+    /// The six neighbours across faces.
+    fn faces(&self) -> impl Iterator<Item = (i32, bool)> {
+        [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], self.is_cut(index))).into_iter()
+    }
+
+    /// The density in the middle, as far as anyone knows; `None` where all was cut off.
+    fn middle(&self) -> Option<i32> {
+        let own = self.densities[Self::MIDDLE];
+        if !self.is_cut(Self::MIDDLE) {
+            return Some(own);
+        }
+        // Towards the surface, distances along the own sign get smaller.
+        let nearest =
+            self.faces().map(|(other, is_cut)| if is_cut { DEPTH } else { other * own.signum() }).min()?;
+        let is_known = self.faces().any(|(_, is_cut)| !is_cut);
+        is_known.then(|| own.signum() * (nearest.max(0) + ONE))
+    }
+
+    /// 64 times the way from the middle, which is `own`, to the average of all.
+    fn to_average(&self, own: i32) -> i32 {
+        let pair = |&(way, weight, length): &([i32; 3], i32, i32)| {
+            let one = |way: [i32; 3]| {
+                let index = Self::index(way);
+                if self.is_cut(index) && own.abs() + length > DEPTH {
+                    return None;
+                }
+                Some((self.densities[index] - own).clamp(-CONTRAST, CONTRAST))
+            };
+            // Where one side is not known, the other one has nothing to be compared with.
+            Some(weight * (one(way)? + one(way.map(|step| -step))?))
+        };
+        PAIRS.iter().filter_map(pair).sum()
+    }
+
+    /// The density after a change that may make the sample solid only beside a solid one, and air only beside air: no
+    /// crumb comes from nowhere.
+    fn attached(&self, after: i32) -> i32 {
+        let was_solid = self.densities[Self::MIDDLE] < 0;
+        if (after < 0) == was_solid || self.faces().any(|(other, _)| (other < 0) == (after < 0)) {
+            return after;
+        }
+        if was_solid { -1 } else { 0 }
+    }
+}
+
+/// An edit that sculpts, ready to be applied.
+#[derive(Clone, Debug)]
+pub(crate) struct Sculptor {
+    deed: Deed,
+    fade: Fade,
+    /// How deep the shape is in its middle.
+    deep: i32,
+}
+
+impl Sculptor {
+    /// The sculptor of a checked deed, if it sculpts.
+    pub(super) fn of(deed: &Deed, shape: &Solid) -> Option<Self> {
+        let fade = deed.fade()?;
+        let deep = match deed {
+            Deed::Stamp { stamp, .. } => shape.deepest().min(stamp.deep()),
+            _ => shape.deepest(),
+        };
+        Some(Self { deed: deed.clone(), fade, deep })
+    }
+
+    /// What new ground is made of, if the operation says so.
+    pub fn material(&self) -> Option<MaterialId> {
+        self.fade.material
+    }
+
+    /// The density at a lattice point after the operation, from its distance to the shape and from what is around; `None`
+    /// where it stays as it is.
+    pub fn density(&self, at: IVec3, outside: i32, around: impl FnOnce() -> Around) -> Option<i32> {
+        if outside > 0 {
+            return None;
+        }
+        let mut outside = outside;
+        let target = match &self.deed {
+            Deed::Flatten { point, normal, .. } => Some(above_plane(at, *point, *normal)),
+            Deed::Level { height, .. } => Some(at.y * ONE - height),
+            Deed::Stamp { stamp, .. } => {
+                let (beside, above) = stamp.at(at);
+                outside = outside.max(beside);
+                Some(above)
+            }
+            _ => None,
+        };
+        let weight = self.fade.weight(outside, self.deep);
+        if weight == 0 {
+            return None;
+        }
+        let around = around();
+        let own = around.densities[Around::MIDDLE];
+        if let Some(target) = target {
+            return Some(own + part(i64::from(target) - i64::from(own), weight));
+        }
+        let middle = around.middle()?;
+        match &self.deed {
+            Deed::Smooth { .. } => {
+                let by = around.to_average(middle) * weight / (64 * ONE);
+                (by != 0).then(|| around.attached(middle + by))
+            }
+            Deed::Sharpen { .. } => {
+                let by = (around.to_average(middle) * weight / (64 * ONE)).clamp(-SHARPER, SHARPER);
+                let all = &around.densities;
+                let (low, high) = all.iter().fold((own, own), |(low, high), &d| (low.min(d), high.max(d)));
+                (by != 0).then(|| around.attached((middle - by).clamp(low, high)))
+            }
+            Deed::Raise { amount, .. } => shifted(middle, -amount, weight),
+            Deed::Lower { amount, .. } => shifted(middle, *amount, weight),
+            Deed::Terrace { step, base, .. } => {
+                let surface = at.y * ONE - middle;
+                let by = part(i64::from(surface) - i64::from(terraced(surface - base, *step) + base), weight);
+                (by != 0).then_some(middle + by)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// A part of `whole`, in 1/256, away from zero: who gets a part again and again gets all of it at last.
+fn part(whole: i64, weight: i32) -> i32 {
+    let part = (whole.abs() * i64::from(weight) + i64::from(ONE) - 1) >> 8;
+    (part * whole.signum()) as i32
+}
+
+/// The density with a part of `by` added, which an opposite shift takes away again to the bit.
+fn shifted(density: i32, by: i32, weight: i32) -> Option<i32> {
+    let by = by.signum() * ((by.abs() * weight + ONE / 2) >> 8);
+    (by != 0).then_some(density + by)
+}
+
+/// A height in steps, with a riser over the middle quarter of each.
+fn terraced(height: i32, step: i32) -> i32 {
+    let tread = height.div_euclid(step) * step;
+    let along = height - tread;
+    tread + ((along - step * 3 / 8) * 4).clamp(0, step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn around(density: impl Fn(i32, i32, i32) -> i32) -> Around {
+        let mut all = Around { densities: [0; 27], cut: 0 };
+        for way in (0..27).map(|i| [i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1]) {
+            all.densities[Around::index(way)] = density(way[0], way[1], way[2]);
+        }
+        all
+    }
+
+    #[test]
+    fn pairs_and_the_middle_are_the_binomial_average() {
+        assert_eq!(PAIRS.iter().map(|(_, weight, _)| 2 * weight).sum::<i32>() + 8, 64);
+        for (way, weight, length) in PAIRS {
+            let along = |step: i32| if step == 0 { 2 } else { 1 };
+            assert_eq!(weight, way.map(along).iter().product::<i32>());
+            let squared: i32 = way.iter().map(|step| step * step).sum();
+            assert_eq!(length, (f64::from(squared).sqrt() * 256.0).round() as i32);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn slopes_of_any_steepness_are_smooth_already(
+            slope in prop::array::uniform3(-3000..3000i32), middle in -900..900i32,
+        ) {
+            let slope = around(|x, y, z| middle + slope[0] * x + slope[1] * y + slope[2] * z);
+            prop_assert_eq!(slope.to_average(middle), 0);
+        }
+
+        #[test]
+        fn a_part_again_and_again_is_all(whole in -1_000_000..1_000_000i64, weight in 1..=256) {
+            let mut rest = whole;
+            for _ in 0..10_000 {
+                rest -= i64::from(part(rest, weight));
+            }
+            prop_assert_eq!(rest, 0);
+        }
+
+        #[test]
+        fn terraces_rise_and_never_fall(height in -100_000..100_000i32, step in 256..65_536i32) {
+            let (low, high) = (terraced(height, step), terraced(height + 1, step));
+            prop_assert!(low <= high && (low - height).abs() <= step * 3 / 8 + 1);
+            let tread = height.div_euclid(step) * step;
+            prop_assert_eq!(terraced(tread, step), tread);
+        }
+    }
+
+    #[test]
+    fn what_was_cut_off_is_one_voxel_farther_than_what_is_known() {
+        let mut cave = around(|_, _, _| DEPTH);
+        cave.cut = (1 << 27) - 1;
+        assert_eq!(cave.middle(), None);
+        let below = Around::index([0, -1, 0]);
+        (cave.densities[below], cave.cut) = (500, cave.cut & !(1 << below));
+        assert_eq!(cave.middle(), Some(756));
+        cave.densities[below] = 1000;
+        assert_eq!(cave.middle(), Some(1000 + ONE));
+        cave.densities[below] = -300;
+        assert_eq!(cave.middle(), Some(ONE));
+        // A wall that is cut off on its far side stays where it is.
+        let mut wall = around(|x, _, _| (x * 256 + 900).min(DEPTH));
+        wall.cut = (0..27).filter(|i| i % 3 == 2).fold(0, |cut, i| cut | 1 << i);
+        assert_eq!(wall.to_average(900), 0);
+    }
+
+    #[test]
+    fn crumbs_do_not_come_from_nowhere() {
+        let air = around(|_, _, _| 20);
+        assert_eq!((air.attached(-9), air.attached(5)), (0, 5));
+        let ground = around(|_, y, _| y * 256 + 20);
+        assert_eq!(ground.attached(-9), -9);
+        let solid = around(|_, _, _| -20);
+        assert_eq!((solid.attached(9), solid.attached(-5)), (-1, -5));
+    }
+}

@@ -1,0 +1,304 @@
+//! Stamps: images that a brush presses onto the ground.
+
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use glam::{IVec3, Quat, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::BrushError;
+use super::error::in_range;
+use super::solid::{check_point, check_size, check_turn, matrix, point, size, turn};
+use crate::ground::GreyImage;
+use crate::lattice::ONE;
+
+/// An image that gives the surface its relief: black lies on the stamp's plane, white `height` above it.
+///
+/// The stamp's own axes are the image's columns (x), up (y) and the image's rows (z); without a rotation, they are those of
+/// the terrain, and the image lies as a [`Ground`](crate::ground::Ground) made of it would.
+///
+/// The surface is the image, interpolated linearly between its samples, to within 1/8 voxel in each lattice column that
+/// the brush covers with full weight: heights are rounded to 1/256 voxel, and the rest is marching cubes between voxels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stamp {
+    /// The image, 2 to 256 samples a side.
+    pub image: Arc<GreyImage>,
+    /// Where the middle of the image lies.
+    pub center: Vec3,
+    /// From the stamp's axes to those of the terrain; of length 1.
+    pub rotation: Quat,
+    /// The image's sides in voxels, along its columns and its rows. Nothing changes beside the image.
+    pub size: Vec2,
+    /// How high white lies above black, in voxels; -256 to 256.
+    pub height: f32,
+}
+
+impl Stamp {
+    /// An image pressed down along the y axis.
+    pub fn new(image: impl Into<Arc<GreyImage>>, center: Vec3, size: Vec2, height: f32) -> Self {
+        Self { image: image.into(), center, rotation: Quat::IDENTITY, size, height }
+    }
+
+    /// The stamp with its plane turned.
+    pub fn with_rotation(self, rotation: Quat) -> Self {
+        Self { rotation, ..self }
+    }
+
+    /// The stamp on a plane: its up becomes `normal`, by the shortest turn. A normal of no direction leaves it as it is.
+    pub fn onto(self, normal: Vec3) -> Self {
+        match normal.try_normalize() {
+            Some(normal) => self.with_rotation(Quat::from_rotation_arc(Vec3::Y, normal)),
+            None => self,
+        }
+    }
+}
+
+/// A stamp as an object of a [`BrushRecord`](super::BrushRecord).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "they are those of a stamp")]
+pub struct StampRecord {
+    pub image: ImageRecord,
+    pub center: [f32; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<[f32; 4]>,
+    pub size: [f32; 2],
+    pub height: f32,
+}
+
+/// The image of a [`StampRecord`]: grey samples, 0 to 65535, row by row.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(missing_docs, reason = "they are those of an image")]
+pub struct ImageRecord {
+    pub width: u32,
+    pub height: u32,
+    pub samples: Vec<u16>,
+}
+
+impl StampRecord {
+    /// The stamp; `None` where the image is none.
+    pub(super) fn stamp(&self) -> Option<Stamp> {
+        let ImageRecord { width, height, samples } = &self.image;
+        let image = GreyImage::from_samples(*width, *height, samples.clone()).ok()?;
+        let stamp =
+            Stamp::new(image, Vec3::from_array(self.center), Vec2::from_array(self.size), self.height);
+        Some(stamp.with_rotation(self.rotation.map_or(Quat::IDENTITY, Quat::from_array)))
+    }
+}
+
+impl From<&Stamp> for StampRecord {
+    fn from(stamp: &Stamp) -> Self {
+        let image = &stamp.image;
+        let samples = image.samples().to_vec();
+        Self {
+            image: ImageRecord { width: image.width(), height: image.height(), samples },
+            center: stamp.center.to_array(),
+            rotation: (stamp.rotation != Quat::IDENTITY).then(|| stamp.rotation.to_array()),
+            size: stamp.size.to_array(),
+            height: stamp.height,
+        }
+    }
+}
+
+/// Least and most samples along a side of an image.
+const SIDES: (u32, u32) = (2, 256);
+
+/// Most height.
+const HEIGHT: f32 = 256.0;
+
+/// The samples of an image of an allowed size.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Samples", into = "Samples")]
+pub(super) struct Relief(Arc<GreyImage>);
+
+/// A relief as it comes from a file or a network.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "Relief", deny_unknown_fields)]
+struct Samples {
+    width: u32,
+    height: u32,
+    samples: Vec<u16>,
+}
+
+impl TryFrom<Samples> for Relief {
+    type Error = BrushError;
+
+    fn try_from(Samples { width, height, samples }: Samples) -> Result<Self, BrushError> {
+        check_sides(width, height)?;
+        let actual = samples.len();
+        let image = GreyImage::from_samples(width, height, samples)
+            .map_err(|_| BrushError::StampSamples { width, height, actual })?;
+        Ok(Self(image.into()))
+    }
+}
+
+impl From<Relief> for Samples {
+    fn from(Relief(image): Relief) -> Self {
+        Self { width: image.width(), height: image.height(), samples: image.samples().to_vec() }
+    }
+}
+
+/// What the samples are counts, not how finely they were once stored.
+impl PartialEq for Relief {
+    fn eq(&self, other: &Self) -> bool {
+        let of = |relief: &Self| (relief.0.width(), relief.0.height());
+        of(self) == of(other) && self.0.samples() == other.0.samples()
+    }
+}
+
+impl Eq for Relief {}
+
+impl Hash for Relief {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.0.width(), self.0.height(), self.0.samples()).hash(state);
+    }
+}
+
+fn check_sides(width: u32, height: u32) -> Result<(), BrushError> {
+    let (least, most) = SIDES;
+    let is_fine = [width, height].iter().all(|side| (least..=most).contains(side));
+    if is_fine { Ok(()) } else { Err(BrushError::StampSize { width, height, least, most }) }
+}
+
+impl Relief {
+    /// The grey at a place, in 1/256 of a step between samples; 65535 * 2^16 for white.
+    fn at(&self, x: i64, y: i64) -> i64 {
+        let cell = |at: i64, side: u32| {
+            let first = (at >> 8).clamp(0, i64::from(side) - 2);
+            (first as u32, (at - (first << 8)).clamp(0, 256))
+        };
+        let grey = |x: u32, y: u32| i64::from(self.0.grey(x, y));
+        let ((x, right), (y, down)) = (cell(x, self.0.width()), cell(y, self.0.height()));
+        let along = |y: u32| grey(x, y) * (256 - right) + grey(x + 1, y) * right;
+        along(y) * (256 - down) + along(y + 1) * down
+    }
+}
+
+/// A [`Stamp`] in integers.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Press {
+    center: [i32; 3],
+    rotation: [i16; 4],
+    half: [i32; 2],
+    height: i32,
+    relief: Relief,
+}
+
+impl Press {
+    pub fn quantize(stamp: &Stamp) -> Result<Self, BrushError> {
+        check_sides(stamp.image.width(), stamp.image.height())?;
+        Ok(Self {
+            center: point("stamp center", stamp.center)?,
+            rotation: turn(stamp.rotation)?,
+            half: [size("stamp size", stamp.size.x / 2.0)?, size("stamp size", stamp.size.y / 2.0)?],
+            height: in_range("stamp height", stamp.height, -HEIGHT, HEIGHT)?,
+            relief: Relief(Arc::clone(&stamp.image)),
+        })
+    }
+
+    pub fn check(&self) -> Result<(), BrushError> {
+        check_point("stamp center", self.center)?;
+        check_turn(self.rotation)?;
+        self.half.into_iter().try_for_each(|half| check_size("stamp size", half))?;
+        in_range("stamp height", self.height as f32 / ONE as f32, -HEIGHT, HEIGHT)?;
+        Ok(())
+    }
+
+    /// The brush's own numbers again.
+    pub fn stamp(&self) -> Stamp {
+        let units = |value: i32| value as f32 / ONE as f32;
+        Stamp {
+            image: Arc::clone(&self.relief.0),
+            center: Vec3::from_array(self.center.map(units)),
+            rotation: Quat::from_array(self.rotation.map(f32::from)).normalize(),
+            size: 2.0 * Vec2::from_array(self.half.map(units)),
+            height: units(self.height),
+        }
+    }
+
+    /// Half the shorter side.
+    pub fn deep(&self) -> i32 {
+        self.half[0].min(self.half[1])
+    }
+
+    /// How far a lattice point lies beside the image, negative inside, and how far above its relief; in 1/256 voxel.
+    pub fn at(&self, at: IVec3) -> (i32, i32) {
+        let (rows, squared) = matrix(self.rotation);
+        let from = at.as_i64vec3() * i64::from(ONE) - IVec3::from_array(self.center).as_i64vec3();
+        let [right, up, down] = [0, 1, 2].map(|i| {
+            let along = rows[0][i] * from.x + rows[1][i] * from.y + rows[2][i] * from.z;
+            (along + squared / 2).div_euclid(squared)
+        });
+        let half = self.half.map(i64::from);
+        let beside = (right.abs() - half[0]).max(down.abs() - half[1]);
+        let place = |at: i64, half: i64, side: u32| (at + half) * (i64::from(side) - 1) * 256 / (2 * half);
+        let column = place(right, half[0], self.relief.0.width());
+        let row = place(down, half[1], self.relief.0.height());
+        let white = 65535 << 16;
+        let relief = (self.relief.at(column, row) * i64::from(self.height) + white / 2).div_euclid(white);
+        let far = |value: i64| value.clamp(-(1 << 25), 1 << 25) as i32;
+        (far(beside), far(up - relief))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp() -> Stamp {
+        let samples = (0..12).map(|i| (i % 4) * 21845).collect();
+        let image = GreyImage::from_samples(4, 3, samples).unwrap();
+        Stamp::new(image, Vec3::new(10.0, 5.0, 20.0), Vec2::new(6.0, 8.0), 3.0)
+    }
+
+    #[test]
+    fn a_ramp_rises_along_its_columns() {
+        let press = Press::quantize(&ramp()).unwrap();
+        for (x, height) in [(7, 0), (8, 128), (10, 384), (12, 640), (13, 768)] {
+            for z in [16, 20, 24] {
+                let (beside, above) = press.at(IVec3::new(x, 5, z));
+                assert!(beside <= 0 && (above + height).abs() <= 1, "{x} {z}: {above}");
+            }
+        }
+        assert_eq!(press.at(IVec3::new(15, 5, 20)).0, 512);
+        assert_eq!(press.at(IVec3::new(10, 5, 25)).0, 256);
+    }
+
+    #[test]
+    fn a_stamp_on_a_wall_looks_along_its_normal() {
+        let press = Press::quantize(&ramp().onto(Vec3::X)).unwrap();
+        let middle = press.at(IVec3::new(10, 5, 20)).1;
+        assert_eq!(press.at(IVec3::new(12, 5, 20)).1, middle + 512);
+    }
+
+    #[test]
+    fn the_stamp_comes_back_from_its_integers() {
+        let stamp = ramp();
+        assert_eq!(Press::quantize(&stamp).unwrap().stamp(), stamp);
+        let turned = ramp().onto(Vec3::new(0.3, 0.9, -0.2));
+        let press = Press::quantize(&turned).unwrap();
+        assert_eq!(Press::quantize(&press.stamp()).unwrap(), press);
+    }
+
+    #[test]
+    fn images_of_other_sizes_are_refused() {
+        for (width, height) in [(1, 9), (9, 1), (257, 2), (2, 257)] {
+            let image = GreyImage::from_samples(width, height, vec![0; (width * height) as usize]).unwrap();
+            let error = Press::quantize(&Stamp { image: image.into(), ..ramp() }).unwrap_err();
+            assert!(matches!(error, BrushError::StampSize { .. }), "{error}");
+        }
+        let press = Press::quantize(&ramp()).unwrap();
+        let json = serde_json::to_string(&press).unwrap();
+        assert_eq!(serde_json::from_str::<Press>(&json).unwrap(), press);
+        for (from, to, message) in [
+            (r#""width":4"#, r#""width":5"#, "takes 15 samples, but 12"),
+            (r#""width":4"#, r#""width":4000000000"#, "2 to 256"),
+            (r#""width":4"#, r#""width":0"#, "2 to 256"),
+        ] {
+            let error = serde_json::from_str::<Press>(&json.replace(from, to)).unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
+        }
+    }
+}

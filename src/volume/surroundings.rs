@@ -1,0 +1,110 @@
+//! A brick with the samples around it, as they were before an edit.
+
+use glam::{IVec3, USizeVec3};
+
+use super::{Brick, SampleView};
+use crate::brush::{Around, DEPTH};
+use crate::lattice::{BRICK, BrickPos, Column, ONE};
+
+/// Samples along a side: the brick's and one on each side.
+const SIDE: usize = BRICK as usize + 2;
+
+/// The densities of a brick and of one sample more on all sides.
+pub(super) struct Surroundings {
+    densities: [[[i32; SIDE]; SIDE]; SIDE],
+    /// Which were cut off where a dig or an add stops to tell distances apart: a bit for each x.
+    cut: [[u16; SIDE]; SIDE],
+}
+
+impl Surroundings {
+    /// Of a brick, the samples of a view.
+    pub fn new(view: &SampleView, pos: BrickPos) -> Self {
+        let low = pos.origin() - 1;
+        let heights = view.ground().heights::<SIDE>(Column::of(low));
+        let mut own = Self { densities: [[[0; SIDE]; SIDE]; SIDE], cut: [[0; SIDE]; SIDE] };
+        for (y, layer) in (low.y..).zip(&mut own.densities) {
+            for (row, heights) in layer.iter_mut().zip(&heights) {
+                row.iter_mut().zip(heights).for_each(|(density, height)| *density = y * ONE - height);
+            }
+        }
+        for step in (0..27).map(|i| IVec3::new(i % 3, i / 9, i / 3 % 3)) {
+            if let Some(brick) = view.brick(BrickPos(pos.0 + step - 1)) {
+                own.enter(brick, step.as_usizevec3());
+            }
+        }
+        own
+    }
+
+    /// Enters the samples of a brick so many steps from the lowest one.
+    fn enter(&mut self, brick: &Brick, step: USizeVec3) {
+        // From where to where, and where that is in the brick.
+        let range = |step: usize| match step {
+            0 => (0..1, 7),
+            1 => (1..SIDE - 1, 0),
+            _ => (SIDE - 1..SIDE, 0),
+        };
+        let ((xs, dx), (ys, dy), (zs, dz)) = (range(step.x), range(step.y), range(step.z));
+        for (y, own_y) in ys.zip(dy..) {
+            for (z, own_z) in zs.clone().zip(dz..) {
+                let row = super::row(brick.samples(), own_y * 64 + own_z * 8);
+                for (x, &sample) in xs.clone().zip(&row[dx..]) {
+                    if sample != i16::MIN {
+                        self.densities[y][z][x] = sample.into();
+                        let is_cut = i32::from(sample).abs() == DEPTH;
+                        self.cut[y][z] |= u16::from(is_cut) << x;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The density of one of the brick's own samples.
+    pub fn density(&self, [x, y, z]: [usize; 3]) -> i32 {
+        self.densities[y + 1][z + 1][x + 1]
+    }
+
+    /// One of the brick's own samples and what is around it.
+    pub fn around(&self, [x, y, z]: [usize; 3]) -> Around {
+        let mut around = Around { densities: [0; 27], cut: 0 };
+        for (i, (dy, dz)) in (0..3).flat_map(|dy| (0..3).map(move |dz| (dy, dz))).enumerate() {
+            let (row, cut) = (&self.densities[y + dy][z + dz], self.cut[y + dy][z + dz]);
+            around.densities[i * 3..i * 3 + 3].copy_from_slice(&row[x..x + 3]);
+            around.cut |= u32::from(cut >> x & 7) << (i * 3);
+        }
+        around
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::volume::Bricks;
+
+    #[test]
+    fn surroundings_are_what_the_view_says() {
+        let ground = Ground::from_fn(30, 30, |x, z| f64::from(x * 7 % 5) + f64::from(z) * 0.3).unwrap();
+        let pos = BrickPos(IVec3::new(1, 0, 2));
+        let mut bricks = Bricks::default();
+        for (i, step) in [IVec3::ZERO, IVec3::X, IVec3::NEG_Y, IVec3::new(-1, 1, 1)].into_iter().enumerate() {
+            let value = |at: usize| if at % 5 == i { DEPTH } else { at as i32 * 7 - 900 };
+            let samples = std::array::from_fn(|at| value(at) as i16);
+            bricks.insert(BrickPos(pos.0 + step), Arc::new(Brick::of_edited(&samples)));
+        }
+        let view = SampleView::new(&ground, &bricks);
+        let own = Surroundings::new(&view, pos);
+        for at in pos.samples().points() {
+            let local = (at - pos.origin()).as_usizevec3().to_array();
+            assert_eq!(own.density(local), view.distance(at));
+            let around = own.around(local);
+            for (i, step) in (0..27).map(|i| (i, IVec3::new(i % 3, i / 9, i / 3 % 3) - 1)) {
+                let distance = view.distance(at + step);
+                assert_eq!(around.densities[i as usize], distance, "{at} {step}");
+                let is_cut = view.is_edited(at + step) && distance == DEPTH;
+                assert_eq!(around.cut >> i & 1 == 1, is_cut, "{at} {step}");
+            }
+        }
+    }
+}
