@@ -46,6 +46,7 @@
 //! | to put it into the world | the [`Terrain`](terrain::Terrain) component; `BurrowPlugins` |
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
+//! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
@@ -145,9 +146,13 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, HeightmapImage, MaterialColors, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile,
+        Field, HeightmapImage, HistoryMoved, MaterialColors, Redo, TargetedBrush, TerrainHit, TerrainReady,
+        Terrains, Tile, Undo,
     };
-    pub use crate::terrain::{Applied, Receipt, Rejection, ScenarioCounts, Span, Terrain, TerrainSettings};
+    pub use crate::terrain::{
+        Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
+        PieceFate, Receipt, Rejection, Restored, ScenarioCounts, Span, Terrain, TerrainSettings,
+    };
     #[cfg(feature = "render")]
     pub use crate::view::TerrainMaterialPlugin;
     pub use crate::volume::Scenario;

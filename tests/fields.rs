@@ -361,6 +361,7 @@ fn the_news_of_a_commit_are_the_difference_of_its_fields() {
                         );
                         gone
                     }
+                    FieldNews::Removed(id) => panic!("seed {seed}: {id:?} is gone, but nothing was undone"),
                 };
                 assert!(told.insert(id), "seed {seed}: {id:?} is in the news twice");
             }

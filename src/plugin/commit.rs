@@ -8,10 +8,12 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::entities::{TerrainEntities, tell};
+use super::intake::tell_steps;
 use super::load::Loading;
 use super::meshes::{self, Ready};
 use super::{
-    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, MaterialColors,
+    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
+    MaterialColors,
 };
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Commit, Drawn, Terrain};
@@ -32,7 +34,7 @@ struct Prepared {
     took: Duration,
 }
 
-/// Starts a transaction for each terrain that has brushes waiting and none under way.
+/// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
@@ -42,6 +44,7 @@ pub(super) fn begin_transactions(
     assets: Option<Res<Assets<Mesh>>>,
     engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
+    mut moved: MessageWriter<HistoryMoved>,
     mut number: Local<u64>,
 ) {
     let start = Instant::now();
@@ -51,7 +54,9 @@ pub(super) fn begin_transactions(
         if terrain.queued() == 0 || terrain.world().version() != entities.shown {
             continue;
         }
-        let Some(transaction) = terrain.begin() else { continue };
+        let transaction = terrain.begin();
+        tell_steps(entity, &mut terrain, &mut moved);
+        let Some(transaction) = transaction else { continue };
         let (colors, engine) = (colors.clone(), terrain.engine().unwrap_or(&engine).clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let start = Instant::now();
@@ -82,6 +87,7 @@ pub(super) fn commit_transactions(
     mut terrains: Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
     shown: Query<&Mesh3d>,
     mut receipts: MessageWriter<BrushApplied>,
+    mut moved: MessageWriter<HistoryMoved>,
 ) {
     let mut done = Vec::new();
     for (entity, _, _, mut transaction) in &mut terrains {
@@ -106,13 +112,21 @@ pub(super) fn commit_transactions(
         let start = Instant::now();
         let news = commit.field_news().to_vec();
         // A transaction that the game gave up is refused; its edits wait in the queue again.
-        let Ok(committed) = terrain.commit(commit) else { continue };
+        let Ok((committed, waste)) = terrain.settle(commit) else { continue };
+        if !waste.is_empty() {
+            AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
+        }
+        tell_steps(entity, &mut terrain, &mut moved);
         swapped += swaps;
         let world = terrain.world();
         entities.shown = world.version();
         let with_fields = news.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
         let with_meshes = meshes.into_iter().map(|(drawn, ready)| (drawn, Some(ready)));
+        let mut touched = Vec::new();
         for (drawn, ready) in with_meshes.chain(with_fields) {
+            if let Drawn::Chunk(chunk) = drawn {
+                touched.push(chunk);
+            }
             let child = entities.get(&mut commands, drawn);
             let is_new = child.is_none();
             if is_new && matches!(ready, Some(None)) {
@@ -131,6 +145,7 @@ pub(super) fn commit_transactions(
             }
         }
         entities.tell_fields(&mut commands, world, &news);
+        entities.drop_empty(&mut commands, world, touched);
         figures.commits += 1;
         figures.brushes += committed.len() as u64;
         figures.last_transaction = took;

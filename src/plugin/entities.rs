@@ -81,6 +81,11 @@ impl TerrainEntities {
                         None => self.spawn_field(commands, chunk, field),
                     }
                 }
+                FieldNews::Removed(id) => {
+                    let child = self.living_field(commands, id);
+                    self.fields.remove(&id);
+                    child.into_iter().for_each(|child| commands.entity(child).try_despawn());
+                }
                 FieldNews::Merged { gone, into } => {
                     let child = self.living_field(commands, gone);
                     let into = self.living_field(commands, into);
@@ -91,6 +96,17 @@ impl TerrainEntities {
                     }
                     commands.entity(child).try_despawn();
                 }
+            }
+        }
+    }
+
+    /// Despawns those of some chunks that draw nothing and hold no field any more, as after an undo.
+    pub(super) fn drop_empty(&mut self, commands: &mut Commands, world: &World, chunks: Vec<ChunkPos>) {
+        for chunk in chunks {
+            if world.fields_of(chunk).is_none() && !world.draws(chunk) {
+                let child = self.get(commands, Drawn::Chunk(chunk));
+                self.drawn.remove(&Drawn::Chunk(chunk));
+                child.into_iter().for_each(|child| commands.entity(child).try_despawn());
             }
         }
     }

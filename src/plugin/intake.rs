@@ -1,11 +1,11 @@
-//! Brush messages on their way into the queues of terrains.
+//! Messages on their way into the queues of terrains: brushes, undo, redo.
 
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::{BrushApplied, BurrowFigures, TargetedBrush};
+use super::{BrushApplied, BurrowFigures, HistoryMoved, Redo, TargetedBrush, Undo};
 use crate::brush::Brush;
-use crate::terrain::{Receipt, Rejection, Terrain};
+use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain};
 
 /// Moves brushes into their terrains' space and queues them. A brush that no terrain can take is answered at once.
 pub(super) fn collect_brushes(
@@ -50,11 +50,62 @@ pub(super) fn collect_brushes(
     figures.main_thread = start.elapsed();
 }
 
-/// Brushes that a terrain had not come to when it goes, or another one takes its place.
+/// Queues steps through history, behind the brushes of this frame. One that no terrain can take is answered at once.
+pub(super) fn collect_steps(
+    mut undos: MessageReader<Undo>,
+    mut redos: MessageReader<Redo>,
+    mut terrains: Query<(Entity, &mut Terrain)>,
+    mut moved: MessageWriter<HistoryMoved>,
+    mut figures: ResMut<BurrowFigures>,
+) {
+    let start = Instant::now();
+    for (entity, mut terrain) in &mut terrains {
+        tell_steps(entity, &mut terrain, &mut moved);
+    }
+    let undos = undos.read().map(|&Undo { terrain }| (HistoryStep::Undo, terrain));
+    let redos = redos.read().map(|&Redo { terrain }| (HistoryStep::Redo, terrain));
+    for (step, target) in undos.chain(redos) {
+        let mut is_taken = false;
+        let mut submit = |mut terrain: Mut<Terrain>| {
+            is_taken = true;
+            match step {
+                HistoryStep::Undo => terrain.submit_undo(),
+                HistoryStep::Redo => terrain.submit_redo(),
+            }
+        };
+        match target {
+            Some(entity) => terrains.get_mut(entity).into_iter().for_each(|(_, terrain)| submit(terrain)),
+            None => terrains.iter_mut().for_each(|(_, terrain)| submit(terrain)),
+        }
+        if !is_taken {
+            moved.write(gone(target, step));
+        }
+    }
+    figures.main_thread += start.elapsed();
+}
+
+/// Hands out what became of a terrain's steps.
+pub(super) fn tell_steps(
+    entity: Entity,
+    terrain: &mut Mut<Terrain>,
+    moved: &mut MessageWriter<HistoryMoved>,
+) {
+    if terrain.has_history_receipts() {
+        let receipts = terrain.take_history_receipts().into_iter();
+        moved.write_batch(receipts.map(|receipt| HistoryMoved { terrain: Some(entity), receipt }));
+    }
+}
+
+fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
+    HistoryMoved { terrain, receipt: HistoryReceipt { step, outcome: Err(HistoryRejection::TerrainGone) } }
+}
+
+/// Brushes and steps that a terrain had not come to when it goes, or another one takes its place.
 pub(super) fn answer_with_terrain(
     gone: On<Discard, Terrain>,
     terrains: Query<&Terrain>,
     mut answers: MessageWriter<BrushApplied>,
+    mut moved: MessageWriter<HistoryMoved>,
 ) {
     let Ok(terrain) = terrains.get(gone.entity) else { return };
     let answer = |tag| BrushApplied {
@@ -62,6 +113,7 @@ pub(super) fn answer_with_terrain(
         receipt: Receipt { tag, outcome: Err(Rejection::TerrainGone) },
     };
     answers.write_batch(terrain.unanswered().map(answer));
+    moved.write_batch(terrain.unanswered_steps().map(|step| self::gone(Some(gone.entity), step)));
 }
 
 /// A brush in world space as its terrain sees it, in voxels.

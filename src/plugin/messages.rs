@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 use crate::brush::Brush;
-use crate::terrain::Receipt;
+use crate::terrain::{HistoryReceipt, Receipt};
 
 /// A brush in world space: every terrain that it reaches obeys it.
 impl Message for Brush {}
@@ -24,6 +24,34 @@ pub struct BrushApplied {
     pub terrain: Option<Entity>,
     /// Scenario, volumes, bounds, or why it was rejected.
     pub receipt: Receipt,
+}
+
+/// A step back: the last transaction that changed the ground is undone. [`HistoryMoved`] says what came of it.
+///
+/// Steps are queued with brushes, in one order. Bevy keeps messages of one type in theirs, and none between types: those
+/// of one frame are taken as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. A transaction takes
+/// the brushes of one frame together, and those of several frames where another one was under way; it is undone whole.
+#[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Undo {
+    /// The terrain's entity; `None` for every terrain there is.
+    pub terrain: Option<Entity>,
+}
+
+/// A step forth: what was undone last is done again. See [`Undo`].
+#[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Redo {
+    /// The terrain's entity; `None` for every terrain there is.
+    pub terrain: Option<Entity>,
+}
+
+/// A step through a terrain's history was taken, in the frame in which its meshes are shown, or there was none to take.
+/// Each [`Undo`] and [`Redo`] gets one from each terrain that it is for.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct HistoryMoved {
+    /// The terrain; `None` where there is none at all.
+    pub terrain: Option<Entity>,
+    /// Back or forth, and what it changed; bounds count in voxels of the terrain.
+    pub receipt: HistoryReceipt,
 }
 
 /// A chunk got its entity.

@@ -6,6 +6,8 @@
 //! meshes, entities, [`BrushApplied`] receipts and entity events. Without an `Assets<Mesh>`, on a server with
 //! `MinimalPlugins`, all of that happens but the meshes.
 //!
+//! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
+//!
 //! Bevy's `multi_threaded` feature keeps transactions off the main thread; without it they run within the frame.
 
 mod commit;
@@ -27,7 +29,8 @@ pub use heightmap::{
 pub use load::TerrainReady;
 pub use meshes::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
-    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, TargetedBrush,
+    BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved, Redo,
+    TargetedBrush, Undo,
 };
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings};
@@ -63,7 +66,7 @@ impl PluginGroup for BurrowPlugins {
 pub enum BurrowSystems {
     /// New terrains are prepared; their tiles appear, all at once, when all are meshed.
     Load,
-    /// Brush messages are checked and queued. Send them before, to have them in this frame's transaction.
+    /// Brush, undo and redo messages are checked and queued. Send them before, to have them in this frame's transaction.
     Collect,
     /// Transactions that are done are committed: meshes, entities, receipts, events.
     Commit,
@@ -84,6 +87,9 @@ impl Plugin for TerrainPlugin {
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()
+            .add_message::<Undo>()
+            .add_message::<Redo>()
+            .add_message::<HistoryMoved>()
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
@@ -106,7 +112,7 @@ impl Plugin for TerrainPlugin {
                     (load::start_loading, load::place_terrains, load::finish_loading)
                         .chain()
                         .in_set(BurrowSystems::Load),
-                    intake::collect_brushes.in_set(BurrowSystems::Collect),
+                    (intake::collect_brushes, intake::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
                     commit::begin_transactions.in_set(BurrowSystems::Begin),
                 ),

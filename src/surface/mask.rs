@@ -47,11 +47,20 @@ impl Mask {
         self.0.iter().map(|(&word, &cells)| (word, cells))
     }
 
-    /// Takes in all cells of another mask.
-    pub(crate) fn extend(&mut self, other: &Self) {
-        for (&word, &bits) in &other.0 {
-            *self.0.entry(word).or_default() |= bits;
-        }
+    /// Stands 8x8 cells in place of those of a word, even if that leaves it empty: for masks that lie over another one.
+    pub(crate) fn lay_word(&mut self, word: (i32, i32), cells: u64) {
+        self.0.insert(word, cells);
+    }
+
+    /// Puts 8x8 cells in place of those of a word; returns what was there.
+    pub(crate) fn replace_word(&mut self, word: (i32, i32), cells: u64) -> u64 {
+        let before = if cells == 0 { self.0.remove(&word) } else { self.0.insert(word, cells) };
+        before.unwrap_or_default()
+    }
+
+    /// The 8x8 cells of a word.
+    pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
+        self.0.get(&word).copied().unwrap_or_default()
     }
 
     /// How many cells are in the mask.
@@ -79,33 +88,34 @@ impl Mask {
     }
 }
 
-/// The mask of a world, and the cells that a running transaction adds to it.
+/// The mask of a world, and words of it that a running transaction changes.
 #[derive(Clone, Copy)]
 pub struct MaskView<'a> {
     committed: &'a Mask,
-    added: Option<&'a Mask>,
+    newer: Option<&'a Mask>,
 }
 
 impl<'a> MaskView<'a> {
     /// The committed mask alone.
     pub fn new(committed: &'a Mask) -> Self {
-        Self { committed, added: None }
+        Self { committed, newer: None }
     }
 
-    /// The same mask with more cells in it.
-    pub fn with(self, added: &'a Mask) -> Self {
-        Self { added: Some(added), ..self }
+    /// The same mask with newer words in place of its own.
+    pub(crate) fn over(self, newer: &'a Mask) -> Self {
+        Self { newer: Some(newer), ..self }
     }
 
     /// Does marching cubes draw the sheet of this cell?
     pub fn contains(&self, cell: Column) -> bool {
-        self.committed.contains(cell) || self.added.is_some_and(|added| added.contains(cell))
+        let (word, bit) = Mask::place(cell);
+        self.word(word) & bit != 0
     }
 
     /// The word of 8x8 cells that starts at (8 x, 8 z): bit `z * 8 + x`.
     pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
-        let of = |mask: &Mask| mask.0.get(&word).copied().unwrap_or_default();
-        of(self.committed) | self.added.map_or(0, of)
+        let newer = self.newer.and_then(|newer| newer.0.get(&word).copied());
+        newer.unwrap_or_else(|| self.committed.word(word))
     }
 
     /// Looks at every cell from `low` up to and without `high`, and at those beside them.
@@ -239,5 +249,20 @@ mod tests {
         assert!(mask.contains(cell) && mask.len() == 1);
         assert_eq!(mask.iter().collect::<Vec<_>>(), [cell]);
         assert_eq!(mask.words().count(), 1);
+    }
+
+    #[test]
+    fn newer_words_stand_in_place_of_older_ones() {
+        let (mut mask, mut newer) = (Mask::default(), Mask::default());
+        mask.insert_word((0, 0), 0b111);
+        mask.insert_word((1, 0), 0b1);
+        newer.lay_word((0, 0), 0b100);
+        newer.lay_word((1, 0), 0);
+        newer.lay_word((2, 0), 0b10);
+        let view = MaskView::new(&mask).over(&newer);
+        let cells: Vec<i32> = (0..24).filter(|&x| view.contains(Column::new(x, 0))).collect();
+        assert_eq!(cells, [2, 17]);
+        assert_eq!([(0, 0), (1, 0), (2, 0)].map(|word| mask.replace_word(word, newer.word(word))), [7, 1, 0]);
+        assert_eq!(mask.words().count(), 2, "an empty word is no word");
     }
 }

@@ -138,6 +138,11 @@ impl Rings {
         }
     }
 
+    /// Does no cell of the tile border on the mask?
+    pub fn is_empty(&self) -> bool {
+        self.patches.is_empty()
+    }
+
     /// The vertices that follow after the tile's columns.
     pub fn vertices(&self) -> &[Vertex] {
         &self.vertices

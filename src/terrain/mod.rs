@@ -13,7 +13,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod change;
+mod commit;
+mod drafting;
+mod field_log;
+mod history;
 mod inspect;
+mod loose;
 mod query;
 mod ray;
 mod receipt;
@@ -22,11 +28,15 @@ mod surface;
 mod transaction;
 mod world;
 
+pub use commit::{Commit, Stages};
+pub use field_log::FieldNews;
+pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use redraw::{MeshUpdates, TileUpdate};
 pub use surface::ChunkSurface;
-pub use transaction::{Commit, FieldNews, Stages, Transaction};
+pub use transaction::Transaction;
 pub use world::{Drawn, Memory, Version, World};
 
 use std::sync::Arc;
@@ -36,6 +46,7 @@ use crate::backend::Engine;
 use crate::brush::{Brush, BrushError, Edit};
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
+use history::{Step, Timeline, Waste};
 
 /// How a terrain is cut up and how large it is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +96,23 @@ pub(crate) struct Submission {
     edit: Result<Edit, BrushError>,
 }
 
+/// What waits for its transaction.
+enum Request {
+    Edit(Submission),
+    Step(HistoryStep),
+}
+
+/// What one transaction does.
+#[derive(Clone)]
+enum Work {
+    Edits(Arc<[Submission]>),
+    /// The step, and what it puts in place.
+    Step(HistoryStep, Arc<Step>),
+}
+
+/// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
+const UNDO_BUDGET: usize = 64 << 20;
+
 /// A world, the edits that wait for it, and the one transaction that may be under way.
 ///
 /// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
@@ -93,15 +121,18 @@ pub struct Terrain {
     world: Arc<World>,
     engine: Option<Engine>,
     voxel_size: f32,
-    queue: Vec<Submission>,
+    queue: Vec<Request>,
     in_flight: Option<InFlight>,
     answered: Vec<Receipt>,
+    loose: Option<LooseSettings>,
+    timeline: Timeline,
+    moves: Vec<HistoryReceipt>,
 }
 
 /// The transaction under way, as far as its terrain keeps it.
 struct InFlight {
     ticket: u64,
-    submissions: Arc<[Submission]>,
+    work: Work,
 }
 
 impl Terrain {
@@ -124,6 +155,9 @@ impl Terrain {
             queue: Vec::new(),
             in_flight: None,
             answered: Vec::new(),
+            loose: None,
+            timeline: Timeline::new(UNDO_BUDGET),
+            moves: Vec::new(),
         })
     }
 
@@ -156,12 +190,12 @@ impl Terrain {
 
     /// Queues a brush. One that is not valid is queued too: its receipt says why it was rejected.
     pub fn submit(&mut self, brush: &Brush) {
-        self.queue.push(Submission { tag: brush.tag, edit: Edit::quantize(brush) });
+        self.queue_edit(brush.tag, Edit::quantize(brush));
     }
 
     /// Queues an edit, say from a file or the network. It is checked like a brush.
     pub fn submit_edit(&mut self, edit: &Edit) {
-        self.queue.push(Submission { tag: edit.tag(), edit: edit.check().map(|()| edit.clone()) });
+        self.queue_edit(edit.tag(), edit.check().map(|()| edit.clone()));
     }
 
     /// Queues a brush if it reaches some column of this world; says whether it does.
@@ -172,12 +206,63 @@ impl Terrain {
         let edit = Edit::quantize(brush)?;
         let is_in_reach = edit.reach().intersection(self.world.grid.edit_bounds()).is_some();
         if is_in_reach {
-            self.queue.push(Submission { tag: brush.tag, edit: Ok(edit) });
+            self.queue_edit(brush.tag, Ok(edit));
         }
         Ok(is_in_reach)
     }
 
-    /// Brushes that wait for their transaction.
+    fn queue_edit(&mut self, tag: u64, edit: Result<Edit, BrushError>) {
+        self.queue.push(Request::Edit(Submission { tag, edit }));
+    }
+
+    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last transaction
+    /// that changed the world. Its [`HistoryReceipt`] says what came of it.
+    ///
+    /// What is undone is a transaction: all edits that waited together when it [began](Self::begin), or that one call of
+    /// [`apply`](Self::apply) was given. One that changed nothing is no step.
+    ///
+    /// Afterwards all is as it was before that transaction, bit by bit: [`World::hash`], samples, materials, fields with
+    /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`], which counts
+    /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
+    pub fn submit_undo(&mut self) {
+        self.queue.push(Request::Step(HistoryStep::Undo));
+    }
+
+    /// Queues a step forth: it does again what was undone last. An edit that changes something in between forgets what
+    /// there was to redo.
+    pub fn submit_redo(&mut self) {
+        self.queue.push(Request::Step(HistoryStep::Redo));
+    }
+
+    /// From the next transaction on, edits look for pieces of ground that they cut off, and receipts list them; `None`
+    /// turns that off, as it is at first. A terrain whose world has to be the same elsewhere needs the same settings there.
+    pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
+        self.loose = settings;
+    }
+
+    /// What edits look for, if they do.
+    pub fn loose(&self) -> Option<&LooseSettings> {
+        self.loose.as_ref()
+    }
+
+    /// What can be undone and redone, and what it takes.
+    pub fn history(&self) -> History {
+        self.timeline.figures()
+    }
+
+    /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
+    /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
+    /// some thousand digs of radius 8.
+    pub fn set_undo_budget(&mut self, bytes: usize) {
+        self.timeline.set_budget(bytes);
+    }
+
+    /// Bytes that the terrain takes: its world, and its history.
+    pub fn memory(&self) -> Memory {
+        Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
+    }
+
+    /// Brushes, and steps through history, that wait for their transaction.
     pub fn queued(&self) -> usize {
         self.queue.len()
     }
@@ -187,16 +272,47 @@ impl Terrain {
         self.in_flight.is_some()
     }
 
-    /// Makes one transaction of everything queued; `None` when nothing is, or when one is under way already. Run it
-    /// anywhere, then hand its commit to [`commit`](Self::commit).
+    /// Makes one transaction of what is queued: of all brushes up to the first step through history, or of such a step.
+    /// `None` when nothing waits, or when one is under way already. Run it anywhere, then hand its commit to
+    /// [`commit`](Self::commit).
+    ///
+    /// Steps that find nothing to undo or redo need no transaction; they are answered at once.
     pub fn begin(&mut self) -> Option<Transaction> {
-        if self.queue.is_empty() || self.is_busy() {
+        if self.is_busy() {
             return None;
         }
-        let submissions: Arc<[Submission]> = std::mem::take(&mut self.queue).into();
+        let work = loop {
+            match self.queue.first()? {
+                Request::Edit(_) => break Work::Edits(self.take_edits()),
+                &Request::Step(step) => {
+                    self.queue.remove(0);
+                    match self.timeline.next(step) {
+                        Some(target) => break Work::Step(step, Arc::clone(target)),
+                        None => self.moves.push(step.nothing()),
+                    }
+                }
+            }
+        };
         let ticket = unique();
-        self.in_flight = Some(InFlight { ticket, submissions: Arc::clone(&submissions) });
-        Some(Transaction::new(ticket, self.snapshot(), submissions, self.engine.clone()))
+        self.in_flight = Some(InFlight { ticket, work: work.clone() });
+        Some(Transaction {
+            ticket,
+            world: self.snapshot(),
+            work,
+            loose: self.loose,
+            engine: self.engine.clone(),
+        })
+    }
+
+    /// The edits in front of the queue.
+    fn take_edits(&mut self) -> Arc<[Submission]> {
+        let is_edit = |request: &Request| matches!(request, Request::Edit(_));
+        let count = self.queue.iter().position(|request| !is_edit(request)).unwrap_or(self.queue.len());
+        let edits = self.queue.drain(..count).filter_map(|request| match request {
+            Request::Edit(submission) => Some(submission),
+            Request::Step(_) => None,
+        });
+        edits.collect()
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
@@ -204,19 +320,35 @@ impl Terrain {
     /// # Errors
     /// When the commit is not that of the transaction under way; nothing is changed then.
     pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
-        self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket()).ok_or(StaleCommit)?;
-        Ok(commit.install(Arc::make_mut(&mut self.world)))
+        self.settle(commit).map(|(receipts, _)| receipts)
     }
 
-    /// Gives up the transaction that is under way, whose task was lost; its edits are queued again, in front.
+    /// The same; what history lets go of is left to the caller, who may free it elsewhere.
+    pub(crate) fn settle(&mut self, commit: Commit) -> Result<(Vec<Receipt>, Waste), StaleCommit> {
+        let done = self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket).ok_or(StaleCommit)?;
+        let installed = commit.install(Arc::make_mut(&mut self.world));
+        self.moves.extend(installed.moved);
+        let waste = match (done.work, installed.replaced) {
+            (Work::Edits(_), Some(replaced)) => self.timeline.record(replaced),
+            (Work::Step(step, used), Some(replaced)) => self.timeline.passed(step, &used, replaced),
+            (_, None) => Waste::default(),
+        };
+        Ok((installed.receipts, waste))
+    }
+
+    /// Gives up the transaction that is under way, whose task was lost; what it had to do is queued again, in front.
     pub fn abandon(&mut self) {
-        if let Some(lost) = self.in_flight.take() {
-            self.queue.splice(0..0, lost.submissions.iter().cloned());
-        }
+        let Some(lost) = self.in_flight.take() else { return };
+        let requests: Vec<Request> = match lost.work {
+            Work::Edits(submissions) => submissions.iter().cloned().map(Request::Edit).collect(),
+            Work::Step(step, _) => vec![Request::Step(step)],
+        };
+        self.queue.splice(0..0, requests);
     }
 
     /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.
-    /// Returns the receipts of these brushes; those of brushes that waited are kept for [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
+    /// Returns the receipts of these brushes; those of brushes that waited are kept for
+    /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
     /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
     pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(
@@ -224,15 +356,42 @@ impl Terrain {
         brushes: impl IntoIterator<Item = B>,
     ) -> Vec<Receipt> {
         self.abandon();
-        let waiting = self.queue.len();
+        let waiting = self.queue.iter().filter(|request| matches!(request, Request::Edit(_))).count();
         for brush in brushes {
             self.submit(brush.borrow());
         }
-        let Some(transaction) = self.begin() else { return Vec::new() };
-        let mut receipts = self.commit(transaction.run()).unwrap_or_default();
+        let mut receipts = self.finish();
         let own = receipts.split_off(waiting.min(receipts.len()));
         self.answered.append(&mut receipts);
         own
+    }
+
+    /// Undoes the last transaction at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
+    pub fn undo(&mut self) -> HistoryReceipt {
+        self.step(HistoryStep::Undo)
+    }
+
+    /// Does again at once what was undone last, after everything that waits.
+    pub fn redo(&mut self) -> HistoryReceipt {
+        self.step(HistoryStep::Redo)
+    }
+
+    fn step(&mut self, step: HistoryStep) -> HistoryReceipt {
+        self.abandon();
+        self.queue.push(Request::Step(step));
+        let mut receipts = self.finish();
+        self.answered.append(&mut receipts);
+        // It was the last one.
+        self.moves.pop().unwrap_or_else(|| step.nothing())
+    }
+
+    /// Runs and commits everything that waits.
+    fn finish(&mut self) -> Vec<Receipt> {
+        let mut receipts = Vec::new();
+        while let Some(transaction) = self.begin() {
+            receipts.append(&mut self.commit(transaction.run()).unwrap_or_default());
+        }
+        receipts
     }
 
     /// Receipts of brushes that waited when [`apply`](Self::apply) was called, in order; each is handed out once.
@@ -245,17 +404,62 @@ impl Terrain {
         !self.answered.is_empty()
     }
 
+    /// What became of steps through history that were submitted, in order; each is handed out once.
+    pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
+        std::mem::take(&mut self.moves)
+    }
+
+    /// Is there any to [take](Self::take_history_receipts)?
+    pub fn has_history_receipts(&self) -> bool {
+        !self.moves.is_empty()
+    }
+
     /// Tags of all brushes without a receipt, in order.
     #[cfg(feature = "plugin")]
     pub(crate) fn unanswered(&self) -> impl Iterator<Item = u64> {
-        let in_flight = self.in_flight.iter().flat_map(|waiting| waiting.submissions.iter());
-        in_flight.chain(&self.queue).map(|submission| submission.tag)
+        let queued = self.queue.iter().filter_map(|request| match request {
+            Request::Edit(submission) => Some(submission),
+            Request::Step(_) => None,
+        });
+        self.submissions_in_flight().chain(queued).map(|submission| submission.tag)
     }
 
-    /// Is no edit on its way to these samples?
+    /// All steps through history without a receipt, in order.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
+        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
+            Work::Step(step, _) => Some(step),
+            Work::Edits(_) => None,
+        });
+        let queued = self.queue.iter().filter_map(|request| match request {
+            Request::Step(step) => Some(*step),
+            Request::Edit(_) => None,
+        });
+        in_flight.chain(queued)
+    }
+
+    #[cfg(feature = "plugin")]
+    fn submissions_in_flight(&self) -> impl Iterator<Item = &Submission> {
+        self.in_flight.iter().flat_map(|waiting| match &waiting.work {
+            Work::Edits(submissions) => &submissions[..],
+            Work::Step(..) => &[],
+        })
+    }
+
+    /// Is nothing on its way to these samples? A step through history that waits may reach all that history does.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
-        let in_flight = self.in_flight.iter().flat_map(|waiting| waiting.submissions.iter());
-        let mut coming = in_flight.chain(&self.queue).filter_map(|submission| submission.edit.as_ref().ok());
-        coming.all(|edit| edit.reach().intersection(bounds).is_none())
+        let misses = |submission: &Submission| {
+            submission.edit.as_ref().map_or(true, |edit| edit.reach().intersection(bounds).is_none())
+        };
+        let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
+            Work::Edits(submissions) => submissions.iter().all(misses),
+            Work::Step(_, target) => target.bounds.is_none_or(|own| own.intersection(bounds).is_none()),
+        });
+        let mut queued = self.queue.iter();
+        in_flight
+            && queued.all(|request| match request {
+                Request::Edit(submission) => misses(submission),
+                Request::Step(_) => !self.timeline.reaches(bounds),
+            })
     }
 }

@@ -1,5 +1,6 @@
 //! Receipts: what became of a brush.
 
+use super::loose::LoosePiece;
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
 use crate::volume::{FieldId, Scenario, Tally};
@@ -26,6 +27,9 @@ pub struct Applied {
     pub added: Tally,
     /// Solid voxels whose material changed, by the new one.
     pub painted: Tally,
+    /// Pieces of ground that it cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone
+    /// are not among `removed`.
+    pub loose: Vec<LoosePiece>,
 }
 
 impl Applied {

@@ -8,8 +8,8 @@ use glam::IVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use super::commit::Stages;
 use super::surface::{ChunkSurface, Fresh, key};
-use super::transaction::Stages;
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};
 use crate::ground::Ground;
@@ -90,39 +90,44 @@ fn added_cells(view: &WorldView, changed: &[DraftedBrick]) -> Mask {
 }
 
 /// Cells by the bricks that hold them: by stacks of bricks, each from below.
-type ByBrick = Vec<(BrickPos, LatticeBox)>;
+pub(super) type ByBrick = Vec<(BrickPos, LatticeBox)>;
 
-/// The cells that join the mask, and those that the changed samples show in, whether they join or not.
-pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut Stages) -> (Mask, ByBrick) {
+/// The cells that the changed samples show in.
+pub(super) fn dirty_cells(view: &WorldView, changed: &[DraftedBrick]) -> ByBrick {
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
     let around = |drafted: &DraftedBrick| {
         let (x, changed) = (drafted.pos.0.x, drafted.changed);
         in_world(view, changed.min - 2, changed.max + 1).map(|cells| (x, cells))
     };
+    by_brick(&changed.iter().filter_map(around).collect::<Vec<_>>())
+}
+
+/// The cells that join the mask, and those that the changed samples show in, whether they join or not.
+pub(super) fn disturb(view: &WorldView, changed: &[DraftedBrick], stages: &mut Stages) -> (Mask, ByBrick) {
     let added = || timed(|| added_cells(view, changed));
-    let dirty = || timed(|| by_brick(&changed.iter().filter_map(around).collect::<Vec<_>>()));
+    let dirty = || timed(|| dirty_cells(view, changed));
     let ((added, ring), (dirty, meshing)) = side_by_side(changed, added, dirty);
     stages.ring += ring;
     stages.meshing += meshing;
     (added, dirty)
 }
 
-/// Every mesh that these cells change.
+/// Every mesh that these cells change, and those of the mask that join it or leave it.
 pub(super) fn updates(
     world: &World,
     view: &WorldView,
     backend: &dyn Compute,
     changed: &[DraftedBrick],
     dirty: ByBrick,
-    added: &Mask,
+    turned: &Mask,
     stages: &mut Stages,
 ) -> MeshUpdates {
     let chunks = || {
         let mut stages = Stages::default();
-        let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(view, dirty, added));
+        let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(world, view, dirty, turned));
         (mesh_blocks(world, view, backend, &blocks, &mut stages), stages)
     };
-    let tiles = || timed(|| touched_tiles(world, view, added));
+    let tiles = || timed(|| touched_tiles(world, view, turned));
     // Tiles and chunks do not depend on each other. What either does alone is time for the other.
     let ((chunks, own), (tiles, ring)) = side_by_side(changed, chunks, tiles);
     stages.meshing += own.meshing;
@@ -153,9 +158,9 @@ fn in_world(view: &WorldView, low: IVec3, high: IVec3) -> Option<LatticeBox> {
 }
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below.
-fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block> {
+fn dirty_blocks(world: &World, view: &WorldView, mut dirty: ByBrick, turned: &Mask) -> Vec<Block> {
     let is_large = dirty.len() >= PARALLEL_BLOCKS;
-    let sheets = sheets_near(view, added);
+    let sheets = sheets_near(world, view, turned);
     if !sheets.is_empty() {
         dirty.extend(by_brick(&sheets));
         // Two sorted lists, which this merges.
@@ -175,11 +180,12 @@ fn dirty_blocks(view: &WorldView, mut dirty: ByBrick, added: &Mask) -> Vec<Block
     }
 }
 
-/// A cell that joins the mask draws its sheet; beside it, vertices leave the mask's border. The boxes around all of these,
-/// one for each stack of bricks and with its x, by which they are sorted.
-fn sheets_near(view: &WorldView, added: &Mask) -> Vec<(i32, LatticeBox)> {
+/// A cell that joins the mask draws its sheet, and one that leaves it draws it no longer; beside it, vertices leave the
+/// mask's border or come to it. The boxes around all of these, one for each stack of bricks and with its x, by which they
+/// are sorted.
+fn sheets_near(world: &World, view: &WorldView, turned: &Mask) -> Vec<(i32, LatticeBox)> {
     let mut near = Vec::new();
-    for ((x, z), cells) in added.words() {
+    for ((x, z), cells) in turned.words() {
         for (dx, dz) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dz| (dx, dz))) {
             let cells = grown_into(cells, dx, dz);
             near.extend((cells != 0).then_some(((x + dx, z + dz), cells)));
@@ -188,7 +194,8 @@ fn sheets_near(view: &WorldView, added: &Mask) -> Vec<(i32, LatticeBox)> {
     sort_by_place(&mut near, |&((x, z), _)| [x, z, 0]);
     let sheet = |same: &[((i32, i32), u64)]| {
         let stack = same[0].0;
-        let cells = same.iter().fold(0, |all, (_, cells)| all | cells) & view.mask.word(stack);
+        let drawn = view.mask.word(stack) | world.mask.word(stack);
+        let cells = same.iter().fold(0, |all, (_, cells)| all | cells) & drawn;
         let low = Column::new(stack.0 * 8, stack.1 * 8);
         let rows = (cells != 0).then(|| block::sheet_rows(view.samples.ground(), low, cells))?;
         Some((stack.0, in_world(view, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))?))
@@ -327,10 +334,10 @@ fn assemble(world: &World, parts: &[Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)
     }
 }
 
-/// Tiles that lose a cell to the mask, or border on one that does, in order.
-fn touched_tiles(world: &World, view: &WorldView, added: &Mask) -> Vec<(TilePos, TileUpdate)> {
+/// Tiles that lose a cell to the mask or get one back, or border on one that does, in order.
+fn touched_tiles(world: &World, view: &WorldView, turned: &Mask) -> Vec<(TilePos, TileUpdate)> {
     let mut touched = Vec::new();
-    for ((x, z), cells) in added.words() {
+    for ((x, z), cells) in turned.words() {
         for (dx, dz) in [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)] {
             let patch = (x + dx, z + dz);
             let near = grown_into(cells, dx, dz);

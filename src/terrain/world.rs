@@ -38,15 +38,17 @@ pub struct Memory {
     pub parts: usize,
     /// Mask, fields and where bricks are.
     pub index: usize,
+    /// What can be undone and redone, as far as nobody else holds it. A world has no history; its terrain does.
+    pub undo: usize,
 }
 
 impl Memory {
     /// All of it.
     pub fn total(&self) -> usize {
-        self.ground + self.edits()
+        self.ground + self.edits() + self.undo
     }
 
-    /// What edits cost: all but the ground.
+    /// What edits cost: all but the ground and history.
     pub fn edits(&self) -> usize {
         self.samples + self.materials + self.meshes + self.parts + self.index
     }
@@ -160,6 +162,12 @@ impl World {
     /// The chunks that draw something, in no order.
     pub fn drawn_chunks(&self) -> impl Iterator<Item = ChunkPos> {
         self.surfaces.keys().copied()
+    }
+
+    /// Does the chunk draw something?
+    #[cfg(feature = "plugin")]
+    pub(crate) fn draws(&self, chunk: ChunkPos) -> bool {
+        self.surfaces.contains_key(&chunk)
     }
 
     /// The mesh of a tile, relative to its lowest column at y = 0; empty where the world has no tile.

@@ -240,7 +240,9 @@ impl Draft {
         draft.effects.resize_with(edits.len(), EditEffect::default);
         let (mut earlier, mut rest) = (Changes::default(), runs(grid, edits).into_iter().peekable());
         while let Some(run) = rest.next() {
-            let work = EditWork::new(base.over(&earlier.newer), grid, &edits[run.clone()]);
+            // What lies over the base already stays there: only edits that sculpt make more than one run.
+            let base = if earlier.newer.is_empty() { base } else { base.over(&earlier.newer) };
+            let work = EditWork::new(base, grid, &edits[run.clone()]);
             apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
             if run.start > 0 || rest.peek().is_some() {
                 earlier.take(std::mem::take(&mut draft.bricks));

@@ -8,6 +8,8 @@ mod brick;
 mod draft;
 mod field;
 mod ledger;
+mod removal;
+mod restore;
 mod runs;
 mod sculpt;
 mod surroundings;
@@ -24,5 +26,7 @@ pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
 pub(crate) use ledger::{Count, Fate, PartEffect};
+pub(crate) use removal::{TakenOut, pristine_layers, take_out};
+pub(crate) use restore::{Replaced, pristine_brick};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};

@@ -273,7 +273,7 @@ impl<'a> Workpiece<'a> {
 }
 
 /// What some edited samples of a brick add to the world's hash, by the hashes of their columns.
-fn hash_of(brick: &Brick, low: i32, layers: &Layers, places: &[u64; 64]) -> u64 {
+pub(super) fn hash_of(brick: &Brick, low: i32, layers: &Layers, places: &[u64; 64]) -> u64 {
     let of_layer = |(y, &layer): (usize, &u64)| {
         let height = low + y as i32;
         let of = |bit: usize| {
@@ -286,12 +286,12 @@ fn hash_of(brick: &Brick, low: i32, layers: &Layers, places: &[u64; 64]) -> u64 
 }
 
 /// From a brick's lowest sample to the one with this index.
-fn offset(index: usize) -> IVec3 {
+pub(super) fn offset(index: usize) -> IVec3 {
     IVec3::new((index & 7) as i32, (index >> 6) as i32, (index >> 3 & 7) as i32)
 }
 
 /// What all samples of a column have in common.
-fn place_hash(column: Column) -> u64 {
+pub(super) fn place_hash(column: Column) -> u64 {
     hash::mix(column.x as u32 as u64 | (column.z as u32 as u64) << 32)
 }
 
@@ -318,7 +318,7 @@ pub(super) fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
 }
 
 /// The box around the samples of some layers, which lie from `low` on.
-fn bounds(layers: &Layers, low: IVec3) -> Option<LatticeBox> {
+pub(super) fn bounds(layers: &Layers, low: IVec3) -> Option<LatticeBox> {
     let all = layers.iter().fold(0, |all, layer| all | layer);
     if all == 0 {
         return None;

@@ -1,0 +1,78 @@
+//! What a commit puts in place of what the world held.
+
+use std::sync::Arc;
+
+use super::world::World;
+use crate::lattice::{BrickPos, ChunkPos};
+use crate::volume::{Brick, Fields};
+
+/// Pieces of a world at one revision: bricks, fields, words of the mask. The rest of the world is the same before and
+/// after, or is made from these.
+#[derive(Clone, Default)]
+pub(super) struct Change {
+    /// By position (x, z, y); `None` is a brick that nobody edited.
+    pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
+    /// All fields of each chunk that a field changed in.
+    pub fields: Vec<(ChunkPos, Fields)>,
+    /// Words of the mask.
+    pub mask: Vec<((i32, i32), u64)>,
+    /// Hash of all samples of the world.
+    pub sample_hash: u64,
+}
+
+impl Change {
+    /// Makes all this part of the world. What stood there before takes its place here, so that swapping again gives the
+    /// former world.
+    pub fn swap(&mut self, world: &mut World) {
+        for (pos, brick) in &mut self.bricks {
+            let (key, y) = ((pos.0.x, pos.0.z), pos.0.y);
+            let is_there = brick.is_some();
+            let before = match brick.take() {
+                Some(brick) => world.bricks.insert(*pos, brick),
+                None => world.bricks.remove(pos),
+            };
+            if is_there != before.is_some() {
+                let stack = world.stacks.entry(key).or_default();
+                match (stack.binary_search(&y), is_there) {
+                    (Err(at), true) => stack.insert(at, y),
+                    (Ok(at), false) => drop(stack.remove(at)),
+                    _ => {}
+                }
+                if stack.is_empty() {
+                    world.stacks.remove(&key);
+                }
+            }
+            *brick = before;
+        }
+        for (chunk, fields) in &mut self.fields {
+            let now = std::mem::take(fields);
+            let before =
+                if now.is_empty() { world.fields.remove(chunk) } else { world.fields.insert(*chunk, now) };
+            *fields = before.unwrap_or_default();
+        }
+        for (word, cells) in &mut self.mask {
+            *cells = world.mask.replace_word(*word, *cells);
+        }
+        std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
+    }
+
+    /// Bytes of the lists, and of the fields in them; bricks come on top.
+    pub fn bytes(&self) -> usize {
+        self.bricks.capacity() * size_of::<(BrickPos, Option<Arc<Brick>>)>()
+            + self.fields.capacity() * size_of::<(ChunkPos, Fields)>()
+            + self.fields.iter().map(|(_, fields)| fields.bytes()).sum::<usize>()
+            + self.mask.capacity() * size_of::<((i32, i32), u64)>()
+    }
+}
+
+/// Bytes of bricks that a world holds and that a change takes away from it. Bricks that are all alike count nothing: the
+/// world keeps one of each kind in any case.
+pub(super) fn replaced_bytes(world: &World, bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> usize {
+    let replaced = bricks.iter().filter_map(|(pos, _)| world.bricks.get(pos));
+    replaced.filter(|brick| brick.uniform().is_none()).map(|brick| shared_bytes(brick)).sum()
+}
+
+/// Bytes of a brick with the counters of its `Arc`.
+fn shared_bytes(brick: &Brick) -> usize {
+    2 * size_of::<usize>() + Brick::BYTES + brick.material_bytes()
+}

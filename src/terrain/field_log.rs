@@ -1,0 +1,116 @@
+//! What a transaction does to fields.
+
+use std::collections::BTreeMap;
+
+use super::receipt::{Applied, ChunkScenario, Rejection};
+use super::world::World;
+use crate::brush::Edit;
+use crate::lattice::{ChunkPos, LatticeBox};
+use crate::volume::{EditEffect, FieldId, Fields, reach};
+
+/// Something that happened to a field in a commit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldNews {
+    /// It is new.
+    Created(FieldId),
+    /// Its samples or its box changed.
+    Changed(FieldId),
+    /// It went into another field of its chunk.
+    Merged {
+        /// The field that is gone.
+        gone: FieldId,
+        /// The field that holds its data now.
+        into: FieldId,
+    },
+    /// It is gone, because its edits were undone.
+    Removed(FieldId),
+}
+
+/// The fields that a transaction touches, and what happened to them.
+pub(super) struct FieldLog<'a> {
+    world: &'a World,
+    pub fields: BTreeMap<ChunkPos, Fields>,
+    merged: Vec<(ChunkPos, FieldNews)>,
+    pub next: u64,
+}
+
+impl<'a> FieldLog<'a> {
+    pub fn new(world: &'a World) -> Self {
+        Self { world, fields: BTreeMap::new(), merged: Vec::new(), next: world.next_field }
+    }
+
+    /// Enters what an edit changed; returns what its receipt says.
+    pub fn enter(&mut self, edit: &Edit, effect: EditEffect) -> Result<Applied, Rejection> {
+        if reach(self.world.grid, edit).is_none() {
+            return Err(Rejection::OutsideWorld);
+        }
+        let mut bounds = None;
+        let mut chunks = Vec::with_capacity(effect.chunks.len());
+        for part in &effect.chunks {
+            LatticeBox::include(&mut bounds, part.bounds);
+            chunks.push(self.absorb(part.chunk, part.bounds));
+        }
+        let EditEffect { removed, added, painted, .. } = effect;
+        Ok(Applied { chunks, bounds, removed, added, painted, loose: Vec::new() })
+    }
+
+    fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {
+        let committed = self.world.fields.get(&chunk);
+        let fields = self.fields.entry(chunk).or_insert_with(|| committed.cloned().unwrap_or_default());
+        let absorbed = fields.absorb(bounds, || {
+            self.next += 1;
+            FieldId(self.next)
+        });
+        let existed = |id| committed.is_some_and(|fields| fields.get(id).is_some());
+        let into = absorbed.field;
+        // What went into a field that goes now as well is in the last one.
+        let merged = if absorbed.gone.is_empty() { &mut [] } else { self.merged.as_mut_slice() };
+        for (_, news) in merged.iter_mut().filter(|(at, _)| *at == chunk) {
+            if let FieldNews::Merged { into: earlier, .. } = news
+                && absorbed.gone.contains(earlier)
+            {
+                *earlier = into;
+            }
+        }
+        let gone = absorbed.gone.iter().filter(|&&id| existed(id));
+        self.merged.extend(gone.map(|&gone| (chunk, FieldNews::Merged { gone, into })));
+        ChunkScenario { chunk, scenario: absorbed.scenario, field: absorbed.field }
+    }
+
+    /// One line for each field that differs from the snapshot.
+    pub fn news(&self) -> Vec<(ChunkPos, FieldNews)> {
+        let mut news = Vec::new();
+        for (&chunk, fields) in &self.fields {
+            let committed = self.world.fields.get(&chunk);
+            for field in fields.iter() {
+                match committed.and_then(|fields| fields.get(field.id)) {
+                    None => news.push((chunk, FieldNews::Created(field.id))),
+                    Some(before) if before != field => news.push((chunk, FieldNews::Changed(field.id))),
+                    Some(_) => {}
+                }
+            }
+        }
+        news.extend_from_slice(&self.merged);
+        news
+    }
+}
+
+/// One line for each field that differs, when the fields of a chunk are replaced by those of another time.
+pub(super) fn news_of_replaced(before: &Fields, after: &Fields) -> Vec<FieldNews> {
+    let mut news = Vec::new();
+    for field in after.iter() {
+        match before.get(field.id) {
+            None => news.push(FieldNews::Created(field.id)),
+            Some(old) if old != field => news.push(FieldNews::Changed(field.id)),
+            Some(_) => {}
+        }
+    }
+    for gone in before.iter().filter(|field| after.get(field.id).is_none()) {
+        let into = after.iter().find(|field| field.bounds.encloses(gone.bounds));
+        news.push(match into {
+            Some(field) => FieldNews::Merged { gone: gone.id, into: field.id },
+            None => FieldNews::Removed(gone.id),
+        });
+    }
+    news
+}

@@ -1,0 +1,217 @@
+//! Undo and redo: what transactions replaced, kept as far back as a budget of bytes allows.
+//!
+//! A step holds the bricks, fields and words of the mask that one transaction replaced. Bricks are shared with whoever
+//! holds them, so a step takes as many bytes as there are bricks in it that nobody else holds. Going back puts the old
+//! ones in place of the new, which in turn are what redo needs.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::change::Change;
+use crate::lattice::LatticeBox;
+use crate::volume::Tally;
+
+/// One step through a terrain's history.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum HistoryStep {
+    /// Back to before the last transaction.
+    Undo,
+    /// What was undone last is done again.
+    Redo,
+}
+
+/// What a terrain's history holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct History {
+    /// Transactions that can be undone.
+    pub undos: usize,
+    /// Transactions that can be done again.
+    pub redos: usize,
+    /// Bytes that history alone holds. What it shares with the world is not counted.
+    pub bytes: usize,
+}
+
+/// What became of a step. Each one that was submitted gets exactly one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HistoryReceipt {
+    /// Back or forth.
+    pub step: HistoryStep,
+    /// What it changed, or why it changed nothing.
+    pub outcome: Result<Restored, HistoryRejection>,
+}
+
+/// What a step through history changed. Inventories that follow receipts have to follow this as well.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Restored {
+    /// Box around all samples that changed.
+    pub bounds: Option<LatticeBox>,
+    /// Voxels that are air now, by the material they had.
+    pub removed: Tally,
+    /// Voxels that are solid now, by the material they have.
+    pub added: Tally,
+    /// Solid voxels whose material changed, by the new one.
+    pub painted: Tally,
+}
+
+/// Why a step changed nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum HistoryRejection {
+    /// Nothing was edited, all of it was undone, or the budget of bytes did not reach so far back.
+    #[error("there is nothing to undo")]
+    NothingToUndo,
+    /// Nothing was undone since the last edit, or the budget of bytes had no room for it.
+    #[error("there is nothing to redo")]
+    NothingToRedo,
+    /// The terrain was removed before the step's turn came, or the entity never had one.
+    #[error("the terrain is gone")]
+    TerrainGone,
+}
+
+impl HistoryStep {
+    /// The answer where there is nothing to do.
+    pub(super) fn nothing(self) -> HistoryReceipt {
+        let why = match self {
+            Self::Undo => HistoryRejection::NothingToUndo,
+            Self::Redo => HistoryRejection::NothingToRedo,
+        };
+        HistoryReceipt { step: self, outcome: Err(why) }
+    }
+}
+
+/// What one transaction replaced.
+pub(super) struct Step {
+    pub change: Change,
+    /// A box around everything in it.
+    pub bounds: Option<LatticeBox>,
+    /// Bytes of its bricks that nobody else holds.
+    pub brick_bytes: usize,
+}
+
+impl Step {
+    /// A step of what a commit replaced.
+    pub fn new(change: Change, brick_bytes: usize) -> Self {
+        let boxes = change.bricks.iter().map(|(pos, _)| pos.samples());
+        let bounds = boxes.reduce(LatticeBox::union);
+        Self { change, bounds, brick_bytes }
+    }
+
+    /// Bytes that go with it, the counters of its `Arc` included.
+    fn bytes(&self) -> usize {
+        2 * size_of::<usize>() + size_of::<Self>() + self.change.bytes() + self.brick_bytes
+    }
+}
+
+/// Steps that a terrain let go of. Freeing many bricks takes its time, so it is left to whoever has some.
+#[derive(Default)]
+pub(crate) struct Waste(Vec<Arc<Step>>);
+
+impl Waste {
+    /// Is there nothing to free?
+    #[cfg(feature = "plugin")]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+/// The steps of a terrain, back and forth.
+pub(super) struct Timeline {
+    /// The oldest first.
+    undo: VecDeque<Arc<Step>>,
+    /// The one that was undone last stands last.
+    redo: VecDeque<Arc<Step>>,
+    budget: usize,
+    /// Bytes of all steps.
+    held: usize,
+}
+
+impl Timeline {
+    /// An empty one with a budget of bytes.
+    pub fn new(budget: usize) -> Self {
+        Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, held: 0 }
+    }
+
+    fn list(&mut self, step: HistoryStep) -> &mut VecDeque<Arc<Step>> {
+        match step {
+            HistoryStep::Undo => &mut self.undo,
+            HistoryStep::Redo => &mut self.redo,
+        }
+    }
+
+    /// What the next step back or forth puts in place.
+    pub fn next(&self, step: HistoryStep) -> Option<&Arc<Step>> {
+        match step {
+            HistoryStep::Undo => self.undo.back(),
+            HistoryStep::Redo => self.redo.back(),
+        }
+    }
+
+    /// What there is.
+    pub fn figures(&self) -> History {
+        History { undos: self.undo.len(), redos: self.redo.len(), bytes: self.bytes() }
+    }
+
+    fn bytes(&self) -> usize {
+        self.held + (self.undo.capacity() + self.redo.capacity()) * size_of::<Arc<Step>>()
+    }
+
+    /// Does some step reach these samples?
+    pub fn reaches(&self, samples: LatticeBox) -> bool {
+        let meets = |step: &Arc<Step>| step.bounds.is_some_and(|own| own.intersection(samples).is_some());
+        self.undo.iter().chain(&self.redo).any(meets)
+    }
+
+    /// A new budget; what it has no room for goes.
+    pub fn set_budget(&mut self, budget: usize) -> Waste {
+        self.budget = budget;
+        let mut waste = Waste::default();
+        self.trim(&mut waste);
+        waste
+    }
+
+    /// An edit was committed: that can be undone now, and nothing can be redone.
+    pub fn record(&mut self, replaced: Step) -> Waste {
+        let mut waste = Waste(self.redo.drain(..).collect());
+        self.held -= waste.0.iter().map(|step| step.bytes()).sum::<usize>();
+        self.keep(HistoryStep::Undo, replaced);
+        self.trim(&mut waste);
+        waste
+    }
+
+    /// A step was committed that put `used` in place; what that replaced is the step in the other direction.
+    pub fn passed(&mut self, step: HistoryStep, used: &Arc<Step>, replaced: Step) -> Waste {
+        let mut waste = Waste::default();
+        // The budget may have let go of it meanwhile.
+        if self.next(step).is_some_and(|next| Arc::ptr_eq(next, used)) {
+            waste.0.extend(self.list(step).pop_back());
+            self.held -= used.bytes();
+        }
+        let other = match step {
+            HistoryStep::Undo => HistoryStep::Redo,
+            HistoryStep::Redo => HistoryStep::Undo,
+        };
+        self.keep(other, replaced);
+        self.trim(&mut waste);
+        waste
+    }
+
+    fn keep(&mut self, step: HistoryStep, replaced: Step) {
+        self.held += replaced.bytes();
+        self.list(step).push_back(Arc::new(replaced));
+    }
+
+    /// Lets go of what is farthest from now, back first, until the rest is within the budget.
+    fn trim(&mut self, waste: &mut Waste) {
+        while self.bytes() > self.budget {
+            let Some(gone) = self.undo.pop_front().or_else(|| self.redo.pop_front()) else { break };
+            self.held -= gone.bytes();
+            waste.0.push(gone);
+            // A list without steps needs no room, nor does one that had many.
+            for list in [&mut self.undo, &mut self.redo] {
+                if list.len() * 4 <= list.capacity() {
+                    list.shrink_to(list.len() * 2);
+                }
+            }
+        }
+    }
+}
