@@ -48,6 +48,7 @@
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
+//! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
@@ -154,6 +155,9 @@ pub mod prelude {
         PieceFate, Receipt, Rejection, Restored, ScenarioCounts, Span, Terrain, TerrainSettings,
     };
     #[cfg(feature = "render")]
-    pub use crate::view::TerrainMaterialPlugin;
+    pub use crate::view::{
+        GroundLayer, GroundLayerKind, GroundLoading, GroundLook, GroundMaterial, GroundQuality, GroundStrata,
+        GroundTextures, TerrainMaterialPlugin,
+    };
     pub use crate::volume::Scenario;
 }

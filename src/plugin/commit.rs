@@ -10,7 +10,7 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use super::entities::{TerrainEntities, tell};
 use super::intake::tell_steps;
 use super::load::Loading;
-use super::meshes::{self, Ready};
+use super::meshes::{Ready, Wardrobe};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
     MaterialColors,
@@ -57,18 +57,24 @@ pub(super) fn begin_transactions(
         let transaction = terrain.begin();
         tell_steps(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
-        let (colors, engine) = (colors.clone(), terrain.engine().unwrap_or(&engine).clone());
+        let wardrobe = Wardrobe::new(terrain.world(), colors);
+        let engine = terrain.engine().unwrap_or(&engine).clone();
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let start = Instant::now();
             let mut commit = transaction.run_on(&engine);
-            let build = |surface: &SurfaceMesh| if draws { meshes::build(surface, &colors) } else { None };
+            let build = |drawn: Drawn, surface: &SurfaceMesh| {
+                if draws { wardrobe.build(drawn, surface) } else { None }
+            };
             // Taken out, so that they are dropped here and not on the main thread.
             let updates = std::mem::take(&mut commit.meshes);
-            let tiles = updates
-                .tiles
-                .iter()
-                .map(|(tile, update)| (Drawn::Tile(*tile), if draws { build(&update.mesh()) } else { None }));
-            let chunks = updates.chunks.iter().map(|(at, chunk)| (Drawn::Chunk(*at), build(chunk.mesh())));
+            let tiles = updates.tiles.iter().map(|(tile, update)| {
+                let drawn = Drawn::Tile(*tile);
+                (drawn, if draws { build(drawn, &update.mesh()) } else { None })
+            });
+            let chunks = updates.chunks.iter().map(|(at, chunk)| {
+                let drawn = Drawn::Chunk(*at);
+                (drawn, build(drawn, chunk.mesh()))
+            });
             let meshes = tiles.chain(chunks).collect();
             Prepared { commit, meshes, took: start.elapsed() }
         });

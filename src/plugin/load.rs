@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::commit::InFlight;
 use super::entities::{TerrainEntities, tell};
-use super::meshes::{self, Ready};
+use super::meshes::{Ready, Wardrobe};
 use super::{BurrowSettings, ChunkCreated, MaterialColors};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
@@ -79,12 +79,13 @@ pub(super) fn place_terrains(
 fn mesh_all(world: &World, colors: &MaterialColors) -> Vec<(Drawn, Ready)> {
     let chunks = world.drawn_chunks().map(Drawn::Chunk);
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
+    let wardrobe = Wardrobe::new(world, colors);
     let mesh = |&drawn: &Drawn| {
         let surface = match drawn {
             Drawn::Tile(tile) => world.tile_mesh(tile),
             Drawn::Chunk(chunk) => world.chunk_mesh(chunk),
         };
-        (drawn, meshes::build(&surface, colors))
+        (drawn, wardrobe.build(drawn, &surface))
     };
     all.par_iter().map(mesh).collect()
 }

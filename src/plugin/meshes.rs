@@ -1,14 +1,20 @@
 //! Surface meshes as Bevy meshes.
 
+use std::sync::Arc;
+
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::primitives::Aabb;
+use bevy::color::{ColorToComponents, LinearRgba};
+use bevy::math::{IVec3, Vec3};
 use bevy::mesh::{
     Indices, Mesh, MeshVertexAttribute, PrimitiveTopology, VertexAttributeValues, VertexFormat,
 };
-use bevy::prelude::*;
 
 use super::MaterialColors;
-use crate::surface::{MaterialMix, SurfaceMesh};
+use crate::ground::{Ground, OVERLAY_DEPTH};
+use crate::lattice::{ChunkGrid, Column, ONE, SNAP};
+use crate::surface::{MaterialMix, SurfaceMesh, Vertex};
+use crate::terrain::{Drawn, World};
 
 /// Up to four material ids of a vertex, for materials that look them up.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
@@ -18,29 +24,105 @@ pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
 pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialWeights", 0x6275_7272_6f77_0002, VertexFormat::Unorm8x4);
 
+/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it.
+pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
+    MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
+
+/// What the ground over or under a vertex was like before anyone dug: how much the overlay of its column covers, and
+/// whether (1) or not (0) the vertex's materials are the ground's own. The other two are 0.
+pub const ATTRIBUTE_GROUND_COVER: MeshVertexAttribute =
+    MeshVertexAttribute::new("Vertex_BurrowGroundCover", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
+
 /// A mesh ready to be swapped in, with its bounds; `None` where nothing is to be drawn.
 pub(super) type Ready = Option<(Mesh, Aabb)>;
 
-/// Builds the Bevy mesh, in the task.
-pub(super) fn build(surface: &SurfaceMesh, colors: &MaterialColors) -> Ready {
-    if surface.is_empty() {
-        return None;
+/// What a mesh is made of beside its surface: colours, and the ground as it was before anyone dug.
+pub(super) struct Wardrobe {
+    colors: MaterialColors,
+    ground: Arc<Ground>,
+    grid: ChunkGrid,
+}
+
+impl Wardrobe {
+    pub(super) fn new(world: &World, colors: &MaterialColors) -> Self {
+        Self { colors: colors.clone(), ground: world.shared_ground(), grid: world.grid() }
     }
-    let (min, max) = surface.bounds()?;
-    let vertices = &surface.vertices;
-    let positions: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.position_f32()).collect();
-    let normals: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.normal.to_array()).collect();
-    let colors: Vec<[f32; 4]> = vertices.iter().map(|vertex| blend(vertex.materials, colors)).collect();
-    let ids = vertices.iter().map(|vertex| vertex.materials.ids).collect();
-    let weights = vertices.iter().map(|vertex| vertex.materials.weights).collect();
-    let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors)
-        .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
-        .with_inserted_attribute(ATTRIBUTE_MATERIAL_WEIGHTS, VertexAttributeValues::Unorm8x4(weights))
-        .with_inserted_indices(Indices::U32(surface.indices.clone()));
-    Some((mesh, Aabb::from_min_max(Vec3::from(min), Vec3::from(max))))
+
+    /// Builds the Bevy mesh of a tile or chunk, in the task.
+    pub(super) fn build(&self, drawn: Drawn, surface: &SurfaceMesh) -> Ready {
+        if surface.is_empty() {
+            return None;
+        }
+        let (min, max) = surface.bounds()?;
+        let origin = match drawn {
+            Drawn::Tile(tile) => self.grid.tile_cells(tile).0.at(0),
+            Drawn::Chunk(chunk) => self.grid.origin(chunk),
+        };
+        let vertices = &surface.vertices;
+        let positions: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.position_f32()).collect();
+        let normals: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.normal.to_array()).collect();
+        let ids = vertices.iter().map(|vertex| vertex.materials.ids).collect();
+        let weights = vertices.iter().map(|vertex| vertex.materials.weights).collect();
+        let origins: Vec<Origin> =
+            vertices.iter().map(|vertex| Origin::of(&self.ground, origin * SNAP, vertex)).collect();
+        let depths: Vec<f32> = origins.iter().map(|origin| origin.depth).collect();
+        let covers = origins.iter().map(|origin| [origin.cover, origin.own, 0, 0]).collect();
+        let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+            .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
+            .with_inserted_attribute(ATTRIBUTE_MATERIAL_WEIGHTS, VertexAttributeValues::Unorm8x4(weights))
+            .with_inserted_attribute(ATTRIBUTE_GROUND_DEPTH, depths)
+            .with_inserted_attribute(ATTRIBUTE_GROUND_COVER, VertexAttributeValues::Unorm8x4(covers))
+            .with_inserted_indices(Indices::U32(surface.indices.clone()));
+        if !self.colors.0.is_empty() {
+            let blended: Vec<[f32; 4]> =
+                vertices.iter().map(|vertex| blend(vertex.materials, &self.colors)).collect();
+            mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, blended);
+        }
+        Some((mesh, Aabb::from_min_max(Vec3::from(min), Vec3::from(max))))
+    }
+}
+
+/// Where a vertex lies in the ground as it was. A function of its place and materials alone, so both sides of a seam have
+/// the same bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Origin {
+    /// Voxels below the pristine surface; above it less than 0.
+    depth: f32,
+    /// How much the column's overlay covers.
+    cover: u8,
+    /// 255 where the materials are the ground's own, 0 where somebody built or painted others.
+    own: u8,
+}
+
+impl Origin {
+    /// The origin of a vertex of a mesh whose own origin is given in 1/4096 voxel.
+    fn of(ground: &Ground, origin: IVec3, vertex: &Vertex) -> Self {
+        let place = origin + vertex.position;
+        let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
+        // A vertex lies on an edge of the lattice, so only one of these is not 0.
+        let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
+        let next = column.offset(i32::from(x > 0), i32::from(z > 0));
+        let step = i64::from(x.max(z));
+        let between = |low: i32, high: i32| {
+            i64::from(low) * i64::from(SNAP) + (i64::from(high) - i64::from(low)) * step
+        };
+        let height = between(ground.height(column), ground.height(next));
+        let depth = height - i64::from(place.y) * i64::from(ONE);
+        let depth = depth as f32 / (SNAP * ONE) as f32;
+        let materials = [column, next].map(|column| ground.column_material(column));
+        let [here, there] = materials
+            .map(|material| i32::from(if material.base == material.overlay { 0 } else { material.blend }));
+        let cover = between(here, there) / i64::from(SNAP);
+        let is_skin = depth <= OVERLAY_DEPTH as f32 / ONE as f32;
+        let is_own = |id: u8| {
+            materials.iter().any(|material| material.base.0 == id || (is_skin && material.overlay.0 == id))
+        };
+        let mix = vertex.materials;
+        let own = mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
+        Self { depth, cover: cover.clamp(0, 255) as u8, own: if own { 255 } else { 0 } }
+    }
 }
 
 /// The mixed colour of a vertex.

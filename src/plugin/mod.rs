@@ -27,7 +27,9 @@ pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
 pub use load::TerrainReady;
-pub use meshes::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
+pub use meshes::{
+    ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
+};
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved, Redo,
     TargetedBrush, Undo,
@@ -49,6 +51,7 @@ use crate::terrain::Terrain;
 /// | [`TerrainPlugin`] | transactions, entities, messages |
 /// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
 /// | `TerrainMaterialPlugin<StandardMaterial>` | dresses tiles and chunks (feature `render`) |
+/// | `GroundPlugin` | layers of texture for terrains with a `GroundLook` (feature `render`) |
 #[derive(Default)]
 pub struct BurrowPlugins;
 
@@ -56,7 +59,9 @@ impl PluginGroup for BurrowPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TerrainPlugin).add(HeightmapPlugin);
         #[cfg(feature = "render")]
-        let group = group.add(crate::view::TerrainMaterialPlugin::<StandardMaterial>::default());
+        let group = group
+            .add(crate::view::TerrainMaterialPlugin::<StandardMaterial>::default())
+            .add(crate::view::GroundPlugin);
         group
     }
 }

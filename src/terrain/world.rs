@@ -108,6 +108,12 @@ impl World {
         &self.ground
     }
 
+    /// The same, shared.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn shared_ground(&self) -> Arc<Ground> {
+        Arc::clone(&self.ground)
+    }
+
     /// How the world is cut into chunks.
     pub fn grid(&self) -> ChunkGrid {
         self.grid

@@ -1,0 +1,443 @@
+// Layers of ground over Bevy's own material. The uniform is `GroundUniform` in material.rs.
+
+#import bevy_pbr::{
+    mesh_functions,
+    mesh_view_bindings::view,
+    pbr_fragment::pbr_input_from_standard_material,
+    view_transformations::position_world_to_clip,
+}
+
+#ifdef PREPASS_PIPELINE
+#import bevy_pbr::{
+    pbr_deferred_functions::deferred_output,
+    prepass_io::{FragmentOutput, VertexOutput},
+}
+#else
+#import bevy_pbr::{
+    forward_io::{FragmentOutput, VertexOutput},
+    pbr_functions::{apply_pbr_lighting, main_pass_post_lighting_processing},
+    pbr_types::STANDARD_MATERIAL_FLAGS_UNLIT_BIT,
+}
+#endif
+
+#ifdef VISIBILITY_RANGE_DITHER
+#import bevy_pbr::pbr_functions::visibility_range_dither;
+#endif
+
+const LAYERS: u32 = 16u;
+
+struct Ground {
+    place: mat4x4<f32>,
+    layers: array<vec4<f32>, 16>,
+    tints: array<vec4<f32>, 16>,
+    soil: vec4<f32>,
+    beds: vec4<f32>,
+    rock: vec4<f32>,
+    vein: vec4<f32>,
+    far: vec4<f32>,
+    detail: vec4<f32>,
+}
+
+@group(#{MATERIAL_BIND_GROUP}) @binding(100) var<uniform> ground: Ground;
+@group(#{MATERIAL_BIND_GROUP}) @binding(101) var albedo_texture: texture_2d_array<f32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(102) var albedo_sampler: sampler;
+@group(#{MATERIAL_BIND_GROUP}) @binding(103) var relief_texture: texture_2d_array<f32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(104) var relief_sampler: sampler;
+@group(#{MATERIAL_BIND_GROUP}) @binding(105) var noise_texture: texture_3d<f32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(106) var noise_sampler: sampler;
+
+struct Vertex {
+    @builtin(instance_index) instance_index: u32,
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+#ifdef GROUND_ATTRIBUTES
+    @location(8) ids: vec4<u32>,
+    @location(9) weights: vec4<f32>,
+    @location(10) depth: f32,
+    @location(11) cover: vec4<f32>,
+#endif
+}
+
+struct Varying {
+    @builtin(position) position: vec4<f32>,
+    @location(0) world_position: vec4<f32>,
+    @location(1) world_normal: vec3<f32>,
+    @location(2) @interpolate(flat) instance_index: u32,
+#ifdef VISIBILITY_RANGE_DITHER
+    @location(3) @interpolate(flat) visibility_range_dither: i32,
+#endif
+#ifdef GROUND_ATTRIBUTES
+    // Depth in metres, cover, own.
+    @location(4) origin: vec3<f32>,
+    // The weight of each layer.
+    @location(5) weights_0: vec4<f32>,
+    @location(6) weights_1: vec4<f32>,
+    @location(7) weights_2: vec4<f32>,
+    @location(8) weights_3: vec4<f32>,
+#endif
+#ifdef PREPASS_PIPELINE
+#ifdef MOTION_VECTOR_PREPASS
+    @location(9) previous_world_position: vec4<f32>,
+#endif
+#endif
+}
+
+@vertex
+fn vertex(in: Vertex) -> Varying {
+    var out: Varying;
+    let world_from_local = mesh_functions::get_world_from_local(in.instance_index);
+    out.world_position = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(in.position, 1.0));
+    out.position = position_world_to_clip(out.world_position.xyz);
+    out.world_normal = mesh_functions::mesh_normal_local_to_world(in.normal, in.instance_index);
+    out.instance_index = in.instance_index;
+#ifdef VISIBILITY_RANGE_DITHER
+    out.visibility_range_dither =
+        mesh_functions::get_visibility_range_dither_level(in.instance_index, world_from_local[3]);
+#endif
+#ifdef GROUND_ATTRIBUTES
+    out.origin = vec3(in.depth * ground.detail.z, in.cover.xy);
+    // Ids can't be blended between vertices; weights of layers can.
+    var weights: array<vec4<f32>, 4>;
+    let last = u32(ground.detail.w) - 1u;
+    for (var i = 0u; i < 4u; i++) {
+        let layer = min(in.ids[i], last);
+        weights[layer / 4u][layer % 4u] += in.weights[i];
+    }
+    out.weights_0 = weights[0];
+    out.weights_1 = weights[1];
+    out.weights_2 = weights[2];
+    out.weights_3 = weights[3];
+#endif
+#ifdef PREPASS_PIPELINE
+#ifdef MOTION_VECTOR_PREPASS
+    let previous = mesh_functions::get_previous_world_from_local(in.instance_index);
+    out.previous_world_position = mesh_functions::mesh_position_local_to_world(previous, vec4(in.position, 1.0));
+#endif
+#endif
+    return out;
+}
+
+// A place on the ground, as far as textures care.
+struct Site {
+    // Metres in the terrain's space, and how it changes from pixel to pixel.
+    place: vec3<f32>,
+    dx: vec3<f32>,
+    dy: vec3<f32>,
+    normal: vec3<f32>,
+    // Weights of the sides from which textures are laid on: along x, y, z.
+    sides: vec3<f32>,
+    // 0 near, 1 far.
+    far: f32,
+}
+
+// What textures say, weighted: colour and height; occlusion and roughness; by how much the normal leans.
+struct Texels {
+    color: vec4<f32>,
+    finish: vec2<f32>,
+    lean: vec3<f32>,
+}
+
+// What one side of one layer says.
+struct Pair {
+    albedo: vec4<f32>,
+    relief: vec4<f32>,
+}
+
+fn is_fine() -> bool {
+    return ground.detail.y > 0.5;
+}
+
+fn fetch(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair {
+    return Pair(
+        textureSampleGrad(albedo_texture, albedo_sampler, uv, layer, dx, dy),
+        textureSampleGrad(relief_texture, relief_sampler, uv, layer, dx, dy),
+    );
+}
+
+fn add(to: Pair, more: Pair, weight: f32) -> Pair {
+    return Pair(to.albedo + more.albedo * weight, to.relief + more.relief * weight);
+}
+
+// Where in the texture a hexagon begins.
+fn shift_of(hexagon: vec2<f32>, layer: i32) -> vec2<f32> {
+    let at = vec2<u32>(vec2<i32>(hexagon));
+    var word = (at.x * 0x8da6b343u) ^ (at.y * 0xd8163841u) ^ (u32(layer) * 0xcb1ab31fu);
+    word = (word ^ (word >> 15u)) * 0x2c1b3c6du;
+    word = (word ^ (word >> 12u)) * 0x297a2d39u;
+    word = word ^ (word >> 15u);
+    return vec2(f32(word & 0xffffu), f32(word >> 16u)) / 65536.0;
+}
+
+// A layer without repetition: each corner of a grid of triangles has its own piece of the texture, and rules the hexagon
+// around it.
+fn fetch_pieces(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair {
+    let skewed = vec2(uv.x - 0.57735027 * uv.y, 1.15470054 * uv.y) * 1.7;
+    let base = floor(skewed);
+    let part = skewed - base;
+    let rest = 1.0 - part.x - part.y;
+    let upper = select(0.0, 1.0, rest < 0.0);
+    let sign = 2.0 * upper - 1.0;
+    let corners = array(base + vec2(upper), base + vec2(upper, 1.0 - upper), base + vec2(1.0 - upper, upper));
+    var weights = vec3(-rest * sign, upper - part.y * sign, upper - part.x * sign);
+    // Narrow borders: what is mixed loses contrast, and most pixels need one piece only.
+    weights = weights * weights;
+    weights = weights * weights * weights;
+    weights = max(weights / (weights.x + weights.y + weights.z) - 0.04, vec3(0.0));
+    weights /= weights.x + weights.y + weights.z;
+    var sum = Pair(vec4(0.0), vec4(0.0));
+    for (var i = 0; i < 3; i++) {
+        if weights[i] > 0.0 {
+            sum = add(sum, fetch(layer, uv + shift_of(corners[i], layer), dx, dy), weights[i]);
+        }
+    }
+    return sum;
+}
+
+// A layer laid on from one side.
+fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32) -> Pair {
+    var sum = Pair(vec4(0.0), vec4(0.0));
+    if far < 1.0 {
+        if is_fine() {
+            sum = add(sum, fetch_pieces(layer, uv, dx, dy), 1.0 - far);
+        } else {
+            sum = add(sum, fetch(layer, uv, dx, dy), 1.0 - far);
+        }
+    }
+    if far > 0.0 {
+        // Six times as large, and turned, so that it does not repeat along with the near one.
+        let turn = mat2x2<f32>(0.1333, 0.1, -0.1, 0.1333);
+        let large = fetch(layer, turn * uv, turn * dx, turn * dy);
+        // The relief would have to be turned back; far away it is half of it.
+        let lean = (large.relief.xy - 0.5) * mat2x2<f32>(0.8, 0.6, -0.6, 0.8) * 0.6 + 0.5;
+        sum = add(sum, Pair(large.albedo, vec4(lean, large.relief.zw)), far);
+    }
+    return sum;
+}
+
+fn lean_of(relief: vec4<f32>) -> vec2<f32> {
+    let lean = relief.xy * 2.0 - 1.0;
+    return lean / sqrt(max(1.0 - dot(lean, lean), 0.05));
+}
+
+// A layer from all sides that show.
+fn layer_at(layer: u32, site: Site) -> Texels {
+    let settings = ground.layers[layer];
+    let place = site.place * settings.x;
+    let dx = site.dx * settings.x;
+    let dy = site.dy * settings.x;
+    var texels = Texels(vec4(0.0), vec2(0.0), vec3(0.0));
+    if site.sides.x > 0.0 {
+        let pair = fetch_side(i32(layer), vec2(place.z, -place.y), vec2(dx.z, -dx.y), vec2(dy.z, -dy.y), site.far);
+        let lean = lean_of(pair.relief);
+        texels.color += pair.albedo * site.sides.x;
+        texels.finish += pair.relief.zw * site.sides.x;
+        texels.lean += vec3(0.0, -lean.y, lean.x) * site.sides.x;
+    }
+    if site.sides.y > 0.0 {
+        let pair = fetch_side(i32(layer), place.xz, dx.xz, dy.xz, site.far);
+        let lean = lean_of(pair.relief);
+        texels.color += pair.albedo * site.sides.y;
+        texels.finish += pair.relief.zw * site.sides.y;
+        texels.lean += vec3(lean.x, 0.0, lean.y) * site.sides.y;
+    }
+    if site.sides.z > 0.0 {
+        let pair = fetch_side(i32(layer), vec2(place.x, -place.y), vec2(dx.x, -dx.y), vec2(dy.x, -dy.y), site.far);
+        let lean = lean_of(pair.relief);
+        texels.color += pair.albedo * site.sides.z;
+        texels.finish += pair.relief.zw * site.sides.z;
+        texels.lean += vec3(lean.x, -lean.y, 0.0) * site.sides.z;
+    }
+    texels.color = vec4(texels.color.rgb * ground.tints[layer].rgb, texels.color.a);
+    texels.lean *= settings.y;
+    return texels;
+}
+
+// Noise in space, about -1 to 1, four kinds of it.
+fn noise_at(place: vec3<f32>, metres: f32) -> vec4<f32> {
+    return textureSampleLevel(noise_texture, noise_sampler, place / metres, 0.0) * 2.0 - 1.0;
+}
+
+// The strongest layers, and how strong.
+struct Choice {
+    layers: vec3<u32>,
+    weights: vec3<f32>,
+}
+
+// Weights of layers: what vertices say, and below the surface what lies there.
+fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice {
+    var weights: array<f32, 16>;
+#ifdef GROUND_ATTRIBUTES
+    let given = array(in.weights_0, in.weights_1, in.weights_2, in.weights_3);
+    for (var i = 0u; i < LAYERS; i++) {
+        weights[i] = given[i / 4u][i % 4u];
+    }
+    let own = in.origin.z;
+    let cover = in.origin.y;
+    let sunk = max(in.origin.x, 0.0);
+    // Borders between strata are ragged, but not at the surface itself.
+    let depth = max(sunk + (0.45 * fine.x + 0.5 * broad.x) * min(sunk, 1.0), 0.0);
+    let steep = 1.0 - smoothstep(ground.far.x, ground.far.y, site.normal.y + 0.08 * fine.y);
+    let bare = own * max(steep, smoothstep(0.10, 0.40, depth));
+    // What the strata fill: under turf, and where the ground itself shows.
+    var under_skin = 0.0;
+    var body = 0.0;
+    for (var i = 0u; i < LAYERS; i++) {
+        let kind = ground.layers[i].w;
+        if kind > 1.5 {
+            body += weights[i] * own;
+            weights[i] -= weights[i] * own;
+        } else if kind > 0.5 {
+            under_skin += weights[i] * bare;
+            weights[i] -= weights[i] * bare;
+        }
+    }
+    if body + under_skin > 0.0 {
+        let all = body + under_skin;
+        let soil_depth = ground.soil.z * max(cover, under_skin / all) * (1.0 + 0.5 * broad.y);
+        let in_soil = 1.0 - smoothstep(0.75 * soil_depth, soil_depth + 0.02, depth);
+        // Bare rock has no soil on its face.
+        let soil = in_soil * (under_skin + body * smoothstep(0.02, 0.30, depth));
+        let subsoil_depth = soil_depth + ground.soil.w * max(cover, under_skin / all) * (1.0 + 0.5 * broad.w);
+        let in_subsoil = (1.0 - in_soil) * (1.0 - smoothstep(0.85 * subsoil_depth, subsoil_depth + 0.05, depth));
+        let subsoil = in_subsoil * all * smoothstep(0.02, 0.30, depth);
+        var rock = max(all - soil - subsoil, 0.0);
+        weights[u32(ground.soil.x)] += soil;
+        weights[u32(ground.soil.y)] += subsoil;
+        if rock > 0.0 {
+            let up = site.place.y + ground.rock.y * (0.7 * broad.z + 0.12 * fine.z);
+            let within = fract(up / ground.rock.x);
+            let seam_off = abs(within - 0.61) * ground.rock.x + 0.15 * fine.x;
+            let seam = smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
+                * (1.0 - smoothstep(0.42, 0.5, seam_off / max(ground.rock.w, 0.001)));
+            weights[u32(ground.rock.z)] += rock * seam;
+            rock -= rock * seam;
+            // Veins are where two kinds of noise cross 0 together: threads in space.
+            let thread = length(fine.yw + 0.25 * broad.yw);
+            let width = 0.30 * ground.vein.z * smoothstep(-0.1, 0.25, broad.x);
+            let vein = smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01)) * (1.0 - smoothstep(0.7, 1.0, thread / max(width, 0.001)));
+            weights[u32(ground.vein.y)] += rock * vein;
+            rock -= rock * vein;
+            let bed = within * 4.0;
+            let number = u32(bed) % 4u;
+            let next = smoothstep(0.93, 1.0, fract(bed));
+            weights[u32(ground.beds[number])] += rock * (1.0 - next);
+            weights[u32(ground.beds[(number + 1u) % 4u])] += rock * next;
+        }
+    }
+#else
+    weights[0] = 1.0;
+#endif
+    var layers = vec3<u32>(0u);
+    var strongest = vec4(0.0);
+    for (var i = 0u; i < LAYERS; i++) {
+        let weight = weights[i];
+        if weight > strongest.x {
+            strongest = vec4(weight, strongest.xyz);
+            layers = vec3(i, layers.xy);
+        } else if weight > strongest.y {
+            strongest = vec4(strongest.x, weight, strongest.yz);
+            layers = vec3(layers.x, i, layers.y);
+        } else if weight > strongest.z {
+            strongest = vec4(strongest.xy, weight, strongest.z);
+            layers.z = i;
+        } else if weight > strongest.w {
+            strongest.w = weight;
+        }
+    }
+    // Less what the first one that is left out has, so that none comes or goes with a jump.
+    let left_out = select(strongest.z, strongest.w, is_fine());
+    return Choice(layers, max(strongest.xyz - left_out, vec3(0.0)));
+}
+
+@fragment
+fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutput {
+#ifdef VISIBILITY_RANGE_DITHER
+    visibility_range_dither(in.position, in.visibility_range_dither);
+#endif
+    var plain: VertexOutput;
+    plain.position = in.position;
+    plain.world_position = in.world_position;
+    plain.instance_index = in.instance_index;
+#ifdef PREPASS_PIPELINE
+#ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
+    plain.world_normal = in.world_normal;
+#endif
+#ifdef MOTION_VECTOR_PREPASS
+    plain.previous_world_position = in.previous_world_position;
+#endif
+#else
+    plain.world_normal = in.world_normal;
+#endif
+#ifdef VERTEX_COLORS
+    plain.color = vec4(1.0);
+#endif
+    var pbr_input = pbr_input_from_standard_material(plain, is_front);
+
+    var site: Site;
+    let turn = mat3x3<f32>(ground.place[0].xyz, ground.place[1].xyz, ground.place[2].xyz);
+    site.place = (ground.place * in.world_position).xyz;
+    site.dx = dpdx(site.place);
+    site.dy = dpdy(site.place);
+    site.normal = normalize(turn * in.world_normal);
+    var sides = site.normal * site.normal;
+    sides = sides * sides;
+    sides = sides * sides;
+    // The weakest side is left out, but where all are alike.
+    sides = max(sides - 0.995 * min(sides.x, min(sides.y, sides.z)), vec3(0.0));
+    sides = max(sides / (sides.x + sides.y + sides.z) - 0.03, vec3(0.0));
+    site.sides = sides / (sides.x + sides.y + sides.z);
+    let distance = length(view.world_position - in.world_position.xyz);
+    site.far = smoothstep(ground.far.z, ground.far.w, distance);
+
+    let broad = noise_at(site.place, 150.0);
+    let fine = noise_at(site.place, 27.0);
+    let choice = choose(in, site, broad, fine);
+
+    // What stands high covers what lies low.
+    var texels = array<Texels, 3>();
+    var scores = vec3(0.0);
+    for (var i = 0; i < 3; i++) {
+        if choice.weights[i] > 0.004 {
+            texels[i] = layer_at(choice.layers[i], site);
+            scores[i] = choice.weights[i] * (0.3 + texels[i].color.a);
+        }
+    }
+    let highest = max(scores.x, max(scores.y, scores.z));
+    scores = max(scores - 0.55 * highest, vec3(0.0));
+    scores /= max(scores.x + scores.y + scores.z, 0.0001);
+    var color = vec3(0.0);
+    var finish = vec2(0.0);
+    var lean = vec3(0.0);
+    var metallic = 0.0;
+    for (var i = 0; i < 3; i++) {
+        color += texels[i].color.rgb * scores[i];
+        finish += texels[i].finish * scores[i];
+        lean += texels[i].lean * scores[i];
+        metallic += ground.layers[choice.layers[i]].z * scores[i];
+    }
+    // No two places have quite the same tint.
+    let mood = clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0) * ground.detail.x;
+    color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(mood, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-mood, 0.0));
+    color *= 1.0 + 0.16 * ground.detail.x * fine.z;
+
+    pbr_input.material.base_color = vec4(pbr_input.material.base_color.rgb * color, 1.0);
+    pbr_input.material.perceptual_roughness = clamp(finish.y, 0.089, 1.0);
+    pbr_input.material.metallic = metallic;
+    pbr_input.diffuse_occlusion *= finish.x;
+    pbr_input.specular_occlusion *= finish.x;
+    lean -= dot(lean, site.normal) * site.normal;
+    pbr_input.N = normalize(normalize(site.normal + lean) * turn);
+
+#ifdef PREPASS_PIPELINE
+    return deferred_output(plain, pbr_input);
+#else
+    var out: FragmentOutput;
+    if (pbr_input.material.flags & STANDARD_MATERIAL_FLAGS_UNLIT_BIT) == 0u {
+        out.color = apply_pbr_lighting(pbr_input);
+    } else {
+        out.color = pbr_input.material.base_color;
+    }
+    out.color = main_pass_post_lighting_processing(pbr_input, out.color);
+    return out;
+#endif
+}

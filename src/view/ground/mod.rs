@@ -1,0 +1,117 @@
+//! Ground that looks like ground: layers of texture, chosen by what was painted, by steepness, and by depth below the
+//! surface that was there before anyone dug.
+//!
+//! | part | what it is |
+//! | --- | --- |
+//! | [`GroundLook`] | a terrain's settings; put it on the terrain instead of a material |
+//! | [`GroundTextures`] | which textures: baked by the project, or a game's own |
+//! | [`GroundLoading`] | how far they are |
+//! | [`GroundMaterial`] | what comes of it |
+//!
+//! # How layers meet
+//!
+//! A triangle's three vertices may have different materials. Ids can't be blended, so the vertex shader spreads each
+//! vertex's ids and weights over sixteen channels, one for each layer, and what is blended are these: linear along any
+//! edge, whichever triangle one comes from. A pixel then samples its strongest layers, less the weight of the first one
+//! that is left out, so that none comes or goes with a jump. Which of two is on top is decided by their heights.
+
+mod bake;
+mod look;
+mod material;
+mod noise;
+mod palette;
+mod textures;
+
+pub use look::{GroundLayer, GroundLayerKind, GroundLook, GroundQuality, GroundStrata, MAX_LAYERS};
+pub use material::{GroundExtension, GroundMaterial};
+pub use textures::{GroundLoading, GroundTextures};
+
+use bevy::asset::embedded_asset;
+use bevy::pbr::{MaterialPlugin, PbrPlugin};
+use bevy::prelude::*;
+
+use super::TerrainMaterialPlugin;
+use crate::plugin::BurrowSystems;
+use crate::terrain::Terrain;
+use material::GroundUniform;
+
+/// Dresses terrains that have a [`GroundLook`]. Does nothing where there is no renderer: add it after Bevy's plugins.
+#[derive(Default)]
+pub struct GroundPlugin;
+
+impl Plugin for GroundPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<GroundTextures>().init_resource::<GroundLoading>();
+        if !app.is_plugin_added::<PbrPlugin>() {
+            return;
+        }
+        embedded_asset!(app, "ground.wgsl");
+        app.add_plugins((
+            MaterialPlugin::<GroundMaterial>::default(),
+            TerrainMaterialPlugin::<GroundMaterial>::default(),
+        ))
+        .add_systems(
+            Update,
+            (textures::load_textures, dress, undress, follow)
+                .chain()
+                .before(BurrowSystems::Dress)
+                .after(BurrowSystems::Begin),
+        );
+    }
+}
+
+/// Gives each terrain with a look its material as soon as the textures are there, and another one when these change.
+fn dress(
+    mut commands: Commands,
+    loading: Res<GroundLoading>,
+    looks: Query<
+        (Entity, &GroundLook, &GlobalTransform, Option<&MeshMaterial3d<GroundMaterial>>),
+        With<Terrain>,
+    >,
+    mut materials: ResMut<Assets<GroundMaterial>>,
+) {
+    let Some(textures) = &loading.ready else { return };
+    for (entity, look, place, material) in &looks {
+        let current = material.and_then(|material| materials.get(&material.0));
+        let fits = |current: &GroundMaterial| {
+            let GroundExtension { albedo, relief, .. } = &current.extension;
+            albedo.as_ref() == Some(&textures.albedo) && relief.as_ref() == Some(&textures.relief)
+        };
+        if current.is_some_and(fits) {
+            continue;
+        }
+        let base = StandardMaterial { reflectance: 0.3, ..default() };
+        let extension = GroundExtension {
+            uniform: GroundUniform::new(look, place),
+            albedo: Some(textures.albedo.clone()),
+            relief: Some(textures.relief.clone()),
+            noise: Some(textures.noise.clone()),
+        };
+        let base = current.map_or(base, |current| current.base.clone());
+        commands.entity(entity).try_insert(MeshMaterial3d(materials.add(GroundMaterial { base, extension })));
+    }
+}
+
+/// Takes the material of a terrain that has lost its look.
+fn undress(mut commands: Commands, mut removed: RemovedComponents<GroundLook>) {
+    for entity in removed.read() {
+        if let Ok(mut terrain) = commands.get_entity(entity) {
+            terrain.try_remove::<MeshMaterial3d<GroundMaterial>>();
+        }
+    }
+}
+
+/// Textures move with the terrain, and follow its look.
+fn follow(
+    looks: Query<
+        (&GroundLook, &GlobalTransform, &MeshMaterial3d<GroundMaterial>),
+        (With<Terrain>, Or<(Changed<GroundLook>, Changed<GlobalTransform>)>),
+    >,
+    mut materials: ResMut<Assets<GroundMaterial>>,
+) {
+    for (look, place, material) in &looks {
+        if let Some(mut material) = materials.get_mut(&material.0) {
+            material.extension.uniform = GroundUniform::new(look, place);
+        }
+    }
+}

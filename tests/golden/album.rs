@@ -1,0 +1,87 @@
+//! Golden pictures and what is compared with them.
+
+use std::path::PathBuf;
+
+use image::RgbImage;
+
+/// Mean FLIP above which a picture counts as another one.
+///
+/// Measured on lavapipe: see `faults_are_larger_than_the_threshold` in `sameness.rs` for what a fault gives, and
+/// `cargo test ... --test golden -- --nocapture` for what each picture gives.
+pub const THRESHOLD: f32 = 0.01;
+
+/// Pictures compared so far.
+#[derive(Default)]
+pub struct Album {
+    faults: Vec<String>,
+}
+
+impl Album {
+    /// Compares a picture with the golden one of that name, or makes it the golden one when told to.
+    pub fn compare(&mut self, name: &str, picture: &RgbImage) {
+        let golden = folder().join(name).with_extension("png");
+        if std::env::var("BURROW_GOLDEN").is_ok_and(|value| value == "write") {
+            picture.save(&golden).expect("a golden picture can be written");
+            println!("{name}: written to {}", golden.display());
+            return;
+        }
+        let Ok(golden) = image::open(&golden) else {
+            keep(name, "actual", picture);
+            self.faults.push(format!("{name}: there is no golden picture; BURROW_GOLDEN=write makes it"));
+            return;
+        };
+        let golden = golden.into_rgb8();
+        let (mean, map) = flip(&golden, picture);
+        println!("{name}: FLIP {mean:.5}, threshold {THRESHOLD}");
+        if mean > THRESHOLD {
+            let path = keep(name, "actual", picture);
+            keep(name, "golden", &golden);
+            keep(name, "difference", &map);
+            self.faults.push(format!("{name}: FLIP {mean:.5} > {THRESHOLD}; see {}", path.display()));
+        }
+    }
+
+    /// Notes something else that is wrong.
+    pub fn check(&mut self, is_right: bool, otherwise: impl FnOnce() -> String) {
+        if !is_right {
+            self.faults.push(otherwise());
+        }
+    }
+
+    /// All pictures have been compared.
+    ///
+    /// # Panics
+    /// When one of them differs: all are told.
+    pub fn close(self) {
+        assert!(self.faults.is_empty(), "pictures differ:\n{}", self.faults.join("\n"));
+    }
+}
+
+/// How different two pictures look: mean FLIP, and a map of it. Pictures of different sizes have nothing in common.
+pub fn flip(a: &RgbImage, b: &RgbImage) -> (f32, RgbImage) {
+    if a.dimensions() != b.dimensions() {
+        return (1.0, b.clone());
+    }
+    let of =
+        |picture: &RgbImage| nv_flip::FlipImageRgb8::with_data(picture.width(), picture.height(), picture);
+    let map = nv_flip::flip(of(a), of(b), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
+    let seen = map.apply_color_lut(&nv_flip::magma_lut());
+    let mean = nv_flip::FlipPool::from_image(&map).mean();
+    let seen = RgbImage::from_raw(seen.width(), seen.height(), seen.to_vec()).unwrap_or_else(|| b.clone());
+    (mean, seen)
+}
+
+/// Leaves a picture where one can look at it.
+pub fn keep(name: &str, what: &str, picture: &RgbImage) -> PathBuf {
+    // The folder of Cargo's own temporary files lies in the target folder.
+    let target = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("a target folder");
+    let folder = target.join("proof").join("golden");
+    std::fs::create_dir_all(&folder).expect("a folder for proof");
+    let path = folder.join(format!("{name}_{what}.png"));
+    picture.save(&path).expect("a picture can be written");
+    path
+}
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/pictures")
+}

@@ -1,0 +1,50 @@
+//! A landscape: grass, rock, sand and snow over hills, with a quarry in the foreground.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::album::Album;
+use crate::studio::Studio;
+
+/// Hills with snow on the tops and sand in the valleys.
+pub fn hills() -> Ground {
+    let noise = NoiseHeights { seed: 5, scale: 130.0, amplitude: 46.0, octaves: 6, ..default() };
+    let snow = MaterialRule {
+        overlay: MaterialId(3),
+        height: (22.0, f64::INFINITY),
+        height_fade: 8.0,
+        slope: (0.0, 1.0),
+        slope_fade: 0.5,
+    };
+    let sand = MaterialRule {
+        overlay: MaterialId(2),
+        height: (f64::NEG_INFINITY, -20.0),
+        height_fade: 5.0,
+        slope: (0.0, 0.5),
+        slope_fade: 0.4,
+    };
+    let grass = MaterialRule { overlay: MaterialId(1), slope: (0.0, 0.85), slope_fade: 0.4, ..default() };
+    let rules = MaterialControl::Rules { base: MaterialId(0), rules: vec![snow, sand, grass] };
+    Ground::from_noise(256, 256, &noise)
+        .and_then(|ground| ground.with_materials(&rules))
+        .expect("valid ground")
+}
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    studio.terrain(hills(), GroundLook::default());
+    let place = |studio: &mut Studio, x: f32, z: f32, up: f32| Vec3::new(x, studio.height(x, z) + up, z);
+    let pit = place(studio, 128.0, 128.0, 0.0);
+    studio.apply([
+        Brush::dig(Shape::sphere(pit, 11.0)),
+        Brush::dig(Shape::sphere(pit - Vec3::Y * 5.0, 9.0)),
+        Brush::add(Shape::sphere(pit + Vec3::new(15.0, 1.0, 4.0), 4.0), MaterialId(11)),
+    ]);
+    let eye = place(studio, 160.0, 178.0, 14.0);
+    studio.look(eye, pit + Vec3::new(-6.0, 4.0, -8.0));
+    album.compare("landscape", &studio.picture());
+    // The same in the other way of drawing.
+    let look = GroundLook { quality: GroundQuality::Low, ..default() };
+    let world = studio.app.world_mut();
+    *world.query::<&mut GroundLook>().single_mut(world).expect("one terrain") = look;
+    album.compare("landscape_low", &studio.picture());
+}

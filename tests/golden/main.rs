@@ -1,0 +1,35 @@
+//! Golden pictures: what the ground looks like, compared with what it looked like when somebody last approved of it.
+//!
+//! | | |
+//! | --- | --- |
+//! | run | `cargo test --release --features examples --test golden` |
+//! | approve of new looks | the same with `BURROW_GOLDEN=write`, then look at `tests/golden/pictures` and commit |
+//! | after a failure | `$CARGO_TARGET_DIR/proof/golden` has the picture, the golden one and where they differ |
+//!
+//! Pictures are compared by FLIP, which says how much of a difference an eye would see: 0 none, 1 all of it. Needs a
+//! Vulkan driver; lavapipe will do. Where there is none, the tests say so and pass.
+//!
+//! # A new scene
+//!
+//! A file with `pub fn shoot(studio: &mut Studio, album: &mut Album)`, and a line in the test below. What needs other
+//! plugins opens a [`Studio`](studio::Studio) of its own, in a test of its own.
+#![cfg(feature = "examples")]
+
+mod album;
+mod landscape;
+mod sameness;
+mod studio;
+mod tunnel;
+
+use album::Album;
+use studio::Studio;
+
+#[test]
+fn ground_looks_as_approved() {
+    let Some(mut studio) = Studio::open(|_| {}) else { return };
+    let mut album = Album::default();
+    landscape::shoot(&mut studio, &mut album);
+    tunnel::shoot(&mut studio, &mut album);
+    sameness::shoot(&mut studio, &mut album);
+    album.close();
+}

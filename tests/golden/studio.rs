@@ -1,0 +1,211 @@
+//! An app without a window that takes pictures of terrains.
+
+use std::panic;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use bevy::app::PluginsState;
+use bevy::camera::RenderTarget;
+use bevy::light::CascadeShadowConfigBuilder;
+use bevy::log::{Level, LogPlugin};
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::TextureFormat;
+use bevy::render::renderer::initialize_renderer;
+use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use bevy_burrow::prelude::*;
+use image::RgbImage;
+
+/// Width and height of pictures.
+pub const SIZE: (u32, u32) = (480, 270);
+
+/// Longest wait for anything.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// One studio at a time: a software renderer takes all cores.
+static OPEN: Mutex<()> = Mutex::new(());
+
+/// An app without a window: a camera, a sun, some haze, and terrains as scenes want them.
+pub struct Studio {
+    pub app: App,
+    pub camera: Entity,
+    sun: Entity,
+    film: Handle<Image>,
+    _only: MutexGuard<'static, ()>,
+}
+
+impl Studio {
+    /// Opens a studio with `BurrowPlugins` and whatever else is added. `None`, and a line that says so, where nothing
+    /// can draw.
+    pub fn open(add: impl FnOnce(&mut App)) -> Option<Self> {
+        let only = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(renderer) = find_renderer() else {
+            eprintln!(
+                "\n*** SKIPPED: no Vulkan device, so no picture was compared. Install mesa-vulkan-drivers. ***\n"
+            );
+            return None;
+        };
+        let mut app = App::new();
+        let render_creation = RenderCreation::Manual(renderer);
+        app.add_plugins(
+            DefaultPlugins
+                .set(WindowPlugin {
+                    primary_window: None,
+                    exit_condition: ExitCondition::DontExit,
+                    ..default()
+                })
+                .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
+                .set(LogPlugin { level: Level::WARN, ..default() })
+                .disable::<WinitPlugin>()
+                .disable::<PipelinedRenderingPlugin>(),
+        )
+        .add_plugins(BurrowPlugins)
+        // Small textures are painted fast; all machines filter them alike without anisotropy.
+        .insert_resource(GroundTextures::Baked { side: 256, anisotropy: 1 })
+        .insert_resource(ClearColor(Color::linear_rgb(0.50, 0.66, 0.86)))
+        .insert_resource(GlobalAmbientLight {
+            color: Color::srgb(0.78, 0.88, 1.0),
+            brightness: 900.0,
+            ..default()
+        })
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
+        add(&mut app);
+        while app.plugins_state() == PluginsState::Adding {
+            bevy::tasks::tick_global_task_pools_on_main_thread();
+        }
+        app.finish();
+        app.cleanup();
+        let image = Image::new_target_texture(SIZE.0, SIZE.1, TextureFormat::Rgba8UnormSrgb, None);
+        let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        let fog = DistanceFog {
+            color: Color::linear_rgb(0.50, 0.66, 0.86),
+            falloff: FogFalloff::from_visibility_squared(900.0),
+            ..default()
+        };
+        let world = app.world_mut();
+        let camera = world
+            .spawn((
+                Camera3d::default(),
+                RenderTarget::from(film.clone()),
+                Msaa::Off,
+                fog,
+                Transform::default(),
+            ))
+            .id();
+        let sun = world
+            .spawn((
+                DirectionalLight { illuminance: 10_000.0, shadow_maps_enabled: true, ..default() },
+                CascadeShadowConfigBuilder { maximum_distance: 250.0, ..default() }.build(),
+            ))
+            .id();
+        let mut studio = Self { app, camera, sun, film, _only: only };
+        studio.sun(Vec3::new(1.0, 0.9, 0.4));
+        Some(studio)
+    }
+
+    /// Puts a terrain with a look into the world, in place of the one before, and waits until it is shown.
+    pub fn terrain(&mut self, ground: Ground, look: GroundLook) {
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+        let world = self.app.world_mut();
+        let old: Vec<Entity> = world.query_filtered::<Entity, With<Terrain>>().iter(world).collect();
+        old.into_iter().for_each(|old| assert!(world.despawn(old)));
+        let entity = world.spawn((terrain, look)).id();
+        self.until("a terrain that is dressed", |app| {
+            let mut tiles = app
+                .world_mut()
+                .query_filtered::<&ChildOf, (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
+            tiles.iter(app.world()).any(|tile| tile.parent() == entity)
+        });
+    }
+
+    /// Where the camera is, and what it looks at.
+    pub fn look(&mut self, from: Vec3, at: Vec3) {
+        let place = Transform::from_translation(from).looking_at(at, Vec3::Y);
+        self.app.world_mut().entity_mut(self.camera).insert(place);
+    }
+
+    /// Where the sun is.
+    pub fn sun(&mut self, from: Vec3) {
+        let place = Transform::from_translation(from).looking_at(Vec3::ZERO, Vec3::Y);
+        self.app.world_mut().entity_mut(self.sun).insert(place);
+    }
+
+    /// The light of the sky, in cd/m2.
+    pub fn sky(&mut self, brightness: f32) {
+        self.app.world_mut().resource_mut::<GlobalAmbientLight>().brightness = brightness;
+    }
+
+    /// The ground's height over a place, in metres.
+    pub fn height(&mut self, x: f32, z: f32) -> f32 {
+        let world = self.app.world_mut();
+        let terrain = world.query::<&Terrain>().single(world).expect("one terrain");
+        terrain.world().height(f64::from(x), f64::from(z)).expect("within the world") as f32
+    }
+
+    /// Sends brushes and waits until all are shown.
+    pub fn apply(&mut self, brushes: impl IntoIterator<Item = Brush>) {
+        let brushes: Vec<Brush> = brushes.into_iter().collect();
+        let answered = self.app.world().resource::<BurrowFigures>().brushes + brushes.len() as u64;
+        self.app.world_mut().write_message_batch(brushes);
+        self.until("receipts", |app| app.world().resource::<BurrowFigures>().brushes >= answered);
+    }
+
+    /// Frames go by until something has happened.
+    pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut App) -> bool) {
+        // Nobody looks meanwhile.
+        self.film_runs(false);
+        let start = Instant::now();
+        while !done(&mut self.app) {
+            assert!(start.elapsed() < PATIENCE, "waited in vain for {what}");
+            self.app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.film_runs(true);
+    }
+
+    /// A picture, once lights and shaders have come in.
+    pub fn picture(&mut self) -> RgbImage {
+        for _ in 0..3 {
+            self.app.update();
+        }
+        let taken = Arc::new(Mutex::new(None));
+        let place = Arc::clone(&taken);
+        let shot = Screenshot::image(self.film.clone());
+        self.app.world_mut().spawn(shot).observe(move |shot: On<ScreenshotCaptured>| {
+            *place.lock().expect("not poisoned") = shot.image.data.clone();
+        });
+        let start = Instant::now();
+        loop {
+            self.app.update();
+            if let Some(data) = taken.lock().expect("not poisoned").take() {
+                let rgb: Vec<u8> =
+                    data.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
+                return RgbImage::from_raw(SIZE.0, SIZE.1, rgb).expect("a whole picture");
+            }
+            assert!(start.elapsed() < PATIENCE, "no picture was taken");
+        }
+    }
+
+    fn film_runs(&mut self, runs: bool) {
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
+            camera.is_active = runs;
+        }
+    }
+}
+
+/// A renderer without a window, if there is an adapter for one, be it in software.
+fn find_renderer() -> Option<RenderResources> {
+    let settings = WgpuSettings::default();
+    let backends = settings.backends?;
+    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
+    panic::set_hook(hook);
+    found.ok()
+}

@@ -1,0 +1,35 @@
+//! Inside a tunnel: strata on its walls tell how deep it is.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::album::Album;
+use crate::studio::Studio;
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    let noise = NoiseHeights { seed: 3, scale: 90.0, amplitude: 10.0, octaves: 4, ..default() };
+    let skin = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
+    let ground = Ground::from_noise(128, 128, &noise)
+        .and_then(|ground| ground.with_materials(&MaterialControl::Uniform(skin)))
+        .expect("valid ground");
+    studio.terrain(ground, GroundLook::default());
+    let top = studio.height(64.0, 30.0);
+    // A cutting, and a gallery on into the ground.
+    let mouth = Vec3::new(64.0, top + 1.0, 30.0);
+    let deep = Vec3::new(64.0, top - 16.0, 74.0);
+    let end = Vec3::new(84.0, top - 22.0, 104.0);
+    studio.apply([
+        Brush::dig(Shape::capsule(mouth, deep, 5.0)),
+        Brush::dig(Shape::capsule(deep, end, 5.0)),
+        Brush::dig(Shape::sphere(end, 8.0)),
+    ]);
+    studio.look(mouth + Vec3::new(-7.0, 6.0, -10.0), mouth + Vec3::new(2.0, -7.0, 14.0));
+    album.compare("cutting", &studio.picture());
+    let lamp = PointLight { intensity: 3_000_000.0, range: 60.0, shadow_maps_enabled: false, ..default() };
+    let lamp = studio.app.world_mut().spawn((lamp, Transform::from_translation(deep + Vec3::Y * 2.0))).id();
+    studio.sky(40.0);
+    studio.look(mouth.lerp(deep, 0.55) - Vec3::Y * 0.5, deep + (end - deep) * 0.25);
+    album.compare("tunnel", &studio.picture());
+    studio.app.world_mut().despawn(lamp);
+    studio.sky(900.0);
+}
