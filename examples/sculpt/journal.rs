@@ -2,7 +2,9 @@
 
 use bevy::prelude::*;
 use bevy_burrow::panel::{BrushTool, PanelPlaces};
+use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::HistoryStep;
 
 pub struct JournalPlugin;
 
@@ -13,7 +15,10 @@ impl Plugin for JournalPlugin {
                 println!("ready hash={:016x}", terrain.world().hash());
             }
         })
-        .add_systems(Update, (tell_receipts, tell_tool, tell_places).after(BurrowSystems::Commit));
+        .add_systems(
+            Update,
+            (tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
+        );
     }
 }
 
@@ -31,6 +36,24 @@ fn tell_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Ter
                 applied.painted.total()
             ),
             Err(rejection) => println!("stroke tag={} rejected: {rejection}", receipt.tag),
+        }
+    }
+}
+
+fn tell_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
+    for HistoryMoved { terrain, receipt } in moves.read() {
+        let name = match receipt.step {
+            HistoryStep::Undo => "undo",
+            HistoryStep::Redo => "redo",
+        };
+        let terrain = terrain.and_then(|terrain| terrains.get(terrain).ok());
+        let hash = terrain.map_or(0, |terrain| terrain.world().hash());
+        match &receipt.outcome {
+            Ok(restored) => {
+                let (removed, added) = (restored.removed.total(), restored.added.total());
+                println!("{name} removed={removed} added={added} hash={hash:016x}");
+            }
+            Err(why) => println!("{name} rejected: {why}"),
         }
     }
 }

@@ -12,6 +12,8 @@
 //! | `W` `A` `S` `D`, `Q`, `E`, `Shift` | flies, down, up, faster |
 //! | wheel, `[`, `]` | size of the brush |
 //! | `Tab` | next operation |
+//! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
+//! | `H` | takes the height under the mouse for levelling |
 //! | `F1` | shows and hides the panel |
 //! | `F12` | saves a picture |
 //! | `Esc` | quits |
@@ -35,6 +37,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use bevy::prelude::*;
+use bevy_burrow::debug::BurrowDebugPlugin;
 use bevy_burrow::panel::BurrowPanelPlugin;
 use bevy_burrow::prelude::*;
 use clap::Parser;
@@ -90,6 +93,7 @@ fn editor(app: &mut App, options: &Options) {
     app.add_plugins((
         BurrowPlugins,
         BurrowPanelPlugin,
+        BurrowDebugPlugin,
         scene::ScenePlugin,
         stroke::StrokePlugin,
         journal::JournalPlugin,

@@ -24,7 +24,7 @@ impl Plugin for ScenePlugin {
     }
 }
 
-fn landscape(mut commands: Commands, mut materials: ResMut<Assets<StandardMaterial>>) -> Result {
+fn landscape(mut commands: Commands) -> Result {
     let noise = NoiseHeights {
         seed: 4,
         kind: NoiseKind::Fractal,
@@ -37,8 +37,7 @@ fn landscape(mut commands: Commands, mut materials: ResMut<Assets<StandardMateri
     let rules = MaterialControl::Rules { base: MaterialId(0), rules: vec![grass] };
     let ground = Ground::from_noise(SIDE, SIDE, &noise)?.with_materials(&rules)?;
     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
-    let earth = StandardMaterial { perceptual_roughness: 0.95, reflectance: 0.15, ..default() };
-    commands.spawn((Name::new("Hills"), terrain, MeshMaterial3d(materials.add(earth))));
+    commands.spawn((Name::new("Hills"), terrain, GroundLook::default()));
     Ok(())
 }
 

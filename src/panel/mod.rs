@@ -34,14 +34,14 @@ mod world_column;
 
 pub use operations::ToolOperation;
 pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
-pub use tool::{BrushTool, ToolAlign, ToolShape};
+pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Color32, Id, Order, RichText, ScrollArea, Ui, Vec2};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
-use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, MaterialColors};
+use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, MaterialColors, Redo, Undo};
 use crate::terrain::Terrain;
 use survey::Survey;
 use world_column::{Content, TerrainLine};
@@ -69,7 +69,13 @@ impl Plugin for BurrowPanelPlugin {
             .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
             .add_systems(
                 Update,
-                (survey::follow_frames, survey::count_terrain, survey::finish_seam_check, act)
+                (
+                    survey::follow_frames,
+                    survey::count_terrain,
+                    survey::finish_seam_check,
+                    act,
+                    set_undo_budget,
+                )
                     .chain()
                     .after(BurrowSystems::Begin),
             )
@@ -85,17 +91,34 @@ fn act(
     check: Option<Res<survey::SeamCheck>>,
     terrains: Query<(Entity, &Terrain)>,
     cameras: Query<&RenderTarget, With<PrimaryEguiContext>>,
+    mut undos: MessageWriter<Undo>,
+    mut redos: MessageWriter<Redo>,
 ) {
     for action in actions.read() {
+        let chosen = survey::chosen(&panel, &terrains);
         match action {
+            PanelAction::Undo => drop(chosen.map(|terrain| undos.write(Undo { terrain: Some(terrain) }))),
+            PanelAction::Redo => drop(chosen.map(|terrain| redos.write(Redo { terrain: Some(terrain) }))),
             PanelAction::CheckSeams => {
-                let terrain = survey::chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok());
+                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
                 if let (Some((_, terrain)), None) = (terrain, &check) {
                     survey::start_seam_check(&mut commands, &mut panel, terrain);
                 }
             }
             PanelAction::SavePicture => picture::save(&mut commands, &mut panel, cameras.iter().next()),
         }
+    }
+}
+
+/// Hands a new budget of undo on to the terrains.
+fn set_undo_budget(
+    panel: Res<BurrowPanel>,
+    mut terrains: Query<&mut Terrain>,
+    mut last: Local<Option<usize>>,
+) {
+    let budget = panel.undo_mebibytes;
+    if last.replace(budget).is_some_and(|last| last != budget) {
+        terrains.iter_mut().for_each(|mut terrain| terrain.set_undo_budget(budget << 20));
     }
 }
 
@@ -110,6 +133,7 @@ fn draw(
     terrains: Query<(Entity, &Terrain)>,
     looks: Query<(Option<&Name>, &MaterialColors)>,
     mut places: ResMut<PanelPlaces>,
+    #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
 ) {
     let Ok(context) = contexts.ctx_mut() else { return };
@@ -147,6 +171,12 @@ fn draw(
                 actions: &mut pressed,
             };
             world_column::show(ui, &mut new_panel, &mut content);
+            #[cfg(feature = "debug")]
+            if let Some(debug) = &mut debug {
+                let mut new = (**debug).clone();
+                world_column::debug(ui, &mut new);
+                debug.set_if_neq(new);
+            }
         });
     }
     // Whoever watches them for changes is told of real ones only.
@@ -159,10 +189,12 @@ fn draw(
 
 /// Colours and names by id, as many as there are of both.
 fn materials(panel: &BurrowPanel, colors: &MaterialColors) -> Vec<(Color32, String)> {
-    let last = colors.0.last().copied().unwrap_or(LinearRgba::WHITE);
-    let color = |at: usize| {
-        let [r, g, b, _] = Srgba::from(colors.0.get(at).copied().unwrap_or(last)).to_u8_array();
-        Color32::from_rgb(r, g, b)
+    let color = |at: usize| match colors.0.get(at) {
+        Some(color) => {
+            let [r, g, b, _] = Srgba::from(*color).to_u8_array();
+            Color32::from_rgb(r, g, b)
+        }
+        None => theme::MORE_MATERIALS[at % theme::MORE_MATERIALS.len()],
     };
     panel.materials.iter().enumerate().map(|(at, name)| (color(at), name.clone())).collect()
 }
