@@ -10,7 +10,7 @@ use super::lines::{Layer, Pen};
 use super::views::{self, Dirty, Place};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
-use crate::plugin::{BrushApplied, BurrowSystems};
+use crate::plugin::{BrushApplied, BurrowSystems, HistoryMoved};
 use crate::terrain::{Terrain, Version};
 
 /// A view of a changing world is drawn again this often at most.
@@ -57,6 +57,7 @@ fn note_dirty(
     time: Res<Time>,
     debug: Res<BurrowDebug>,
     mut receipts: MessageReader<BrushApplied>,
+    mut moves: MessageReader<HistoryMoved>,
     terrains: Query<&Terrain>,
     mut dirty: ResMut<DirtyBricks>,
 ) {
@@ -68,15 +69,21 @@ fn note_dirty(
     if !debug.dirty {
         dirty.0.clear();
         receipts.clear();
+        moves.clear();
         return;
     }
     let most = debug.most_lines / BOX_LINES;
-    for BrushApplied { terrain, receipt } in receipts.read() {
-        let Some((entity, terrain)) = terrain.and_then(|entity| Some((entity, terrains.get(entity).ok()?)))
-        else {
-            continue;
-        };
-        let Some(bounds) = receipt.outcome.as_ref().ok().and_then(|applied| applied.bounds) else { continue };
+    let edited = receipts.read().map(|applied| {
+        let bounds = applied.receipt.outcome.as_ref().ok().and_then(|applied| applied.bounds);
+        (applied.terrain, bounds)
+    });
+    let restored = moves.read().map(|moved| {
+        let bounds = moved.receipt.outcome.as_ref().ok().and_then(|restored| restored.bounds);
+        (moved.terrain, bounds)
+    });
+    for (entity, bounds) in edited.chain(restored) {
+        let (Some(entity), Some(bounds)) = (entity, bounds) else { continue };
+        let Ok(terrain) = terrains.get(entity) else { continue };
         let samples = terrain.world().samples();
         for brick in BrickPos::covering(bounds).filter(|&brick| samples.brick(brick).is_some()) {
             if dirty.0.len() >= most {
@@ -100,7 +107,7 @@ struct Key {
 /// Draws what is on and not as it should be, and takes away what is off.
 fn draw(
     mut commands: Commands,
-    time: Res<Time<Real>>,
+    time: Res<Time>,
     debug: Res<BurrowDebug>,
     dirty: Res<DirtyBricks>,
     terrains: Query<(Entity, &Terrain, &GlobalTransform)>,

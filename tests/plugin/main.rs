@@ -1,6 +1,8 @@
 //! The Bevy plugin from outside: brushes go in as messages, and what is shown, told and kept is looked at frame by frame.
 #![cfg(feature = "plugin")]
 
+#[cfg(feature = "debug")]
+mod debug_views;
 mod despawning;
 mod entities;
 mod heightmaps;
