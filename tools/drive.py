@@ -130,9 +130,20 @@ class Stage:
         self.rest()
 
     def click(self, x, y, button=1):
+        """A short click: however slow frames are, the button is seen as pressed in one of them only."""
         self.move(x, y)
-        self.press(button)
-        self.release(button)
+        self.xdo("click", "--delay", 0, button)
+        self.rest()
+
+    def settle(self, quiet=2.0):
+        """Waits until the program has had nothing to say for a while."""
+        deadline = time.monotonic() + self.patience
+        while time.monotonic() < deadline:
+            before = self.mark()
+            time.sleep(quiet)
+            if self.mark() == before:
+                return
+        raise Failed("the program does not come to rest")
 
     def drag(self, a, b, steps=6):
         self.move(*a)
@@ -199,7 +210,7 @@ def sculpt(stage):
     if removed == 0:
         raise Failed("a click on the ground dug nothing")
     stage.say(f"a click dug {removed} voxels")
-    stage.rest(1)
+    stage.settle()
     stage.shoot("2_dug")
 
     radius = lambda: float(stage.last(r"^tool .*radius=([\d.]+)").group(1))
@@ -212,6 +223,7 @@ def sculpt(stage):
         raise Failed(f"the slider left the radius at {radius()}")
     stage.say(f"the slider changed the radius from {before} to {radius()}")
     stage.click(left, top - 8)
+    stage.settle()
     if stage.last(r"^stroke tag=(\d+)").group(1) != strokes:
         raise Failed("a click on the panel dug into the ground behind it")
     stage.say("clicks on the panel did not dig")
@@ -223,7 +235,7 @@ def sculpt(stage):
     if more <= removed:
         raise Failed(f"the larger brush dug {more} voxels and the smaller one {removed}")
     stage.say(f"the larger brush dug {more} voxels")
-    stage.rest(1)
+    stage.settle()
     stage.shoot("4_larger")
     undo(stage, pristine)
 
