@@ -74,7 +74,12 @@ class Stage:
     # What the program says
 
     def lines(self):
-        return self.log.read_text(errors="replace").splitlines()
+        """All that was said, frames left out."""
+        return [line for line in self.log.read_text(errors="replace").splitlines() if line != "frame"]
+
+    def frames(self):
+        """Frames so far, of a program that tells of each."""
+        return self.log.read_text(errors="replace").count("\nframe\n")
 
     def mark(self):
         """The end of what was said so far."""
@@ -118,8 +123,16 @@ class Stage:
         self.rest()
 
     def rest(self, seconds=0.6):
-        """Some frames' time: in software a frame takes a while, and short clicks would be lost between two."""
-        time.sleep(seconds)
+        """Two frames' time: in software a frame may take a second. Where the program does not tell, some time."""
+        start = self.frames()
+        if start == 0:
+            time.sleep(seconds)
+            return
+        deadline = time.monotonic() + self.patience
+        while self.frames() < start + 2:
+            if time.monotonic() > deadline or self.program.poll() is not None:
+                raise Failed("the program draws no more frames")
+            time.sleep(0.02)
 
     def press(self, button=1):
         self.xdo("mousedown", button)
@@ -151,7 +164,7 @@ class Stage:
         for step in range(1, steps + 1):
             t = step / steps
             self.xdo("mousemove", round(a[0] + (b[0] - a[0]) * t), round(a[1] + (b[1] - a[1]) * t))
-            self.rest(0.3)
+            self.rest()
         self.release()
 
     def key(self, name):
@@ -162,10 +175,10 @@ class Stage:
 
     def chord(self, modifier, name):
         self.xdo("keydown", modifier)
-        self.rest(0.3)
+        self.rest()
         self.key(name)
         self.xdo("keyup", modifier)
-        self.rest(0.3)
+        self.rest()
 
     # Eyes
 
@@ -288,7 +301,7 @@ def main():
         return 1
     command = [str(binary), "--width", str(size[0]), "--height", str(size[1]), "--out", str(args.out)]
     if args.play == "sculpt":
-        command.append("--tell-places")
+        command.append("--tell")
     print(f"{args.play}: {binary}", flush=True)
     stage = Stage(command + args.arguments, args.out, size, args.patience)
     try:

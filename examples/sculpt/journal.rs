@@ -67,9 +67,13 @@ fn tell_tool(tool: Res<BrushTool>) {
     }
 }
 
-/// Where the panel's widgets are, whenever that changes: `tools/drive.py` clicks on them.
-fn tell_places(places: Res<PanelPlaces>, told: Res<TellPlaces>) {
-    if !told.0 || !places.is_changed() {
+/// Each frame, and where the panel's widgets are whenever that changes: `tools/drive.py` clicks on them.
+fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
+    if !tells.0 {
+        return;
+    }
+    println!("frame");
+    if !places.is_changed() {
         return;
     }
     for (name, place) in &places.0 {
@@ -80,6 +84,6 @@ fn tell_places(places: Res<PanelPlaces>, told: Res<TellPlaces>) {
     }
 }
 
-/// Should it be told where the panel's widgets are?
+/// Should frames and places be told?
 #[derive(Resource, Default)]
-pub struct TellPlaces(pub bool);
+pub struct TellAll(pub bool);

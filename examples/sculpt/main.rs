@@ -57,9 +57,9 @@ struct Options {
     /// Height of the window or the pictures, in pixels.
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
-    /// Write where the panel's widgets are to standard output, for scripts that click on them.
+    /// Write each frame, and where the panel's widgets are, to standard output: for scripts that click on them.
     #[arg(long)]
-    tell_places: bool,
+    tell: bool,
 }
 
 fn main() -> ExitCode {
@@ -98,7 +98,7 @@ fn editor(app: &mut App, options: &Options) {
         stroke::StrokePlugin,
         journal::JournalPlugin,
     ));
-    app.insert_resource(journal::TellPlaces(options.tell_places));
+    app.insert_resource(journal::TellAll(options.tell));
     app.world_mut().resource_mut::<bevy_burrow::panel::BurrowPanel>().pictures = options.out.clone();
 }
 

@@ -174,7 +174,7 @@ fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<
 }
 
 fn settings(ui: &mut Ui, panel: &mut BurrowPanel, settings: &mut BurrowSettings) {
-    slider(ui, "Undo", &mut panel.undo_mebibytes, 0..=1024, |slider| slider.suffix(" MiB"))
+    slider(ui, "History", &mut panel.undo_mebibytes, 0..=1024, |slider| slider.suffix(" MiB"))
         .on_hover_text("What undo may take of memory, of each terrain");
     slider(ui, "Swaps", &mut settings.swaps_per_frame, 1..=4096, |slider| slider.logarithmic(true))
         .on_hover_text("Meshes swapped per frame, at most");

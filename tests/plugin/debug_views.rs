@@ -1,15 +1,23 @@
 //! Debug views: drawn below their terrains while they are on, and gone when they are off.
 
+use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy_burrow::debug::{BurrowDebug, BurrowDebugPlugin, DebugLines, DebugView};
 use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level};
 
+/// A stage with meshes and something more.
+fn stage(more: impl Fn(&mut App) + Send + Sync + 'static) -> Stage {
+    Stage::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, more))
+}
+
 /// A stage with the debug views, around a place that was dug.
 fn dug_stage() -> (Stage, Entity) {
-    let mut stage = Stage::drawing();
-    stage.app.init_asset::<GizmoAsset>().add_plugins(BurrowDebugPlugin);
+    let views = |app: &mut App| {
+        app.init_asset::<GizmoAsset>().add_plugins(BurrowDebugPlugin);
+    };
+    let mut stage = stage(views);
     let focus = Some(Vec3::new(32.0, 8.0, 32.0));
     stage.app.insert_resource(BurrowDebug { focus, fade: 1e6, ..default() });
     let terrain = stage.show(level(1.0));
@@ -106,8 +114,9 @@ fn lines_go_with_their_terrain() {
 
 #[test]
 fn without_gizmos_the_views_do_nothing() {
-    let mut stage = Stage::drawing();
-    stage.app.add_plugins(BurrowDebugPlugin).insert_resource(BurrowDebug { mask: true, ..default() });
+    let mut stage = stage(|app: &mut App| {
+        app.add_plugins(BurrowDebugPlugin).insert_resource(BurrowDebug { mask: true, ..default() });
+    });
     stage.show(level(1.0));
     stage.send(dig(32.0, 8.0, 32.0, 5.0));
     stage.settle();
