@@ -50,10 +50,13 @@
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
+//! | an editor's panel | `BurrowPanelPlugin`, and `BrushTool` for the brush in hand (feature `egui`) |
+//! | to see what the model holds | `BurrowDebugPlugin` and the switches of `BurrowDebug` (feature `debug`) |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
 //! Rooms, from the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`.
+//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `panel`,
+//! `debug`.
 //!
 //! # How the seam closes
 //!
@@ -106,6 +109,8 @@
 //! | `cuda` | transactions on an NVIDIA card where one is found, see [`backend`]; compiles everywhere | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
+//! | `egui` | the panel: brush, settings, live figures | |
+//! | `debug` | debug views as gizmos | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
 //! Without any feature the model alone is built, with no Bevy at all. Bevy's own `multi_threaded` feature, part of its
