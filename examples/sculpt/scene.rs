@@ -21,10 +21,7 @@ impl Plugin for ScenePlugin {
         app.add_plugins(FreeCameraPlugin)
             .insert_resource(ClearColor(SKY))
             .insert_resource(GlobalAmbientLight { brightness: 900.0, ..default() })
-            .add_systems(
-                Startup,
-                (draws_in_software.pipe(landscape), draws_in_software.pipe(sun_and_camera)),
-            );
+            .add_systems(Startup, (landscape, sun_and_camera));
     }
 }
 
@@ -33,7 +30,12 @@ fn draws_in_software(adapter: Option<Res<RenderAdapterInfo>>, windows: Query<&Wi
     adapter.is_some_and(|adapter| format!("{:?}", adapter.device_type) == "Cpu") && !windows.is_empty()
 }
 
-fn landscape(is_plain: In<bool>, mut commands: Commands) -> Result {
+fn landscape(
+    mut commands: Commands,
+    adapter: Option<Res<RenderAdapterInfo>>,
+    windows: Query<&Window>,
+) -> Result {
+    let is_plain = draws_in_software(adapter, windows);
     let noise = NoiseHeights {
         seed: 4,
         kind: NoiseKind::Fractal,
@@ -46,15 +48,16 @@ fn landscape(is_plain: In<bool>, mut commands: Commands) -> Result {
     let rules = MaterialControl::Rules { base: MaterialId(0), rules: vec![grass] };
     let ground = Ground::from_noise(SIDE, SIDE, &noise)?.with_materials(&rules)?;
     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
-    let quality = if *is_plain { GroundQuality::Low } else { GroundQuality::High };
+    let quality = if is_plain { GroundQuality::Low } else { GroundQuality::High };
     let look = GroundLook { quality, ..default() };
     commands.spawn((Name::new("Hills"), terrain, look));
     Ok(())
 }
 
-fn sun_and_camera(is_plain: In<bool>, mut commands: Commands) {
+fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>, windows: Query<&Window>) {
+    let is_plain = draws_in_software(adapter, windows);
     commands.spawn((
-        DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: !*is_plain, ..default() },
+        DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: !is_plain, ..default() },
         CascadeShadowConfigBuilder { maximum_distance: 260.0, first_cascade_far_bound: 40.0, ..default() }
             .build(),
         Transform::from_xyz(-0.6, 0.7, 0.45).looking_at(Vec3::ZERO, Vec3::Y),

@@ -37,6 +37,7 @@ fn ground_looks_as_approved() {
 }
 
 #[test]
+#[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
 fn debug_views_look_as_approved() {
     let Some(mut studio) = Studio::open(|app| drop(app.add_plugins(bevy_burrow::debug::BurrowDebugPlugin)))
     else {
@@ -48,6 +49,7 @@ fn debug_views_look_as_approved() {
 }
 
 #[test]
+#[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
 fn the_panel_looks_as_approved() {
     let Some(mut studio) = Studio::open(|app| drop(app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin)))
     else {
