@@ -24,7 +24,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run test test-model test-plugin test-examples soak paper pictures bench bench-backends peers instructions ptx
+.PHONY: help setup run test test-model test-plugin test-examples drive soak paper pictures bench bench-backends peers instructions ptx
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -44,7 +44,7 @@ test-model:
 	cargo test $(WITHOUT_BEVY) --doc
 
 test-plugin:
-	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal
+	cargo test $(WITH_BEVY) --lib $(PLUGIN_TESTS) --example digger --example minimal --example server
 	cargo test $(WITH_BEVY) --doc
 
 # The examples as a user starts them; whatever an earlier run left is not taken for theirs.
@@ -52,9 +52,16 @@ test-examples:
 	rm -rf '$(PROOF)'
 	cargo run $(WITH_BEVY) --example digger -- --headless --out '$(PROOF)/digger'
 	@pictures=$$(ls '$(PROOF)/digger' | grep -c '\.png$$'); echo "digger: $$pictures pictures"; [ "$$pictures" -ge 6 ]
+	cargo run $(WITH_BEVY) --example sculpt -- --headless --out '$(PROOF)/sculpt'
+	@pictures=$$(ls '$(PROOF)/sculpt' | grep -c '\.png$$'); echo "sculpt: $$pictures pictures"; [ "$$pictures" -ge 5 ]
+	cargo run $(WITH_BEVY) --example server -- --script examples/server/brushes.jsonl
 	cargo run $(WITH_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
+
+drive: setup ## Play sculpt by real mouse and keys in a window under Xvfb; skips where there is none
+	cargo build $(WITH_BEVY) --example sculpt
+	@python3 tools/drive.py sculpt --out out/drive; status=$$?; [ $$status -eq 77 ] || exit $$status
 
 soak: ## Dig WORLDS (10000) random worlds; look at every seam, and compare every mesh with the plain mesher
 	@tools/setup.sh build

@@ -55,10 +55,13 @@
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
 //! | more from the same surfaces, in the same commit | `Companion`s |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
+//! | an editor's panel | `BurrowPanelPlugin`, and `BrushTool` for the brush in hand (feature `egui`) |
+//! | to see what the model holds | `BurrowDebugPlugin` and the switches of `BurrowDebug` (feature `debug`) |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
 //! Rooms, from the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`.
+//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
+//! `panel`, `debug`.
 //!
 //! # How the seam closes
 //!
@@ -112,6 +115,8 @@
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
+//! | `egui` | the panel: brush, settings, live figures | |
+//! | `debug` | debug views as gizmos | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
 //! Without any feature the model alone is built, with no Bevy at all. Bevy's own `multi_threaded` feature, part of its

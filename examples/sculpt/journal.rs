@@ -1,8 +1,10 @@
 //! A line on standard output for whatever happened: what was done can be followed, and checked by a script.
 
 use bevy::prelude::*;
-use bevy_burrow::panel::BrushTool;
+use bevy_burrow::panel::{BrushTool, PanelPlaces};
+use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::HistoryStep;
 
 pub struct JournalPlugin;
 
@@ -13,7 +15,10 @@ impl Plugin for JournalPlugin {
                 println!("ready hash={:016x}", terrain.world().hash());
             }
         })
-        .add_systems(Update, (tell_receipts, tell_tool).after(BurrowSystems::Commit));
+        .add_systems(
+            Update,
+            (tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
+        );
     }
 }
 
@@ -35,6 +40,24 @@ fn tell_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Ter
     }
 }
 
+fn tell_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
+    for HistoryMoved { terrain, receipt } in moves.read() {
+        let name = match receipt.step {
+            HistoryStep::Undo => "undo",
+            HistoryStep::Redo => "redo",
+        };
+        let terrain = terrain.and_then(|terrain| terrains.get(terrain).ok());
+        let hash = terrain.map_or(0, |terrain| terrain.world().hash());
+        match &receipt.outcome {
+            Ok(restored) => {
+                let (removed, added) = (restored.removed.total(), restored.added.total());
+                println!("{name} removed={removed} added={added} hash={hash:016x}");
+            }
+            Err(why) => println!("{name} rejected: {why}"),
+        }
+    }
+}
+
 fn tell_tool(tool: Res<BrushTool>) {
     if tool.is_changed() {
         println!(
@@ -43,3 +66,24 @@ fn tell_tool(tool: Res<BrushTool>) {
         );
     }
 }
+
+/// Each frame, and where the panel's widgets are whenever that changes: `tools/drive.py` clicks on them.
+fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
+    if !tells.0 {
+        return;
+    }
+    println!("frame");
+    if !places.is_changed() {
+        return;
+    }
+    for (name, place) in &places.0 {
+        println!(
+            "place {name:?} {:.0} {:.0} {:.0} {:.0}",
+            place.min.x, place.min.y, place.max.x, place.max.y
+        );
+    }
+}
+
+/// Should frames and places be told?
+#[derive(Resource, Default)]
+pub struct TellAll(pub bool);

@@ -12,6 +12,8 @@
 //! | `W` `A` `S` `D`, `Q`, `E`, `Shift` | flies, down, up, faster |
 //! | wheel, `[`, `]` | size of the brush |
 //! | `Tab` | next operation |
+//! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
+//! | `H` | takes the height under the mouse for levelling |
 //! | `F1` | shows and hides the panel |
 //! | `F12` | saves a picture |
 //! | `Esc` | quits |
@@ -35,6 +37,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use bevy::prelude::*;
+use bevy_burrow::debug::BurrowDebugPlugin;
 use bevy_burrow::panel::BurrowPanelPlugin;
 use bevy_burrow::prelude::*;
 use clap::Parser;
@@ -54,6 +57,9 @@ struct Options {
     /// Height of the window or the pictures, in pixels.
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
+    /// Write each frame, and where the panel's widgets are, to standard output: for scripts that click on them.
+    #[arg(long)]
+    tell: bool,
 }
 
 fn main() -> ExitCode {
@@ -87,10 +93,12 @@ fn editor(app: &mut App, options: &Options) {
     app.add_plugins((
         BurrowPlugins,
         BurrowPanelPlugin,
+        BurrowDebugPlugin,
         scene::ScenePlugin,
         stroke::StrokePlugin,
         journal::JournalPlugin,
     ));
+    app.insert_resource(journal::TellAll(options.tell));
     app.world_mut().resource_mut::<bevy_burrow::panel::BurrowPanel>().pictures = options.out.clone();
 }
 

@@ -14,6 +14,7 @@ use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_dis
 use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
+use bevy_burrow::debug::BurrowDebug;
 use bevy_burrow::panel::{BrushTool, PanelAction, ToolAlign, ToolOperation, ToolShape};
 use bevy_burrow::prelude::*;
 
@@ -41,37 +42,80 @@ struct Stage {
 pub fn play(options: &Options) -> Result {
     std::fs::create_dir_all(&options.out)?;
     let mut stage = Stage::open(options)?;
-    stage.wait_until(|world| world.query::<&Tile>().iter(world).next().is_some())?;
+    stage.wait_until(|world| {
+        let mut dressed = world.query_filtered::<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
+        dressed.iter(world).next().is_some()
+    })?;
 
+    // Dig, build and paint.
     for x in [-9.0, -3.0, 3.0, 9.0] {
         stage.stroke(Vec2::new(x, 4.0))?;
     }
-    let changed = |tool: &mut BrushTool, operation, shape| (tool.operation, tool.shape) = (operation, shape);
-    stage.tool(|tool| {
-        changed(tool, ToolOperation::Add, ToolShape::Cylinder);
+    stage.take(ToolOperation::Add, ToolShape::Cylinder, |tool| {
         (tool.radius, tool.length, tool.material, tool.sink) = (3.0, 10.0, 5, -0.6);
     });
     for x in [-14.0, 14.0] {
         stage.stroke(Vec2::new(x, -8.0))?;
     }
-    stage.tool(|tool| {
-        changed(tool, ToolOperation::Paint, ToolShape::Sphere);
+    stage.take(ToolOperation::Paint, ToolShape::Sphere, |tool| {
         (tool.radius, tool.material, tool.is_rough, tool.bump) = (6.0, 7, true, 1.5);
     });
     stage.stroke(Vec2::new(0.0, -10.0))?;
-    stage.tool(|tool| {
-        changed(tool, ToolOperation::Dig, ToolShape::Box);
-        (tool.half, tool.turn, tool.align, tool.sink) =
-            (Vec3::new(5.0, 3.0, 4.0), 30.0, ToolAlign::Surface, 0.3);
+    stage.take(ToolOperation::Dig, ToolShape::Box, |tool| {
+        (tool.half, tool.turn, tool.align) = (Vec3::new(5.0, 3.0, 4.0), 30.0, ToolAlign::Surface);
     });
     stage.stroke(Vec2::new(22.0, 6.0))?;
-    stage.aim(Some(Vec2::new(-20.0, 8.0)));
     stage.act(PanelAction::CheckSeams);
+    stage.aim(Vec2::new(-20.0, 8.0));
     stage.frames(40);
-    stage.shoot("1_panel")?;
+    stage.shoot("1_dug_and_built")?;
+
+    // Sculpt: each operation at a place of its own.
+    let soft = |tool: &mut BrushTool| (tool.radius, tool.falloff, tool.strength) = (9.0, 6.0, 1.0);
+    for (operation, place, strokes) in [
+        (ToolOperation::Raise, Vec2::new(-34.0, -14.0), 4),
+        (ToolOperation::Lower, Vec2::new(32.0, -18.0), 3),
+        (ToolOperation::Smooth, Vec2::new(3.0, 4.0), 4),
+        (ToolOperation::Sharpen, Vec2::new(-9.0, 4.0), 3),
+        (ToolOperation::Flatten, Vec2::new(-18.0, 22.0), 2),
+        (ToolOperation::Level, Vec2::new(22.0, 24.0), 2),
+        (ToolOperation::Stamp, Vec2::new(2.0, -34.0), 1),
+        (ToolOperation::Terrace, Vec2::new(-30.0, 8.0), 3),
+    ] {
+        let ground = stage.aim(place).map_or(0.0, |hit| hit.position.y);
+        stage.take(operation, ToolShape::Sphere, |tool| {
+            soft(tool);
+            (tool.level, tool.step, tool.amount) = (ground + 2.0, 3.0, 2.0);
+            if operation == ToolOperation::Stamp {
+                (tool.radius, tool.amount, tool.falloff) = (16.0, 11.0, 1.0);
+            }
+        });
+        for _ in 0..strokes {
+            stage.stroke(place)?;
+        }
+    }
+    stage.frames(40);
+    stage.shoot("2_sculpted")?;
+
+    // Back to before the sculpting, and half of the way forth again.
+    for _ in 0..22 {
+        stage.step(PanelAction::Undo)?;
+    }
+    stage.frames(40);
+    stage.shoot("3_undone")?;
+    for _ in 0..22 {
+        stage.step(PanelAction::Redo)?;
+    }
+
+    // What the model holds.
+    let debug = BurrowDebug { chunks: true, fields: true, mask: true, rings: true, ..default() };
+    stage.app.world_mut().insert_resource(debug);
+    stage.frames(40);
+    stage.shoot("4_debug_views")?;
+    stage.app.world_mut().insert_resource(BurrowDebug::default());
     stage.resize(1920, 1080);
-    stage.frames(4);
-    stage.shoot("2_large")
+    stage.frames(40);
+    stage.shoot("5_large")
 }
 
 impl Stage {
@@ -100,6 +144,7 @@ impl Stage {
         app.update();
         let camera = app.world_mut().query_filtered::<Entity, With<Camera3d>>().single(app.world())?;
         let mut stage = Self { app, camera, folder: options.out.clone(), strokes: 0, pictures: 0 };
+        stage.film_runs(false);
         stage.resize(options.width, options.height);
         Ok(stage)
     }
@@ -109,6 +154,13 @@ impl Stage {
         let image = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
         let image = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
         self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(image));
+    }
+
+    /// Only pictures are drawn: in software a frame takes long.
+    fn film_runs(&mut self, runs: bool) {
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
+            camera.is_active = runs;
+        }
     }
 
     fn frames(&mut self, count: usize) {
@@ -126,8 +178,22 @@ impl Stage {
         Ok(())
     }
 
-    fn tool(&mut self, change: impl FnOnce(&mut BrushTool)) {
-        change(&mut self.app.world_mut().resource_mut::<BrushTool>());
+    /// Takes a fresh tool, and sets it up.
+    fn take(&mut self, operation: ToolOperation, shape: ToolShape, set_up: impl FnOnce(&mut BrushTool)) {
+        let mut tool = BrushTool { operation, shape, ..default() };
+        set_up(&mut tool);
+        self.app.world_mut().insert_resource(tool);
+    }
+
+    /// A step through history, and the frames until it is taken.
+    fn step(&mut self, action: PanelAction) -> Result {
+        let redos = |world: &mut World| {
+            let mut terrains = world.query::<&Terrain>();
+            terrains.iter(world).map(|terrain| terrain.history().redos).sum::<usize>()
+        };
+        let before = redos(self.app.world_mut());
+        self.act(action);
+        self.wait_until(|world| redos(world) != before)
     }
 
     fn act(&mut self, action: PanelAction) {
@@ -135,11 +201,11 @@ impl Stage {
     }
 
     /// Points at the ground at an offset from the middle.
-    fn aim(&mut self, offset: Option<Vec2>) -> Option<TerrainHit> {
+    fn aim(&mut self, offset: Vec2) -> Option<TerrainHit> {
         let world = self.app.world_mut();
         let mut terrains = world.query::<(Entity, &Terrain)>();
         let (entity, terrain) = terrains.iter(world).next()?;
-        let place = MIDDLE + Vec3::new(offset?.x, 500.0, offset?.y);
+        let place = MIDDLE + Vec3::new(offset.x, 500.0, offset.y);
         let hit = terrain.world().raycast(place.as_dvec3(), bevy::math::DVec3::NEG_Y, 1000.0)?;
         let aim = TerrainHit {
             terrain: entity,
@@ -155,7 +221,7 @@ impl Stage {
 
     /// One stroke, and the frames until its receipt is there.
     fn stroke(&mut self, offset: Vec2) -> Result {
-        let hit = self.aim(Some(offset)).ok_or("the script works outside the landscape")?;
+        let hit = self.aim(offset).ok_or("the script works outside the landscape")?;
         self.strokes += 1;
         let brush = self.app.world().resource::<BrushTool>().brush_at(&hit).with_tag(self.strokes);
         self.app.world_mut().write_message(brush);
@@ -166,8 +232,12 @@ impl Stage {
     fn shoot(&mut self, name: &str) -> Result {
         let path = self.folder.join(format!("{name}.png"));
         let target = self.app.world().get::<RenderTarget>(self.camera);
-        let Some(RenderTarget::Image(image)) = target else { return Err("the camera draws nowhere".into()) };
+        let Some(RenderTarget::Image(image)) = target.cloned() else {
+            return Err("the camera draws nowhere".into());
+        };
         let screenshot = Screenshot::image(image.handle.clone());
+        self.film_runs(true);
+        self.frames(2);
         self.app
             .world_mut()
             .spawn(screenshot)
@@ -176,6 +246,7 @@ impl Stage {
         self.pictures += 1;
         let pictures = self.pictures;
         self.wait_until(|world| world.resource::<Developed>().0 >= pictures)?;
+        self.film_runs(false);
         println!("picture {}", path.display());
         Ok(())
     }

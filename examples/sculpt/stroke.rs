@@ -101,6 +101,7 @@ fn resize(wheel: Res<AccumulatedMouseScroll>, mut tool: ResMut<BrushTool>) {
 
 fn keys(
     keys: Res<ButtonInput<KeyCode>>,
+    aim: Res<Aim>,
     mut tool: ResMut<BrushTool>,
     mut panel: ResMut<BurrowPanel>,
     mut actions: MessageWriter<PanelAction>,
@@ -116,6 +117,18 @@ fn keys(
         let all: Vec<ToolOperation> = ToolOperation::all().collect();
         let next = all.iter().position(|&operation| operation == tool.operation).map_or(0, |at| at + 1);
         tool.operation = all.get(next).copied().unwrap_or_default();
+    }
+    let (is_ctrl, is_shift) = (
+        keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]),
+        keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]),
+    );
+    match (is_ctrl, keys.just_pressed(KeyCode::KeyZ), keys.just_pressed(KeyCode::KeyY)) {
+        (true, true, _) if !is_shift => drop(actions.write(PanelAction::Undo)),
+        (true, true, _) | (true, _, true) => drop(actions.write(PanelAction::Redo)),
+        _ => {}
+    }
+    if let (true, Some(hit)) = (keys.just_pressed(KeyCode::KeyH), &aim.0) {
+        tool.level = hit.position.y;
     }
     if keys.just_pressed(KeyCode::F1) {
         panel.is_open = !panel.is_open;
@@ -152,6 +165,6 @@ fn show_through_ground(mut store: ResMut<GizmoConfigStore>) {
 fn preview(aim: Res<Aim>, tool: Res<BrushTool>, mut gizmos: Gizmos) {
     let Some(hit) = &aim.0 else { return };
     draw_shape(&mut gizmos, &tool.shape_at(hit), Color::srgb(1.0, 0.80, 0.30));
-    let normal = hit.normal * (0.5 * tool.radius).max(1.0);
+    let normal = hit.normal * f32::max(0.5 * tool.radius, 1.0);
     gizmos.line(hit.position, hit.position + normal, Color::srgb(1.0, 1.0, 1.0));
 }

@@ -1,2 +1,97 @@
-//! placeholder
-fn main() {}
+//! `server`: the world without rendering, as a dedicated server runs it: brushes in, receipts and a hash out.
+//!
+//! ```text
+//! cargo run --release --features examples --example server
+//! cargo run --release --features examples --example server -- --script examples/server/brushes.jsonl
+//! some_game | cargo run --release --features examples --example server -- --script -
+//! ```
+//!
+//! It runs Bevy's `MinimalPlugins` and `BurrowPlugins`, so it needs no window, no graphics and no assets. A script has a
+//! brush a line, as [`BrushRecord`] has it, in voxels; `{"undo":true}` and `{"redo":true}` are steps through history, and
+//! blank lines and lines that start with `#` count for nothing. `-` reads standard input as it comes in; without a script
+//! it digs at random, the same each time.
+//!
+//! For each brush a line with what became of it, then fields, memory, and the hash of the world: a client that got the
+//! same brushes in the same order has the same one. With `--per-tick` brushes go in batches, as they would from players;
+//! the hash does not depend on that.
+//!
+//! | file | subject |
+//! | --- | --- |
+//! | `script.rs` | where brushes come from |
+//! | `ledger.rs` | what is printed |
+
+mod ledger;
+mod script;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use bevy::app::ScheduleRunnerPlugin;
+use bevy::prelude::*;
+use bevy_burrow::backend::{Backend, Engine};
+use bevy_burrow::prelude::*;
+use clap::Parser;
+
+/// The world without rendering: brushes in, receipts and a hash out.
+#[derive(Parser, Clone, Debug)]
+pub struct Options {
+    /// Brushes, one JSON object a line; `-` for standard input.
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
+    /// Brushes to make up without a script.
+    #[arg(long, default_value_t = 200)]
+    brushes: u64,
+    /// Brushes that go in with each tick.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..))]
+    per_tick: u64,
+    /// Ticks a second; 0 for as many as there can be.
+    #[arg(long, default_value_t = 0.0)]
+    ticks: f64,
+    /// Cells along the world's sides.
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=8192))]
+    side: u32,
+    /// Cells along a chunk's side.
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(8..=128))]
+    chunk: u32,
+    /// Prints no receipts, only the end.
+    #[arg(long)]
+    quiet: bool,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    let terrain = match terrain(&options) {
+        Ok(terrain) => terrain,
+        Err(error) => {
+            eprintln!("server: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let source = match script::open(&options) {
+        Ok(source) => source,
+        Err(error) => {
+            eprintln!("server: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let period = Duration::try_from_secs_f64(1.0 / options.ticks).unwrap_or(Duration::ZERO);
+    let mut app = App::new();
+    app.add_plugins(MinimalPlugins.set(ScheduleRunnerPlugin::run_loop(period)))
+        .insert_resource(BurrowEngine(Engine::new(Backend::Cpu)))
+        .add_plugins(BurrowPlugins);
+    ledger::add(&mut app, options.quiet);
+    script::add(&mut app, source);
+    app.world_mut().spawn(terrain);
+    match app.run() {
+        AppExit::Success => ExitCode::SUCCESS,
+        AppExit::Error(code) => ExitCode::from(code.get()),
+    }
+}
+
+/// Hills in chunks, not touched yet.
+fn terrain(options: &Options) -> Result<Terrain> {
+    let noise = NoiseHeights { seed: 4, amplitude: 40.0, scale: 180.0, octaves: 5, ..default() };
+    let ground = Ground::from_noise(options.side, options.side, &noise)?;
+    Ok(Terrain::new(ground, &TerrainSettings { chunk_size: options.chunk, voxel_size: 1.0 })?)
+}

@@ -2,7 +2,7 @@
 
 use bevy_egui::egui::{self, Color32, CornerRadius, Pos2, Rect, Shape, Stroke, StrokeKind, Ui, Vec2};
 
-use super::operations::OPERATIONS;
+use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, FAINT};
 use super::widgets::{choice, section, slider, swatches, switch, tiles};
 use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolShape};
@@ -11,13 +11,14 @@ use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolShape};
 pub fn show(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) {
     section(ui, "Operation", true, |ui| operations(ui, tool));
     section(ui, "Shape", true, |ui| shape(ui, tool));
-    let needs = tool.operation.row().needs;
-    if needs.material {
+    if tool.operation.row().needs.contains(&Need::Material) {
         section(ui, "Material", true, |ui| material(ui, tool, materials));
     }
     section(ui, "Surface", true, |ui| surface(ui, tool));
     section(ui, "Stroke", true, |ui| {
         slider(ui, "Rate", &mut tool.rate, 1.0..=30.0, |slider| slider.max_decimals(0).suffix(" /s"));
+        slider(ui, "Power", &mut tool.power, 0..=u8::MAX, |slider| slider)
+            .on_hover_text("How hard the material may be that it takes away");
     });
 }
 
@@ -43,15 +44,20 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool) {
     }
     let row = tool.operation.row();
     ui.label(egui::RichText::new(row.help).color(FAINT).size(11.0));
-    if row.needs.strength {
-        slider(ui, "Strength", &mut tool.strength, 0.0..=1.0, percent);
+    for need in row.needs {
+        match need {
+            Need::Material => continue,
+            Need::Strength => slider(ui, "Strength", &mut tool.strength, 0.0..=1.0, percent),
+            Need::Falloff => slider(ui, "Falloff", &mut tool.falloff, 0.0..=16.0, metres),
+            Need::Amount => slider(ui, "Amount", &mut tool.amount, 0.0..=16.0, metres),
+            Need::Level => slider(ui, "Height", &mut tool.level, -128.0..=256.0, metres),
+            Need::Step => slider(ui, "Step", &mut tool.step, 1.0..=32.0, metres),
+        };
     }
-    if row.needs.hardness {
-        slider(ui, "Hardness", &mut tool.hardness, 0.0..=1.0, percent);
-    }
-    if let Some(name) = row.needs.height {
-        slider(ui, name, &mut tool.height, -64.0..=256.0, |slider| slider.max_decimals(1).suffix(" m"));
-    }
+}
+
+fn metres(slider: egui::Slider<'_>) -> egui::Slider<'_> {
+    slider.fixed_decimals(1).suffix(" m")
 }
 
 fn percent(slider: egui::Slider<'_>) -> egui::Slider<'_> {

@@ -14,6 +14,7 @@
 //! | --- | --- |
 //! | [`BrushTool`] | the brush in hand: [`brush_at`](BrushTool::brush_at) makes the [`Brush`](crate::brush::Brush) |
 //! | [`BurrowPanel`] | what is shown, names of materials, where pictures go |
+//! | [`PanelPlaces`] | where its widgets are on the screen: for tutorials that point at one, and for tests |
 //! | [`PanelInput`] | who has the pointer and the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
 //!
 //! [`PanelAction`] messages are its buttons, for keys of the game. It is drawn by the camera that has egui's primary
@@ -32,15 +33,15 @@ mod widgets;
 mod world_column;
 
 pub use operations::ToolOperation;
-pub use state::{BurrowPanel, PanelAction, PanelInput, keyboard_is_free, pointer_is_free};
-pub use tool::{BrushTool, ToolAlign, ToolShape};
+pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
+pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Color32, Id, Order, RichText, ScrollArea, Ui, Vec2};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
-use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, MaterialColors};
+use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, MaterialColors, Redo, Undo};
 use crate::terrain::Terrain;
 use survey::Survey;
 use world_column::{Content, TerrainLine};
@@ -62,12 +63,19 @@ impl Plugin for BurrowPanelPlugin {
         app.init_resource::<BrushTool>()
             .init_resource::<BurrowPanel>()
             .init_resource::<PanelInput>()
+            .init_resource::<PanelPlaces>()
             .init_resource::<Survey>()
             .add_message::<PanelAction>()
             .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
             .add_systems(
                 Update,
-                (survey::follow_frames, survey::count_terrain, survey::finish_seam_check, act)
+                (
+                    survey::follow_frames,
+                    survey::count_terrain,
+                    survey::finish_seam_check,
+                    act,
+                    set_undo_budget,
+                )
                     .chain()
                     .after(BurrowSystems::Begin),
             )
@@ -83,17 +91,34 @@ fn act(
     check: Option<Res<survey::SeamCheck>>,
     terrains: Query<(Entity, &Terrain)>,
     cameras: Query<&RenderTarget, With<PrimaryEguiContext>>,
+    mut undos: MessageWriter<Undo>,
+    mut redos: MessageWriter<Redo>,
 ) {
     for action in actions.read() {
+        let chosen = survey::chosen(&panel, &terrains);
         match action {
+            PanelAction::Undo => drop(chosen.map(|terrain| undos.write(Undo { terrain: Some(terrain) }))),
+            PanelAction::Redo => drop(chosen.map(|terrain| redos.write(Redo { terrain: Some(terrain) }))),
             PanelAction::CheckSeams => {
-                let terrain = survey::chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok());
+                let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
                 if let (Some((_, terrain)), None) = (terrain, &check) {
                     survey::start_seam_check(&mut commands, &mut panel, terrain);
                 }
             }
             PanelAction::SavePicture => picture::save(&mut commands, &mut panel, cameras.iter().next()),
         }
+    }
+}
+
+/// Hands a new budget of undo on to the terrains.
+fn set_undo_budget(
+    panel: Res<BurrowPanel>,
+    mut terrains: Query<&mut Terrain>,
+    mut last: Local<Option<usize>>,
+) {
+    let budget = panel.undo_mebibytes;
+    if last.replace(budget).is_some_and(|last| last != budget) {
+        terrains.iter_mut().for_each(|mut terrain| terrain.set_undo_budget(budget << 20));
     }
 }
 
@@ -107,6 +132,8 @@ fn draw(
     survey: Res<Survey>,
     terrains: Query<(Entity, &Terrain)>,
     looks: Query<(Option<&Name>, &MaterialColors)>,
+    mut places: ResMut<PanelPlaces>,
+    #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
 ) {
     let Ok(context) = contexts.ctx_mut() else { return };
@@ -144,21 +171,30 @@ fn draw(
                 actions: &mut pressed,
             };
             world_column::show(ui, &mut new_panel, &mut content);
+            #[cfg(feature = "debug")]
+            if let Some(debug) = &mut debug {
+                let mut new = (**debug).clone();
+                world_column::debug(ui, &mut new);
+                debug.set_if_neq(new);
+            }
         });
     }
     // Whoever watches them for changes is told of real ones only.
     tool.set_if_neq(new_tool);
     panel.set_if_neq(new_panel);
     settings.set_if_neq(new_settings);
+    places.set_if_neq(widgets::places(context));
     actions.write_batch(pressed);
 }
 
 /// Colours and names by id, as many as there are of both.
 fn materials(panel: &BurrowPanel, colors: &MaterialColors) -> Vec<(Color32, String)> {
-    let last = colors.0.last().copied().unwrap_or(LinearRgba::WHITE);
-    let color = |at: usize| {
-        let [r, g, b, _] = Srgba::from(colors.0.get(at).copied().unwrap_or(last)).to_u8_array();
-        Color32::from_rgb(r, g, b)
+    let color = |at: usize| match colors.0.get(at) {
+        Some(color) => {
+            let [r, g, b, _] = Srgba::from(*color).to_u8_array();
+            Color32::from_rgb(r, g, b)
+        }
+        None => theme::MORE_MATERIALS[at % theme::MORE_MATERIALS.len()],
     };
     panel.materials.iter().enumerate().map(|(at, name)| (color(at), name.clone())).collect()
 }
@@ -175,16 +211,206 @@ fn column(
     let offset = Vec2::new(if side == Align2::LEFT_TOP { theme::GAP } else { -theme::GAP }, theme::GAP);
     egui::Area::new(Id::new(id)).order(Order::Middle).anchor(side, offset).show(context, |ui| {
         ui.set_style(theme::style());
+        ui.set_max_height(height);
         let card = theme::card();
         let inside = theme::COLUMN - card.inner_margin.sum().x;
         card.show(ui, |ui| {
             ui.set_width(inside);
             ui.label(RichText::new(title).heading().color(theme::BRIGHT));
             let rest = (height - card.inner_margin.sum().y - 30.0).max(80.0);
+            ui.set_max_height(rest + 30.0);
             ScrollArea::vertical().max_height(rest).auto_shrink([false, true]).show(ui, |ui| {
                 ui.set_width(inside);
                 content(ui);
             });
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_egui::egui::{Event, Modifiers, PointerButton, Pos2, RawInput, Rect};
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::terrain::TerrainSettings;
+
+    /// The panel on a screen of its own, without an app.
+    struct Screen {
+        context: egui::Context,
+        size: Vec2,
+        tool: BrushTool,
+        panel: BurrowPanel,
+        settings: BurrowSettings,
+        terrains: Vec<Terrain>,
+        actions: Vec<PanelAction>,
+        places: PanelPlaces,
+        frames: f64,
+    }
+
+    impl Screen {
+        fn new(width: f32, height: f32, terrains: usize) -> Self {
+            let terrain = |_| {
+                let ground = Ground::flat(64, 64, 8.0).expect("valid");
+                Terrain::new(ground, &TerrainSettings::default()).expect("valid")
+            };
+            let mut screen = Self {
+                context: egui::Context::default(),
+                size: Vec2::new(width, height),
+                tool: BrushTool::default(),
+                panel: BurrowPanel::default(),
+                settings: BurrowSettings::default(),
+                terrains: (0..terrains).map(terrain).collect(),
+                actions: Vec::new(),
+                places: PanelPlaces::default(),
+                frames: 0.0,
+            };
+            (0..3).for_each(|_| screen.frame(Vec::new()));
+            screen
+        }
+
+        fn frame(&mut self, events: Vec<Event>) {
+            self.frames += 1.0;
+            let input = RawInput {
+                screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size)),
+                time: Some(self.frames / 60.0),
+                events,
+                ..RawInput::default()
+            };
+            let entity = |at: usize| Entity::from_raw_u32(at as u32 + 1).expect("small");
+            let lines: Vec<TerrainLine> = self
+                .terrains
+                .iter()
+                .enumerate()
+                .map(|(at, terrain)| TerrainLine { entity: entity(at), name: format!("Hills {at}"), terrain })
+                .collect();
+            let materials = materials(&self.panel, &MaterialColors::default());
+            let (figures, survey) = (BurrowFigures::default(), Survey::default());
+            let mut actions = Vec::new();
+            let _ = self.context.run_ui(input, |ui| {
+                let context = ui.ctx().clone();
+                column(&context, "burrow brush", Align2::LEFT_TOP, "Brush", |ui| {
+                    brush_column::show(ui, &mut self.tool, &materials);
+                });
+                column(&context, "burrow world", Align2::RIGHT_TOP, "World", |ui| {
+                    let mut content = Content {
+                        terrains: &lines,
+                        chosen: self.panel.terrain.or(lines.first().map(|line| line.entity)),
+                        figures: &figures,
+                        survey: &survey,
+                        settings: &mut self.settings,
+                        actions: &mut actions,
+                    };
+                    world_column::show(ui, &mut self.panel, &mut content);
+                });
+            });
+            self.actions.append(&mut actions);
+            self.places = widgets::places(&self.context);
+        }
+
+        fn middle(&self, name: &str) -> Pos2 {
+            let middle = self.places.0.get(name).unwrap_or_else(|| panic!("{name} is not seen")).center();
+            Pos2::new(middle.x, middle.y)
+        }
+
+        fn button(at: Pos2, is_down: bool) -> Event {
+            Event::PointerButton {
+                pos: at,
+                button: PointerButton::Primary,
+                pressed: is_down,
+                modifiers: Modifiers::NONE,
+            }
+        }
+
+        fn click(&mut self, at: Pos2) {
+            self.frame(vec![Event::PointerMoved(at)]);
+            self.frame(vec![Self::button(at, true)]);
+            self.frame(vec![Self::button(at, false)]);
+        }
+    }
+
+    #[test]
+    fn both_columns_fit_on_common_screens() {
+        for (width, height) in [(1280.0, 720.0), (1920.0, 1080.0), (800.0, 600.0)] {
+            for terrains in [0, 1, 5] {
+                let screen = Screen::new(width, height, terrains);
+                for (name, place) in &screen.places.0 {
+                    assert!(place.min.x >= 0.0 && place.max.x <= width, "{name} {place:?}");
+                    assert!(place.width() > 4.0, "{name} {place:?}");
+                    let middle = place.center().x;
+                    assert!(middle < 0.4 * width || middle > 0.6 * width, "{name} hides the view: {place:?}");
+                }
+                for name in ["Dig", "Terrace", "Sphere", "Radius", "Undo", "Check seams", "Save picture"] {
+                    let place = screen.places.0.get(name).unwrap_or_else(|| panic!("{name} at {width}"));
+                    assert!(place.max.y <= height, "{name} {place:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tiles_and_sliders_set_the_brush() {
+        let mut screen = Screen::new(1280.0, 720.0, 1);
+        for operation in ToolOperation::all() {
+            let at = screen.middle(operation.name());
+            screen.click(at);
+            assert_eq!(screen.tool.operation, operation);
+        }
+        for shape in ToolShape::ALL {
+            let at = screen.middle(shape.name());
+            screen.click(at);
+            assert_eq!(screen.tool.shape, shape);
+        }
+        let at = screen.middle("Sphere");
+        screen.click(at);
+        screen.frame(Vec::new());
+        let rail = screen.places.0["Radius"];
+        let (from, to) =
+            (Pos2::new(rail.min.x + 20.0, rail.center().y), Pos2::new(rail.max.x - 4.0, rail.center().y));
+        screen.frame(vec![Event::PointerMoved(from)]);
+        screen.frame(vec![Screen::button(from, true)]);
+        let small = screen.tool.radius;
+        screen.frame(vec![Event::PointerMoved(to)]);
+        screen.frame(vec![Screen::button(to, false)]);
+        assert!(screen.tool.radius > 2.0 * small, "{} {small}", screen.tool.radius);
+    }
+
+    #[test]
+    fn buttons_act_only_where_they_can() {
+        let mut screen = Screen::new(1280.0, 720.0, 0);
+        for name in ["Undo", "Redo", "Check seams"] {
+            let at = screen.middle(name);
+            screen.click(at);
+        }
+        assert_eq!(screen.actions, []);
+        let mut screen = Screen::new(1280.0, 720.0, 1);
+        let shape = crate::brush::Shape::sphere(Vec3::splat(32.0).with_y(8.0), 4.0);
+        screen.terrains[0].apply([crate::brush::Brush::dig(shape)]);
+        screen.frame(Vec::new());
+        for name in ["Undo", "Redo", "Check seams", "Save picture"] {
+            let at = screen.middle(name);
+            screen.click(at);
+        }
+        assert_eq!(screen.actions, [PanelAction::Undo, PanelAction::CheckSeams, PanelAction::SavePicture]);
+    }
+
+    #[test]
+    fn one_of_several_terrains_is_chosen() {
+        let mut screen = Screen::new(1280.0, 720.0, 3);
+        let at = screen.middle("Hills 2");
+        screen.click(at);
+        assert_eq!(screen.panel.terrain, Entity::from_raw_u32(3));
+    }
+
+    #[test]
+    fn egui_has_the_pointer_over_a_column_only() {
+        let mut screen = Screen::new(1280.0, 720.0, 1);
+        let over = screen.middle("Radius");
+        for (at, is_over) in [(over, true), (Pos2::new(640.0, 400.0), false), (Pos2::new(1200.0, 60.0), true)]
+        {
+            screen.frame(vec![Event::PointerMoved(at)]);
+            screen.frame(Vec::new());
+            assert_eq!(screen.context.is_pointer_over_egui(), is_over, "{at:?}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 use super::BrushTool;
-use crate::brush::Operation;
+use crate::brush::{Operation, Stamp};
 use crate::plugin::TerrainHit;
 
 /// What a [`BrushTool`] does.
@@ -17,26 +17,42 @@ pub enum ToolOperation {
     Add,
     /// Changes the material.
     Paint,
+    /// Evens out bumps and edges.
+    Smooth,
+    /// Deepens bumps and edges.
+    Sharpen,
+    /// Makes a plane through where the stroke is, as the surface lies there.
+    Flatten,
+    /// Makes the ground level at [`BrushTool::level`].
+    Level,
+    /// Moves the surface outwards by [`BrushTool::amount`].
+    Raise,
+    /// Moves the surface inwards by [`BrushTool::amount`].
+    Lower,
+    /// Presses [`BrushTool::stamp`] onto the ground, [`BrushTool::amount`] high.
+    Stamp,
+    /// Cuts slopes into steps of [`BrushTool::step`].
+    Terrace,
 }
 
-/// Which settings an operation has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Needs {
-    pub material: bool,
-    pub strength: bool,
-    pub hardness: bool,
-    /// What [`BrushTool::height`] means, if anything.
-    pub height: Option<&'static str>,
+/// A setting that some operations have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Need {
+    Material,
+    Strength,
+    Falloff,
+    Amount,
+    Level,
+    Step,
 }
-
-const NOTHING: Needs = Needs { material: false, strength: false, hardness: false, height: None };
+use Need::{Amount, Falloff, Level, Material, Step, Strength};
 
 /// A row of the table.
 pub(super) struct Row {
     pub tool: ToolOperation,
     pub name: &'static str,
     pub help: &'static str,
-    pub needs: Needs,
+    pub needs: &'static [Need],
     /// The ground's height before and after, from left (0) to right (1): its icon.
     pub profile: fn(f32) -> (f32, f32),
     make: fn(&BrushTool, &TerrainHit) -> Operation,
@@ -46,39 +62,67 @@ impl Row {
     pub fn operation(&self, tool: &BrushTool, hit: &TerrainHit) -> Operation {
         (self.make)(tool, hit)
     }
+
+    /// Does it fade, and do a part of its work?
+    pub fn sculpts(&self) -> bool {
+        self.needs.contains(&Strength)
+    }
 }
 
 /// Every operation, in the panel's order. That of [`ToolOperation`] itself is the same.
+#[rustfmt::skip]
 pub(super) const OPERATIONS: &[Row] = &[
-    Row {
-        tool: ToolOperation::Dig,
-        name: "Dig",
-        help: "Takes ground away",
-        needs: NOTHING,
-        profile: |x| (0.62, 0.62 - 0.5 * bowl(x)),
-        make: |_, _| Operation::Dig,
-    },
-    Row {
-        tool: ToolOperation::Add,
-        name: "Build",
-        help: "Fills the shape with ground",
-        needs: Needs { material: true, ..NOTHING },
-        profile: |x| (0.3, 0.3 + 0.5 * bowl(x)),
-        make: |tool, _| Operation::Add { material: tool.material_id() },
-    },
-    Row {
-        tool: ToolOperation::Paint,
-        name: "Paint",
-        help: "Changes the material of ground that is there",
-        needs: Needs { material: true, ..NOTHING },
-        profile: |x| (0.3, 0.45 + 0.18 * (x * 5.5).sin()),
-        make: |tool, _| Operation::Paint { material: tool.material_id() },
-    },
+    Row { tool: ToolOperation::Dig, name: "Dig", help: "Takes ground away", needs: &[],
+        profile: |x| (0.62, 0.62 - 0.5 * bowl(x)), make: |_, _| Operation::Dig },
+    Row { tool: ToolOperation::Add, name: "Build", help: "Fills the shape with ground", needs: &[Material],
+        profile: |x| (0.3, 0.3 + 0.5 * bowl(x)), make: |tool, _| Operation::Add { material: tool.material_id() } },
+    Row { tool: ToolOperation::Paint, name: "Paint", help: "Changes the material of ground that is there", needs: &[Material],
+        profile: |x| (0.25, 0.5 + 0.12 * (x * 6.0).sin()), make: |tool, _| Operation::Paint { material: tool.material_id() } },
+    Row { tool: ToolOperation::Smooth, name: "Smooth", help: "Evens out bumps and edges", needs: &[Strength, Falloff],
+        profile: |x| (0.5 + 0.3 * saw(x * 4.0), 0.5 + 0.08 * (x * 12.0).sin()), make: |_, _| Operation::Smooth },
+    Row { tool: ToolOperation::Sharpen, name: "Sharpen", help: "Deepens bumps and edges", needs: &[Strength, Falloff],
+        profile: |x| (0.5 + 0.1 * (x * 12.0).sin(), 0.5 + 0.4 * saw(x * 3.0)), make: |_, _| Operation::Sharpen },
+    Row { tool: ToolOperation::Flatten, name: "Flatten", help: "Makes a plane, as the surface lies", needs: &[Strength, Falloff],
+        profile: |x| (0.2 + 0.6 * x + 0.15 * (x * 14.0).sin(), 0.2 + 0.6 * x),
+        make: |_, hit| Operation::Flatten { point: hit.position, normal: hit.normal } },
+    Row { tool: ToolOperation::Level, name: "Level", help: "Makes the ground level at a height", needs: &[Level, Strength, Falloff],
+        profile: |x| (0.5 + 0.35 * (x * 8.0).sin(), 0.5), make: |tool, _| Operation::Level { height: tool.level } },
+    Row { tool: ToolOperation::Raise, name: "Raise", help: "Moves the surface outwards", needs: &[Amount, Strength, Falloff],
+        profile: |x| (0.25, 0.25 + 0.6 * bell(x)), make: |tool, _| Operation::Raise { amount: tool.amount } },
+    Row { tool: ToolOperation::Lower, name: "Lower", help: "Moves the surface inwards", needs: &[Amount, Strength, Falloff],
+        profile: |x| (0.75, 0.75 - 0.6 * bell(x)), make: |tool, _| Operation::Lower { amount: tool.amount } },
+    Row { tool: ToolOperation::Stamp, name: "Stamp", help: "Presses an image onto the ground", needs: &[Amount, Strength, Falloff],
+        profile: |x| (0.2, 0.2 + 0.7 * (1.0 - (x - 0.5).abs() * 2.6).max(0.0)), make: stamp },
+    Row { tool: ToolOperation::Terrace, name: "Terrace", help: "Cuts slopes into steps", needs: &[Step, Strength, Falloff],
+        profile: |x| (0.1 + 0.8 * x, 0.1 + 0.8 * (x * 3.0).round() / 3.0),
+        make: |tool, _| Operation::Terrace { step: tool.step, base: 0.0 } },
 ];
 
 /// Half an ellipse in the middle.
 fn bowl(x: f32) -> f32 {
     (1.0 - ((x - 0.5) / 0.32).powi(2)).max(0.0).sqrt()
+}
+
+/// A soft hill in the middle.
+fn bell(x: f32) -> f32 {
+    (-((x - 0.5) / 0.18).powi(2)).exp()
+}
+
+/// Teeth between -1 and 1, one for each whole number.
+fn saw(x: f32) -> f32 {
+    ((x - x.floor()) * 4.0 - 2.0).abs() - 1.0
+}
+
+/// The tool's image over its radius, lying as the tool does.
+fn stamp(tool: &BrushTool, hit: &TerrainHit) -> Operation {
+    let (size, turn) = (Vec2::splat(2.0 * tool.width()), Quat::from_rotation_y(tool.turn.to_radians()));
+    let tilt = Quat::from_rotation_arc(Vec3::Y, tool.axis(hit));
+    match tool.stamp.image() {
+        Some(image) => {
+            Operation::Stamp(Stamp::new(image, hit.position, size, tool.amount).with_rotation(tilt * turn))
+        }
+        None => Operation::Raise { amount: tool.amount },
+    }
 }
 
 impl ToolOperation {

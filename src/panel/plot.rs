@@ -36,7 +36,7 @@ pub fn line(
     label: &str,
     now: &str,
 ) {
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 34.0), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 40.0), Sense::hover());
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, CornerRadius::same(5), SLATE.gamma_multiply(0.7));
     let values: Vec<f32> = values.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 }).collect();
@@ -48,7 +48,7 @@ pub fn line(
         .iter()
         .enumerate()
         .map(|(at, value)| {
-            Pos2::new(start + step * at as f32, inner.bottom() - inner.height() * 0.62 * value / top)
+            Pos2::new(start + step * at as f32, inner.bottom() - inner.height() * 0.52 * value / top)
         })
         .collect();
     // The area below, as one thin line for each value: exact whatever the shape.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 
@@ -20,6 +21,8 @@ pub struct BurrowPanel {
     /// What materials are called, by id. The panel offers these; their colours are those of the terrain's
     /// [`MaterialColors`](crate::plugin::MaterialColors).
     pub materials: Vec<String>,
+    /// What undo may take of memory, in MiB, of each terrain. Terrains keep their own budget until this changes.
+    pub undo_mebibytes: usize,
     /// Where pictures are saved, as `burrow_0001.png` and so on.
     pub pictures: PathBuf,
     /// What the panel has to say: the last seam check, the last picture.
@@ -27,15 +30,29 @@ pub struct BurrowPanel {
 }
 
 impl Default for BurrowPanel {
-    /// Open, with the materials of the default [`MaterialColors`](crate::plugin::MaterialColors).
+    /// Open, with the materials of the plugin's own look of the ground.
     fn default() -> Self {
-        let names = ["Rock", "Grass", "Sand", "Snow", "Clay", "Concrete", "Coal", "Gold"];
+        let names = [
+            "Rock",
+            "Grass",
+            "Sand",
+            "Snow",
+            "Clay",
+            "Concrete",
+            "Coal",
+            "Gold",
+            "Soil",
+            "Sandstone",
+            "Shale",
+            "Gravel",
+        ];
         Self {
             is_open: true,
             shows_brush: true,
             shows_world: true,
             terrain: None,
             materials: names.map(String::from).to_vec(),
+            undo_mebibytes: 64,
             pictures: PathBuf::from("pictures"),
             note: None,
         }
@@ -55,6 +72,10 @@ pub(super) enum Note {
 pub enum PanelAction {
     /// Looks at every triangle of the terrain, in a task, and shows whether all seams are closed.
     CheckSeams,
+    /// Undoes the last transaction of the terrain.
+    Undo,
+    /// Does again what was undone last.
+    Redo,
     /// Saves what the camera with the panel sees, the panel included.
     SavePicture,
 }
@@ -68,6 +89,12 @@ pub struct PanelInput {
     /// Something is being typed into it.
     pub has_keyboard: bool,
 }
+
+/// Where the panel's widgets were drawn in the last frame, by name, in logical pixels from the window's upper left corner.
+/// Of a slider it is the rail.
+#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Resource, Default)]
+pub struct PanelPlaces(pub HashMap<String, Rect>);
 
 /// Run condition: nothing of egui has the pointer, so that a click means the world. Without the panel it always holds.
 pub fn pointer_is_free(input: Option<Res<PanelInput>>) -> bool {

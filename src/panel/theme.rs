@@ -34,6 +34,14 @@ pub const PARTS: [Color32; 6] = [
     Color32::from_rgb(224, 122, 140),
 ];
 
+/// Of materials that a terrain's colours do not reach: soil, sandstone, shale, gravel.
+pub const MORE_MATERIALS: [Color32; 4] = [
+    Color32::from_rgb(96, 70, 48),
+    Color32::from_rgb(178, 134, 92),
+    Color32::from_rgb(84, 88, 96),
+    Color32::from_rgb(128, 122, 114),
+];
+
 /// The frame around a column.
 pub fn card() -> Frame {
     Frame::new()

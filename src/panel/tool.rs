@@ -1,10 +1,12 @@
 //! The brush in hand: what the panel's left column sets and games read.
 
+use std::sync::{Arc, LazyLock};
+
 use bevy::prelude::*;
 
 use super::operations::ToolOperation;
-use crate::brush::{Brush, Roughness, Shape};
-use crate::ground::MaterialId;
+use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
+use crate::ground::{GreyImage, MaterialId};
 use crate::plugin::TerrainHit;
 
 /// The brush in hand, in metres of the world. The panel changes it, keys of the game may too, and the game reads it:
@@ -41,13 +43,21 @@ pub struct BrushTool {
     pub sink: f32,
     /// What it builds or paints with: a [`MaterialId`].
     pub material: u8,
-    /// How much of its work one stroke does, 0 to 1, for operations that can do a part.
+    /// How much of its work one stroke does, 0 to 1, for operations that sculpt.
     pub strength: f32,
-    /// Where its rim begins to fade, as a part of its radius: 0 fades from the middle, 1 has a hard rim. For operations
-    /// with a soft rim.
-    pub hardness: f32,
-    /// The height that some operations aim at, or how high steps are, in metres.
-    pub height: f32,
+    /// Over how many metres from its rim inwards it fades in, for operations that sculpt.
+    pub falloff: f32,
+    /// How far it moves the surface, or how high a stamp is, in metres.
+    pub amount: f32,
+    /// The height that it levels to, in metres of the world.
+    pub level: f32,
+    /// Height of terraces, in metres.
+    pub step: f32,
+    /// What it stamps.
+    #[reflect(ignore)]
+    pub stamp: StampImage,
+    /// How hard the material may be that it takes away, where the terrain has rules for that; 255 takes away all.
+    pub power: u8,
     /// Has it bumps on its surface?
     pub is_rough: bool,
     /// Height of the bumps.
@@ -72,9 +82,13 @@ impl Default for BrushTool {
             turn: 0.0,
             sink: 0.0,
             material: 0,
-            strength: 0.5,
-            hardness: 0.4,
-            height: 4.0,
+            strength: 0.6,
+            falloff: 3.0,
+            amount: 2.0,
+            level: 0.0,
+            step: 4.0,
+            stamp: StampImage::default(),
+            power: FULL_POWER,
             is_rough: false,
             bump: 0.5,
             bump_width: 4.0,
@@ -83,6 +97,30 @@ impl Default for BrushTool {
         }
     }
 }
+
+/// What a [`BrushTool`] stamps: an image of heights, white is high. Without one, a ridge of the panel's own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StampImage(pub Option<Arc<GreyImage>>);
+
+impl StampImage {
+    /// The image; `None` only if there can be none at all.
+    pub(super) fn image(&self) -> Option<Arc<GreyImage>> {
+        self.0.clone().or_else(|| RIDGE.clone())
+    }
+}
+
+/// A mountain with three ridges.
+static RIDGE: LazyLock<Option<Arc<GreyImage>>> = LazyLock::new(|| {
+    const SIDE: u32 = 65;
+    let height = |x: u32, z: u32| {
+        let at = (Vec2::new(x as f32, z as f32) * 2.0 / (SIDE - 1) as f32) - 1.0;
+        let ridge = 0.5 + 0.5 * (3.0 * at.y.atan2(at.x)).cos();
+        let fall = (1.0 - at.length()).clamp(0.0, 1.0);
+        (fall.powf(1.6 - 0.8 * ridge) * f32::from(u16::MAX)) as u16
+    };
+    let samples = (0..SIDE).flat_map(|z| (0..SIDE).map(move |x| height(x, z))).collect();
+    GreyImage::from_samples(SIDE, SIDE, samples).ok().map(Arc::new)
+});
 
 /// The form of a [`BrushTool`].
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -136,18 +174,17 @@ impl ToolShape {
 impl BrushTool {
     /// The brush that this tool makes where a ray met the ground, in world space.
     pub fn brush_at(&self, hit: &TerrainHit) -> Brush {
+        let row = self.operation.row();
         let mut brush = Brush::dig(self.shape_at(hit));
-        brush.operation = self.operation.row().operation(self, hit);
+        brush.operation = row.operation(self, hit);
         brush.roughness = self.roughness();
-        brush
+        brush.power = self.power;
+        if row.sculpts() { brush.with_strength(self.strength).with_falloff(self.falloff) } else { brush }
     }
 
     /// The shape of that brush alone: for a preview.
     pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
-        let axis = match self.align {
-            ToolAlign::Upright => Vec3::Y,
-            ToolAlign::Surface => hit.normal.try_normalize().unwrap_or(Vec3::Y),
-        };
+        let axis = self.axis(hit);
         let middle = hit.position - axis * self.sink * self.reach();
         let end = middle - axis * self.length / 2.0;
         match self.shape {
@@ -160,6 +197,19 @@ impl BrushTool {
             ToolShape::Capsule => Shape::capsule(end, end + axis * self.length, self.radius),
             ToolShape::Cone => Shape::cone(end, axis * self.length, self.radius),
         }
+    }
+
+    /// Where its axis points at a place.
+    pub(super) fn axis(&self, hit: &TerrainHit) -> Vec3 {
+        match self.align {
+            ToolAlign::Upright => Vec3::Y,
+            ToolAlign::Surface => hit.normal.try_normalize().unwrap_or(Vec3::Y),
+        }
+    }
+
+    /// From its middle to its rim.
+    pub(super) fn width(&self) -> f32 {
+        if self.shape == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
     }
 
     /// What it builds or paints with.

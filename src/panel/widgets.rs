@@ -3,11 +3,33 @@
 use std::ops::RangeInclusive;
 
 use bevy_egui::egui::{
-    Align, Align2, Button, Color32, CornerRadius, CursorIcon, FontId, Id, Layout, Pos2, Rect, Response,
-    RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2, emath::Numeric,
+    Align, Align2, Button, Color32, Context, CornerRadius, CursorIcon, FontId, Id, Layout, Pos2, Rect,
+    Response, RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2, emath::Numeric,
 };
 
+use super::PanelPlaces;
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
+
+/// Where widgets were drawn in this frame.
+#[derive(Clone, Default)]
+struct Drawn(PanelPlaces);
+
+/// Notes where a widget is, if it can be seen.
+fn note(ui: &Ui, name: &str, rect: Rect) {
+    if !ui.is_rect_visible(rect) {
+        return;
+    }
+    let corner = |at: Pos2| bevy::math::Vec2::new(at.x, at.y);
+    let place = bevy::math::Rect::from_corners(corner(rect.min), corner(rect.max));
+    ui.data_mut(|data| {
+        data.get_temp_mut_or_default::<Drawn>(Id::NULL).0.0.insert(name.into(), place);
+    });
+}
+
+/// Where this frame's widgets are.
+pub fn places(context: &Context) -> PanelPlaces {
+    context.data_mut(|data| std::mem::take(data.get_temp_mut_or_default::<Drawn>(Id::NULL))).0
+}
 
 /// A heading that opens and closes what follows.
 pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl FnOnce(&mut Ui)) {
@@ -55,6 +77,7 @@ pub fn tiles(
             for (column, name) in line.iter().enumerate() {
                 let at = row * columns + column;
                 let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 48.0), Sense::click());
+                note(ui, name, rect);
                 let color = frame_tile(ui, rect, &response, at == chosen);
                 let area = Rect::from_min_max(
                     rect.min + Vec2::new(10.0, 6.0),
@@ -112,6 +135,7 @@ pub fn swatches(ui: &mut Ui, colors: &[(Color32, &str)], chosen: usize) -> Optio
             for (column, (color, name)) in line.iter().enumerate() {
                 let at = row * COLUMNS + column;
                 let (rect, response) = ui.allocate_exact_size(Vec2::splat(side), Sense::click());
+                note(ui, name, rect);
                 let edge = match (at == chosen, response.hovered()) {
                     (true, _) => Stroke::new(2.0, BRIGHT),
                     (false, true) => Stroke::new(1.0, FAINT),
@@ -141,6 +165,8 @@ pub fn slider<N: Numeric>(
         ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font, TEXT);
         ui.spacing_mut().slider_width = (ui.available_width() - 62.0).max(40.0);
         let slider = Slider::new(value, range).clamping(SliderClamping::Always);
+        let rail = Rect::from_min_size(ui.cursor().min, Vec2::new(ui.spacing().slider_width, 20.0));
+        note(ui, name, rail);
         ui.add(format(slider))
     })
     .inner
@@ -168,6 +194,7 @@ pub fn switch(ui: &mut Ui, name: &str, is_on: &mut bool) -> Response {
         *is_on = !*is_on;
         response.mark_changed();
     }
+    note(ui, name, rect);
     let painter = ui.painter();
     let color = if response.hovered() { BRIGHT } else { TEXT };
     painter.text(rect.left_center(), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
@@ -183,7 +210,9 @@ pub fn switch(ui: &mut Ui, name: &str, is_on: &mut bool) -> Response {
 
 /// A button as wide as its share of a row.
 pub fn button(ui: &mut Ui, text: &str, width: f32, is_enabled: bool) -> Response {
-    ui.add_enabled(is_enabled, Button::new(text).min_size(Vec2::new(width, 26.0)))
+    let response = ui.add_enabled(is_enabled, Button::new(text).min_size(Vec2::new(width, 26.0)));
+    note(ui, text, response.rect);
+    response
 }
 
 /// Width of one of `count` buttons in a row.

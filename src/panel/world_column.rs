@@ -10,7 +10,7 @@ use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
 use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
 use crate::backend::{Choice, EngineState, Stage};
 use crate::plugin::{BurrowFigures, BurrowSettings};
-use crate::terrain::Terrain;
+use crate::terrain::{History, Terrain};
 
 /// A terrain on the list.
 pub struct TerrainLine<'a> {
@@ -32,7 +32,7 @@ pub struct Content<'a> {
 /// Draws the column.
 pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     let chosen = content.terrains.iter().find(|line| Some(line.entity) == content.chosen);
-    buttons(ui, panel, content.actions, chosen.is_some());
+    buttons(ui, panel, content.actions, chosen.map(|line| line.terrain.history()));
     section(ui, "Terrain", true, |ui| terrain(ui, panel, content.terrains, chosen));
     section(ui, "Live", true, |ui| live(ui, content.figures, content.survey));
     if let Some(counts) = &content.survey.counts {
@@ -41,12 +41,23 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     if let Some((state, stages, last)) = &content.survey.engine {
         section(ui, "Engine", true, |ui| engine(ui, state, *stages, last.as_ref()));
     }
-    section(ui, "Settings", false, |ui| settings(ui, content.settings));
+    section(ui, "Settings", false, |ui| settings(ui, panel, content.settings));
 }
 
-fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, has_terrain: bool) {
+fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, history: Option<History>) {
     let is_busy = matches!(panel.note, Some(Note::Busy(_)));
     let width = share(ui, 2);
+    let has_terrain = history.is_some();
+    let History { undos, redos, bytes: held } = history.unwrap_or_default();
+    ui.horizontal(|ui| {
+        if button(ui, "Undo", width, undos > 0).clicked() {
+            actions.push(PanelAction::Undo);
+        }
+        if button(ui, "Redo", width, redos > 0).clicked() {
+            actions.push(PanelAction::Redo);
+        }
+    });
+    figure(ui, "Undo, redo", format!("{undos}, {redos} steps, {}", bytes(held)));
     ui.horizontal(|ui| {
         let seams = button(ui, "Check seams", width, has_terrain && !is_busy);
         if seams.on_hover_text("Looks at every triangle of the terrain").clicked() {
@@ -162,9 +173,24 @@ fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<
     }
 }
 
-fn settings(ui: &mut Ui, settings: &mut BurrowSettings) {
+fn settings(ui: &mut Ui, panel: &mut BurrowPanel, settings: &mut BurrowSettings) {
+    slider(ui, "History", &mut panel.undo_mebibytes, 0..=1024, |slider| slider.suffix(" MiB"))
+        .on_hover_text("What undo may take of memory, of each terrain");
     slider(ui, "Swaps", &mut settings.swaps_per_frame, 1..=4096, |slider| slider.logarithmic(true))
         .on_hover_text("Meshes swapped per frame, at most");
     slider(ui, "Loads", &mut settings.loads_per_frame, 1..=4096, |slider| slider.logarithmic(true))
         .on_hover_text("Tile meshes handed to the renderer per frame while a terrain loads");
+}
+
+/// Draws the switches of the debug views.
+#[cfg(feature = "debug")]
+pub fn debug(ui: &mut Ui, debug: &mut crate::debug::BurrowDebug) {
+    section(ui, "Debug views", false, |ui| {
+        for view in crate::debug::DebugView::ALL {
+            super::widgets::switch(ui, view.name(), debug.switch(view));
+        }
+        slider(ui, "Reach", &mut debug.radius, 8.0..=512.0, |slider| slider.logarithmic(true).suffix(" m"));
+        slider(ui, "Near", &mut debug.near, 4.0..=64.0, |slider| slider.logarithmic(true).suffix(" m"))
+            .on_hover_text("How far normals and wires reach");
+    });
 }

@@ -148,6 +148,11 @@ impl Rings {
         &self.vertices
     }
 
+    /// Their triangles: the tile's columns count first, then these rings' own vertices.
+    pub(crate) fn fans(&self) -> &[u32] {
+        &self.fans
+    }
+
     /// Bytes of the rings, their buffers included.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()

@@ -18,6 +18,7 @@ mod commit;
 mod drafting;
 mod field_log;
 mod history;
+mod inspect;
 mod loose;
 mod query;
 mod ray;

@@ -16,7 +16,9 @@
 #![cfg(feature = "examples")]
 
 mod album;
+mod debug_views;
 mod landscape;
+mod panel;
 mod sameness;
 mod studio;
 mod tunnel;
@@ -33,5 +35,29 @@ fn ground_looks_as_approved() {
     tunnel::shoot(&mut studio, &mut album);
     sameness::shoot(&mut studio, &mut album);
     ways::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+#[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
+fn debug_views_look_as_approved() {
+    let Some(mut studio) = Studio::open(|app| drop(app.add_plugins(bevy_burrow::debug::BurrowDebugPlugin)))
+    else {
+        return;
+    };
+    let mut album = Album::default();
+    debug_views::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+#[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
+fn the_panel_looks_as_approved() {
+    let Some(mut studio) = Studio::open(|app| drop(app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin)))
+    else {
+        return;
+    };
+    let mut album = Album::default();
+    panel::shoot(&mut studio, &mut album);
     album.close();
 }

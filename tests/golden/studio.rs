@@ -37,6 +37,7 @@ pub struct Studio {
     pub camera: Entity,
     sun: Entity,
     film: Handle<Image>,
+    size: (u32, u32),
     _only: MutexGuard<'static, ()>,
 }
 
@@ -105,7 +106,7 @@ impl Studio {
                 CascadeShadowConfigBuilder { num_cascades: 2, maximum_distance: 120.0, ..default() }.build(),
             ))
             .id();
-        let mut studio = Self { app, camera, sun, film, _only: only };
+        let mut studio = Self { app, camera, sun, film, size: SIZE, _only: only };
         studio.sun(Vec3::new(1.0, 0.9, 0.4));
         Some(studio)
     }
@@ -123,6 +124,14 @@ impl Studio {
                 .query_filtered::<&ChildOf, (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
             tiles.iter(app.world()).any(|tile| tile.parent() == entity)
         });
+    }
+
+    /// From now on pictures have another size.
+    pub fn resize(&mut self, size: (u32, u32)) {
+        let image = Image::new_target_texture(size.0, size.1, TextureFormat::Rgba8UnormSrgb, None);
+        self.film = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        self.size = size;
+        self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(self.film.clone()));
     }
 
     /// Where the camera is, and what it looks at.
@@ -191,7 +200,7 @@ impl Studio {
             if let Some(data) = taken.lock().expect("not poisoned").take() {
                 let rgb: Vec<u8> =
                     data.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
-                return RgbImage::from_raw(SIZE.0, SIZE.1, rgb).expect("a whole picture");
+                return RgbImage::from_raw(self.size.0, self.size.1, rgb).expect("a whole picture");
             }
             assert!(start.elapsed() < PATIENCE, "no picture was taken");
         }

@@ -2,6 +2,8 @@
 #![cfg(feature = "plugin")]
 
 mod companions;
+#[cfg(feature = "debug")]
+mod debug_views;
 mod despawning;
 mod entities;
 mod heightmaps;

@@ -1,0 +1,123 @@
+//! What is printed: a line for each receipt, and a summary at the end.
+
+use std::time::{Duration, Instant};
+
+use bevy::prelude::*;
+use bevy_burrow::plugin::HistoryMoved;
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::{HistoryStep, Memory};
+
+/// What happened so far.
+#[derive(Resource)]
+pub struct Ledger {
+    /// Brushes and steps that were answered.
+    pub answered: u64,
+    /// Lines that could not be read.
+    pub faults: u64,
+    /// Was the summary asked for?
+    pub is_done: bool,
+    quiet: bool,
+    rejected: u64,
+    scenarios: ScenarioCounts,
+    moved: (u64, u64),
+    start: Instant,
+}
+
+/// Prints what comes in, and the summary when the program ends.
+pub fn add(app: &mut App, quiet: bool) {
+    let ledger = Ledger {
+        answered: 0,
+        faults: 0,
+        is_done: false,
+        quiet,
+        rejected: 0,
+        scenarios: ScenarioCounts::default(),
+        moved: (0, 0),
+        start: Instant::now(),
+    };
+    app.insert_resource(ledger)
+        .add_systems(Update, (enter_receipts, enter_steps).after(BurrowSystems::Commit))
+        .add_systems(Last, sum_up.run_if(on_message::<AppExit>));
+}
+
+fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut ledger: ResMut<Ledger>) {
+    for BrushApplied { receipt, .. } in receipts.read() {
+        ledger.answered += 1;
+        ledger.scenarios.count(receipt);
+        let tag = receipt.tag;
+        match &receipt.outcome {
+            Ok(applied) => {
+                let (removed, added) = (applied.removed.total(), applied.added.total());
+                let painted = applied.painted.total();
+                ledger.moved = (ledger.moved.0 + removed, ledger.moved.1 + added);
+                if !ledger.quiet {
+                    let chunks = applied.chunks.len();
+                    println!(
+                        "brush {tag}: {removed} removed, {added} added, {painted} painted in {chunks} chunks"
+                    );
+                }
+            }
+            Err(rejection) => {
+                ledger.rejected += 1;
+                if !ledger.quiet {
+                    println!("brush {tag}: rejected, {rejection}");
+                }
+            }
+        }
+    }
+}
+
+fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut ledger: ResMut<Ledger>) {
+    for HistoryMoved { receipt, .. } in moves.read() {
+        ledger.answered += 1;
+        let name = match receipt.step {
+            HistoryStep::Undo => "undo",
+            HistoryStep::Redo => "redo",
+        };
+        match &receipt.outcome {
+            Ok(restored) if !ledger.quiet => {
+                println!("{name}: {} removed, {} added", restored.removed.total(), restored.added.total());
+            }
+            Err(why) if !ledger.quiet => println!("{name}: {why}"),
+            _ => {}
+        }
+    }
+}
+
+fn sum_up(ledger: Res<Ledger>, figures: Res<BurrowFigures>, terrains: Query<&Terrain>) {
+    let Ledger { answered, rejected, scenarios, moved, start, .. } = &*ledger;
+    println!("{answered} answered, {rejected} rejected, in {:.2} s", start.elapsed().as_secs_f64());
+    println!(
+        "scenarios: {} created, {} changed, {} extended, {} merged, {} split over chunks",
+        scenarios.created, scenarios.changed, scenarios.extended, scenarios.merged, scenarios.split
+    );
+    println!("voxels: {} removed, {} added", moved.0, moved.1);
+    let ms = |time: Option<Duration>| time.unwrap_or_default().as_secs_f64() * 1e3;
+    let [p50, p95, p99] = [50, 95, 99].map(|percent| ms(figures.transactions.percentile(percent)));
+    println!("transactions: {} commits, p50 {p50:.2}, p95 {p95:.2}, p99 {p99:.2} ms", figures.commits);
+    for terrain in &terrains {
+        let (world, memory) = (terrain.world(), terrain.memory());
+        let fields: usize = world.fields().map(|(_, fields)| fields.len()).sum();
+        println!(
+            "world: {fields} fields, {} bricks, {} drawn chunks",
+            world.bricks().count(),
+            world.drawn_chunks().count()
+        );
+        println!("memory: {}", in_words(&memory));
+        println!("hash: {:016x}", world.hash());
+    }
+}
+
+fn in_words(memory: &Memory) -> String {
+    let kib = |bytes: usize| bytes.div_ceil(1024);
+    format!(
+        "ground {} KiB, samples {}, materials {}, meshes {}, parts {}, index {}, undo {}",
+        kib(memory.ground),
+        kib(memory.samples),
+        kib(memory.materials),
+        kib(memory.meshes),
+        kib(memory.parts),
+        kib(memory.index),
+        kib(memory.undo)
+    )
+}

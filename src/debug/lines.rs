@@ -1,0 +1,70 @@
+//! Lines in a terrain's own space, and no more than allowed.
+
+use bevy::prelude::*;
+
+/// Lines of one width.
+#[derive(Clone, Debug, Default)]
+pub struct Layer {
+    pub lines: Vec<(Vec3, Vec3, LinearRgba)>,
+    pub width: f32,
+}
+
+/// Draws lines of a view as long as there is room.
+#[derive(Clone, Debug)]
+pub struct Pen {
+    layers: Vec<Layer>,
+    room: usize,
+}
+
+impl Pen {
+    /// A pen for so many lines.
+    pub fn new(most_lines: usize) -> Self {
+        Self { layers: Vec::new(), room: most_lines }
+    }
+
+    /// The following lines have this width, in pixels.
+    pub fn width(&mut self, width: f32) {
+        self.layers.push(Layer { lines: Vec::new(), width });
+    }
+
+    /// May no more be drawn?
+    pub fn is_full(&self) -> bool {
+        self.room == 0
+    }
+
+    pub fn line(&mut self, from: Vec3, to: Vec3, color: LinearRgba) {
+        let Some(room) = self.room.checked_sub(1) else { return };
+        self.room = room;
+        if self.layers.is_empty() {
+            self.width(2.0);
+        }
+        if let Some(layer) = self.layers.last_mut() {
+            layer.lines.push((from, to, color));
+        }
+    }
+
+    /// The twelve edges of a box.
+    pub fn cuboid(&mut self, min: Vec3, max: Vec3, color: LinearRgba) {
+        let corner = |bits: usize| {
+            let part = |axis: usize| if bits >> axis & 1 == 1 { max[axis] } else { min[axis] };
+            Vec3::new(part(0), part(1), part(2))
+        };
+        for from in 0..8 {
+            for axis in (0..3).filter(|axis| from >> axis & 1 == 0) {
+                self.line(corner(from), corner(from | 1 << axis), color);
+            }
+        }
+    }
+
+    pub fn triangle(&mut self, [a, b, c]: [Vec3; 3], color: LinearRgba) {
+        self.line(a, b, color);
+        self.line(b, c, color);
+        self.line(c, a, color);
+    }
+
+    /// What was drawn; layers without lines are left out.
+    pub fn finish(mut self) -> Vec<Layer> {
+        self.layers.retain(|layer| !layer.lines.is_empty());
+        self.layers
+    }
+}

@@ -1,0 +1,213 @@
+//! Draws the views below the terrains' entities, and keeps them as the world is.
+
+use std::time::Duration;
+
+use bevy::asset::AssetEventSystems;
+use bevy::platform::collections::HashMap;
+use bevy::prelude::*;
+
+use super::lines::{Layer, Pen};
+use super::views::{self, Dirty, Place};
+use super::{BurrowDebug, DebugView};
+use crate::lattice::BrickPos;
+use crate::plugin::{BrushApplied, BurrowSystems, HistoryMoved};
+use crate::terrain::{Terrain, Version};
+
+/// A view of a changing world is drawn again this often at most.
+const PERIOD: Duration = Duration::from_millis(100);
+/// How far the camera sees the ground it looks at, in metres.
+const SIGHT: f64 = 2000.0;
+/// Lines lie this much before the surface: z-fighting would break them.
+const BIAS: f32 = -0.0004;
+/// Lines of a box.
+const BOX_LINES: usize = 12;
+
+/// Adds the debug views to a game that has `BurrowPlugins`; all are off until [`BurrowDebug`] says otherwise.
+pub struct BurrowDebugPlugin;
+
+impl Plugin for BurrowDebugPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<BurrowDebug>()
+            .init_resource::<DirtyBricks>()
+            .add_systems(Update, note_dirty.after(BurrowSystems::Commit))
+            .add_systems(
+                PostUpdate,
+                draw.after(TransformSystems::Propagate)
+                    .before(AssetEventSystems)
+                    .run_if(resource_exists::<Assets<GizmoAsset>>),
+            );
+    }
+}
+
+/// Lines of a debug view, below a terrain's entity.
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+#[require(Transform)]
+pub struct DebugLines {
+    /// Which one.
+    pub view: DebugView,
+}
+
+/// Bricks that edits may have changed lately, and when.
+#[derive(Resource, Default)]
+struct DirtyBricks(HashMap<(Entity, BrickPos), Duration>);
+
+/// Takes down which stored bricks lie in the boxes of new receipts, and forgets old ones.
+fn note_dirty(
+    time: Res<Time>,
+    debug: Res<BurrowDebug>,
+    mut receipts: MessageReader<BrushApplied>,
+    mut moves: MessageReader<HistoryMoved>,
+    terrains: Query<&Terrain>,
+    mut dirty: ResMut<DirtyBricks>,
+) {
+    let now = time.elapsed();
+    let fade = Duration::try_from_secs_f32(debug.fade).unwrap_or(Duration::ZERO);
+    if !dirty.0.is_empty() {
+        dirty.0.retain(|_, since| now.saturating_sub(*since) < fade);
+    }
+    if !debug.dirty {
+        dirty.0.clear();
+        receipts.clear();
+        moves.clear();
+        return;
+    }
+    let most = debug.most_lines / BOX_LINES;
+    let edited = receipts.read().map(|applied| {
+        let bounds = applied.receipt.outcome.as_ref().ok().and_then(|applied| applied.bounds);
+        (applied.terrain, bounds)
+    });
+    let restored = moves.read().map(|moved| {
+        let bounds = moved.receipt.outcome.as_ref().ok().and_then(|restored| restored.bounds);
+        (moved.terrain, bounds)
+    });
+    for (entity, bounds) in edited.chain(restored) {
+        let (Some(entity), Some(bounds)) = (entity, bounds) else { continue };
+        let Ok(terrain) = terrains.get(entity) else { continue };
+        let samples = terrain.world().samples();
+        for brick in BrickPos::covering(bounds).filter(|&brick| samples.brick(brick).is_some()) {
+            if dirty.0.len() >= most {
+                break;
+            }
+            dirty.0.insert((entity, brick), now);
+        }
+    }
+}
+
+/// What a view was drawn for.
+#[derive(Clone, PartialEq)]
+struct Key {
+    version: Version,
+    focus: IVec3,
+    settings: BurrowDebug,
+    /// Counts frames in which bricks fade.
+    fading: u64,
+}
+
+/// Draws what is on and not as it should be, and takes away what is off.
+fn draw(
+    mut commands: Commands,
+    time: Res<Time>,
+    debug: Res<BurrowDebug>,
+    dirty: Res<DirtyBricks>,
+    terrains: Query<(Entity, &Terrain, &GlobalTransform)>,
+    cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
+    shown: Query<(Entity, &DebugLines, &ChildOf)>,
+    mut assets: ResMut<Assets<GizmoAsset>>,
+    mut drawn: Local<HashMap<(Entity, DebugView), Key>>,
+    mut frames: Local<u64>,
+    mut last: Local<Duration>,
+) {
+    for (entity, lines, parent) in &shown {
+        if !debug.shows(lines.view) || !terrains.contains(parent.parent()) {
+            commands.entity(entity).try_despawn();
+        }
+    }
+    drawn.retain(|(terrain, view), _| debug.shows(*view) && terrains.contains(*terrain));
+    if !DebugView::ALL.into_iter().any(|view| debug.shows(view)) {
+        return;
+    }
+    *frames += u64::from(!dirty.0.is_empty());
+    let is_due = time.elapsed().saturating_sub(*last) >= PERIOD;
+    for (entity, terrain, place) in &terrains {
+        let Some(focus) = focus(&debug, terrain, place, &cameras) else { continue };
+        let scale = place.scale().x.abs().max(f32::MIN_POSITIVE);
+        // In steps, so that not every move of the camera draws everything anew.
+        let step = (debug.near / scale / 4.0).max(1.0);
+        let steps = (focus / step).round();
+        let place = Place { focus: steps * step, radius: debug.radius / scale, near: debug.near / scale };
+        for view in DebugView::ALL.into_iter().filter(|&view| debug.shows(view)) {
+            let fading = if view == DebugView::Dirty { *frames } else { 0 };
+            let key = Key {
+                version: terrain.world().version(),
+                focus: steps.as_ivec3(),
+                settings: debug.clone(),
+                fading,
+            };
+            let old = drawn.get(&(entity, view));
+            let is_urgent = old.is_none_or(|old| old.settings != key.settings || old.fading != key.fading);
+            if old == Some(&key) || !is_due && !is_urgent {
+                continue;
+            }
+            *last = time.elapsed();
+            let fresh = fresh_bricks(&dirty, entity, &debug, time.elapsed());
+            let mut pen = Pen::new(debug.most_lines);
+            views::draw(
+                view,
+                terrain.world(),
+                place,
+                if view == DebugView::Dirty { &fresh } else { &[] },
+                &mut pen,
+            );
+            let own =
+                shown.iter().filter(|(_, lines, parent)| lines.view == view && parent.parent() == entity);
+            own.for_each(|(old, ..)| commands.entity(old).try_despawn());
+            for layer in pen.finish() {
+                commands.spawn((DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity)));
+            }
+            drawn.insert((entity, view), key);
+        }
+    }
+}
+
+fn gizmo(layer: Layer, assets: &mut Assets<GizmoAsset>) -> Gizmo {
+    let mut asset = GizmoAsset::default();
+    for (from, to, color) in layer.lines {
+        asset.line(from, to, color);
+    }
+    let line_config = GizmoLineConfig { width: layer.width, ..default() };
+    Gizmo { handle: assets.add(asset), line_config, depth_bias: BIAS }
+}
+
+/// The bricks of a terrain with how fresh each is, in order.
+fn fresh_bricks(dirty: &DirtyBricks, terrain: Entity, debug: &BurrowDebug, now: Duration) -> Vec<Dirty> {
+    let mut fresh: Vec<Dirty> = dirty
+        .0
+        .iter()
+        .filter(|((of, _), _)| *of == terrain)
+        .map(|((_, brick), since)| (*brick, 1.0 - now.saturating_sub(*since).as_secs_f32() / debug.fade))
+        .collect();
+    fresh.sort_unstable_by_key(|(brick, _)| brick.0.to_array());
+    fresh
+}
+
+/// The place around which is drawn, in voxels of a terrain: the game's, or where a camera looks at the ground, or is.
+fn focus(
+    debug: &BurrowDebug,
+    terrain: &Terrain,
+    place: &GlobalTransform,
+    cameras: &Query<(&Camera, &GlobalTransform), With<Camera3d>>,
+) -> Option<Vec3> {
+    let inverse = place.affine().inverse();
+    let focus = match debug.focus {
+        Some(focus) => inverse.transform_point3(focus),
+        None => {
+            let (_, eye) = cameras.iter().find(|(camera, _)| camera.is_active).or(cameras.iter().next())?;
+            let origin = inverse.transform_point3(eye.translation());
+            let along = inverse.transform_vector3(*eye.forward());
+            let hit = terrain.world().raycast(origin.as_dvec3(), along.as_dvec3(), SIGHT);
+            hit.map_or(origin, |hit| hit.position.as_vec3())
+        }
+    };
+    focus.is_finite().then_some(focus)
+}

@@ -1,0 +1,113 @@
+//! Which views are on, and how far they reach.
+
+use bevy::prelude::*;
+
+/// The debug views' switches.
+#[derive(Resource, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Resource, Default)]
+pub struct BurrowDebug {
+    /// Chunks that draw something or hold fields, and the borders of tiles.
+    pub chunks: bool,
+    /// Boxes of fields.
+    pub fields: bool,
+    /// Cells of the mask.
+    pub mask: bool,
+    /// Triangles of rings.
+    pub rings: bool,
+    /// Bricks in the boxes of the latest edits, fading.
+    pub dirty: bool,
+    /// Normals of vertices.
+    pub normals: bool,
+    /// Edges of triangles, and which of them tiles and chunks share.
+    pub wires: bool,
+    /// The place around which is drawn, in world space; `None` for where the camera looks at the ground.
+    pub focus: Option<Vec3>,
+    /// How far views reach, in metres; normals and wires reach [`near`](Self::near).
+    pub radius: f32,
+    /// How far normals and wires reach, in metres.
+    pub near: f32,
+    /// Most lines of a view of one terrain.
+    pub most_lines: usize,
+    /// How long dirty bricks are shown, in seconds.
+    pub fade: f32,
+}
+
+impl Default for BurrowDebug {
+    /// All views off.
+    fn default() -> Self {
+        Self {
+            chunks: false,
+            fields: false,
+            mask: false,
+            rings: false,
+            dirty: false,
+            normals: false,
+            wires: false,
+            focus: None,
+            radius: 96.0,
+            near: 20.0,
+            most_lines: 40_000,
+            fade: 1.5,
+        }
+    }
+}
+
+/// One of the debug views.
+#[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "the switches of BurrowDebug say what they are")]
+pub enum DebugView {
+    Chunks,
+    Fields,
+    Mask,
+    Rings,
+    Dirty,
+    Normals,
+    Wires,
+}
+
+impl DebugView {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Chunks, Self::Fields, Self::Mask, Self::Rings, Self::Dirty, Self::Normals, Self::Wires];
+
+    /// In plain words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Chunks => "Chunk grid",
+            Self::Fields => "Field boxes",
+            Self::Mask => "Mask",
+            Self::Rings => "Rings",
+            Self::Dirty => "Dirty bricks",
+            Self::Normals => "Normals",
+            Self::Wires => "Seam wires",
+        }
+    }
+}
+
+impl BurrowDebug {
+    /// Is a view on?
+    pub fn shows(&self, view: DebugView) -> bool {
+        match view {
+            DebugView::Chunks => self.chunks,
+            DebugView::Fields => self.fields,
+            DebugView::Mask => self.mask,
+            DebugView::Rings => self.rings,
+            DebugView::Dirty => self.dirty,
+            DebugView::Normals => self.normals,
+            DebugView::Wires => self.wires,
+        }
+    }
+
+    /// The switch of a view.
+    pub fn switch(&mut self, view: DebugView) -> &mut bool {
+        match view {
+            DebugView::Chunks => &mut self.chunks,
+            DebugView::Fields => &mut self.fields,
+            DebugView::Mask => &mut self.mask,
+            DebugView::Rings => &mut self.rings,
+            DebugView::Dirty => &mut self.dirty,
+            DebugView::Normals => &mut self.normals,
+            DebugView::Wires => &mut self.wires,
+        }
+    }
+}
