@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::physics::{ColliderSource, TerrainPhysicsPlugin};
 use bevy_burrow::plugin::TerrainPlugin;
 
 use super::*;
@@ -16,7 +17,7 @@ fn app() -> App {
         .init_resource::<Blows>()
         .init_resource::<Tremor>()
         .add_message::<Burst>()
-        .add_systems(Update, (move_bombs, burn_fuses).chain().before(BurrowSystems::Collect))
+        .add_systems(Update, burn_fuses.before(BurrowSystems::Collect))
         .add_observer(explode)
         .add_observer(shake);
     let ground = Ground::from_fn(64, 64, |_, _| 20.0).expect("a small world");

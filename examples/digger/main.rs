@@ -30,18 +30,19 @@
 //! | --- | --- |
 //! | `phase.rs`, `menu.rs` and `menu/`, `ui.rs`, `art.rs` | title, pause, settings, controls, help |
 //! | `input.rs`, `settings.rs` | actions and their keys; what the player may set |
-//! | `player.rs`, `mover.rs` | the player's eyes and body |
+//! | `player.rs`, `body.rs` | the player's eyes and body |
 //! | `tools.rs`, `held.rs` | the tools, and how they look in hand |
 //! | `work.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
 //! | `bombs.rs`, `lamps.rs`, `particles.rs` | what flies, what shines, what crumbles |
-//! | `landscape.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
-//! | `hud.rs`, `frames.rs` | what is written over it all |
+//! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
+//! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
 //! | `script.rs`, `tour.rs` | two stories |
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
 //! | `wires.rs`, `report.rs` | lines of a seam; receipts, times and the summary |
 
 mod art;
+mod body;
 mod bombs;
 mod day;
 mod film;
@@ -55,7 +56,7 @@ mod lamps;
 mod landscape;
 mod light;
 mod menu;
-mod mover;
+mod panel;
 mod particles;
 mod phase;
 mod places;
@@ -68,6 +69,7 @@ mod studio;
 mod tools;
 mod tour;
 mod ui;
+mod veins;
 mod wires;
 mod work;
 mod works;
@@ -163,6 +165,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             light::LightPlugin,
         ))
         .add_plugins((
+            body::BodyPlugin,
             player::PlayerPlugin,
             tools::ToolsPlugin,
             held::HeldPlugin,
@@ -178,6 +181,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             menu::MenuPlugin,
             hud::HudPlugin,
             frames::FramesPlugin,
+            panel::PanelPlugin,
             report::LogbookPlugin,
         ));
 }
@@ -188,6 +192,7 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
+    app.add_plugins(veins::VeinsPlugin);
     app
 }
 

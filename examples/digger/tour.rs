@@ -16,7 +16,7 @@ use crate::day::{AFTERNOON, Clock};
 use crate::film::Film;
 use crate::held::ShowHand;
 use crate::hud::ShowHud;
-use crate::input::{Action, Actions};
+use crate::input::Action;
 use crate::landscape::CONCRETE;
 use crate::particles::{Burst, Matter};
 use crate::places::{Hillside, Places};
