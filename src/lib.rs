@@ -161,5 +161,5 @@ pub mod prelude {
         GroundLayer, GroundLayerKind, GroundLoading, GroundLook, GroundMaterial, GroundQuality, GroundStrata,
         GroundTextures, TerrainMaterialPlugin,
     };
-    pub use crate::volume::Scenario;
+    pub use crate::volume::{DiggingRules, Refused, Scenario};
 }

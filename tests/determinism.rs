@@ -12,7 +12,9 @@ use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
 use fastrand::Rng;
 use glam::{I64Vec3, Quat, Vec3};
-use worlds::{random_brush, random_brush_at_a_face, random_ground, steep_real_ground};
+use worlds::{
+    random_brush, random_brush_at_a_face, random_ground, random_sculpting_brush, steep_real_ground,
+};
 
 /// A vertex without floats, so that it can be compared bit for bit.
 type Bits = ([i64; 3], [u32; 3], [[u8; 4]; 2]);
@@ -22,8 +24,9 @@ fn random_script(seed: u64) -> (Ground, Vec<Brush>) {
     let mut rng = Rng::with_seed(seed);
     let (ground, _) = random_ground(&mut rng, seed);
     let brushes = (0..rng.u32(6..14))
-        .map(|_| match rng.u32(0..3) {
-            0 => {
+        .map(|_| match rng.u32(0..5) {
+            0 | 1 => random_sculpting_brush(&mut rng, &ground),
+            2 => {
                 let chunk_size = [8, 25, 32, 64, 100][rng.usize(0..5)];
                 random_brush_at_a_face(&mut rng, &ground, chunk_size)
             }

@@ -16,7 +16,8 @@ pub struct Blend {
     /// Over how many voxels from the shape's surface inwards the change fades in: 0 to 64. One that is wider than the
     /// shape is deep ends in its middle. With 0 the change ends in a step at the shape's surface.
     pub falloff: f32,
-    /// What new ground is made of; `None`: what lies straight below it, within 64 voxels, or beside it.
+    /// What new ground is made of; `None`: the first ground straight below it, else straight above,
+    /// within 64 voxels, else beside it.
     pub material: Option<MaterialId>,
 }
 

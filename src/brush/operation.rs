@@ -27,7 +27,8 @@ pub enum Operation {
         /// The new material.
         material: MaterialId,
     },
-    /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are.
+    /// Evens out bumps and edges: each sample goes towards the average of the 26 around it. Slopes stay as they are;
+    /// hollows and towers of a radius r are gone after about r x r times, as it is with averages.
     Smooth,
     /// Deepens bumps and edges, by at most a quarter of a voxel each time.
     Sharpen,
@@ -131,6 +132,16 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
+    /// What [`Operation::apply`] gives.
+    pub fn apply(self, before: i32, outside: i32) -> i32 {
+        let outside = outside.max(-DEPTH);
+        match self {
+            Self::Dig => before.max(-outside),
+            Self::Add { .. } => before.min(outside),
+            Self::Paint { .. } | Self::Sculpt => before,
+        }
+    }
+
     /// The material that an add or a paint brings along.
     pub fn material(self) -> Option<MaterialId> {
         match self {

@@ -58,6 +58,17 @@ impl Around {
         self.cut >> index & 1 == 1
     }
 
+    /// The density in the middle.
+    pub fn own(&self) -> i32 {
+        self.densities[Self::MIDDLE]
+    }
+
+    /// Where there is a solid neighbour across a face.
+    pub fn solid_faces(&self) -> impl Iterator<Item = IVec3> {
+        let ways = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+        ways.filter(|way| self.densities[Self::index(way.to_array())] < 0)
+    }
+
     /// The six neighbours across faces.
     fn faces(&self) -> impl Iterator<Item = (i32, bool)> {
         [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], self.is_cut(index))).into_iter()
@@ -73,7 +84,7 @@ impl Around {
         let nearest =
             self.faces().map(|(other, is_cut)| if is_cut { DEPTH } else { other * own.signum() }).min()?;
         let is_known = self.faces().any(|(_, is_cut)| !is_cut);
-        is_known.then(|| own.signum() * (nearest.max(0) + ONE).min(DEPTH))
+        is_known.then(|| own.signum() * (nearest.max(0) + ONE))
     }
 
     /// 64 times the way from the middle, which is `own`, to the average of all.
@@ -257,7 +268,7 @@ mod tests {
         (cave.densities[below], cave.cut) = (500, cave.cut & !(1 << below));
         assert_eq!(cave.middle(), Some(756));
         cave.densities[below] = 1000;
-        assert_eq!(cave.middle(), Some(DEPTH));
+        assert_eq!(cave.middle(), Some(1000 + ONE));
         cave.densities[below] = -300;
         assert_eq!(cave.middle(), Some(ONE));
         // A wall that is cut off on its far side stays where it is.

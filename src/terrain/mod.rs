@@ -42,6 +42,7 @@ use crate::backend::Engine;
 use crate::brush::{Brush, BrushError, Edit};
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
+use crate::volume::DiggingRules;
 use history::{Step, Timeline, Waste};
 
 /// How a terrain is cut up and how large it is drawn.
@@ -159,6 +160,12 @@ impl Terrain {
     /// terrain runs on the processor, or on whatever the plugin has.
     pub fn set_engine(&mut self, engine: Engine) {
         self.engine = Some(engine);
+    }
+
+    /// From now on, edits obey these rules; what is there stays as it is. A transaction under way keeps those it began
+    /// with. A journal is replayed exactly only if rules change at the same edits.
+    pub fn set_rules(&mut self, rules: DiggingRules) {
+        Arc::make_mut(&mut self.world).rules = (!rules.is_empty()).then(|| Arc::new(rules));
     }
 
     /// The engine of its own, if it has one.

@@ -2,7 +2,7 @@
 
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
-use crate::volume::{FieldId, Scenario, Tally};
+use crate::volume::{FieldId, Refused, Scenario, Tally};
 
 /// What became of a brush. Each one that was submitted gets exactly one receipt.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +26,8 @@ pub struct Applied {
     pub added: Tally,
     /// Solid voxels whose material changed, by the new one.
     pub painted: Tally,
+    /// Voxels that the terrain's [`DiggingRules`](crate::volume::DiggingRules) kept from changing, by reason.
+    pub refused: Refused,
 }
 
 impl Applied {

@@ -76,7 +76,8 @@ impl Transaction {
         let edits: Vec<&Edit> = submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
         let draft = Stages::time(&mut stages.edit, || {
             let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| backend.edit(work, each);
-            Draft::make(world.samples(), world.grid, &edits, world.sample_hash, &world.uniform, apply)
+            let (base, hash, rules) = (world.samples(), world.sample_hash, world.rules());
+            Draft::make(base, world.grid, &edits, hash, &world.uniform, rules, apply)
         });
         let bricks: Bricks =
             draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();

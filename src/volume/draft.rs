@@ -17,7 +17,7 @@ use super::brick::UniformBricks;
 use super::ledger::{Fate, Ledger};
 use super::runs::runs;
 use super::workpiece::Workpiece;
-use super::{Brick, Bricks, SampleView, Tally};
+use super::{Brick, Bricks, DiggingRules, Refused, SampleView, Tally};
 use crate::brush::{Edit, Evaluator, Kind, Sculptor};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, sort_by_place};
 
@@ -41,6 +41,8 @@ pub struct EditEffect {
     pub added: Tally,
     /// Solid voxels that changed their material, by the material they have now.
     pub painted: Tally,
+    /// Voxels that rules kept from changing.
+    pub refused: Refused,
 }
 
 impl EditEffect {
@@ -112,6 +114,7 @@ pub(crate) struct Tool {
     pub operation: Kind,
     pub evaluator: Evaluator,
     pub sculptor: Option<Sculptor>,
+    pub power: u8,
 }
 
 /// The part of an edit's reach that lies in the world; `None` when it lies outside.
@@ -127,6 +130,7 @@ pub struct EditWork<'a> {
     pub grid: ChunkGrid,
     pub(crate) tools: Vec<Tool>,
     jobs: Vec<Job>,
+    rules: Option<&'a DiggingRules>,
 }
 
 impl<'a> EditWork<'a> {
@@ -137,16 +141,22 @@ impl<'a> EditWork<'a> {
             operation: edit.kind(),
             evaluator: edit.evaluator(),
             sculptor: edit.sculptor(),
+            power: edit.power(),
         };
         let tools: Vec<Tool> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
-        Self { base, grid, tools, jobs }
+        Self { base, grid, tools, jobs, rules: None }
     }
 
-    /// Is there nothing but digs, adds and paint? Cards know no more.
+    /// The same under rules.
+    pub(crate) fn under(self, rules: Option<&'a DiggingRules>) -> Self {
+        Self { rules, ..self }
+    }
+
+    /// Is there nothing but digs, adds and paint, and no rule? Cards know no more.
     #[cfg(feature = "cuda")]
     pub(crate) fn is_plain(&self) -> bool {
-        self.tools.iter().all(|tool| tool.sculptor.is_none())
+        self.rules.is_none() && self.tools.iter().all(|tool| tool.sculptor.is_none())
     }
 
     /// The jobs of each brick, in order of the edits.
@@ -234,13 +244,15 @@ impl Draft {
         edits: &[&Edit],
         hash: u64,
         uniform: &UniformBricks,
+        rules: Option<&DiggingRules>,
         mut apply: impl FnMut(&EditWork, &mut dyn FnMut(Ledger)),
     ) -> Self {
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits.len(), EditEffect::default);
-        let (mut earlier, mut rest) = (Changes::default(), runs(grid, edits).into_iter().peekable());
+        let (mut earlier, mut rest) =
+            (Changes::default(), runs(grid, edits, rules.is_some()).into_iter().peekable());
         while let Some(run) = rest.next() {
-            let work = EditWork::new(base.over(&earlier.newer), grid, &edits[run.clone()]);
+            let work = EditWork::new(base.over(&earlier.newer), grid, &edits[run.clone()]).under(rules);
             apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
             if run.start > 0 || rest.peek().is_some() {
                 earlier.take(std::mem::take(&mut draft.bricks));
@@ -268,6 +280,10 @@ impl Draft {
                 Fate::Removed => &mut effect.removed,
                 Fate::Added => &mut effect.added,
                 Fate::Painted => &mut effect.painted,
+                Fate::Protected => &mut effect.refused.protected,
+                Fate::Unbreakable => &mut effect.refused.unbreakable,
+                Fate::TooHard => &mut effect.refused.too_hard,
+                Fate::Slowed => &mut effect.refused.slowed,
             };
             tally.count_many(count.material, count.voxels);
         }
@@ -307,6 +323,6 @@ fn finish(work: &EditWork, jobs: &[Job], ledger: &mut Ledger) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
     let mut jobs = jobs.iter().filter(|job| work.reaches(job)).peekable();
     if jobs.peek().is_some() {
-        Workpiece::new(work.base, work.grid, pos).take(&work.tools, jobs, ledger);
+        Workpiece::new(work.base, work.grid, pos).take(&work.tools, work.rules, jobs, ledger);
     }
 }

@@ -39,6 +39,11 @@ pub(crate) enum Fate {
     Removed,
     Added,
     Painted,
+    /// Rules were against it.
+    Protected,
+    Unbreakable,
+    TooHard,
+    Slowed,
 }
 
 /// Voxels of one material that an edit dealt with in one brick.

@@ -5,12 +5,13 @@
 //! read the same numbers there, and the samples of a world do not depend on its chunk size.
 
 mod brick;
+mod careful;
 mod draft;
 mod field;
 mod ledger;
 mod restore;
+mod rules;
 mod runs;
-mod sculpt;
 mod surroundings;
 mod tally;
 mod view;
@@ -26,5 +27,6 @@ pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
 pub(crate) use ledger::{Count, Fate, PartEffect};
 pub(crate) use restore::{Replaced, pristine_brick};
+pub use rules::{DiggingRules, Refused};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::careful::reads;
 use super::draft::reach;
-use super::sculpt::reads;
 use crate::brush::Edit;
 use crate::lattice::{ChunkGrid, LatticeBox};
 
@@ -12,18 +12,22 @@ const LONGEST: usize = 1 << 12;
 
 /// Cuts edits into runs, in order. In each, all that an edit reads but the samples it changes itself is as it was before
 /// the run: digs, adds and paint look at nothing else, and one that sculpts begins a new run where it would read what an
-/// earlier edit of the run may change.
-pub(super) fn runs(grid: ChunkGrid, edits: &[&Edit]) -> Vec<Range<usize>> {
+/// earlier edit of the run may change. Under rules all edits look around.
+pub(super) fn runs(grid: ChunkGrid, edits: &[&Edit], has_rules: bool) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut first = 0;
     let mut reaches: Vec<LatticeBox> = Vec::new();
     // Nothing is looked up while nothing sculpts.
     let mut is_known = 0;
     for (number, edit) in edits.iter().enumerate() {
-        let (Some(sculptor), Some(own)) = (edit.sculptor(), reach(grid, edit)) else { continue };
+        let sculptor = edit.sculptor();
+        if sculptor.is_none() && !has_rules {
+            continue;
+        }
+        let around = reach(grid, edit).and_then(|own| reads(sculptor.as_ref(), has_rules, own));
+        let Some(around) = around else { continue };
         reaches.extend(edits[is_known.max(first)..number].iter().filter_map(|edit| reach(grid, edit)));
         is_known = number;
-        let around = reads(&sculptor, own);
         let is_disturbed = || reaches.iter().any(|earlier| earlier.intersection(around).is_some());
         if number > first && (number - first >= LONGEST || is_disturbed()) {
             runs.push(first..number);
@@ -51,7 +55,7 @@ mod tests {
         let at = |x: f32| Shape::sphere(Vec3::new(x, 0.0, 50.0), 4.0);
         let of = |brushes: &[Brush]| {
             let edits: Vec<Edit> = brushes.iter().map(|brush| Edit::quantize(brush).unwrap()).collect();
-            runs(grid, &edits.iter().collect::<Vec<_>>())
+            runs(grid, &edits.iter().collect::<Vec<_>>(), false)
         };
         let (dig, smooth) = (|x| Brush::dig(at(x)), |x| Brush::smooth(at(x), 1.0));
         assert_eq!(of(&[]), []);
@@ -60,7 +64,7 @@ mod tests {
         assert_eq!(of(&[smooth(20.0), dig(60.0), smooth(100.0), dig(20.0), dig(100.0)]), [0..5]);
         assert_eq!(of(&[dig(20.0), smooth(25.0), dig(25.0), smooth(90.0), smooth(20.0)]), [0..1, 1..4, 4..5]);
         assert_eq!(of(&[smooth(20.0), smooth(20.0), smooth(20.0)]), [0..1, 1..2, 2..3]);
-        // New ground looks for its material 64 voxels down, unless it is told one.
+        // New ground looks for its material 64 voxels down and up, unless it is told one.
         let above = Shape::sphere(Vec3::new(20.0, 60.0, 50.0), 4.0);
         assert_eq!(of(&[dig(20.0), Brush::raise(above, 1.0)]), [0..1, 1..2]);
         assert_eq!(of(&[dig(20.0), Brush::raise(above, 1.0).with_material(MaterialId(1))]), [0..2]);

@@ -10,7 +10,7 @@ use super::draft::{Job, Tool};
 use super::ledger::{Counts, Fate, Ledger, PartEffect};
 use super::surroundings::Surroundings;
 use super::view::resolve;
-use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
+use super::{Brick, DiggingRules, DraftedBrick, Layers, Sample, SampleView};
 use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE, hash};
@@ -48,7 +48,13 @@ impl<'a> Workpiece<'a> {
     }
 
     /// Applies all jobs.
-    pub fn take<'j>(&mut self, tools: &[Tool], jobs: impl Iterator<Item = &'j Job>, ledger: &mut Ledger) {
+    pub fn take<'j>(
+        &mut self,
+        tools: &[Tool],
+        rules: Option<&DiggingRules>,
+        jobs: impl Iterator<Item = &'j Job>,
+        ledger: &mut Ledger,
+    ) {
         let mut distances = [i16x8::ZERO; 64];
         let low = self.pos.origin();
         for job in jobs {
@@ -60,14 +66,13 @@ impl<'a> Workpiece<'a> {
             tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
             let first = ledger.counts.len();
             let mut counts = Counts { edit, first, list: &mut ledger.counts };
-            let around = tool.sculptor.is_some().then(|| Surroundings::new(&self.view, self.pos));
+            let is_careful = tool.sculptor.is_some() || rules.is_some();
+            let around = is_careful.then(|| Surroundings::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
-                let changed = match (&tool.sculptor, &around) {
-                    (Some(sculptor), Some(around)) => {
-                        self.sculpt(sculptor, samples, &distances, around, &mut counts)
-                    }
-                    _ => self.apply(tool.operation, samples, &distances, &mut counts),
+                let changed = match &around {
+                    Some(around) => self.carefully(tool, rules, samples, &distances, around, &mut counts),
+                    None => self.apply(tool.operation, samples, &distances, &mut counts),
                 };
                 self.changed.iter_mut().zip(&changed).for_each(|(all, layer)| *all |= layer);
                 if let Some(bounds) = bounds(&changed, low) {
@@ -309,7 +314,7 @@ fn bits(lanes: i16x8) -> u8 {
 
 /// Positions of the bits that are set, lowest first.
 #[inline(always)]
-pub(super) fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
+fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);

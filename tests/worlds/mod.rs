@@ -185,6 +185,31 @@ pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) }
 }
 
+/// Rules of every kind, some of which will matter.
+pub fn random_rules(rng: &mut Rng, ground: &Ground) -> DiggingRules {
+    let (low, high) = ground.height_range();
+    let mut rules = DiggingRules::default();
+    for material in 0..8 {
+        match rng.u32(0..6) {
+            0 => rules = rules.with_unbreakable(MaterialId(material)),
+            1 | 2 => rules = rules.with_hardness(MaterialId(material), rng.u8(..)),
+            _ => {}
+        }
+    }
+    if rng.bool() {
+        rules = rules.with_bedrock(rng.i32(low / 256 - 5..=high / 256 + 2));
+    }
+    for _ in 0..rng.u32(0..4) {
+        let (x, z) = (rng.i32(0..=ground.width()), rng.i32(0..=ground.depth()));
+        let y = ground.height(bevy_burrow::lattice::Column::new(x, z)) / 256 + rng.i32(-3..4);
+        let half = glam::IVec3::new(rng.i32(0..6), rng.i32(0..6), rng.i32(0..6));
+        let at = glam::IVec3::new(x, y, z);
+        let samples = bevy_burrow::lattice::LatticeBox::new(at - half, at + half);
+        rules = rules.with_protected(samples.expect("not empty"));
+    }
+    rules
+}
+
 fn random_rotation(rng: &mut Rng) -> Quat {
     let angles = [rng.f32() * 6.3, rng.f32() * 6.3, rng.f32() * 6.3];
     if rng.bool() {
@@ -209,7 +234,7 @@ pub fn random_brush_at_a_face(rng: &mut Rng, ground: &Ground, chunk_size: u32) -
     if rng.bool() { Brush::dig(shape) } else { Brush::add(shape, MaterialId(5)) }
 }
 
-/// A random, edited world.
+/// A random, edited world; every fourth one with rules.
 pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
     let (ground, chunk_size) = random_ground(rng, index);
     let mut brushes = Vec::new();
@@ -230,6 +255,11 @@ pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
     }
     let mut terrain =
         Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
+    if index / 4 % 4 == 3 {
+        let rules = random_rules(rng, terrain.world().ground());
+        terrain.set_rules(rules);
+        brushes.iter_mut().for_each(|brush| brush.power = rng.u8(..) | rng.u8(..));
+    }
     // Some at once, some in transactions of their own.
     let cut = rng.usize(0..=brushes.len());
     terrain.apply(&brushes[..cut]);

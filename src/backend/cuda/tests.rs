@@ -551,3 +551,30 @@ fn a_high_cliff_at_the_end_of_the_lattice_is_the_processors() {
     ];
     compare_on(ground, 8, &[&engine], &transactions);
 }
+
+#[test]
+fn what_a_card_does_not_know_is_the_processors_in_the_same_transaction() {
+    let Some(first) = mapped() else { return };
+    let Some(second) = device() else { return };
+    let second = engine(second, 64 << 20);
+    let mut rng = Rng::with_seed(31);
+    for index in 0..worlds::world_count(40) / 4 {
+        let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
+        let brushes = |rng: &mut Rng| (0..5).map(|_| worlds::any_random_brush(rng, &ground)).collect();
+        let transactions: Vec<Vec<Brush>> = (0..4).map(|_| brushes(&mut rng)).collect();
+        compare_on(ground, chunk_size, &[&first, &second], &transactions);
+    }
+    let stages = |engine: &Engine, stage| {
+        let choices = engine.figures().choices;
+        let of = |is_cuda| {
+            let is = |choice: &&crate::backend::Choice| choice.stage == stage && choice.is_cuda == is_cuda;
+            choices.iter().filter(is).count()
+        };
+        (of(true), of(false))
+    };
+    for engine in [&first, &second] {
+        let (on_card, on_processor) = stages(engine, Stage::Edit);
+        assert!(on_card > 0 && on_processor > 0, "{on_card} {on_processor}");
+        assert!(stages(engine, Stage::Mesh).0 > 0, "meshes go to the card");
+    }
+}

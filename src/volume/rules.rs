@@ -1,0 +1,178 @@
+//! What may be dug: hardness of materials, bedrock, protected boxes.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::IVec3;
+
+use super::ledger::Fate;
+use super::{SampleView, Tally};
+use crate::brush::Around;
+use crate::ground::MaterialId;
+use crate::lattice::{LatticeBox, ONE};
+
+/// What brushes may do to a world. Without any rule, everything.
+///
+/// Rules are part of a world's snapshot: the same edits under the same rules make the same world, bit for bit. They bind
+/// every operation, whatever it is: an operation *takes away* where it makes a sample's density higher, solid or not.
+///
+/// ```
+/// use bevy_burrow::prelude::*;
+/// use glam::Vec3;
+///
+/// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+/// terrain.set_rules(DiggingRules::default().with_hardness(MaterialId(0), 100).with_bedrock(4));
+/// let dig = Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0));
+/// let receipts = terrain.apply([dig.clone().with_power(50), dig.clone().with_power(75), dig]);
+/// let refused = |at: usize| receipts[at].outcome.as_ref().map(|applied| applied.refused.clone());
+/// assert!(refused(0)?.too_hard.total() > 100);
+/// assert!(refused(1)?.slowed.total() > 10);
+/// assert!(refused(2)?.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DiggingRules {
+    /// How hard materials are; the others are soft. A brush whose power is at least that digs as ever; with half of it or
+    /// less it takes nothing away; between them, it goes a part of the way that grows from nothing to all of it.
+    pub hardness: BTreeMap<MaterialId, u8>,
+    /// Materials that no brush takes away, nor paints over.
+    pub unbreakable: BTreeSet<MaterialId>,
+    /// Nothing solid below this height, in voxels, is taken away.
+    pub bedrock: Option<i32>,
+    /// Samples that no operation changes at all, paint included.
+    pub protected: Vec<LatticeBox>,
+}
+
+impl DiggingRules {
+    /// The rules with another hardness of a material.
+    pub fn with_hardness(mut self, material: MaterialId, hardness: u8) -> Self {
+        self.hardness.insert(material, hardness);
+        self
+    }
+
+    /// The rules with one more material that no brush takes away.
+    pub fn with_unbreakable(mut self, material: MaterialId) -> Self {
+        self.unbreakable.insert(material);
+        self
+    }
+
+    /// The rules with bedrock below a height, in voxels.
+    pub fn with_bedrock(self, below: i32) -> Self {
+        Self { bedrock: Some(below), ..self }
+    }
+
+    /// The rules with one more protected box.
+    pub fn with_protected(mut self, samples: LatticeBox) -> Self {
+        self.protected.push(samples);
+        self
+    }
+
+    /// Is there no rule?
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    pub(super) fn is_protected(&self, at: IVec3) -> bool {
+        self.protected.iter().any(|samples| samples.contains(at))
+    }
+
+    pub(super) fn is_unbreakable(&self, material: MaterialId) -> bool {
+        self.unbreakable.contains(&material)
+    }
+
+    /// How much of a change a brush of this power makes that takes away what is solid, in 1/256, and why not all.
+    fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<Fate>) {
+        if self.bedrock.is_some_and(|bedrock| y < bedrock) || self.is_unbreakable(material) {
+            return (0, Some(Fate::Unbreakable));
+        }
+        let (power, hardness) = (i32::from(power), i32::from(*self.hardness.get(&material).unwrap_or(&0)));
+        if power >= hardness {
+            return (ONE, None);
+        }
+        match ((2 * power - hardness) * ONE / hardness).max(0) {
+            0 => (0, Some(Fate::TooHard)),
+            part => (part, Some(Fate::Slowed)),
+        }
+    }
+
+    /// The density that a sample may have instead of the proposed one, and why it is another one.
+    pub(super) fn judge(
+        &self,
+        view: &SampleView,
+        at: IVec3,
+        power: u8,
+        around: &Around,
+        proposed: i32,
+    ) -> (i32, Option<Fate>) {
+        let before = around.own();
+        if self.is_protected(at) {
+            return (before, Some(Fate::Protected));
+        }
+        if proposed <= before {
+            return (proposed, None);
+        }
+        let pace = |at: IVec3| self.pace(view.material(at), at.y, power);
+        let (part, fate) = if before < 0 {
+            pace(at)
+        } else {
+            // Air beside what is solid holds its surface.
+            let holds = |way: IVec3| if self.is_protected(at + way) { (0, None) } else { pace(at + way) };
+            around.solid_faces().map(holds).min_by_key(|(part, _)| *part).unwrap_or((ONE, None))
+        };
+        if part == ONE {
+            return (proposed, None);
+        }
+        let change = (i64::from(proposed) - i64::from(before)) * i64::from(part);
+        (before + ((change + i64::from(ONE) - 1) >> 8) as i32, fate)
+    }
+}
+
+/// Voxels that an operation would have changed but for the rules, by the material that they have, or would have got.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Refused {
+    /// Those in protected boxes: not taken away, not filled, not painted.
+    pub protected: Tally,
+    /// Those of unbreakable materials, or below bedrock.
+    pub unbreakable: Tally,
+    /// Those too hard for the brush's power.
+    pub too_hard: Tally,
+    /// Those so hard that the brush has to come again.
+    pub slowed: Tally,
+}
+
+impl Refused {
+    /// Was nothing refused?
+    pub fn is_empty(&self) -> bool {
+        self.total() == 0
+    }
+
+    /// All voxels that were refused.
+    pub fn total(&self) -> u64 {
+        [&self.protected, &self.unbreakable, &self.too_hard, &self.slowed].map(Tally::total).iter().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn power_goes_all_the_way_or_a_part_of_it_or_nowhere() {
+        let rules = DiggingRules::default()
+            .with_hardness(MaterialId(1), 100)
+            .with_unbreakable(MaterialId(2))
+            .with_bedrock(-5);
+        let pace = |material, y, power| {
+            let (part, fate) = rules.pace(MaterialId(material), y, power);
+            (part, fate.is_some())
+        };
+        assert_eq!(pace(0, 0, 0), (256, false));
+        assert_eq!(
+            [0, 50, 51, 75, 99, 100, 255].map(|power| pace(1, 0, power).0),
+            [0, 0, 5, 128, 250, 256, 256]
+        );
+        assert_eq!(
+            (pace(2, 0, 255), pace(0, -6, 255), pace(0, -5, 255)),
+            ((0, true), (0, true), (256, false))
+        );
+    }
+}

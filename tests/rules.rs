@@ -1,0 +1,203 @@
+//! Digging rules: what they protect stays, what they allow happens, and nobody can tell how it was computed.
+
+mod worlds;
+
+use std::sync::Arc;
+
+use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::volume::Tally;
+use fastrand::Rng;
+use glam::{IVec3, Vec3};
+use worlds::{any_random_brush, random_brush_at_a_face, random_ground, random_rules};
+
+/// A ground, its chunk size, rules, and brushes of any power.
+fn script(seed: u64) -> (Arc<Ground>, u32, DiggingRules, Vec<Brush>) {
+    let mut rng = Rng::with_seed(seed);
+    let (ground, chunk_size) = random_ground(&mut rng, seed);
+    let rules = random_rules(&mut rng, &ground);
+    let brush = |rng: &mut Rng| match rng.u32(0..4) {
+        0 => random_brush_at_a_face(rng, &ground, chunk_size),
+        _ => any_random_brush(rng, &ground),
+    };
+    let brushes: Vec<Brush> = (0..10)
+        .map(|_| {
+            let power = rng.u8(..) | rng.u8(..);
+            brush(&mut rng).with_power(power)
+        })
+        .collect();
+    (ground.into(), chunk_size, rules, brushes)
+}
+
+fn terrain(ground: &Arc<Ground>, chunk_size: u32, rules: &DiggingRules) -> Terrain {
+    let settings = TerrainSettings { chunk_size, ..Default::default() };
+    let mut terrain = Terrain::new(Arc::clone(ground), &settings).expect("valid settings");
+    terrain.set_rules(rules.clone());
+    terrain
+}
+
+fn drawn(world: &World) -> Vec<(Drawn, SurfaceMesh)> {
+    world.drawn().collect()
+}
+
+#[test]
+fn what_is_protected_or_unbreakable_stays() {
+    let (mut protected, mut unbreakable) = (0, 0);
+    for seed in 0..worlds::world_count(60) {
+        let (ground, chunk_size, rules, brushes) = script(seed);
+        let mut terrain = terrain(&ground, chunk_size, &rules);
+        for brush in &brushes {
+            let before = terrain.snapshot();
+            let receipts = terrain.apply([brush]);
+            let Ok(applied) = &receipts[0].outcome else { continue };
+            protected += applied.refused.protected.total();
+            unbreakable += applied.refused.unbreakable.total();
+            let Some(bounds) = applied.bounds else { continue };
+            let (old, new) = (before.samples(), terrain.world().samples());
+            for point in bounds.points() {
+                let is_same = old.sample(point) == new.sample(point)
+                    && old.stored_material(point) == new.stored_material(point);
+                let is_in = |samples: &LatticeBox| samples.contains(point);
+                let is_protected = rules.protected.iter().any(is_in);
+                assert!(is_same || !is_protected, "world {seed} at {point}: {brush:?}");
+                let is_bedrock = rules.bedrock.is_some_and(|bedrock| point.y < bedrock);
+                let is_hard = rules.unbreakable.contains(&old.material(point));
+                if old.is_solid(point) && (is_bedrock || is_hard) {
+                    // What is stored ends at 128 voxels, whatever there was.
+                    let is_kept = new.distance(point) <= old.distance(point).max(-32_767);
+                    assert!(is_kept, "world {seed} at {point}: {brush:?}");
+                    assert!(is_bedrock || new.material(point) == old.material(point), "{seed} at {point}");
+                }
+            }
+        }
+        let report = terrain.world().check_seams();
+        assert!(report.is_flawless(), "world {seed}: {report}");
+    }
+    assert!(protected > 500 && unbreakable > 1000, "{protected} {unbreakable}");
+}
+
+#[test]
+fn rules_that_are_against_nothing_change_nothing() {
+    for seed in 100..100 + worlds::world_count(40) {
+        let (ground, chunk_size, _, brushes) = script(seed);
+        let far = LatticeBox::point(IVec3::new(3, 32_000, 3));
+        let rules = DiggingRules::default().with_protected(far).with_hardness(MaterialId(200), 9);
+        let [mut with, mut without] =
+            [rules, DiggingRules::default()].map(|rules| terrain(&ground, chunk_size, &rules));
+        for brushes in brushes.chunks(3) {
+            assert_eq!(with.apply(brushes), without.apply(brushes), "world {seed}");
+        }
+        assert_eq!(with.world().hash(), without.world().hash(), "world {seed}");
+        assert!(drawn(with.world()) == drawn(without.world()), "world {seed}");
+    }
+}
+
+#[test]
+fn under_rules_neither_batches_nor_threads_show() {
+    let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
+    for seed in 200..200 + worlds::world_count(30) {
+        let (ground, chunk_size, rules, brushes) = script(seed);
+        let run = |batch: usize| {
+            let mut terrain = terrain(&ground, chunk_size, &rules);
+            let receipts: Vec<Receipt> =
+                brushes.chunks(batch).flat_map(|brushes| terrain.apply(brushes)).collect();
+            (terrain.world().hash(), drawn(terrain.world()), receipts)
+        };
+        let first = run(1);
+        for (pool, batch) in pools.iter().zip([10, 3, 10]) {
+            let other = pool.install(|| run(batch));
+            assert_eq!(first.0, other.0, "world {seed}: hash in batches of {batch}");
+            assert!(first == other, "world {seed}: receipts or meshes in batches of {batch}");
+        }
+    }
+}
+
+#[test]
+fn a_weak_tool_takes_its_time_and_gets_there() {
+    let ground = Arc::new(Ground::flat(64, 64, 30.25).expect("valid"));
+    let shape = Shape::capsule(Vec3::new(28.0, 28.0, 32.0), Vec3::new(36.0, 22.0, 32.0), 5.0);
+    let rules = DiggingRules::default().with_hardness(MaterialId(0), 120);
+    let air = |terrain: &Terrain| {
+        let all = LatticeBox::new(IVec3::new(12, 5, 12), IVec3::new(50, 30, 50)).expect("not empty");
+        all.volume() - terrain.world().samples().solid_count(all)
+    };
+    let mut full = terrain(&ground, 32, &rules);
+    let removed = |receipts: &[Receipt]| receipts[0].outcome.as_ref().map_or(0, |a| a.removed.total());
+    let all = removed(&full.apply([Brush::dig(shape)]));
+    let mut steps = Vec::new();
+    for power in [70, 90, 119] {
+        let mut slow = terrain(&ground, 32, &rules);
+        let (mut sum, mut count) = (0, 0);
+        while air(&slow) < air(&full) {
+            let receipts = slow.apply([Brush::dig(shape).with_power(power)]);
+            let applied = receipts[0].outcome.as_ref().expect("a valid brush");
+            assert!(applied.bounds.is_some(), "it goes on while anything is left");
+            assert!(count > 0 || power > 100 || applied.refused.slowed.total() > 50);
+            sum += applied.removed.total();
+            count += 1;
+            assert!(count < 200 && air(&slow) <= air(&full));
+        }
+        assert_eq!(sum, all, "in the end, as much as at once");
+        steps.push(count);
+    }
+    assert!(steps[0] > steps[1] && steps[1] > steps[2] && steps[2] > 1, "{steps:?}");
+    let mut weak = terrain(&ground, 32, &rules);
+    let receipts = weak.apply([Brush::dig(shape).with_power(60)]);
+    let applied = receipts[0].outcome.as_ref().expect("a valid brush");
+    assert_eq!((applied.bounds, applied.removed.total()), (None, 0), "half the hardness is too little");
+    assert_eq!(applied.refused.too_hard.iter().collect::<Vec<_>>(), [(MaterialId(0), all)]);
+}
+
+#[test]
+fn receipts_tell_what_was_refused_and_why() {
+    let ground = Arc::new(Ground::flat(64, 64, 20.5).expect("valid"));
+    let samples = LatticeBox::new(IVec3::new(30, 18, 20), IVec3::new(34, 40, 44)).expect("not empty");
+    let rules =
+        DiggingRules::default().with_protected(samples).with_bedrock(17).with_unbreakable(MaterialId(7));
+    let mut terrain = terrain(&ground, 25, &rules);
+    let ball = Shape::sphere(Vec3::new(32.0, 20.0, 32.0), 6.0);
+    let receipts = terrain.apply([
+        Brush::dig(ball),
+        Brush::add(Shape::sphere(Vec3::new(32.0, 28.0, 32.0), 6.0), MaterialId(7)),
+        Brush::paint(ball, MaterialId(3)),
+        Brush::dig(Shape::sphere(Vec3::new(32.0, 28.0, 32.0), 7.0)),
+    ]);
+    let applied: Vec<&Applied> =
+        receipts.iter().map(|receipt| receipt.outcome.as_ref().expect("valid brushes")).collect();
+    let list = |tally: &Tally| tally.iter().collect::<Vec<_>>();
+    // Of the ball below the surface, what is not taken away is refused.
+    let solid = |points: &mut dyn Iterator<Item = IVec3>| points.count() as u64;
+    let inside = |at: IVec3| at.y <= 20 && (at - IVec3::new(32, 20, 32)).length_squared() <= 36;
+    let all = LatticeBox::point(IVec3::new(32, 20, 32)).grown(6);
+    let boxed = solid(&mut all.points().filter(|&at| inside(at) && samples.contains(at)));
+    let rock = solid(&mut all.points().filter(|&at| inside(at) && at.y < 17 && !samples.contains(at)));
+    assert_eq!(list(&applied[0].refused.protected), [(MaterialId(0), boxed)]);
+    assert_eq!(list(&applied[0].refused.unbreakable), [(MaterialId(0), rock)]);
+    let every = solid(&mut all.points().filter(|&at| inside(at)));
+    assert_eq!(applied[0].removed.total() + boxed + rock, every);
+    // New ground in the box would have been of material 7, and is unbreakable beside it.
+    assert!(applied[1].refused.protected.of(MaterialId(7)) > 100 && applied[1].added.total() > 100);
+    assert_eq!(list(&applied[2].refused.protected), [(MaterialId(0), boxed)]);
+    assert!(applied[2].painted.of(MaterialId(3)) > 50);
+    assert!(applied[3].refused.unbreakable.of(MaterialId(7)) > 100);
+    assert_eq!(applied[3].removed.of(MaterialId(7)), 0);
+    assert!(terrain.world().check_seams().is_flawless());
+}
+
+#[test]
+fn rules_can_be_taken_back() {
+    let ground = Arc::new(Ground::flat(40, 40, 10.0).expect("valid"));
+    let mut terrain = terrain(&ground, 32, &DiggingRules::default().with_bedrock(100));
+    let dig = Brush::dig(Shape::sphere(Vec3::new(20.0, 10.0, 20.0), 4.0));
+    assert!(terrain.world().rules().is_some());
+    terrain.apply([&dig]);
+    let held = terrain.snapshot();
+    terrain.set_rules(DiggingRules::default());
+    assert!(terrain.world().rules().is_none() && held.rules().is_some());
+    terrain.apply([&dig]);
+    let mut free = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    free.apply([&dig]);
+    assert_eq!(free.world().hash(), terrain.world().hash());
+}
