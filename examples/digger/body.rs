@@ -3,7 +3,9 @@
 use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
 use bevy::prelude::*;
-use bevy_burrow::physics::{Character, CharacterMotion, CharacterPlugin, ColliderSource, TerrainPhysicsPlugin};
+use bevy_burrow::physics::{
+    Character, CharacterMotion, CharacterPlugin, ColliderSource, TerrainPhysicsPlugin,
+};
 
 /// Steps of the simulation in a second.
 const HERTZ: f64 = 60.0;

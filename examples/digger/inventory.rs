@@ -107,11 +107,7 @@ fn enter_history(
 }
 
 /// What the keys for it say.
-fn step_through_history(
-    actions: Res<Actions>,
-    mut undo: MessageWriter<Undo>,
-    mut redo: MessageWriter<Redo>,
-) {
+fn step_through_history(actions: Res<Actions>, mut undo: MessageWriter<Undo>, mut redo: MessageWriter<Redo>) {
     if actions.just_pressed(Action::Undo) {
         undo.write_default();
     }
@@ -135,10 +131,7 @@ impl Plugin for InventoryPlugin {
         app.init_resource::<Inventory>()
             .add_message::<StockChanged>()
             .add_systems(Update, (enter_receipts, enter_history).after(BurrowSystems::Commit))
-            .add_systems(
-                Update,
-                step_through_history.in_set(Playing).run_if(in_state(Phase::Playing)),
-            );
+            .add_systems(Update, step_through_history.in_set(Playing).run_if(in_state(Phase::Playing)));
     }
 }
 

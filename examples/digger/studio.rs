@@ -191,10 +191,6 @@ impl Studio {
         let height = self.terrain()?.world().height(at.x, at.y).ok_or("the script left the world")?;
         self.stand_at(Vec3::new(place.x, height as f32, place.y))?;
         self.wait(10);
-        let start = Instant::now();
-        while self.is_held() && start.elapsed() < PATIENCE {
-            self.step();
-        }
         Ok(())
     }
 
@@ -202,7 +198,14 @@ impl Studio {
     pub fn stand_at(&mut self, feet: Vec3) -> Result {
         let place = Character::default().standing_at(feet);
         self.put(place)?;
-        self.put(CharacterMotion::default())
+        self.put(CharacterMotion::default())?;
+        // One frame to see that there is no ground, and the others until there is.
+        self.step();
+        let start = Instant::now();
+        while self.is_held() && start.elapsed() < PATIENCE {
+            self.step();
+        }
+        Ok(())
     }
 
     /// Where the player's feet are.

@@ -92,7 +92,10 @@ fn what_was_broken_flies_off_as_chips_of_its_material() {
     }
     app.update();
     let bursts: Vec<Burst> = app.world_mut().resource_mut::<Messages<Burst>>().drain().collect();
-    assert!(bursts.iter().any(|burst| burst.matter == Matter::Chips(MaterialId(0)) && burst.count > 3), "{bursts:?}");
+    assert!(
+        bursts.iter().any(|burst| burst.matter == Matter::Chips(MaterialId(0)) && burst.count > 3),
+        "{bursts:?}"
+    );
     // A receipt for nobody throws nothing.
     let receipt = Receipt { tag, outcome: Ok(Applied::default()) };
     app.world_mut().write_message(BrushApplied { terrain: None, receipt });
