@@ -39,7 +39,7 @@
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
 //! | `script.rs`, `tour.rs` | two stories |
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
-//! | `wires.rs`, `report.rs` | lines of a seam; receipts, times and the summary |
+//! | `wires.rs`, `report.rs`, `tell.rs` | lines of a seam; receipts, times and the summary; what goes on |
 
 mod art;
 mod body;
@@ -66,6 +66,7 @@ mod script;
 mod settings;
 mod sky;
 mod studio;
+mod tell;
 mod tools;
 mod tour;
 mod ui;
@@ -111,6 +112,9 @@ pub struct Options {
     /// Draw every frame of the script, not only the pictures: for frame times.
     #[arg(long)]
     draw_all: bool,
+    /// Say on standard output what goes on, for programs that play the game.
+    #[arg(long)]
+    tell: bool,
     /// What edits are computed on.
     #[arg(long, value_enum, default_value_t = Computer::Auto)]
     backend: Computer,
@@ -193,6 +197,9 @@ fn open_window(options: &Options) -> App {
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
     app.add_plugins(veins::VeinsPlugin);
+    if options.tell {
+        app.add_plugins(tell::TellPlugin);
+    }
     app
 }
 
