@@ -76,7 +76,7 @@ ptx: ## Compile the CUDA kernels to PTX again; needs no card (ARGS=--check to co
 	@tools/setup.sh ptx
 	@python3 tools/ptx.py $(ARGS)
 
-peers: ## Time the dense mesher beside VTK, scikit-image and PyMCubes, which it installs outside the clone
+peers: ## Time the dense mesher beside VTK, scikit-image and PyMCubes, installed outside the clone (ARGS=--gpu: GPU meshers)
 	@tools/peers.sh $(ARGS)
 
 instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)

@@ -49,11 +49,13 @@
 //! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
+//! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
+//! | more from the same surfaces, in the same commit | `Companion`s |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
 //! Rooms, from the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`.
+//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`.
 //!
 //! # How the seam closes
 //!
@@ -106,6 +108,7 @@
 //! | `cuda` | transactions on an NVIDIA card where one is found, see [`backend`]; compiles everywhere | |
 //! | `plugin` | the Bevy plugin; enough for a dedicated server with `MinimalPlugins` | |
 //! | `render` | materials on tiles and chunks | yes |
+//! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
 //! Without any feature the model alone is built, with no Bevy at all. Bevy's own `multi_threaded` feature, part of its
@@ -153,8 +156,8 @@ pub mod prelude {
         Terrains, Tile, Undo,
     };
     pub use crate::terrain::{
-        Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Restored,
-        ScenarioCounts, Span, Terrain, TerrainSettings,
+        Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
+        PieceFate, Receipt, Rejection, Restored, ScenarioCounts, Span, Terrain, TerrainSettings,
     };
     #[cfg(feature = "render")]
     pub use crate::view::{

@@ -181,6 +181,7 @@ fn move_characters(
             &mut Transform,
             &mut LinearVelocity,
             &Collider,
+            Option<&CollisionLayers>,
         ),
         Without<HeldByGround>,
     >,
@@ -190,12 +191,14 @@ fn move_characters(
     if dt <= 0.0 {
         return;
     }
-    for (entity, character, steering, mut motion, mut transform, mut velocity, collider) in &mut characters {
+    for (entity, character, steering, mut motion, mut transform, mut velocity, collider, layers) in
+        &mut characters
+    {
         let before = transform.translation;
         if !before.is_finite() {
             continue;
         }
-        let walk = Walk::new(&mover, collider, character, entity);
+        let walk = Walk::new(&mover, collider, layers, character, entity);
         let (place, after) = walk.advance(before, *motion, steering, dt);
         motion.set_if_neq(after);
         if place != before {

@@ -18,25 +18,31 @@ const CLEARANCE: f32 = 4.0;
 /// This body stands still until the ground under it has colliders: it is over a terrain that loads, or farther from all
 /// [`ColliderSource`]s than their radius.
 ///
-/// The plugin puts it on dynamic bodies, with avian's `RigidBodyDisabled`, and on [`Character`]s, and takes it away again.
-/// Velocities are kept. Bodies high above the ground are not held.
-#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The plugin puts it on dynamic bodies, whose axes it locks, and on [`Character`]s, and takes it away again; the body goes
+/// on with the velocity it had. Bodies high above the ground are not held.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default)]
 #[reflect(Component, Default)]
-pub struct HeldByGround;
+pub struct HeldByGround {
+    velocity: Vec3,
+    spin: Vec3,
+    /// What was locked before.
+    locked: Option<LockedAxes>,
+}
 
 /// Holds bodies and lets them go.
 pub(super) fn hold(
     mut commands: Commands,
-    bodies: Query<
+    mut bodies: Query<
         (
             Entity,
             &RigidBody,
             &Position,
-            &LinearVelocity,
+            &mut LinearVelocity,
+            &mut AngularVelocity,
+            Option<&LockedAxes>,
             Option<&ColliderAabb>,
             Has<Character>,
-            Has<HeldByGround>,
-            Has<RigidBodyDisabled>,
+            Option<&HeldByGround>,
         ),
         Without<super::GroundBody>,
     >,
@@ -54,26 +60,40 @@ pub(super) fn hold(
         })
         .collect();
     let mut held = 0;
-    for (entity, body, position, velocity, bounds, is_character, is_held, is_disabled) in &bodies {
-        if !(body.is_dynamic() || is_character) || is_disabled && !is_held {
+    for (entity, body, position, mut velocity, mut spin, locked, bounds, is_character, hold) in &mut bodies {
+        if !(body.is_dynamic() || is_character) {
             continue;
         }
         let half = bounds.map_or(Vec3::splat(0.5), |bounds| (bounds.max - bounds.min) / 2.0);
         let half = half.clamp(Vec3::ZERO, Vec3::splat(8.0));
+        let towards = hold.map_or(velocity.0, |hold| hold.velocity);
         let lacks_ground = terrains.iter().any(|(terrain, model, affine)| {
-            affine.lacks_ground(*terrain, model, &ready, position.0, velocity.0, half)
+            affine.lacks_ground(*terrain, model, &ready, position.0, towards, half)
         });
         held += usize::from(lacks_ground);
-        if lacks_ground == is_held {
-            continue;
-        }
         let mut entity = commands.entity(entity);
-        match (lacks_ground, is_character) {
-            (true, true) => entity.try_insert(HeldByGround),
-            (true, false) => entity.try_insert((HeldByGround, RigidBodyDisabled)),
-            (false, true) => entity.try_remove::<HeldByGround>(),
-            (false, false) => entity.try_remove::<(HeldByGround, RigidBodyDisabled)>(),
-        };
+        match (lacks_ground, hold) {
+            (true, None) => {
+                let hold = HeldByGround { velocity: velocity.0, spin: spin.0, locked: locked.copied() };
+                entity.try_insert(hold);
+                if !is_character {
+                    (velocity.0, spin.0) = (Vec3::ZERO, Vec3::ZERO);
+                    entity.try_insert(LockedAxes::ALL_LOCKED);
+                }
+            }
+            (false, Some(hold)) => {
+                entity.try_remove::<HeldByGround>();
+                if !is_character {
+                    // Told so by the change, avian wakes it.
+                    (velocity.0, spin.0) = (hold.velocity, hold.spin);
+                    match hold.locked {
+                        Some(locked) => entity.try_insert(locked),
+                        None => entity.try_remove::<LockedAxes>(),
+                    };
+                }
+            }
+            _ => {}
+        }
     }
     figures.held = held;
     if held > 0 && sources.is_empty() {

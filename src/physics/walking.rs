@@ -27,10 +27,12 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     pub(super) fn new(
         mover: &'a MoveAndSlide<'w, 's>,
         collider: &'a Collider,
+        layers: Option<&CollisionLayers>,
         character: &'a Character,
         entity: Entity,
     ) -> Self {
-        let filter = SpatialQueryFilter::from_excluded_entities([entity]);
+        let filter = SpatialQueryFilter::from_excluded_entities([entity])
+            .with_mask(layers.copied().unwrap_or_default().filters);
         Self { mover, collider, character, filter, level: character.steepest.clamp(0.0, 1.5).cos() }
     }
 

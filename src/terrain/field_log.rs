@@ -50,7 +50,8 @@ impl<'a> FieldLog<'a> {
             LatticeBox::include(&mut bounds, part.bounds);
             chunks.push(self.absorb(part.chunk, part.bounds));
         }
-        Ok(Applied { chunks, bounds, removed: effect.removed, added: effect.added, painted: effect.painted })
+        let EditEffect { removed, added, painted, refused, .. } = effect;
+        Ok(Applied { chunks, bounds, removed, added, painted, refused, loose: Vec::new() })
     }
 
     fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {

@@ -15,8 +15,10 @@
 
 mod change;
 mod commit;
+mod drafting;
 mod field_log;
 mod history;
+mod loose;
 mod query;
 mod ray;
 mod receipt;
@@ -28,6 +30,7 @@ mod world;
 pub use commit::{Commit, Stages};
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use redraw::{MeshUpdates, TileUpdate};
@@ -121,6 +124,7 @@ pub struct Terrain {
     queue: Vec<Request>,
     in_flight: Option<InFlight>,
     answered: Vec<Receipt>,
+    loose: Option<LooseSettings>,
     timeline: Timeline,
     moves: Vec<HistoryReceipt>,
 }
@@ -151,6 +155,7 @@ impl Terrain {
             queue: Vec::new(),
             in_flight: None,
             answered: Vec::new(),
+            loose: None,
             timeline: Timeline::new(UNDO_BUDGET),
             moves: Vec::new(),
         })
@@ -235,6 +240,17 @@ impl Terrain {
         self.queue.push(Request::Step(HistoryStep::Redo));
     }
 
+    /// From the next transaction on, edits look for pieces of ground that they cut off, and receipts list them; `None`
+    /// turns that off, as it is at first. A terrain whose world has to be the same elsewhere needs the same settings there.
+    pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
+        self.loose = settings;
+    }
+
+    /// What edits look for, if they do.
+    pub fn loose(&self) -> Option<&LooseSettings> {
+        self.loose.as_ref()
+    }
+
     /// What can be undone and redone, and what it takes.
     pub fn history(&self) -> History {
         self.timeline.figures()
@@ -285,7 +301,13 @@ impl Terrain {
         };
         let ticket = unique();
         self.in_flight = Some(InFlight { ticket, work: work.clone() });
-        Some(Transaction::new(ticket, self.snapshot(), work, self.engine.clone()))
+        Some(Transaction {
+            ticket,
+            world: self.snapshot(),
+            work,
+            loose: self.loose,
+            engine: self.engine.clone(),
+        })
     }
 
     /// The edits in front of the queue.

@@ -1,5 +1,6 @@
 //! Receipts: what became of a brush.
 
+use super::loose::LoosePiece;
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
 use crate::volume::{FieldId, Refused, Scenario, Tally};
@@ -28,6 +29,9 @@ pub struct Applied {
     pub painted: Tally,
     /// Voxels that the terrain's [`DiggingRules`](crate::volume::DiggingRules) kept from changing, by reason.
     pub refused: Refused,
+    /// Pieces of ground that it cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone
+    /// are not among `removed`.
+    pub loose: Vec<LoosePiece>,
 }
 
 impl Applied {

@@ -12,9 +12,11 @@ use web_time::Instant;
 
 use super::change::{Change, replaced_bytes};
 use super::commit::{Commit, Stages};
+use super::drafting::{Drafted, Drafting};
 use super::field_log::{FieldLog, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
-use super::receipt::Receipt;
+use super::loose::LooseSettings;
+use super::receipt::{Applied, Receipt};
 use super::redraw::{self, MeshUpdates};
 use super::world::World;
 use super::{Submission, Work};
@@ -23,26 +25,22 @@ use crate::brush::Edit;
 use crate::lattice::LatticeBox;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{
-    Bricks, Draft, DraftedBrick, EditWork, Fields, Ledger, Replaced, UniformBricks, pristine_brick,
-};
+use crate::volume::{Bricks, DraftedBrick, Fields, Replaced, UniformBricks, pristine_brick};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.
 #[derive(Clone)]
 pub struct Transaction {
-    ticket: u64,
-    world: Arc<World>,
-    work: Work,
+    pub(super) ticket: u64,
+    pub(super) world: Arc<World>,
+    pub(super) work: Work,
+    /// Without them, nobody looks for loose pieces.
+    pub(super) loose: Option<LooseSettings>,
     /// Without one, the processor.
-    engine: Option<Engine>,
+    pub(super) engine: Option<Engine>,
 }
 
 impl Transaction {
-    pub(super) fn new(ticket: u64, world: Arc<World>, work: Work, engine: Option<Engine>) -> Self {
-        Self { ticket, world, work, engine }
-    }
-
     /// How many edits it holds; a step through history holds none.
     pub fn len(&self) -> usize {
         match &self.work {
@@ -74,13 +72,13 @@ impl Transaction {
     fn edit(&self, submissions: &[Submission], backend: &dyn Compute) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
-        let draft = Stages::time(&mut stages.edit, || {
-            let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| backend.edit(work, each);
-            let (base, hash, rules) = (world.samples(), world.sample_hash, world.rules());
-            Draft::make(base, world.grid, &edits, hash, &world.uniform, rules, apply)
+        let Drafted { draft, over: bricks, mut pieces } = Stages::time(&mut stages.edit, || {
+            let drafting = Drafting { world, backend };
+            match &self.loose {
+                Some(settings) => drafting.one_by_one(&edits, settings),
+                None => drafting.together(&edits),
+            }
         });
-        let bricks: Bricks =
-            draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
         let samples = world.samples().over(&bricks);
 
         let before = WorldView { samples, ..world.view() };
@@ -93,11 +91,17 @@ impl Transaction {
         let meshes = redraw::updates(world, &view, backend, &draft.bricks, dirty, &added, &mut stages);
 
         let mut log = FieldLog::new(world);
-        let mut effects = draft.effects.into_iter();
+        let mut effects = draft.effects.into_iter().enumerate();
         let receipts = submissions.iter().map(|submission| {
             let outcome = match &submission.edit {
                 Err(error) => Err((*error).into()),
-                Ok(edit) => log.enter(edit, effects.next().unwrap_or_default()),
+                Ok(edit) => {
+                    let (number, effect) = effects.next().unwrap_or_default();
+                    log.enter(edit, effect).map(|applied| {
+                        let loose = pieces.remove(&number).unwrap_or_default();
+                        Applied { loose, ..applied }
+                    })
+                }
             };
             Receipt { tag: submission.tag, outcome }
         });

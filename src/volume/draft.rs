@@ -237,7 +237,8 @@ impl Changes {
 }
 
 impl Draft {
-    /// What edits make of samples of this hash. Whoever applies them gets them run by run.
+    /// What edits make of samples of this hash. Whoever applies them gets them run by run. Where `base` has newer bricks
+    /// already, there must be one run only: a single edit, say.
     pub(crate) fn make(
         base: SampleView,
         grid: ChunkGrid,
@@ -252,7 +253,8 @@ impl Draft {
         let (mut earlier, mut rest) =
             (Changes::default(), runs(grid, edits, rules.is_some()).into_iter().peekable());
         while let Some(run) = rest.next() {
-            let work = EditWork::new(base.over(&earlier.newer), grid, &edits[run.clone()]).under(rules);
+            let base = if run.start == 0 { base } else { base.over(&earlier.newer) };
+            let work = EditWork::new(base, grid, &edits[run.clone()]).under(rules);
             apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
             if run.start > 0 || rest.peek().is_some() {
                 earlier.take(std::mem::take(&mut draft.bricks));

@@ -9,6 +9,7 @@ mod careful;
 mod draft;
 mod field;
 mod ledger;
+mod removal;
 mod restore;
 mod rules;
 mod runs;
@@ -26,6 +27,7 @@ pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
 pub(crate) use ledger::{Count, Fate, PartEffect};
+pub(crate) use removal::{TakenOut, pristine_layers, take_out};
 pub(crate) use restore::{Replaced, pristine_brick};
 pub use rules::{DiggingRules, Refused};
 pub use tally::Tally;

@@ -2,21 +2,17 @@
 
 use glam::IVec3;
 
-use super::brick::{PRISTINE, solid_layers};
+use super::brick::PRISTINE;
+use super::removal::pristine_layers;
 use super::view::resolve;
 use super::workpiece::{bounds, offset, ones};
 use super::{Brick, Layers, Tally};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BrickPos, Column, LatticeBox};
+use crate::lattice::{BrickPos, LatticeBox};
 
 /// A brick that nobody edited: what stands for a missing one where a table lies over another that has it.
 pub(crate) fn pristine_brick(ground: &Ground, pos: BrickPos) -> Brick {
     Brick::pristine(pristine_layers(ground, pos))
-}
-
-fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
-    let low = pos.origin();
-    solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
 }
 
 /// What becomes of voxels when bricks are replaced.

@@ -314,7 +314,7 @@ fn bits(lanes: i16x8) -> u8 {
 
 /// Positions of the bits that are set, lowest first.
 #[inline(always)]
-fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
+pub(super) fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);

@@ -149,7 +149,7 @@ fn a_loose_piece_becomes_a_body_with_its_volume() {
     terrain.apply([Brush::add(Shape::sphere(Vec3::new(24.0, 24.0, 24.0), 4.0), MaterialId(2))]);
     let chunk = terrain.world().grid().chunk_of(IVec3::new(24, 24, 24));
     let piece = terrain.world().chunk_mesh(chunk);
-    for voxel_size in [1.0, 0.5] {
+    for voxel_size in [1.0f32, 0.5] {
         let collider = debris_collider(&piece, voxel_size).expect("a ball has volume");
         let volume = collider.mass_properties(1.0).mass / voxel_size.powi(3);
         assert!((volume / 268.0 - 1.0).abs() < 0.06, "{volume}");

@@ -1,0 +1,81 @@
+//! `physics`: balls rain on hills that are dug away under them.
+//!
+//! ```text
+//! cargo run --release --features examples --example physics
+//! cargo run --release --features examples --example physics -- --headless --out out/physics
+//! ```
+//!
+//! | control | does |
+//! | --- | --- |
+//! | left mouse button, held | digs where the cursor points |
+//! | middle mouse button, held | builds there |
+//! | right mouse button, held | looks around |
+//! | `W` `A` `S` `D`, `Q`, `E` | moves, down, up; with `Shift` faster |
+//! | `Space` | throws a ball |
+//! | `P` | stops the digging machine, or lets it go on |
+//!
+//! Without a display, or with `--headless`, it plays by itself for some seconds of the game's time and leaves pictures and
+//! `report.json` in `--out`; it fails if a ball is below the ground then.
+
+mod headless;
+mod rain;
+mod scene;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use avian3d::prelude::*;
+use bevy::camera_controller::free_camera::FreeCameraPlugin;
+use bevy::prelude::*;
+use bevy_burrow::physics::TerrainPhysicsPlugin;
+use bevy_burrow::prelude::*;
+use clap::Parser;
+
+/// Balls rain on hills that are dug away under them.
+#[derive(Parser, Clone, Debug)]
+pub struct Options {
+    /// Play without a window and write pictures and a report.
+    #[arg(long)]
+    headless: bool,
+    /// Folder for pictures and the report.
+    #[arg(long, value_name = "DIR", default_value = "out/physics")]
+    out: PathBuf,
+    /// How many balls there are at most.
+    #[arg(long, default_value_t = 1000)]
+    balls: usize,
+    /// Seconds of the game's time to play without a window.
+    #[arg(long, default_value_t = 20.0)]
+    seconds: f32,
+    /// Width of pictures, in pixels.
+    #[arg(long, default_value_t = 960, value_parser = clap::value_parser!(u32).range(64..=8192))]
+    width: u32,
+    /// Height of pictures, in pixels.
+    #[arg(long, default_value_t = 540, value_parser = clap::value_parser!(u32).range(64..=8192))]
+    height: u32,
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    let has_display =
+        !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|d| !d.is_empty());
+    if options.headless || !has_display {
+        return headless::run(&options);
+    }
+    let mut app = App::new();
+    app.add_plugins((DefaultPlugins, FreeCameraPlugin));
+    game(&mut app, &options);
+    app.add_systems(Update, (scene::use_mouse, scene::press_keys).before(BurrowSystems::Collect));
+    match app.run() {
+        AppExit::Success => ExitCode::SUCCESS,
+        AppExit::Error(code) => ExitCode::from(code.get()),
+    }
+}
+
+/// Everything that needs no window: ten lines of physics, and a scene.
+fn game(app: &mut App, options: &Options) {
+    app.add_plugins((BurrowPlugins, PhysicsPlugins::default(), TerrainPhysicsPlugin))
+        .insert_resource(rain::Rain::new(options.balls))
+        .add_systems(Startup, (scene::set_up, rain::prepare))
+        .add_systems(FixedUpdate, rain::fall)
+        .add_systems(Update, rain::dig.before(BurrowSystems::Collect));
+}

@@ -1,0 +1,108 @@
+//! The surface of a piece of ground, cut out of the world.
+
+use glam::IVec3;
+use rustc_hash::FxHashMap;
+
+use super::bits::Samples;
+use super::search::{self, Component};
+use crate::ground::{Ground, MaterialId};
+use crate::lattice::{BrickPos, Column, ONE};
+use crate::surface::SurfaceMesh;
+use crate::surface::cases;
+use crate::surface::vertex::{Lattice, WorldView, vertex};
+
+/// Density of what lies beyond the world's sides. The piece ends at its last sample there, not halfway to the next.
+const BEYOND: i32 = i32::MAX / 4;
+
+/// The world as it is, but with air around the piece.
+struct Piece<'a> {
+    view: &'a WorldView<'a>,
+    samples: Samples,
+}
+
+impl Piece<'_> {
+    fn contains(&self, point: IVec3) -> bool {
+        let bit = BrickPos::index(point);
+        self.samples.get(&BrickPos::of(point)).is_some_and(|layers| layers[bit >> 6] >> (bit & 63) & 1 == 1)
+    }
+
+    fn is_in_world(&self, point: IVec3) -> bool {
+        let grid = self.view.grid;
+        (0..=grid.width()).contains(&point.x) && (0..=grid.depth()).contains(&point.z)
+    }
+}
+
+impl Lattice for Piece<'_> {
+    fn distance(&self, point: IVec3) -> i32 {
+        if !self.is_in_world(point) {
+            return BEYOND;
+        }
+        let own = self.view.distance(point);
+        // Other ground touches the piece nowhere; it would only turn normals.
+        if own < 0 && !self.contains(point) { ONE } else { own }
+    }
+    fn is_edited(&self, point: IVec3) -> bool {
+        !self.is_in_world(point) || self.view.is_edited(point)
+    }
+    fn stored_material(&self, point: IVec3) -> MaterialId {
+        self.view.stored_material(point)
+    }
+    fn ground(&self) -> &Ground {
+        self.view.ground()
+    }
+    fn is_volumetric(&self, cell: Column) -> Option<bool> {
+        self.view.is_volumetric(cell)
+    }
+}
+
+/// What marching cubes draws of a piece alone: closed, with the vertices that the world has there.
+pub(super) fn closed(view: &WorldView, piece: &Component, origin: IVec3) -> SurfaceMesh {
+    let samples = piece.iter().map(|(&key, &layers)| (search::brick(key), layers)).collect();
+    let piece_view = Piece { view, samples };
+    let mut mesh = SurfaceMesh::default();
+    let mut numbers: FxHashMap<(IVec3, usize), u32> = FxHashMap::default();
+    for (&key, layers) in piece {
+        let low = search::brick(key).origin();
+        let own = (0..512usize).filter(|bit| layers[bit >> 6] >> (bit & 63) & 1 == 1);
+        for bit in own {
+            let point = low + IVec3::new((bit & 7) as i32, (bit >> 6) as i32, (bit >> 3 & 7) as i32);
+            cubes_of(&piece_view, point, |cube, case| {
+                for triangle in cases::table()[case].triangles() {
+                    let triangle = triangle.map(|edge| {
+                        let (corner, axis) = cases::edge_corners(edge);
+                        let at = cube + IVec3::from_array(cases::corner(corner));
+                        *numbers.entry((at, axis)).or_insert_with(|| {
+                            mesh.vertices.push(vertex(&piece_view, at, axis, origin));
+                            mesh.vertices.len() as u32 - 1
+                        })
+                    });
+                    mesh.indices.extend_from_slice(&triangle);
+                }
+            });
+        }
+    }
+    mesh
+}
+
+/// The cubes around a sample of the piece that hold surface, with their cases. Of the samples that are corners of a cube,
+/// only the first gets it.
+fn cubes_of(piece: &Piece, point: IVec3, mut each: impl FnMut(IVec3, usize)) {
+    let mut around = [false; 27];
+    for (i, own) in (0..).zip(&mut around) {
+        *own = piece.contains(point + IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+    }
+    if around.iter().all(|&own| own) {
+        return;
+    }
+    for corner in 0..8 {
+        // Where the cube's lowest corner is among the 27.
+        let [x, y, z] = cases::corner(corner).map(|step| (1 - step) as usize);
+        let case = (0..8).fold(0, |case, other| {
+            let [dx, dy, dz] = cases::corner(other).map(|step| step as usize);
+            case | usize::from(around[x + dx + (y + dy) * 3 + (z + dz) * 9]) << other
+        });
+        if case.trailing_zeros() as usize == corner {
+            each(point - IVec3::from_array(cases::corner(corner)), case);
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Loose pieces: ground that digging cut off from the world.
+//!
+//! **What is connected.** Two solid samples that are neighbours along an axis, six for each sample. That is what the
+//! surface connects as well: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples,
+//! and cuts solid corners off wherever they only meet across a diagonal. So two parts are one piece of ground exactly if a
+//! worm could get from one to the other without coming out of what is drawn.
+//!
+//! **What is tied.** A piece that reaches the deep: ground below everything that was ever edited. The world's sides tie
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as tied without looking further; so a search has
+//! a bound, and its result does not depend on the order in which it looks.
+//!
+//! **What is taken out.** The samples of a piece become the air that the middle of a dig is, and so does air that touches
+//! them and no other ground, so that nothing is left of the shape. What remains keeps its vertices to the bit. All of that
+//! belongs to the edit that cut the piece off: it is hashed, undone and replayed with it.
+
+mod bits;
+mod mesh;
+mod search;
+
+use std::sync::Arc;
+
+use glam::IVec3;
+
+use super::world::World;
+use crate::lattice::{BrickPos, LatticeBox};
+use crate::surface::SurfaceMesh;
+use crate::surface::vertex::WorldView;
+use crate::volume::{Bricks, DiggingRules, DraftedBrick, SampleView, TakenOut, Tally, take_out};
+pub(super) use bits::Samples;
+use bits::{NONE, SIDES};
+use search::{Component, Solid};
+
+/// What to look for after a dig, and what to do with it.
+///
+/// With these, each edit that can remove ground looks for what it cut off before the next edit applies: the world is the
+/// same however edits were batched, as long as the settings are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LooseSettings {
+    /// The largest piece to look for, in voxels. Whatever is larger counts as tied; this bounds the time that a search
+    /// takes.
+    pub largest: u32,
+    /// Pieces up to so many voxels vanish.
+    pub crumbs: u32,
+    /// Larger ones, up to so many voxels, break off: they are taken out of the ground, and leave a closed mesh to make a
+    /// body of. Others stay where they are, and are reported.
+    pub debris: u32,
+}
+
+impl Default for LooseSettings {
+    /// Pieces up to 32768 voxels are reported, and stay.
+    fn default() -> Self {
+        Self { largest: 1 << 15, crumbs: 0, debris: 0 }
+    }
+}
+
+impl LooseSettings {
+    /// What becomes of a piece of so many voxels.
+    fn fate(&self, voxels: u64) -> PieceFate {
+        if voxels <= u64::from(self.crumbs) {
+            PieceFate::Removed
+        } else if voxels <= u64::from(self.debris) {
+            PieceFate::BrokeOff
+        } else {
+            PieceFate::Left
+        }
+    }
+}
+
+/// What became of a loose piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PieceFate {
+    /// It is still there, tied to nothing. So are all that the terrain's [`DiggingRules`] keep a part of.
+    Left,
+    /// It was taken out of the ground.
+    Removed,
+    /// It was taken out of the ground, and its mesh is there to make a body of.
+    BrokeOff,
+}
+
+/// Solid samples in a row along x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Run {
+    /// The first of them.
+    pub start: IVec3,
+    /// How many.
+    pub len: u32,
+}
+
+/// A piece of ground that nothing ties to the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoosePiece {
+    /// What became of it.
+    pub fate: PieceFate,
+    /// Box around its samples.
+    pub bounds: LatticeBox,
+    /// How many samples it has.
+    pub voxels: u64,
+    /// These by material: times density and volume of a voxel, its mass.
+    pub materials: Tally,
+    /// Its samples, by y, then z, then x.
+    pub runs: Arc<[Run]>,
+    /// Its surface as marching cubes draws it, closed, with positions counted from the lowest corner of `bounds`; for
+    /// those that broke off.
+    pub mesh: Option<Arc<SurfaceMesh>>,
+}
+
+impl World {
+    /// The loose pieces of up to `largest` voxels that hold some sample of a box, in order of their lowest samples there.
+    /// Says what the settings would make of each, but takes none out, and makes no meshes.
+    pub fn loose_pieces(&self, around: LatticeBox, settings: &LooseSettings) -> Vec<LoosePiece> {
+        let solid = Solid::new(self.samples(), self.grid, &self.stacks, None);
+        let Some(around) = around.intersection(self.grid.edit_bounds()) else { return Vec::new() };
+        let seeds = BrickPos::covering(around).map(|pos| (pos, bits::within(pos, around))).collect();
+        let found = search::search(&solid, &seeds, settings.largest.into());
+        found.iter().map(|piece| describe(self.samples(), piece, settings)).collect()
+    }
+}
+
+/// What edits cut off and what was taken out for it.
+#[derive(Default)]
+pub(super) struct Fallen {
+    pub pieces: Vec<LoosePiece>,
+    pub taken: Vec<TakenOut>,
+}
+
+/// Samples next to those that drafted bricks turn to air, which lie over a world and newer bricks.
+pub(super) fn seeds(world: &World, over: &Bricks, drafted: &[DraftedBrick]) -> Samples {
+    let before = Solid::new(world.samples().over(over), world.grid, &world.stacks, None);
+    search::seeds(&before, drafted)
+}
+
+/// Looks for loose pieces at seeds, in a world with newer bricks over it, and takes them out if the settings say so.
+pub(super) fn fall(world: &World, over: &Bricks, seeds: &Samples, settings: &LooseSettings) -> Fallen {
+    if seeds.is_empty() {
+        return Fallen::default();
+    }
+    let samples = world.samples().over(over);
+    let solid = Solid::new(samples, world.grid, &world.stacks, Some(over));
+    let found = search::search(&solid, seeds, settings.largest.into());
+    let mut fallen = Fallen::default();
+    let mut gone = Samples::default();
+    for component in &found {
+        let mut piece = describe(samples, component, settings);
+        if world.rules().is_some_and(|rules| keep(rules, component, &piece)) {
+            piece.fate = PieceFate::Left;
+        }
+        if piece.fate != PieceFate::Left {
+            component.iter().for_each(|(&key, layers)| bits::include(&mut gone, search::brick(key), layers));
+        }
+        if piece.fate == PieceFate::BrokeOff {
+            let view = WorldView { samples, ..world.view() };
+            piece.mesh = Some(Arc::new(mesh::closed(&view, component, piece.bounds.min)));
+        }
+        fallen.pieces.push(piece);
+    }
+    let air = air_around(&solid, &gone);
+    for (&pos, layers) in &air {
+        let mut air = bits::and(layers, &bits::within(pos, world.grid.edit_bounds()));
+        for protected in world.rules().iter().flat_map(|rules| &rules.protected) {
+            air = bits::without(&air, &bits::within(pos, *protected));
+        }
+        bits::include(&mut gone, pos, &air);
+    }
+    let mut bricks: Vec<BrickPos> = gone.keys().copied().collect();
+    bricks.sort_unstable_by_key(|pos| (pos.0.x, pos.0.z, pos.0.y));
+    let take = |pos| take_out(samples, world.grid, pos, gone.get(&pos)?);
+    fallen.taken = bricks.into_iter().filter_map(take).collect();
+    fallen
+}
+
+/// Do the rules keep some part of a piece from being taken away, whatever the brush?
+fn keep(rules: &DiggingRules, component: &Component, piece: &LoosePiece) -> bool {
+    let is_protected = |samples: &LatticeBox| {
+        let mut parts = component.iter().map(|(&key, layers)| (search::brick(key), layers));
+        samples.intersection(piece.bounds).is_some()
+            && parts.any(|(pos, layers)| bits::and(layers, &bits::within(pos, *samples)) != NONE)
+    };
+    rules.bedrock.is_some_and(|bedrock| piece.bounds.min.y < bedrock)
+        || rules.unbreakable.iter().any(|&material| piece.materials.of(material) > 0)
+        || rules.protected.iter().any(is_protected)
+}
+
+/// The air that touches pieces and no other ground.
+fn air_around(solid: &Solid, pieces: &Samples) -> Samples {
+    let mut air = Samples::default();
+    let rest = |pos: BrickPos| bits::without(&solid.layers(pos), pieces.get(&pos).unwrap_or(&NONE));
+    for (pos, near) in bits::grown_set(pieces) {
+        let near = bits::without(&near, &solid.layers(pos));
+        if near == NONE {
+            continue;
+        }
+        let mut other = bits::grown(&rest(pos));
+        for side in SIDES {
+            other = bits::or(&other, &bits::beyond(&rest(BrickPos(pos.0 - side)), side));
+        }
+        bits::include(&mut air, pos, &bits::without(&near, &other));
+    }
+    air
+}
+
+/// What there is to say about a piece.
+fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) -> LoosePiece {
+    let mut runs: Vec<Run> = Vec::new();
+    let (mut voxels, mut materials) = (0, Tally::default());
+    for (&key, layers) in piece {
+        let low = search::brick(key).origin();
+        for (row, y, z) in (0..8).flat_map(|y| (0..8).map(move |z| (layers[y] >> (z * 8) & 0xff, y, z))) {
+            let mut rest = row;
+            while rest != 0 {
+                let from = rest.trailing_zeros();
+                let len = (rest >> from).trailing_ones();
+                rest &= !(((1 << len) - 1) << from);
+                runs.push(Run { start: low + IVec3::new(from as i32, y as i32, z), len });
+            }
+        }
+        voxels += bits::count(layers);
+    }
+    runs.sort_unstable_by_key(|run| [run.start.y, run.start.z, run.start.x]);
+    runs.dedup_by(|next, run| {
+        let goes_on = next.start == run.start + IVec3::X * run.len as i32;
+        run.len += if goes_on { next.len } else { 0 };
+        goes_on
+    });
+    let mut bounds: Option<LatticeBox> = None;
+    for run in &runs {
+        let end = run.start + IVec3::X * (run.len as i32 - 1);
+        LatticeBox::include(&mut bounds, LatticeBox { min: run.start, max: end });
+        let (mut last, mut count) = (None, 0);
+        for x in 0..run.len as i32 {
+            let material = samples.material(run.start + IVec3::X * x);
+            if last != Some(material) {
+                last.into_iter().for_each(|last| materials.count_many(last, count));
+                (last, count) = (Some(material), 0);
+            }
+            count += 1;
+        }
+        last.into_iter().for_each(|last| materials.count_many(last, count));
+    }
+    let bounds = bounds.unwrap_or(LatticeBox::point(IVec3::ZERO));
+    LoosePiece { fate: settings.fate(voxels), bounds, voxels, materials, runs: runs.into(), mesh: None }
+}

@@ -1,0 +1,394 @@
+//! Loose pieces: what digging cuts off is found, all of it and nothing else, and taken out with the edit that did it.
+
+mod worlds;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::vertex::crossing;
+use bevy_burrow::terrain::World;
+use bevy_burrow::volume::Tally;
+use fastrand::Rng;
+use glam::{IVec3, Vec3};
+use worlds::{random_brush, random_brush_at_a_face, random_ground, world_count};
+
+const STEPS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
+
+type Point = [i32; 3];
+
+/// Samples in order.
+type Piece = BTreeSet<Point>;
+
+/// All loose pieces of a world, by filling what is solid sample by sample: those that do not reach the bottom, which lies
+/// below all that was edited and all of the surface.
+fn by_brute_force(world: &World) -> Vec<Piece> {
+    let samples = world.samples();
+    let (low, high) = world.ground().height_range();
+    let edited = world.bricks().map(|(pos, _)| pos.samples());
+    let rows =
+        LatticeBox { min: IVec3::Y * (low.div_euclid(256) - 1), max: IVec3::Y * (high.div_euclid(256) + 1) };
+    let around = edited.fold(rows, |all, brick| all.union(brick)).grown(1);
+    let (width, depth) = (world.grid().width(), world.grid().depth());
+    let all = LatticeBox { min: IVec3::new(0, around.min.y, 0), max: IVec3::new(width, around.max.y, depth) };
+    let size = all.size();
+    let index = |p: IVec3| {
+        let at = p - all.min;
+        ((at.y * size.z + at.z) * size.x + at.x) as usize
+    };
+    let mut solid: Vec<bool> = all.points().map(|point| samples.is_solid(point)).collect();
+    let mut pieces = Vec::new();
+    // From the bottom first; then from whatever is left.
+    for start in all.points() {
+        if !solid[index(start)] {
+            continue;
+        }
+        let (mut open, mut piece) = (vec![start], Piece::new());
+        solid[index(start)] = false;
+        while let Some(point) = open.pop() {
+            piece.insert(point.to_array());
+            for near in STEPS.map(|step| point + step) {
+                if all.contains(near) && std::mem::take(&mut solid[index(near)]) {
+                    open.push(near);
+                }
+            }
+        }
+        if piece.iter().all(|point| point[1] > all.min.y) {
+            pieces.push(piece);
+        }
+    }
+    pieces
+}
+
+fn samples_of(piece: &LoosePiece) -> Piece {
+    let along = |x: u32, start: IVec3| (start + IVec3::X * x as i32).to_array();
+    piece.runs.iter().flat_map(|run| (0..run.len).map(move |x| along(x, run.start))).collect()
+}
+
+/// Fails unless what a piece says of itself is so.
+fn check_piece(world: &World, piece: &LoosePiece, what: &str) {
+    let samples = samples_of(piece);
+    assert_eq!(piece.voxels, samples.len() as u64, "{what}");
+    assert_eq!(piece.runs.iter().map(|run| u64::from(run.len)).sum::<u64>(), piece.voxels, "{what}");
+    let points = || samples.iter().map(|&point| IVec3::from_array(point));
+    let bounds = points().map(LatticeBox::point).reduce(LatticeBox::union);
+    assert_eq!(Some(piece.bounds), bounds, "{what}");
+    let mut tally: BTreeMap<MaterialId, u64> = BTreeMap::new();
+    points().for_each(|point| *tally.entry(world.samples().material(point)).or_default() += 1);
+    assert_eq!(piece.materials.iter().collect::<BTreeMap<_, _>>(), tally, "{what}");
+}
+
+/// Digs that leave much hanging: rough ones, thin walls, balls in the air that are cut through.
+fn crumbling_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
+    let brush = match rng.u32(0..6) {
+        0 => random_brush_at_a_face(rng, ground, chunk_size),
+        1 => {
+            // A cut right through hills and what hangs over them.
+            let (low, high) = ground.height_range();
+            let y = (low as f32 + (high - low) as f32 * rng.f32()) / 256.0 + rng.f32() * 6.0;
+            let middle = Vec3::new(ground.width() as f32, 2.0 * y, ground.depth() as f32) / 2.0;
+            let half = Vec3::new(middle.x.min(40.0) + 1.0, 1.1, middle.z.min(40.0) + 1.0);
+            Brush::dig(Shape::cuboid(middle, half))
+        }
+        _ => random_brush(rng, ground),
+    };
+    if rng.u32(0..3) > 0 {
+        return brush;
+    }
+    brush.with_roughness(Roughness::new(rng.f32() * 4.0, 1.0 + rng.f32() * 3.0, rng.u32(..)))
+}
+
+fn small_world(rng: &mut Rng, index: u64) -> (Ground, u32) {
+    if index.is_multiple_of(8) {
+        return random_ground(rng, index);
+    }
+    let (width, depth) = (rng.u32(6..30), rng.u32(6..30));
+    let steep = [0.0, 0.4, 2.0][rng.usize(0..3)];
+    let rough = rng.f64() * 4.0;
+    let seed = rng.u64(..);
+    let height = |x: i32, z: i32| {
+        let noise = Rng::with_seed(seed ^ (x as u64) << 20 ^ z as u64).f64();
+        12.0 + steep * f64::from(x) + rough * noise
+    };
+    (Ground::from_fn(width, depth, height).expect("finite heights"), [8, 9, 17, 32, 128][rng.usize(0..5)])
+}
+
+fn terrain(ground: Ground, chunk_size: u32) -> Terrain {
+    Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings")
+}
+
+fn everything(world: &World) -> LatticeBox {
+    world.grid().edit_bounds().intersection(LatticeBox::point(IVec3::ZERO).grown(4000)).expect("not empty")
+}
+
+#[test]
+fn pieces_are_those_of_brute_force() {
+    let (mut found, mut bounded) = (0, 0);
+    for index in 0..world_count(1000) {
+        let mut rng = Rng::with_seed(51_000 + index);
+        let (ground, chunk_size) = small_world(&mut rng, index);
+        let brushes: Vec<Brush> =
+            (0..rng.usize(1..9)).map(|_| crumbling_brush(&mut rng, &ground, chunk_size)).collect();
+        let mut terrain = terrain(ground, chunk_size);
+        terrain.apply(&brushes);
+        let world = terrain.world();
+        let around = world.bricks().map(|(pos, _)| pos.samples().grown(1)).reduce(LatticeBox::union);
+        let around = around.unwrap_or(LatticeBox::point(IVec3::ZERO));
+        let expected = by_brute_force(world);
+        for largest in [u32::MAX, 40, 1] {
+            let settings = LooseSettings { largest, crumbs: 5, debris: 90 };
+            let pieces = world.loose_pieces(around, &settings);
+            let own: BTreeSet<Piece> = pieces.iter().map(samples_of).collect();
+            let small = |piece: &&Piece| piece.len() as u64 <= largest.into();
+            assert_eq!(own, expected.iter().filter(small).cloned().collect(), "world {index}, {largest}");
+            assert_eq!(own.len(), pieces.len(), "world {index}: each is found once");
+            for piece in &pieces {
+                check_piece(world, piece, &format!("world {index}"));
+                let fate = match piece.voxels {
+                    ..=5 => PieceFate::Removed,
+                    ..=90 => PieceFate::BrokeOff,
+                    _ => PieceFate::Left,
+                };
+                assert_eq!(piece.fate, fate);
+            }
+            found += pieces.len();
+            bounded += usize::from(own.len() < expected.len());
+        }
+    }
+    println!("{found} pieces, {bounded} bounded searches");
+    assert!(found > 500 && bounded > 100, "{found} pieces, {bounded} bounded searches");
+}
+
+/// Every edge is walked both ways: the surface has no rim.
+fn assert_closed(piece: &LoosePiece, what: &str) {
+    let mesh = piece.mesh.as_ref().expect("what broke off has a mesh");
+    let mut edges: HashMap<([i32; 3], [i32; 3]), i32> = HashMap::new();
+    let mut volume = 0.0;
+    for triangle in mesh.triangles() {
+        let corners = triangle.map(|vertex| vertex.position.to_array());
+        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+            *edges.entry((corners[a], corners[b])).or_default() += 1;
+        }
+        let [a, b, c] = triangle.map(|vertex| vertex.position.as_dvec3() / 4096.0);
+        volume += a.dot(b.cross(c)) / 6.0;
+    }
+    for (&(a, b), &count) in &edges {
+        assert_eq!(edges.get(&(b, a)), Some(&count), "{what}: {a:?} to {b:?}");
+    }
+    assert!(volume > 0.0 && volume < piece.voxels as f64 * 4.0, "{what}: {volume} of {}", piece.voxels);
+    let reach = LatticeBox { min: IVec3::ZERO, max: piece.bounds.size() - 1 }.grown(1);
+    for vertex in &mesh.vertices {
+        assert!(reach.contains(vertex.position.div_euclid(IVec3::splat(4096))), "{what}");
+    }
+}
+
+/// The pieces that an edit cut off: those with a sample beside one that turned to air.
+fn cut_off(before: &World, after: &World) -> Vec<Piece> {
+    let turned = |point: IVec3| before.samples().is_solid(point) && !after.samples().is_solid(point);
+    let is_inside = |p: &IVec3| {
+        let grid = after.grid();
+        (0..=grid.width()).contains(&p.x) && (0..=grid.depth()).contains(&p.z)
+    };
+    let beside = |point: &Point| {
+        STEPS.map(|step| IVec3::from_array(*point) + step).iter().any(|p| is_inside(p) && turned(*p))
+    };
+    by_brute_force(after).into_iter().filter(|piece| piece.iter().any(beside)).collect()
+}
+
+#[test]
+fn edits_take_out_what_they_cut_off_and_nothing_else() {
+    let (mut removed, mut broken, mut left) = (0, 0, 0);
+    for index in 0..world_count(150) {
+        let mut rng = Rng::with_seed(52_000 + index);
+        let (ground, chunk_size) = small_world(&mut rng, index);
+        let mut terrain = terrain(ground, chunk_size);
+        let settings = LooseSettings { largest: 3000, crumbs: rng.u32(0..6), debris: rng.u32(6..400) };
+        for turn in 0..6 {
+            let what = format!("world {index}, turn {turn}");
+            let ground = terrain.snapshot();
+            let brush = crumbling_brush(&mut rng, ground.ground(), chunk_size);
+            let before = terrain.snapshot();
+            terrain.set_loose(None);
+            terrain.apply([&brush]);
+            let plain = terrain.snapshot();
+            if plain.hash() == before.hash() {
+                continue;
+            }
+            assert!(terrain.undo().outcome.is_ok());
+            terrain.set_loose(Some(settings));
+            let applied = terrain.apply([&brush]).remove(0).outcome.expect("it changed something before");
+            let expected: BTreeSet<Piece> =
+                cut_off(&before, &plain).into_iter().filter(|piece| piece.len() <= 3000).collect();
+            let own: BTreeSet<Piece> = applied.loose.iter().map(samples_of).collect();
+            assert_eq!(own, expected, "{what}");
+
+            let mut gone = Piece::new();
+            for piece in &applied.loose {
+                check_piece(&plain, piece, &what);
+                match piece.fate {
+                    PieceFate::Left => left += 1,
+                    PieceFate::Removed => removed += 1,
+                    PieceFate::BrokeOff => {
+                        assert_closed(piece, &what);
+                        broken += 1;
+                    }
+                }
+                assert_eq!(piece.mesh.is_some(), piece.fate == PieceFate::BrokeOff);
+                if piece.fate != PieceFate::Left {
+                    gone.append(&mut samples_of(piece));
+                }
+            }
+            // What is solid, and of what; and where the surface lies.
+            let (world, mut tally) = (terrain.world(), Tally::default());
+            let columns = everything(world);
+            let bricks = world.bricks().filter_map(|(pos, _)| pos.samples().intersection(columns));
+            let bricks: Vec<LatticeBox> = bricks.collect();
+            let mut bounds = None;
+            for point in bricks.iter().flat_map(|brick| brick.points()) {
+                let (old, new) = (plain.samples(), world.samples());
+                let is_gone = gone.contains(&point.to_array());
+                assert_eq!(new.is_solid(point), old.is_solid(point) && !is_gone, "{what}: {point}");
+                let sample =
+                    |world: &World| (world.samples().sample(point), world.samples().stored_material(point));
+                if sample(&before) != sample(world) {
+                    LatticeBox::include(&mut bounds, LatticeBox::point(point));
+                }
+                if !new.is_solid(point) {
+                    continue;
+                }
+                assert_eq!(new.material(point), old.material(point), "{what}: {point}");
+                for step in STEPS.map(|step| point + step) {
+                    let axis = (0..3).find(|&axis| step[axis] != point[axis]).expect("a step");
+                    let low = point.min(step);
+                    if columns.contains(step) && !new.is_solid(step) && !old.is_solid(step) {
+                        let at = |world: &World| crossing(&world.view(), low, axis);
+                        assert_eq!(at(world), at(&plain), "{what}: {point} to {step}");
+                    }
+                }
+            }
+            assert_eq!(applied.bounds, bounds, "{what}");
+            applied.loose.iter().for_each(|piece| tally.add(&piece.materials));
+            assert!(world.check_seams().is_flawless(), "{what}: {}", world.check_seams());
+            if gone.is_empty() {
+                assert_eq!(world.hash(), plain.hash(), "{what}");
+            }
+            let after = world.hash();
+            assert!(terrain.undo().outcome.is_ok());
+            assert_eq!(terrain.world().hash(), before.hash(), "{what}: undone");
+            assert!(terrain.redo().outcome.is_ok());
+            assert_eq!(terrain.world().hash(), after, "{what}: redone");
+        }
+    }
+    println!("{removed} removed, {broken} broken off, {left} left");
+    assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
+}
+
+#[test]
+fn what_falls_does_not_depend_on_how_edits_are_batched() {
+    let mut fallen = 0;
+    for index in 0..world_count(60) {
+        let mut rng = Rng::with_seed(53_000 + index);
+        let brushes = |rng: &mut Rng, ground: &Ground, chunk_size| -> Vec<Brush> {
+            (0..14).map(|tag| crumbling_brush(rng, ground, chunk_size).with_tag(tag)).collect()
+        };
+        let settings = LooseSettings { largest: 2000, crumbs: 10, debris: 300 };
+        let (seed, mut results) = (rng.u64(..), Vec::new());
+        for batch in [1, 3, 14] {
+            // The same world each time, in chunks of another size.
+            let mut rng = Rng::with_seed(seed);
+            let (ground, _) = small_world(&mut rng, index);
+            let brushes = brushes(&mut rng, &ground, 16);
+            let mut terrain = terrain(ground, [8, 16, 61][batch % 3]);
+            terrain.set_loose(Some(settings));
+            let receipts: Vec<Receipt> =
+                brushes.chunks(batch).flat_map(|batch| terrain.apply(batch)).collect();
+            let loose: Vec<Vec<LoosePiece>> = receipts
+                .into_iter()
+                .map(|receipt| receipt.outcome.map(|own| own.loose).unwrap_or_default())
+                .collect();
+            fallen += loose.iter().map(Vec::len).sum::<usize>();
+            assert!(terrain.world().check_seams().is_flawless(), "world {index}");
+            results.push((terrain.world().hash(), pieces_without_normals(loose)));
+        }
+        assert!(results.windows(2).all(|pair| pair[0] == pair[1]), "world {index}");
+    }
+    assert!(fallen > 100, "{fallen} pieces");
+}
+
+/// Positions decide what falls; normals on the mask's border may be those of the mask as it was committed.
+fn pieces_without_normals(all: Vec<Vec<LoosePiece>>) -> Vec<Vec<(Piece, Vec<IVec3>)>> {
+    let positions = |piece: &LoosePiece| {
+        piece.mesh.iter().flat_map(|mesh| mesh.vertices.iter().map(|vertex| vertex.position)).collect()
+    };
+    all.iter().map(|own| own.iter().map(|piece| (samples_of(piece), positions(piece))).collect()).collect()
+}
+
+/// A table: a pillar of 3 x 3 voxels that carries a slab.
+fn table() -> Terrain {
+    let mut terrain = terrain(Ground::flat(64, 64, 8.0).expect("flat ground"), 16);
+    let at = |y: f32| Vec3::new(32.0, y, 32.0);
+    let pillar = Shape::cuboid(at(14.0), Vec3::new(1.2, 8.0, 1.2));
+    let slab = Shape::cuboid(at(22.0), Vec3::new(8.2, 2.2, 8.2));
+    terrain.apply([Brush::add(pillar, MaterialId(2)), Brush::add(slab, MaterialId(3))]);
+    terrain
+}
+
+fn saw() -> Brush {
+    Brush::dig(Shape::cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(4.0, 1.2, 4.0)))
+}
+
+#[test]
+fn a_slab_falls_when_its_pillar_is_sawn_through() {
+    let mut terrain = table();
+    let settings = LooseSettings { largest: 10_000, crumbs: 0, debris: 10_000 };
+    terrain.set_loose(Some(settings));
+    let half = Brush::dig(Shape::cuboid(Vec3::new(29.0, 14.0, 32.0), Vec3::new(2.2, 1.2, 4.0)));
+    let receipt = terrain.apply([half]).remove(0).outcome.expect("it reaches the pillar");
+    assert!(receipt.removed.total() > 0 && receipt.loose.is_empty(), "half a pillar carries it");
+    let receipt = terrain.apply([saw()]).remove(0).outcome.expect("it reaches the pillar");
+    let [piece] = &receipt.loose[..] else { panic!("one piece: {:?}", receipt.loose) };
+    assert_eq!(piece.fate, PieceFate::BrokeOff);
+    // 17 x 5 x 17 samples, into which the pillar reaches two deep.
+    assert_eq!(piece.materials.of(MaterialId(3)), 17 * 5 * 17 - 3 * 3 * 2);
+    assert!(piece.materials.of(MaterialId(2)) > 3 * 3 * 2);
+    assert_closed(piece, "slab");
+    assert_eq!(terrain.world().height(36.0, 36.0), Some(8.0), "nothing hangs over the ground");
+    assert!(terrain.world().check_seams().is_flawless());
+}
+
+#[test]
+fn paint_and_add_cut_nothing_off_and_what_is_large_is_tied() {
+    let mut terrain = table();
+    terrain.set_loose(Some(LooseSettings { largest: 1000, crumbs: 1000, debris: 0 }));
+    let hash = |terrain: &Terrain| terrain.world().hash();
+    let receipt = terrain.apply([saw()]).remove(0).outcome.expect("it reaches the pillar");
+    assert!(receipt.loose.is_empty(), "the slab has more than 1000 voxels");
+    let before = hash(&terrain);
+    terrain.set_loose(Some(LooseSettings { largest: 10_000, crumbs: 10_000, debris: 0 }));
+    let slab = Vec3::new(32.0, 24.0, 32.0);
+    let painted = terrain.apply([Brush::paint(Shape::sphere(slab, 3.0), MaterialId(7))]);
+    assert!(painted[0].outcome.as_ref().is_ok_and(|applied| applied.loose.is_empty()));
+    assert_ne!(hash(&terrain), before);
+    // The first dig at it finds that it hangs.
+    let receipt = terrain.apply([Brush::dig(Shape::sphere(slab, 2.0))]).remove(0).outcome.expect("a hit");
+    assert_eq!(receipt.loose.iter().map(|piece| piece.fate).collect::<Vec<_>>(), [PieceFate::Removed]);
+    assert!(receipt.loose[0].materials.of(MaterialId(7)) > 0);
+    assert_eq!(terrain.world().height(36.0, 36.0), Some(8.0));
+}
+
+#[test]
+fn corners_and_edges_connect_nothing() {
+    // Two balls whose boxes meet at a corner only, above ground.
+    let mut terrain = terrain(Ground::flat(64, 64, 8.0).expect("flat ground"), 32);
+    let cube = |low: Vec3| Brush::add(Shape::cuboid(low + 1.5, Vec3::splat(1.6)), MaterialId(1));
+    terrain.apply([cube(Vec3::new(20.0, 20.0, 20.0)), cube(Vec3::new(24.0, 24.0, 20.0))]);
+    let world = terrain.world();
+    let pieces = world.loose_pieces(
+        everything(world)
+            .intersection(LatticeBox { min: IVec3::splat(15), max: IVec3::splat(35) })
+            .expect("not empty"),
+        &LooseSettings::default(),
+    );
+    assert_eq!(pieces.iter().map(|piece| piece.voxels).collect::<Vec<_>>(), [64, 64]);
+    assert!(pieces.iter().all(|piece| piece.runs.len() == 16 && piece.fate == PieceFate::Left));
+}
