@@ -33,7 +33,7 @@
 //! | `player.rs`, `body.rs` | the player's eyes and body |
 //! | `tools.rs`, `held.rs` | the tools, and how they look in hand |
 //! | `work.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
-//! | `bombs.rs`, `lamps.rs`, `particles.rs` | what flies, what shines, what crumbles |
+//! | `bombs.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what shines, what falls and crumbles |
 //! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
@@ -45,6 +45,7 @@ mod art;
 mod body;
 mod bombs;
 mod day;
+mod debris;
 mod film;
 mod frames;
 mod headless;
@@ -196,7 +197,7 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
-    app.add_plugins(veins::VeinsPlugin);
+    app.add_plugins((veins::VeinsPlugin, debris::DebrisPlugin));
     if options.tell {
         app.add_plugins(tell::TellPlugin);
     }
