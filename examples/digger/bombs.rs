@@ -1,11 +1,12 @@
 //! Bombs: thrown, they bounce and roll until the fuse is down, and take a room out of the hill.
 
+use avian3d::prelude::*;
 use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
+use bevy_burrow::physics::{Character, CharacterMotion};
 use bevy_burrow::prelude::*;
 
 use crate::inventory::Inventory;
-use crate::mover::Body;
 use crate::particles::{Burst, Matter};
 use crate::player::Tremor;
 use crate::tools::{Strike, Tool};
@@ -20,14 +21,19 @@ const RADIUS: f32 = 0.16;
 const BLAST: f32 = 5.5;
 /// In the air at once.
 const BOMBS: usize = 12;
-const GRAVITY: f32 = 12.0;
 
-/// A bomb on its way.
+/// A bomb on its way, and the seconds that are left to it: a ball of iron, as far as the physics are concerned.
 #[derive(Component, Clone, Copy, Debug)]
-#[require(Transform, Visibility)]
+#[require(
+    Visibility,
+    RigidBody::Dynamic,
+    Collider::sphere(RADIUS),
+    Restitution::new(0.42),
+    Friction::new(0.7),
+    AngularDamping(1.2),
+    TransformInterpolation
+)]
 pub struct Bomb {
-    pub velocity: Vec3,
-    /// Seconds that are left.
     pub fuse: f32,
 }
 
@@ -54,7 +60,7 @@ pub struct BombsPlugin;
 impl Plugin for BombsPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(Startup, found)
-            .add_systems(Update, (move_bombs, burn_fuses).chain().before(BurrowSystems::Collect))
+            .add_systems(Update, burn_fuses.before(BurrowSystems::Collect))
             .add_systems(Update, fade_flashes)
             .add_observer(throw)
             .add_observer(explode)
@@ -101,41 +107,14 @@ fn bomb(foundry: &Foundry, place: Vec3, velocity: Vec3) -> impl Bundle {
     );
     (
         Name::new("bomb"),
-        Bomb { velocity, fuse: FUSE },
+        Bomb { fuse: FUSE },
+        LinearVelocity(velocity),
+        AngularVelocity(velocity.cross(Vec3::Y) * -0.4),
         Mesh3d(foundry.shell.0.clone()),
         MeshMaterial3d(foundry.shell.1.clone()),
         Transform::from_translation(place),
         children![spark],
     )
-}
-
-/// Ballistics: straight to the ground, off it with less, and on along it.
-fn move_bombs(time: Res<Time>, terrains: Terrains, mut bombs: Query<(&mut Bomb, &mut Transform)>) {
-    let dt = time.delta_secs();
-    for (mut bomb, mut place) in &mut bombs {
-        bomb.velocity.y -= GRAVITY * dt;
-        let way = bomb.velocity * dt;
-        let Ok(direction) = Dir3::new(way) else { continue };
-        let reach = way.length() + RADIUS;
-        match terrains.raycast(Ray3d::new(place.translation, direction), reach) {
-            Some(hit) if hit.from_inside => {
-                // The ground came over it: up and out.
-                place.translation.y += 4.0 * dt;
-                bomb.velocity = Vec3::ZERO;
-            }
-            Some(hit) => {
-                let into = bomb.velocity.dot(hit.normal).min(0.0);
-                let along = bomb.velocity - hit.normal * into;
-                bomb.velocity = along * 0.82 - hit.normal * into * 0.38;
-                place.translation = hit.position + hit.normal * (RADIUS + 0.01);
-            }
-            None => place.translation += way,
-        }
-        let level = bomb.velocity.with_y(0.0);
-        if let Ok(axis) = Dir3::new(Vec3::Y.cross(level)) {
-            place.rotate(Quat::from_axis_angle(*axis, level.length() * dt / RADIUS));
-        }
-    }
 }
 
 fn burn_fuses(mut commands: Commands, time: Res<Time>, mut bombs: Query<(Entity, &mut Bomb, &Transform)>) {
@@ -156,7 +135,7 @@ fn explode(
     mut blows: ResMut<Blows>,
     mut brushes: MessageWriter<Brush>,
     mut bursts: MessageWriter<Burst>,
-    mut bombs: Query<(&mut Bomb, &Transform)>,
+    mut bombs: Query<(&mut Bomb, &mut LinearVelocity, &Transform)>,
 ) {
     let place = blast.place;
     let tag = inventory.tag();
@@ -171,25 +150,29 @@ fn explode(
         PointLight { color: Color::srgb(1.0, 0.72, 0.40), range: 60.0, intensity: 0.0, ..default() },
         Transform::from_translation(place + Vec3::Y),
     ));
-    for (mut bomb, other) in &mut bombs {
+    for (mut bomb, mut velocity, other) in &mut bombs {
         let away = other.translation - place;
         if away.length() < 1.5 * BLAST {
             bomb.fuse = bomb.fuse.min(0.15 + 0.03 * away.length());
-            bomb.velocity += away.normalize_or(Vec3::Y) * 6.0;
+            velocity.0 += away.normalize_or(Vec3::Y) * 6.0;
         }
     }
 }
 
 /// Who stands near is shaken and pushed.
-fn shake(blast: On<Blast>, mut tremor: ResMut<Tremor>, mut bodies: Query<&mut Body>) {
-    for mut body in &mut bodies {
-        let away = body.eye() - blast.place;
+fn shake(
+    blast: On<Blast>,
+    mut tremor: ResMut<Tremor>,
+    mut bodies: Query<(&Transform, &mut CharacterMotion), With<Character>>,
+) {
+    for (place, mut motion) in &mut bodies {
+        let away = place.translation - blast.place;
         let near = (1.0 - away.length() / 40.0).max(0.0);
         tremor.nudge(1.6 * near);
         let push = (1.0 - away.length() / (1.6 * BLAST)).max(0.0);
-        body.velocity += away.normalize_or(Vec3::Y) * 11.0 * push;
         if push > 0.0 {
-            body.grounded = false;
+            motion.velocity += away.normalize_or(Vec3::Y) * 11.0 * push;
+            motion.grounded = false;
         }
     }
 }

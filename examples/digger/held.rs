@@ -4,10 +4,11 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
+use bevy_burrow::physics::Character;
 use bevy_burrow::prelude::*;
 
+use crate::body::Body;
 use crate::light::Eyes;
-use crate::mover::Body;
 use crate::phase::Phase;
 use crate::player::Drone;
 use crate::tools::{Hand, Swing, Tool};
@@ -208,15 +209,18 @@ fn carry(
     time: Res<Time>,
     hand: Res<Hand>,
     swing: Res<Swing>,
-    bodies: Query<&Body>,
-    mut held: Single<&mut Transform, (With<Held>, Without<Bit>)>,
-    mut bits: Query<&mut Transform, With<Bit>>,
+    bodies: Query<Body, With<Character>>,
+    mut held: Single<&mut Transform, (With<Held>, Without<Bit>, Without<Character>)>,
+    mut bits: Query<&mut Transform, (With<Bit>, Without<Character>)>,
     mut steps: Local<f32>,
     mut sink: Local<(f32, Option<Tool>)>,
 ) {
     let dt = time.delta_secs();
-    let speed =
-        bodies.iter().filter(|body| body.grounded).map(|body| body.velocity.xz().length()).sum::<f32>();
+    let speed: f32 = bodies
+        .iter()
+        .filter(|body| body.motion.grounded)
+        .map(|body| body.motion.velocity.xz().length())
+        .sum();
     *steps += dt * speed * 1.35;
     let stride = (speed / 6.0).min(1.0);
     let bob = Vec3::new((*steps).sin() * 0.006, -(2.0 * *steps).sin().abs() * 0.006, 0.0) * stride;

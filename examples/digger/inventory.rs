@@ -4,9 +4,15 @@
 //! can't spend the same ground twice; the receipt says what it really took.
 
 use bevy::prelude::*;
+use bevy_burrow::plugin::{HistoryMoved, Redo, Undo};
 use bevy_burrow::prelude::*;
+use bevy_burrow::volume::Tally;
 
+use crate::hud::Hint;
+use crate::input::{Action, Actions};
 use crate::landscape::{CONCRETE, MATERIALS};
+use crate::phase::Phase;
+use crate::player::Playing;
 
 /// Tags from here on belong to the hand. Brushes of scripts have others, and cost nothing.
 const FIRST: u64 = 1 << 32;
@@ -65,13 +71,48 @@ impl Inventory {
         }
         self.pledges.retain(|pledge| pledge.0 != receipt.tag);
         let Ok(applied) = &receipt.outcome else { return Vec::new() };
-        let came = applied.removed.iter().map(|(material, voxels)| (material, voxels as i64));
-        let went = applied.added.iter().map(|(material, voxels)| (material, -(voxels as i64)));
+        self.enter_tallies(&applied.removed, &applied.added)
+    }
+
+    /// Enters what came and what went; says the same as a list.
+    fn enter_tallies(&mut self, removed: &Tally, added: &Tally) -> Vec<(MaterialId, i64)> {
+        let came = removed.iter().map(|(material, voxels)| (material, voxels as i64));
+        let went = added.iter().map(|(material, voxels)| (material, -(voxels as i64)));
         let changes: Vec<_> = came.chain(went).collect();
         for &(material, voxels) in &changes {
             self.gain(material, voxels);
         }
         changes
+    }
+}
+
+/// Undo and redo give back and take, as digging and building did.
+fn enter_history(
+    mut steps: MessageReader<HistoryMoved>,
+    mut inventory: ResMut<Inventory>,
+    mut changes: MessageWriter<StockChanged>,
+    mut hints: MessageWriter<Hint>,
+) {
+    for HistoryMoved { receipt, .. } in steps.read() {
+        match &receipt.outcome {
+            Ok(restored) => {
+                let entered = inventory.enter_tallies(&restored.removed, &restored.added);
+                changes.write_batch(entered.into_iter().map(|(material, by)| StockChanged { material, by }));
+            }
+            Err(nothing) => {
+                hints.write(Hint::new(nothing.to_string()));
+            }
+        }
+    }
+}
+
+/// What the keys for it say.
+fn step_through_history(actions: Res<Actions>, mut undo: MessageWriter<Undo>, mut redo: MessageWriter<Redo>) {
+    if actions.just_pressed(Action::Undo) {
+        undo.write_default();
+    }
+    if actions.just_pressed(Action::Redo) {
+        redo.write_default();
     }
 }
 
@@ -89,7 +130,8 @@ impl Plugin for InventoryPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Inventory>()
             .add_message::<StockChanged>()
-            .add_systems(Update, enter_receipts.after(BurrowSystems::Commit));
+            .add_systems(Update, (enter_receipts, enter_history).after(BurrowSystems::Commit))
+            .add_systems(Update, step_through_history.in_set(Playing).run_if(in_state(Phase::Playing)));
     }
 }
 

@@ -79,7 +79,9 @@ struct Survey(Handle<HeightmapImage>);
 #[derive(Resource)]
 struct Shaping(Task<Result<(Terrain, Places), String>>);
 
+/// The terrain's entity is there before its terrain: its look makes the textures be painted meanwhile.
 fn open_survey(mut commands: Commands, assets: Res<AssetServer>) {
+    commands.spawn((Name::new("Jacksboro fault"), GroundLook::default()));
     commands.insert_resource(Survey(assets.load(SURVEY_ASSET)));
 }
 
@@ -126,16 +128,15 @@ fn vegetation() -> MaterialControl {
 fn spawn_terrain(
     mut commands: Commands,
     shaping: Option<ResMut<Shaping>>,
-    mut materials: ResMut<Assets<StandardMaterial>>,
+    country: Single<Entity, With<GroundLook>>,
     mut exit: MessageWriter<AppExit>,
 ) {
     let Some(shaped) = shaping.and_then(|mut shaping| check_ready(&mut shaping.0)) else { return };
     commands.remove_resource::<Shaping>();
     match shaped {
         Ok((terrain, places)) => {
-            let earth = StandardMaterial { perceptual_roughness: 0.95, reflectance: 0.15, ..default() };
             commands.insert_resource(places);
-            commands.spawn((Name::new("Jacksboro fault"), terrain, MeshMaterial3d(materials.add(earth))));
+            commands.entity(*country).insert(terrain);
         }
         Err(reason) => {
             error!("the landscape can't be made: {reason}");

@@ -11,7 +11,7 @@ use bevy_burrow::prelude::*;
 
 use crate::input::{Action, Actions};
 use crate::phase::Phase;
-use crate::settings::{Quality, Settings};
+use crate::settings::{Quality, Settings, SettingsFile};
 
 /// The way to the sun on a late afternoon, of length 1: from the south-west.
 pub const SUN: Vec3 = Vec3::new(-0.58, 0.64, 0.504);
@@ -54,7 +54,7 @@ impl Plugin for LightPlugin {
         app.insert_resource(Skylight { color: Color::WHITE, brightness: 1000.0 })
             .insert_resource(GlobalAmbientLight { brightness: 1000.0, ..default() })
             .init_resource::<LampSwitch>()
-            .add_systems(Startup, (open_eyes, let_there_be_sun))
+            .add_systems(Startup, (open_eyes, let_there_be_sun, spare_software))
             .add_systems(
                 Update,
                 (
@@ -70,6 +70,18 @@ impl Plugin for LightPlugin {
 /// Is there no graphics card, so that the processor draws? (Bevy does not re-export the type that tells.)
 fn draws_in_software(adapter: &RenderAdapterInfo) -> bool {
     format!("{:?}", adapter.device_type) == "Cpu"
+}
+
+/// A player without a graphics card begins with what the processor can draw.
+fn spare_software(
+    adapter: Option<Res<RenderAdapterInfo>>,
+    file: Res<SettingsFile>,
+    mut settings: ResMut<Settings>,
+) {
+    let is_first = file.0.as_ref().is_some_and(|file| !file.exists());
+    if is_first && adapter.is_some_and(|adapter| draws_in_software(&adapter)) {
+        settings.quality = Quality::Low;
+    }
 }
 
 fn open_eyes(mut commands: Commands) {
@@ -116,6 +128,7 @@ fn apply_settings(
     adapter: Option<Res<RenderAdapterInfo>>,
     mut eyes: Single<(Entity, &mut Projection, &mut DistanceFog), With<Eyes>>,
     sun: Single<Entity, With<Sun>>,
+    mut looks: Query<&mut GroundLook>,
 ) {
     let (entity, projection, fog) = &mut *eyes;
     if let Projection::Perspective(lens) = &mut **projection {
@@ -139,9 +152,13 @@ fn apply_settings(
     .build();
     commands.entity(*sun).insert(shadows);
     let mut eyes = commands.entity(*entity);
+    let is_low = settings.quality == Quality::Low;
+    for mut look in &mut looks {
+        look.quality = if is_low { GroundQuality::Low } else { GroundQuality::High };
+    }
     // Four samples for each pixel cost a software renderer three times the time of one.
     let in_software = adapter.is_some_and(|adapter| draws_in_software(&adapter));
-    if in_software || settings.quality == Quality::Low {
+    if in_software || is_low {
         eyes.insert((Msaa::Off, Smaa::default()));
     } else {
         eyes.insert(Msaa::Sample4).remove::<Smaa>();

@@ -30,20 +30,22 @@
 //! | --- | --- |
 //! | `phase.rs`, `menu.rs` and `menu/`, `ui.rs`, `art.rs` | title, pause, settings, controls, help |
 //! | `input.rs`, `settings.rs` | actions and their keys; what the player may set |
-//! | `player.rs`, `mover.rs` | the player's eyes and body |
+//! | `player.rs`, `body.rs` | the player's eyes and body |
 //! | `tools.rs`, `held.rs` | the tools, and how they look in hand |
 //! | `work.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
-//! | `bombs.rs`, `lamps.rs`, `particles.rs` | what flies, what shines, what crumbles |
-//! | `landscape.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
-//! | `hud.rs`, `frames.rs` | what is written over it all |
+//! | `bombs.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what shines, what falls and crumbles |
+//! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
+//! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
 //! | `script.rs`, `tour.rs` | two stories |
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
-//! | `wires.rs`, `report.rs` | lines of a seam; receipts, times and the summary |
+//! | `wires.rs`, `report.rs`, `tell.rs` | lines of a seam; receipts, times and the summary; what goes on |
 
 mod art;
+mod body;
 mod bombs;
 mod day;
+mod debris;
 mod film;
 mod frames;
 mod headless;
@@ -55,7 +57,7 @@ mod lamps;
 mod landscape;
 mod light;
 mod menu;
-mod mover;
+mod panel;
 mod particles;
 mod phase;
 mod places;
@@ -65,9 +67,11 @@ mod script;
 mod settings;
 mod sky;
 mod studio;
+mod tell;
 mod tools;
 mod tour;
 mod ui;
+mod veins;
 mod wires;
 mod work;
 mod works;
@@ -109,6 +113,9 @@ pub struct Options {
     /// Draw every frame of the script, not only the pictures: for frame times.
     #[arg(long)]
     draw_all: bool,
+    /// Say on standard output what goes on, for programs that play the game.
+    #[arg(long)]
+    tell: bool,
     /// What edits are computed on.
     #[arg(long, value_enum, default_value_t = Computer::Auto)]
     backend: Computer,
@@ -163,6 +170,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             light::LightPlugin,
         ))
         .add_plugins((
+            body::BodyPlugin,
             player::PlayerPlugin,
             tools::ToolsPlugin,
             held::HeldPlugin,
@@ -178,6 +186,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             menu::MenuPlugin,
             hud::HudPlugin,
             frames::FramesPlugin,
+            panel::PanelPlugin,
             report::LogbookPlugin,
         ));
 }
@@ -188,6 +197,10 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
+    app.add_plugins((veins::VeinsPlugin, debris::DebrisPlugin));
+    if options.tell {
+        app.add_plugins(tell::TellPlugin);
+    }
     app
 }
 

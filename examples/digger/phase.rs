@@ -61,13 +61,13 @@ fn stop_time(mut time: ResMut<Time<Virtual>>) {
     time.pause();
 }
 
-fn take_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
+pub fn take_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
     for mut cursor in &mut cursors {
         (cursor.visible, cursor.grab_mode) = (false, CursorGrabMode::Locked);
     }
 }
 
-fn leave_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
+pub fn leave_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
     for mut cursor in &mut cursors {
         (cursor.visible, cursor.grab_mode) = (true, CursorGrabMode::None);
     }

@@ -1,25 +1,26 @@
-//! The player: actions steer a [`Body`], and the camera looks through its eyes.
+//! The player: actions steer a body, and the camera looks through its eyes.
 
 use bevy::prelude::*;
+use bevy_burrow::physics::CharacterSteering;
 use bevy_burrow::prelude::*;
 
+use crate::body::{self, Body};
 use crate::input::{Action, Actions};
 use crate::light::Eyes;
-use crate::mover::{Body, Steering};
 use crate::phase::Phase;
 use crate::places::Places;
 use crate::settings::Settings;
 
 /// Who digs here.
 #[derive(Component, Clone, Copy, Debug, Default)]
-#[require(Steering)]
 pub struct Player {
     /// Angle around the vertical; 0 looks along -z.
     pub yaw: f32,
     /// Angle above the horizon.
     pub pitch: f32,
-    /// How far the eyes lag behind the body on steps, in metres.
+    /// How far the eyes lag behind the body on steps, in metres, and where its soles were a frame ago.
     lag: f32,
+    before: Option<f32>,
 }
 
 /// The camera goes where it is told, and not with the player, while it has this.
@@ -53,8 +54,7 @@ impl Plugin for PlayerPlugin {
                 Update,
                 (
                     (look, steer).run_if(in_state(Phase::Playing)).in_set(Playing),
-                    // After a commit, so that who was built over gets out in the same frame.
-                    (walk, see).chain().after(BurrowSystems::Commit),
+                    see.after(BurrowSystems::Commit),
                 ),
             )
             .add_systems(OnExit(Phase::Playing), stand_still);
@@ -65,7 +65,7 @@ impl Player {
     /// Looking from one place at another.
     pub fn looking(from: Vec3, at: Vec3) -> Self {
         let way = at - from;
-        Self { yaw: (-way.x).atan2(-way.z), pitch: way.y.atan2(way.xz().length()), lag: 0.0 }
+        Self { yaw: (-way.x).atan2(-way.z), pitch: way.y.atan2(way.xz().length()), ..default() }
     }
 
     /// How the head is turned.
@@ -78,9 +78,9 @@ fn arrive(ready: On<TerrainReady>, mut commands: Commands, terrains: Query<&Terr
     let Ok(terrain) = terrains.get(ready.entity) else { return };
     let start = places.hillside.start().as_dvec2();
     let height = terrain.world().height(start.x, start.y).unwrap_or_default();
-    let body = Body::at(Vec3::new(start.x as f32, height as f32, start.y as f32));
-    let hill = places.hillside.mouth + Vec3::Y * 4.0;
-    commands.spawn((Name::new("player"), Player::looking(body.eye(), hill), body));
+    let feet = Vec3::new(start.x as f32, height as f32, start.y as f32);
+    let hill = places.hillside.mouth + Vec3::Y * 2.5;
+    commands.spawn((Name::new("player"), Player::looking(feet, hill), body::standing_at(feet)));
 }
 
 fn look(actions: Res<Actions>, settings: Res<Settings>, mut players: Query<&mut Player>) {
@@ -96,7 +96,7 @@ fn look(actions: Res<Actions>, settings: Res<Settings>, mut players: Query<&mut 
 #[derive(Component)]
 pub struct Scripted;
 
-fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut Steering), Without<Scripted>>) {
+fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut CharacterSteering), Without<Scripted>>) {
     for (player, mut steering) in &mut players {
         let way = Quat::from_rotation_y(player.yaw) * Vec3::new(actions.walk.x, 0.0, -actions.walk.y);
         steering.direction = way.xz();
@@ -105,34 +105,25 @@ fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut Steering), Wit
     }
 }
 
-fn stand_still(mut players: Query<&mut Steering, Without<Scripted>>) {
+fn stand_still(mut players: Query<&mut CharacterSteering, Without<Scripted>>) {
     for mut steering in &mut players {
         *steering = default();
-    }
-}
-
-fn walk(time: Res<Time>, terrains: Terrains, mut players: Query<(&mut Player, &mut Body, &Steering)>) {
-    if time.delta_secs() == 0.0 {
-        return;
-    }
-    for (mut player, mut body, steering) in &mut players {
-        let before = body.feet.y;
-        body.advance(&terrains, steering, time.delta_secs());
-        // Eyes follow steps smoothly, but neither fall behind a jump out of the ground nor poke through a ceiling.
-        let step = body.feet.y - before;
-        let lag = if step.abs() > 1.0 || !body.grounded { 0.0 } else { player.lag + step };
-        player.lag = (lag * (-14.0 * time.delta_secs()).exp()).clamp(-0.05, 0.6);
     }
 }
 
 fn see(
     time: Res<Time>,
     mut tremor: ResMut<Tremor>,
-    players: Query<(&Player, &Body)>,
-    mut eyes: Query<&mut Transform, (With<Eyes>, Without<Drone>)>,
+    mut players: Query<(&mut Player, Body)>,
+    mut eyes: Query<&mut Transform, (With<Eyes>, Without<Drone>, Without<Player>)>,
 ) {
     tremor.0 *= (-6.5 * time.delta_secs()).exp();
-    let Ok((player, body)) = players.single() else { return };
+    let Ok((mut player, body)) = players.single_mut() else { return };
+    // Eyes follow steps smoothly, but neither fall behind a jump nor poke through a ceiling.
+    let feet = body.feet().y;
+    let step = feet - player.before.replace(feet).unwrap_or(feet);
+    let lag = if step.abs() > 1.0 || !body.motion.grounded { 0.0 } else { player.lag + step };
+    player.lag = (lag * (-14.0 * time.delta_secs()).exp()).clamp(-0.05, 0.6);
     // Three sines that never meet: nobody sees that it is no chance.
     let (t, strength) = (time.elapsed_secs(), 0.022 * tremor.0 * tremor.0.max(0.35));
     let shake = Vec3::new((t * 61.0).sin(), (t * 47.0 + 1.0).sin(), (t * 39.0 + 2.0).sin()) * strength;

@@ -1,6 +1,7 @@
 //! The studio: the game without a window, run frame by frame by a script that walks, digs and takes pictures.
 //!
-//! The script is an ordinary player: it steers the same body with the same [`Steering`] and sends the same [`Brush`]
+//! The script is an ordinary player: it steers the same body with the same
+//! [`CharacterSteering`] and sends the same [`Brush`]
 //! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
 
 use std::f32::consts::PI;
@@ -13,7 +14,9 @@ use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy::render::settings::RenderResources;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
+use bevy_burrow::physics::{Character, CharacterMotion, CharacterSteering, HeldByGround};
 use bevy_burrow::prelude::*;
+use bevy_burrow::view::GroundLoading;
 
 use crate::Options;
 use crate::day::Clock;
@@ -22,7 +25,6 @@ use crate::held::ShowHand;
 use crate::hud::ShowHud;
 use crate::input::{Action, Actions};
 use crate::light::{Eyes, LampSwitch};
-use crate::mover::{Body, Steering};
 use crate::phase::Phase;
 use crate::player::{Drone, Player, Scripted};
 use crate::report::{EditTime, FrameTimes, Logbook};
@@ -34,6 +36,13 @@ pub const PATIENCE: Duration = Duration::from_secs(300);
 /// Pictures that lie on the disk, as far as the renderer told.
 #[derive(Resource, Default)]
 pub struct Developed(pub usize);
+
+/// Where the player stands.
+#[derive(Clone, Copy, Debug)]
+struct Stance {
+    feet: Vec3,
+    eye: Vec3,
+}
 
 /// An app without a window, and what came of its edits and pictures.
 pub struct Studio {
@@ -79,7 +88,7 @@ impl Studio {
             Image::new_target_texture(options.width, options.height, TextureFormat::Rgba8UnormSrgb, None);
         let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
-        let player = wait_for_player(&mut app)?;
+        let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
         // A bright afternoon that lasts, and no title.
@@ -134,6 +143,10 @@ impl Studio {
 
     /// One frame.
     fn step(&mut self) {
+        if self.is_held() {
+            // Colliders are made in tasks, and frames without pictures are faster than those.
+            std::thread::sleep(Duration::from_millis(1));
+        }
         let start = Instant::now();
         self.app.update();
         if self.draws_all {
@@ -154,8 +167,17 @@ impl Studio {
         self.app.world_mut().resource_mut::<LampSwitch>().0 = on;
     }
 
-    fn body(&self) -> Result<Body> {
-        Ok(*self.app.world().get_entity(self.player)?.get::<Body>().ok_or("the player has lost its body")?)
+    fn body(&self) -> Result<Stance> {
+        let player = self.app.world().get_entity(self.player)?;
+        let parts = player.get::<Character>().zip(player.get::<Transform>());
+        let (character, place) = parts.ok_or("the player has lost its body")?;
+        let middle = place.translation;
+        Ok(Stance { feet: character.feet(middle), eye: character.eyes(middle) })
+    }
+
+    /// Is there no ground for the player to stand on yet?
+    fn is_held(&self) -> bool {
+        self.app.world().get::<HeldByGround>(self.player).is_some()
     }
 
     fn put<C: Component>(&mut self, component: C) -> Result {
@@ -167,14 +189,23 @@ impl Studio {
     pub fn carry_to(&mut self, place: Vec2) -> Result {
         let at = place.as_dvec2();
         let height = self.terrain()?.world().height(at.x, at.y).ok_or("the script left the world")?;
-        self.put(Body::at(Vec3::new(place.x, height as f32, place.y)))?;
+        self.stand_at(Vec3::new(place.x, height as f32, place.y))?;
         self.wait(10);
         Ok(())
     }
 
     /// Puts the player's feet to a place, as only a script can.
     pub fn stand_at(&mut self, feet: Vec3) -> Result {
-        self.put(Body::at(feet))
+        let place = Character::default().standing_at(feet);
+        self.put(place)?;
+        self.put(CharacterMotion::default())?;
+        // One frame to see that there is no ground, and the others until there is.
+        self.step();
+        let start = Instant::now();
+        while self.is_held() && start.elapsed() < PATIENCE {
+            self.step();
+        }
+        Ok(())
     }
 
     /// Where the player's feet are.
@@ -184,14 +215,14 @@ impl Studio {
 
     /// Where the player walks from now on, at most 1 long.
     pub fn walk(&mut self, direction: Vec2) {
-        if let Some(mut steering) = self.app.world_mut().get_mut::<Steering>(self.player) {
-            *steering = Steering { direction, run: false, jump: false };
+        if let Some(mut steering) = self.app.world_mut().get_mut::<CharacterSteering>(self.player) {
+            *steering = CharacterSteering { direction, run: false, jump: false };
         }
     }
 
     /// Turns the player's head some part of the way to a place.
     pub fn gaze(&mut self, place: Vec3, part: f32) -> Result {
-        let eye = self.body()?.eye();
+        let eye = self.body()?.eye;
         let mut player = self.app.world_mut().get_mut::<Player>(self.player).ok_or("there is no player")?;
         let goal = Player::looking(eye, place);
         let turn = (goal.yaw - player.yaw + PI).rem_euclid(2.0 * PI) - PI;
@@ -220,7 +251,7 @@ impl Studio {
 
     /// Turns the player's head.
     pub fn look_at(&mut self, place: Vec3) -> Result {
-        let eye = self.body()?.eye();
+        let eye = self.body()?.eye;
         self.put(Player::looking(eye, place))
     }
 
@@ -237,12 +268,12 @@ impl Studio {
             let body = self.body()?;
             let way = place - body.feet.xz();
             if way.length() < NEAR {
-                self.put(Steering::default())?;
+                self.put(CharacterSteering::default())?;
                 self.wait(15);
                 return Ok(());
             }
-            self.look_at(Vec3::new(place.x, body.eye().y, place.y))?;
-            self.put(Steering { direction: way.normalize(), run, jump: false })?;
+            self.look_at(Vec3::new(place.x, body.eye.y, place.y))?;
+            self.put(CharacterSteering { direction: way.normalize(), run, jump: false })?;
             self.step();
         }
         let body = self.body()?;
@@ -341,11 +372,15 @@ impl Studio {
     }
 }
 
-fn wait_for_player(app: &mut App) -> Result<Entity> {
+fn wait_for_player(app: &mut App, renders: bool) -> Result<Entity> {
     let start = Instant::now();
     while start.elapsed() < PATIENCE {
         app.update();
-        if let Ok(player) = app.world_mut().query_filtered::<Entity, With<Player>>().single(app.world()) {
+        let player = app.world_mut().query_filtered::<Entity, With<Player>>().single(app.world());
+        // Nobody is filmed on ground that is not painted yet.
+        if let Ok(player) = player
+            && (!renders || app.world().resource::<GroundLoading>().is_ready())
+        {
             return Ok(player);
         }
         if app.should_exit().is_some() {

@@ -209,7 +209,8 @@ pub struct Hand {
 }
 
 impl Hand {
-    fn new(settings: &Settings) -> Self {
+    /// Empty, with brushes as the settings have them.
+    pub fn new(settings: &Settings) -> Self {
         let radii = Tool::ALL.map(|tool| match tool {
             Tool::Pickaxe | Tool::Builder => settings.radius.clamp(tool.radii().0, tool.radii().1),
             _ => tool.manner().radius.2,

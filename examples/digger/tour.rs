@@ -16,7 +16,7 @@ use crate::day::{AFTERNOON, Clock};
 use crate::film::Film;
 use crate::held::ShowHand;
 use crate::hud::ShowHud;
-use crate::input::{Action, Actions};
+use crate::input::Action;
 use crate::landscape::CONCRETE;
 use crate::particles::{Burst, Matter};
 use crate::places::{Hillside, Places};
@@ -210,6 +210,7 @@ impl Tour {
     /// Blow by blow into the slope.
     fn pickaxe(&mut self, hillside: &Hillside) -> Result {
         let Hillside { mouth, inward, .. } = *hillside;
+        self.film.settle()?;
         self.studio().carry_to(mouth.xz() - inward * 9.0)?;
         self.take(Tool::Pickaxe);
         self.studio().world().resource_mut::<Hand>().set_radius(Tool::Pickaxe, 2.1);
@@ -277,6 +278,7 @@ impl Tour {
         self.set_hour(15.6);
         let corner = places.corner;
         let way = Vec2::new(0.86, -0.51);
+        self.film.settle()?;
         self.studio().carry_to(corner.xz() - way * 17.0)?;
         self.take(Tool::Bomb);
         let aside = flat(way.perp());

@@ -71,8 +71,7 @@ fn dig(
         Tool::Pickaxe => {
             (broken(Brush::dig(Shape::sphere(place + along * 0.3 * radius, radius)), radius), 0.8)
         }
-        // Shaves off what stands out.
-        Tool::Shovel => (Brush::dig(Shape::sphere(place + normal * 0.8 * radius, radius)), 0.4),
+        Tool::Shovel => (Brush::smooth(Shape::sphere(place, radius), 0.7), 0.4),
         Tool::Drill => {
             let (from, to) = (place - along * 0.5, place + along * 1.4);
             (broken(Brush::dig(Shape::capsule(from, to, radius)), radius), 0.25)
@@ -160,3 +159,7 @@ fn throw_chips(
         }
     }
 }
+
+#[cfg(test)]
+#[path = "work_tests.rs"]
+mod tests;

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
+use bevy_burrow::view::GroundLoading;
 
 use super::go_to;
 use crate::art::Art;
@@ -71,8 +72,13 @@ fn open(mut commands: Commands, art: Option<Res<Art>>) {
 }
 
 /// Once there is someone to play.
-fn start(_: On<Chosen>, players: Query<(), With<Player>>, mut phase: ResMut<NextState<Phase>>) {
-    if !players.is_empty() {
+fn start(
+    _: On<Chosen>,
+    players: Query<(), With<Player>>,
+    painting: Res<GroundLoading>,
+    mut phase: ResMut<NextState<Phase>>,
+) {
+    if !players.is_empty() && painting.is_ready() {
         phase.set(Phase::Playing);
     }
 }
@@ -81,10 +87,20 @@ fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
     exit.write(AppExit::Success);
 }
 
-fn tell_progress(players: Query<(), With<Player>>, mut words: Query<&mut Text, With<Progress>>) {
-    let word = if players.is_empty() { "the landscape is being surveyed ..." } else { "" };
+fn tell_progress(
+    players: Query<(), With<Player>>,
+    painting: Res<GroundLoading>,
+    mut words: Query<&mut Text, With<Progress>>,
+) {
+    let word = if !painting.is_ready() {
+        format!("the ground is being painted: {:.0} %", 100.0 * painting.progress())
+    } else if players.is_empty() {
+        "the land is being surveyed ...".into()
+    } else {
+        String::new()
+    };
     for mut text in &mut words {
-        text.set_if_neq(Text::new(word));
+        text.set_if_neq(Text::new(&word));
     }
 }
 

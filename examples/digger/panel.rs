@@ -1,0 +1,60 @@
+//! The plugin's own panel over the game: figures, plots, seam check. While it is open the mouse is its own.
+
+use bevy::prelude::*;
+use bevy_burrow::panel::{BurrowPanel, BurrowPanelPlugin};
+
+use crate::input::{Action, Actions};
+use crate::phase::{self, Phase};
+use crate::player::Playing;
+
+/// Opens and closes the panel.
+pub struct PanelPlugin;
+
+impl Plugin for PanelPlugin {
+    fn build(&self, app: &mut App) {
+        let mut panel = BurrowPanel::default();
+        // The hand has its own tools; the figures are what is missing.
+        (panel.is_open, panel.shows_brush) = (false, false);
+        app.insert_resource(panel)
+            .add_plugins(BurrowPanelPlugin)
+            .configure_sets(Update, Playing.run_if(panel_is_closed))
+            .add_systems(
+                Update,
+                (
+                    toggle.run_if(in_state(Phase::Playing)),
+                    (phase::leave_mouse, listen).run_if(panel_opened),
+                    (phase::take_mouse, listen).run_if(panel_closed.and_then(in_state(Phase::Playing))),
+                )
+                    .chain()
+                    .before(Playing),
+            )
+            .add_systems(OnExit(Phase::Playing), close);
+    }
+}
+
+fn panel_is_closed(panel: Res<BurrowPanel>) -> bool {
+    !panel.is_open
+}
+
+fn panel_opened(panel: Res<BurrowPanel>, mut was_open: Local<bool>) -> bool {
+    !std::mem::replace(&mut *was_open, panel.is_open) && panel.is_open
+}
+
+fn panel_closed(panel: Res<BurrowPanel>, mut was_open: Local<bool>) -> bool {
+    std::mem::replace(&mut *was_open, panel.is_open) && !panel.is_open
+}
+
+fn toggle(actions: Res<Actions>, mut panel: ResMut<BurrowPanel>) {
+    if actions.just_pressed(Action::Panel) {
+        panel.is_open = !panel.is_open;
+    }
+}
+
+/// A click on the panel digs nothing once it is closed.
+fn listen(mut actions: ResMut<Actions>) {
+    actions.forget();
+}
+
+fn close(mut panel: ResMut<BurrowPanel>) {
+    panel.is_open = false;
+}
