@@ -51,14 +51,19 @@ impl Wardrobe {
 
     /// Builds the Bevy mesh of a tile or chunk, in the task.
     pub(super) fn build(&self, drawn: Drawn, surface: &SurfaceMesh) -> Ready {
-        if surface.is_empty() {
-            return None;
-        }
-        let (min, max) = surface.bounds()?;
         let origin = match drawn {
             Drawn::Tile(tile) => self.grid.tile_cells(tile).0.at(0),
             Drawn::Chunk(chunk) => self.grid.origin(chunk),
         };
+        self.build_at(origin, surface)
+    }
+
+    /// Builds the Bevy mesh of a surface whose positions count from this point.
+    pub(super) fn build_at(&self, origin: IVec3, surface: &SurfaceMesh) -> Ready {
+        if surface.is_empty() {
+            return None;
+        }
+        let (min, max) = surface.bounds()?;
         let vertices = &surface.vertices;
         let positions: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.position_f32()).collect();
         let normals: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.normal.to_array()).collect();

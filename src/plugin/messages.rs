@@ -2,9 +2,10 @@
 
 use bevy::prelude::*;
 
-use super::{MaterialColors, meshes};
+use super::MaterialColors;
+use super::meshes::Wardrobe;
 use crate::brush::Brush;
-use crate::terrain::{HistoryReceipt, LoosePiece, Receipt};
+use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
 
 /// A brush in world space: every terrain that it reaches obeys it.
 impl Message for Brush {}
@@ -73,10 +74,12 @@ impl LoosePieceFound {
         self.piece.bounds.min.as_vec3()
     }
 
-    /// The piece as a mesh like those of chunks; `None` unless it broke off.
-    pub fn mesh(&self, colors: &MaterialColors) -> Option<Mesh> {
+    /// The piece as a mesh like those of chunks, for any material that they can have; `None` unless it broke off. It wants
+    /// the terrain, which knows how deep in the ground the piece was.
+    pub fn mesh(&self, terrain: &Terrain, colors: &MaterialColors) -> Option<Mesh> {
         let surface = self.piece.mesh.as_ref()?;
-        meshes::build(surface, colors).map(|(mesh, _)| mesh)
+        let ready = Wardrobe::new(terrain.world(), colors).build_at(self.piece.bounds.min, surface);
+        ready.map(|(mesh, _)| mesh)
     }
 }
 

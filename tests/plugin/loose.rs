@@ -34,7 +34,7 @@ fn what_breaks_off_is_told_with_its_mesh() {
         let [found] = &heard[..] else { panic!("one piece: {heard:?}") };
         assert_eq!((found.terrain, found.tag, found.piece.fate), (terrain, 9, PieceFate::BrokeOff));
         assert_eq!(found.origin(), found.piece.bounds.min.as_vec3());
-        let mesh = found.mesh(&MaterialColors::default()).expect("it broke off");
+        let mesh = found.mesh(&model, &MaterialColors::default()).expect("it broke off");
         assert!(mesh.count_vertices() > 100);
         let receipt = &stage.receipts()[0].receipt;
         assert_eq!(receipt.outcome.as_ref().map(|applied| applied.loose.len()), Ok(1));
