@@ -131,8 +131,19 @@ fn crumble(
         piece.left -= time.delta_secs();
         if piece.left <= 0.0 {
             let middle = place.translation + place.rotation * piece.half;
-            let chips = Burst { place: middle, out: Vec3::Y, count: 18, speed: 2.5, matter: Matter::Chips(piece.material) };
-            bursts.write(Burst { count: 4, speed: 1.0, matter: Matter::Dust(piece.material), ..chips.clone() });
+            let chips = Burst {
+                place: middle,
+                out: Vec3::Y,
+                count: 18,
+                speed: 2.5,
+                matter: Matter::Chips(piece.material),
+            };
+            bursts.write(Burst {
+                count: 4,
+                speed: 1.0,
+                matter: Matter::Dust(piece.material),
+                ..chips.clone()
+            });
             bursts.write(chips);
             commands.entity(entity).despawn();
         }
