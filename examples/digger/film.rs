@@ -59,12 +59,8 @@ impl Film {
         self.pass(Duration::ZERO);
         let start = Instant::now();
         loop {
-            let far = Vec3::splat(1.0e5);
-            let is_ready = self
-                .studio
-                .world()
-                .run_system_cached(move |terrains: Terrains| terrains.is_ready(-far, far))
-                .map_err(|error| error.to_string())?;
+            let is_ready =
+                self.studio.world().run_system_cached(is_all_ready).map_err(|error| error.to_string())?;
             if is_ready {
                 return Ok(());
             }
@@ -86,7 +82,7 @@ impl Film {
         self.studio.film_runs(is_drawn);
         if is_drawn && !self.is_warm {
             // Lights need a few frames to find what they shine on.
-            for _ in 0..4 {
+            for _ in 0..3 {
                 self.studio.step_and_draw();
             }
         }
@@ -142,4 +138,10 @@ impl Film {
     fn path(&self, number: usize) -> PathBuf {
         self.studio.folder.join(format!("frame_{number:05}.png"))
     }
+}
+
+/// Is no edit on its way, anywhere?
+fn is_all_ready(terrains: Terrains) -> bool {
+    const FAR: f32 = 1.0e5;
+    terrains.is_ready(Vec3::splat(-FAR), Vec3::splat(FAR))
 }

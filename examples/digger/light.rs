@@ -72,14 +72,18 @@ fn draws_in_software(adapter: &RenderAdapterInfo) -> bool {
     format!("{:?}", adapter.device_type) == "Cpu"
 }
 
-/// A player without a graphics card begins with what the processor can draw.
+/// Without a graphics card there is no filter for textures seen at an angle, and a player begins with low quality.
 fn spare_software(
     adapter: Option<Res<RenderAdapterInfo>>,
     file: Res<SettingsFile>,
     mut settings: ResMut<Settings>,
+    mut textures: ResMut<GroundTextures>,
 ) {
-    let is_first = file.0.as_ref().is_some_and(|file| !file.exists());
-    if is_first && adapter.is_some_and(|adapter| draws_in_software(&adapter)) {
+    if !adapter.is_some_and(|adapter| draws_in_software(&adapter)) {
+        return;
+    }
+    *textures = GroundTextures::Baked { side: 512, anisotropy: 1 };
+    if file.0.as_ref().is_some_and(|file| !file.exists()) {
         settings.quality = Quality::Low;
     }
 }
@@ -153,11 +157,12 @@ fn apply_settings(
     commands.entity(*sun).insert(shadows);
     let mut eyes = commands.entity(*entity);
     let is_low = settings.quality == Quality::Low;
+    let in_software = adapter.is_some_and(|adapter| draws_in_software(&adapter));
     for mut look in &mut looks {
-        look.quality = if is_low { GroundQuality::Low } else { GroundQuality::High };
+        // Some fifty texels for each pixel are nothing to a card, and seconds to a processor.
+        look.quality = if is_low || in_software { GroundQuality::Low } else { GroundQuality::High };
     }
     // Four samples for each pixel cost a software renderer three times the time of one.
-    let in_software = adapter.is_some_and(|adapter| draws_in_software(&adapter));
     if in_software || is_low {
         eyes.insert((Msaa::Off, Smaa::default()));
     } else {

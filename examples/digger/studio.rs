@@ -88,6 +88,10 @@ impl Studio {
             Image::new_target_texture(options.width, options.height, TextureFormat::Rgba8UnormSrgb, None);
         let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
+        // Nobody looks while the land is made.
+        if let Some(mut camera) = app.world_mut().get_mut::<Camera>(eyes) {
+            camera.is_active = false;
+        }
         let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
