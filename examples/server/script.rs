@@ -52,7 +52,7 @@ pub fn open(options: &Options) -> Result<Source> {
             std::thread::spawn(move || {
                 let lines = std::io::stdin().lock().lines().zip(1..);
                 let parsed = lines.filter_map(|(line, number)| parse(line, number));
-                parsed.map(|line| sender.send(line)).take_while(Result::is_ok).for_each(drop);
+                parsed.map_while(|line| sender.send(line).ok()).for_each(drop);
             });
             source.coming = Some(Mutex::new(receiver));
         }

@@ -25,6 +25,7 @@ mod tunnel;
 mod ways;
 
 use album::Album;
+use bevy::app::App;
 use studio::Studio;
 
 #[test]
@@ -41,10 +42,10 @@ fn ground_looks_as_approved() {
 #[test]
 #[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
 fn debug_views_look_as_approved() {
-    let Some(mut studio) = Studio::open(|app| drop(app.add_plugins(bevy_burrow::debug::BurrowDebugPlugin)))
-    else {
-        return;
+    let add = |app: &mut App| {
+        app.add_plugins(bevy_burrow::debug::BurrowDebugPlugin);
     };
+    let Some(mut studio) = Studio::open(add) else { return };
     let mut album = Album::default();
     debug_views::shoot(&mut studio, &mut album);
     album.close();
@@ -53,10 +54,10 @@ fn debug_views_look_as_approved() {
 #[test]
 #[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
 fn the_panel_looks_as_approved() {
-    let Some(mut studio) = Studio::open(|app| drop(app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin)))
-    else {
-        return;
+    let add = |app: &mut App| {
+        app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin);
     };
+    let Some(mut studio) = Studio::open(add) else { return };
     let mut album = Album::default();
     panel::shoot(&mut studio, &mut album);
     album.close();

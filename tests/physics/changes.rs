@@ -61,9 +61,7 @@ fn colliders_are_the_surface_that_the_model_has_at_every_scale() {
             };
             let world = stage.app.world();
             let hits = ground.iter().filter_map(|&body| {
-                let part = |error| format!("{error}");
-                let collider =
-                    world.get::<Collider>(body).ok_or("no collider").map_err(part).expect("a body");
+                let collider = world.get::<Collider>(body).expect("a body has a collider");
                 ray(collider, world.get::<Position>(body)?, world.get::<Rotation>(body)?)
             });
             let hits: Vec<f32> = hits.map(|(distance, _)| 30.0 - distance / voxel_size).collect();

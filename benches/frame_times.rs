@@ -1,0 +1,189 @@
+//! What digging costs a frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`.
+//!
+//! A walk over the real landscape in textures, shadows and fog, drawn without a window, 60 frames a second. On each backend
+//! it is walked digging, 20 brushes of radius 3 a second, and then again over the dug ground with nothing to do. A frame
+//! is timed from its start until the graphics card has drawn it, so one frame overlaps no other, as it would in a game.
+
+use std::time::{Duration, Instant};
+
+use bevy::app::PluginsState;
+use bevy::camera::RenderTarget;
+use bevy::light::CascadeShadowConfigBuilder;
+use bevy::log::{Level, LogPlugin};
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::{PollType, TextureFormat};
+use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use bevy_burrow::backend::{Backend, Engine, EngineState};
+use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale};
+use bevy_burrow::lattice::Column;
+use bevy_burrow::prelude::*;
+
+/// Time from frame to frame.
+const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
+
+/// Frames from brush to brush.
+const BRUSH_EVERY: usize = 3;
+
+/// Frames before anything is timed.
+const WARM_UP: usize = 120;
+
+fn main() {
+    // Cargo itself passes `--bench`.
+    let given: Vec<u32> = std::env::args().skip(1).filter_map(|arg| arg.parse().ok()).collect();
+    let [seconds, width, height] = [(0, 10), (1, 1280), (2, 720)]
+        .map(|(at, default)| given.get(at).copied().unwrap_or(default).clamp(1, 8192));
+    let mut backends = vec![Backend::Cpu];
+    if let EngineState::Cuda(name) = Engine::new(Backend::Cuda).wait(Duration::from_secs(30)) {
+        println!("CUDA: {name}");
+        backends.push(Backend::Cuda);
+    }
+    let frames = seconds as usize * 60;
+    println!("{width} x {height}, {seconds} s each; us");
+    for backend in backends {
+        let mut walk = Walk::new(backend, (width, height));
+        (0..WARM_UP).for_each(|_| drop(walk.frame(0, false)));
+        let mut medians = [[0.0; 2]; 2];
+        for (pass, is_digging) in [true, false].into_iter().enumerate() {
+            let (mut all, mut systems, before) = (Vec::new(), Vec::new(), walk.commits());
+            for number in 0..frames {
+                let (took, plugin) = walk.frame(number, is_digging);
+                all.push(took);
+                systems.push(plugin);
+            }
+            let what = if is_digging { "digging" } else { "the same, nothing to do" };
+            let commits = walk.commits() - before;
+            medians[pass] = report(&format!("{backend:?}, {what}, {commits} commits: frames"), all);
+            report("    the plugin's systems in these", systems);
+        }
+        let [p50, p99] = [0, 1].map(|at| medians[0][at] / medians[1][at]);
+        println!("{backend:?}: digging over nothing to do: p50 {p50:.2}, p99 {p99:.2}");
+    }
+}
+
+/// Prints and gives median and 99th percentile.
+fn report(what: &str, mut times: Vec<Duration>) -> [f64; 2] {
+    times.sort_unstable();
+    let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e6;
+    println!("{what:<60} p50 {:8.0}   p99 {:8.0}   most {:8.0}", at(0.5), at(0.99), at(1.0));
+    [at(0.5), at(0.99)]
+}
+
+/// An app that walks over a landscape.
+struct Walk {
+    app: App,
+    camera: Entity,
+    path: Vec<Vec3>,
+}
+
+impl Walk {
+    fn new(backend: Backend, (width, height): (u32, u32)) -> Self {
+        let mut app = App::new();
+        app.add_plugins(
+            DefaultPlugins
+                .set(WindowPlugin {
+                    primary_window: None,
+                    exit_condition: ExitCondition::DontExit,
+                    ..default()
+                })
+                .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+                .set(LogPlugin { level: Level::WARN, ..default() })
+                .disable::<WinitPlugin>()
+                .disable::<PipelinedRenderingPlugin>(),
+        )
+        .add_plugins(BurrowPlugins);
+        let engine = Engine::new(backend);
+        engine.wait(Duration::from_secs(30));
+        app.insert_resource(BurrowEngine(engine));
+        while app.plugins_state() == PluginsState::Adding {
+            bevy::tasks::tick_global_task_pools_on_main_thread();
+        }
+        app.finish();
+        app.cleanup();
+
+        let ground = ground();
+        let path = path(&ground);
+        let world = app.world_mut();
+        println!("drawn by {}", world.resource::<RenderAdapterInfo>().name);
+        let film = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
+        let film = world.resource_mut::<Assets<Image>>().add(film);
+        let fog =
+            DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
+        let camera =
+            world.spawn((Camera3d::default(), RenderTarget::from(film), fog, Transform::default())).id();
+        let shadows =
+            CascadeShadowConfigBuilder { num_cascades: 3, maximum_distance: 150.0, ..default() }.build();
+        world.spawn((
+            DirectionalLight { illuminance: 10_000.0, shadow_maps_enabled: true, ..default() },
+            shadows,
+            Transform::from_xyz(1.0, 0.9, 0.4).looking_at(Vec3::ZERO, Vec3::Y),
+        ));
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+        world.spawn((terrain, GroundLook::default()));
+        let mut walk = Self { app, camera, path };
+        // The ground is there when its textures are painted and its tiles are shown.
+        let start = Instant::now();
+        while !walk.is_shown() {
+            assert!(start.elapsed() < Duration::from_secs(300), "the ground never appeared");
+            walk.app.update();
+        }
+        walk
+    }
+
+    fn is_shown(&mut self) -> bool {
+        let world = self.app.world_mut();
+        let is_painted = world.get_resource::<GroundLoading>().is_none_or(|loading| loading.is_ready());
+        let mut tiles = world.query_filtered::<(), (With<Tile>, With<Mesh3d>)>();
+        is_painted && tiles.iter(world).count() > 0
+    }
+
+    fn commits(&self) -> u64 {
+        self.app.world().resource::<BurrowFigures>().commits
+    }
+
+    /// One frame: how long it took, and the plugin's systems in it.
+    fn frame(&mut self, number: usize, is_digging: bool) -> (Duration, Duration) {
+        let start = Instant::now();
+        let at = self.path[number % self.path.len()];
+        let ahead = self.path[(number + 90) % self.path.len()];
+        let world = self.app.world_mut();
+        if let Some(mut camera) = world.get_mut::<Transform>(self.camera) {
+            *camera = Transform::from_translation(at + Vec3::Y * 6.0).looking_at(ahead, Vec3::Y);
+        }
+        if is_digging && number.is_multiple_of(BRUSH_EVERY) {
+            world.write_message(Brush::dig(Shape::sphere(ahead, 3.0)));
+        }
+        self.app.update();
+        let world = self.app.world();
+        let plugin = world.resource::<BurrowFigures>().main_thread;
+        let drawn = world.resource::<RenderDevice>().poll(PollType::wait_indefinitely());
+        assert!(drawn.is_ok(), "the frame is never done: {drawn:?}");
+        let took = start.elapsed();
+        std::thread::sleep(FRAME.saturating_sub(took));
+        (took, plugin)
+    }
+}
+
+/// The landscape of the examples.
+fn ground() -> Ground {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/jacksboro_fault.png");
+    let bytes = std::fs::read(path).expect("the shipped elevation model can be read");
+    let image = GreyImage::decode_png(&bytes, &ImageLimits::default()).expect("a grey PNG");
+    let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
+    Ground::from_image(&image, &scale).expect("valid ground")
+}
+
+/// Where the walk is in each frame: a wide loop, 9 m/s, on the ground.
+fn path(ground: &Ground) -> Vec<Vec3> {
+    let (center, radius, frames) = (Vec2::new(560.0, 500.0), 280.0, 12_000);
+    let place = |frame: i32| {
+        let angle = frame as f32 / frames as f32 * std::f32::consts::TAU;
+        let at = center + Vec2::from_angle(angle) * radius;
+        let height = ground.height(Column::new(at.x as i32, at.y as i32)) as f32 / 256.0;
+        Vec3::new(at.x, height, at.y)
+    };
+    (0..frames).map(place).collect()
+}
