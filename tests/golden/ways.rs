@@ -1,7 +1,7 @@
 //! Every way of drawing shows the same: forward, with all prepasses, and deferred.
 
 use bevy::core_pipeline::prepass::{DeferredPrepass, MotionVectorPrepass, NormalPrepass};
-use bevy::material::OpaqueRendererMethod;
+use bevy::pbr::DefaultOpaqueRendererMethod;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
@@ -13,10 +13,7 @@ use crate::studio::Studio;
 const CLOSE: f32 = 0.05;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
-    studio.terrain(hills(64), GroundLook::default());
-    let middle = Vec3::new(32.0, studio.height(32.0, 32.0), 32.0);
-    studio.apply([Brush::dig(Shape::sphere(middle, 6.0))]);
-    studio.look(middle + Vec3::new(14.0, 14.0, 20.0), middle);
+    set_up(studio);
     let forward = studio.picture();
     let camera = studio.camera;
     let mut check = |studio: &mut Studio, way: &str| {
@@ -32,20 +29,21 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     };
     studio.app.world_mut().entity_mut(camera).insert((NormalPrepass, MotionVectorPrepass));
     check(studio, "prepasses");
-    // A deferred material wants a deferred camera, before and after.
+    // A deferred material wants a deferred camera as long as it is there.
     studio.app.world_mut().entity_mut(camera).insert(DeferredPrepass);
-    studio.app.update();
-    draw_by(studio, OpaqueRendererMethod::Deferred);
+    studio.app.insert_resource(DefaultOpaqueRendererMethod::deferred());
+    set_up(studio);
     check(studio, "deferred");
-    draw_by(studio, OpaqueRendererMethod::Forward);
+    studio.close_terrain();
+    studio.app.insert_resource(DefaultOpaqueRendererMethod::forward());
     studio.app.update();
     let mut camera = studio.app.world_mut().entity_mut(camera);
     camera.remove::<(NormalPrepass, MotionVectorPrepass, DeferredPrepass)>();
 }
 
-fn draw_by(studio: &mut Studio, method: OpaqueRendererMethod) {
-    let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
-    for (_, material) in materials.iter_mut() {
-        material.base.opaque_render_method = method;
-    }
+fn set_up(studio: &mut Studio) {
+    studio.terrain(hills(64), GroundLook::default());
+    let middle = Vec3::new(32.0, studio.height(32.0, 32.0), 32.0);
+    studio.apply([Brush::dig(Shape::sphere(middle, 6.0))]);
+    studio.look(middle + Vec3::new(14.0, 14.0, 20.0), middle);
 }
