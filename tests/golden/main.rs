@@ -23,6 +23,7 @@ mod tunnel;
 mod ways;
 
 use album::Album;
+use bevy::pbr::DefaultOpaqueRendererMethod;
 use studio::Studio;
 
 #[test]
@@ -33,5 +34,16 @@ fn ground_looks_as_approved() {
     tunnel::shoot(&mut studio, &mut album);
     sameness::shoot(&mut studio, &mut album);
     ways::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+fn deferred_ground_looks_the_same() {
+    let deferred = |app: &mut bevy::app::App| {
+        app.insert_resource(DefaultOpaqueRendererMethod::deferred());
+    };
+    let Some(mut studio) = Studio::open(deferred) else { return };
+    let mut album = Album::default();
+    ways::shoot_deferred(&mut studio, &mut album);
     album.close();
 }
