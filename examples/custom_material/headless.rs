@@ -75,6 +75,10 @@ fn shoot(app: &mut App, film: &Handle<Image>, path: PathBuf) -> Result {
     };
     app.world_mut().spawn(Screenshot::image(film.clone())).observe(note);
     until(app, |app| app.world().resource::<Written>().0 > before)?;
+    // A frame of one colour is compressed to next to nothing.
+    if std::fs::metadata(&path)?.len() < 20_000 {
+        return Err(format!("{} shows nothing", path.display()).into());
+    }
     println!("{}", path.display());
     Ok(())
 }

@@ -47,7 +47,7 @@ impl Default for MapMaterial {
     }
 }
 
-const SHADER: &str = "embedded://custom_material/map.wgsl";
+const SHADER: &str = "embedded://custom_material/custom_material/map.wgsl";
 
 impl Material for MapMaterial {
     fn vertex_shader() -> ShaderRef {

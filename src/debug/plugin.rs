@@ -114,9 +114,9 @@ fn draw(
     cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
     shown: Query<(Entity, &DebugLines, &ChildOf)>,
     mut assets: ResMut<Assets<GizmoAsset>>,
-    mut drawn: Local<HashMap<(Entity, DebugView), Key>>,
+    mut drawn: Local<HashMap<(Entity, DebugView), (Key, Duration)>>,
     mut frames: Local<u64>,
-    mut last: Local<Duration>,
+    mut faded: Local<bool>,
 ) {
     for (entity, lines, parent) in &shown {
         if !debug.shows(lines.view) || !terrains.contains(parent.parent()) {
@@ -127,8 +127,10 @@ fn draw(
     if !DebugView::ALL.into_iter().any(|view| debug.shows(view)) {
         return;
     }
-    *frames += u64::from(!dirty.0.is_empty());
-    let is_due = time.elapsed().saturating_sub(*last) >= PERIOD;
+    // Once more when the last one is forgotten.
+    *frames += u64::from(!dirty.0.is_empty() || *faded);
+    *faded = !dirty.0.is_empty();
+    let now = time.elapsed();
     for (entity, terrain, place) in &terrains {
         let Some(focus) = focus(&debug, terrain, place, &cameras) else { continue };
         let scale = place.scale().x.abs().max(f32::MIN_POSITIVE);
@@ -144,13 +146,13 @@ fn draw(
                 settings: debug.clone(),
                 fading,
             };
-            let old = drawn.get(&(entity, view));
-            let is_urgent = old.is_none_or(|old| old.settings != key.settings || old.fading != key.fading);
-            if old == Some(&key) || !is_due && !is_urgent {
-                continue;
+            if let Some((old, since)) = drawn.get(&(entity, view)) {
+                let is_urgent = old.settings != key.settings || old.fading != key.fading;
+                if *old == key || !is_urgent && now.saturating_sub(*since) < PERIOD {
+                    continue;
+                }
             }
-            *last = time.elapsed();
-            let fresh = fresh_bricks(&dirty, entity, &debug, time.elapsed());
+            let fresh = fresh_bricks(&dirty, entity, &debug, now);
             let mut pen = Pen::new(debug.most_lines);
             views::draw(
                 view,
@@ -165,7 +167,7 @@ fn draw(
             for layer in pen.finish() {
                 commands.spawn((DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity)));
             }
-            drawn.insert((entity, view), key);
+            drawn.insert((entity, view), (key, now));
         }
     }
 }

@@ -26,6 +26,7 @@ mod ways;
 
 use album::Album;
 use bevy::app::App;
+use bevy::pbr::DefaultOpaqueRendererMethod;
 use studio::Studio;
 
 #[test]
@@ -60,5 +61,16 @@ fn the_panel_looks_as_approved() {
     let Some(mut studio) = Studio::open(add) else { return };
     let mut album = Album::default();
     panel::shoot(&mut studio, &mut album);
+    album.close();
+}
+
+#[test]
+fn deferred_ground_looks_the_same() {
+    let deferred = |app: &mut App| {
+        app.insert_resource(DefaultOpaqueRendererMethod::deferred());
+    };
+    let Some(mut studio) = Studio::open(deferred) else { return };
+    let mut album = Album::default();
+    ways::shoot_deferred(&mut studio, &mut album);
     album.close();
 }

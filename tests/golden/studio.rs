@@ -114,10 +114,8 @@ impl Studio {
     /// Puts a terrain with a look into the world, in place of the one before, and waits until it is shown.
     pub fn terrain(&mut self, ground: Ground, look: GroundLook) {
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
-        let world = self.app.world_mut();
-        let old: Vec<Entity> = world.query_filtered::<Entity, With<Terrain>>().iter(world).collect();
-        old.into_iter().for_each(|old| assert!(world.despawn(old)));
-        let entity = world.spawn((terrain, look)).id();
+        self.close_terrain();
+        let entity = self.app.world_mut().spawn((terrain, look)).id();
         self.until("a terrain that is dressed", |app| {
             let mut tiles = app
                 .world_mut()
@@ -132,6 +130,13 @@ impl Studio {
         self.film = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
         self.size = size;
         self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(self.film.clone()));
+    }
+
+    /// Takes the terrain away.
+    pub fn close_terrain(&mut self) {
+        let world = self.app.world_mut();
+        let old: Vec<Entity> = world.query_filtered::<Entity, With<Terrain>>().iter(world).collect();
+        old.into_iter().for_each(|old| assert!(world.despawn(old)));
     }
 
     /// Where the camera is, and what it looks at.
