@@ -48,13 +48,12 @@ pub enum Action {
     Help,
     Figures,
     Panel,
-    Lines,
     Pause,
 }
 
 impl Action {
     /// All of them, in the order of the page of controls, with what they are called there.
-    pub const ALL: [(Self, &str); 30] = [
+    pub const ALL: [(Self, &str); 29] = [
         (Self::Forward, "forward"),
         (Self::Back, "back"),
         (Self::Left, "left"),
@@ -83,7 +82,6 @@ impl Action {
         (Self::Help, "help"),
         (Self::Figures, "frame times"),
         (Self::Panel, "panel"),
-        (Self::Lines, "lines of the ground"),
         (Self::Pause, "pause"),
     ];
 
@@ -181,7 +179,7 @@ impl Default for Bindings {
         use Binding::{Key, Mouse, Pad, WheelDown, WheelUp};
         use GamepadButton as G;
         use KeyCode as K;
-        let all: [(Action, &[Binding]); 30] = [
+        let all: [(Action, &[Binding]); 29] = [
             (A::Forward, &[Key(K::KeyW), Key(K::ArrowUp)]),
             (A::Back, &[Key(K::KeyS), Key(K::ArrowDown)]),
             (A::Left, &[Key(K::KeyA), Key(K::ArrowLeft)]),
@@ -210,7 +208,6 @@ impl Default for Bindings {
             (A::Help, &[Key(K::KeyH), Pad(G::Select)]),
             (A::Figures, &[Key(K::F3)]),
             (A::Panel, &[Key(K::F1)]),
-            (A::Lines, &[Key(K::F2)]),
             (A::Pause, &[Key(K::Escape), Pad(G::Start)]),
         ];
         Self(all.into_iter().map(|(action, bindings)| (action, bindings.to_vec())).collect())

@@ -120,9 +120,7 @@ fn a_gamepad_walks_looks_and_digs() {
     let mut app = app();
     let pad = app.world_mut().spawn_empty().id();
     let connection = GamepadConnection::Connected { name: "pad".into(), vendor_id: None, product_id: None };
-    app.world_mut().write_message(RawGamepadEvent::Connection(GamepadConnectionEvent::new(pad, connection)));
-    // One frame to enter the pad, and one to give it its component.
-    app.update();
+    app.world_mut().write_message(GamepadConnectionEvent::new(pad, connection));
     app.update();
     let events = [
         RawGamepadEvent::Button(RawGamepadButtonChangedEvent::new(pad, GamepadButton::RightTrigger2, 1.0)),

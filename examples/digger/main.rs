@@ -17,7 +17,7 @@
 //! | `1` to `7` | pickaxe, shovel, drill, builder, painter, bomb, lamp |
 //! | `Q` `E`, `C` | material, form of what is built |
 //! | `F`, `Z` `Y` | headlamp; undo, redo |
-//! | `F1` `F2` `F3` | panel, lines of the ground, frame times |
+//! | `F1` `F3` | panel, frame times |
 //! | `H`, `Esc` | help, pause |
 //!
 //! A gamepad does all of that too, with `--features examples,gamepad`.

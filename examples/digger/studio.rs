@@ -29,6 +29,7 @@ use crate::phase::Phase;
 use crate::player::{Drone, Player, Scripted};
 use crate::report::{EditTime, FrameTimes, Logbook};
 use crate::tools::Hand;
+use crate::ui::scale_for;
 
 /// Longest wait for the landscape.
 pub const PATIENCE: Duration = Duration::from_secs(300);
@@ -95,6 +96,7 @@ impl Studio {
         let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
+        world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32);
         // A bright afternoon that lasts, and no title.
         world.resource_mut::<Clock>().runs = false;
         world.resource_mut::<ShowHud>().0 = false;

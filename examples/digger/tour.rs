@@ -389,10 +389,14 @@ impl Tour {
 
     /// A way through places at heights over the ground.
     fn over_ground(&mut self, places: &[(Vec3, f32)]) -> Result<CubicCurve<Vec3>> {
+        const RIM: f32 = 20.0;
         let world = self.film.studio.terrain()?.world();
+        let (width, depth) = (world.grid().width() as f32, world.grid().depth() as f32);
         let points = places.iter().map(|&(place, metres)| {
-            let height = world.height(place.x.into(), place.z.into()).ok_or("the tour left the world")?;
-            Ok(place.with_y(height as f32 + metres))
+            // Hills may lie near the rim; the way stays within it.
+            let [x, z] = [(place.x, width), (place.z, depth)].map(|(at, end)| at.clamp(RIM, end - RIM));
+            let height = world.height(x.into(), z.into()).ok_or("the tour left the world")?;
+            Ok(Vec3::new(x, height as f32 + metres, z))
         });
         spline(points.collect::<Result<Vec<Vec3>>>()?)
     }

@@ -97,9 +97,22 @@ impl Plugin for UiPlugin {
                     .run_if(not(in_state(Page::None)))
                     .run_if(not(resource_exists::<Deaf>)),
             )
+            .add_systems(Update, fit_window)
             .add_systems(Update, (point, light_up).chain().run_if(not(in_state(Page::None))))
             .add_systems(StateTransition, forget_focus.run_if(state_changed::<Page>));
     }
+}
+
+/// Everything is laid out for 1280 x 720, and as large as the window allows.
+fn fit_window(windows: Query<&Window, Changed<Window>>, mut scale: ResMut<UiScale>) {
+    if let Some(window) = windows.iter().next() {
+        scale.0 = scale_for(window.width(), window.height());
+    }
+}
+
+/// How large everything is in a window or a picture.
+pub fn scale_for(width: f32, height: f32) -> f32 {
+    (width / 1280.0).min(height / 720.0).clamp(0.4, 3.0)
 }
 
 fn forget_focus(mut focus: ResMut<Focus>) {
