@@ -79,7 +79,7 @@ class Stage:
 
     def frames(self):
         """Frames so far, of a program that tells of each."""
-        return self.log.read_text(errors="replace").count("\nframe\n")
+        return self.log.read_text(errors="replace").splitlines().count("frame")
 
     def mark(self):
         """The end of what was said so far."""
@@ -213,7 +213,8 @@ def sculpt(stage):
     stage.focus("sculpt")
     pristine = stage.wait(r"^ready hash=(\w+)").group(1)
     stage.wait(r'^place "Radius"')
-    stage.rest(2)
+    stage.wait(r"^dressed")
+    stage.rest()
     stage.shoot("1_start")
     middle = (stage.size[0] / 2, stage.size[1] * 0.6)
 
@@ -280,7 +281,7 @@ def main():
     parser.add_argument("--binary", type=pathlib.Path, help="the example's program")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/drive"), help="folder for pictures and log")
     parser.add_argument("--size", default="1280x720", help="of the window, in pixels")
-    parser.add_argument("--patience", type=float, default=120, help="seconds to wait for each thing")
+    parser.add_argument("--patience", type=float, default=300, help="seconds to wait for each thing")
     parser.add_argument("arguments", nargs="*", help="for the program, after --")
     args = parser.parse_args()
     if args.list:

@@ -17,8 +17,19 @@ impl Plugin for JournalPlugin {
         })
         .add_systems(
             Update,
-            (tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
+            (tell_look, tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
         );
+    }
+}
+
+/// The ground's textures take a moment: from now on it can be seen.
+fn tell_look(
+    dressed: Query<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>,
+    mut is_told: Local<bool>,
+) {
+    if !*is_told && !dressed.is_empty() {
+        *is_told = true;
+        println!("dressed");
     }
 }
 

@@ -215,10 +215,11 @@ fn column(
         let card = theme::card();
         let inside = theme::COLUMN - card.inner_margin.sum().x;
         card.show(ui, |ui| {
+            // Before anything is placed: later it would move what follows up to the top.
+            ui.set_max_height(height - card.inner_margin.sum().y);
             ui.set_width(inside);
             ui.label(RichText::new(title).heading().color(theme::BRIGHT));
             let rest = (height - card.inner_margin.sum().y - 30.0).max(80.0);
-            ui.set_max_height(rest + 30.0);
             ScrollArea::vertical().max_height(rest).auto_shrink([false, true]).show(ui, |ui| {
                 ui.set_width(inside);
                 content(ui);
