@@ -113,6 +113,7 @@ pub fn choice(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
     ui.horizontal(|ui| {
         for (at, name) in names.iter().enumerate() {
             let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 24.0), Sense::click());
+            note(ui, name, rect);
             let color = frame_tile(ui, rect, &response, at == chosen);
             ui.painter().text(rect.center(), Align2::CENTER_CENTER, name, FontId::proportional(12.0), color);
             if response.clicked() {
