@@ -44,16 +44,19 @@ test-model:
 	cargo test $(WITHOUT_BEVY) --doc
 
 test-plugin:
-	cargo test $(WITH_BEVY) --lib $(PLUGIN_TESTS) --example digger --example minimal --example server
+	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::
+	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example server
 	cargo test $(WITH_BEVY) --doc
 
 # The examples as a user starts them; whatever an earlier run left is not taken for theirs.
 test-examples:
 	rm -rf '$(PROOF)'
-	cargo run $(WITH_BEVY) --example digger -- --headless --out '$(PROOF)/digger'
+	cargo run $(WITH_BEVY) --example digger -- --headless --width 640 --height 360 --out '$(PROOF)/digger'
 	@pictures=$$(ls '$(PROOF)/digger' | grep -c '\.png$$'); echo "digger: $$pictures pictures"; [ "$$pictures" -ge 6 ]
-	cargo run $(WITH_BEVY) --example sculpt -- --headless --out '$(PROOF)/sculpt'
+	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out '$(PROOF)/sculpt'
 	@pictures=$$(ls '$(PROOF)/sculpt' | grep -c '\.png$$'); echo "sculpt: $$pictures pictures"; [ "$$pictures" -ge 5 ]
+	cargo run $(WITH_BEVY) --example physics -- --headless --seconds 3 --balls 150 --out '$(PROOF)/physics'
+	cargo run $(WITH_BEVY) --example custom_material -- --headless --out '$(PROOF)/custom_material'
 	cargo run $(WITH_BEVY) --example server -- --script examples/server/brushes.jsonl
 	cargo run $(WITH_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
