@@ -45,7 +45,9 @@ fn main() {
     println!("{width} x {height}, {seconds} s each; us");
     for backend in backends {
         let mut walk = Walk::new(backend, (width, height));
-        (0..WARM_UP).for_each(|_| drop(walk.frame(0, false)));
+        for _ in 0..WARM_UP {
+            walk.frame(0, false);
+        }
         let mut medians = [[0.0; 2]; 2];
         for (pass, is_digging) in [true, false].into_iter().enumerate() {
             let (mut all, mut systems, before) = (Vec::new(), Vec::new(), walk.commits());

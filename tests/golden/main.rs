@@ -41,7 +41,6 @@ fn ground_looks_as_approved() {
 }
 
 #[test]
-#[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
 fn debug_views_look_as_approved() {
     let add = |app: &mut App| {
         app.add_plugins(bevy_burrow::debug::BurrowDebugPlugin);
@@ -53,7 +52,6 @@ fn debug_views_look_as_approved() {
 }
 
 #[test]
-#[ignore = "its pictures are still to be approved of: BURROW_GOLDEN=write"]
 fn the_panel_looks_as_approved() {
     let add = |app: &mut App| {
         app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin);
