@@ -7,9 +7,9 @@
 //! ```
 //!
 //! It runs Bevy's `MinimalPlugins` and `BurrowPlugins`, so it needs no window, no graphics and no assets. A script has a
-//! brush a line, as [`BrushRecord`] has it, in voxels; `{"undo":true}` and `{"redo":true}` are steps through history, and
-//! blank lines and lines that start with `#` count for nothing. `-` reads standard input as it comes in; without a script
-//! it digs at random, the same each time.
+//! brush a line, as [`BrushRecord`](bevy_burrow::brush::BrushRecord) has it, in voxels; `{"undo":true}` and `{"redo":true}`
+//! are steps through history, and blank lines and lines that start with `#` count for nothing. `-` reads standard input
+//! as it comes in; without a script it digs at random, the same each time.
 //!
 //! For each brush a line with what became of it, then fields, memory, and the hash of the world: a client that got the
 //! same brushes in the same order has the same one. With `--per-tick` brushes go in batches, as they would from players;
