@@ -62,9 +62,12 @@ test-examples:
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
 
-drive: setup ## Play sculpt by real mouse and keys in a window under Xvfb; skips where there is none
-	cargo build $(WITH_BEVY) --example sculpt
-	@python3 tools/drive.py sculpt --out out/drive; status=$$?; [ $$status -eq 77 ] || exit $$status
+drive: setup ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where there is none
+	cargo build $(WITH_BEVY) --example sculpt --example digger
+	@for play in sculpt digger; do \
+		python3 tools/drive.py $$play --out out/drive/$$play; status=$$?; \
+		[ $$status -eq 0 ] || [ $$status -eq 77 ] || exit $$status; \
+	done
 
 soak: ## Dig WORLDS (10000) random worlds; look at every seam, and compare every mesh with the plain mesher
 	@tools/setup.sh build

@@ -208,6 +208,93 @@ class Stage:
 
 
 @play
+def digger(stage):
+    """Starts the game from its title, digs, changes the radius, digs again, takes it back, throws a bomb, pauses."""
+
+    def page(name, since):
+        stage.wait(r"^page " + name, since)
+        stage.rest()
+
+    def blow(since):
+        return int(stage.wait(r"^edit tag=\d+ removed=([1-9]\d*)", since).group(1))
+
+    def look(by):
+        for _ in range(3):
+            stage.xdo("mousemove_relative", "--", "0", str(by))
+            stage.rest()
+
+    radius = lambda: float(stage.last(r"^tool pickaxe radius=([\d.]+)").group(1))
+    stage.wait(r"^ready")
+    stage.focus("Digger")
+    stage.rest()
+    stage.shoot("1_title")
+    for downs, name in ((1, "Settings"), (2, "Controls"), (3, "Help")):
+        since = stage.mark()
+        for _ in range(downs):
+            stage.key("Down")
+        stage.key("Return")
+        page(f"Title {name}", since)
+        stage.shoot(f"2_{name.lower()}")
+        since = stage.mark()
+        stage.key("Escape")
+        page("Title Menu", since)
+    since = stage.mark()
+    stage.key("Return")
+    page("Playing None", since)
+    stage.say("the title's menu starts the game")
+    stage.shoot("3_play")
+
+    look(110)
+    since = stage.mark()
+    stage.press()
+    stage.say(f"a blow of the pickaxe dug {blow(since)} voxels")
+    stage.release()
+    stage.settle(1.0)
+    stage.shoot("4_dug")
+
+    before = radius()
+    for _ in range(4):
+        stage.xdo("click", "--delay", 0, 4)
+        stage.rest()
+    if not radius() > before:
+        raise Failed(f"the wheel left the radius at {radius()}")
+    stage.say(f"the wheel changed the radius from {before} to {radius()}")
+    since = stage.mark()
+    stage.press()
+    stage.say(f"the next blow dug {blow(since)} voxels")
+    stage.release()
+    stage.settle(1.0)
+    stage.shoot("5_larger")
+
+    since = stage.mark()
+    stage.key("z")
+    back = int(stage.wait(r"^history Undo removed=0 added=(\d+)", since).group(1))
+    stage.say(f"Z brought {back} voxels back")
+    stage.settle(1.0)
+    stage.shoot("6_undone")
+
+    since = stage.mark()
+    stage.key("6")
+    stage.wait(r"^tool bomb", since)
+    look(-130)
+    since = stage.mark()
+    stage.press()
+    stage.release()
+    stage.say(f"a bomb dug {blow(since)} voxels")
+    stage.settle(2.0)
+    stage.shoot("7_crater")
+    stage.key("F1")
+    stage.rest()
+    stage.shoot("8_panel")
+    stage.key("F1")
+    stage.rest()
+    since = stage.mark()
+    stage.key("Escape")
+    page("Paused Menu", since)
+    stage.shoot("9_pause")
+
+
+@play
 def sculpt(stage):
     """Digs, drags the radius, digs again, does not dig through the panel, takes both strokes back."""
     stage.focus("sculpt")
@@ -300,9 +387,7 @@ def main():
     if not binary.exists():
         print(f"{binary} is not there: build it first, or name it with --binary", file=sys.stderr)
         return 1
-    command = [str(binary), "--width", str(size[0]), "--height", str(size[1]), "--out", str(args.out)]
-    if args.play == "sculpt":
-        command.append("--tell")
+    command = [str(binary), "--width", str(size[0]), "--height", str(size[1]), "--out", str(args.out), "--tell"]
     print(f"{args.play}: {binary}", flush=True)
     stage = Stage(command + args.arguments, args.out, size, args.patience)
     try:
