@@ -165,7 +165,7 @@ pub fn slider<N: Numeric>(
         let font = FontId::proportional(13.0);
         ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font, TEXT);
         ui.spacing_mut().slider_width = (ui.available_width() - 62.0).max(40.0);
-        let slider = Slider::new(value, range).clamping(SliderClamping::Always);
+        let slider = Slider::new(value, range).clamping(SliderClamping::Edits);
         let rail = Rect::from_min_size(ui.cursor().min, Vec2::new(ui.spacing().slider_width, 20.0));
         note(ui, name, rail);
         ui.add(format(slider))

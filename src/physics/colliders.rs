@@ -126,10 +126,12 @@ impl Prepared {
             return;
         }
         let old = old.and_then(|old| old.body);
-        let place = part.get::<GlobalTransform>().copied().unwrap_or_default();
         self.grounds.set_shape(&self.part, self.shape.clone());
         let body = part.world_scope(|world| {
             if let Some((low, high)) = self.changed {
+                // A new part is not placed itself before the end of the frame.
+                let terrain = world.get::<GlobalTransform>(self.part.terrain).copied().unwrap_or_default();
+                let place = terrain * Transform::from_translation(self.part.origin.as_vec3());
                 let change = Change::new(self.part.terrain, &place, self.part.voxel_size, low, high);
                 world.resource_mut::<GroundChanges>().0.push(change);
             }

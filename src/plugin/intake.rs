@@ -123,11 +123,14 @@ fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
 /// Brushes and steps that a terrain had not come to when it goes, or another one takes its place.
 pub(super) fn answer_with_terrain(
     gone: On<Discard, Terrain>,
-    terrains: Query<&Terrain>,
+    mut terrains: Query<&mut Terrain>,
     mut answers: MessageWriter<BrushApplied>,
     mut moved: MessageWriter<HistoryMoved>,
 ) {
-    let Ok(terrain) = terrains.get(gone.entity) else { return };
+    let Ok(mut terrain) = terrains.get_mut(gone.entity) else { return };
+    let answered = terrain.take_answered().into_iter();
+    answers.write_batch(answered.map(|receipt| BrushApplied { terrain: Some(gone.entity), receipt }));
+    tell_steps(gone.entity, &mut terrain, &mut moved);
     let answer = |tag| BrushApplied {
         terrain: Some(gone.entity),
         receipt: Receipt { tag, outcome: Err(Rejection::TerrainGone) },

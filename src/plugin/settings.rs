@@ -87,7 +87,7 @@ impl From<LooseGround> for LooseSettings {
 pub struct BurrowFigures {
     /// Commits so far.
     pub commits: u64,
-    /// Brushes that got a receipt so far.
+    /// Brushes in these commits.
     pub brushes: u64,
     /// Meshes swapped so far.
     pub swaps: u64,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::loose::{self, LoosePiece, LooseSettings};
+use super::loose::{self, LoosePiece, LooseSettings, Lowest};
 use super::world::World;
 use crate::backend::Compute;
 use crate::brush::{Edit, Operation};
@@ -50,7 +50,7 @@ impl Drafting<'_> {
     /// The same world, but each edit that can remove ground comes by itself, and what it cuts off falls before the next.
     pub fn one_by_one(&self, edits: &[&Edit], settings: &LooseSettings) -> Drafted {
         let world = self.world;
-        let (mut over, mut pieces) = (Bricks::default(), BTreeMap::new());
+        let (mut over, mut lowest, mut pieces) = (Bricks::default(), Lowest::default(), BTreeMap::new());
         let mut all = Draft { hash: world.sample_hash, ..Draft::default() };
         let mut bricks: BTreeMap<[i32; 3], DraftedBrick> = BTreeMap::new();
         let mut known = world.uniform.clone();
@@ -64,16 +64,16 @@ impl Drafting<'_> {
             known.extend(uniform);
             let is_looked_after = group.iter().any(|edit| can_remove(edit));
             let seeds = is_looked_after.then(|| loose::seeds(world, &over, &drafted));
-            lay(&mut over, &drafted);
+            lay(&mut over, &mut lowest, &drafted);
             if let Some(seeds) = seeds {
-                let fallen = loose::fall(world, &over, &seeds, settings);
+                let fallen = loose::fall(world, &over, &lowest, &seeds, settings);
                 for TakenOut { drafted: mut taken, hash, chunks } in fallen.taken {
                     all.hash = all.hash.wrapping_add(hash);
                     if let Some(effect) = effects.last_mut() {
                         chunks.into_iter().for_each(|chunk| reach(effect, chunk));
                     }
                     share(&mut known, &mut taken);
-                    lay(&mut over, [&taken]);
+                    lay(&mut over, &mut lowest, [&taken]);
                     drafted.push(taken);
                 }
                 if !fallen.pieces.is_empty() {
@@ -92,8 +92,12 @@ impl Drafting<'_> {
 }
 
 /// Lays bricks over those that are there.
-fn lay<'d>(over: &mut Bricks, drafted: impl IntoIterator<Item = &'d DraftedBrick>) {
-    over.extend(drafted.into_iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))));
+fn lay<'d>(over: &mut Bricks, lowest: &mut Lowest, drafted: impl IntoIterator<Item = &'d DraftedBrick>) {
+    for DraftedBrick { pos, brick, .. } in drafted {
+        over.insert(*pos, Arc::clone(brick));
+        let lowest = lowest.entry((pos.0.x, pos.0.z)).or_insert(pos.0.y);
+        *lowest = pos.0.y.min(*lowest);
+    }
 }
 
 /// Takes in what a brick is now, and what changed in it beside what did before.

@@ -40,6 +40,7 @@ pub use surface::ChunkSurface;
 pub use transaction::Transaction;
 pub use world::{Drawn, Memory, Version, World};
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -120,7 +121,7 @@ pub struct Terrain {
     world: Arc<World>,
     engine: Option<Engine>,
     voxel_size: f32,
-    queue: Vec<Request>,
+    queue: VecDeque<Request>,
     in_flight: Option<InFlight>,
     answered: Vec<Receipt>,
     loose: Option<LooseSettings>,
@@ -151,7 +152,7 @@ impl Terrain {
             world: Arc::new(world),
             engine: None,
             voxel_size: settings.voxel_size,
-            queue: Vec::new(),
+            queue: VecDeque::new(),
             in_flight: None,
             answered: Vec::new(),
             loose: None,
@@ -217,7 +218,7 @@ impl Terrain {
     }
 
     fn queue_edit(&mut self, tag: u64, edit: Result<Edit, BrushError>) {
-        self.queue.push(Request::Edit(Submission { tag, edit }));
+        self.queue.push_back(Request::Edit(Submission { tag, edit }));
     }
 
     /// From the next transaction on, edits look for pieces of ground that they cut off, and receipts list them; `None`
@@ -251,10 +252,10 @@ impl Terrain {
             return None;
         }
         let work = loop {
-            match self.queue.first()? {
+            match self.queue.front()? {
                 Request::Edit(_) => break Work::Edits(self.take_edits()),
                 &Request::Step(step) => {
-                    self.queue.remove(0);
+                    self.queue.pop_front();
                     match self.timeline.next(step) {
                         Some(target) => break Work::Step(step, Arc::clone(target)),
                         None => self.moves.push(step.nothing()),
@@ -312,7 +313,7 @@ impl Terrain {
             Work::Edits(submissions) => submissions.iter().cloned().map(Request::Edit).collect(),
             Work::Step(step, _) => vec![Request::Step(step)],
         };
-        self.queue.splice(0..0, requests);
+        requests.into_iter().rev().for_each(|request| self.queue.push_front(request));
     }
 
     /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.

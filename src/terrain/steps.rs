@@ -18,13 +18,13 @@ impl Terrain {
     /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`](super::World::revision), which counts
     /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
     pub fn submit_undo(&mut self) {
-        self.queue.push(Request::Step(HistoryStep::Undo));
+        self.queue.push_back(Request::Step(HistoryStep::Undo));
     }
 
     /// Queues a step forth: it does again what was undone last. An edit that changes something in between forgets what
     /// there was to redo.
     pub fn submit_redo(&mut self) {
-        self.queue.push(Request::Step(HistoryStep::Redo));
+        self.queue.push_back(Request::Step(HistoryStep::Redo));
     }
 
     /// What can be undone and redone, and what it takes.
@@ -56,7 +56,7 @@ impl Terrain {
 
     fn step(&mut self, step: HistoryStep) -> HistoryReceipt {
         self.abandon();
-        self.queue.push(Request::Step(step));
+        self.queue.push_back(Request::Step(step));
         let mut receipts = self.finish();
         self.answered.append(&mut receipts);
         // It was the last one.

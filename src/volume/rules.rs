@@ -33,7 +33,8 @@ use crate::lattice::{LatticeBox, ONE};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DiggingRules {
     /// How hard materials are; the others are soft. A brush whose power is at least that digs as ever; with half of it or
-    /// less it takes nothing away; between them, it goes a part of the way that grows from nothing to all of it.
+    /// less it takes nothing away; between them, it goes a part of the way that grows from nothing to all of it. Painting
+    /// is not held up: ground that is painted with a softer material is softer from then on.
     pub hardness: BTreeMap<MaterialId, u8>,
     /// Materials that no brush takes away, nor paints over.
     pub unbreakable: BTreeSet<MaterialId>,

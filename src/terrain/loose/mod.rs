@@ -22,11 +22,13 @@ use std::sync::Arc;
 use glam::IVec3;
 
 use super::world::World;
-use crate::lattice::{BrickPos, LatticeBox};
+use crate::lattice::{BrickPos, Column, LatticeBox};
 use crate::surface::SurfaceMesh;
 use crate::volume::{Bricks, DiggingRules, DraftedBrick, SampleView, TakenOut, Tally, take_out};
 use bits::{NONE, SIDES, Samples};
 use search::{Component, Solid};
+
+pub(super) use search::Lowest;
 
 /// What to look for after a dig, and what to do with it.
 ///
@@ -108,7 +110,19 @@ impl World {
     pub fn loose_pieces(&self, around: LatticeBox, settings: &LooseSettings) -> Vec<LoosePiece> {
         let solid = Solid::new(self.samples(), self.grid, &self.stacks, None);
         let Some(around) = around.intersection(self.grid.edit_bounds()) else { return Vec::new() };
-        let seeds = BrickPos::covering(around).map(|pos| (pos, bits::within(pos, around))).collect();
+        let (low, high): (IVec3, IVec3) = (around.min >> 3, around.max >> 3);
+        let near = |(x, z): (i32, i32)| (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z);
+        let mut seeds = Samples::default();
+        for (&(x, z), ys) in self.stacks.iter().filter(|(stack, _)| near(**stack)) {
+            // Below what is stored the ground is whole; above it, nothing is solid but the ground.
+            let (Some(&lowest), Some(&highest)) = (ys.first(), ys.last()) else { continue };
+            let heights = self.ground.heights::<8>(Column::new(x * 8, z * 8));
+            let top = heights.iter().flatten().max().map_or(highest, |&height| highest.max(height >> 11));
+            for y in lowest.max(low.y)..=top.min(high.y) {
+                let pos = BrickPos(IVec3::new(x, y, z));
+                seeds.insert(pos, bits::within(pos, around));
+            }
+        }
         let found = search::search(&solid, &seeds, settings.largest.into());
         found.iter().map(|piece| describe(self.samples(), piece, settings)).collect()
     }
@@ -128,12 +142,19 @@ pub(super) fn seeds(world: &World, over: &Bricks, drafted: &[DraftedBrick]) -> S
 }
 
 /// Looks for loose pieces at seeds, in a world with newer bricks over it, and takes them out if the settings say so.
-pub(super) fn fall(world: &World, over: &Bricks, seeds: &Samples, settings: &LooseSettings) -> Fallen {
+/// `lowest` are the lowest of the newer ones.
+pub(super) fn fall(
+    world: &World,
+    over: &Bricks,
+    lowest: &Lowest,
+    seeds: &Samples,
+    settings: &LooseSettings,
+) -> Fallen {
     if seeds.is_empty() {
         return Fallen::default();
     }
     let samples = world.samples().over(over);
-    let solid = Solid::new(samples, world.grid, &world.stacks, Some(over));
+    let solid = Solid::new(samples, world.grid, &world.stacks, Some(lowest));
     let found = search::search(&solid, seeds, settings.largest.into());
     let mut fallen = Fallen::default();
     let mut gone = Samples::default();

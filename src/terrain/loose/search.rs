@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 
 use super::bits::{self, NONE, SIDES, Samples};
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
-use crate::volume::{Bricks, DraftedBrick, Layers, SampleView, pristine_layers};
+use crate::volume::{DraftedBrick, Layers, SampleView, pristine_layers};
 
 /// A world as the search sees it.
 pub(super) struct Solid<'a> {
@@ -18,23 +18,20 @@ pub(super) struct Solid<'a> {
     /// Samples that belong to the world.
     bounds: LatticeBox,
     stacks: &'a FxHashMap<(i32, i32), Vec<i32>>,
-    /// The lowest of newer bricks in each stack.
-    newer: FxHashMap<(i32, i32), i32>,
+    newer: Option<&'a Lowest>,
 }
 
+/// The lowest of newer bricks in each stack.
+pub(in crate::terrain) type Lowest = FxHashMap<(i32, i32), i32>;
+
 impl<'a> Solid<'a> {
-    /// A world with newer bricks, if any, over it.
+    /// A world with newer bricks over it, of which these are the lowest.
     pub fn new(
         view: SampleView<'a>,
         grid: ChunkGrid,
         stacks: &'a FxHashMap<(i32, i32), Vec<i32>>,
-        over: Option<&Bricks>,
+        newer: Option<&'a Lowest>,
     ) -> Self {
-        let mut newer = FxHashMap::default();
-        for pos in over.into_iter().flat_map(Bricks::keys) {
-            let lowest = newer.entry((pos.0.x, pos.0.z)).or_insert(pos.0.y);
-            *lowest = pos.0.y.min(*lowest);
-        }
         // Pristine ground has no bottom.
         let mut bounds = grid.edit_bounds();
         (bounds.min.y, bounds.max.y) = (i32::MIN, i32::MAX);
@@ -54,7 +51,10 @@ impl<'a> Solid<'a> {
     fn is_bottomless(&self, pos: BrickPos) -> bool {
         let stack = (pos.0.x, pos.0.z);
         let lowest = self.stacks.get(&stack).and_then(|stack| stack.first());
-        [lowest, self.newer.get(&stack)].iter().flatten().all(|&&lowest| pos.0.y < lowest)
+        [lowest, self.newer.and_then(|newer| newer.get(&stack))]
+            .iter()
+            .flatten()
+            .all(|&&lowest| pos.0.y < lowest)
     }
 }
 

@@ -15,7 +15,7 @@ pub enum GroundTextures {
     /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel.
     /// The same bytes on every machine.
     Baked {
-        /// Texels along a side: a power of two from 16 to 2048, else the nearest one.
+        /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
         side: u32,
         /// Anisotropic filtering, 1 (none) to 16; dear on software renderers.
         anisotropy: u16,
