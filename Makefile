@@ -53,6 +53,8 @@ test-examples:
 	rm -rf '$(PROOF)'
 	cargo run $(WITH_BEVY) --example digger -- --headless --width 640 --height 360 --out '$(PROOF)/digger'
 	@pictures=$$(ls '$(PROOF)/digger' | grep -c '\.png$$'); echo "digger: $$pictures pictures"; [ "$$pictures" -ge 6 ]
+	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out '$(PROOF)/sculpt'
+	@pictures=$$(ls '$(PROOF)/sculpt' | grep -c '\.png$$'); echo "sculpt: $$pictures pictures"; [ "$$pictures" -ge 5 ]
 	cargo run $(WITH_BEVY) --example physics -- --headless --seconds 3 --balls 150 --out '$(PROOF)/physics'
 	cargo run $(WITH_BEVY) --example custom_material -- --headless --out '$(PROOF)/custom_material'
 	cargo run $(WITH_BEVY) --example server -- --script examples/server/brushes.jsonl

@@ -25,17 +25,20 @@ impl Plugin for ScenePlugin {
     }
 }
 
-/// Does the processor draw into a window? Then all that is dear is left out. (Bevy does not re-export the type that tells.)
-fn draws_in_software(adapter: Option<Res<RenderAdapterInfo>>, windows: Query<&Window>) -> bool {
-    adapter.is_some_and(|adapter| format!("{:?}", adapter.device_type) == "Cpu") && !windows.is_empty()
+/// Does the processor draw? Then all that is dear is left out. (Bevy does not re-export the type that tells.)
+fn draws_in_software(adapter: Option<Res<RenderAdapterInfo>>) -> bool {
+    adapter.is_some_and(|adapter| format!("{:?}", adapter.device_type) == "Cpu")
 }
 
 fn landscape(
     mut commands: Commands,
+    mut textures: ResMut<GroundTextures>,
     adapter: Option<Res<RenderAdapterInfo>>,
-    windows: Query<&Window>,
 ) -> Result {
-    let is_plain = draws_in_software(adapter, windows);
+    let is_plain = draws_in_software(adapter);
+    if is_plain {
+        *textures = GroundTextures::Baked { side: 256, anisotropy: 1 };
+    }
     let noise = NoiseHeights {
         seed: 4,
         kind: NoiseKind::Fractal,
@@ -54,8 +57,8 @@ fn landscape(
     Ok(())
 }
 
-fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>, windows: Query<&Window>) {
-    let is_plain = draws_in_software(adapter, windows);
+fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
+    let is_plain = draws_in_software(adapter);
     commands.spawn((
         DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: !is_plain, ..default() },
         CascadeShadowConfigBuilder { maximum_distance: 260.0, first_cascade_far_bound: 40.0, ..default() }
