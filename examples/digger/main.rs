@@ -39,7 +39,7 @@
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
 //! | `script.rs`, `tour.rs` | two stories |
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
-//! | `wires.rs`, `report.rs`, `tell.rs` | lines of a seam; receipts, times and the summary; what goes on |
+//! | `report.rs`, `tell.rs` | receipts, times and the summary; what goes on |
 
 mod art;
 mod body;
@@ -72,7 +72,6 @@ mod tools;
 mod tour;
 mod ui;
 mod veins;
-mod wires;
 mod work;
 mod works;
 

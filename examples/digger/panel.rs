@@ -1,6 +1,7 @@
-//! The plugin's own panel over the game: figures, plots, seam check. While it is open the mouse is its own.
+//! The plugin's own panel over the game: figures, plots, seam check, debug views. While it is open the mouse is its own.
 
 use bevy::prelude::*;
+use bevy_burrow::debug::BurrowDebugPlugin;
 use bevy_burrow::panel::{BurrowPanel, BurrowPanelPlugin};
 
 use crate::input::{Action, Actions};
@@ -16,7 +17,7 @@ impl Plugin for PanelPlugin {
         // The hand has its own tools; the figures are what is missing.
         (panel.is_open, panel.shows_brush) = (false, false);
         app.insert_resource(panel)
-            .add_plugins(BurrowPanelPlugin)
+            .add_plugins((BurrowPanelPlugin, BurrowDebugPlugin))
             .configure_sets(Update, Playing.run_if(panel_is_closed))
             .add_systems(
                 Update,

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy::render::settings::RenderResources;
+use bevy_burrow::debug::{BurrowDebug, SeamWires};
 use bevy_burrow::plugin::BurrowEngine;
 use bevy_burrow::terrain::World as Model;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -14,7 +15,6 @@ use crate::places::{Hillside, Places, Ravine, TUNNEL_RADIUS};
 use crate::report::{Logbook, Report};
 use crate::studio::Studio;
 use crate::tools::{Hand, Tool};
-use crate::wires::Wires;
 use crate::works;
 
 /// The pictures, in the order they are taken.
@@ -190,15 +190,12 @@ impl Stage {
         self.bar.set_message("the seam");
         let Hillside { mouth, inward, .. } = *hillside;
         let rim = mouth + flat(inward) * 3.0 + Vec3::Y * (2.0 * TUNNEL_RADIUS);
-        let wires = Wires::around(self.studio.terrain()?, rim, 16.0);
-        if wires.shared() == 0 {
+        let radius = 16.0;
+        if SeamWires::around(self.studio.terrain()?.world(), rim, radius).shared() == 0 {
             return Err("no tile and chunk share an edge at the tunnel's mouth".into());
         }
-        let world = self.studio.world();
-        world.resource_scope(|world, mut assets: Mut<Assets<GizmoAsset>>| {
-            wires.spawn(&mut world.commands(), &mut assets);
-            world.flush();
-        });
+        let lines = BurrowDebug { wires: true, focus: Some(rim), near: radius, ..default() };
+        self.studio.world().insert_resource(lines);
         let eye = mouth - flat(inward) * 6.0 + flat(inward.perp()) * 4.0 + Vec3::Y * 6.5;
         self.shoot_from("9_seam", eye, rim - Vec3::Y * 1.5)
     }

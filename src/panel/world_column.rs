@@ -156,7 +156,7 @@ fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<
         EngineState::Opening => figure(ui, "Backend", "processor, opening a card"),
         EngineState::Cuda(name) => figure_in(ui, "Backend", name, GOOD),
         EngineState::Lost(why) => {
-            figure_in(ui, "Backend", "processor, the card is lost", BAD);
+            figure_in(ui, "Backend", "processor, without a card", BAD);
             ui.label(RichText::new(why).color(FAINT).size(11.0));
         }
     }
