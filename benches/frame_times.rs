@@ -3,20 +3,18 @@
 //! A walk over the real landscape in textures, shadows and fog, drawn without a window, 60 frames a second. On each backend
 //! it is walked digging, 20 brushes of radius 3 a second, and then again over the dug ground with nothing to do. A frame
 //! is timed from its start until the graphics card has drawn it, so one frame overlaps no other, as it would in a game.
+//! Last come frames of which a part is left out, to see where their time goes.
+
+#[path = "../examples/shared/offscreen.rs"]
+mod offscreen;
 
 use std::time::{Duration, Instant};
 
-use bevy::app::PluginsState;
 use bevy::camera::RenderTarget;
 use bevy::light::CascadeShadowConfigBuilder;
-use bevy::log::{Level, LogPlugin};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale};
 use bevy_burrow::lattice::Column;
@@ -27,6 +25,9 @@ const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
 /// Frames from brush to brush.
 const BRUSH_EVERY: usize = 3;
+
+/// Frames of which a part is left out.
+const PARTIAL: usize = 240;
 
 /// Frames before anything is timed.
 const WARM_UP: usize = 120;
@@ -63,6 +64,10 @@ fn main() {
         }
         let [p50, p99] = [0, 1].map(|at| medians[0][at] / medians[1][at]);
         println!("{backend:?}: digging over nothing to do: p50 {p50:.2}, p99 {p99:.2}");
+        if backend == Backend::Cpu {
+            walk.leave_out("no shadows", Walk::drop_shadows);
+            walk.leave_out("no shadows, and nothing in sight", Walk::look_away);
+        }
     }
 }
 
@@ -83,29 +88,12 @@ struct Walk {
 
 impl Walk {
     fn new(backend: Backend, (width, height): (u32, u32)) -> Self {
-        let mut app = App::new();
-        app.add_plugins(
-            DefaultPlugins
-                .set(WindowPlugin {
-                    primary_window: None,
-                    exit_condition: ExitCondition::DontExit,
-                    ..default()
-                })
-                .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-                .set(LogPlugin { level: Level::WARN, ..default() })
-                .disable::<WinitPlugin>()
-                .disable::<PipelinedRenderingPlugin>(),
-        )
-        .add_plugins(BurrowPlugins);
         let engine = Engine::new(backend);
         engine.wait(Duration::from_secs(30));
-        app.insert_resource(BurrowEngine(engine));
-        while app.plugins_state() == PluginsState::Adding {
-            bevy::tasks::tick_global_task_pools_on_main_thread();
-        }
-        app.finish();
-        app.cleanup();
-
+        let renderer = offscreen::find_renderer().expect("a graphics adapter");
+        let mut app = offscreen::build(Some(renderer), |app| {
+            app.add_plugins(BurrowPlugins).insert_resource(BurrowEngine(engine));
+        });
         let ground = ground();
         let path = path(&ground);
         let world = app.world_mut();
@@ -140,6 +128,25 @@ impl Walk {
         let is_painted = world.get_resource::<GroundLoading>().is_none_or(|loading| loading.is_ready());
         let mut tiles = world.query_filtered::<(), (With<Tile>, With<Mesh3d>)>();
         is_painted && tiles.iter(world).count() > 0
+    }
+
+    /// Frames without one thing more.
+    fn leave_out(&mut self, what: &str, change: fn(&mut Self)) {
+        change(self);
+        let took = (0..PARTIAL).map(|number| self.frame(number, false).0);
+        report(&format!("    {what}: frames"), took.collect());
+    }
+
+    fn drop_shadows(&mut self) {
+        let world = self.app.world_mut();
+        world
+            .query::<&mut DirectionalLight>()
+            .iter_mut(world)
+            .for_each(|mut sun| sun.shadow_maps_enabled = false);
+    }
+
+    fn look_away(&mut self) {
+        self.path.iter_mut().for_each(|place| place.y += 1e5);
     }
 
     fn commits(&self) -> u64 {

@@ -1,51 +1,31 @@
 //! The app without a window: a script digs, and pictures are written.
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::path::Path;
+use std::time::Duration;
 
-use bevy::app::PluginsState;
-use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::render_resource::TextureFormat;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_burrow::prelude::*;
 
-const SIZE: (u32, u32) = (960, 540);
-const PATIENCE: Duration = Duration::from_secs(120);
+use crate::offscreen;
+use crate::photo::{Photographer, wait_until};
 
-/// Pictures written so far.
-#[derive(Resource, Default)]
-struct Written(usize);
+const SIZE: (u32, u32) = (960, 540);
 
 /// Two pictures: before and after digging.
 pub fn run(folder: &Path) -> Result {
     std::fs::create_dir_all(folder)?;
-    let mut app = App::new();
-    app.add_plugins(
-        DefaultPlugins
-            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
-            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-            .disable::<WinitPlugin>(),
-    )
-    .add_plugins(super::table)
-    .init_resource::<Written>();
-    while app.plugins_state() == PluginsState::Adding {
-        bevy::tasks::tick_global_task_pools_on_main_thread();
-    }
-    app.finish();
-    app.cleanup();
-    let film = Image::new_target_texture(SIZE.0, SIZE.1, TextureFormat::Rgba8UnormSrgb, None);
-    let film = app.world_mut().resource_mut::<Assets<Image>>().add(film);
+    let renderer = offscreen::find_renderer().ok_or("there is no graphics adapter, and so no picture")?;
+    let mut app = offscreen::build(Some(renderer), |app| {
+        app.add_plugins(super::table);
+    });
     let place = Transform::from_translation(super::VIEW.0).looking_at(super::VIEW.1, Vec3::Y);
-    app.world_mut().spawn((Camera3d::default(), RenderTarget::from(film.clone()), place));
+    let camera = app.world_mut().spawn((Camera3d::default(), place)).id();
+    let photographer = Photographer::new(&mut app, camera, SIZE);
     until(&mut app, |app| {
         let mut tiles = app.world_mut().query_filtered::<(), (With<Tile>, With<Mesh3d>)>();
         tiles.iter(app.world()).count() == 64
     })?;
-    shoot(&mut app, &film, folder.join("1_map.png"))?;
+    photographer.shoot(&mut app, &folder.join("1_map.png"))?;
     let at = |app: &mut App, x: f32, z: f32| -> Result<Vec3> {
         let world = app.world_mut();
         let terrain = world.query::<&Terrain>().single(world)?;
@@ -60,37 +40,13 @@ pub fn run(folder: &Path) -> Result {
         Brush::add(Shape::capsule(wall, wall + Vec3::new(20.0, 4.0, -25.0), 6.0), MaterialId(2)),
     ]);
     until(&mut app, |app| app.world().resource::<BurrowFigures>().brushes == 3)?;
-    shoot(&mut app, &film, folder.join("2_dug.png"))
+    photographer.shoot(&mut app, &folder.join("2_dug.png"))
 }
 
-fn shoot(app: &mut App, film: &Handle<Image>, path: PathBuf) -> Result {
-    for _ in 0..4 {
-        app.update();
-    }
-    let before = app.world().resource::<Written>().0;
-    let mut save = save_to_disk(path.clone());
-    let note = move |picture: On<ScreenshotCaptured>, mut written: ResMut<Written>| {
-        save(picture);
-        written.0 += 1;
-    };
-    app.world_mut().spawn(Screenshot::image(film.clone())).observe(note);
-    until(app, |app| app.world().resource::<Written>().0 > before)?;
-    // A frame of one colour is compressed to next to nothing.
-    if std::fs::metadata(&path)?.len() < 20_000 {
-        return Err(format!("{} shows nothing", path.display()).into());
-    }
-    println!("{}", path.display());
-    Ok(())
-}
-
-fn until(app: &mut App, mut done: impl FnMut(&mut App) -> bool) -> Result {
-    let start = Instant::now();
-    while !done(app) {
-        if start.elapsed() > PATIENCE {
-            return Err("waited in vain".into());
-        }
+fn until(app: &mut App, mut is_so: impl FnMut(&mut App) -> bool) -> Result {
+    wait_until(app, |app| {
         app.update();
         std::thread::sleep(Duration::from_millis(1));
-    }
-    Ok(())
+        is_so(app)
+    })
 }

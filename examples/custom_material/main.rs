@@ -23,6 +23,10 @@
 
 mod headless;
 mod map;
+#[path = "../shared/offscreen.rs"]
+mod offscreen;
+#[path = "../shared/photo.rs"]
+mod photo;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,62 +1,22 @@
-//! The app without a window: its renderer, if there is one, and its plugins.
+//! The app without a window.
 
-use std::panic;
 use std::time::Duration;
 
-use bevy::app::PluginsState;
-use bevy::log::{Level, LogPlugin};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy::render::renderer::initialize_renderer;
-use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
+use bevy::render::settings::RenderResources;
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_burrow::prelude::*;
 
+use crate::offscreen;
 use crate::settings::SettingsFile;
 
 /// The script's time from frame to frame.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
-/// A renderer without a window, if there is an adapter for one, be it in software.
-pub fn find_renderer() -> Option<RenderResources> {
-    let settings = WgpuSettings::default();
-    let backends = settings.backends?;
-    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
-    panic::set_hook(hook);
-    found.ok()
-}
-
 /// The game's app, ready for its first frame: `update` runs one frame of a sixtieth of a second.
 pub fn build_app(renderer: Option<RenderResources>, engine: BurrowEngine) -> App {
-    let (render_creation, filter) = match renderer {
-        Some(renderer) => (RenderCreation::Manual(renderer), ""),
-        // The absence of a renderer is told once, in plain words, and not by everyone who misses it.
-        None => {
-            let settings = WgpuSettings { backends: None, ..default() };
-            (settings.into(), "bevy_render=off,bevy_gizmos_render=off,bevy_gltf=off")
-        }
-    };
-    let mut app = App::new();
-    app.add_plugins(
-        DefaultPlugins
-            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
-            .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
-            .set(LogPlugin { level: Level::WARN, filter: filter.into(), ..default() })
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>(),
-    )
-    .insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-    crate::game(&mut app, engine, SettingsFile::default());
-    while app.plugins_state() == PluginsState::Adding {
-        bevy::tasks::tick_global_task_pools_on_main_thread();
-    }
-    app.finish();
-    app.cleanup();
-    app
+    offscreen::build(renderer, |app| {
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
+        crate::game(app, engine, SettingsFile::default());
+    })
 }

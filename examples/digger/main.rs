@@ -57,6 +57,8 @@ mod lamps;
 mod landscape;
 mod light;
 mod menu;
+#[path = "../shared/offscreen.rs"]
+mod offscreen;
 mod panel;
 mod particles;
 mod phase;
@@ -140,7 +142,7 @@ impl Computer {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    let renderer = headless::find_renderer();
+    let renderer = offscreen::find_renderer();
     if options.tour {
         return tour::run(&options, renderer);
     }

@@ -18,6 +18,10 @@
 //! `report.json` in `--out`; it fails if a ball is below the ground then.
 
 mod headless;
+#[path = "../shared/offscreen.rs"]
+mod offscreen;
+#[path = "../shared/photo.rs"]
+mod photo;
 mod rain;
 mod scene;
 

@@ -29,6 +29,10 @@
 //! | `script.rs` | what it does without a window |
 
 mod journal;
+#[path = "../shared/offscreen.rs"]
+mod offscreen;
+#[path = "../shared/photo.rs"]
+mod photo;
 mod scene;
 mod script;
 mod stroke;

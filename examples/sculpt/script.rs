@@ -1,41 +1,27 @@
 //! Without a window: a script sculpts, and the camera draws into an image, the panel included.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use bevy::app::PluginsState;
-use bevy::camera::RenderTarget;
-use bevy::log::{Level, LogPlugin};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy::render::render_resource::TextureFormat;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_burrow::debug::BurrowDebug;
 use bevy_burrow::panel::{BrushTool, PanelAction, ToolAlign, ToolOperation, ToolShape};
 use bevy_burrow::prelude::*;
 
-use crate::Options;
+use crate::photo::{Photographer, wait_until};
 use crate::scene::MIDDLE;
 use crate::stroke::Aim;
+use crate::{Options, offscreen};
 
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
-/// Longest wait for anything.
-const PATIENCE: Duration = Duration::from_secs(300);
-
-/// Pictures that lie on the disk.
-#[derive(Resource, Default)]
-struct Developed(usize);
 
 struct Stage {
     app: App,
     camera: Entity,
+    photographer: Photographer,
     folder: PathBuf,
     strokes: u64,
-    pictures: usize,
 }
 
 /// Plays the script.
@@ -120,47 +106,20 @@ pub fn play(options: &Options) -> Result {
 
 impl Stage {
     fn open(options: &Options) -> Result<Self> {
-        let mut app = App::new();
-        app.add_plugins(
-            DefaultPlugins
-                .set(WindowPlugin {
-                    primary_window: None,
-                    exit_condition: ExitCondition::DontExit,
-                    ..default()
-                })
-                .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-                .set(LogPlugin { level: Level::WARN, ..default() })
-                .disable::<WinitPlugin>()
-                .disable::<PipelinedRenderingPlugin>(),
-        )
-        .insert_resource(TimeUpdateStrategy::ManualDuration(FRAME))
-        .init_resource::<Developed>();
-        crate::editor(&mut app, options);
-        while app.plugins_state() == PluginsState::Adding {
-            bevy::tasks::tick_global_task_pools_on_main_thread();
-        }
-        app.finish();
-        app.cleanup();
+        let renderer = offscreen::find_renderer().ok_or("there is no graphics adapter, and so no picture")?;
+        let mut app = offscreen::build(Some(renderer), |app| {
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
+            crate::editor(app, options);
+        });
         app.update();
         let camera = app.world_mut().query_filtered::<Entity, With<Camera3d>>().single(app.world())?;
-        let mut stage = Self { app, camera, folder: options.out.clone(), strokes: 0, pictures: 0 };
-        stage.film_runs(false);
-        stage.resize(options.width, options.height);
-        Ok(stage)
+        let photographer = Photographer::new(&mut app, camera, (options.width, options.height));
+        Ok(Self { app, camera, photographer, folder: options.out.clone(), strokes: 0 })
     }
 
-    /// From now on the camera draws into an image of this size.
+    /// From now on pictures have another size.
     fn resize(&mut self, width: u32, height: u32) {
-        let image = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
-        let image = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
-        self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(image));
-    }
-
-    /// Only pictures are drawn: in software a frame takes long.
-    fn film_runs(&mut self, runs: bool) {
-        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
-            camera.is_active = runs;
-        }
+        self.photographer = Photographer::new(&mut self.app, self.camera, (width, height));
     }
 
     fn frames(&mut self, count: usize) {
@@ -168,14 +127,10 @@ impl Stage {
     }
 
     fn wait_until(&mut self, mut is_so: impl FnMut(&mut World) -> bool) -> Result {
-        let start = Instant::now();
-        while !is_so(self.app.world_mut()) {
-            if start.elapsed() > PATIENCE {
-                return Err("waited in vain".into());
-            }
-            self.app.update();
-        }
-        Ok(())
+        wait_until(&mut self.app, |app| {
+            app.update();
+            is_so(app.world_mut())
+        })
     }
 
     /// Takes a fresh tool, and sets it up.
@@ -230,24 +185,6 @@ impl Stage {
     }
 
     fn shoot(&mut self, name: &str) -> Result {
-        let path = self.folder.join(format!("{name}.png"));
-        let target = self.app.world().get::<RenderTarget>(self.camera);
-        let Some(RenderTarget::Image(image)) = target.cloned() else {
-            return Err("the camera draws nowhere".into());
-        };
-        let screenshot = Screenshot::image(image.handle.clone());
-        self.film_runs(true);
-        self.frames(2);
-        self.app
-            .world_mut()
-            .spawn(screenshot)
-            .observe(save_to_disk(path.clone()))
-            .observe(|_: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| developed.0 += 1);
-        self.pictures += 1;
-        let pictures = self.pictures;
-        self.wait_until(|world| world.resource::<Developed>().0 >= pictures)?;
-        self.film_runs(false);
-        println!("picture {}", path.display());
-        Ok(())
+        self.photographer.shoot(&mut self.app, &self.folder.join(name).with_extension("png"))
     }
 }

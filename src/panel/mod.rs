@@ -65,6 +65,7 @@ impl Plugin for BurrowPanelPlugin {
             .init_resource::<PanelInput>()
             .init_resource::<PanelPlaces>()
             .init_resource::<Survey>()
+            .init_resource::<picture::Saving>()
             .add_message::<PanelAction>()
             .add_systems(PreUpdate, state::read_input.after(EguiPreUpdateSet::BeginPass))
             .add_systems(
@@ -73,6 +74,7 @@ impl Plugin for BurrowPanelPlugin {
                     survey::follow_frames,
                     survey::count_terrain,
                     survey::finish_seam_check,
+                    picture::finish,
                     act,
                     set_undo_budget,
                 )

@@ -1,18 +1,26 @@
 //! Pictures of what the camera with the panel sees.
 
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy::tasks::{IoTaskPool, Task, futures::check_ready};
 use bevy::window::WindowRef;
+use image::ImageFormat;
 
 use super::state::{BurrowPanel, Note};
 
-/// Pictures of one folder that are numbered; more overwrite the last.
+/// Pictures of one folder that are numbered; when all are there, there are no more.
 const MOST: u32 = 9999;
 
-/// Asks for a picture of a camera's target, and saves it when it comes.
+/// Pictures on their way to the disk.
+#[derive(Resource, Default)]
+pub(super) struct Saving(Vec<Task<io::Result<PathBuf>>>);
+
+/// Asks for a picture of a camera's target, and saves it in a task when it comes.
 pub(super) fn save(commands: &mut Commands, panel: &mut BurrowPanel, target: Option<&RenderTarget>) {
     let screenshot = match target {
         Some(RenderTarget::Image(image)) => Screenshot::image(image.handle.clone()),
@@ -23,29 +31,58 @@ pub(super) fn save(commands: &mut Commands, panel: &mut BurrowPanel, target: Opt
             return;
         }
     };
-    let path = match next_path(&panel.pictures) {
-        Ok(path) => path,
-        Err(error) => {
-            let folder = panel.pictures.display();
-            panel.note = Some(Note::Bad(format!("{folder} can't be made: {error}")));
-            return;
-        }
-    };
     panel.note = Some(Note::Busy("taking a picture ...".into()));
-    let name = path.display().to_string();
-    let tell = move |_: On<ScreenshotCaptured>, mut panel: ResMut<BurrowPanel>| {
-        info!("saved picture {name}");
-        panel.note = Some(Note::Good(format!("saved {name}")));
+    let folder = panel.pictures.clone();
+    let develop = move |mut shot: On<ScreenshotCaptured>, mut saving: ResMut<Saving>| {
+        let (image, folder) = (std::mem::take(&mut shot.image), folder.clone());
+        saving.0.push(IoTaskPool::get().spawn(async move { write(image, &folder) }));
     };
-    commands.spawn(screenshot).observe(save_to_disk(path)).observe(tell);
+    commands.spawn(screenshot).observe(develop);
 }
 
-/// The first free name in a folder, which is made if it is not there.
-fn next_path(folder: &Path) -> std::io::Result<PathBuf> {
-    std::fs::create_dir_all(folder)?;
-    let free =
-        (1..MOST).map(|number| folder.join(format!("burrow_{number:04}.png"))).find(|path| !path.exists());
-    Ok(free.unwrap_or_else(|| folder.join(format!("burrow_{MOST:04}.png"))))
+/// Says what became of pictures.
+pub(super) fn finish(mut saving: ResMut<Saving>, mut panel: ResMut<BurrowPanel>) {
+    if saving.0.is_empty() {
+        return;
+    }
+    saving.0.retain_mut(|task| {
+        let Some(done) = check_ready(task) else { return true };
+        panel.note = Some(match done {
+            Ok(path) => Note::Good(format!("saved {}", path.display())),
+            Err(error) => Note::Bad(format!("no picture in {}: {error}", panel.pictures.display())),
+        });
+        false
+    });
+}
+
+/// Writes a picture into a folder, which is made if it is not there, under the first free name.
+fn write(image: Image, folder: &Path) -> io::Result<PathBuf> {
+    let picture = image.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
+    fs::create_dir_all(folder)?;
+    let (path, file) = create(folder)?;
+    let mut file = BufWriter::new(file);
+    let written = picture.write_to(&mut file, ImageFormat::Png).map_err(io::Error::other);
+    match written.and_then(|()| file.flush()) {
+        Ok(()) => Ok(path),
+        Err(error) => {
+            // A torn picture is none.
+            drop(file);
+            let _ = fs::remove_file(&path);
+            Err(error)
+        }
+    }
+}
+
+/// A new file under the first free name of a folder.
+fn create(folder: &Path) -> io::Result<(PathBuf, File)> {
+    for number in 1..=MOST {
+        let path = folder.join(format!("burrow_{number:04}.png"));
+        match File::create_new(&path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            file => return Ok((path, file?)),
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{MOST} pictures are there already")))
 }
 
 #[cfg(test)]
@@ -53,16 +90,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_are_numbered_from_the_first_free_name() {
+    fn pictures_are_numbered_and_none_takes_the_name_of_another() {
         let folder = std::env::temp_dir().join(format!("burrow_panel_{}", std::process::id()));
-        let first = next_path(&folder).expect("the folder is made");
-        assert!(first.ends_with("burrow_0001.png"), "{first:?}");
-        std::fs::write(&first, b"").expect("written");
-        assert!(next_path(&folder).expect("there").ends_with("burrow_0002.png"));
-        std::fs::remove_dir_all(&folder).expect("removed");
+        let image = || {
+            Image::new_target_texture(
+                3,
+                2,
+                bevy::render::render_resource::TextureFormat::Rgba8UnormSrgb,
+                None,
+            )
+        };
+        for name in ["burrow_0001.png", "burrow_0002.png"] {
+            let path = write(image(), &folder).expect("written");
+            assert!(path.ends_with(name), "{path:?}");
+            let picture = image::open(&path).expect("a picture").into_rgb8();
+            assert_eq!(picture.dimensions(), (3, 2));
+        }
+        fs::remove_dir_all(&folder).expect("removed");
         let file = std::env::temp_dir().join(format!("burrow_panel_file_{}", std::process::id()));
-        std::fs::write(&file, b"").expect("written");
-        assert!(next_path(&file).is_err());
-        std::fs::remove_file(&file).expect("removed");
+        fs::write(&file, b"").expect("written");
+        assert!(write(image(), &file).is_err());
+        fs::remove_file(&file).expect("removed");
+    }
+
+    #[test]
+    fn an_image_that_is_no_picture_leaves_no_file() {
+        let folder = std::env::temp_dir().join(format!("burrow_panel_none_{}", std::process::id()));
+        assert!(write(Image { data: None, ..Image::default() }, &folder).is_err());
+        assert!(!folder.exists());
     }
 }

@@ -9,7 +9,7 @@ use super::PhysicsFigures;
 use super::colliders::{GroundBody, GroundCollider, Grounds, Prepared, detach, is_far};
 use super::near::Neighbourhood;
 use crate::lattice::{ChunkPos, TilePos};
-use crate::plugin::{Chunk, Part, ShownSurface, Tile};
+use crate::plugin::{Chunk, Part, ShownSurface, TerrainEntities, Tile};
 use crate::terrain::{Drawn, Terrain};
 
 /// Parts that one task makes colliders for: few, so that the nearest come soon and the snapshot is soon let go of.
@@ -73,7 +73,7 @@ type Parts<'w, 's> = Query<
 pub(super) fn tend(
     mut commands: Commands,
     grounds: Res<Grounds>,
-    terrains: Query<&Terrain>,
+    terrains: Query<(&Terrain, &TerrainEntities)>,
     parts: Parts,
     mut gone: RemovedComponents<ShownSurface>,
     mut detached: RemovedComponents<GroundBody>,
@@ -96,7 +96,7 @@ pub(super) fn tend(
     let mut missing: Vec<(f32, Entity, Part)> = Vec::new();
     let mut count = 0;
     for (entity, shown, ground, parent, tile, chunk) in &parts {
-        let (Some(drawn), Ok(terrain)) = (drawn(tile, chunk), terrains.get(parent.parent())) else {
+        let (Some(drawn), Ok((terrain, _))) = (drawn(tile, chunk), terrains.get(parent.parent())) else {
             continue;
         };
         let world = terrain.world();
@@ -124,14 +124,19 @@ pub(super) fn tend(
     }
 }
 
-/// Starts on the nearest of the missing colliders, all of one terrain.
+/// Starts on the nearest of the missing colliders, all of one terrain. One whose world is not shown yet has to wait: its
+/// colliders would be of ground that nobody sees.
 fn begin(
     grounds: &Grounds,
-    terrains: &Query<&Terrain>,
+    terrains: &Query<(&Terrain, &TerrainEntities)>,
     missing: Vec<(f32, Entity, Part)>,
 ) -> Option<Task<Vec<(Entity, Prepared)>>> {
-    let terrain = missing.first()?.2.terrain;
-    let (world, grounds) = (terrains.get(terrain).ok()?.snapshot(), grounds.clone());
+    let snapshot = |terrain: Entity| {
+        let (model, entities) = terrains.get(terrain).ok()?;
+        entities.show(model.world()).then(|| (terrain, model.snapshot()))
+    };
+    let (terrain, world) = missing.iter().find_map(|(_, _, part)| snapshot(part.terrain))?;
+    let grounds = grounds.clone();
     let batch: Vec<(Entity, Part)> = missing
         .into_iter()
         .filter(|(_, _, part)| part.terrain == terrain)

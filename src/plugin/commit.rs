@@ -53,7 +53,7 @@ pub(super) fn begin_transactions(
     let draws = assets.is_some();
     for (entity, mut terrain, entities, colors, loose) in &mut terrains {
         // A world that the game changed by itself is loaded again first.
-        if terrain.queued() == 0 || terrain.world().version() != entities.shown {
+        if terrain.queued() == 0 || !entities.show(terrain.world()) {
             continue;
         }
         if let Some(&loose) = loose {

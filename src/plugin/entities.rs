@@ -21,6 +21,11 @@ impl TerrainEntities {
         Self { shown, drawn: HashMap::default(), fields: HashMap::default() }
     }
 
+    /// Are they those of this world, as it is now? Not while one that the game changed by itself loads.
+    pub(crate) fn show(&self, world: &World) -> bool {
+        self.shown == world.version()
+    }
+
     /// Tiles and chunks; fields lie below these.
     pub(super) fn drawn(&self) -> impl Iterator<Item = Entity> {
         self.drawn.values().copied()

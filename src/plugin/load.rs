@@ -53,7 +53,7 @@ pub(super) fn start_loading(
     companions: Res<Companions>,
 ) {
     for (entity, terrain, colors, mut transform, entities) in &mut terrains {
-        if entities.is_some_and(|entities| entities.shown == terrain.world().version()) {
+        if entities.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
         let scale = Vec3::splat(terrain.voxel_size());

@@ -29,6 +29,8 @@ mod times;
 
 pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, MaterialColors, ShownSurface, Tile};
+#[cfg(feature = "avian")]
+pub(crate) use entities::TerrainEntities;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };

@@ -118,7 +118,7 @@ impl Terrains<'_, '_> {
     /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there?
     pub fn is_ready(&self, min: Vec3, max: Vec3) -> bool {
         self.terrains.iter().all(|(_, terrain, place, entities)| {
-            let loaded = entities.is_some_and(|entities| entities.shown == terrain.world().version());
+            let loaded = entities.is_some_and(|entities| entities.show(terrain.world()));
             let inverse = place.affine().inverse();
             let (a, b) = (inverse.transform_point3(min), inverse.transform_point3(max));
             let bounds = LatticeBox::new(a.min(b).floor().as_ivec3(), a.max(b).ceil().as_ivec3());

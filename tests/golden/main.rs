@@ -18,6 +18,8 @@
 mod album;
 mod debug_views;
 mod landscape;
+#[path = "../../examples/shared/offscreen.rs"]
+mod offscreen;
 mod panel;
 mod sameness;
 mod studio;

@@ -1,26 +1,19 @@
 //! An app without a window that takes pictures of terrains.
 
-use std::panic;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use bevy::app::PluginsState;
 use bevy::camera::RenderTarget;
 use bevy::ecs::component::Mutable;
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
-use bevy::log::{Level, LogPlugin};
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::TextureFormat;
-use bevy::render::renderer::initialize_renderer;
-use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_burrow::prelude::*;
 use image::RgbImage;
+
+use crate::offscreen;
 
 /// Width and height of pictures.
 pub const SIZE: (u32, u32) = (480, 270);
@@ -46,43 +39,26 @@ impl Studio {
     /// can draw.
     pub fn open(add: impl FnOnce(&mut App)) -> Option<Self> {
         let only = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(renderer) = find_renderer() else {
+        let Some(renderer) = offscreen::find_renderer() else {
             eprintln!(
                 "\n*** SKIPPED: no Vulkan device, so no picture was compared. Install mesa-vulkan-drivers. ***\n"
             );
             return None;
         };
-        let mut app = App::new();
-        let render_creation = RenderCreation::Manual(renderer);
-        app.add_plugins(
-            DefaultPlugins
-                .set(WindowPlugin {
-                    primary_window: None,
-                    exit_condition: ExitCondition::DontExit,
+        let mut app = offscreen::build(Some(renderer), |app| {
+            app.add_plugins(BurrowPlugins)
+                // Small textures are painted fast; all machines filter them alike without anisotropy.
+                .insert_resource(GroundTextures::Baked { side: 256, anisotropy: 1 })
+                .insert_resource(ClearColor(Color::linear_rgb(0.50, 0.66, 0.86)))
+                .insert_resource(GlobalAmbientLight {
+                    color: Color::srgb(0.78, 0.88, 1.0),
+                    brightness: 900.0,
                     ..default()
                 })
-                .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
-                .set(LogPlugin { level: Level::WARN, ..default() })
-                .disable::<WinitPlugin>()
-                .disable::<PipelinedRenderingPlugin>(),
-        )
-        .add_plugins(BurrowPlugins)
-        // Small textures are painted fast; all machines filter them alike without anisotropy.
-        .insert_resource(GroundTextures::Baked { side: 256, anisotropy: 1 })
-        .insert_resource(ClearColor(Color::linear_rgb(0.50, 0.66, 0.86)))
-        .insert_resource(GlobalAmbientLight {
-            color: Color::srgb(0.78, 0.88, 1.0),
-            brightness: 900.0,
-            ..default()
-        })
-        .insert_resource(DirectionalLightShadowMap { size: 1024 })
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
-        add(&mut app);
-        while app.plugins_state() == PluginsState::Adding {
-            bevy::tasks::tick_global_task_pools_on_main_thread();
-        }
-        app.finish();
-        app.cleanup();
+                .insert_resource(DirectionalLightShadowMap { size: 1024 })
+                .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
+            add(app);
+        });
         let image = Image::new_target_texture(SIZE.0, SIZE.1, TextureFormat::Rgba8UnormSrgb, None);
         let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         let fog = DistanceFog {
@@ -216,16 +192,4 @@ impl Studio {
             camera.is_active = runs;
         }
     }
-}
-
-/// A renderer without a window, if there is an adapter for one, be it in software.
-fn find_renderer() -> Option<RenderResources> {
-    let settings = WgpuSettings::default();
-    let backends = settings.backends?;
-    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
-    panic::set_hook(hook);
-    found.ok()
 }

@@ -2,7 +2,8 @@
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
-use bevy_burrow::physics::{ColliderSource, GroundBody};
+use bevy_burrow::physics::{ColliderSource, GroundBody, GroundCollider};
+use bevy_burrow::plugin::ShownSurface;
 use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level, pit};
@@ -109,4 +110,28 @@ fn colliders_go_with_their_terrain() {
     stage.frames_until("all colliders go", |stage| stage.ground().is_empty());
     let world = stage.app.world_mut();
     assert_eq!(world.query::<&GroundBody>().iter(world).count(), 0);
+}
+
+#[test]
+fn no_collider_is_of_ground_that_is_not_shown_yet() {
+    let (mut stage, entity) = Stage::with_ground(level(192, 1.0));
+    for number in 0..6 {
+        // A change by the game itself is loaded, and shown when all of it is there; meanwhile a part loses its collider.
+        let world = stage.app.world_mut();
+        let part =
+            world.query_filtered::<Entity, With<GroundCollider>>().iter(world).next().expect("one is there");
+        world.entity_mut(part).remove::<GroundCollider>();
+        let mut terrain = world.get_mut::<Terrain>(entity).expect("it stays");
+        let revision = terrain.world().revision();
+        terrain.apply([pit(20.0 + 25.0 * number as f32, 8.0, 90.0, 5.0)]);
+        assert!(terrain.world().revision() > revision);
+        stage.frames_until("the new ground is shown", |stage| {
+            let world = stage.app.world_mut();
+            let shown = world.query::<&ShownSurface>().iter(world).map(|shown| shown.revision).max();
+            let made = world.query::<&GroundCollider>().iter(world).map(|ground| ground.revision).max();
+            assert!(made <= shown, "a collider of revision {made:?}, but {shown:?} is what is shown");
+            shown > Some(revision)
+        });
+        stage.settle();
+    }
 }

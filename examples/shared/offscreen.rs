@@ -1,0 +1,53 @@
+//! An app without a window. Examples, benchmarks and tests have it in common; each takes it in by its path.
+
+use std::panic;
+
+use bevy::app::PluginsState;
+use bevy::log::{Level, LogPlugin};
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::renderer::initialize_renderer;
+use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+
+/// A renderer without a window, if there is an adapter for one, be it in software.
+pub fn find_renderer() -> Option<RenderResources> {
+    let settings = WgpuSettings::default();
+    let backends = settings.backends?;
+    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
+    panic::set_hook(hook);
+    found.ok()
+}
+
+/// Bevy's plugins and what `add` adds, ready for the first frame. Without a renderer all goes on, and nothing is drawn.
+pub fn build(renderer: Option<RenderResources>, add: impl FnOnce(&mut App)) -> App {
+    let (render_creation, filter) = match renderer {
+        Some(renderer) => (RenderCreation::Manual(renderer), ""),
+        // The absence of a renderer is told once, in plain words, and not by everyone who misses it.
+        None => {
+            let settings = WgpuSettings { backends: None, ..default() };
+            (settings.into(), "bevy_render=off,bevy_gizmos_render=off,bevy_gltf=off")
+        }
+    };
+    let mut app = App::new();
+    app.add_plugins(
+        DefaultPlugins
+            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+            .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
+            .set(LogPlugin { level: Level::WARN, filter: filter.into(), ..default() })
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>(),
+    );
+    add(&mut app);
+    while app.plugins_state() == PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    app.finish();
+    app.cleanup();
+    app
+}

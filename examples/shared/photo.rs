@@ -1,0 +1,94 @@
+//! Pictures of what a camera sees, without a window. Examples have it in common; each takes it in by its path.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use bevy::camera::RenderTarget;
+use bevy::prelude::*;
+use bevy::render::render_resource::{PollType, TextureFormat};
+use bevy::render::renderer::RenderDevice;
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
+
+/// Longest wait for anything.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// A picture of one colour is compressed to less than that.
+const LEAST_BYTES: u64 = 20_000;
+
+/// Pictures that lie on the disk.
+#[derive(Resource, Default)]
+struct Developed(usize);
+
+/// A camera that draws into an image, and only while pictures are taken: in software a frame takes long.
+pub struct Photographer {
+    camera: Entity,
+    film: Handle<Image>,
+}
+
+impl Photographer {
+    /// Takes a camera over.
+    pub fn new(app: &mut App, camera: Entity, (width, height): (u32, u32)) -> Self {
+        app.init_resource::<Developed>();
+        let image = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
+        let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        app.world_mut().entity_mut(camera).insert(RenderTarget::from(film.clone()));
+        let photographer = Self { camera, film };
+        photographer.film_runs(app, false);
+        photographer
+    }
+
+    fn film_runs(&self, app: &mut App, runs: bool) {
+        if let Some(mut camera) = app.world_mut().get_mut::<Camera>(self.camera) {
+            camera.is_active = runs;
+        }
+    }
+
+    /// Takes a picture after a few frames: lights need some to find what they shine on.
+    ///
+    /// # Errors
+    /// When it is not written, or shows nothing.
+    pub fn shoot(&self, app: &mut App, path: &Path) -> Result {
+        self.film_runs(app, true);
+        (0..4).for_each(|_| draw(app));
+        let before = app.world().resource::<Developed>().0;
+        let mut save = save_to_disk(path.to_owned());
+        let develop = move |picture: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| {
+            save(picture);
+            developed.0 += 1;
+        };
+        app.world_mut().spawn(Screenshot::image(self.film.clone())).observe(develop);
+        wait_until(app, |app| {
+            draw(app);
+            app.world().resource::<Developed>().0 > before
+        })?;
+        self.film_runs(app, false);
+        if std::fs::metadata(path)?.len() < LEAST_BYTES {
+            return Err(format!("{} shows nothing", path.display()).into());
+        }
+        println!("picture {}", path.display());
+        Ok(())
+    }
+}
+
+/// Asks again and again; whoever asks lets frames go by.
+///
+/// # Errors
+/// When it takes too long.
+pub fn wait_until(app: &mut App, mut is_so: impl FnMut(&mut App) -> bool) -> Result {
+    let start = Instant::now();
+    while !is_so(app) {
+        if start.elapsed() > PATIENCE {
+            return Err("waited in vain".into());
+        }
+    }
+    Ok(())
+}
+
+/// A frame, drawn to its end.
+fn draw(app: &mut App) {
+    app.update();
+    if let Some(device) = app.world().get_resource::<RenderDevice>() {
+        // An error here is the device's end, and shows as a missing picture.
+        let _ = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
+    }
+}
