@@ -24,7 +24,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run test test-model test-plugin test-examples drive soak paper pictures bench bench-backends peers instructions ptx
+.PHONY: help setup run example test test-model test-plugin test-examples drive soak paper pictures bench bench-backends peers instructions ptx
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -32,6 +32,10 @@ help: ## List the targets
 run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only)
 	@tools/setup.sh run
 	cargo run $(WITH_BEVY) --example digger -- $(ARGS)
+
+example: ## Run another example (NAME=sculpt ARGS="--headless")
+	@tools/setup.sh run
+	cargo run $(WITH_BEVY) --example $(NAME) -- $(ARGS)
 
 test: setup test-model test-plugin test-examples ## Install what is missing, then run every test
 
@@ -58,11 +62,12 @@ test-examples:
 	cargo run $(WITH_BEVY) --example physics -- --headless --seconds 3 --balls 150 --out '$(PROOF)/physics'
 	cargo run $(WITH_BEVY) --example custom_material -- --headless --out '$(PROOF)/custom_material'
 	cargo run $(WITH_BEVY) --example server -- --script examples/server/brushes.jsonl
-	cargo run $(WITH_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
+	cargo run $(WITHOUT_BEVY) --example export -- --heights assets/jacksboro_fault.png --voxels-per-sample 3 \
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
 
-drive: setup ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where there is none
+drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where there is none
+	@tools/setup.sh drive
 	cargo build $(WITH_BEVY) --example sculpt --example digger
 	@for play in sculpt digger; do \
 		python3 tools/drive.py $$play --out out/drive/$$play; status=$$?; \
@@ -95,8 +100,10 @@ peers: ## Time the dense mesher beside VTK, scikit-image and PyMCubes, installed
 instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)
 	@tools/instructions.sh $(ARGS)
 
-pictures: ## Make the pictures of the README again
+pictures: ## Make the still pictures of the README again
 	@tools/setup.sh run
-	cargo run $(WITH_BEVY) --example digger -- --headless --out out/pictures
+	cargo run $(WITH_BEVY) --example digger -- --headless --width 960 --height 540 --out out/pictures
+	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out out/pictures/sculpt
 	mkdir -p docs/pictures
+	cp out/pictures/sculpt/2_sculpted.png docs/pictures/panel.png
 	cd out/pictures && cp 1_landscape.png 3_tunnel_outside.png 4_tunnel_inside.png 7_bridge.png 9_seam.png ../../docs/pictures/

@@ -174,3 +174,7 @@ pub mod prelude {
     };
     pub use crate::volume::{DiggingRules, Refused, Scenario};
 }
+
+#[cfg(all(doctest, feature = "examples"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

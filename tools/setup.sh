@@ -4,6 +4,7 @@
 #   tools/setup.sh build          compiler, linker, Rust
 #   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
 #   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a card
+#   tools/setup.sh drive          the same as run, and Python, which plays the examples
 #   tools/setup.sh lint           the same as build, and rustfmt and clippy
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
 #   tools/setup.sh ptx            Python, whose package index has the compiler of the CUDA kernels
@@ -43,11 +44,12 @@ install_packages() {
         return 0
     fi
     say "installing$packages"
-    $root apt-get update -qq
+    # One source of several may be out of order without being needed.
+    $root apt-get update -qq || say "apt-get update failed; going on with the lists there are"
     # The names are words of this script.
     # shellcheck disable=SC2086
     $root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y -o Dpkg::Use-Pty=0 --no-install-recommends \
-        $packages >/dev/null </dev/null
+        $packages >/dev/null </dev/null || say "that failed; please install (names as in Debian):$packages"
 }
 
 rust_version() { rustc --version 2>/dev/null | sed -n 's/^rustc \([0-9]*\.[0-9]*\).*/\1/p'; }
@@ -62,7 +64,9 @@ rust_is_new_enough() {
 
 install_rust() {
     rust_is_new_enough && return 0
-    if has rustup; then
+    if has rustup && [ -z "$(rust_version)" ]; then
+        die "rustup has no toolchain: run 'rustup default stable'"
+    elif has rustup; then
         die "rustc is $(rust_version), but $wanted_rust is the least: run 'rustup update stable'"
     fi
     say "installing Rust for $(id -un) with its official installer"
@@ -75,8 +79,8 @@ install_rust() {
 }
 
 case $goal in
-    build | run | test | lint | peers | ptx | instructions) ;;
-    *) die "unknown goal '$goal': build, run, test, lint, peers, ptx or instructions" ;;
+    build | run | test | drive | lint | peers | ptx | instructions) ;;
+    *) die "unknown goal '$goal': build, run, test, drive, lint, peers, ptx or instructions" ;;
 esac
 
 has make || want make
@@ -90,6 +94,10 @@ if ! rust_is_new_enough && ! has rustup; then
 fi
 if [ "$goal" = test ]; then
     has c++ || want g++
+    goal=run
+fi
+if [ "$goal" = drive ]; then
+    has python3 || want python3
     goal=run
 fi
 if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then

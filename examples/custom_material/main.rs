@@ -21,6 +21,8 @@
 //! | `map.rs`, `map.wgsl` | the material |
 //! | `headless.rs` | the app without a window, and its pictures |
 
+#[path = "../shared/display.rs"]
+mod display;
 mod headless;
 mod map;
 #[path = "../shared/offscreen.rs"]
@@ -50,7 +52,7 @@ struct Options {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    if options.headless {
+    if options.headless || !display::has_display() {
         return match headless::run(&options.out) {
             Ok(()) => ExitCode::SUCCESS,
             Err(reason) => {

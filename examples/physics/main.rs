@@ -17,6 +17,8 @@
 //! Without a display, or with `--headless`, it plays by itself for some seconds of the game's time and leaves pictures and
 //! `report.json` in `--out`; it fails if a ball is below the ground then.
 
+#[path = "../shared/display.rs"]
+mod display;
 mod headless;
 #[path = "../shared/offscreen.rs"]
 mod offscreen;
@@ -60,9 +62,7 @@ pub struct Options {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    let has_display =
-        !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|d| !d.is_empty());
-    if options.headless || !has_display {
+    if options.headless || !display::has_display() {
         return headless::run(&options);
     }
     let mut app = App::new();

@@ -28,6 +28,8 @@
 //! | `journal.rs` | a line for each receipt |
 //! | `script.rs` | what it does without a window |
 
+#[path = "../shared/display.rs"]
+mod display;
 mod journal;
 #[path = "../shared/offscreen.rs"]
 mod offscreen;
@@ -68,7 +70,7 @@ struct Options {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    if options.headless || !has_display() {
+    if options.headless || !display::has_display() {
         return match script::play(&options) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
@@ -104,9 +106,4 @@ fn editor(app: &mut App, options: &Options) {
     ));
     app.insert_resource(journal::TellAll(options.tell));
     app.world_mut().resource_mut::<bevy_burrow::panel::BurrowPanel>().pictures = options.out.clone();
-}
-
-/// Can a window be opened? The examples are built for X11 on Linux; elsewhere there is always a desktop.
-fn has_display() -> bool {
-    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }

@@ -110,7 +110,7 @@ fn draw(
     time: Res<Time>,
     debug: Res<BurrowDebug>,
     dirty: Res<DirtyBricks>,
-    terrains: Query<(Entity, &Terrain, &GlobalTransform)>,
+    terrains: Query<(Entity, &Terrain, &GlobalTransform, &InheritedVisibility)>,
     cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
     shown: Query<(Entity, &DebugLines, &ChildOf)>,
     mut assets: ResMut<Assets<GizmoAsset>>,
@@ -118,12 +118,13 @@ fn draw(
     mut frames: Local<u64>,
     mut faded: Local<bool>,
 ) {
+    let is_seen = |terrain: Entity| terrains.get(terrain).is_ok_and(|(.., seen)| seen.get());
     for (entity, lines, parent) in &shown {
-        if !debug.shows(lines.view) || !terrains.contains(parent.parent()) {
+        if !debug.shows(lines.view) || !is_seen(parent.parent()) {
             commands.entity(entity).try_despawn();
         }
     }
-    drawn.retain(|(terrain, view), _| debug.shows(*view) && terrains.contains(*terrain));
+    drawn.retain(|(terrain, view), _| debug.shows(*view) && is_seen(*terrain));
     if !DebugView::ALL.into_iter().any(|view| debug.shows(view)) {
         return;
     }
@@ -131,9 +132,9 @@ fn draw(
     *frames += u64::from(!dirty.0.is_empty() || *faded);
     *faded = !dirty.0.is_empty();
     let now = time.elapsed();
-    for (entity, terrain, place) in &terrains {
-        let Some(focus) = focus(&debug, terrain, place, &cameras) else { continue };
-        let scale = place.scale().x.abs().max(f32::MIN_POSITIVE);
+    for (entity, terrain, own_place, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
+        let Some(focus) = focus(&debug, terrain, own_place, &cameras) else { continue };
+        let scale = own_place.scale().x.abs().max(f32::MIN_POSITIVE);
         // In steps, so that not every move of the camera draws everything anew.
         let step = (debug.near / scale / 4.0).max(1.0);
         let steps = (focus / step).round();
@@ -165,7 +166,8 @@ fn draw(
                 shown.iter().filter(|(_, lines, parent)| lines.view == view && parent.parent() == entity);
             own.for_each(|(old, ..)| commands.entity(old).try_despawn());
             for layer in pen.finish() {
-                commands.spawn((DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity)));
+                // They are drawn in this very frame, and nobody places them any more.
+                commands.spawn((DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity), *own_place));
             }
             drawn.insert((entity, view), (key, now));
         }
@@ -212,4 +214,40 @@ fn focus(
         }
     };
     focus.is_finite().then_some(focus)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::Ground;
+    use crate::plugin::BurrowPlugins;
+    use crate::terrain::TerrainSettings;
+
+    #[test]
+    fn lines_are_where_their_terrain_is_in_the_frame_they_come_in_and_go_when_it_is_hidden() {
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins,
+            AssetPlugin::default(),
+            TransformPlugin,
+            BurrowPlugins,
+            BurrowDebugPlugin,
+        ))
+        .init_asset::<GizmoAsset>()
+        .insert_resource(BurrowDebug { chunks: true, focus: Some(Vec3::splat(120.0)), ..default() });
+        app.finish();
+        app.cleanup();
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        let terrain = Terrain::new(ground, &TerrainSettings { voxel_size: 0.5, ..default() }).expect("valid");
+        let place = Transform::from_xyz(100.0, 116.0, 104.0);
+        let entity = app.world_mut().spawn((terrain, place, InheritedVisibility::VISIBLE)).id();
+        app.update();
+        let mut lines = app.world_mut().query_filtered::<&GlobalTransform, With<DebugLines>>();
+        let places: Vec<&GlobalTransform> = lines.iter(app.world()).collect();
+        let expected = GlobalTransform::from(place.with_scale(Vec3::splat(0.5)));
+        assert!(!places.is_empty() && places.iter().all(|&&place| place == expected), "{places:?}");
+        app.world_mut().entity_mut(entity).insert(InheritedVisibility::HIDDEN);
+        app.update();
+        assert_eq!(lines.iter(app.world()).count(), 0);
+    }
 }

@@ -52,6 +52,10 @@ pub(super) fn begin_transactions(
     let start = Instant::now();
     let draws = assets.is_some();
     for (entity, mut terrain, entities, colors, loose) in &mut terrains {
+        // The game put a terrain here whose task another entity had.
+        if terrain.waits_for_plugin() {
+            terrain.abandon();
+        }
         // A world that the game changed by itself is loaded again first.
         if terrain.queued() == 0 || !entities.show(terrain.world()) {
             continue;
@@ -59,7 +63,7 @@ pub(super) fn begin_transactions(
         if let Some(&loose) = loose {
             terrain.set_loose(Some(loose.into()));
         }
-        let transaction = terrain.begin();
+        let transaction = terrain.begin_for(true);
         tell_steps(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
         let engine = terrain.engine().unwrap_or(&engine).clone();

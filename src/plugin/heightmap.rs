@@ -47,7 +47,8 @@ pub enum HeightmapError {
     RawSize,
 }
 
-/// Loads `.png`, `.raw` and `.r16` files as [`HeightmapImage`].
+/// Loads `.png`, `.raw` and `.r16` files as [`HeightmapImage`]. Who loads a `.png` says of which type, as
+/// `load::<HeightmapImage>` does; without that it is an ordinary picture.
 #[derive(Default, TypePath)]
 pub struct HeightmapLoader;
 
@@ -75,7 +76,8 @@ impl AssetLoader for HeightmapLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &["png", "raw", "r16"]
+        // Not "png": the last loader of an extension gets all files that nobody asks a type for.
+        &["raw", "r16"]
     }
 }
 

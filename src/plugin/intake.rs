@@ -120,7 +120,8 @@ fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
     HistoryMoved { terrain, receipt: HistoryReceipt { step, outcome: Err(HistoryRejection::TerrainGone) } }
 }
 
-/// Brushes and steps that a terrain had not come to when it goes, or another one takes its place.
+/// Brushes and steps that a terrain had not come to when it goes, or another one takes its place. If it comes back, it
+/// does not do what was answered.
 pub(super) fn answer_with_terrain(
     gone: On<Discard, Terrain>,
     mut terrains: Query<&mut Terrain>,
@@ -137,6 +138,7 @@ pub(super) fn answer_with_terrain(
     };
     answers.write_batch(terrain.unanswered().map(answer));
     moved.write_batch(terrain.unanswered_steps().map(|step| self::gone(Some(gone.entity), step)));
+    terrain.forget();
 }
 
 /// A brush in world space as its terrain sees it, in voxels.

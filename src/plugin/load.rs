@@ -44,21 +44,28 @@ struct Loaded {
 /// Terrains that no task works for.
 type Idle = (Without<Loading>, Without<InFlight>);
 
-/// Starts the task of each terrain that is new, or whose world the game changed by itself, and scales its entity to the
-/// voxel size.
-pub(super) fn start_loading(
-    mut commands: Commands,
-    mut terrains: Query<(Entity, &Terrain, &MaterialColors, &mut Transform, Option<&TerrainEntities>), Idle>,
-    assets: Option<Res<Assets<Mesh>>>,
-    companions: Res<Companions>,
+/// Keeps the entities of terrains as large as their voxels are, wherever games put them.
+pub(super) fn scale_terrains(
+    mut terrains: Query<(&Terrain, &mut Transform), Or<(Changed<Transform>, Changed<Terrain>)>>,
 ) {
-    for (entity, terrain, colors, mut transform, entities) in &mut terrains {
-        if entities.is_some_and(|entities| entities.show(terrain.world())) {
-            continue;
-        }
+    for (terrain, mut transform) in &mut terrains {
         let scale = Vec3::splat(terrain.voxel_size());
         if transform.scale != scale {
             transform.scale = scale;
+        }
+    }
+}
+
+/// Starts the task of each terrain that is new, or whose world the game changed by itself.
+pub(super) fn start_loading(
+    mut commands: Commands,
+    terrains: Query<(Entity, &Terrain, &MaterialColors, Option<&TerrainEntities>), Idle>,
+    assets: Option<Res<Assets<Mesh>>>,
+    companions: Res<Companions>,
+) {
+    for (entity, terrain, colors, entities) in &terrains {
+        if entities.is_some_and(|entities| entities.show(terrain.world())) {
+            continue;
         }
         let world = terrain.snapshot();
         let workshop = Workshop {
@@ -106,15 +113,16 @@ pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
     mut assets: Option<ResMut<Assets<Mesh>>>,
-    mut terrains: Query<(Entity, &mut Loading, Option<&TerrainEntities>)>,
+    mut terrains: Query<(Entity, &Terrain, &mut Loading, Option<&TerrainEntities>)>,
 ) {
-    for (entity, mut loading, old) in &mut terrains {
+    let mut budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
+    for (entity, terrain, mut loading, old) in &mut terrains {
         if let Some(task) = &mut loading.task {
             let Some(parts) = check_ready(task) else { continue };
             (loading.task, loading.waiting) = (None, parts);
         }
-        let budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
         let rest = loading.waiting.len().saturating_sub(budget);
+        budget -= loading.waiting.len() - rest;
         for mut fresh in loading.waiting.split_off(rest) {
             let mesh = assets
                 .as_mut()
@@ -128,8 +136,12 @@ pub(super) fn finish_loading(
             commands.entity(child).try_despawn();
         }
         let entities = show(&mut commands, entity, &mut loading);
+        let is_current = entities.show(terrain.world());
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
-        tell(&mut commands, TerrainReady { entity });
+        // What the game changed meanwhile loads next.
+        if is_current {
+            tell(&mut commands, TerrainReady { entity });
+        }
     }
 }
 

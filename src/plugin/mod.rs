@@ -125,7 +125,7 @@ impl Plugin for TerrainPlugin {
             .add_systems(
                 Update,
                 (
-                    (load::start_loading, load::place_terrains, load::finish_loading)
+                    (load::scale_terrains, load::start_loading, load::place_terrains, load::finish_loading)
                         .chain()
                         .in_set(BurrowSystems::Load),
                     (intake::collect_brushes, intake::collect_steps).chain().in_set(BurrowSystems::Collect),

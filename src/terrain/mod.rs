@@ -133,6 +133,8 @@ pub struct Terrain {
 struct InFlight {
     ticket: u64,
     work: Work,
+    /// Has the plugin a task for it?
+    is_plugins: bool,
 }
 
 impl Terrain {
@@ -248,6 +250,10 @@ impl Terrain {
     ///
     /// Steps that find nothing to undo or redo need no transaction; they are answered at once.
     pub fn begin(&mut self) -> Option<Transaction> {
+        self.begin_for(false)
+    }
+
+    pub(crate) fn begin_for(&mut self, is_plugins: bool) -> Option<Transaction> {
         if self.is_busy() {
             return None;
         }
@@ -264,7 +270,7 @@ impl Terrain {
             }
         };
         let ticket = unique();
-        self.in_flight = Some(InFlight { ticket, work: work.clone() });
+        self.in_flight = Some(InFlight { ticket, work: work.clone(), is_plugins });
         Some(Transaction {
             ticket,
             world: self.snapshot(),
@@ -314,6 +320,19 @@ impl Terrain {
             Work::Step(step, _) => vec![Request::Step(step)],
         };
         requests.into_iter().rev().for_each(|request| self.queue.push_front(request));
+    }
+
+    /// Is a transaction under way that the plugin began?
+    #[cfg(feature = "plugin")]
+    pub(crate) fn waits_for_plugin(&self) -> bool {
+        self.in_flight.as_ref().is_some_and(|waiting| waiting.is_plugins)
+    }
+
+    /// Forgets what is queued and under way; all of it has been answered.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn forget(&mut self) {
+        self.in_flight = None;
+        self.queue.clear();
     }
 
     /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.

@@ -21,6 +21,8 @@ fn dug_stage() -> (Stage, Entity) {
     let focus = Some(Vec3::new(32.0, 8.0, 32.0));
     stage.app.insert_resource(BurrowDebug { focus, fade: 1e6, ..default() });
     let terrain = stage.show(level(1.0));
+    // Nobody here works out who is seen.
+    stage.app.world_mut().entity_mut(terrain).insert(InheritedVisibility::VISIBLE);
     // Seen by the views of dirty bricks, which have to be on by then.
     stage.app.world_mut().resource_mut::<BurrowDebug>().dirty = true;
     stage.send(dig(32.0, 8.0, 32.0, 5.0));

@@ -154,3 +154,45 @@ fn a_raw_file_loads_with_the_settings_of_its_meta_file() {
         stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
     assert_eq!((image.width(), image.height(), image.samples()), (4, 3, &samples[..]));
 }
+
+/// Stands for Bevy's own loader of pictures.
+#[derive(Default, TypePath)]
+struct Pictures;
+
+impl bevy::asset::AssetLoader for Pictures {
+    type Asset = Image;
+    type Settings = ();
+    type Error = std::io::Error;
+
+    async fn load(
+        &self,
+        _: &mut dyn bevy::asset::io::Reader,
+        (): &(),
+        _: &mut bevy::asset::LoadContext<'_>,
+    ) -> Result<Image, std::io::Error> {
+        Ok(Image::default())
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["png"]
+    }
+}
+
+#[test]
+fn pictures_of_a_game_stay_pictures() {
+    let folder = Folder::new("pictures");
+    folder.put("colours.png", &png(image::RgbImage::new(4, 4).into()));
+    let assets = AssetPlugin { file_path: folder.0.to_string_lossy().into_owned(), ..default() };
+    let mut stage = Stage::with((MinimalPlugins, assets, |app: &mut App| {
+        app.init_asset::<Image>().init_asset_loader::<Pictures>();
+    }));
+    let server = stage.app.world().resource::<AssetServer>().clone();
+    let untyped = server.load_builder().load_untyped("colours.png");
+    stage.frames_until("a picture is loaded", |stage| {
+        let state = stage.app.world().resource::<AssetServer>().load_state(&untyped);
+        assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
+        matches!(state, LoadState::Loaded)
+    });
+    let pictures = stage.app.world().resource::<Assets<Image>>();
+    assert_eq!(pictures.iter().count(), 1, "no other loader took it");
+}

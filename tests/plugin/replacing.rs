@@ -125,3 +125,66 @@ fn nothing_is_left_of_a_terrain_whose_component_is_removed() {
     stage.frames(4);
     assert_eq!((stage.count::<Tile>(), stage.count::<Mesh3d>()), (0, 0));
 }
+
+#[test]
+fn a_terrain_that_is_taken_off_in_the_middle_of_a_transaction_works_elsewhere() {
+    let mut stage = Stage::drawing();
+    let first = stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
+    stage.frame();
+    assert!(stage.terrain(first).is_busy());
+    stage.send(dig(20.0, 4.0, 20.0, 6.0).with_tag(2));
+    stage.app.world_mut().run_schedule(First);
+    let parked = stage.app.world_mut().entity_mut(first).take::<Terrain>().expect("it was there");
+    stage.frames(4);
+    let second = stage.show(parked);
+    stage.send(dig(40.0, 4.0, 40.0, 5.0).with_tag(3));
+    stage.settle();
+    let outcomes: Vec<(u64, bool)> = stage
+        .receipts()
+        .iter()
+        .map(|applied| (applied.receipt.tag, applied.receipt.outcome.is_ok()))
+        .collect();
+    assert_eq!(outcomes, [(1, false), (2, false), (3, true)]);
+    let mut model = steep();
+    model.apply([dig(40.0, 4.0, 40.0, 5.0)]);
+    assert_eq!(stage.hash(second), model.world().hash(), "what was answered is not done");
+    stage.assert_whole(second, "parked");
+}
+
+#[test]
+fn terrains_that_change_places_in_the_middle_of_their_transactions_go_on() {
+    let mut stage = Stage::drawing();
+    let (first, second) = (stage.spawn(steep()), stage.spawn_at(level(1.0), Vec3::X * 500.0));
+    stage.settle();
+    stage.send_to(first, dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
+    stage.send_to(second, dig(510.0, 8.0, 20.0, 4.0).with_tag(2));
+    stage.frame();
+    let mut both = stage.app.world_mut().query::<&mut Terrain>();
+    let [mut a, mut b] = both.get_many_mut(stage.app.world_mut(), [first, second]).expect("both are there");
+    assert!(a.is_busy() && b.is_busy());
+    std::mem::swap(&mut *a, &mut *b);
+    stage.frames(20);
+    stage.settle();
+    let mut tags = stage.tags();
+    tags.sort_unstable();
+    assert_eq!(tags, [1, 2]);
+    let mut model = steep();
+    model.apply([dig(30.0, 4.0, 30.0, 6.0)]);
+    assert_eq!(stage.hash(second), model.world().hash());
+    stage.assert_whole(first, "swapped");
+}
+
+#[test]
+fn a_terrain_that_is_put_elsewhere_keeps_the_size_of_its_voxels() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(level(0.5));
+    stage.app.world_mut().entity_mut(terrain).insert(Transform::from_xyz(8.0, 0.0, 0.0));
+    stage.send(dig(16.0, 4.0, 16.0, 2.0));
+    stage.settle();
+    let place: &Transform = stage.app.world().get(terrain).expect("a place");
+    assert_eq!(*place, Transform::from_xyz(8.0, 0.0, 0.0).with_scale(Vec3::splat(0.5)));
+    let mut model = level(0.5);
+    model.apply([dig(16.0, 8.0, 32.0, 4.0)]);
+    assert_eq!(stage.hash(terrain), model.world().hash());
+}

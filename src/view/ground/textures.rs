@@ -45,6 +45,8 @@ pub struct GroundLoading {
     wanted: Option<GroundTextures>,
     baked: Option<[Handle<Image>; 3]>,
     pub(super) ready: Option<Textures>,
+    /// Are those the ones that were wanted last?
+    is_current: bool,
 }
 
 /// What materials are made with.
@@ -56,14 +58,15 @@ pub(super) struct Textures {
 }
 
 impl GroundLoading {
-    /// From 0 (nothing asked for, or just begun) to 1 (terrains are dressed).
+    /// From 0 (nothing asked for, or just begun) to 1 (terrains are dressed). While other textures are made, terrains keep
+    /// those they have, and this begins anew.
     pub fn progress(&self) -> f32 {
-        if self.ready.is_some() { 1.0 } else { self.meter.progress().min(0.99) }
+        if self.is_current { 1.0 } else { self.meter.progress().min(0.99) }
     }
 
     /// Are the textures there, and terrains dressed with them?
     pub fn is_ready(&self) -> bool {
-        self.ready.is_some()
+        self.is_current
     }
 }
 
@@ -73,6 +76,7 @@ pub(super) fn load_textures(
     settings: Res<GroundTextures>,
     looks: Query<(), With<super::GroundLook>>,
     mut images: ResMut<Assets<Image>>,
+    server: Option<Res<AssetServer>>,
 ) {
     let loading = loading.bypass_change_detection();
     if looks.is_empty() && loading.wanted.is_none() {
@@ -88,7 +92,7 @@ pub(super) fn load_textures(
             GroundTextures::Images { .. } => (16, 1),
         };
         loading.meter = Meter::default();
-        loading.baked = None;
+        (loading.baked, loading.is_current) = (None, false);
         let meter = loading.meter.clone();
         loading.task = Some(AsyncComputeTaskPool::get().spawn(async move { bake(side, anisotropy, &meter) }));
     }
@@ -104,7 +108,14 @@ pub(super) fn load_textures(
         }
     };
     let is_there = |image: &Handle<Image>| images.contains(image);
-    if loading.ready.as_ref() != Some(&textures) && is_there(&textures.albedo) && is_there(&textures.relief) {
-        loading.ready = Some(textures);
+    if is_there(&textures.albedo) && is_there(&textures.relief) {
+        loading.is_current = true;
+        if loading.ready.as_ref() != Some(&textures) {
+            loading.ready = Some(textures);
+        }
+    } else if let Some(server) = server
+        && [&textures.albedo, &textures.relief].iter().any(|image| server.load_state(*image).is_failed())
+    {
+        warn_once!("the ground has no look: an image of GroundTextures can't be loaded");
     }
 }
