@@ -29,6 +29,8 @@ pub struct Commit {
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
     pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
+    /// The world that this changes, unless nobody else holds it.
+    pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
     pub meshes: MeshUpdates,
     /// Where the time went.
@@ -103,5 +105,70 @@ impl Commit {
         world.revision += 1;
         let replaced = (!self.change.bricks.is_empty()).then(|| Step::new(self.change, self.replaced_bytes));
         Installed { receipts: self.receipts, moved: self.moved, replaced }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::{Ground, MaterialId};
+    use crate::terrain::{Terrain, TerrainSettings};
+    use crate::volume::DiggingRules;
+    use glam::Vec3;
+
+    fn terrain() -> Terrain {
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        terrain.apply([dig(20.0)]);
+        terrain
+    }
+
+    fn dig(x: f32) -> Brush {
+        Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0))
+    }
+
+    /// What digging once more comes to, and whether the task's copy became the world.
+    fn dig_on(terrain: &mut Terrain, meanwhile: impl FnOnce(&mut Terrain)) -> (bool, Option<Arc<World>>) {
+        terrain.submit(&dig(40.0));
+        let commit = terrain.begin().expect("something waits").run();
+        let copy = commit.copy.as_ref().map(Arc::as_ptr);
+        meanwhile(terrain);
+        let (_, waste) = terrain.settle(commit).expect("the one under way");
+        (copy == Some(Arc::as_ptr(&terrain.world)), waste.copy)
+    }
+
+    #[test]
+    fn a_world_that_others_hold_is_copied_in_the_task() {
+        let mut alone = terrain();
+        let (is_copy, waste) = dig_on(&mut alone, |_| {});
+        assert!(!is_copy && waste.is_none());
+
+        let mut held = terrain();
+        let snapshot = held.snapshot();
+        let before = snapshot.hash();
+        let (is_copy, waste) = dig_on(&mut held, |_| {});
+        assert!(is_copy && waste.is_none());
+        assert_eq!((held.world().hash(), snapshot.hash()), (alone.world().hash(), before));
+
+        let mut let_go = terrain();
+        let mut snapshot = Some(let_go.snapshot());
+        let (is_copy, waste) = dig_on(&mut let_go, |_| snapshot = None);
+        assert!(!is_copy && waste.is_some());
+        assert_eq!(let_go.world().hash(), alone.world().hash());
+    }
+
+    #[test]
+    fn rules_that_come_during_a_transaction_hold_after_it() {
+        let mut terrain = terrain();
+        let mut held = vec![terrain.snapshot()];
+        let (is_copy, _) = dig_on(&mut terrain, |terrain| {
+            terrain.set_rules(DiggingRules::default().with_unbreakable(MaterialId(0)));
+            held.push(terrain.snapshot());
+        });
+        assert!(is_copy);
+        terrain.apply([dig(54.0)]);
+        let is_solid = |x: f64| terrain.world().is_solid(glam::DVec3::new(x, 7.0, 30.0));
+        assert_eq!([20.0, 40.0, 54.0].map(is_solid), [false, false, true]);
     }
 }

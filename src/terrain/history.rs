@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::change::Change;
+use super::world::World;
 use crate::lattice::LatticeBox;
 use crate::volume::Tally;
 
@@ -102,15 +103,19 @@ impl Step {
     }
 }
 
-/// Steps that a terrain let go of. Freeing many bricks takes its time, so it is left to whoever has some.
+/// What a terrain let go of: steps, and a copy of the world that was not needed. Freeing many bricks takes its time, so it
+/// is left to whoever has some.
 #[derive(Default)]
-pub(crate) struct Waste(Vec<Arc<Step>>);
+pub(crate) struct Waste {
+    steps: Vec<Arc<Step>>,
+    pub(super) copy: Option<Arc<World>>,
+}
 
 impl Waste {
     /// Is there nothing to free?
     #[cfg(feature = "plugin")]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.steps.is_empty() && self.copy.is_none()
     }
 }
 
@@ -171,8 +176,8 @@ impl Timeline {
 
     /// An edit was committed: that can be undone now, and nothing can be redone.
     pub fn record(&mut self, replaced: Step) -> Waste {
-        let mut waste = Waste(self.redo.drain(..).collect());
-        self.held -= waste.0.iter().map(|step| step.bytes()).sum::<usize>();
+        let mut waste = Waste { steps: self.redo.drain(..).collect(), copy: None };
+        self.held -= waste.steps.iter().map(|step| step.bytes()).sum::<usize>();
         self.keep(HistoryStep::Undo, replaced);
         self.trim(&mut waste);
         waste
@@ -183,7 +188,7 @@ impl Timeline {
         let mut waste = Waste::default();
         // The budget may have let go of it meanwhile.
         if self.next(step).is_some_and(|next| Arc::ptr_eq(next, used)) {
-            waste.0.extend(self.list(step).pop_back());
+            waste.steps.extend(self.list(step).pop_back());
             self.held -= used.bytes();
         }
         let other = match step {
@@ -205,7 +210,7 @@ impl Timeline {
         while self.bytes() > self.budget {
             let Some(gone) = self.undo.pop_front().or_else(|| self.redo.pop_front()) else { break };
             self.held -= gone.bytes();
-            waste.0.push(gone);
+            waste.steps.push(gone);
             // A list without steps needs no room, nor does one that had many.
             for list in [&mut self.undo, &mut self.redo] {
                 if list.len() * 4 <= list.capacity() {

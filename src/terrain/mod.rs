@@ -190,8 +190,8 @@ impl Terrain {
         &self.world
     }
 
-    /// The world as last committed, to be read elsewhere. While a snapshot is held, the next commit copies the world's
-    /// index first, so let go of it soon.
+    /// The world as last committed, to be read elsewhere. While a snapshot is held, the next transaction copies the
+    /// world's index, and a commit does so by itself if the snapshot came in between; so let go of it soon.
     pub fn snapshot(&self) -> Arc<World> {
         Arc::clone(&self.world)
     }
@@ -300,15 +300,24 @@ impl Terrain {
     }
 
     /// The same; what history lets go of is left to the caller, who may free it elsewhere.
-    pub(crate) fn settle(&mut self, commit: Commit) -> Result<(Vec<Receipt>, Waste), StaleCommit> {
+    pub(crate) fn settle(&mut self, mut commit: Commit) -> Result<(Vec<Receipt>, Waste), StaleCommit> {
         let done = self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket).ok_or(StaleCommit)?;
+        let mut copy = commit.copy.take();
+        if Arc::get_mut(&mut self.world).is_none()
+            && let Some(mut copy) = copy.take_if(|copy| copy.version() == self.world.version())
+        {
+            // Rules may have changed meanwhile.
+            Arc::make_mut(&mut copy).rules.clone_from(&self.world.rules);
+            self.world = copy;
+        }
         let installed = commit.install(Arc::make_mut(&mut self.world));
         self.moves.extend(installed.moved);
-        let waste = match (done.work, installed.replaced) {
+        let mut waste = match (done.work, installed.replaced) {
             (Work::Edits(_), Some(replaced)) => self.timeline.record(replaced),
             (Work::Step(step, used), Some(replaced)) => self.timeline.passed(step, &used, replaced),
             (_, None) => Waste::default(),
         };
+        waste.copy = copy;
         Ok((installed.receipts, waste))
     }
 

@@ -63,10 +63,13 @@ impl Transaction {
     /// result does not depend on how many those are.
     pub fn run(self) -> Commit {
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
-        match &self.work {
+        let commit = match &self.work {
             Work::Edits(submissions) => self.edit(submissions, backend),
             Work::Step(step, target) => self.step(*step, target, backend),
-        }
+        };
+        // The terrain and this hold the world. Where others do, the commit changes a copy: better made here than there.
+        let is_shared = Arc::strong_count(&self.world) > 2;
+        Commit { copy: is_shared.then(|| Arc::new(World::clone(&self.world))), ..commit }
     }
 
     fn edit(&self, submissions: &[Submission], backend: &dyn Compute) -> Commit {
@@ -180,6 +183,7 @@ impl Transaction {
             receipts: Vec::new(),
             moved: None,
             news: Vec::new(),
+            copy: None,
             surfaces: meshes.chunks.clone(),
             rings: meshes.tiles.iter().map(|(tile, update)| (*tile, Arc::clone(&update.rings))).collect(),
             meshes,
