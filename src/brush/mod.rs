@@ -96,12 +96,12 @@ pub use error::BrushError;
 pub use evaluator::Evaluator;
 pub(crate) use operation::Kind;
 pub use operation::Operation;
-pub use record::{BrushRecord, OperationName, RecordError, ShapeName};
+pub use record::{BrushRecord, ImageRecord, OperationName, RecordError, ShapeName, StampRecord};
 pub use request::Brush;
 pub use roughness::Roughness;
 pub(crate) use sculptor::{Around, Sculptor};
 pub use shape::Shape;
-pub use stamp::{ImageRecord, Stamp, StampRecord};
+pub use stamp::Stamp;
 
 use crate::lattice::ONE;
 

@@ -53,54 +53,6 @@ impl Stamp {
     }
 }
 
-/// A stamp as an object of a [`BrushRecord`](super::BrushRecord).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "they are those of a stamp")]
-pub struct StampRecord {
-    pub image: ImageRecord,
-    pub center: [f32; 3],
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rotation: Option<[f32; 4]>,
-    pub size: [f32; 2],
-    pub height: f32,
-}
-
-/// The image of a [`StampRecord`]: grey samples, 0 to 65535, row by row.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "they are those of an image")]
-pub struct ImageRecord {
-    pub width: u32,
-    pub height: u32,
-    pub samples: Vec<u16>,
-}
-
-impl StampRecord {
-    /// The stamp; `None` where the image is none.
-    pub(super) fn stamp(&self) -> Option<Stamp> {
-        let ImageRecord { width, height, samples } = &self.image;
-        let image = GreyImage::from_samples(*width, *height, samples.clone()).ok()?;
-        let stamp =
-            Stamp::new(image, Vec3::from_array(self.center), Vec2::from_array(self.size), self.height);
-        Some(stamp.with_rotation(self.rotation.map_or(Quat::IDENTITY, Quat::from_array)))
-    }
-}
-
-impl From<&Stamp> for StampRecord {
-    fn from(stamp: &Stamp) -> Self {
-        let image = &stamp.image;
-        let samples = image.samples().to_vec();
-        Self {
-            image: ImageRecord { width: image.width(), height: image.height(), samples },
-            center: stamp.center.to_array(),
-            rotation: (stamp.rotation != Quat::IDENTITY).then(|| stamp.rotation.to_array()),
-            size: stamp.size.to_array(),
-            height: stamp.height,
-        }
-    }
-}
-
 /// Least and most samples along a side of an image.
 const SIDES: (u32, u32) = (2, 256);
 
