@@ -52,7 +52,7 @@ impl TryFrom<BrushRecord> for Brush {
 impl BrushRecord {
     fn read_shape(&self) -> Result<Shape, RecordError> {
         let owner = self.shape.as_str();
-        for (field, is_given) in [
+        let given = [
             ("center", self.center.is_some()),
             ("half", self.half.is_some()),
             ("rotation", self.rotation.is_some()),
@@ -61,11 +61,8 @@ impl BrushRecord {
             ("from", self.from.is_some()),
             ("to", self.to.is_some()),
             ("radius", self.radius.is_some()),
-        ] {
-            if is_given && !self.shape.fields().contains(&field) {
-                return Err(RecordError::Foreign { owner, field });
-            }
-        }
+        ];
+        refuse_foreign(owner, &given, |field| self.shape.fields().contains(field))?;
         let vector = |field, value: Option<[f32; 3]>| {
             value.map(Vec3::from_array).ok_or(RecordError::Missing { owner, field })
         };
@@ -89,7 +86,7 @@ impl BrushRecord {
 
     fn read_operation(&self) -> Result<Operation, RecordError> {
         let owner = self.op.as_str();
-        for (field, is_given) in [
+        let given = [
             ("material", self.material.is_some()),
             ("strength", self.strength.is_some()),
             ("falloff", self.falloff.is_some()),
@@ -99,13 +96,10 @@ impl BrushRecord {
             ("amount", self.amount.is_some()),
             ("step", self.step.is_some()),
             ("stamp", self.stamp.is_some()),
-        ] {
-            let is_own =
-                self.op.fields().contains(&field) || self.op.is_sculpting() && BLEND.contains(&field);
-            if is_given && !is_own {
-                return Err(RecordError::Foreign { owner, field });
-            }
-        }
+        ];
+        refuse_foreign(owner, &given, |field| {
+            self.op.fields().contains(field) || self.op.is_sculpting() && BLEND.contains(field)
+        })?;
         let missing = |field| RecordError::Missing { owner, field };
         let vector =
             |field, value: Option<[f32; 3]>| value.map(Vec3::from_array).ok_or_else(|| missing(field));
@@ -140,5 +134,17 @@ impl BrushRecord {
             falloff: self.falloff.unwrap_or(like.falloff),
             material: self.material.filter(|_| self.op.is_sculpting()),
         }
+    }
+}
+
+/// Refuses a field that is given and does not belong to its shape or operation.
+fn refuse_foreign(
+    owner: &'static str,
+    fields: &[(&'static str, bool)],
+    is_own: impl Fn(&&'static str) -> bool,
+) -> Result<(), RecordError> {
+    match fields.iter().find(|(field, is_given)| *is_given && !is_own(field)) {
+        Some(&(field, _)) => Err(RecordError::Foreign { owner, field }),
+        None => Ok(()),
     }
 }
