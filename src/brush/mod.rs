@@ -29,6 +29,7 @@
 //! | amount of a raise or lower | 0 | 64 voxels |
 //! | step of a terrace | 1 voxel | 256 voxels |
 //! | samples along a side of a stamp | 2 | 256 |
+//! | side of a stamp | 1/2 voxel | 2048 voxels |
 //! | height of a stamp | -256 voxels | 256 voxels |
 //!
 //! # Sculpting
