@@ -2,6 +2,7 @@
 
 mod brushes;
 mod ends;
+mod integers;
 mod terrains;
 mod transactions;
 #[path = "../worlds/mod.rs"]
