@@ -6,10 +6,11 @@ use bevy_burrow::terrain::TerrainError;
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
 
+use crate::operations::sculpting;
 use crate::terrains::small_terrain;
 
 /// Any bits, special numbers, and numbers that make sense.
-fn number() -> impl Strategy<Value = f32> {
+pub fn number() -> impl Strategy<Value = f32> {
     let limit = LIMIT as f32;
     let special = [
         0.0,
@@ -77,7 +78,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_brushes_get_receipts_and_leave_a_closed_surface(brushes in prop::collection::vec(brush(), 1..6)) {
+    fn any_brushes_get_receipts_and_leave_a_closed_surface(brushes in prop::collection::vec(prop_oneof![brush(), sculpting()], 1..6)) {
         let mut terrain = small_terrain();
         // Brushes of the greatest size are valid; here they would only take long.
         let affordable = |brush: &&Brush| {

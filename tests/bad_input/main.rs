@@ -3,6 +3,7 @@
 mod brushes;
 mod ends;
 mod integers;
+mod operations;
 mod terrains;
 mod transactions;
 #[path = "../worlds/mod.rs"]
