@@ -167,6 +167,37 @@ fn a_box_of_all_numbers_protects_everything() {
 }
 
 #[test]
+fn what_falls_takes_nothing_along_that_is_protected() {
+    let ground = Arc::new(Ground::flat(64, 64, 10.0).expect("valid"));
+    let cuboid = |center: Vec3, half: Vec3| Brush::add(Shape::cuboid(center, half), MaterialId(2));
+    let pillar = cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(1.2, 8.0, 1.2));
+    let slab = cuboid(Vec3::new(32.0, 22.0, 32.0), Vec3::new(6.2, 2.2, 6.2));
+    // What changes in a box when the pillar is dug away, and what becomes of the slab.
+    let fall = |rules: DiggingRules, own: LatticeBox| {
+        let mut terrain = terrain(&ground, 16, &DiggingRules::default());
+        terrain.apply([&pillar, &slab]);
+        terrain.set_rules(rules);
+        terrain.set_loose(Some(LooseSettings { crumbs: 10_000, ..Default::default() }));
+        let before = terrain.snapshot();
+        let dig = Brush::dig(Shape::sphere(Vec3::new(32.0, 15.0, 32.0), 4.0));
+        let applied = terrain.apply([dig]).remove(0).outcome.expect("a valid brush");
+        let (old, new) = (before.samples(), terrain.world().samples());
+        let changed = own.points().filter(|&at| old.sample(at) != new.sample(at)).count();
+        assert!(terrain.world().check_seams().is_flawless());
+        (changed, applied.loose.iter().map(|piece| piece.fate).collect::<Vec<_>>())
+    };
+    // Air that the slab touches, among a thousand boxes far off.
+    let beside = LatticeBox::new(IVec3::new(39, 18, 20), IVec3::new(42, 26, 44)).expect("not empty");
+    let rules = DiggingRules { protected: boxes_of_no_account(), ..Default::default() };
+    let (changed, fates) = fall(rules.clone(), beside);
+    assert!(changed > 50 && fates == [PieceFate::Removed]);
+    assert_eq!(fall(rules.clone().with_protected(beside), beside), (0, vec![PieceFate::Removed]));
+    // A voxel of the slab itself.
+    let corner = LatticeBox::point(IVec3::new(38, 22, 32));
+    assert_eq!(fall(rules.with_protected(corner), beside), (0, vec![PieceFate::Left]));
+}
+
+#[test]
 fn hardness_has_two_ends() {
     let ground = Arc::new(Ground::flat(40, 40, 20.5).expect("valid"));
     let dig = |power| Brush::dig(Shape::sphere(Vec3::new(20.0, 20.0, 20.0), 5.0)).with_power(power);
