@@ -156,3 +156,36 @@ mod tests {
         assert!(!bear(none().with_protected(inside_out)));
     }
 }
+
+#[cfg(all(test, feature = "cuda"))]
+mod plain_edits {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Edit, Shape};
+    use crate::ground::Ground;
+    use crate::lattice::ChunkGrid;
+    use crate::volume::{Bricks, Draft, EditWork, Ledger, UniformBricks};
+
+    #[test]
+    fn edits_that_no_rule_bears_on_are_plain_and_run_together() {
+        let ground = Ground::flat(200, 60, 0.0).unwrap();
+        let (grid, bricks, uniform) =
+            (ChunkGrid::new(32, 200, 60), Bricks::default(), UniformBricks::default());
+        let dig = |x| Edit::quantize(&Brush::dig(Shape::sphere(Vec3::new(x, 0.0, 30.0), 4.0))).unwrap();
+        let runs = |edits: &[Edit], rules: DiggingRules| {
+            let (edits, mut runs) = (edits.iter().collect::<Vec<_>>(), Vec::new());
+            let note = |work: &EditWork, _: &mut dyn FnMut(Ledger)| {
+                runs.push((work.tools.len(), work.is_plain()));
+            };
+            let view = SampleView::new(&ground, &bricks);
+            Draft::make(view, grid, &edits, 0, &uniform, Some(&rules), note);
+            runs
+        };
+        let (none, at) = (DiggingRules::default, |x| LatticeBox::point(IVec3::new(x, 0, 30)));
+        let edits = [dig(20.0), dig(22.0), dig(120.0)];
+        assert_eq!(runs(&edits, none().with_protected(at(60)).with_bedrock(-90)), [(3, true)]);
+        assert_eq!(runs(&edits, none().with_protected(at(120))), [(3, false)]);
+        assert_eq!(runs(&edits, none().with_protected(at(22))), [(1, false), (2, false)]);
+    }
+}
