@@ -34,6 +34,10 @@ class Stage:
             raise Failed("Xvfb did not start")
         self.env = dict(os.environ, DISPLAY=f":{display}", WINIT_UNIX_BACKEND="x11", WINIT_X11_SCALE_FACTOR="1")
         self.env.pop("WAYLAND_DISPLAY", None)
+        # The settings of whoever plays here by hand stay as they are.
+        config = out.resolve() / "config"
+        shutil.rmtree(config, ignore_errors=True)
+        self.env["XDG_CONFIG_HOME"] = str(config)
         self.written = open(self.log, "wb")
         self.program = subprocess.Popen(command, env=self.env, stdout=self.written, stderr=subprocess.STDOUT)
 
