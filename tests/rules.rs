@@ -94,6 +94,127 @@ fn rules_that_are_against_nothing_change_nothing() {
     }
 }
 
+/// Boxes that protect nothing that is there: far off, beyond the world, turned inside out, at the ends of the numbers.
+fn boxes_of_no_account() -> Vec<LatticeBox> {
+    let far = |i: i32| LatticeBox::point(IVec3::new(i % 100 - 50, 20_000 + i, i / 10 - 50)).grown(i % 7);
+    let (low, high) = (IVec3::MIN, IVec3::MAX);
+    let strange = [
+        LatticeBox { min: IVec3::splat(9), max: IVec3::splat(-9) },
+        LatticeBox { min: high, max: low },
+        LatticeBox { min: low.with_x(5), max: high.with_x(4) },
+        LatticeBox::point(low),
+        LatticeBox::point(high),
+        LatticeBox { min: low, max: high.with_y(-32_770) },
+        LatticeBox { min: low.with_x(i32::MAX - 1), max: high },
+    ];
+    (0..1000).map(far).chain(strange).collect()
+}
+
+#[test]
+fn any_number_of_boxes_elsewhere_changes_nothing() {
+    let protected = boxes_of_no_account();
+    for seed in 300..300 + worlds::world_count(30) {
+        let (ground, chunk_size, own, brushes) = script(seed);
+        // Alone, and beside rules that matter.
+        for rules in [DiggingRules::default(), own] {
+            let more = DiggingRules { protected: [&*protected, &*rules.protected].concat(), ..rules.clone() };
+            let [mut with, mut without] = [more, rules].map(|rules| {
+                let mut terrain = terrain(&ground, chunk_size, &rules);
+                // What falls is kept from it by protected boxes too.
+                terrain
+                    .set_loose((seed % 2 == 0).then(|| LooseSettings { debris: 400, ..Default::default() }));
+                terrain
+            });
+            for brushes in brushes.chunks(4) {
+                assert_eq!(with.apply(brushes), without.apply(brushes), "world {seed}");
+            }
+            assert_eq!(with.world().hash(), without.world().hash(), "world {seed}");
+        }
+    }
+}
+
+#[test]
+fn boxes_are_one_with_all_that_they_are_cut_into() {
+    for seed in 400..400 + worlds::world_count(20) {
+        let (ground, chunk_size, rules, brushes) = script(seed);
+        let cut = |own: &LatticeBox| own.points().map(LatticeBox::point).collect::<Vec<_>>();
+        let protected = rules.protected.iter().flat_map(cut).rev().collect();
+        let [mut whole, mut pieces] = [rules.clone(), DiggingRules { protected, ..rules }]
+            .map(|rules| terrain(&ground, chunk_size, &rules));
+        for brushes in brushes.chunks(3) {
+            assert_eq!(whole.apply(brushes), pieces.apply(brushes), "world {seed}");
+        }
+        assert_eq!(whole.world().hash(), pieces.world().hash(), "world {seed}");
+    }
+}
+
+#[test]
+fn a_box_of_all_numbers_protects_everything() {
+    let all = LatticeBox { min: IVec3::MIN, max: IVec3::MAX };
+    for seed in 500..510 {
+        let (ground, chunk_size, _, brushes) = script(seed);
+        let mut terrain = terrain(&ground, chunk_size, &DiggingRules::default().with_protected(all));
+        terrain.set_loose(Some(LooseSettings { crumbs: 100, debris: 400, ..Default::default() }));
+        let before = terrain.world().hash();
+        for receipt in terrain.apply(&brushes) {
+            let applied = receipt.outcome.expect("a valid brush");
+            assert!(applied.bounds.is_none() && applied.loose.is_empty(), "world {seed}");
+            let changed = [&applied.removed, &applied.added, &applied.painted].map(Tally::total);
+            assert_eq!(changed, [0; 3], "world {seed}");
+        }
+        assert_eq!(terrain.world().hash(), before, "world {seed}");
+    }
+}
+
+#[test]
+fn what_falls_takes_nothing_along_that_is_protected() {
+    let ground = Arc::new(Ground::flat(64, 64, 10.0).expect("valid"));
+    let cuboid = |center: Vec3, half: Vec3| Brush::add(Shape::cuboid(center, half), MaterialId(2));
+    let pillar = cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(1.2, 8.0, 1.2));
+    let slab = cuboid(Vec3::new(32.0, 22.0, 32.0), Vec3::new(6.2, 2.2, 6.2));
+    // What changes in a box when the pillar is dug away, and what becomes of the slab.
+    let fall = |rules: DiggingRules, own: LatticeBox| {
+        let mut terrain = terrain(&ground, 16, &DiggingRules::default());
+        terrain.apply([&pillar, &slab]);
+        terrain.set_rules(rules);
+        terrain.set_loose(Some(LooseSettings { crumbs: 10_000, ..Default::default() }));
+        let before = terrain.snapshot();
+        let dig = Brush::dig(Shape::sphere(Vec3::new(32.0, 15.0, 32.0), 4.0));
+        let applied = terrain.apply([dig]).remove(0).outcome.expect("a valid brush");
+        let (old, new) = (before.samples(), terrain.world().samples());
+        let changed = own.points().filter(|&at| old.sample(at) != new.sample(at)).count();
+        assert!(terrain.world().check_seams().is_flawless());
+        (changed, applied.loose.iter().map(|piece| piece.fate).collect::<Vec<_>>())
+    };
+    // Air that the slab touches, among a thousand boxes far off.
+    let beside = LatticeBox::new(IVec3::new(39, 18, 20), IVec3::new(42, 26, 44)).expect("not empty");
+    let rules = DiggingRules { protected: boxes_of_no_account(), ..Default::default() };
+    let (changed, fates) = fall(rules.clone(), beside);
+    assert!(changed > 50 && fates == [PieceFate::Removed]);
+    assert_eq!(fall(rules.clone().with_protected(beside), beside), (0, vec![PieceFate::Removed]));
+    // A voxel of the slab itself.
+    let corner = LatticeBox::point(IVec3::new(38, 22, 32));
+    assert_eq!(fall(rules.with_protected(corner), beside), (0, vec![PieceFate::Left]));
+}
+
+#[test]
+fn hardness_has_two_ends() {
+    let ground = Arc::new(Ground::flat(40, 40, 20.5).expect("valid"));
+    let dig = |power| Brush::dig(Shape::sphere(Vec3::new(20.0, 20.0, 20.0), 5.0)).with_power(power);
+    let removed = |hardness, power| {
+        let mut terrain =
+            terrain(&ground, 32, &DiggingRules::default().with_hardness(MaterialId(0), hardness));
+        let applied = terrain.apply([dig(power)]).remove(0).outcome.expect("a valid brush");
+        (applied.removed.total(), applied.refused.total())
+    };
+    let (all, none) = removed(0, 0);
+    assert!(all > 100 && none == 0, "what is not hard needs no power");
+    assert_eq!(removed(255, 255), (all, 0));
+    let (nearly, slowed) = removed(255, 254);
+    assert!(nearly + slowed == all && slowed > 0 && slowed < all / 4, "{nearly} and {slowed} of {all}");
+    assert_eq!([removed(255, 127), removed(255, 0), removed(1, 0)], [(0, all); 3]);
+}
+
 #[test]
 fn under_rules_neither_batches_nor_threads_show() {
     let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));

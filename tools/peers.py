@@ -6,13 +6,20 @@ round everybody meshes the grid twice and the second call is timed. What is comp
 without, shared vertices always. Before anything is timed, the meshes of closed grids are compared.
 """
 
-import argparse
 import json
 import sys
-from pathlib import Path
 
 import mcubes
-from peers_shared import Ours, Peer, ScikitImage, check, exported_grids, measure, rounds, show_findings, show_rows
+from peers_shared import (
+    Ours,
+    Peer,
+    ScikitImage,
+    arguments,
+    check_closed,
+    exported_grids,
+    measure_cut,
+    show_findings,
+)
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkSMPTools, vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkImageData
@@ -82,47 +89,32 @@ def targets(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bench", required=True, help="the built bench binary 'meshers'")
-    parser.add_argument("--quick", action="store_true", help="few rounds")
-    parser.add_argument("--fields", default="sphere,terrain,caves,empty")
-    parser.add_argument("--sizes", default="64,100,128")
-    parser.add_argument("--json", type=Path, help="where to write all figures")
-    arguments = parser.parse_args()
+    told = arguments(__doc__.splitlines()[0])
 
     vtkSMPTools.SetBackend("Sequential")
     vtkSMPTools.Initialize(1)
-    bench = arguments.bench
     meshers = [
-        Ours(bench, "burrow dense f32", True),
+        Ours(told.bench, "burrow dense f32", True),
         FlyingEdges(True),
         ScikitImage(),
-        Ours(bench, "burrow dense f32, bare", False),
+        Ours(told.bench, "burrow dense f32, bare", False),
         FlyingEdges(False),
         PyMCubes(),
     ]
-    findings, rows, fine = [], [], True
-    grids = exported_grids(bench, arguments.fields, arguments.sizes)
+    grids = exported_grids(told.bench, told.fields, told.sizes)
     print("closed grids, before anything is timed")
-    for grid in (grid for grid in grids if grid.closed):
-        found, is_fine = check(meshers, grid)
-        show_findings(found)
-        findings += found
-        fine &= is_fine
+    findings, fine = check_closed(grids, lambda _: meshers, show_findings)
     if not fine:
         sys.exit("peers: meshes are not closed, or not of the same surface; nothing is timed")
-    for grid in (grid for grid in grids if not grid.closed):
-        measured = measure(meshers, grid, *rounds(arguments.quick))
-        show_rows(measured, grid)
-        rows += measured
+    rows = measure_cut(grids, lambda _: meshers, told.quick)
     reached = targets(rows)
     print("\ntargets: our time over VTK's, both with normals, on one thread")
     for target in reached:
         verdict = "met" if target["met"] else "missed"
         print(f"  {target['what']:<20} {target['ratio']['median']:.3f}  at most {TARGET:.2f}  {verdict}")
-    if arguments.json:
+    if told.json:
         report = {"findings": findings, "rows": rows, "targets": reached}
-        arguments.json.write_text(json.dumps(report, indent=2) + "\n")
+        told.json.write_text(json.dumps(report, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -13,10 +13,8 @@ scikit-image's and the one of ours beside it. What our own CUDA backend does wit
 comparison: `cargo bench --no-default-features --features cuda --bench backends`.
 """
 
-import argparse
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 from peers_shared import (
@@ -24,11 +22,10 @@ from peers_shared import (
     Ours,
     Peer,
     ScikitImage,
-    check,
+    arguments,
+    check_closed,
     exported_grids,
-    measure,
-    rounds,
-    show_rows,
+    measure_cut,
     topology,
 )
 
@@ -208,14 +205,7 @@ def show_meshes(findings):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bench", required=True, help="the built bench binary 'meshers'")
-    parser.add_argument("--quick", action="store_true", help="few rounds")
-    parser.add_argument("--fields", default="sphere,terrain,caves,empty")
-    parser.add_argument("--sizes", default="64,100,128")
-    parser.add_argument("--json", type=Path, help="where to write all figures")
-    arguments = parser.parse_args()
-
+    told = arguments(__doc__.splitlines()[0])
     kinds = {
         "cupmb": lambda: Cupmb(is_tuned=False),
         "cupmb tuned": lambda: Cupmb(is_tuned=True),
@@ -226,29 +216,22 @@ def main():
     if not cards:
         sys.exit("peers: no GPU mesher runs here, so nothing is compared; they need an NVIDIA card with its driver")
     ways = [Way(card, way) for way in WAYS for card in cards]
-    bench = arguments.bench
-    ours = [Ours(bench, "burrow dense f32, bare", False)]
+    ours = [Ours(told.bench, "burrow dense f32, bare", False)]
     # For scale; and what it is compared with has normals.
     scikit_image = available({"scikit-image": ScikitImage})
-    ours += [Ours(bench, "burrow dense f32", True)] if scikit_image else []
+    ours += [Ours(told.bench, "burrow dense f32", True)] if scikit_image else []
 
-    findings, rows, fine = [], [], True
-    grids = exported_grids(bench, arguments.fields, arguments.sizes)
+    grids = exported_grids(told.bench, told.fields, told.sizes)
     print("closed grids, before anything is timed: vertices after welding, and as they were written")
-    for grid in (grid for grid in grids if grid.closed):
-        found, is_fine = check(ours + scikit_image + working(ways[: len(cards)], grid), grid)
-        show_meshes(found)
-        findings += found
-        fine &= is_fine
+    cards_alone = ways[: len(cards)]
+    findings, fine = check_closed(
+        grids, lambda grid: ours + scikit_image + working(cards_alone, grid), show_meshes
+    )
     if not fine:
         sys.exit("peers: our mesh is not closed; nothing is timed")
-    for grid in (grid for grid in grids if not grid.closed):
-        meshers = ours + scikit_image + working(ways, grid)
-        measured = measure(meshers, grid, *rounds(arguments.quick))
-        show_rows(measured, grid)
-        rows += measured
-    if arguments.json:
-        arguments.json.write_text(json.dumps({"findings": findings, "rows": rows}, indent=2) + "\n")
+    rows = measure_cut(grids, lambda grid: ours + scikit_image + working(ways, grid), told.quick)
+    if told.json:
+        told.json.write_text(json.dumps({"findings": findings, "rows": rows}, indent=2) + "\n")
 
 
 if __name__ == "__main__":

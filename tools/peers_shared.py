@@ -1,5 +1,6 @@
 """What tools/peers.py and tools/peers_gpu.py share: our mesher, the grids, the checks, the rounds."""
 
+import argparse
 import json
 import statistics
 import subprocess
@@ -13,6 +14,17 @@ import scipy.sparse
 
 TOPOLOGY = ("vertices", "written", "triangles", "unbalanced", "components", "euler")
 """What is said of a mesh; vertices after welding and as they were written, edges that do not run both ways alike."""
+
+
+def arguments(description):
+    """What the command line says."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--bench", required=True, help="the built bench binary 'meshers'")
+    parser.add_argument("--quick", action="store_true", help="few rounds")
+    parser.add_argument("--fields", default="sphere,terrain,caves,empty")
+    parser.add_argument("--sizes", default="64,100,128")
+    parser.add_argument("--json", type=Path, help="where to write all figures")
+    return parser.parse_args()
 
 
 class Ours:
@@ -158,6 +170,17 @@ def check(meshers, grid):
     return findings, fine
 
 
+def check_closed(grids, meshers_of, show):
+    """The same for all closed grids, by the meshers of each."""
+    findings, fine = [], True
+    for grid in (grid for grid in grids if grid.closed):
+        found, is_fine = check(meshers_of(grid), grid)
+        show(found)
+        findings += found
+        fine &= is_fine
+    return findings, fine
+
+
 def show_findings(findings):
     first = findings[0]
     print(
@@ -213,6 +236,16 @@ def measure(meshers, grid, least, most, budget):
                 "ratio": None if mesher is reference else quartiles([ours / other for ours, other in pairs]),
             }
         )
+    return rows
+
+
+def measure_cut(grids, meshers_of, is_quick):
+    """The rows of all grids that are not closed, each shown as soon as it is measured."""
+    rows = []
+    for grid in (grid for grid in grids if not grid.closed):
+        measured = measure(meshers_of(grid), grid, *rounds(is_quick))
+        show_rows(measured, grid)
+        rows += measured
     return rows
 
 

@@ -14,7 +14,8 @@ use crate::lattice::{LatticeBox, ONE};
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
 ///
 /// An edit is always within the limits of [the room's table](super): [`quantize`](Self::quantize) checks, and so does
-/// deserialising, which fails with the message of the [`BrushError`].
+/// deserialising, which fails with the message of the [`BrushError`]. Both drop roughness of amplitude 0, which has
+/// no bumps.
 ///
 /// # Format
 ///
@@ -148,7 +149,7 @@ impl TryFrom<Unchecked> for Edit {
         let (deed, power) = operation.unlimited()?;
         let edit = Self { shape, deed, power, roughness, tag };
         edit.check()?;
-        Ok(edit)
+        Ok(Self { roughness: roughness.filter(|grain| grain.amplitude != 0), ..edit })
     }
 }
 
@@ -329,6 +330,18 @@ mod tests {
             let error = parse(&operation).unwrap_err();
             assert!(error.contains(message), "{operation}: {error}");
         }
+    }
+
+    #[test]
+    fn roughness_without_bumps_is_none_wherever_it_comes_from() {
+        let plain = Brush::dig(Shape::sphere(Vec3::ZERO, 2.0));
+        let rough = plain.clone().with_roughness(Roughness::new(0.0, 4.0, 7));
+        let edit = Edit::quantize(&plain).unwrap();
+        assert_eq!(Edit::quantize(&rough).unwrap(), edit);
+        let json = serde_json::to_string(&edit).unwrap();
+        let read = |grain: &str| serde_json::from_str::<Edit>(&json.replace("null", grain));
+        assert_eq!(read(r#"{"amplitude":0,"scale":1024,"seed":7}"#).unwrap(), edit);
+        assert!(read(r#"{"amplitude":0,"scale":0,"seed":7}"#).is_err());
     }
 
     #[test]

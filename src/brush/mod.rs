@@ -29,6 +29,7 @@
 //! | amount of a raise or lower | 0 | 64 voxels |
 //! | step of a terrace | 1 voxel | 256 voxels |
 //! | samples along a side of a stamp | 2 | 256 |
+//! | side of a stamp | 1/2 voxel | 2048 voxels |
 //! | height of a stamp | -256 voxels | 256 voxels |
 //!
 //! # Sculpting
@@ -96,12 +97,12 @@ pub use error::BrushError;
 pub use evaluator::Evaluator;
 pub(crate) use operation::Kind;
 pub use operation::Operation;
-pub use record::{BrushRecord, OperationName, RecordError, ShapeName};
+pub use record::{BrushRecord, ImageRecord, OperationName, RecordError, ShapeName, StampRecord};
 pub use request::Brush;
 pub use roughness::Roughness;
 pub(crate) use sculptor::{Around, Sculptor};
 pub use shape::Shape;
-pub use stamp::{ImageRecord, Stamp, StampRecord};
+pub use stamp::Stamp;
 
 use crate::lattice::ONE;
 

@@ -53,59 +53,14 @@ impl Stamp {
     }
 }
 
-/// A stamp as an object of a [`BrushRecord`](super::BrushRecord).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "they are those of a stamp")]
-pub struct StampRecord {
-    pub image: ImageRecord,
-    pub center: [f32; 3],
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rotation: Option<[f32; 4]>,
-    pub size: [f32; 2],
-    pub height: f32,
-}
-
-/// The image of a [`StampRecord`]: grey samples, 0 to 65535, row by row.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[expect(missing_docs, reason = "they are those of an image")]
-pub struct ImageRecord {
-    pub width: u32,
-    pub height: u32,
-    pub samples: Vec<u16>,
-}
-
-impl StampRecord {
-    /// The stamp; `None` where the image is none.
-    pub(super) fn stamp(&self) -> Option<Stamp> {
-        let ImageRecord { width, height, samples } = &self.image;
-        let image = GreyImage::from_samples(*width, *height, samples.clone()).ok()?;
-        let stamp =
-            Stamp::new(image, Vec3::from_array(self.center), Vec2::from_array(self.size), self.height);
-        Some(stamp.with_rotation(self.rotation.map_or(Quat::IDENTITY, Quat::from_array)))
-    }
-}
-
-impl From<&Stamp> for StampRecord {
-    fn from(stamp: &Stamp) -> Self {
-        let image = &stamp.image;
-        let samples = image.samples().to_vec();
-        Self {
-            image: ImageRecord { width: image.width(), height: image.height(), samples },
-            center: stamp.center.to_array(),
-            rotation: (stamp.rotation != Quat::IDENTITY).then(|| stamp.rotation.to_array()),
-            size: stamp.size.to_array(),
-            height: stamp.height,
-        }
-    }
-}
-
 /// Least and most samples along a side of an image.
 const SIDES: (u32, u32) = (2, 256);
 
 /// Most height.
 const HEIGHT: f32 = 256.0;
+
+/// What errors call the length that they tell, which is half of what a stamp has.
+const HALF: &str = "half the stamp size";
 
 /// The samples of an image of an allowed size.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -192,7 +147,7 @@ impl Press {
         Ok(Self {
             center: point("stamp center", stamp.center)?,
             rotation: turn(stamp.rotation)?,
-            half: [size("stamp size", stamp.size.x / 2.0)?, size("stamp size", stamp.size.y / 2.0)?],
+            half: [size(HALF, stamp.size.x / 2.0)?, size(HALF, stamp.size.y / 2.0)?],
             height: in_range("stamp height", stamp.height, -HEIGHT, HEIGHT)?,
             relief: Relief(Arc::clone(&stamp.image)),
         })
@@ -201,7 +156,7 @@ impl Press {
     pub fn check(&self) -> Result<(), BrushError> {
         check_point("stamp center", self.center)?;
         check_turn(self.rotation)?;
-        self.half.into_iter().try_for_each(|half| check_size("stamp size", half))?;
+        self.half.into_iter().try_for_each(|half| check_size(HALF, half))?;
         in_range("stamp height", self.height as f32 / ONE as f32, -HEIGHT, HEIGHT)?;
         Ok(())
     }
@@ -280,6 +235,17 @@ mod tests {
         let turned = ramp().onto(Vec3::new(0.3, 0.9, -0.2));
         let press = Press::quantize(&turned).unwrap();
         assert_eq!(Press::quantize(&press.stamp()).unwrap(), press);
+    }
+
+    #[test]
+    fn stamps_that_are_too_small_or_too_large_are_refused_by_half_their_size() {
+        let error = |size| Press::quantize(&Stamp { size, ..ramp() }).unwrap_err();
+        let (what, least, most) = (HALF, 0.25, 1024.0);
+        let small = BrushError::TooSmall { what, value: 0.125, least };
+        assert_eq!([error(Vec2::new(0.25, 4.0)), error(Vec2::new(4.0, 0.25))], [small; 2]);
+        assert_eq!(error(Vec2::new(4.0, 2050.0)), BrushError::TooLarge { what, value: 1025.0, most });
+        assert!(matches!(error(Vec2::new(f32::NAN, 4.0)), BrushError::NotFinite { .. }));
+        assert!(Press::quantize(&Stamp { size: Vec2::new(0.5, 2048.0), ..ramp() }).is_ok());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Boxes of lattice points, both ends included.
 
-use glam::IVec3;
+use glam::{I64Vec3, IVec3};
 
 /// A non-empty box of lattice points; `min` and `max` belong to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,9 +47,10 @@ impl LatticeBox {
         *own = Some(own.map_or(other, |own| own.union(other)));
     }
 
-    /// The box with `by` more points on every side.
+    /// The box with `by` more points on every side, as far as there are numbers for them.
     pub fn grown(self, by: i32) -> Self {
-        Self { min: self.min - by, max: self.max + by }
+        let by = IVec3::splat(by);
+        Self { min: self.min.saturating_sub(by), max: self.max.saturating_add(by) }
     }
 
     /// Do the boxes share a point, or lie one step apart, so that a lattice cell touches both?
@@ -57,15 +58,15 @@ impl LatticeBox {
         self.grown(1).intersection(other).is_some()
     }
 
-    /// Points along each axis.
+    /// Points along each axis; [`i32::MAX`] where there are more.
     pub fn size(self) -> IVec3 {
-        self.max - self.min + 1
+        self.max.saturating_sub(self.min).saturating_add(IVec3::ONE)
     }
 
-    /// Points in the box.
+    /// Points in the box; [`u64::MAX`] where there are more.
     pub fn volume(self) -> u64 {
-        let size = self.size().as_u64vec3();
-        size.x * size.y * size.z
+        let size = (self.max.as_i64vec3() - self.min.as_i64vec3() + 1).max(I64Vec3::ZERO).as_u64vec3();
+        size.x.saturating_mul(size.y).saturating_mul(size.z)
     }
 
     /// Every point of the box, x fastest, then z, then y.
@@ -96,5 +97,18 @@ mod tests {
         let cube = LatticeBox::new(IVec3::new(-1, 2, 3), IVec3::new(1, 3, 6)).unwrap();
         assert_eq!(cube.points().count() as u64, cube.volume());
         assert!(cube.points().all(|p| cube.contains(p)));
+    }
+
+    #[test]
+    fn boxes_as_large_as_numbers_go_are_boxes() {
+        let (all, middle) = (LatticeBox { min: IVec3::MIN, max: IVec3::MAX }, LatticeBox::point(IVec3::ZERO));
+        assert_eq!((all.grown(1), all.volume(), all.size()), (all, u64::MAX, IVec3::MAX));
+        assert!(all.meets(middle) && middle.meets(all) && all.encloses(middle));
+        let half = LatticeBox { min: IVec3::MIN.with_y(0), ..all };
+        assert_eq!(half.grown(i32::MAX).min, IVec3::new(i32::MIN, -i32::MAX, i32::MIN));
+        let flat = LatticeBox { min: IVec3::MIN.with_y(3), max: IVec3::new(i32::MAX, 3, i32::MIN) };
+        assert_eq!(flat.volume(), 1 << 32);
+        // Turned inside out.
+        assert_eq!(LatticeBox { min: IVec3::MAX, max: IVec3::MIN }.volume(), 0);
     }
 }

@@ -67,9 +67,9 @@ impl Column {
         IVec3::new(self.x, y, self.z)
     }
 
-    /// The column `dx`, `dz` voxels away.
+    /// The column `dx`, `dz` voxels away, or the last one that numbers reach.
     pub const fn offset(self, dx: i32, dz: i32) -> Self {
-        Self::new(self.x + dx, self.z + dz)
+        Self::new(self.x.saturating_add(dx), self.z.saturating_add(dz))
     }
 
     /// The four columns of the cell named by this one, counter-clockwise seen from above (x right, z down).

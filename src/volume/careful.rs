@@ -1,14 +1,15 @@
-//! Edits that look around: those that sculpt, and all of them under rules. Sample by sample.
+//! Edits that look around: those that sculpt, and all that rules bear on. Sample by sample.
 
 use glam::IVec3;
 use wide::i16x8;
 
+use super::bearing::BrickRules;
 use super::draft::Tool;
 use super::ledger::{Counts, Fate};
 use super::surroundings::Surroundings;
 use super::view::resolve;
 use super::workpiece::{Changed, Workpiece};
-use super::{DiggingRules, Layers, Sample, SampleView};
+use super::{Layers, Sample, SampleView};
 use crate::brush::{BAND, Kind, Sculptor};
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
@@ -17,11 +18,11 @@ use crate::lattice::LatticeBox;
 const LOOK: i32 = 64;
 
 impl Workpiece<'_> {
-    /// Applies an edit that sculpts, or any edit under rules, to some samples; returns those that changed.
+    /// Applies an edit that sculpts, or one that rules bear on, to some samples; returns those that changed.
     pub(super) fn carefully(
         &mut self,
         tool: &Tool,
-        rules: Option<&DiggingRules>,
+        rules: Option<&BrickRules>,
         samples: LatticeBox,
         distances: &[i16x8; 64],
         around: &Surroundings,
@@ -101,7 +102,7 @@ impl Workpiece<'_> {
         point: IVec3,
         index: usize,
         material: MaterialId,
-        rules: Option<&DiggingRules>,
+        rules: Option<&BrickRules>,
         around: &Surroundings,
         counts: &mut Counts<'_>,
     ) -> bool {
@@ -111,10 +112,12 @@ impl Workpiece<'_> {
             return false;
         }
         let (own, new) = (resolve(ground, point, old), resolve(ground, point, material));
-        let fate = rules.and_then(|rules| match (rules.is_protected(point), rules.is_unbreakable(own)) {
-            (true, _) => Some(Fate::Protected),
-            (_, true) => Some(Fate::Unbreakable),
-            _ => None,
+        let fate = rules.and_then(|own_rules| {
+            match (own_rules.is_protected(point), own_rules.rules.is_unbreakable(own)) {
+                (true, _) => Some(Fate::Protected),
+                (_, true) => Some(Fate::Unbreakable),
+                _ => None,
+            }
         });
         if let Some(fate) = fate {
             if own != new {
@@ -170,8 +173,8 @@ impl Below {
 }
 
 /// The samples that an edit reads which reaches these; `None` where it looks at none but those it changes.
-pub(super) fn reads(sculptor: Option<&Sculptor>, has_rules: bool, reach: LatticeBox) -> Option<LatticeBox> {
+pub(super) fn reads(sculptor: Option<&Sculptor>, is_bound: bool, reach: LatticeBox) -> Option<LatticeBox> {
     let look = IVec3::Y * if sculptor.is_some_and(|own| own.material().is_none()) { LOOK } else { 0 };
     let all = reach.grown(1);
-    (has_rules || sculptor.is_some()).then_some(LatticeBox { min: all.min - look, max: all.max + look })
+    (is_bound || sculptor.is_some()).then_some(LatticeBox { min: all.min - look, max: all.max + look })
 }

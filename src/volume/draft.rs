@@ -13,6 +13,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::bearing::RunRules;
 use super::brick::UniformBricks;
 use super::ledger::{Fate, Ledger};
 use super::runs::runs;
@@ -115,6 +116,8 @@ pub(crate) struct Tool {
     pub evaluator: Evaluator,
     pub sculptor: Option<Sculptor>,
     pub power: u8,
+    /// May some rule be against it?
+    pub is_bound: bool,
 }
 
 /// The part of an edit's reach that lies in the world; `None` when it lies outside.
@@ -130,7 +133,7 @@ pub struct EditWork<'a> {
     pub grid: ChunkGrid,
     pub(crate) tools: Vec<Tool>,
     jobs: Vec<Job>,
-    rules: Option<&'a DiggingRules>,
+    rules: Option<RunRules<'a>>,
 }
 
 impl<'a> EditWork<'a> {
@@ -142,18 +145,21 @@ impl<'a> EditWork<'a> {
             evaluator: edit.evaluator(),
             sculptor: edit.sculptor(),
             power: edit.power(),
+            is_bound: false,
         };
         let tools: Vec<Tool> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
         Self { base, grid, tools, jobs, rules: None }
     }
 
-    /// The same under rules.
-    pub(crate) fn under(self, rules: Option<&'a DiggingRules>) -> Self {
-        Self { rules, ..self }
+    /// The same under rules, which bear on these of the edits.
+    fn under(mut self, rules: Option<&'a DiggingRules>, bound: &[bool]) -> Self {
+        self.tools.iter_mut().zip(bound).for_each(|(tool, &is_bound)| tool.is_bound = is_bound);
+        self.rules = rules.and_then(|rules| RunRules::new(rules, &self.tools));
+        self
     }
 
-    /// Is there nothing but digs, adds and paint, and no rule? Cards know no more.
+    /// Is there nothing but digs, adds and paint that no rule bears on? Cards know no more.
     #[cfg(feature = "cuda")]
     pub(crate) fn is_plain(&self) -> bool {
         self.rules.is_none() && self.tools.iter().all(|tool| tool.sculptor.is_none())
@@ -250,11 +256,14 @@ impl Draft {
     ) -> Self {
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits.len(), EditEffect::default);
-        let (mut earlier, mut rest) =
-            (Changes::default(), runs(grid, edits, rules.is_some()).into_iter().peekable());
+        let is_bound = |edit: &&Edit| {
+            rules.is_some_and(|rules| reach(grid, edit).is_some_and(|own| rules.bear_on(own, edit.power())))
+        };
+        let bound: Vec<bool> = edits.iter().map(is_bound).collect();
+        let (mut earlier, mut rest) = (Changes::default(), runs(grid, edits, &bound).into_iter().peekable());
         while let Some(run) = rest.next() {
             let base = if run.start == 0 { base } else { base.over(&earlier.newer) };
-            let work = EditWork::new(base, grid, &edits[run.clone()]).under(rules);
+            let work = EditWork::new(base, grid, &edits[run.clone()]).under(rules, &bound[run.clone()]);
             apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
             if run.start > 0 || rest.peek().is_some() {
                 earlier.take(std::mem::take(&mut draft.bricks));
@@ -325,6 +334,6 @@ fn finish(work: &EditWork, jobs: &[Job], ledger: &mut Ledger) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
     let mut jobs = jobs.iter().filter(|job| work.reaches(job)).peekable();
     if jobs.peek().is_some() {
-        Workpiece::new(work.base, work.grid, pos).take(&work.tools, work.rules, jobs, ledger);
+        Workpiece::new(work.base, work.grid, pos).take(&work.tools, work.rules.as_ref(), jobs, ledger);
     }
 }

@@ -4,6 +4,7 @@
 //! whenever it is asked for. Bricks lie on the world's own grid and hold each sample once, so chunks that share a face
 //! read the same numbers there, and the samples of a world do not depend on its chunk size.
 
+mod bearing;
 mod brick;
 mod careful;
 mod draft;

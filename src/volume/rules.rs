@@ -2,11 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::IVec3;
-
+use super::Tally;
 use super::ledger::Fate;
-use super::{SampleView, Tally};
-use crate::brush::Around;
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, ONE};
 
@@ -40,7 +37,7 @@ pub struct DiggingRules {
     pub unbreakable: BTreeSet<MaterialId>,
     /// Nothing solid below this height, in voxels, is taken away.
     pub bedrock: Option<i32>,
-    /// Samples that no operation changes at all, paint included.
+    /// Samples that no operation changes at all, paint included. An edit pays for the boxes that it comes near.
     pub protected: Vec<LatticeBox>,
 }
 
@@ -73,16 +70,12 @@ impl DiggingRules {
         *self == Self::default()
     }
 
-    pub(super) fn is_protected(&self, at: IVec3) -> bool {
-        self.protected.iter().any(|samples| samples.contains(at))
-    }
-
     pub(super) fn is_unbreakable(&self, material: MaterialId) -> bool {
         self.unbreakable.contains(&material)
     }
 
     /// How much of a change a brush of this power makes that takes away what is solid, in 1/256, and why not all.
-    fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<Fate>) {
+    pub(super) fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<Fate>) {
         if self.bedrock.is_some_and(|bedrock| y < bedrock) || self.is_unbreakable(material) {
             return (0, Some(Fate::Unbreakable));
         }
@@ -94,37 +87,6 @@ impl DiggingRules {
             0 => (0, Some(Fate::TooHard)),
             part => (part, Some(Fate::Slowed)),
         }
-    }
-
-    /// The density that a sample may have instead of the proposed one, and why it is another one.
-    pub(super) fn judge(
-        &self,
-        view: &SampleView,
-        at: IVec3,
-        power: u8,
-        around: &Around,
-        proposed: i32,
-    ) -> (i32, Option<Fate>) {
-        let before = around.own();
-        if self.is_protected(at) {
-            return (before, Some(Fate::Protected));
-        }
-        if proposed <= before {
-            return (proposed, None);
-        }
-        let pace = |at: IVec3| self.pace(view.material(at), at.y, power);
-        let (part, fate) = if before < 0 {
-            pace(at)
-        } else {
-            // Air beside what is solid holds its surface.
-            let holds = |way: IVec3| if self.is_protected(at + way) { (0, None) } else { pace(at + way) };
-            around.solid_faces().map(holds).min_by_key(|(part, _)| *part).unwrap_or((ONE, None))
-        };
-        if part == ONE {
-            return (proposed, None);
-        }
-        let change = (i64::from(proposed) - i64::from(before)) * i64::from(part);
-        (before + ((change + i64::from(ONE) - 1) >> 8) as i32, fate)
     }
 }
 

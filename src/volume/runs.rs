@@ -12,19 +12,19 @@ const LONGEST: usize = 1 << 12;
 
 /// Cuts edits into runs, in order. In each, all that an edit reads but the samples it changes itself is as it was before
 /// the run: digs, adds and paint look at nothing else, and one that sculpts begins a new run where it would read what an
-/// earlier edit of the run may change. Under rules all edits look around.
-pub(super) fn runs(grid: ChunkGrid, edits: &[&Edit], has_rules: bool) -> Vec<Range<usize>> {
+/// earlier edit of the run may change. So does every edit that rules bear on: those are `bound`.
+pub(super) fn runs(grid: ChunkGrid, edits: &[&Edit], bound: &[bool]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut first = 0;
     let mut reaches: Vec<LatticeBox> = Vec::new();
     // Nothing is looked up while nothing sculpts.
     let mut is_known = 0;
-    for (number, edit) in edits.iter().enumerate() {
+    for (number, (edit, &is_bound)) in edits.iter().zip(bound).enumerate() {
         let sculptor = edit.sculptor();
-        if sculptor.is_none() && !has_rules {
+        if sculptor.is_none() && !is_bound {
             continue;
         }
-        let around = reach(grid, edit).and_then(|own| reads(sculptor.as_ref(), has_rules, own));
+        let around = reach(grid, edit).and_then(|own| reads(sculptor.as_ref(), is_bound, own));
         let Some(around) = around else { continue };
         reaches.extend(edits[is_known.max(first)..number].iter().filter_map(|edit| reach(grid, edit)));
         is_known = number;
@@ -55,7 +55,7 @@ mod tests {
         let at = |x: f32| Shape::sphere(Vec3::new(x, 0.0, 50.0), 4.0);
         let of = |brushes: &[Brush]| {
             let edits: Vec<Edit> = brushes.iter().map(|brush| Edit::quantize(brush).unwrap()).collect();
-            let runs = runs(grid, &edits.iter().collect::<Vec<_>>(), false);
+            let runs = runs(grid, &edits.iter().collect::<Vec<_>>(), &vec![false; edits.len()]);
             // Each ends where the next one begins.
             assert!(runs.windows(2).all(|pair| pair[0].end == pair[1].start));
             assert_eq!(runs.last().map_or(0, |run| run.end), edits.len());

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::IVec3;
 use wide::{i16x8, i32x8};
 
+use super::bearing::RunRules;
 use super::brick::{PRISTINE, row, solid_layers};
 use super::draft::{Job, Tool};
 use super::ledger::{Counts, Fate, Ledger, PartEffect};
 use super::surroundings::Surroundings;
 use super::view::resolve;
-use super::{Brick, DiggingRules, DraftedBrick, Layers, Sample, SampleView};
+use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
 use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE, hash};
@@ -51,12 +52,13 @@ impl<'a> Workpiece<'a> {
     pub fn take<'j>(
         &mut self,
         tools: &[Tool],
-        rules: Option<&DiggingRules>,
+        rules: Option<&RunRules>,
         jobs: impl Iterator<Item = &'j Job>,
         ledger: &mut Ledger,
     ) {
         let mut distances = [i16x8::ZERO; 64];
         let low = self.pos.origin();
+        let rules = rules.map(|rules| rules.of_brick(self.pos));
         for job in jobs {
             let (edit, tool) = (job.edit as usize, &tools[job.edit as usize]);
             let Some(reached) = tool.reach.and_then(|reach| reach.intersection(self.pos.samples())) else {
@@ -66,6 +68,7 @@ impl<'a> Workpiece<'a> {
             tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
             let first = ledger.counts.len();
             let mut counts = Counts { edit, first, list: &mut ledger.counts };
+            let rules = rules.as_ref().filter(|_| tool.is_bound);
             let is_careful = tool.sculptor.is_some() || rules.is_some();
             let around = is_careful.then(|| Surroundings::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {

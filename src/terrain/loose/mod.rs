@@ -171,11 +171,12 @@ pub(super) fn fall(
         }
         fallen.pieces.push(piece);
     }
+    let protected = protected_beside(world, &fallen.pieces);
     let air = air_around(&solid, &gone);
     for (&pos, layers) in &air {
         let mut air = bits::and(layers, &bits::within(pos, world.grid.edit_bounds()));
-        for protected in world.rules().iter().flat_map(|rules| &rules.protected) {
-            air = bits::without(&air, &bits::within(pos, *protected));
+        for &protected in &protected {
+            air = bits::without(&air, &bits::within(pos, protected));
         }
         bits::include(&mut gone, pos, &air);
     }
@@ -196,6 +197,16 @@ fn keep(rules: &DiggingRules, component: &Component, piece: &LoosePiece) -> bool
     rules.bedrock.is_some_and(|bedrock| piece.bounds.min.y < bedrock)
         || rules.unbreakable.iter().any(|&material| piece.materials.of(material) > 0)
         || rules.protected.iter().any(is_protected)
+}
+
+/// The protected boxes that pieces which are taken out may touch.
+fn protected_beside(world: &World, pieces: &[LoosePiece]) -> Vec<LatticeBox> {
+    let taken = pieces.iter().filter(|piece| piece.fate != PieceFate::Left).map(|piece| piece.bounds);
+    let (Some(rules), Some(all)) = (world.rules(), taken.reduce(LatticeBox::union)) else {
+        return Vec::new();
+    };
+    let all = all.grown(1);
+    rules.protected.iter().copied().filter(|own| own.intersection(all).is_some()).collect()
 }
 
 /// The air that touches pieces and no other ground.

@@ -1,0 +1,174 @@
+//! Edits, sample by sample, straight from what the documentation says.
+
+use bevy_burrow::brush::{BAND, Evaluator};
+use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::prelude::*;
+use glam::IVec3;
+
+use crate::witness::{Effect, Witness};
+
+impl Witness {
+    /// What an operation that sculpts makes of a sample, straight from what the crate's documentation says.
+    fn sculpted(&self, brush: &Brush, point: IVec3, outside: i32) -> Option<i32> {
+        let units = |voxels: f32| (voxels * 256.0).round_ties_even() as i32;
+        let deepest = match brush.shape {
+            Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => units(radius),
+            Shape::Cuboid { half, .. } => units(half.min_element()),
+            _ => panic!("no such shape is sculpted here"),
+        };
+        let (strength, falloff) = (units(brush.blend.strength), units(brush.blend.falloff).min(deepest));
+        let weight = match -outside {
+            inside if inside < 0 || inside == 0 && falloff > 0 => return None,
+            inside if inside >= falloff => strength,
+            inside => {
+                let t = inside * 256 / falloff;
+                ((t * t * (768 - 2 * t) / 65_536) * strength + 128) / 256
+            }
+        };
+        let (own, depth) = (self.distance(point), bevy_burrow::brush::DEPTH);
+        let is_cut = |at: IVec3| self.samples.get(&at).is_some_and(|&(distance, _)| distance.abs() == depth);
+        let away = |whole: i64| (whole.signum() * ((whole.abs() * i64::from(weight) + 255) / 256)) as i32;
+        let to = |target: i32| own + away(i64::from(target) - i64::from(own));
+        let faces = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
+        let faces: Vec<IVec3> = faces.map(|step| point + step).collect();
+        if weight == 0 {
+            return None;
+        }
+        if let Operation::Level { height } = brush.operation {
+            return Some(to(point.y * 256 - units(height)));
+        }
+        // Of what was cut off, no more is known than that it is a voxel farther than what is not.
+        let mut middle = own;
+        if is_cut(point) {
+            let sign = own.signum();
+            let known = faces.iter().filter(|&&face| !is_cut(face));
+            let nearest = known.map(|&face| self.distance(face) * sign).min()?;
+            let others = faces.iter().filter(|&&face| is_cut(face)).map(|_| depth).min();
+            middle = sign * (nearest.min(others.unwrap_or(i32::MAX)).max(0) + 256);
+        }
+        // 64 times the change that the average of 27 samples would be.
+        let average = || {
+            let mut sum = 0;
+            let steps = (0..27).map(|i| IVec3::new(i % 3, i / 3 % 3, i / 9) - 1);
+            for step in steps.filter(|&step| step != IVec3::ZERO) {
+                let length = (256.0 * step.as_dvec3().length()).round() as i32;
+                let weight = [8, 4, 2, 1][step.abs().element_sum() as usize];
+                let is_known = |at: IVec3| !is_cut(at) || middle.abs() + length <= depth;
+                if is_known(point + step) && is_known(point - step) {
+                    sum += weight * (self.distance(point + step) - middle).clamp(-512, 512);
+                }
+            }
+            sum
+        };
+        let attached = |after: i32| {
+            let same = |at: &IVec3| (self.distance(*at) < 0) == (after < 0);
+            if (own < 0) == (after < 0) || faces.iter().any(same) { after } else { -i32::from(own < 0) }
+        };
+        let shift = |voxels: f32| (units(voxels) * weight + 128) / 256;
+        match brush.operation {
+            Operation::Smooth => match average() * weight / (64 * 256) {
+                0 => None,
+                by => Some(attached(middle + by)),
+            },
+            Operation::Sharpen => match (average() * weight / (64 * 256)).clamp(-64, 64) {
+                0 => None,
+                by => {
+                    let around = LatticeBox::point(point).grown(1);
+                    let all: Vec<i32> = around.points().map(|at| self.distance(at)).collect();
+                    let (low, high) = (all.iter().min()?, all.iter().max()?);
+                    Some(attached((middle - by).clamp(*low, *high)))
+                }
+            },
+            Operation::Raise { amount } => (shift(amount) != 0).then(|| middle - shift(amount)),
+            Operation::Lower { amount } => (shift(amount) != 0).then(|| middle + shift(amount)),
+            Operation::Terrace { step, base } => {
+                let (step, base) = (units(step), units(base));
+                let surface = point.y * 256 - middle;
+                let tread = (surface - base).div_euclid(step) * step;
+                let riser = ((surface - base - tread - step * 3 / 8) * 4).clamp(0, step);
+                let by = away(i64::from(surface) - i64::from(base + tread + riser));
+                (by != 0).then_some(middle + by)
+            }
+            _ => panic!("{brush:?}"),
+        }
+    }
+
+    /// What a sample is made of that becomes solid.
+    fn new_material(&self, brush: &Brush, point: IVec3) -> MaterialId {
+        if let Some(material) = brush.blend.material {
+            return material;
+        }
+        let column = (1..=64).map(|by| -by).chain(1..=64).map(|by| point + IVec3::Y * by);
+        let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|step| point + step);
+        let solid = column.chain(beside).find(|&at| self.distance(at) < 0);
+        let stored = solid.and_then(|at| self.samples.get(&at));
+        stored.map_or(MaterialId::GROUND, |&(_, material)| material)
+    }
+
+    /// Applies a brush to the naive samples.
+    pub fn naive(&mut self, brush: &Brush, edit: &Edit) -> Effect {
+        let (grid, ground) = (self.terrain.world().grid(), self.terrain.world().ground());
+        let mut effect = Effect::default();
+        let mut changes = Vec::new();
+        let Some(reach) = edit.reach().intersection(grid.edit_bounds()) else { return effect };
+        let evaluator: Evaluator = edit.evaluator();
+        let mut row = vec![0; reach.size().x as usize];
+        for (y, z) in
+            (reach.min.y..=reach.max.y).flat_map(|y| (reach.min.z..=reach.max.z).map(move |z| (y, z)))
+        {
+            evaluator.row(IVec3::new(reach.min.x, y, z), &mut row);
+            for (x, &outside) in (reach.min.x..).zip(&row) {
+                let point = IVec3::new(x, y, z);
+                let stored = self.samples.get(&point).copied();
+                let before = stored.map_or_else(|| ground.distance(point), |(distance, _)| distance);
+                let own = stored.map_or(MaterialId::GROUND, |(_, material)| material);
+                let after = edit.operation().apply(before, outside);
+                let number = after.clamp(-32767, 32767);
+                match edit.operation() {
+                    operation if operation.is_sculpting() => {
+                        let after =
+                            self.sculpted(brush, point, outside).map(|after| after.clamp(-32767, 32767));
+                        let Some(after) = after.filter(|&after| after != before.clamp(-32767, 32767)) else {
+                            continue;
+                        };
+                        let material = match (before < 0, after < 0) {
+                            (true, false) => MaterialId::GROUND,
+                            (false, true) => self.new_material(brush, point),
+                            _ => own,
+                        };
+                        changes.push((point, before, (after, material)));
+                    }
+                    Operation::Paint { material } => {
+                        if outside <= 0 && before < 0 && (stored.is_none() || own != material) {
+                            changes.push((point, before, (number, material)));
+                        }
+                    }
+                    operation => {
+                        if outside <= BAND && after != before && stored.is_none_or(|(d, _)| d != number) {
+                            let material = match (before < 0, after < 0) {
+                                (true, false) => MaterialId::GROUND,
+                                (false, true) => operation.material().unwrap_or(own),
+                                _ => own,
+                            };
+                            changes.push((point, before, (number, material)));
+                        }
+                    }
+                }
+            }
+        }
+        for (point, before, (after, material)) in changes {
+            let old = self.material(point);
+            self.samples.insert(point, (after, material));
+            let new = self.material(point);
+            effect.chunks.insert(grid.chunk_of(point));
+            LatticeBox::include(&mut effect.bounds, LatticeBox::point(point));
+            match (before < 0, after < 0) {
+                (true, false) => *effect.removed.entry(old).or_default() += 1,
+                (false, true) => *effect.added.entry(new).or_default() += 1,
+                (true, true) if old != new => *effect.painted.entry(new).or_default() += 1,
+                _ => {}
+            }
+        }
+        effect
+    }
+}

@@ -1,0 +1,95 @@
+//! What a world under test is compared with.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use bevy_burrow::lattice::{ChunkPos, LatticeBox, TilePos};
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::block::Mesher;
+use bevy_burrow::volume::FieldId;
+use glam::IVec3;
+
+use crate::bits::{MeshBits, mesh_bits};
+
+/// Every edited sample: density and stored material.
+pub type Samples = HashMap<IVec3, (i32, MaterialId)>;
+
+/// What an edit did, by the naive count.
+#[derive(Debug, Default, PartialEq)]
+pub struct Effect {
+    pub chunks: BTreeSet<ChunkPos>,
+    pub bounds: Option<LatticeBox>,
+    pub removed: BTreeMap<MaterialId, u64>,
+    pub added: BTreeMap<MaterialId, u64>,
+    pub painted: BTreeMap<MaterialId, u64>,
+}
+
+/// A world that is edited sample by sample, and whatever else has to be true of the one under test.
+pub struct Witness {
+    pub terrain: Terrain,
+    pub samples: Samples,
+    /// Meshes as a game has them that only ever hears of updates.
+    pub tiles: HashMap<TilePos, MeshBits>,
+    pub chunks: HashMap<ChunkPos, MeshBits>,
+    /// Kinds of bricks that were all alike at some commit.
+    pub kinds: HashSet<(i32, MaterialId)>,
+    pub fields: BTreeSet<(ChunkPos, FieldId)>,
+    pub mesher: Mesher,
+    /// A tall cliff's sheets have too many blocks to be meshed twice each time.
+    pub is_meshed_again: bool,
+}
+
+impl Witness {
+    pub fn new(ground: Ground, chunk_size: u32) -> Self {
+        let settings = TerrainSettings { chunk_size, ..Default::default() };
+        let terrain = Terrain::new(ground, &settings).expect("valid settings");
+        let world = terrain.world();
+        let tiles = world.grid().tiles().map(|tile| (tile, mesh_bits(&world.tile_mesh(tile)))).collect();
+        Self {
+            terrain,
+            samples: Samples::default(),
+            tiles,
+            chunks: HashMap::new(),
+            kinds: HashSet::new(),
+            fields: BTreeSet::new(),
+            mesher: Mesher::default(),
+            is_meshed_again: true,
+        }
+    }
+
+    /// One transaction of these brushes, and every check there is.
+    pub fn apply(&mut self, brushes: &[Brush], what: &str) {
+        for brush in brushes {
+            self.terrain.submit(brush);
+        }
+        let transaction = self.terrain.begin().expect("brushes wait");
+        let mut commit = transaction.run();
+        let news = commit.field_news().to_vec();
+        // Whoever swaps meshes may take them away; the world keeps its own.
+        let meshes = std::mem::take(&mut commit.meshes);
+        let receipts = self.terrain.commit(commit).expect("nothing else commits");
+        assert_eq!(receipts.len(), brushes.len(), "{what}");
+        for (receipt, brush) in receipts.iter().zip(brushes) {
+            self.check_receipt(receipt, brush, what);
+        }
+        self.check_samples(what);
+        self.check_bricks(what);
+        self.check_fields(&news, what);
+        self.check_mask(what);
+        self.check_updates(&meshes, what);
+        if self.is_meshed_again {
+            self.check_meshes(what);
+        }
+    }
+
+    pub fn material(&self, point: IVec3) -> MaterialId {
+        match self.samples.get(&point) {
+            Some(&(_, material)) if material != MaterialId::GROUND => material,
+            _ => self.terrain.world().ground().material(point),
+        }
+    }
+
+    pub fn distance(&self, point: IVec3) -> i32 {
+        let stored = self.samples.get(&point);
+        stored.map_or_else(|| self.terrain.world().ground().distance(point), |&(distance, _)| distance)
+    }
+}

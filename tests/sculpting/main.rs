@@ -1,0 +1,9 @@
+//! What sculpting does to ground: what each operation promises, measured on the surface itself.
+
+mod bookkeeping;
+mod measured;
+mod moved;
+mod planes;
+mod smoothed;
+#[path = "../worlds/mod.rs"]
+mod worlds;
