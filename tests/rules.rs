@@ -322,3 +322,32 @@ fn rules_can_be_taken_back() {
     free.apply([&dig]);
     assert_eq!(free.world().hash(), terrain.world().hash());
 }
+
+#[test]
+fn what_is_built_on_ground_that_stays_is_dug_off_without_a_scar() {
+    let ground = Arc::new(Ground::flat(32, 32, 19.9).expect("valid"));
+    let below = LatticeBox::new(IVec3::new(0, -100, 0), IVec3::new(32, 19, 32)).expect("in order");
+    let none = DiggingRules::default;
+    for rules in [
+        none().with_protected(below),
+        none().with_unbreakable(MaterialId(0)),
+        none().with_bedrock(20),
+        none().with_hardness(MaterialId(0), 100),
+    ] {
+        let mut terrain = terrain(&ground, 32, &rules);
+        let dig = Brush::dig(Shape::sphere(Vec3::new(16.0, 20.0, 16.0), 4.0)).with_power(0);
+        terrain.apply([&dig]);
+        let height = |terrain: &Terrain| terrain.world().height(16.0, 16.0).expect("inside");
+        let before = height(&terrain);
+        let bumps = (0..25).map(|i| {
+            let place = Vec3::new(14.0 + (i % 5) as f32, 20.0, 14.0 + (i / 5) as f32);
+            Brush::add(Shape::sphere(place, 0.3), MaterialId(7))
+        });
+        terrain.apply(bumps);
+        assert!(height(&terrain) > before + 0.1);
+        let receipts = terrain.apply([&dig]);
+        let applied = receipts[0].outcome.as_ref().expect("applied");
+        assert_eq!(applied.removed.total(), 25, "the bumps");
+        assert!((height(&terrain) - before).abs() < 0.01, "{before} became {}", height(&terrain));
+    }
+}

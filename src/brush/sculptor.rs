@@ -63,10 +63,15 @@ impl Around {
         self.densities[Self::MIDDLE]
     }
 
+    /// The density one step away.
+    pub fn density(&self, way: IVec3) -> i32 {
+        self.densities[Self::index(way.to_array())]
+    }
+
     /// Where there is a solid neighbour across a face.
     pub fn solid_faces(&self) -> impl Iterator<Item = IVec3> {
         let ways = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
-        ways.filter(|way| self.densities[Self::index(way.to_array())] < 0)
+        ways.filter(|way| self.density(*way) < 0)
     }
 
     /// The six neighbours across faces.

@@ -134,6 +134,7 @@ struct InFlight {
     ticket: u64,
     work: Work,
     /// Has the plugin a task for it?
+    #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
     is_plugins: bool,
 }
 

@@ -93,18 +93,22 @@ impl<'a> BrickRules<'a> {
             return (proposed, None);
         }
         let pace = |at: IVec3| self.rules.pace(view.material(at), at.y, power);
+        let holds = |way: IVec3| if self.is_protected(at + way) { (0, None) } else { pace(at + way) };
         let (part, fate) = if before < 0 {
             pace(at)
         } else {
             // Air beside what is solid holds its surface.
-            let holds = |way: IVec3| if self.is_protected(at + way) { (0, None) } else { pace(at + way) };
             around.solid_faces().map(holds).min_by_key(|(part, _)| *part).unwrap_or((ONE, None))
         };
-        if part == ONE {
-            return (proposed, None);
-        }
         let change = (i64::from(proposed) - i64::from(before)) * i64::from(part);
-        (before + ((change + i64::from(ONE) - 1) >> 8) as i32, fate)
+        let mut allowed = before + ((change + i64::from(ONE) - 1) >> 8) as i32;
+        if before < 0 && allowed >= 0 {
+            // What turns to air beside ground that stays uncovers it, and takes nothing of it.
+            for way in around.solid_faces().filter(|&way| holds(way).0 == 0) {
+                allowed = allowed.min((ONE + around.density(way)).max(0));
+            }
+        }
+        (allowed, fate)
     }
 }
 

@@ -1,5 +1,7 @@
 //! A brick with the samples around it, as they were before an edit.
 
+use std::ops::RangeInclusive;
+
 use glam::{IVec3, USizeVec3};
 
 use super::{Brick, SampleView};
@@ -32,7 +34,29 @@ impl Surroundings {
                 own.enter(brick, step.as_usizevec3());
             }
         }
+        let (width, depth) = (view.ground().width(), view.ground().depth());
+        own.go_on_beyond(inside(low.x, width), inside(low.z, depth));
         own
+    }
+
+    /// Beyond the world's rim, where nobody can edit anything, all goes on as it is at the rim.
+    fn go_on_beyond(&mut self, xs: RangeInclusive<usize>, zs: RangeInclusive<usize>) {
+        if (xs.clone(), zs.clone()) == (0..=SIDE - 1, 0..=SIDE - 1) {
+            return;
+        }
+        for (layer, cut) in self.densities.iter_mut().zip(&mut self.cut) {
+            for (row, cut) in layer.iter_mut().zip(&mut *cut) {
+                for x in (0..SIDE).filter(|x| !xs.contains(x)) {
+                    let from = x.clamp(*xs.start(), *xs.end());
+                    row[x] = row[from];
+                    *cut = *cut & !(1 << x) | (*cut >> from & 1) << x;
+                }
+            }
+            for z in (0..SIDE).filter(|z| !zs.contains(z)) {
+                let from = z.clamp(*zs.start(), *zs.end());
+                (layer[z], cut[z]) = (layer[from], cut[from]);
+            }
+        }
     }
 
     /// Enters the samples of a brick so many steps from the lowest one.
@@ -73,6 +97,12 @@ impl Surroundings {
         }
         around
     }
+}
+
+/// Which of the surroundings' samples along an axis lie in a world of so many cells; at least one is taken to.
+fn inside(low: i32, cells: i32) -> RangeInclusive<usize> {
+    let local = |at: i32| (at.saturating_sub(low)).clamp(0, SIDE as i32 - 1) as usize;
+    local(0)..=local(cells)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod bookkeeping;
 mod measured;
 mod moved;
 mod planes;
+mod rim;
 mod smoothed;
 #[path = "../worlds/mod.rs"]
 mod worlds;
