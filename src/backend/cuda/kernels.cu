@@ -12,7 +12,7 @@
 //
 // Blocks share nothing but counters from which each reserves room for its output, so blocks come out in any order, while
 // the order inside a block is fixed. Counters go on past the end of the room: the host then knows how much is needed.
-// They are 32 bits wide; what one launch may ask for must fit (see layout.rs).
+// They are 32 bits wide; what one launch may ask for must fit (see layout/).
 //
 // The same sources are compiled for the CPU by tools/emulator, as plain C++, to be tested where there is no device.
 

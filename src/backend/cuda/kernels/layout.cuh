@@ -1,4 +1,4 @@
-// What host and kernels hand each other, and the numbers of the lattice. layout.rs has the same in Rust.
+// What host and kernels hand each other, and the numbers of the lattice. layout/ has the same in Rust.
 #pragma once
 
 typedef unsigned char u8;
@@ -164,9 +164,9 @@ struct HeightsParams {
     u32 octaves, is_ridged, pad;
 };
 
-static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout.rs");
-static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout.rs");
-static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout.rs");
-static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout.rs");
-static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout.rs");
-static_assert(sizeof(HeightsParams) == 128, "see layout.rs");
+static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
+static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout/");
+static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
+static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");
+static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout/");
+static_assert(sizeof(HeightsParams) == 128, "see layout/");
