@@ -100,6 +100,8 @@ pub use record::{BrushRecord, OperationName, RecordError, ShapeName};
 pub use request::Brush;
 pub use roughness::Roughness;
 pub(crate) use sculptor::{Around, Sculptor};
+#[cfg(feature = "cuda")]
+pub(crate) use sculptor::{SculptorConstants, Stroke};
 pub use shape::Shape;
 pub use stamp::{ImageRecord, Stamp, StampRecord};
 

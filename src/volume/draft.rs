@@ -153,10 +153,16 @@ impl<'a> EditWork<'a> {
         Self { rules, ..self }
     }
 
-    /// Is there nothing but digs, adds and paint, and no rule? Cards know no more.
+    /// Are there rules? Cards know none.
     #[cfg(feature = "cuda")]
-    pub(crate) fn is_plain(&self) -> bool {
-        self.rules.is_none() && self.tools.iter().all(|tool| tool.sculptor.is_none())
+    pub(crate) fn has_rules(&self) -> bool {
+        self.rules.is_some()
+    }
+
+    /// Does any edit sculpt?
+    #[cfg(feature = "cuda")]
+    pub(crate) fn sculpts(&self) -> bool {
+        self.tools.iter().any(|tool| tool.sculptor.is_some())
     }
 
     /// The jobs of each brick, in order of the edits.

@@ -168,7 +168,7 @@ impl Session {
         let slots = places.iter().map(|&place| self.need_stack(uploads, place));
         let columns: Vec<_> =
             places.iter().copied().zip(slots.collect::<Result<Vec<u32>, Fault>>()?).collect();
-        let windows = Windows::around(view.samples, blocks.iter().map(|block| block.brick));
+        let windows = Windows::around(view.samples, blocks.iter().map(|block| block.brick), 1);
         let refs = self.refs(&windows, uploads)?;
         let single = ground.single_material().map(MaterialMix::pure);
         let plain = single.filter(|_| refs.iter().all(|&at| at == NONE || at & 1 == 0));

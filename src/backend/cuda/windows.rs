@@ -2,7 +2,9 @@
 //!
 //! Bricks that lie close together share a window, a box of bricks around them: so each is looked up once.
 
-use crate::lattice::BrickPos;
+use glam::IVec3;
+
+use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::window::{Window, shared};
 use crate::volume::{Brick, SampleView};
 
@@ -33,12 +35,17 @@ pub(super) struct Windows<'a> {
 pub(super) type Refs<'a> = (Vec<u32>, Vec<(u32, &'a Brick)>);
 
 impl<'a> Windows<'a> {
-    /// Windows around bricks, sorted by stacks.
-    pub fn around(view: SampleView<'a>, bricks: impl Iterator<Item = BrickPos> + Clone) -> Self {
+    /// Windows around bricks, sorted by stacks: one brick more to all sides, and so many up and down.
+    pub fn around(
+        view: SampleView<'a>,
+        bricks: impl Iterator<Item = BrickPos> + Clone,
+        up_and_down: i32,
+    ) -> Self {
         let (mut groups, mut of, mut rest) = (Vec::new(), Vec::new(), bricks);
+        let more = IVec3::Y * (up_and_down - 1);
         while let Some((count, places)) = shared(rest.clone()) {
             of.resize(of.len() + count, groups.len() as u32);
-            groups.push(places);
+            groups.push(LatticeBox { min: places.min - more, max: places.max + more });
             rest.by_ref().take(count).for_each(drop);
         }
         let mut first = 0;
@@ -81,8 +88,6 @@ mod tests {
     use std::collections::BTreeSet;
     use std::sync::Arc;
 
-    use glam::IVec3;
-
     use super::*;
     use crate::ground::Ground;
     use crate::volume::Bricks;
@@ -104,7 +109,7 @@ mod tests {
             stored.insert(at, Arc::new(brick));
         }
         let asked: BTreeSet<_> = (0..60).map(|_| place(&mut rng)).collect();
-        let windows = Windows::around(SampleView::new(&ground, &stored), asked.iter().copied().map(pos));
+        let windows = Windows::around(SampleView::new(&ground, &stored), asked.iter().copied().map(pos), 8);
         let (mut refs, missing) = windows.refs(|brick| {
             let code = brick.tag.get() as u32;
             (!code.is_multiple_of(3)).then_some(code)
@@ -117,7 +122,8 @@ mod tests {
         for (number, at) in asked.into_iter().map(pos).enumerate() {
             let entry = windows.entry(number, at);
             let [x, z] = [entry.strides & 0xffff, entry.strides >> 16].map(|stride| stride as i32);
-            for step in (0..27).map(|i| IVec3::new(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1)) {
+            let around = (0..27).map(|i| IVec3::new(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1));
+            for step in around.chain((-8..=8).map(|up| IVec3::Y * up)) {
                 let found = refs[(entry.number as i32 + step.x * x + step.z * z + step.y) as usize];
                 let expected = stored.get(&BrickPos(at.0 + step)).map_or(NONE, |_| code(at.0 + step));
                 assert_eq!(found, expected, "{at:?} {step}");

@@ -1,106 +1,20 @@
 //! Edits on the device: one launch for all bricks that they may reach.
+//!
+//! Those that look around take another kernel, which knows the bricks around too: see [`careful`](self::careful).
 
-use std::sync::Arc;
+mod careful;
+mod output;
 
-use super::device::{Device, Fault, Kernel};
-use super::layout::{
-    self, EditCount, EditJob, EditParams, EditPart, EditResult, MATERIAL_BYTES, MOST_JOBS, MOST_LIST, NONE,
-    RECORD_BYTES,
-};
-use super::mail::{Outbox, Plan, fill, map};
+use super::device::{Fault, Kernel};
+use super::layout::{self, EditJob, EditParams, EditResult, MOST_JOBS, MOST_LIST, NONE};
+use super::mail::{Plan, fill, map};
 use super::session::{Session, Uploads};
 use super::slots::reference;
-use crate::ground::MaterialId;
-use crate::lattice::{BrickPos, ChunkGrid};
-use crate::volume::{Brick, Count, DraftedBrick, EditWork, Fate, Job, Ledger, PartEffect, Tool};
-
-/// What the edit kernel writes.
-pub(super) struct EditOutput {
-    results: Outbox,
-    records: Outbox,
-    materials: Outbox,
-    parts: Outbox,
-    counts: Outbox,
-    totals: Outbox,
-}
-
-/// How many entries of each list the kernel wanted to write.
-#[derive(Clone, Copy, Debug, Default)]
-struct Totals {
-    records: usize,
-    materials: usize,
-    parts: usize,
-    counts: usize,
-}
-
-/// Entries that there is room for at the start.
-const FIRST: usize = 1 << 8;
-
-impl EditOutput {
-    pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
-        Ok(Self {
-            results: Outbox::new(device, size_of::<EditResult>(), FIRST)?,
-            records: Outbox::new(device, RECORD_BYTES, FIRST)?,
-            materials: Outbox::new(device, MATERIAL_BYTES, FIRST)?,
-            parts: Outbox::new(device, size_of::<EditPart>(), 4 * FIRST)?,
-            counts: Outbox::new(device, size_of::<EditCount>(), 4 * FIRST)?,
-            totals: Outbox::new(device, size_of::<u32>(), 4)?,
-        })
-    }
-
-    /// Room for all that; says whether there was too little.
-    fn reserve(&mut self, device: &mut dyn Device, totals: Totals, is_long: bool) -> Result<bool, Fault> {
-        let mut grown = self.records.reserve(device, totals.records, is_long)?;
-        grown |= self.materials.reserve(device, totals.materials, is_long)?;
-        grown |= self.parts.reserve(device, totals.parts, is_long)?;
-        grown |= self.counts.reserve(device, totals.counts, is_long)?;
-        Ok(grown)
-    }
-
-    /// Copies what is not here yet.
-    fn fetch(&mut self, device: &mut dyn Device, totals: Totals) -> Result<(), Fault> {
-        let mut is_copied = self.records.fetch(device, totals.records)?;
-        is_copied |= self.materials.fetch(device, totals.materials)?;
-        is_copied |= self.parts.fetch(device, totals.parts)?;
-        is_copied |= self.counts.fetch(device, totals.counts)?;
-        if is_copied { device.wait() } else { Ok(()) }
-    }
-
-    /// How much of each list was written. Asking the device takes longer than a small launch; so where lists are in the
-    /// host's memory, they are wiped before, and end where no entry stands.
-    fn totals(&mut self, results: usize) -> Totals {
-        if !self.parts.is_mapped() {
-            let mut totals = [0; 4];
-            totals.copy_from_slice(self.totals.entries::<u32>(4));
-            let [records, materials, parts, counts] = totals.map(|count: u32| count as usize);
-            return Totals { records, materials, parts, counts };
-        }
-        let (parts, counts) = (self.parts.capacity() as usize, self.counts.capacity() as usize);
-        let parts = self.parts.entries::<EditPart>(parts).iter().take_while(|part| part.job != NONE).count();
-        let counts =
-            self.counts.entries::<EditCount>(counts).iter().take_while(|count| count.edit != NONE).count();
-        self.parts.wrote(parts);
-        self.counts.wrote(counts);
-        // A list that is full may have been too short; nobody knows by how much.
-        let wanted = |count: usize, list: &Outbox| match list.capacity() as usize {
-            full if full == count => 2 * count,
-            _ => count,
-        };
-        let mut totals = Totals {
-            records: 0,
-            materials: 0,
-            parts: wanted(parts, &self.parts),
-            counts: wanted(counts, &self.counts),
-        };
-        for result in self.results.entries::<EditResult>(results) {
-            let is = |flag: u32| result.flags & flag != 0;
-            let is_stored = is(EditResult::CHANGED) && !is(EditResult::UNIFORM);
-            totals.records += usize::from(is_stored);
-            totals.materials += usize::from(is_stored && is(EditResult::HAS_MATERIALS));
-        }
-        totals
-    }
-}
+use crate::lattice::BrickPos;
+use crate::volume::{EditWork, Job, Ledger, Tool};
+use careful::{Care, Look};
+pub(super) use output::EditOutput;
+use output::Totals;
 
 /// From how many bricks on they are dealt with side by side.
 const LONG: usize = 1024;
@@ -111,29 +25,51 @@ const COPIED: usize = 256;
 /// Most passes: each gives twice the room where it is not known how much is needed.
 const PASSES: usize = 12;
 
-/// Bricks that one thread makes of what came back.
-const GROUP: usize = 64;
-
 /// A slot that is to hold a changed brick, with its tag.
 type Target = (u32, u64);
 
-/// A brick that edits may reach: what it is now, its stack, and where its edits begin in the list.
+/// A brick that edits may reach: what it is now, its stack, where its edits begin in the list, and where it is in the
+/// windows, with the way to its neighbours there.
 struct Site {
     pos: BrickPos,
     base: u32,
     stack: u32,
     first: u32,
+    window: u32,
+    strides: u32,
 }
 
 impl Session {
-    /// Applies edits: what they changed, brick by brick.
+    /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
     pub fn edit(&mut self, work: &EditWork) -> Result<Vec<Ledger>, Fault> {
+        let bricks = work.bricks_in_reach();
+        if !work.sculpts() {
+            return self.try_edits(work, &bricks, None).map(Option::unwrap_or_default);
+        }
+        // Most new ground finds its material close by.
+        for look in [Look::Near, Look::Far] {
+            if let Some(ledgers) = self.try_edits(work, &bricks, Some(look))? {
+                return Ok(ledgers);
+            }
+        }
+        Err(Fault::Failed("new ground looked too far".into()))
+    }
+
+    /// The same, where edits look no farther than that; `None` where they did.
+    fn try_edits(
+        &mut self,
+        work: &EditWork,
+        bricks: &[&[Job]],
+        look: Option<Look>,
+    ) -> Result<Option<Vec<Ledger>>, Fault> {
         self.begin();
-        let (bricks, mut uploads) = (work.bricks_in_reach(), Uploads::new(work.base.ground()));
+        let mut uploads = Uploads::new(work.base.ground());
         let mut targets = Vec::with_capacity(bricks.len());
-        let ledgers = self.run_edits(work, &bricks, &mut uploads, &mut targets);
+        let ledgers = self.run_edits(work, bricks, look, &mut uploads, &mut targets);
         if ledgers.is_err() {
             self.give_up(&uploads);
+        }
+        if !matches!(ledgers, Ok(Some(_))) {
             targets.iter().for_each(|&(slot, _)| self.bricks.give_back(slot));
         }
         ledgers
@@ -143,13 +79,20 @@ impl Session {
         &mut self,
         work: &EditWork<'a>,
         bricks: &[&[Job]],
+        look: Option<Look>,
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
-    ) -> Result<Vec<Ledger>, Fault> {
-        if bricks.len() > MOST_JOBS || work.jobs().len() > MOST_LIST {
+    ) -> Result<Option<Vec<Ledger>>, Fault> {
+        // Edits that sculpt enter twice as many counts.
+        let most = if look.is_some() { MOST_LIST / 2 } else { MOST_LIST };
+        if bricks.len() > MOST_JOBS || work.jobs().len() > most {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
-        let sites = self.sites(work, bricks, uploads)?;
+        let mut care = look.map(|look| Care::new(work, bricks, look));
+        let sites = match &mut care {
+            Some(care) => self.careful_sites(bricks, care, uploads)?,
+            None => self.sites(work, bricks, uploads)?,
+        };
         self.bricks.take_many(&mut *self.device, sites.len(), targets)?;
         let mut plan = Plan::default();
         uploads.plan(&mut plan);
@@ -157,6 +100,7 @@ impl Session {
         let tool_list = plan.section::<layout::Tool>(work.tools.len());
         let edits = plan.section::<u32>(bricks.iter().map(|jobs| jobs.len()).sum());
         let counters = plan.section::<u32>(4);
+        care.iter_mut().for_each(|care| care.plan(&mut plan));
         self.inbox.open(&mut *self.device, &plan)?;
         let list = self.inbox.entries::<u32>(edits).iter_mut();
         list.zip(bricks.iter().copied().flatten()).for_each(|(entry, job)| *entry = job.edit);
@@ -169,11 +113,14 @@ impl Session {
             first: site.first,
             count: bricks[number].len() as u32,
             cuts: layout::cuts(work.grid, site.pos),
-            pad: [0; 3],
+            window: site.window,
+            strides: site.strides,
+            pad: 0,
         });
         let tools: Vec<layout::Tool> = work.tools.iter().map(tool).collect();
         self.inbox.put(tool_list, &tools);
         self.inbox.entries::<u32>(counters).fill(0);
+        care.iter().for_each(|care| care.put(&mut self.inbox));
         let is_long = sites.len() >= COPIED;
         self.edits.results.reserve(&mut *self.device, sites.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
@@ -199,7 +146,14 @@ impl Session {
                 part_capacity: self.edits.parts.capacity(),
                 count_capacity: self.edits.counts.capacity(),
             };
-            self.device.launch(Kernel::Edit, sites.len() as u32, bytemuck::bytes_of(&params))?;
+            let blocks = sites.len() as u32;
+            match &care {
+                None => self.device.launch(Kernel::Edit, blocks, bytemuck::bytes_of(&params))?,
+                Some(care) => {
+                    let params = care.params(params, &self.inbox);
+                    self.device.launch(Kernel::Careful, blocks, bytemuck::bytes_of(&params))?;
+                }
+            }
             self.edits.results.fetch(&mut *self.device, sites.len())?;
             if !self.edits.parts.is_mapped() {
                 self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
@@ -207,10 +161,13 @@ impl Session {
             self.device.wait()?;
             self.times = self.device.times();
             let totals = self.edits.totals(sites.len());
+            if care.is_some() && self.edits.is_too_far(sites.len()) {
+                return Ok(None);
+            }
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
                 self.edits.fetch(&mut *self.device, totals)?;
                 self.free_targets(targets);
-                return Ok(self.edits.ledgers(work, bricks, targets, totals));
+                return Ok(Some(self.edits.ledgers(work, bricks, targets, totals)));
             }
             // Once more, with room for all.
         }
@@ -244,7 +201,7 @@ impl Session {
                 Some((brick, Some(slot))) => reference(slot, brick),
                 Some((brick, None)) => self.need_brick(uploads, brick)?,
             };
-            sites.push(Site { pos, base, stack, first });
+            sites.push(Site { pos, base, stack, first, window: 0, strides: 0 });
             first += jobs.len() as u32;
         }
         Ok(sites)
@@ -261,74 +218,6 @@ impl Session {
     }
 }
 
-impl EditOutput {
-    /// What came back, as ledgers.
-    fn ledgers(&self, work: &EditWork, bricks: &[&[Job]], targets: &[Target], totals: Totals) -> Vec<Ledger> {
-        let results = self.results.entries::<EditResult>(bricks.len());
-        let group = |((bricks, results), targets): &((&[&[Job]], &[EditResult]), &[Target])| {
-            let mut ledger = Ledger::default();
-            for ((jobs, result), &(_, tag)) in bricks.iter().zip(*results).zip(*targets) {
-                let Some(job) = jobs.first().filter(|_| result.flags & EditResult::CHANGED != 0) else {
-                    continue;
-                };
-                let (pos, Some(brick)) = (job.pos(), self.brick(result, tag)) else { continue };
-                ledger.hash = ledger.hash.wrapping_add(result.hash);
-                ledger.bricks.push(DraftedBrick {
-                    pos,
-                    brick: Arc::new(brick),
-                    changed: layout::unpack_box(result.bounds, pos.origin()),
-                    is_extended: result.flags & EditResult::EXTENDED != 0,
-                });
-            }
-            ledger
-        };
-        let groups: Vec<_> =
-            bricks.chunks(GROUP).zip(results.chunks(GROUP)).zip(targets.chunks(GROUP)).collect();
-        let mut ledgers = map(&groups, 2, group);
-        if let Some(first) = ledgers.first_mut() {
-            let parts = self.parts.entries::<EditPart>(totals.parts).iter();
-            first.parts = parts.filter_map(|part| effect(work.grid, bricks, part)).collect();
-            first.counts = self.counts.entries::<EditCount>(totals.counts).iter().map(count).collect();
-        }
-        ledgers
-    }
-
-    /// The brick of a result, whose place on the device has this tag.
-    fn brick<'a>(&'a self, result: &EditResult, tag: u64) -> Option<Brick> {
-        let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
-        if result.flags & EditResult::UNIFORM != 0 {
-            let [low, high, material, _] = result.uniform.to_le_bytes();
-            let material = has_materials.then_some(MaterialId(material));
-            return Some(Brick::of_one(i16::from_le_bytes([low, high]), material));
-        }
-        let entry = |list: &'a Outbox, number: u32, bytes: usize| {
-            list.entries::<u8>((number as usize + 1) * bytes).get(number as usize * bytes..)
-        };
-        let record = entry(&self.records, result.record, RECORD_BYTES).unwrap_or_default();
-        let materials = has_materials.then(|| entry(&self.materials, result.material, MATERIAL_BYTES));
-        let brick = layout::brick_of(record, materials.flatten())?;
-        brick.tag.set(tag);
-        Some(brick)
-    }
-}
-
-/// What an edit changed in a chunk's part of a brick.
-fn effect(grid: ChunkGrid, bricks: &[&[Job]], part: &EditPart) -> Option<PartEffect> {
-    let pos = bricks.get(part.job as usize)?.first()?.pos();
-    let bounds = layout::unpack_box(part.bounds, pos.origin());
-    Some(PartEffect { edit: part.edit as usize, chunk: layout::part_chunk(grid, pos, part.part), bounds })
-}
-
 fn tool(tool: &Tool) -> layout::Tool {
     layout::tool(tool.reach, tool.operation, &tool.evaluator)
-}
-
-fn count(count: &EditCount) -> Count {
-    let [fate, material, ..] = count.fate.to_le_bytes();
-    let fate = match fate {
-        0 => Fate::Removed,
-        1 => Fate::Added,
-        _ => Fate::Painted,
-    };
-    Count { edit: count.edit as usize, fate, material: MaterialId(material), voxels: count.voxels.into() }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use bytemuck::Zeroable;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
@@ -11,14 +12,16 @@ use crate::brush::{Brush, Edit, Roughness, Shape};
 use crate::ground::{ColumnMaterial, Ground, MaterialControl, MaterialId};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 use crate::terrain::{Terrain, TerrainSettings};
-use crate::volume::{Brick, EditWork, Ledger};
+use crate::volume::{Brick, EditWork, Ledger, SampleView};
 
 /// Edits of all kinds: those of the worlds, larger ones that leave bricks all alike, and such as give ground its look back.
 fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
+    let sculpts = rng.bool();
     let mut brushes = Vec::new();
     for _ in 0..rng.usize(1..6) {
         let mut brush = match rng.u32(0..6) {
             0 => worlds::random_brush_at_a_face(rng, ground, chunk_size),
+            1 | 2 if sculpts => worlds::random_sculpting_brush(rng, ground),
             _ => worlds::random_brush(rng, ground),
         };
         match rng.u32(0..8) {
@@ -77,14 +80,37 @@ struct EditRun {
     after: Vec<u8>,
 }
 
+/// The bricks around jobs, as edits look at them.
+struct Around {
+    look: i32,
+    refs: Vec<u32>,
+}
+
+impl Around {
+    /// The entry of a brick, and its strides. Each has a window of its own.
+    fn around(&mut self, slots: &mut Slots, samples: SampleView, pos: BrickPos) -> (u32, u32) {
+        let first = self.refs.len() as u32;
+        for (x, z) in (-1..=1).flat_map(|x| (-1..=1).map(move |z| (x, z))) {
+            let column = (-self.look..=self.look).map(|y| BrickPos(pos.0 + IVec3::new(x, y, z)));
+            self.refs.extend(column.map(|pos| slots.reference(samples, pos)));
+        }
+        let height = 2 * self.look as u32 + 1;
+        (first + 4 * height + self.look as u32, height * 3 | height << 16)
+    }
+}
+
 impl EditRun {
-    fn new(device: &mut Device, work: &EditWork, rng: &mut Rng, room: EditRoom) -> Self {
+    fn new(device: &mut Device, work: &EditWork, rng: &mut Rng, room: EditRoom, look: i32) -> Self {
         let (mut slots, mut jobs, mut list) = (Slots::default(), Vec::new(), Vec::new());
+        let mut windows = Around { look, refs: Vec::new() };
         for of_brick in work.bricks() {
             let Some(pos) = of_brick.first().map(|job| job.pos()) else { continue };
             let base = slots.reference(work.base, pos);
-            // In place, or to another slot.
-            let target = if base != NONE && rng.bool() { base >> 1 } else { slots.brick(None) };
+            // In place, or to another slot; where edits look around, always to another one.
+            let is_in_place = base != NONE && !work.sculpts() && rng.bool();
+            let target = if is_in_place { base >> 1 } else { slots.brick(None) };
+            let (window, strides) =
+                if work.sculpts() { windows.around(&mut slots, work.base, pos) } else { (0, 0) };
             let stack = slots.stack(work.base.ground(), (pos.0.x, pos.0.z));
             let (first, count) = (list.len() as u32, of_brick.len() as u32);
             list.extend(of_brick.iter().map(|job| job.edit));
@@ -97,7 +123,9 @@ impl EditRun {
                 first,
                 count,
                 cuts,
-                pad: [0; 3],
+                window,
+                strides,
+                pad: 0,
             });
         }
         let tools: Vec<Tool> =
@@ -127,7 +155,29 @@ impl EditRun {
             part_capacity: room.parts as u32,
             count_capacity: room.counts as u32,
         };
-        device.launch(Kernel::Edit, jobs.len(), params);
+        if work.sculpts() {
+            let (mut chisels, mut images) = (Vec::new(), vec![7u16; 3]);
+            for tool in &work.tools {
+                let constants = tool.sculptor.as_ref().and_then(|sculptor| sculptor.constants());
+                chisels.push(constants.map_or(Chisel::zeroed(), |of| {
+                    layout::chisel(&of, |image| {
+                        images.extend_from_slice(image.samples());
+                        (images.len() - image.samples().len()) as u32
+                    })
+                }));
+            }
+            let params = CarefulParams {
+                edit: params,
+                windows: device.upload(&windows.refs),
+                chisels: device.upload(&chisels),
+                images: device.upload(&images),
+                look,
+                pad: 0,
+            };
+            device.launch(Kernel::Careful, jobs.len(), params);
+        } else {
+            device.launch(Kernel::Edit, jobs.len(), params);
+        }
         let run = Self {
             jobs,
             results: device.read_checked(&results),
@@ -262,7 +312,7 @@ fn compare_edits(device: &mut Device, world: &crate::terrain::World, edits: &[Ed
         parts: ledger.parts.len(),
         counts: ledger.counts.len(),
     };
-    let run = EditRun::new(device, &work, rng, most);
+    let run = EditRun::new(device, &work, rng, most, FAR);
     assert_eq!(run.counters[2..], [most.parts as u32, most.counts as u32]);
     run.check_bricks(&ledger, true);
     run.check_effects(&ledger, &work);
@@ -274,11 +324,20 @@ fn compare_edits(device: &mut Device, world: &crate::terrain::World, edits: &[Ed
         parts: less(most.parts),
         counts: less(most.counts),
     };
-    let short = EditRun::new(device, &work, rng, room);
+    let short = EditRun::new(device, &work, rng, room, FAR);
     short.check_bricks(&ledger, false);
     assert_eq!(short.counters, run.counters, "counters go on past the room");
+    // Windows that end near the brick do, or it is told that they don't.
+    let near = EditRun::new(device, &work, rng, most, 1);
+    if near.results.iter().all(|result| result.flags & EditResult::TOO_FAR == 0) {
+        near.check_bricks(&ledger, true);
+        near.check_effects(&ledger, &work);
+    }
     ledger.bricks.len()
 }
+
+/// How far windows have to reach up and down that are always enough.
+const FAR: i32 = 8;
 
 #[test]
 fn edits_are_those_of_the_cpu() {

@@ -66,7 +66,9 @@ struct EditJob {
     u32 base, target, stack;
     u32 first, count;
     u32 cuts;
-    u32 pad[3];
+    // Where edits look around: its entry in `windows`; to the next along x | along z << 16, along y it is 1.
+    u32 window, strides;
+    u32 pad;
 };
 
 enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE };
@@ -83,7 +85,30 @@ struct Tool {
     u32 seed, pad;
 };
 
-enum ResultFlags { CHANGED = 1, EXTENDED = 2, UNIFORM = 4, HAS_MATERIALS = 8 };
+// What a tool does beyond its operation: nothing, or it sculpts.
+enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
+
+// What a tool that sculpts needs besides.
+struct Chisel {
+    // `material` is what new ground is made of; `NONE`: what is around says it.
+    u32 stroke, material;
+    // In 1/256; in 1/256 voxel.
+    i32 strength, falloff;
+    // Level: the height. Shift: what is added to densities. Terrace: step, base.
+    i32 amounts[2];
+    // Flatten: of the plane. Stamp: the middle of the image.
+    i32 point[3];
+    // Stamp: half its sides, and how high white is.
+    i32 half[2], height;
+    // Stamp: the first sample of its image in `images`, and how many there are.
+    u32 image, columns, rows, pad;
+    // Stamp: a rotation, and what to divide it by. Flatten: the first row is the normal.
+    i64 matrix[3][3], squared;
+    // Flatten: of the normal.
+    double length;
+};
+
+enum ResultFlags { CHANGED = 1, EXTENDED = 2, UNIFORM = 4, HAS_MATERIALS = 8, TOO_FAR = 16 };
 
 struct EditResult {
     u64 hash;
@@ -113,6 +138,17 @@ struct EditParams {
     // Records, materials, parts, counts.
     u32* counters;
     u32 record_capacity, material_capacity, part_capacity, count_capacity;
+};
+
+struct CarefulParams {
+    EditParams edit;
+    const u32* windows;
+    // One for each tool.
+    const Chisel* chisels;
+    const u16* images;
+    // How many bricks windows reach up and down.
+    i32 look;
+    u32 pad;
 };
 
 struct ColumnJob {
@@ -166,6 +202,7 @@ struct HeightsParams {
 
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
 static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout/");
+static_assert(sizeof(Chisel) == 152 && sizeof(CarefulParams) == 136, "see layout/");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
 static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");
 static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout/");

@@ -3,8 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
 
-use super::Address;
-use crate::brush::{Evaluator, Kind};
+use super::{Address, NONE};
+use crate::brush::{Evaluator, Kind, SculptorConstants, Stroke};
+use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
 
 /// Most numbers in the `list` of one `edit` launch. Each may enter 256 counts and 8 parts.
@@ -27,7 +28,10 @@ pub(crate) struct EditJob {
     pub count: u32,
     /// See [`cuts`].
     pub cuts: u32,
-    pub pad: [u32; 3],
+    /// For `careful`: its entry in the windows; from there to the next along x, and `<< 16` along z, along y it is 1.
+    pub window: u32,
+    pub strides: u32,
+    pub pad: u32,
 }
 
 /// An edit, all that is derived from it once included.
@@ -51,6 +55,29 @@ pub(crate) struct Tool {
     pub scale: i32,
     pub seed: u32,
     pub pad: u32,
+}
+
+/// What a tool that sculpts needs besides; for other tools it is zero. See `layout.cuh`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Chisel {
+    /// Plain, smooth, sharpen, flatten, level, shift, stamp, terrace.
+    pub stroke: u32,
+    /// Of new ground; [`NONE`] where what is around says it.
+    pub material: u32,
+    pub strength: i32,
+    pub falloff: i32,
+    pub amounts: [i32; 2],
+    pub point: [i32; 3],
+    pub half: [i32; 2],
+    pub height: i32,
+    pub image: u32,
+    pub columns: u32,
+    pub rows: u32,
+    pub pad: u32,
+    pub matrix: [[i64; 3]; 3],
+    pub squared: i64,
+    pub length: f64,
 }
 
 /// What became of a brick.
@@ -80,6 +107,8 @@ impl EditResult {
     pub const UNIFORM: u32 = 4;
     /// The brick has materials.
     pub const HAS_MATERIALS: u32 = 8;
+    /// New ground looked farther for its material than windows reach. All that is said of the brick may be wrong.
+    pub const TOO_FAR: u32 = 16;
 }
 
 /// What an edit changed in one chunk's part of a brick.
@@ -137,17 +166,34 @@ pub(crate) struct EditParams {
     pub count_capacity: u32,
 }
 
+/// The parameter of `careful`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CarefulParams {
+    /// No job's target may be what another job, or an entry of `windows`, refers to.
+    pub edit: EditParams,
+    /// References of bricks. Of each job all 27 around must be there, and above and below as many as `look` says.
+    pub windows: Address,
+    /// A [`Chisel`] for each tool.
+    pub chisels: Address,
+    /// Samples of images, `u16` each.
+    pub images: Address,
+    pub look: i32,
+    pub pad: u32,
+}
+
 // layout.cuh says the same.
 const _: () =
     assert!(size_of::<EditJob>() == 48 && size_of::<Tool>() == 128 && size_of::<EditResult>() == 32);
 const _: () =
     assert!(size_of::<EditPart>() == 16 && size_of::<EditCount>() == 16 && size_of::<EditParams>() == 104);
+const _: () = assert!(size_of::<Chisel>() == 152 && size_of::<CarefulParams>() == 136);
 
-/// An edit that reaches these samples of the world; `None`: it reaches none. One that sculpts is no work for a card.
+/// An edit that reaches these samples of the world; `None`: it reaches none.
 pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> Tool {
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
-    let LatticeBox { min, max } = reach.filter(|_| operation != Kind::Sculpt).unwrap_or(nothing);
+    let LatticeBox { min, max } = reach.unwrap_or(nothing);
     let (amplitude, scale, seed) = of.grain.unwrap_or((0, 1, 0));
     Tool {
         kind: of.kind,
@@ -167,6 +213,39 @@ pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evalu
         scale,
         seed,
         pad: 0,
+    }
+}
+
+/// What an edit that sculpts needs besides; `image` says where the samples of an image begin.
+pub(crate) fn chisel(of: &SculptorConstants, image: impl FnOnce(&GreyImage) -> u32) -> Chisel {
+    let chisel = |stroke| Chisel {
+        stroke,
+        material: of.material.map_or(NONE, |material| material.0.into()),
+        strength: of.strength,
+        falloff: of.falloff,
+        ..Chisel::default()
+    };
+    match &of.stroke {
+        Stroke::Smooth => chisel(1),
+        Stroke::Sharpen => chisel(2),
+        &Stroke::Flatten(point, normal, length) => {
+            let matrix = [normal.map(i64::from), [0; 3], [0; 3]];
+            Chisel { point, matrix, length, ..chisel(3) }
+        }
+        &Stroke::Level(height) => Chisel { amounts: [height, 0], ..chisel(4) },
+        &Stroke::Shift(by) => Chisel { amounts: [by, 0], ..chisel(5) },
+        Stroke::Stamp(press) => Chisel {
+            point: press.center,
+            half: press.half,
+            height: press.height,
+            image: image(press.image),
+            columns: press.image.width(),
+            rows: press.image.height(),
+            matrix: press.rows,
+            squared: press.squared,
+            ..chisel(6)
+        },
+        &Stroke::Terrace(step, base) => Chisel { amounts: [step, base], ..chisel(7) },
     }
 }
 

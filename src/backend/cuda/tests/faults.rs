@@ -4,6 +4,7 @@ use std::sync::Mutex;
 
 use super::super::device::{Device, Fault, HostMemory, Kernel};
 use super::*;
+use crate::backend::Stage;
 
 /// A device that fails when it is told to.
 struct Faulty {
@@ -117,6 +118,43 @@ fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_l
     }
     // Two worlds may take fewer calls than the last ones here wait for.
     assert!(lost > 20, "{lost}");
+}
+
+#[test]
+fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
+    // Each reads what the one before may change.
+    let shape = |i: i32| Shape::sphere(glam::Vec3::new(30.0 + 3.0 * i as f32, 31.0, 30.0), 6.0);
+    let brush = |i: i32| match i % 3 {
+        0 => Brush::dig(shape(i)),
+        1 => Brush::smooth(shape(i), 1.0),
+        _ => Brush::raise(shape(i), 2.0),
+    };
+    let brushes: Vec<Brush> = (0..9).map(brush).collect();
+    let ground = Arc::new(Ground::from_fn(80, 60, |x, z| 30.0 + f64::from(x * z % 5)).expect("valid"));
+    let terrain = || Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
+    let mut expected = terrain();
+    let receipts = expected.apply(&brushes);
+    let mut runs_done = Vec::new();
+    for calls in (0..).step_by(3) {
+        let Some(own) = device() else { return };
+        let plan = Arc::new(Mutex::new(None));
+        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let fault = if calls % 2 == 0 { Fault::Failed("in the middle".into()) } else { PANIC };
+        *lock(&plan) = Some((calls, fault));
+        let mut found = terrain();
+        found.set_engine(engine.clone());
+        assert_eq!(receipts, found.apply(&brushes), "after {calls} calls");
+        assert_same(expected.world(), found.world(), u64::from(calls));
+        let choices = engine.figures().choices;
+        let runs = choices.iter().filter(|choice| choice.stage == Stage::Edit);
+        runs_done.push(runs.filter(|choice| choice.is_cuda).count());
+        if !matches!(engine.state(), EngineState::Lost(_)) {
+            break;
+        }
+    }
+    // None, some, all of seven.
+    assert!(runs_done.is_sorted() && runs_done.first() == Some(&0), "{runs_done:?}");
+    assert!((0..=7).all(|runs| runs_done.contains(&runs)), "{runs_done:?}");
 }
 
 #[test]

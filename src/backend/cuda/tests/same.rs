@@ -36,7 +36,7 @@ fn history_and_loose_pieces_of_a_device_are_those_of_the_processor() {
                 0 => assert_eq!(expected.undo(), found.undo(), "world {index}"),
                 1 => assert_eq!(expected.redo(), found.redo(), "world {index}"),
                 _ => {
-                    let brushes = [(); 3].map(|()| worlds::random_brush(&mut rng, &ground));
+                    let brushes = [(); 3].map(|()| worlds::any_random_brush(&mut rng, &ground));
                     assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
                 }
             }
@@ -136,7 +136,7 @@ fn engines_take_turns_with_the_same_bricks() {
     let mut rng = Rng::with_seed(21);
     let (ground, chunk_size) = worlds::random_ground(&mut rng, 3);
     let transactions: Vec<Vec<Brush>> =
-        (0..24).map(|_| (0..3).map(|_| worlds::random_brush(&mut rng, &ground)).collect()).collect();
+        (0..24).map(|_| (0..3).map(|_| worlds::any_random_brush(&mut rng, &ground)).collect()).collect();
     compare_on(ground, chunk_size, &[&first, &second], &transactions);
 }
 
@@ -157,28 +157,93 @@ fn a_high_cliff_at_the_end_of_the_lattice_is_the_processors() {
 }
 
 #[test]
-fn what_a_card_does_not_know_is_the_processors_in_the_same_transaction() {
+fn sculpting_of_any_kind_is_that_of_the_processor() {
     let Some(first) = mapped() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
     let mut rng = Rng::with_seed(31);
-    for index in 0..worlds::world_count(40) / 4 {
+    for index in 0..worlds::world_count(40) / 2 {
         let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
-        let brushes = |rng: &mut Rng| (0..5).map(|_| worlds::any_random_brush(rng, &ground)).collect();
+        // Many in one place, so that most read what others change.
+        let brushes = |rng: &mut Rng| {
+            let place = worlds::random_sculpting_brush(rng, &ground).shape;
+            let near = |rng: &mut Rng| match rng.u32(0..3) {
+                0 => worlds::any_random_brush(rng, &ground),
+                1 => Brush { shape: place.clone(), ..worlds::any_random_brush(rng, &ground) },
+                _ => Brush { shape: place.clone(), ..worlds::random_sculpting_brush(rng, &ground) },
+            };
+            (0..6).map(|_| near(rng)).collect()
+        };
         let transactions: Vec<Vec<Brush>> = (0..4).map(|_| brushes(&mut rng)).collect();
         compare_on(ground, chunk_size, &[&first, &second], &transactions);
     }
-    let stages = |engine: &Engine, stage| {
-        let choices = engine.figures().choices;
-        let of = |is_cuda| {
-            let is = |choice: &&crate::backend::Choice| choice.stage == stage && choice.is_cuda == is_cuda;
-            choices.iter().filter(is).count()
-        };
-        (of(true), of(false))
-    };
     for engine in [&first, &second] {
-        let (on_card, on_processor) = stages(engine, Stage::Edit);
-        assert!(on_card > 0 && on_processor > 0, "{on_card} {on_processor}");
-        assert!(stages(engine, Stage::Mesh).0 > 0, "meshes go to the card");
+        let figures = engine.figures();
+        assert!(figures.cuda > figures.cpu * 10, "{figures:?}");
     }
+}
+
+#[test]
+fn new_ground_far_from_all_other_finds_its_material() {
+    let Some(first) = mapped() else { return };
+    let Some(second) = device() else { return };
+    let second = engine(second, 64 << 20);
+    let high = |x: i32, z: i32| if (x / 12 + z / 12) % 2 == 0 { 30.0 } else { -40.0 };
+    let rule = |overlay, from, to| MaterialRule {
+        overlay: MaterialId(overlay),
+        height: (from, to),
+        ..Default::default()
+    };
+    let control =
+        MaterialControl::Rules { base: MaterialId(1), rules: vec![rule(2, -50.0, 0.0), rule(3, 0.0, 60.0)] };
+    let ground =
+        Ground::from_fn(70, 60, high).and_then(|ground| ground.with_materials(&control)).expect("valid");
+    let at = |x: f32, y: f32, z: f32| glam::Vec3::new(x, y, z);
+    let all = |y: f32, half: f32| Shape::cuboid(at(35.0, y, 30.0), at(36.0, half, 31.0));
+    let ball =
+        |x: f32, y: f32, material| Brush::add(Shape::sphere(at(x, y, 18.0), 3.0), MaterialId(material));
+    let transactions = [
+        vec![ball(18.0, 20.0, 5), ball(30.0, 58.0, 6), ball(40.0, -20.0, 7)],
+        vec![Brush::level(all(0.0, 46.0), 24.0)],
+        vec![Brush::dig(all(-12.0, 9.0)), Brush::dig(all(12.0, 4.0))],
+        vec![Brush::flatten(all(0.0, 70.0), at(30.0, 40.0, 30.0), at(0.2, 1.0, 0.1))],
+        // Down from a roof, and in the open where nothing is within reach.
+        vec![
+            Brush::dig(all(-20.0, 50.0)),
+            Brush::lower(all(0.0, 90.0), 3.0),
+            Brush::level(all(110.0, 9.0), 112.0),
+        ],
+        vec![Brush::raise(all(20.0, 110.0), 6.0)],
+    ];
+    compare_on(ground, 32, &[&first, &second], &transactions);
+}
+
+#[test]
+fn what_is_under_rules_is_the_processors() {
+    let Some(device) = device() else { return };
+    let engine = engine(device, 64 << 20);
+    let mut rng = Rng::with_seed(32);
+    for index in 0..worlds::world_count(40) / 4 {
+        let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
+        let rules = worlds::random_rules(&mut rng, &ground);
+        let settings = TerrainSettings { chunk_size, ..Default::default() };
+        let ground = Arc::new(ground);
+        let [mut expected, mut found] =
+            [0, 1].map(|_| Terrain::new(Arc::clone(&ground), &settings).expect("valid settings"));
+        found.set_engine(engine.clone());
+        for number in 0..4 {
+            let rules = if number % 2 == 0 { rules.clone() } else { DiggingRules::default() };
+            expected.set_rules(rules.clone());
+            found.set_rules(rules);
+            let brush = |rng: &mut Rng| Brush { power: rng.u8(..), ..worlds::any_random_brush(rng, &ground) };
+            let brushes: Vec<Brush> = (0..4).map(|_| brush(&mut rng)).collect();
+            assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
+            assert_same(expected.world(), found.world(), index);
+        }
+    }
+    let of = |stage, is_cuda| {
+        let choices = engine.figures().choices;
+        choices.iter().filter(|choice| choice.stage == stage && choice.is_cuda == is_cuda).count()
+    };
+    assert!(of(Stage::Edit, true) > 0 && of(Stage::Edit, false) > 0 && of(Stage::Mesh, true) > 0);
 }
