@@ -62,7 +62,7 @@ pub(super) struct Cuda {
 /// Where the session is.
 enum Place {
     Opening,
-    Open(Box<Session>, Costs),
+    Open(Box<Session>, Box<Costs>),
     Lost,
 }
 
@@ -108,7 +108,7 @@ impl Cuda {
             match opened {
                 Ok((session, costs)) => {
                     let name = session.name();
-                    *lock(&slot) = Place::Open(Box::new(session), costs);
+                    *lock(&slot) = Place::Open(Box::new(session), Box::new(costs));
                     *lock(&state) = EngineState::Cuda(name);
                 }
                 Err(fault) => lose(&mut lock(&slot), &state, &fault),

@@ -95,7 +95,7 @@ impl Around {
             self.refs.extend(column.map(|pos| slots.reference(samples, pos)));
         }
         let height = 2 * self.look as u32 + 1;
-        (first + 4 * height + self.look as u32, height * 3 | height << 16)
+        (first + 4 * height + self.look as u32, (height * 3) | (height << 16))
     }
 }
 

@@ -169,8 +169,8 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
             let place = worlds::random_sculpting_brush(rng, &ground).shape;
             let near = |rng: &mut Rng| match rng.u32(0..3) {
                 0 => worlds::any_random_brush(rng, &ground),
-                1 => Brush { shape: place.clone(), ..worlds::any_random_brush(rng, &ground) },
-                _ => Brush { shape: place.clone(), ..worlds::random_sculpting_brush(rng, &ground) },
+                1 => Brush { shape: place, ..worlds::any_random_brush(rng, &ground) },
+                _ => Brush { shape: place, ..worlds::random_sculpting_brush(rng, &ground) },
             };
             (0..6).map(|_| near(rng)).collect()
         };
@@ -188,7 +188,7 @@ fn new_ground_far_from_all_other_finds_its_material() {
     let Some(first) = mapped() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
-    let high = |x: i32, z: i32| if (x / 12 + z / 12) % 2 == 0 { 30.0 } else { -40.0 };
+    let high = |x: i32, z: i32| if (x / 7 + z / 9) % 2 == 0 { 30.0 } else { -40.0 };
     let rule = |overlay, from, to| MaterialRule {
         overlay: MaterialId(overlay),
         height: (from, to),
@@ -197,16 +197,16 @@ fn new_ground_far_from_all_other_finds_its_material() {
     let control =
         MaterialControl::Rules { base: MaterialId(1), rules: vec![rule(2, -50.0, 0.0), rule(3, 0.0, 60.0)] };
     let ground =
-        Ground::from_fn(70, 60, high).and_then(|ground| ground.with_materials(&control)).expect("valid");
+        Ground::from_fn(30, 26, high).and_then(|ground| ground.with_materials(&control)).expect("valid");
     let at = |x: f32, y: f32, z: f32| glam::Vec3::new(x, y, z);
-    let all = |y: f32, half: f32| Shape::cuboid(at(35.0, y, 30.0), at(36.0, half, 31.0));
+    let all = |y: f32, half: f32| Shape::cuboid(at(15.0, y, 13.0), at(16.0, half, 14.0));
     let ball =
-        |x: f32, y: f32, material| Brush::add(Shape::sphere(at(x, y, 18.0), 3.0), MaterialId(material));
+        |x: f32, y: f32, material| Brush::add(Shape::sphere(at(x, y, 12.0), 3.0), MaterialId(material));
     let transactions = [
-        vec![ball(18.0, 20.0, 5), ball(30.0, 58.0, 6), ball(40.0, -20.0, 7)],
+        vec![ball(8.0, 20.0, 5), ball(18.0, 58.0, 6), ball(26.0, -20.0, 7)],
         vec![Brush::level(all(0.0, 46.0), 24.0)],
         vec![Brush::dig(all(-12.0, 9.0)), Brush::dig(all(12.0, 4.0))],
-        vec![Brush::flatten(all(0.0, 70.0), at(30.0, 40.0, 30.0), at(0.2, 1.0, 0.1))],
+        vec![Brush::flatten(all(0.0, 70.0), at(15.0, 40.0, 13.0), at(0.2, 1.0, 0.1))],
         // Down from a roof, and in the open where nothing is within reach.
         vec![
             Brush::dig(all(-20.0, 50.0)),
