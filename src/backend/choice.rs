@@ -101,9 +101,10 @@ impl Curve {
 pub(super) struct Load {
     /// Bricks, once for each edit that may reach them; or blocks.
     pub amount: usize,
-    /// Of those, how many times an edit is rough, and how many times one sculpts.
+    /// Of those, how many times an edit is rough, and how many times one looks around: it sculpts, or there are
+    /// rules.
     pub rough: usize,
-    pub sculpted: usize,
+    pub careful: usize,
     /// Bricks and stacks of the ground that the card does not have.
     pub missing: usize,
 }
@@ -118,7 +119,11 @@ impl Load {
         Self {
             amount: jobs.len(),
             rough: count(|tool| tool.evaluator.is_rough()),
-            sculpted: if work.sculpts() { count(|tool| tool.sculptor.is_some()) } else { 0 },
+            careful: match work.rules {
+                Some(_) => jobs.len(),
+                None if work.looks_around() => count(|tool| tool.sculptor.is_some()),
+                None => 0,
+            },
             missing: 0,
         }
     }
@@ -129,8 +134,8 @@ impl Load {
 #[derive(Clone, Debug)]
 pub(super) struct Costs {
     pub edit: [Curve; 2],
-    /// Edits that sculpt.
-    pub sculpt: [Curve; 2],
+    /// Edits that look around.
+    pub careful: [Curve; 2],
     /// Seconds that roughness adds for each brick.
     pub rough: [f64; 2],
     pub mesh: [Curve; 2],
@@ -159,7 +164,7 @@ impl Default for Costs {
     fn default() -> Self {
         Self {
             edit: Default::default(),
-            sculpt: Default::default(),
+            careful: Default::default(),
             rough: [0.0; 2],
             mesh: Default::default(),
             upload: 0.0,
@@ -182,10 +187,10 @@ impl Costs {
 
     /// Seconds that edits take on a backend as measured, where nothing is missing.
     fn edits(&self, load: Load, on: usize) -> f64 {
-        // What sculpting takes longer than digging does.
-        let more = match load.sculpted {
+        // What looking around takes longer than digging alone does.
+        let more = match load.careful {
             0 => 0.0,
-            sculpted => (self.sculpt[on].at(sculpted) - self.edit[on].at(sculpted)).max(0.0),
+            careful => (self.careful[on].at(careful) - self.edit[on].at(careful)).max(0.0),
         };
         self.edit[on].at(load.amount) + self.rough[on] * load.rough as f64 + more
     }
@@ -236,16 +241,16 @@ mod tests {
     }
 
     #[test]
-    fn sculpting_takes_its_own_time() {
+    fn looking_around_takes_its_own_time() {
         let mut costs = Costs::default();
         for (on, per) in [(0, 10), (1, 3)] {
             for amount in [10, 100] {
                 costs.edit[on].push(amount, Duration::from_micros(amount as u64));
-                costs.sculpt[on].push(amount, Duration::from_micros(amount as u64 * per));
+                costs.careful[on].push(amount, Duration::from_micros(amount as u64 * per));
             }
         }
-        let of = |amount, sculpted| {
-            let estimate = costs.edit(Load { amount, sculpted, ..Load::default() });
+        let of = |amount, careful| {
+            let estimate = costs.edit(Load { amount, careful, ..Load::default() });
             [estimate.cpu, estimate.cuda].map(|time| time.as_nanos().div_ceil(1000))
         };
         assert_eq!(of(50, 0), [50, 50]);

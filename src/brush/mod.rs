@@ -99,9 +99,9 @@ pub use operation::Operation;
 pub use record::{BrushRecord, OperationName, RecordError, ShapeName};
 pub use request::Brush;
 pub use roughness::Roughness;
-pub(crate) use sculptor::{Around, Sculptor};
 #[cfg(feature = "cuda")]
-pub(crate) use sculptor::{SculptorConstants, Stroke};
+pub(crate) use sculptor::Stroke;
+pub(crate) use sculptor::{Around, Sculptor};
 pub use shape::Shape;
 pub use stamp::{ImageRecord, Stamp, StampRecord};
 

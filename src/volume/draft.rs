@@ -130,7 +130,7 @@ pub struct EditWork<'a> {
     pub grid: ChunkGrid,
     pub(crate) tools: Vec<Tool>,
     jobs: Vec<Job>,
-    rules: Option<&'a DiggingRules>,
+    pub(crate) rules: Option<&'a DiggingRules>,
 }
 
 impl<'a> EditWork<'a> {
@@ -153,16 +153,10 @@ impl<'a> EditWork<'a> {
         Self { rules, ..self }
     }
 
-    /// Are there rules? Cards know none.
+    /// Does any edit look at other samples than those that it changes?
     #[cfg(feature = "cuda")]
-    pub(crate) fn has_rules(&self) -> bool {
-        self.rules.is_some()
-    }
-
-    /// Does any edit sculpt?
-    #[cfg(feature = "cuda")]
-    pub(crate) fn sculpts(&self) -> bool {
-        self.tools.iter().any(|tool| tool.sculptor.is_some())
+    pub(crate) fn looks_around(&self) -> bool {
+        self.rules.is_some() || self.tools.iter().any(|tool| tool.sculptor.is_some())
     }
 
     /// The jobs of each brick, in order of the edits.

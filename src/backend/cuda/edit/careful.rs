@@ -1,6 +1,5 @@
-//! Edits that look around: what they need besides.
+//! Edits that look around, sculpting ones and all under rules: what they need besides.
 
-use bytemuck::Zeroable;
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
@@ -33,16 +32,19 @@ impl Look {
     }
 }
 
-/// What edits that look around need besides: the bricks around, numbers, images.
+/// What edits that look around need besides: the bricks around, numbers, images, rules.
 pub(super) struct Care<'a> {
     look: Look,
     windows: Windows<'a>,
     refs: Vec<u32>,
     chisels: Vec<Chisel>,
     images: Vec<u16>,
+    /// Bytes of the rules, and of what is protected; none where there are no rules.
+    rules: Vec<u8>,
     ref_list: Section,
     chisel_list: Section,
     image_list: Section,
+    rule_list: Section,
 }
 
 /// Where the edits of a brick are.
@@ -54,21 +56,25 @@ impl<'a> Care<'a> {
     pub fn new(work: &EditWork<'a>, bricks: &[&[Job]], look: Look) -> Self {
         let windows = Windows::around(work.base, bricks.iter().map(|jobs| pos(jobs)), look.bricks());
         let mut images = Images::default();
-        let chisel = |tool: &Tool| {
-            let constants = tool.sculptor.as_ref().and_then(|sculptor| sculptor.constants());
-            constants.map_or(Chisel::zeroed(), |of| layout::chisel(&of, |image| images.first(image)))
-        };
+        let chisel =
+            |tool: &Tool| layout::chisel(tool.sculptor.as_ref(), tool.power, |image| images.first(image));
         let chisels = work.tools.iter().map(chisel).collect();
-        let [ref_list, chisel_list, image_list] = [Section::default(); 3];
+        let rules = work.rules.map(|rules| {
+            let (rules, boxes) = layout::rules(rules);
+            [bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat()
+        });
+        let [ref_list, chisel_list, image_list, rule_list] = [Section::default(); 4];
         Self {
             look,
             windows,
             refs: Vec::new(),
             chisels,
             images: images.samples,
+            rules: rules.unwrap_or_default(),
             ref_list,
             chisel_list,
             image_list,
+            rule_list,
         }
     }
 
@@ -77,6 +83,7 @@ impl<'a> Care<'a> {
         self.ref_list = plan.section::<u32>(self.refs.len());
         self.chisel_list = plan.section::<Chisel>(self.chisels.len());
         self.image_list = plan.section::<u16>(self.images.len());
+        self.rule_list = plan.section::<u8>(self.rules.len());
     }
 
     /// Writes it.
@@ -84,6 +91,7 @@ impl<'a> Care<'a> {
         inbox.put(self.ref_list, &self.refs);
         inbox.put(self.chisel_list, &self.chisels);
         inbox.put(self.image_list, &self.images);
+        inbox.put(self.rule_list, &self.rules);
     }
 
     /// The parameter of the kernel.
@@ -93,6 +101,7 @@ impl<'a> Care<'a> {
             windows: inbox.address(self.ref_list),
             chisels: inbox.address(self.chisel_list),
             images: inbox.address(self.image_list),
+            rules: if self.rules.is_empty() { 0 } else { inbox.address(self.rule_list) },
             look: self.look.bricks(),
             pad: 0,
         }

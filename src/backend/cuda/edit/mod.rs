@@ -43,7 +43,7 @@ impl Session {
     /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
     pub fn edit(&mut self, work: &EditWork) -> Result<Vec<Ledger>, Fault> {
         let bricks = work.bricks_in_reach();
-        if !work.sculpts() {
+        if !work.looks_around() {
             return self.try_edits(work, &bricks, None).map(Option::unwrap_or_default);
         }
         // Most new ground finds its material close by.
@@ -83,7 +83,7 @@ impl Session {
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
     ) -> Result<Option<Vec<Ledger>>, Fault> {
-        // Edits that sculpt enter twice as many counts.
+        // Edits that look around enter twice as many counts.
         let most = if look.is_some() { MOST_LIST / 2 } else { MOST_LIST };
         if bricks.len() > MOST_JOBS || work.jobs().len() > most {
             return Err(Fault::TooLarge(work.jobs().len()));

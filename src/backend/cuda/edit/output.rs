@@ -181,7 +181,11 @@ fn count(count: &EditCount) -> Count {
     let fate = match fate {
         0 => Fate::Removed,
         1 => Fate::Added,
-        _ => Fate::Painted,
+        2 => Fate::Painted,
+        3 => Fate::Protected,
+        4 => Fate::Unbreakable,
+        5 => Fate::TooHard,
+        _ => Fate::Slowed,
     };
     Count { edit: count.edit as usize, fate, material: MaterialId(material), voxels: count.voxels.into() }
 }

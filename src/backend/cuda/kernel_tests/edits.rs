@@ -2,14 +2,13 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use bytemuck::Zeroable;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
 use super::super::layout::{self, *};
 use super::{Device, Kernel, Slots, assert_same, seeds, worlds};
 use crate::brush::{Brush, Edit, Roughness, Shape};
-use crate::ground::{ColumnMaterial, Ground, MaterialControl, MaterialId};
+use crate::ground::{ColumnMaterial, GreyImage, Ground, MaterialControl, MaterialId};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 use crate::terrain::{Terrain, TerrainSettings};
 use crate::volume::{Brick, EditWork, Ledger, SampleView};
@@ -49,6 +48,7 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
             }
             _ => {}
         }
+        brush.power = rng.u8(..) | rng.u8(..);
         brushes.push(brush);
         if rng.u32(0..4) == 0 {
             brushes.extend(brushes.last().cloned());
@@ -107,10 +107,10 @@ impl EditRun {
             let Some(pos) = of_brick.first().map(|job| job.pos()) else { continue };
             let base = slots.reference(work.base, pos);
             // In place, or to another slot; where edits look around, always to another one.
-            let is_in_place = base != NONE && !work.sculpts() && rng.bool();
+            let is_in_place = base != NONE && !work.looks_around() && rng.bool();
             let target = if is_in_place { base >> 1 } else { slots.brick(None) };
             let (window, strides) =
-                if work.sculpts() { windows.around(&mut slots, work.base, pos) } else { (0, 0) };
+                if work.looks_around() { windows.around(&mut slots, work.base, pos) } else { (0, 0) };
             let stack = slots.stack(work.base.ground(), (pos.0.x, pos.0.z));
             let (first, count) = (list.len() as u32, of_brick.len() as u32);
             list.extend(of_brick.iter().map(|job| job.edit));
@@ -155,22 +155,25 @@ impl EditRun {
             part_capacity: room.parts as u32,
             count_capacity: room.counts as u32,
         };
-        if work.sculpts() {
-            let (mut chisels, mut images) = (Vec::new(), vec![7u16; 3]);
-            for tool in &work.tools {
-                let constants = tool.sculptor.as_ref().and_then(|sculptor| sculptor.constants());
-                chisels.push(constants.map_or(Chisel::zeroed(), |of| {
-                    layout::chisel(&of, |image| {
-                        images.extend_from_slice(image.samples());
-                        (images.len() - image.samples().len()) as u32
-                    })
-                }));
-            }
+        if work.looks_around() {
+            let mut images = vec![7u16; 3];
+            let mut image = |image: &GreyImage| {
+                images.extend_from_slice(image.samples());
+                (images.len() - image.samples().len()) as u32
+            };
+            let chisel =
+                |tool: &crate::volume::Tool| layout::chisel(tool.sculptor.as_ref(), tool.power, &mut image);
+            let chisels: Vec<Chisel> = work.tools.iter().map(chisel).collect();
+            let rules = work.rules.map_or(0, |rules| {
+                let (rules, boxes) = layout::rules(rules);
+                device.place(&[bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat())
+            });
             let params = CarefulParams {
                 edit: params,
                 windows: device.upload(&windows.refs),
                 chisels: device.upload(&chisels),
                 images: device.upload(&images),
+                rules,
                 look,
                 pad: 0,
             };
@@ -304,7 +307,9 @@ fn ledger_of(work: &EditWork) -> Ledger {
 /// Applies edits to a world on both sides, with room enough and then without; returns how many bricks changed.
 fn compare_edits(device: &mut Device, world: &crate::terrain::World, edits: &[Edit], rng: &mut Rng) -> usize {
     let edits: Vec<&Edit> = edits.iter().collect();
+    let rules = worlds::random_rules(rng, world.ground());
     let work = EditWork::new(world.samples(), world.grid(), &edits);
+    let work = work.under((rng.u32(0..3) == 0).then_some(&rules));
     let ledger = ledger_of(&work);
     let most = EditRoom {
         records: ledger.bricks.len(),

@@ -395,30 +395,34 @@ __device__ inline void edit_brick(const EditParams& params, Workbench& bench, Ca
                 noise = hash_noise(tool, column.low, bench.noise);
                 __syncthreads();
             }
-            u32 own = 0;
             if constexpr (Care::LOOKS) {
-                own = looks_around ? care.apply(edit, column, open, noise, bench, has_materials)
-                                   : apply(tool, column, open, noise, bench, has_materials);
-            } else {
-                own = apply(tool, column, open, noise, bench, has_materials);
+                if (looks_around) {
+                    u32 own = care.apply(edit, column, open, noise, bench, has_materials);
+                    changed |= own;
+                    bool has_changed = __syncthreads_or(own != 0);
+                    is_changed |= has_changed;
+                    if (has_changed || care.params.rules) care.enter(job, edit);
+                    continue;
+                }
             }
+            u32 own = apply(tool, column, open, noise, bench, has_materials);
             changed |= own;
             if (!__syncthreads_or(own != 0)) continue;
             is_changed = true;
-            // Nobody begins with the next edit before these warps are done.
+            // Nobody begins with the next edit before these two warps are done.
             if (warp() == 0) enter_parts(params, job.cuts, edit, bench.effect.changed);
-            if (warp() == 1) enter_counts(params, edit, looks_around ? (u32)DIG : tool.operation, bench.effect.counts);
-            if constexpr (Care::LOOKS) {
-                if (looks_around && warp() == 2) enter_counts(params, edit, ADD, care.bench.added);
-            }
+            if (warp() == 1) enter_counts(params, edit, tool.operation, bench.effect.counts);
         }
     }
+    bool is_too_far = false;
+    if constexpr (Care::LOOKS) is_too_far = __syncthreads_or(care.is_too_far);
     if (!is_changed) {
-        if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, NONE, NONE, 0, 0, 0};
+        u32 flags = is_too_far ? (u32)TOO_FAR : 0;
+        if (threadIdx.x == 0) params.results[blockIdx.x] = {0, flags, NONE, NONE, 0, 0, 0};
         return;
     }
     sum_up(bench, column, base, had_materials, has_materials, changed);
-    if constexpr (Care::LOOKS) care.end(bench);
+    if (is_too_far && threadIdx.x == 0) atomicOr(&bench.flags, TOO_FAR);
     __syncthreads();
     if (threadIdx.x == 0) reserve(params, bench);
     if (warp() == 1 && lane() == 0) bench.bounds = bounds_of(bench.changed, ~0ull, 0, SIDE);

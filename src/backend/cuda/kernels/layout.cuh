@@ -88,7 +88,7 @@ struct Tool {
 // What a tool does beyond its operation: nothing, or it sculpts.
 enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
 
-// What a tool that sculpts needs besides.
+// What a tool that looks around needs besides.
 struct Chisel {
     // `material` is what new ground is made of; `NONE`: what is around says it.
     u32 stroke, material;
@@ -101,7 +101,9 @@ struct Chisel {
     // Stamp: half its sides, and how high white is.
     i32 half[2], height;
     // Stamp: the first sample of its image in `images`, and how many there are.
-    u32 image, columns, rows, pad;
+    u32 image, columns, rows;
+    // How hard a material it takes away, under rules.
+    i32 power;
     // Stamp: a rotation, and what to divide it by. Flatten: the first row is the normal.
     i64 matrix[3][3], squared;
     // Flatten: of the normal.
@@ -140,12 +142,30 @@ struct EditParams {
     u32 record_capacity, material_capacity, part_capacity, count_capacity;
 };
 
+// What edits may not change, or not at once.
+struct Rules {
+    // Of each material.
+    u8 hardness[256];
+    // Bits of materials that no edit takes away, nor paints over.
+    u32 unbreakable[8];
+    // Nothing solid below this height is taken away.
+    i32 bedrock;
+    u32 boxes;
+};
+
+// Samples that nothing changes, both ends included.
+struct Protected {
+    i32 min[3], max[3];
+};
+
 struct CarefulParams {
     EditParams edit;
     const u32* windows;
     // One for each tool.
     const Chisel* chisels;
     const u16* images;
+    // Null where there are none; protected boxes come right behind them.
+    const Rules* rules;
     // How many bricks windows reach up and down.
     i32 look;
     u32 pad;
@@ -202,7 +222,8 @@ struct HeightsParams {
 
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
 static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout/");
-static_assert(sizeof(Chisel) == 152 && sizeof(CarefulParams) == 136, "see layout/");
+static_assert(sizeof(Chisel) == 152 && sizeof(CarefulParams) == 144, "see layout/");
+static_assert(sizeof(Rules) == 296 && sizeof(Protected) == 24, "see layout/");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
 static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");
 static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout/");
