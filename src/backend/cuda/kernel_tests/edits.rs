@@ -1,17 +1,18 @@
 //! Edits of random worlds.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
 use super::super::layout::{self, *};
 use super::{Device, Kernel, Slots, assert_same, seeds, worlds};
-use crate::brush::{Brush, Edit, Roughness, Shape};
+use crate::brush::{Brush, DEPTH, Edit, Roughness, Shape};
 use crate::ground::{ColumnMaterial, GreyImage, Ground, MaterialControl, MaterialId};
-use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, Column, LatticeBox};
 use crate::terrain::{Terrain, TerrainSettings};
-use crate::volume::{Brick, EditWork, Ledger, SampleView};
+use crate::volume::{Brick, Bricks, EditWork, Ledger, SampleView};
 
 /// Edits of all kinds: those of the worlds, larger ones that leave bricks all alike, and such as give ground its look back.
 fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
@@ -305,10 +306,15 @@ fn ledger_of(work: &EditWork) -> Ledger {
 }
 
 /// Applies edits to a world on both sides, with room enough and then without; returns how many bricks changed.
-fn compare_edits(device: &mut Device, world: &crate::terrain::World, edits: &[Edit], rng: &mut Rng) -> usize {
+fn compare_edits(
+    device: &mut Device,
+    (samples, grid): (SampleView, ChunkGrid),
+    edits: &[Edit],
+    rng: &mut Rng,
+) -> usize {
     let edits: Vec<&Edit> = edits.iter().collect();
-    let rules = worlds::random_rules(rng, world.ground());
-    let work = EditWork::new(world.samples(), world.grid(), &edits);
+    let rules = worlds::random_rules(rng, samples.ground());
+    let work = EditWork::new(samples, grid, &edits);
     let work = work.under((rng.u32(0..3) == 0).then_some(&rules));
     let ledger = ledger_of(&work);
     let most = EditRoom {
@@ -352,7 +358,7 @@ fn edits_are_those_of_the_cpu() {
         let terrain = worlds::random_world(&mut rng, seed);
         let world = terrain.world();
         let edits = random_edits(&mut rng, world.ground(), world.grid().size() as u32);
-        bricks += compare_edits(&mut device, world, &edits, &mut rng);
+        bricks += compare_edits(&mut device, (world.samples(), world.grid()), &edits, &mut rng);
     }
     println!("{bricks} edited bricks are the same");
 }
@@ -372,10 +378,48 @@ fn edits_at_the_ends_of_the_lattice_are_those_of_the_cpu() {
             TerrainSettings { chunk_size: worlds::CHUNK_SIZES[seed as usize % 4], ..Default::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("a terrain");
         for _ in 0..3 {
-            let edits = random_edits(&mut rng, terrain.world().ground(), settings.chunk_size);
-            compare_edits(&mut device, terrain.world(), &edits, &mut rng);
+            let world = terrain.world();
+            let edits = random_edits(&mut rng, world.ground(), settings.chunk_size);
+            compare_edits(&mut device, (world.samples(), world.grid()), &edits, &mut rng);
             edits.iter().for_each(|edit| terrain.submit_edit(edit));
             terrain.apply(std::iter::empty::<Brush>());
         }
+    }
+}
+
+/// A brick that no brush would leave behind: any density beside any other, many of them cut off.
+fn noise_brick(rng: &mut Rng) -> Brick {
+    let mut sample = || match rng.u32(0..6) {
+        0 => DEPTH as i16,
+        1 => -DEPTH as i16,
+        2 => rng.i16(..),
+        _ => rng.i16(-300..300),
+    };
+    let mut brick = Brick::of_edited(&std::array::from_fn(|_| sample()));
+    if rng.bool() {
+        (0..512).for_each(|index| brick.set_material(index, MaterialId(rng.u8(0..4))));
+    }
+    brick
+}
+
+#[test]
+fn noise_is_sculpted_like_on_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    for (seed, mut rng) in seeds(24) {
+        let ground = worlds::random_ground(&mut rng, seed).0;
+        let grid =
+            ChunkGrid::new(worlds::CHUNK_SIZES[seed as usize % 4] as i32, ground.width(), ground.depth());
+        let near = LatticeBox::point(IVec3::ONE).grown(1).points();
+        let mut bricks = Bricks::default();
+        for pos in near.map(BrickPos).filter(|_| rng.u32(0..6) > 0).collect::<Vec<_>>() {
+            bricks.insert(pos, Arc::new(noise_brick(&mut rng)));
+        }
+        let brush = |rng: &mut Rng| {
+            let place = Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 16.0 + 4.0;
+            let shape = Shape::sphere(place, 2.0 + rng.f32() * 5.0);
+            worlds::sculpting_brush(rng, shape, place)
+        };
+        let edits: Vec<Edit> = (0..3).filter_map(|_| Edit::quantize(&brush(&mut rng)).ok()).collect();
+        compare_edits(&mut device, (SampleView::new(&ground, &bricks), grid), &edits, &mut rng);
     }
 }

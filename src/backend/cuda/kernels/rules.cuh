@@ -67,19 +67,15 @@ struct Judge : Surroundings {
         if (before < 0) {
             least = pace(column, column.x, y, column.z, power, fate);
         } else {
-            // Air beside what is solid holds its surface.
+            // Air beside what is solid holds its surface. It is air in any case, so nobody asks why.
             for (i32 i = 0; i < 6; i++) {
                 i32 axis = i / 2, step = i & 1 ? -1 : 1;
                 i32 way[3] = {axis == 0 ? step : 0, axis == 1 ? step : 0, axis == 2 ? step : 0};
                 i32 x = column.x + way[0], next_y = y + way[1], z = column.z + way[2];
                 if (bench.around[around_at(x, next_y, z)] >= 0) continue;
-                i32 beside[3] = {at[0] + way[0], at[1] + way[1], at[2] + way[2]}, part = 0;
-                u32 why = FATES;
-                if (!is_protected(beside)) part = pace(column, x, next_y, z, power, why);
-                if (part < least) {
-                    least = part;
-                    fate = why;
-                }
+                i32 beside[3] = {at[0] + way[0], at[1] + way[1], at[2] + way[2]};
+                u32 why;
+                least = smallest(least, is_protected(beside) ? 0 : pace(column, x, next_y, z, power, why));
             }
         }
         if (least == ONE) return proposed;

@@ -89,10 +89,22 @@ fn assert_same(expected: &World, found: &World, index: u64) {
 
 /// Transactions on the processor and on engines that take turns, on ground that is given.
 fn compare_on(ground: Ground, chunk_size: u32, engines: &[&Engine], transactions: &[Vec<Brush>]) {
+    compare_under(DiggingRules::default(), ground, chunk_size, engines, transactions);
+}
+
+/// The same under rules.
+fn compare_under(
+    rules: DiggingRules,
+    ground: Ground,
+    chunk_size: u32,
+    engines: &[&Engine],
+    transactions: &[Vec<Brush>],
+) {
     let settings = TerrainSettings { chunk_size, ..Default::default() };
     let ground = Arc::new(ground);
     let [mut expected, mut found] =
         [0, 1].map(|_| Terrain::new(Arc::clone(&ground), &settings).expect("valid settings"));
+    [&mut expected, &mut found].into_iter().for_each(|terrain| terrain.set_rules(rules.clone()));
     for (number, brushes) in transactions.iter().enumerate() {
         found.set_engine(engines[number % engines.len()].clone());
         assert_eq!(expected.apply(brushes), found.apply(brushes), "transaction {number}");

@@ -1,6 +1,9 @@
 //! Worlds of a device are those of the processor.
 
+use glam::IVec3;
+
 use super::*;
+use crate::lattice::LatticeBox;
 
 #[test]
 fn worlds_of_a_device_are_those_of_the_processor() {
@@ -215,6 +218,23 @@ fn new_ground_far_from_all_other_finds_its_material() {
         vec![Brush::raise(all(20.0, 110.0), 6.0)],
     ];
     compare_on(ground, 32, &[&first, &second], &transactions);
+    // Between a floor and a roof: within reach of the one, of the other, of neither; there between walls, one voxel apart.
+    let slab = |y: f32, material| Brush::add(all(y, 2.0), MaterialId(material));
+    let between = Brush::flatten(all(70.0, 20.0), at(15.0, 70.0, 13.0), at(0.5, 1.0, 0.2)).with_falloff(0.0);
+    let wall = |x: f32, z: f32, half: [f32; 2], material| {
+        let half = at(half[0], 3.0, half[1]);
+        Brush::add(Shape::cuboid(at(x, 70.0, z), half), MaterialId(material))
+    };
+    let mut first_ones = vec![slab(0.0, 5), slab(140.0, 6)];
+    first_ones.extend([wall(9.0, 13.0, [1.5, 9.0], 3), wall(13.0, 13.0, [1.5, 9.0], 4)]);
+    first_ones.extend([wall(22.0, 8.0, [5.0, 1.5], 1), wall(22.0, 12.0, [5.0, 1.5], 2)]);
+    let transactions = [first_ones, vec![between]];
+    let flat = || Ground::flat(30, 26, -100.0).expect("valid");
+    compare_on(flat(), 25, &[&first, &second], &transactions);
+    // What is refused is counted by the material that it would have had.
+    let samples = LatticeBox { min: IVec3::new(-9, 20, -9), max: IVec3::new(99, 120, 99) };
+    let rules = DiggingRules::default().with_protected(samples);
+    compare_under(rules, flat(), 25, &[&first, &second], &transactions);
 }
 
 #[test]
