@@ -15,6 +15,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use bevy_burrow::backend::{Backend, Choice, Engine, EngineState, Stage};
+use bevy_burrow::prelude::{Brush, Shape};
 use bevy_burrow::terrain::{Commit, Stages, Transaction};
 use glam::Vec3;
 
@@ -22,13 +23,20 @@ use landscape::{dig, landscape, threads};
 use level::Level;
 use statistics::Sample;
 
-const SECTIONS: [(&str, fn(&Engines)); 5] = [
+const SECTIONS: [(&str, fn(&Engines)); 7] = [
     ("craters", |engines| bulk(engines, false)),
     ("rough-craters", |engines| bulk(engines, true)),
     ("field", one_field),
-    ("brush", brush),
-    ("sweep", sweep),
+    ("brush", |engines| brush(engines, dig)),
+    ("sweep", |engines| sweep(engines, dig)),
+    ("stroke", |engines| brush(engines, smooth)),
+    ("stroke-sweep", |engines| sweep(engines, smooth)),
 ];
+
+/// A round brush that smooths.
+fn smooth(center: Vec3, radius: f32) -> Brush {
+    Brush::smooth(Shape::sphere(center, radius), 1.0)
+}
 
 /// One engine of each kind.
 struct Engines {
@@ -212,13 +220,13 @@ fn one_field(engines: &Engines) {
 }
 
 /// Single brushes of radius 4 on dug ground.
-fn brush(engines: &Engines) {
+fn brush(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     header("radius 4");
     let mut times = [(); 3].map(|()| Times::default());
     let mut terrain = landscape(32);
     for (round, at) in landscape::Places::new(600).iter().enumerate() {
         terrain.apply([dig(at, 4.0)]);
-        terrain.submit(&dig(at + Vec3::splat(2.0), 4.0));
+        terrain.submit(&brush(at + Vec3::splat(2.0), 4.0));
         let transaction = terrain.begin().expect("a brush waits");
         for who in turns(round) {
             let (mut discarded, (_, engine)) = (Times::default(), engines.named()[who]);
@@ -232,7 +240,7 @@ fn brush(engines: &Engines) {
 }
 
 /// Transactions of one block to thousands, on each backend and as `Auto` has it.
-fn sweep(engines: &Engines) {
+fn sweep(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     println!(
         "  {:<28}{:>9}{:>9}{:>9}   us, medians; Auto over the better one",
         "dirty blocks", "CPU", "CUDA", "Auto"
@@ -247,7 +255,7 @@ fn sweep(engines: &Engines) {
         for round in 0..25 {
             let radius = if count == 1 { 1.0 } else { 3.0 };
             let own = places.iter().cycle().skip(round * count).take(count);
-            own.for_each(|&place| terrain.submit(&dig(place + Vec3::splat(round as f32 * 0.1), radius)));
+            own.for_each(|&place| terrain.submit(&brush(place + Vec3::splat(round as f32 * 0.1), radius)));
             let transaction = terrain.begin().expect("brushes wait");
             let mut taken = [0.0; 3];
             for who in turns(round) {

@@ -1,5 +1,5 @@
-//! Much at once, on the processor and on a CUDA card: ground from noise, a meteor shower, a landscape cut into terraces, and a world of
-//! thousands of edits replayed as when it is loaded.
+//! Much at once, on the processor and on a CUDA card: ground from noise, a meteor shower, a landscape cut into terraces and
+//! smoothed as a whole, hundreds of strokes that sculpt it, and a world of thousands of edits replayed as when it is loaded.
 //!
 //! `cargo run --release --no-default-features --features cuda --example bulk [-- --help]`
 
@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::Commit;
+use bevy_burrow::terrain::{Commit, Transaction};
 use clap::Parser;
 use fastrand::Rng;
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 /// Times large transactions on the processor and on a CUDA card.
 #[derive(Parser)]
@@ -31,14 +31,23 @@ struct Arguments {
 /// Something large to do to a landscape.
 struct Scene {
     name: &'static str,
+    /// What was done to it before.
+    before: fn(&Ground, &mut Rng) -> Vec<Brush>,
     brushes: fn(&Ground, &mut Rng) -> Vec<Brush>,
 }
 
-const SCENES: [Scene; 3] = [
-    Scene { name: "meteor shower", brushes: meteors },
-    Scene { name: "terraces", brushes: terraces },
-    Scene { name: "replay of 3,000 edits", brushes: replay },
+const SCENES: [Scene; 5] = [
+    Scene { name: "meteor shower", before: nothing, brushes: meteors },
+    Scene { name: "terraces", before: nothing, brushes: terraces },
+    Scene { name: "replay of 3,000 edits", before: nothing, brushes: replay },
+    Scene { name: "smooth the whole terrain", before: terraces, brushes: smooth },
+    Scene { name: "800 strokes that sculpt", before: replay, brushes: strokes },
 ];
+
+/// A landscape that nobody has touched.
+fn nothing(_: &Ground, _: &mut Rng) -> Vec<Brush> {
+    Vec::new()
+}
 
 /// A place on the ground.
 fn place(ground: &Ground, rng: &mut Rng) -> Vec3 {
@@ -68,6 +77,50 @@ fn terraces(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
         Brush::dig(Shape::cuboid(Vec3::new(x as f32, floor + 12.0, z as f32), half))
     };
     places.map(cut).collect()
+}
+
+/// All of the ground smoothed in overlapping squares. Those of one colour, of four, lie apart, so that they need not wait
+/// for each other.
+fn smooth(ground: &Ground, _: &mut Rng) -> Vec<Brush> {
+    let (step, overlap) = (64, 4);
+    let square = |x: i32, z: i32| {
+        let (x, z) = (x * step, z * step);
+        let columns =
+            (0..=step).step_by(4).flat_map(|dz| (0..=step).step_by(4).map(move |dx| (x + dx, z + dz)));
+        let heights = columns.map(|(x, z)| ground.height(Column::new(x, z)) as f32 / 256.0);
+        let (low, high) =
+            heights.fold((f32::MAX, f32::MIN), |(low, high), height| (low.min(height), high.max(height)));
+        let side = step as f32 * 0.5;
+        let center = Vec3::new(x as f32 + side, (low + high) * 0.5, z as f32 + side);
+        let half = Vec3::new(side + overlap as f32, (high - low) * 0.5 + 10.0, side + overlap as f32);
+        Brush::smooth(Shape::cuboid(center, half), 1.0)
+    };
+    let colours = [(0, 0), (1, 0), (0, 1), (1, 1)];
+    let of_colour = |(x0, z0): (i32, i32)| {
+        let rows = (z0..ground.depth() / step).step_by(2);
+        rows.flat_map(move |z| (x0..ground.width() / step).step_by(2).map(move |x| square(x, z)))
+    };
+    colours.into_iter().flat_map(of_colour).collect()
+}
+
+/// What an editor's strokes do to a landscape: every operation that sculpts, anywhere, in any order.
+fn strokes(ground: &Ground, rng: &mut Rng) -> Vec<Brush> {
+    let bumps = (0..64).map(|i| 2700 * (i % 8 * (7 - i % 8) + i / 8 * (7 - i / 8))).collect();
+    let image = Arc::new(GreyImage::from_samples(8, 8, bumps).expect("as many samples as it has"));
+    let stroke = |i: u32| {
+        let (at, radius) = (place(ground, rng), 6.0 + 10.0 * rng.f32());
+        let shape = Shape::sphere(at, radius);
+        match i % 8 {
+            0 | 1 => Brush::smooth(shape, 1.0),
+            2 => Brush::raise(shape, 3.0),
+            3 => Brush::lower(shape, 2.0),
+            4 => Brush::level(shape, at.y),
+            5 => Brush::flatten(shape, at, Vec3::new(rng.f32() - 0.5, 1.0, rng.f32() - 0.5)),
+            6 => Brush::stamp(shape, Stamp::new(Arc::clone(&image), at, Vec2::splat(radius), 4.0)),
+            _ => Brush::terrace(shape, 3.0),
+        }
+    };
+    (0..800).map(stroke).collect()
 }
 
 /// What players may have left behind: holes, tunnels, walls, heaps.
@@ -112,12 +165,10 @@ struct Outcome {
     on_card: u64,
 }
 
-/// Runs a scene as one transaction on fresh ground.
-fn run(ground: &Arc<Ground>, brushes: &[Brush], engine: &Engine) -> Outcome {
-    let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings");
-    brushes.iter().for_each(|brush| terrain.submit(brush));
+/// Runs a transaction, which stays as it is.
+fn run(transaction: &Transaction, engine: &Engine) -> Outcome {
     let before = engine.figures().cuda;
-    let commit = terrain.begin().expect("brushes wait").run_on(engine);
+    let commit = transaction.clone().run_on(engine);
     let on_card = engine.figures().cuda - before;
     let hash = commit.sample_hash();
     Outcome { commit, hash, on_card }
@@ -150,6 +201,11 @@ fn main() {
     println!("\n{:<24}{:>9}{:>10}{cpu}{cuda}{auto}   ms, medians", "", "brushes", "vertices");
     for scene in &SCENES {
         let brushes = (scene.brushes)(&ground, &mut Rng::with_seed(1));
+        let mut terrain =
+            Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
+        terrain.apply((scene.before)(&ground, &mut Rng::with_seed(2)));
+        brushes.iter().for_each(|brush| terrain.submit(brush));
+        let transaction = terrain.begin().expect("brushes wait");
         let mut times = [const { Vec::new() }; 3];
         let (mut hashes, mut vertices, mut on_card) = (Vec::new(), 0, [0; 3]);
         // The first round warms memory and threads.
@@ -157,7 +213,7 @@ fn main() {
             // In turns: whoever comes later finds caches warm.
             for i in (0..engines.len()).map(|turn| (turn + usize::from(round)) % engines.len()) {
                 let engine = &engines[i].1;
-                let outcome = run(&ground, &brushes, engine);
+                let outcome = run(&transaction, engine);
                 hashes.push(outcome.hash);
                 on_card[i] = outcome.on_card;
                 let meshes = outcome.commit.meshes.chunks.iter();

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 #[cfg(feature = "cuda")]
-use crate::volume::{EditWork, Job};
+use crate::volume::{EditWork, Tool};
 
 /// A stage of a transaction that a backend does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -101,8 +101,10 @@ impl Curve {
 pub(super) struct Load {
     /// Bricks, once for each edit that may reach them; or blocks.
     pub amount: usize,
-    /// Of those, how many times an edit is rough.
+    /// Of those, how many times an edit is rough, and how many times one looks around: it sculpts, or rules
+    /// bear on it.
     pub rough: usize,
+    pub careful: usize,
     /// Bricks and stacks of the ground that the card does not have.
     pub missing: usize,
 }
@@ -111,9 +113,15 @@ pub(super) struct Load {
 impl Load {
     /// What edits are to do, as if the card had all bricks.
     pub fn of_edits(work: &EditWork) -> Self {
-        let is_rough = |job: &&Job| work.tools[job.edit as usize].evaluator.is_rough();
         let jobs = work.jobs();
-        Self { amount: jobs.len(), rough: jobs.iter().filter(is_rough).count(), missing: 0 }
+        let count =
+            |is: fn(&Tool) -> bool| jobs.iter().filter(|job| is(&work.tools[job.edit as usize])).count();
+        Self {
+            amount: jobs.len(),
+            rough: count(|tool| tool.evaluator.is_rough()),
+            careful: if work.looks_around() { count(Tool::looks_around) } else { 0 },
+            missing: 0,
+        }
     }
 }
 
@@ -122,6 +130,8 @@ impl Load {
 #[derive(Clone, Debug)]
 pub(super) struct Costs {
     pub edit: [Curve; 2],
+    /// Edits that look around.
+    pub careful: [Curve; 2],
     /// Seconds that roughness adds for each brick.
     pub rough: [f64; 2],
     pub mesh: [Curve; 2],
@@ -150,6 +160,7 @@ impl Default for Costs {
     fn default() -> Self {
         Self {
             edit: Default::default(),
+            careful: Default::default(),
             rough: [0.0; 2],
             mesh: Default::default(),
             upload: 0.0,
@@ -163,16 +174,21 @@ impl Costs {
     /// The stages of a transaction are chosen one by one. But what is edited on the processor has to be brought to the
     /// card before it is meshed there, and that counts already when edits are chosen.
     pub fn edit(&self, load: Load) -> Estimate {
-        let rough = self.rough.map(|each| each * load.rough as f64);
+        let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * self.drift[0][on]);
         let blocks = (load.amount as f64 * BLOCKS_PER_BRICK) as usize;
         let mesh = [0, 1].map(|on| self.mesh[on].at(blocks) * self.drift[1][on]);
         let brought = mesh[1] + self.upload * load.amount as f64;
-        estimate(
-            (self.edit[0].at(load.amount) + rough[0]) * self.drift[0][0] + mesh[0].min(brought),
-            (self.edit[1].at(load.amount) + rough[1]) * self.drift[0][1]
-                + self.upload * load.missing as f64
-                + mesh[0].min(mesh[1]),
-        )
+        estimate(cpu + mesh[0].min(brought), cuda + self.upload * load.missing as f64 + mesh[0].min(mesh[1]))
+    }
+
+    /// Seconds that edits take on a backend as measured, where nothing is missing.
+    fn edits(&self, load: Load, on: usize) -> f64 {
+        // What looking around takes longer than digging alone does.
+        let more = match load.careful {
+            0 => 0.0,
+            careful => (self.careful[on].at(careful) - self.edit[on].at(careful)).max(0.0),
+        };
+        self.edit[on].at(load.amount) + self.rough[on] * load.rough as f64 + more
     }
 
     /// Meshing blocks.
@@ -184,12 +200,12 @@ impl Costs {
     /// Takes in how long a stage took that was expected to take so long, the other one's part not counted.
     pub fn learn(&mut self, stage: Stage, load: Load, is_cuda: bool, took: Duration) {
         let on = usize::from(is_cuda);
-        let drift = &mut self.drift[stage as usize];
         let expected = match stage {
-            Stage::Edit => self.edit[on].at(load.amount) + self.rough[on] * load.rough as f64,
+            Stage::Edit => self.edits(load, on),
             Stage::Mesh => self.mesh[on].at(load.amount),
         };
         let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
+        let drift = &mut self.drift[stage as usize];
         if expected > 0.0 {
             let found = (took.as_secs_f64() / expected).clamp(DRIFT[0], DRIFT[1]);
             drift[on] += (found - drift[on]) * LEARNING;
@@ -218,6 +234,24 @@ mod tests {
         let micros = |amount| (curve.at(amount) * 1e6).round();
         assert_eq!([1, 10, 15, 20, 30, 40].map(micros), [20.0, 20.0, 25.0, 30.0, 30.0, 30.0]);
         assert_eq!([60, 80, 160].map(micros), [70.0, 110.0, 270.0]);
+    }
+
+    #[test]
+    fn looking_around_takes_its_own_time() {
+        let mut costs = Costs::default();
+        for (on, per) in [(0, 10), (1, 3)] {
+            for amount in [10, 100] {
+                costs.edit[on].push(amount, Duration::from_micros(amount as u64));
+                costs.careful[on].push(amount, Duration::from_micros(amount as u64 * per));
+            }
+        }
+        let of = |amount, careful| {
+            let estimate = costs.edit(Load { amount, careful, ..Load::default() });
+            [estimate.cpu, estimate.cuda].map(|time| time.as_nanos().div_ceil(1000))
+        };
+        assert_eq!(of(50, 0), [50, 50]);
+        assert_eq!(of(50, 50), [500, 150]);
+        assert_eq!(of(70, 50), [520, 170]);
     }
 
     #[test]

@@ -156,9 +156,8 @@ impl Shared {
 impl Compute for Shared {
     fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
-        // Cards know digs, adds and paint; whatever else there is, the processor does.
         #[cfg(feature = "cuda")]
-        if let Some(cuda) = self.cuda.as_ref().filter(|_| work.is_plain()) {
+        if let Some(cuda) = &self.cuda {
             let (ledgers, load) = cuda.edit(work, &mut choice);
             match ledgers {
                 Some(ledgers) => ledgers.into_iter().for_each(each),

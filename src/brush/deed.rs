@@ -234,7 +234,7 @@ fn direction(normal: Vec3) -> Result<[i16; 3], BrushError> {
     Ok(parts.map(|part| (part / length * UNIT).round_ties_even() as i16))
 }
 
-fn length(normal: [i16; 3]) -> f64 {
+pub(super) fn length(normal: [i16; 3]) -> f64 {
     normal.map(f64::from).iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 

@@ -100,6 +100,8 @@ pub use operation::Operation;
 pub use record::{BrushRecord, ImageRecord, OperationName, RecordError, ShapeName, StampRecord};
 pub use request::Brush;
 pub use roughness::Roughness;
+#[cfg(feature = "cuda")]
+pub(crate) use sculptor::Stroke;
 pub(crate) use sculptor::{Around, Sculptor};
 pub use shape::Shape;
 pub use stamp::Stamp;

@@ -11,6 +11,8 @@ use super::DEPTH;
 use super::blend::Fade;
 use super::deed::{Deed, above_plane};
 use super::solid::Solid;
+#[cfg(feature = "cuda")]
+use super::{deed::length, stamp::PressConstants};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
@@ -191,6 +193,52 @@ impl Sculptor {
             }
             _ => None,
         }
+    }
+}
+
+/// A sculptor as plain numbers, for other machines.
+#[cfg(feature = "cuda")]
+pub(crate) struct SculptorConstants<'a> {
+    pub strength: i32,
+    /// Not wider than the shape is deep.
+    pub falloff: i32,
+    pub material: Option<MaterialId>,
+    pub stroke: Stroke<'a>,
+}
+
+/// What a sculptor does to a surface.
+#[cfg(feature = "cuda")]
+pub(crate) enum Stroke<'a> {
+    Smooth,
+    Sharpen,
+    /// A point of the plane, its normal, and what that measures.
+    Flatten([i32; 3], [i16; 3], f64),
+    Level(i32),
+    /// How much is added to densities.
+    Shift(i32),
+    Stamp(PressConstants<'a>),
+    /// Step and base.
+    Terrace(i32, i32),
+}
+
+#[cfg(feature = "cuda")]
+impl Sculptor {
+    /// All that densities are computed from; `None` for what is no sculptor's deed.
+    pub(crate) fn constants(&self) -> Option<SculptorConstants<'_>> {
+        let stroke = match &self.deed {
+            Deed::Smooth { .. } => Stroke::Smooth,
+            Deed::Sharpen { .. } => Stroke::Sharpen,
+            Deed::Flatten { point, normal, .. } => Stroke::Flatten(*point, *normal, length(*normal)),
+            Deed::Level { height, .. } => Stroke::Level(*height),
+            Deed::Raise { amount, .. } => Stroke::Shift(-amount),
+            Deed::Lower { amount, .. } => Stroke::Shift(*amount),
+            Deed::Stamp { stamp, .. } => Stroke::Stamp(stamp.constants()),
+            Deed::Terrace { step, base, .. } => Stroke::Terrace(*step, *base),
+            Deed::Dig | Deed::Add { .. } | Deed::Paint { .. } => return None,
+            Deed::Limited(never) => match *never {},
+        };
+        let Fade { strength, falloff, material } = self.fade;
+        Some(SculptorConstants { strength, falloff: falloff.min(self.deep), material, stroke })
     }
 }
 

@@ -198,6 +198,28 @@ impl Press {
     }
 }
 
+/// A press as plain numbers, for other machines.
+#[cfg(feature = "cuda")]
+pub(crate) struct PressConstants<'a> {
+    pub center: [i32; 3],
+    /// Rows of the rotation's matrix, and what to divide them by.
+    pub rows: [[i64; 3]; 3],
+    pub squared: i64,
+    pub half: [i32; 2],
+    pub height: i32,
+    pub image: &'a GreyImage,
+}
+
+#[cfg(feature = "cuda")]
+impl Press {
+    /// All that [`Press::at`] looks at.
+    pub(super) fn constants(&self) -> PressConstants<'_> {
+        let &Self { center, rotation, half, height, .. } = self;
+        let (rows, squared) = matrix(rotation);
+        PressConstants { center, rows, squared, half, height, image: &self.relief.0 }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,6 @@
 //! Noise as its numbers, for those who compute the heights elsewhere, to the same bits.
 
+use bytemuck::{Pod, Zeroable};
 use noise::permutationtable::{NoiseHasher, PermutationTable};
 use noise::{Fbm, Perlin, RidgedMulti};
 
@@ -10,14 +11,19 @@ use super::world::Ground;
 use crate::lattice::{LIMIT, ONE};
 
 /// [`NoiseHeights`] over a world, checked, with all that is derived from them.
-///
-/// At the column (x, z) the first octave is looked up at `(x, z) / scale + origin`, times `frequency`; each further one
-/// `lacunarity` times as far out. What is made of their sum is in `kernels/heights.cuh`, and in the crate `noise`.
 pub(crate) struct NoiseTerms {
     extent: Extent,
     pub kind: NoiseKind,
     /// For each octave the permutation of 0 to 255 that its gradients are drawn from.
     pub tables: Vec<[u8; 256]>,
+    pub numbers: NoiseNumbers,
+}
+
+/// At the column (x, z) the first octave is looked up at `(x, z) / scale + origin`, times `frequency`; each further one
+/// `lacunarity` times as far out. What is made of their sum is in `kernels/heights.cuh`, and in the crate `noise`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct NoiseNumbers {
     pub scale: f64,
     pub origin: [f64; 2],
     pub frequency: f64,
@@ -45,10 +51,7 @@ impl NoiseHeights {
         let noise = Octaves::new(kind, seed, octaves, scale, amplitude)?;
         let extent = Extent::new(width, depth)?;
         let tables = seeds(seed, octaves).map(table).collect();
-        let common = |frequency, lacunarity, persistence| NoiseTerms {
-            extent,
-            kind,
-            tables,
+        let common = |frequency, lacunarity, persistence| NoiseNumbers {
             scale,
             origin: ORIGIN,
             frequency,
@@ -60,19 +63,20 @@ impl NoiseHeights {
             amplitude,
             base,
         };
-        Ok(match &noise {
-            Octaves::Fractal(noise) => NoiseTerms {
+        let numbers = match &noise {
+            Octaves::Fractal(noise) => NoiseNumbers {
                 factor: fractal_factor(noise),
                 ..common(noise.frequency, noise.lacunarity, noise.persistence)
             },
-            Octaves::Ridged(noise, peak) => NoiseTerms {
+            Octaves::Ridged(noise, peak) => NoiseNumbers {
                 // A power of two: multiplying gives the bits of dividing.
                 weighting: 1.0 / noise.attenuation,
                 factor: ridged_factor(noise),
                 peak: *peak,
                 ..common(noise.frequency, noise.lacunarity, noise.persistence)
             },
-        })
+        };
+        Ok(NoiseTerms { extent, kind, tables, numbers })
     }
 }
 
@@ -166,11 +170,15 @@ mod tests {
             };
             // 2 at half the strength, and nothing more.
             let noise = Fbm::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(2.0, 0.0));
-            assert_eq!(terms(NoiseKind::Fractal, octaves).factor, noise.get([0.0; 2]), "{octaves} octaves");
+            assert_eq!(
+                terms(NoiseKind::Fractal, octaves).numbers.factor,
+                noise.get([0.0; 2]),
+                "{octaves} octaves"
+            );
             // A ridge where the first octave is 0, none where another is 1. The last bit is safe from the 1 that comes off.
             let noise =
                 RidgedMulti::<Fixed>::new(0).set_octaves(octaves as usize).set_sources(fixed(0.0, 1.0));
-            let factor = terms(NoiseKind::Ridged, octaves).factor;
+            let factor = terms(NoiseKind::Ridged, octaves).numbers.factor;
             assert_eq!(factor - 1.0, noise.get([0.0; 2]), "{octaves} octaves");
             assert!((1.0..2.0).contains(&factor));
         }
@@ -190,13 +198,13 @@ mod tests {
     #[test]
     fn the_farthest_point_of_an_octave_has_a_whole_part_of_31_bits() {
         let terms = terms(NoiseKind::Fractal, MAX_OCTAVES);
-        let farthest = (f64::from(MAX_SIZE) + 1.0) * terms.lacunarity.powi(MAX_OCTAVES as i32 - 1);
-        assert!(farthest * terms.frequency < f64::from(1 << 30) * 1.9);
+        let farthest = (f64::from(MAX_SIZE) + 1.0) * terms.numbers.lacunarity.powi(MAX_OCTAVES as i32 - 1);
+        assert!(farthest * terms.numbers.frequency < f64::from(1 << 30) * 1.9);
     }
 
     #[test]
     fn an_octave_weighs_half_of_the_one_before_which_is_exact() {
-        assert_eq!(terms(NoiseKind::Ridged, 2).weighting, 0.5);
+        assert_eq!(terms(NoiseKind::Ridged, 2).numbers.weighting, 0.5);
     }
 
     #[test]

@@ -72,6 +72,12 @@ impl<'a> Window<'a> {
         [(self.size.z * self.size.y) as usize, 1, self.size.y as usize]
     }
 
+    /// All bricks, by place.
+    #[cfg(feature = "cuda")]
+    pub fn bricks(&self) -> &[Option<&'a Brick>] {
+        &self.bricks
+    }
+
     /// The brick at a place.
     #[inline]
     pub fn at(&self, place: usize) -> Option<&'a Brick> {

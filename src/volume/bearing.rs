@@ -22,15 +22,15 @@ impl DiggingRules {
 }
 
 /// The rules that bear on some edit of a run.
-pub(super) struct RunRules<'a> {
-    rules: &'a DiggingRules,
+pub(crate) struct RunRules<'a> {
+    pub(crate) rules: &'a DiggingRules,
     /// The protected boxes among what those edits reach, or beside it.
-    protected: Vec<LatticeBox>,
+    pub(crate) protected: Vec<LatticeBox>,
 }
 
 impl<'a> RunRules<'a> {
     /// Those for the tools that are bound; `None` where none is.
-    pub fn new(rules: &'a DiggingRules, tools: &[Tool]) -> Option<Self> {
+    pub(super) fn new(rules: &'a DiggingRules, tools: &[Tool]) -> Option<Self> {
         let bound = tools.iter().filter(|tool| tool.is_bound);
         let around: Vec<LatticeBox> = bound.filter_map(|tool| Some(tool.reach?.grown(1))).collect();
         let is_near = |own: &LatticeBox| around.iter().any(|around| own.intersection(*around).is_some());
@@ -39,7 +39,7 @@ impl<'a> RunRules<'a> {
     }
 
     /// What they say in a brick.
-    pub fn of_brick(&self, pos: BrickPos) -> BrickRules<'a> {
+    pub(super) fn of_brick(&self, pos: BrickPos) -> BrickRules<'a> {
         BrickRules::new(self.rules, &self.protected, pos)
     }
 }
@@ -180,7 +180,7 @@ mod plain_edits {
         let runs = |edits: &[Edit], rules: DiggingRules| {
             let (edits, mut runs) = (edits.iter().collect::<Vec<_>>(), Vec::new());
             let note = |work: &EditWork, _: &mut dyn FnMut(Ledger)| {
-                runs.push((work.tools.len(), work.is_plain()));
+                runs.push((work.tools.len(), !work.looks_around()));
             };
             let view = SampleView::new(&ground, &bricks);
             Draft::make(view, grid, &edits, 0, &uniform, Some(&rules), note);

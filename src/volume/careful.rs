@@ -10,7 +10,7 @@ use super::surroundings::Surroundings;
 use super::view::resolve;
 use super::workpiece::{Changed, Workpiece};
 use super::{Layers, Sample, SampleView};
-use crate::brush::{BAND, Kind, Sculptor};
+use crate::brush::{Around, BAND, Kind, Sculptor};
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 
@@ -56,9 +56,9 @@ impl Workpiece<'_> {
                     continue;
                 };
                 let mut new = || match &tool.sculptor {
-                    Some(sculptor) => {
-                        sculptor.material().unwrap_or_else(|| below.material(&self.view, point))
-                    }
+                    Some(sculptor) => sculptor
+                        .material()
+                        .unwrap_or_else(|| below.material(&self.view, point, &around.around(local))),
                     None => tool.operation.material().unwrap_or(MaterialId::GROUND),
                 };
                 let mut after = Sample::edited(proposed);
@@ -153,7 +153,7 @@ struct Seen {
 
 impl Below {
     /// What a point is made of that becomes solid: what lies straight below, else straight above, else beside it.
-    fn material(&mut self, view: &SampleView, point: IVec3) -> MaterialId {
+    fn material(&mut self, view: &SampleView, point: IVec3, around: &Around) -> MaterialId {
         let known = &mut self.0[((point.z & 7) * 8 + (point.x & 7)) as usize];
         let end = known.map_or(point.y - LOOK, |seen| seen.from);
         let fresh = (end..point.y).rev().map(|y| point.with_y(y)).find(|&at| view.is_solid(at));
@@ -165,10 +165,12 @@ impl Below {
         if let Some((_, material)) = solid.filter(|(y, _)| point.y - y <= LOOK) {
             return material;
         }
-        let above = (1..=LOOK).map(|up| point + IVec3::Y * up);
-        let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|step| point + step);
-        let other = above.chain(beside).find(|&at| view.is_solid(at));
-        other.map_or(MaterialId::GROUND, |at| view.stored_material(at))
+        let above = (1..=LOOK).map(|up| point + IVec3::Y * up).find(|&at| view.is_solid(at));
+        let beside = || {
+            let ways = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].into_iter();
+            ways.filter(|way| around.density(*way) < 0).map(|way| point + way).next()
+        };
+        above.or_else(beside).map_or(MaterialId::GROUND, |at| view.stored_material(at))
     }
 }
 

@@ -120,9 +120,21 @@ pub(crate) struct Tool {
     pub is_bound: bool,
 }
 
+impl Tool {
+    /// Does the edit look at other samples than those that it changes?
+    pub fn looks_around(&self) -> bool {
+        self.sculptor.is_some() || self.is_bound
+    }
+}
+
 /// The part of an edit's reach that lies in the world; `None` when it lies outside.
 pub fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
+}
+
+/// May some rule be against an edit of this reach and power?
+fn is_bound(rules: Option<&DiggingRules>, reach: Option<LatticeBox>, power: u8) -> bool {
+    rules.zip(reach).is_some_and(|(rules, own)| rules.bear_on(own, power))
 }
 
 /// Edits, sorted by the bricks that they may reach.
@@ -133,7 +145,7 @@ pub struct EditWork<'a> {
     pub grid: ChunkGrid,
     pub(crate) tools: Vec<Tool>,
     jobs: Vec<Job>,
-    rules: Option<RunRules<'a>>,
+    pub(crate) rules: Option<RunRules<'a>>,
 }
 
 impl<'a> EditWork<'a> {
@@ -152,17 +164,25 @@ impl<'a> EditWork<'a> {
         Self { base, grid, tools, jobs, rules: None }
     }
 
+    /// The same under rules.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn under(self, rules: Option<&'a DiggingRules>) -> Self {
+        let bound: Vec<bool> =
+            self.tools.iter().map(|tool| is_bound(rules, tool.reach, tool.power)).collect();
+        self.bound(rules, &bound)
+    }
+
     /// The same under rules, which bear on these of the edits.
-    fn under(mut self, rules: Option<&'a DiggingRules>, bound: &[bool]) -> Self {
+    fn bound(mut self, rules: Option<&'a DiggingRules>, bound: &[bool]) -> Self {
         self.tools.iter_mut().zip(bound).for_each(|(tool, &is_bound)| tool.is_bound = is_bound);
         self.rules = rules.and_then(|rules| RunRules::new(rules, &self.tools));
         self
     }
 
-    /// Is there nothing but digs, adds and paint that no rule bears on? Cards know no more.
+    /// Does any edit look at other samples than those that it changes?
     #[cfg(feature = "cuda")]
-    pub(crate) fn is_plain(&self) -> bool {
-        self.rules.is_none() && self.tools.iter().all(|tool| tool.sculptor.is_none())
+    pub(crate) fn looks_around(&self) -> bool {
+        self.tools.iter().any(Tool::looks_around)
     }
 
     /// The jobs of each brick, in order of the edits.
@@ -256,14 +276,12 @@ impl Draft {
     ) -> Self {
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits.len(), EditEffect::default);
-        let is_bound = |edit: &&Edit| {
-            rules.is_some_and(|rules| reach(grid, edit).is_some_and(|own| rules.bear_on(own, edit.power())))
-        };
-        let bound: Vec<bool> = edits.iter().map(is_bound).collect();
+        let bound: Vec<bool> =
+            edits.iter().map(|edit| is_bound(rules, reach(grid, edit), edit.power())).collect();
         let (mut earlier, mut rest) = (Changes::default(), runs(grid, edits, &bound).into_iter().peekable());
         while let Some(run) = rest.next() {
             let base = if run.start == 0 { base } else { base.over(&earlier.newer) };
-            let work = EditWork::new(base, grid, &edits[run.clone()]).under(rules, &bound[run.clone()]);
+            let work = EditWork::new(base, grid, &edits[run.clone()]).bound(rules, &bound[run.clone()]);
             apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
             if run.start > 0 || rest.peek().is_some() {
                 earlier.take(std::mem::take(&mut draft.bricks));

@@ -19,6 +19,8 @@ mod tally;
 mod view;
 mod workpiece;
 
+#[cfg(feature = "cuda")]
+pub(crate) use bearing::RunRules;
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub(crate) use brick::{PRISTINE, row};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};

@@ -69,8 +69,7 @@ impl<'a> Workpiece<'a> {
             let first = ledger.counts.len();
             let mut counts = Counts { edit, first, list: &mut ledger.counts };
             let rules = rules.as_ref().filter(|_| tool.is_bound);
-            let is_careful = tool.sculptor.is_some() || rules.is_some();
-            let around = is_careful.then(|| Surroundings::new(&self.view, self.pos));
+            let around = tool.looks_around().then(|| Surroundings::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
                 let changed = match &around {

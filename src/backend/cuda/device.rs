@@ -55,11 +55,13 @@ pub(super) enum Kernel {
     Mesh,
     /// Makes heights of noise.
     Heights,
+    /// Applies edits to bricks, among them such as look around.
+    Careful,
 }
 
 impl Kernel {
     /// All of them, in order of their numbers.
-    pub const ALL: [Self; 4] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights];
+    pub const ALL: [Self; 5] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights, Self::Careful];
 
     /// Its name in the source.
     pub const fn name(self) -> &'static str {
@@ -68,6 +70,7 @@ impl Kernel {
             Self::Edit => "edit",
             Self::Mesh => "mesh",
             Self::Heights => "heights",
+            Self::Careful => "careful",
         }
     }
 }

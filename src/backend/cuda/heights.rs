@@ -132,16 +132,7 @@ fn params(terms: &NoiseTerms, tables: u64) -> HeightsParams {
     HeightsParams {
         tables,
         heights: 0,
-        scale: terms.scale,
-        origin: terms.origin,
-        frequency: terms.frequency,
-        lacunarity: terms.lacunarity,
-        persistence: terms.persistence,
-        weighting: terms.weighting,
-        factor: terms.factor,
-        peak: terms.peak,
-        amplitude: terms.amplitude,
-        base: terms.base,
+        noise: terms.numbers,
         first: 0,
         count: 0,
         row_len: terms.row_len() as u32,
@@ -228,7 +219,7 @@ mod tests {
             let (x, z) = (rng.u32(0..=width), rng.u32(0..=depth));
             let expected = noise.by_column()(x as i32, z as i32);
             let mut terms = noise.terms(width, depth).expect("parameters in range");
-            (terms.amplitude, terms.base) = (amplitude, -amplitude * expected);
+            (terms.numbers.amplitude, terms.numbers.base) = (amplitude, -amplitude * expected);
             let mut heights = vec![77; terms.columns()];
             session.heights(&terms, &mut heights).expect("the device is fine");
             let found = heights[z as usize * terms.row_len() + x as usize];

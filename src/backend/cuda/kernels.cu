@@ -1,9 +1,10 @@
 // The work of a transaction on the device: bricks are brought there, edited, and meshed.
 //
-// Four kernels, a block of 128 threads for each job:
+// Five kernels, a block of 128 threads for each job:
 //
 //   scatter  copies what the host sent to where it belongs
 //   edit     applies edits to one brick        as volume/workpiece.rs does
+//   careful  the same, also those that sculpt  as volume/careful.rs does
 //   mesh     draws the cells of one brick      as surface/block.rs does
 //   heights  makes ground of noise              as ground/noise_heights.rs does, a block for every 1024 columns
 //
@@ -12,11 +13,11 @@
 //
 // Blocks share nothing but counters from which each reserves room for its output, so blocks come out in any order, while
 // the order inside a block is fixed. Counters go on past the end of the room: the host then knows how much is needed.
-// They are 32 bits wide; what one launch may ask for must fit (see layout.rs).
+// They are 32 bits wide; what one launch may ask for must fit (see layout/).
 //
 // The same sources are compiled for the CPU by tools/emulator, as plain C++, to be tested where there is no device.
 
-#include "kernels/edit.cuh"
+#include "kernels/careful.cuh"
 #include "kernels/heights.cuh"
 #include "kernels/mesh.cuh"
 

@@ -6,7 +6,6 @@ use super::device::{Device, Fault, Kernel};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams, MeshResult, NONE};
 use super::mail::{Outbox, Plan, fill, map};
 use super::session::{Session, Uploads};
-use super::slots::reference;
 use super::windows::Windows;
 use crate::lattice::SNAP;
 use crate::surface::block::{Block, Part, Parts};
@@ -169,8 +168,8 @@ impl Session {
         let slots = places.iter().map(|&place| self.need_stack(uploads, place));
         let columns: Vec<_> =
             places.iter().copied().zip(slots.collect::<Result<Vec<u32>, Fault>>()?).collect();
-        let windows = Windows::around(blocks);
-        let refs = self.refs(view, &windows, uploads)?;
+        let windows = Windows::around(view.samples, blocks.iter().map(|block| block.brick), 1);
+        let refs = self.refs(&windows, uploads)?;
         let single = ground.single_material().map(MaterialMix::pure);
         let plain = single.filter(|_| refs.iter().all(|&at| at == NONE || at & 1 == 0));
 
@@ -225,36 +224,14 @@ impl Session {
         }
         Err(Fault::Failed("results changed from one pass to the next".into()))
     }
-
-    /// References to the bricks of windows.
-    fn refs<'a>(
-        &mut self,
-        view: &WorldView<'a>,
-        windows: &Windows,
-        uploads: &mut Uploads<'a>,
-    ) -> Result<Vec<u32>, Fault> {
-        let (mut refs, slots) = (vec![NONE; windows.len()], &self.bricks);
-        let missing = windows.fill(&mut refs, |pos| match view.samples.brick(pos) {
-            None => (NONE, None),
-            Some(brick) => match slots.find(brick.tag.get()) {
-                Some(slot) => (reference(slot, brick), None),
-                None => (NONE, Some(brick)),
-            },
-        });
-        for (number, brick) in missing {
-            refs[number as usize] = self.need_brick(uploads, brick)?;
-        }
-        Ok(refs)
-    }
 }
 
 fn mesh_job(view: &WorldView, windows: &Windows, number: usize, block: &Block, column: u32) -> MeshJob {
     let entry = windows.entry(number, block.brick);
-    let [x, z] = entry.strides.map(u32::from);
     let cells = block.brick.samples().intersection(view.grid.chunk_cells(block.chunk));
     MeshJob {
         window: entry.number,
-        strides: x | z << 16,
+        strides: entry.strides,
         column,
         y: block.brick.0.y,
         cells: cells.map_or(NO_CELLS, |cells| layout::pack_box(cells, block.brick.origin())),

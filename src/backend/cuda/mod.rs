@@ -7,6 +7,10 @@
 //!           vertices, indices    <--what is used-
 //! ```
 //!
+//! Edits that look around, sculpting ones and all under rules, take a kernel of their own, which gets windows of bricks too.
+//! They come run by run, as the processor takes them: what one run changed is on the device already when the next one
+//! reads it. A fault in the middle leaves the runs that came back as they are, and the processor does the rest.
+//!
 //! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
 //! - [`session`](self::session) keeps bricks and heights on it, with a budget; `slots` says where, and which go first.
 //! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
@@ -62,7 +66,7 @@ pub(super) struct Cuda {
 /// Where the session is.
 enum Place {
     Opening,
-    Open(Box<Session>, Costs),
+    Open(Box<Session>, Box<Costs>),
     Lost,
 }
 
@@ -108,7 +112,7 @@ impl Cuda {
             match opened {
                 Ok((session, costs)) => {
                     let name = session.name();
-                    *lock(&slot) = Place::Open(Box::new(session), costs);
+                    *lock(&slot) = Place::Open(Box::new(session), Box::new(costs));
                     *lock(&state) = EngineState::Cuda(name);
                 }
                 Err(fault) => lose(&mut lock(&slot), &state, &fault),

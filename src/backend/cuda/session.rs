@@ -10,6 +10,7 @@ use super::layout::{self, BRICK_BYTES, RECORD_BYTES, ScatterJob, ScatterParams, 
 use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
 use super::slots::{Slots, reference};
+use super::windows::Windows;
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::surface::block::Block;
@@ -204,6 +205,21 @@ impl Session {
         brick.tag.set(tag);
         uploads.bricks.push((brick, slot));
         Ok(reference(slot, brick))
+    }
+
+    /// References to the bricks of windows, which are uploaded where they have to be.
+    pub(super) fn refs<'a>(
+        &mut self,
+        windows: &Windows<'a>,
+        uploads: &mut Uploads<'a>,
+    ) -> Result<Vec<u32>, Fault> {
+        let slots = &self.bricks;
+        let find = |brick: &Brick| slots.find(brick.tag.get()).map(|slot| reference(slot, brick));
+        let (mut refs, missing) = windows.refs(find);
+        for (number, brick) in missing {
+            refs[number as usize] = self.need_brick(uploads, brick)?;
+        }
+        Ok(refs)
     }
 
     /// Sees to it that a stack is there; returns its slot.

@@ -1,11 +1,11 @@
-//! A trial before a device is trusted: ground is made of noise, and a piece of ground is dug, on it and on the processor.
-//! Every bit is compared, and digging is timed on both.
+//! A trial before a device is trusted: ground is made of noise, and a piece of ground is dug and sculpted, on it and on the
+//! processor. Every bit is compared, and the time it takes on both.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use glam::{IVec3, Vec3};
+use glam::{IVec3, Vec2, Vec3};
 use web_time::Instant;
 
 use super::device::Fault;
@@ -13,13 +13,13 @@ use super::layout;
 use super::session::Session;
 use crate::backend::choice::Costs;
 use crate::backend::{Compute, Cpu};
-use crate::brush::{Brush, Edit, Roughness, Shape};
-use crate::ground::{Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
+use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
+use crate::ground::{GreyImage, Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE};
 use crate::surface::block::{Block, Parts};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, Vertex};
-use crate::volume::{Brick, Bricks, DraftedBrick, EditWork, Ledger, SampleView};
+use crate::volume::{Brick, Bricks, DiggingRules, DraftedBrick, EditWork, Ledger, SampleView};
 
 /// Cells along a side of the ground.
 const SIDE: i32 = 256;
@@ -52,14 +52,27 @@ pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
 
         let work = EditWork::new(samples, grid, &rough.iter().collect::<Vec<_>>());
         let (rough, _) = compare_edits(session, &work)?;
+        // Under rules: not timed, as it takes about as long as sculpting.
+        let rules = rules();
+        let under_rules = work.under(Some(&rules));
+        if summary(&ledgers_of(&under_rules)) != summary(&session.edit(&under_rules)?) {
+            return Err(Fault::SelfTest);
+        }
         let more = |on: usize| rough[on].saturating_sub(times[on]).as_secs_f64() / jobs as f64;
         costs.rough = [more(0), more(1)];
 
         let drafted: Vec<DraftedBrick> = ledgers.into_iter().flat_map(|ledger| ledger.bricks).collect();
         let bricks: Bricks =
             drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
+        let dug = SampleView::new(&ground, &bricks);
+        let sculpting = sculpting_edits(&ground, count, radius);
+        let work = EditWork::new(dug, grid, &sculpting.iter().collect::<Vec<_>>());
+        let (times, _) = compare_edits(session, &work)?;
+        let jobs = work.jobs().len();
+        costs.careful.iter_mut().zip(times).for_each(|(curve, time)| curve.push(jobs, time));
+
         let mask = Mask::default();
-        let view = WorldView { samples: SampleView::new(&ground, &bricks), mask: MaskView::new(&mask), grid };
+        let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid };
         let blocks = dirty(grid, &drafted);
         let on_cpu = || {
             let mut all = Vec::new();
@@ -94,13 +107,15 @@ fn compare_heights(session: &mut Session) -> Result<(), Fault> {
 
 /// Edits on both.
 fn compare_edits(session: &mut Session, work: &EditWork) -> Result<([Duration; 2], Vec<Ledger>), Fault> {
-    let on_cpu = || {
-        let mut ledgers = Vec::new();
-        Cpu.edit(work, &mut |ledger| ledgers.push(ledger));
-        ledgers
-    };
     let is_same = |cpu: &Vec<Ledger>, cuda: &Vec<Ledger>| summary(cpu) == summary(cuda);
-    compare(session, on_cpu, |session| session.edit(work), is_same)
+    compare(session, || ledgers_of(work), |session| session.edit(work), is_same)
+}
+
+/// What the processor makes of edits.
+fn ledgers_of(work: &EditWork) -> Vec<Ledger> {
+    let mut ledgers = Vec::new();
+    Cpu.edit(work, &mut |ledger| ledgers.push(ledger));
+    ledgers
 }
 
 /// The blocks that changed samples show in.
@@ -151,20 +166,61 @@ fn ground() -> Result<Ground, Fault> {
     made.map_err(|error| Fault::Failed(error.to_string()))
 }
 
+/// The middle of a brush at the surface; they lie side by side.
+fn place(ground: &Ground, i: i32, radius: f32) -> Vec3 {
+    let (x, z) = (16 + i % 8 * 31, 16 + i / 8 * 29);
+    let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;
+    Vec3::new(x as f32 + 0.3, height - 0.2 * radius, z as f32 - 0.4)
+}
+
+/// Rules of every kind.
+fn rules() -> DiggingRules {
+    let box_at = |x: i32| LatticeBox { min: IVec3::new(x, -99, 9), max: IVec3::new(x + 2, 99, 18) };
+    DiggingRules::default()
+        .with_hardness(MaterialId(0), 150)
+        .with_unbreakable(MaterialId(3))
+        .with_bedrock(-3)
+        .with_protected(box_at(14))
+        .with_protected(box_at(50))
+}
+
+/// Brushes of every kind that sculpts, where others dug. None reads what another one changes.
+fn sculpting_edits(ground: &Ground, count: i32, radius: f32) -> Vec<Edit> {
+    let relief = GreyImage::from_samples(3, 2, vec![0, 40_000, 9_000, 65_535, 20_000, 1]).ok().map(Arc::new);
+    let brush = |i: i32| {
+        let center = place(ground, i, radius);
+        let (shape, slope) = (Shape::sphere(center, radius + 1.0), Vec3::new(0.3, 1.0, -0.2));
+        let brush = match (i / 3 % 6, &relief) {
+            (0, _) => Brush::sharpen(shape, 1.0),
+            (1, _) => Brush::flatten(shape, center, slope),
+            (2, _) => Brush::level(shape, center.y),
+            (3, Some(relief)) => {
+                let stamp = Stamp::new(Arc::clone(relief), center, Vec2::splat(radius), 2.0);
+                Brush::stamp(shape, stamp.onto(slope))
+            }
+            (4, _) => Brush::terrace(shape, 1.5),
+            _ => Brush::lower(shape, 0.7),
+        };
+        match i % 3 {
+            0 => Brush::smooth(brush.shape, 0.8),
+            1 => Brush::raise(brush.shape, 1.3),
+            _ => brush,
+        }
+    };
+    (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
+}
+
 /// Brushes at the surface, side by side.
 fn edits(ground: &Ground, count: i32, radius: f32, is_rough: bool) -> Vec<Edit> {
-    let place = |i: i32| {
-        let (x, z) = (16 + i % 8 * 31, 16 + i / 8 * 29);
-        let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;
-        Vec3::new(x as f32 + 0.3, height - 0.2 * radius, z as f32 - 0.4)
-    };
-    let brush = |i: i32| match (i % 4, place(i)) {
+    let brush = |i: i32| match (i % 4, place(ground, i, radius)) {
         (2, base) => Brush::add(Shape::cone(base, Vec3::new(1.0, radius * 1.5, 2.0), radius), MaterialId(3)),
         (3, from) => Brush::dig(Shape::capsule(from, from + Vec3::new(3.0, -radius, 4.0), radius * 0.7)),
         (_, center) => Brush::dig(Shape::sphere(center, radius)),
     };
+    let power = |i: i32| [255, 100, 120, 20][(i / 2 % 4) as usize];
     let grain = |i: i32| Roughness::new(1.5, 4.0, i as u32);
-    let brush = |i: i32| if is_rough { brush(i).with_roughness(grain(i)) } else { brush(i) };
+    let brush =
+        |i: i32| if is_rough { brush(i).with_roughness(grain(i)).with_power(power(i)) } else { brush(i) };
     (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
 }
 

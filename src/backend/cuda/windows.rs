@@ -1,170 +1,133 @@
-//! The bricks around blocks, as tables that kernels look them up in.
+//! The bricks around other bricks, as tables that kernels look them up in.
 //!
-//! Blocks are put together by regions of some bricks a side. A region's window is the box around its bricks and one more
-//! on each side: so bricks that lie close together share their neighbours, and each is looked up once.
+//! Bricks that lie close together share a window, a box of bricks around them: so each is looked up once.
 
 use glam::IVec3;
-use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
-use crate::lattice::BrickPos;
-use crate::surface::block::Block;
+use crate::lattice::{BrickPos, LatticeBox};
+use crate::surface::window::{Window, shared};
+use crate::volume::{Brick, SampleView};
 
-/// Bricks along a region's side, as a power of two.
-const REGION: i32 = 2;
+use super::layout::NONE;
+use super::mail::map;
 
-/// From how many regions on their windows are filled side by side.
-const LONG: usize = 16;
+/// From how many windows on they are filled side by side.
+const LONG: usize = 8;
 
-/// Where a block's own brick is in the tables.
+/// Where a brick is in the tables.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     /// Its number.
     pub number: u32,
-    /// Entries to the next brick along x and along z; along y it is 1.
-    pub strides: [u16; 2],
+    /// Entries to the next brick along x, and `<< 16` along z; along y it is 1.
+    pub strides: u32,
 }
 
-/// A box of bricks.
-#[derive(Clone, Copy, Debug)]
-struct Window {
-    low: IVec3,
-    high: IVec3,
-    /// Entries of all windows before it.
-    first: u32,
-}
-
-impl Window {
-    fn size(&self) -> IVec3 {
-        self.high - self.low + 1
-    }
-
-    fn len(&self) -> usize {
-        let size = self.size();
-        (size.x * size.y * size.z) as usize
-    }
-
-    fn entry(&self, brick: BrickPos) -> Entry {
-        let (size, at) = (self.size(), brick.0 - self.low);
-        let number = self.first + ((at.x * size.z + at.z) * size.y + at.y) as u32;
-        Entry { number, strides: [(size.z * size.y) as u16, size.y as u16] }
-    }
-
-    /// Its bricks, in order of their entries.
-    fn bricks(self) -> impl Iterator<Item = BrickPos> {
-        let (low, high) = (self.low, self.high);
-        (low.x..=high.x).flat_map(move |x| {
-            (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| BrickPos(IVec3::new(x, y, z))))
-        })
-    }
-}
-
-/// The windows of many blocks.
-pub(super) struct Windows {
-    windows: Vec<Window>,
-    /// For each block, its window.
+/// The windows of many bricks.
+pub(super) struct Windows<'a> {
+    /// Each with the entries of all windows before it.
+    windows: Vec<(Window<'a>, u32)>,
+    /// For each brick that was asked for, its window.
     of: Vec<u32>,
-    len: usize,
 }
 
-impl Windows {
-    /// Windows around blocks.
-    pub fn around(blocks: &[Block]) -> Self {
-        let mut regions: FxHashMap<IVec3, u32> = FxHashMap::default();
-        let mut windows: Vec<Window> = Vec::new();
-        // Blocks come by stacks, so most lie in the region of the one before.
-        let mut last = None;
-        let find = |block: &Block| {
-            let (brick, region) = (block.brick.0, block.brick.0 >> REGION);
-            let number = match last {
-                Some((same, number)) if same == region => number,
-                _ => *regions.entry(region).or_insert_with(|| {
-                    windows.push(Window { low: brick - 1, high: brick + 1, first: 0 });
-                    windows.len() as u32 - 1
-                }),
-            };
-            last = Some((region, number));
-            let window = &mut windows[number as usize];
-            (window.low, window.high) = (window.low.min(brick - 1), window.high.max(brick + 1));
-            number
+/// References by entry, and the bricks that have none, with their entries.
+pub(super) type Refs<'a> = (Vec<u32>, Vec<(u32, &'a Brick)>);
+
+impl<'a> Windows<'a> {
+    /// Windows around bricks, sorted by stacks: one brick more to all sides, and so many up and down.
+    pub fn around(
+        view: SampleView<'a>,
+        bricks: impl Iterator<Item = BrickPos> + Clone,
+        up_and_down: i32,
+    ) -> Self {
+        let (mut groups, mut of, mut rest) = (Vec::new(), Vec::new(), bricks);
+        let more = IVec3::Y * (up_and_down - 1);
+        while let Some((count, places)) = shared(rest.clone()) {
+            of.resize(of.len() + count, groups.len() as u32);
+            groups.push(LatticeBox { min: places.min - more, max: places.max + more });
+            rest.by_ref().take(count).for_each(drop);
+        }
+        let mut first = 0;
+        let numbered = |window: Window<'a>| {
+            let own = first;
+            first += window.bricks().len() as u32;
+            (window, own)
         };
-        let of = blocks.iter().map(find).collect();
-        let mut len = 0;
-        for window in &mut windows {
-            window.first = len as u32;
-            len += window.len();
-        }
-        Self { windows, of, len }
+        let windows = map(&groups, LONG, |&places| Window::new(&view, places));
+        Self { windows: windows.into_iter().map(numbered).collect(), of }
     }
 
-    /// Entries of all windows.
-    pub fn len(&self) -> usize {
-        self.len
+    /// The entry of a brick that was asked for, by its number among those.
+    pub fn entry(&self, number: usize, brick: BrickPos) -> Entry {
+        let (window, first) = &self.windows[self.of[number] as usize];
+        let [x, _, z] = window.steps();
+        Entry { number: first + window.place(brick) as u32, strides: (x | z << 16) as u32 }
     }
 
-    /// The entry of the brick of a block, by the block's number.
-    pub fn entry(&self, block: usize, brick: BrickPos) -> Entry {
-        self.windows[self.of[block] as usize].entry(brick)
-    }
-
-    /// Writes what `find` says of each brick to its entry; returns what it gave besides, with the entry's number.
-    pub fn fill<T: Send>(
-        &self,
-        out: &mut [u32],
-        find: impl Fn(BrickPos) -> (u32, Option<T>) + Sync,
-    ) -> Vec<(u32, T)> {
-        let mut slices = Vec::with_capacity(self.windows.len());
-        let mut rest = out;
-        for window in &self.windows {
-            let (own, others) = rest.split_at_mut(window.len());
-            slices.push((window, own));
-            rest = others;
-        }
-        let fill = |(window, own): (&Window, &mut [u32])| {
-            let mut besides = Vec::new();
-            for ((number, entry), brick) in (window.first..).zip(own).zip(window.bricks()) {
-                let found = find(brick);
-                *entry = found.0;
-                besides.extend(found.1.map(|other| (number, other)));
-            }
-            besides
-        };
-        if slices.len() < LONG {
-            slices.into_iter().flat_map(fill).collect()
-        } else {
-            slices.into_par_iter().flat_map_iter(fill).collect()
-        }
+    /// What `find` says of each brick; [`NONE`] where none is stored, and where it says nothing.
+    pub fn refs(&self, find: impl Fn(&Brick) -> Option<u32> + Send + Sync) -> Refs<'a> {
+        let parts = map(&self.windows, LONG, |(window, first)| {
+            let mut missing = Vec::new();
+            let found = (*first..).zip(window.bricks()).map(|(number, brick)| {
+                let Some(brick) = *brick else { return NONE };
+                find(brick).unwrap_or_else(|| {
+                    missing.push((number, brick));
+                    NONE
+                })
+            });
+            (found.collect::<Vec<u32>>(), missing)
+        });
+        let (found, missing): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        (found.concat(), missing.concat())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::Arc;
+
     use super::*;
-    use crate::lattice::ChunkPos;
+    use crate::ground::Ground;
+    use crate::volume::Bricks;
 
     #[test]
-    fn every_neighbour_of_a_block_has_its_entry() {
-        let chunk = ChunkPos { x: 0, y: 0, z: 0 };
+    fn every_neighbour_of_a_brick_has_its_entry() {
+        let ground = Ground::flat(8, 8, 0.0).unwrap();
         let mut rng = fastrand::Rng::with_seed(7);
-        let brick = |rng: &mut fastrand::Rng| IVec3::new(rng.i32(-9..9), rng.i32(-9..9), rng.i32(-9..9));
-        let blocks: Vec<Block> = (0..60).map(|_| Block { brick: BrickPos(brick(&mut rng)), chunk }).collect();
-        let windows = Windows::around(&blocks);
-        let code =
-            |brick: BrickPos| (brick.0.x + 20 + (brick.0.y + 20) * 40 + (brick.0.z + 20) * 1600) as u32;
-        let mut entries = vec![0; windows.len()];
-        let odd = windows.fill(&mut entries, |brick| (code(brick), (brick.0.x % 2 != 0).then_some(brick)));
-        for (number, block) in blocks.iter().enumerate() {
-            let entry = windows.entry(number, block.brick);
-            for step in (0..27).map(|i| IVec3::new(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1)) {
-                let at = entry.number as i32
-                    + step.x * i32::from(entry.strides[0])
-                    + step.z * i32::from(entry.strides[1])
-                    + step.y;
-                assert_eq!(entries[at as usize], code(BrickPos(block.brick.0 + step)));
+        let place = |rng: &mut fastrand::Rng| {
+            let [x, y, z] = [rng.i32(-9..9), rng.i32(-9..9), rng.i32(-9..9)];
+            (x, z, y)
+        };
+        let code = |pos: IVec3| (pos.x + 20 + (pos.y + 20) * 40 + (pos.z + 20) * 1600) as u32;
+        let pos = |(x, z, y)| BrickPos(IVec3::new(x, y, z));
+        let mut stored = Bricks::default();
+        for at in (0..3000).map(|_| pos(place(&mut rng))) {
+            let brick = Brick::of_edited(&[0; 512]);
+            brick.tag.set(code(at.0).into());
+            stored.insert(at, Arc::new(brick));
+        }
+        let asked: BTreeSet<_> = (0..60).map(|_| place(&mut rng)).collect();
+        let windows = Windows::around(SampleView::new(&ground, &stored), asked.iter().copied().map(pos), 8);
+        let (mut refs, missing) = windows.refs(|brick| {
+            let code = brick.tag.get() as u32;
+            (!code.is_multiple_of(3)).then_some(code)
+        });
+        assert!(!missing.is_empty());
+        for (entry, brick) in missing {
+            assert_eq!(refs[entry as usize], NONE);
+            refs[entry as usize] = brick.tag.get() as u32;
+        }
+        for (number, at) in asked.into_iter().map(pos).enumerate() {
+            let entry = windows.entry(number, at);
+            let [x, z] = [entry.strides & 0xffff, entry.strides >> 16].map(|stride| stride as i32);
+            let around = (0..27).map(|i| IVec3::new(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1));
+            for step in around.chain((-8..=8).map(|up| IVec3::Y * up)) {
+                let found = refs[(entry.number as i32 + step.x * x + step.z * z + step.y) as usize];
+                let expected = stored.get(&BrickPos(at.0 + step)).map_or(NONE, |_| code(at.0 + step));
+                assert_eq!(found, expected, "{at:?} {step}");
             }
         }
-        assert!(
-            odd.iter().all(|&(number, brick)| entries[number as usize] == code(brick)) && !odd.is_empty()
-        );
     }
 }

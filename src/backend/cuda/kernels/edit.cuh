@@ -1,4 +1,4 @@
-// Applies edits to one brick, as volume/workpiece.rs does.
+// Applies edits to one brick, as volume/workpiece.rs does. Those that look around are in careful.cuh.
 //
 // A thread owns four samples of one column, two layers apart, from the first edit to the last. Before distances are
 // computed, bricks too far from the shape are sorted out, and samples that no distance changes: much of what brushes reach
@@ -33,7 +33,7 @@ struct Workbench {
     u32 record, material, bounds;
 };
 
-constexpr u32 NOT_UNIFORM = 16;
+constexpr u32 NOT_UNIFORM = 32;
 
 // What a thread's samples have in common.
 struct OwnColumn {
@@ -214,15 +214,16 @@ __device__ inline bool is_settled(u32 operation, i32 density) {
     return operation == ADD ? density <= -DEPTH : density >= 0;
 }
 
-// Which of the thread's samples an edit may change, a bit for each.
-__device__ inline u32 open_samples(const Tool& tool, const OwnColumn& column, const Brick& brick) {
+// Which of the thread's samples an edit may change, a bit for each: those in its reach, and of those, unless it looks
+// around, the ones that are not settled.
+__device__ inline u32 open_samples(const Tool& tool, const OwnColumn& column, const Brick& brick, bool looks_around) {
     i32 x = column.low[0] + column.x, z = column.low[2] + column.z;
     if (x < tool.min[0] || x > tool.max[0] || z < tool.min[2] || z > tool.max[2]) return 0;
     u32 open = 0;
     for (i32 k = 0; k < OWN; k++) {
         i32 y = column.low[1] + own_y(column, k), raw = brick.samples[own_index(k)];
         i32 density = raw == PRISTINE ? pristine_distance(column, k) : raw;
-        bool is_open = tool.min[1] <= y && y <= tool.max[1] && !is_settled(tool.operation, density);
+        bool is_open = tool.min[1] <= y && y <= tool.max[1] && (looks_around || !is_settled(tool.operation, density));
         open |= (u32)is_open << k;
     }
     return open;
@@ -329,7 +330,7 @@ __device__ inline void reserve(const EditParams& params, Workbench& bench) {
 }
 
 __device__ inline EditResult result_of(const Workbench& bench) {
-    u32 flags = CHANGED | (bench.flags & (EXTENDED | HAS_MATERIALS)), uniform = 0;
+    u32 flags = CHANGED | (bench.flags & (EXTENDED | HAS_MATERIALS | TOO_FAR)), uniform = 0;
     if (is_uniform(bench)) {
         flags |= UNIFORM;
         uniform = (u16)bench.brick.samples[0] | (u32)bench.brick.materials[0] << 16;
@@ -352,8 +353,14 @@ __device__ inline void store(const EditParams& params, const Workbench& bench, B
     entries[is_record ? piece : piece - RECORD] = data;
 }
 
-extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
-    __shared__ Workbench bench;
+// Where no edit looks around.
+struct NoCare {
+    static constexpr bool LOOKS = false;
+};
+
+// Applies the edits of the block's job. `Care` knows how those are applied that look around.
+template <typename Care>
+__device__ inline void edit_brick(const EditParams& params, Workbench& bench, Care& care) {
     const EditJob job = params.jobs[blockIdx.x];
     const Brick* base = job.base == NONE ? nullptr : &params.bricks[job.base >> 1];
     const bool had_materials = base != nullptr && job.base & 1;
@@ -379,12 +386,24 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
             const Tool& tool = params.tools[edit];
             if (!is_taken) begin(bench, base, had_materials);
             is_taken = true;
-            u32 open = open_samples(tool, column, bench.brick);
+            bool looks_around = false;
+            if constexpr (Care::LOOKS) looks_around = care.begin(job, stack, edit);
+            u32 open = open_samples(tool, column, bench.brick, looks_around);
             if (!__syncthreads_or(open != 0)) continue;
             Noise noise = {{0, 0.0f}, 0, 0};
             if (tool.is_rough) {
                 noise = hash_noise(tool, column.low, bench.noise);
                 __syncthreads();
+            }
+            if constexpr (Care::LOOKS) {
+                if (looks_around) {
+                    u32 own = care.apply(edit, column, open, noise, bench, has_materials);
+                    changed |= own;
+                    bool has_changed = __syncthreads_or(own != 0);
+                    is_changed |= has_changed;
+                    if (has_changed || care.params.rules) care.enter(job, edit);
+                    continue;
+                }
             }
             u32 own = apply(tool, column, open, noise, bench, has_materials);
             changed |= own;
@@ -395,15 +414,25 @@ extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
             if (warp() == 1) enter_counts(params, edit, tool.operation, bench.effect.counts);
         }
     }
+    bool is_too_far = false;
+    if constexpr (Care::LOOKS) is_too_far = __syncthreads_or(care.is_too_far);
     if (!is_changed) {
-        if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, NONE, NONE, 0, 0, 0};
+        u32 flags = is_too_far ? (u32)TOO_FAR : 0;
+        if (threadIdx.x == 0) params.results[blockIdx.x] = {0, flags, NONE, NONE, 0, 0, 0};
         return;
     }
     sum_up(bench, column, base, had_materials, has_materials, changed);
+    if (is_too_far && threadIdx.x == 0) atomicOr(&bench.flags, TOO_FAR);
     __syncthreads();
     if (threadIdx.x == 0) reserve(params, bench);
     if (warp() == 1 && lane() == 0) bench.bounds = bounds_of(bench.changed, ~0ull, 0, SIDE);
     __syncthreads();
     store(params, bench, &params.bricks[job.target]);
     if (threadIdx.x == THREADS - 1) params.results[blockIdx.x] = result_of(bench);
+}
+
+extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
+    __shared__ Workbench bench;
+    NoCare none;
+    edit_brick(params, bench, none);
 }

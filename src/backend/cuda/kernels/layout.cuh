@@ -1,4 +1,4 @@
-// What host and kernels hand each other, and the numbers of the lattice. layout.rs has the same in Rust.
+// What host and kernels hand each other, and the numbers of the lattice. layout/ has the same in Rust.
 #pragma once
 
 typedef unsigned char u8;
@@ -66,7 +66,9 @@ struct EditJob {
     u32 base, target, stack;
     u32 first, count;
     u32 cuts;
-    u32 pad[3];
+    // Where edits look around: its entry in `windows`; to the next along x | along z << 16, along y it is 1.
+    u32 window, strides;
+    u32 pad;
 };
 
 enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE };
@@ -83,7 +85,32 @@ struct Tool {
     u32 seed, pad;
 };
 
-enum ResultFlags { CHANGED = 1, EXTENDED = 2, UNIFORM = 4, HAS_MATERIALS = 8 };
+// What a tool does beyond its operation: nothing, or it sculpts.
+enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
+
+// What a tool that looks around needs besides.
+struct Chisel {
+    // `material` is what new ground is made of; `NONE`: what is around says it.
+    u32 stroke, material;
+    // In 1/256; in 1/256 voxel.
+    i32 strength, falloff;
+    // Level: the height. Shift: what is added to densities. Terrace: step, base.
+    i32 amounts[2];
+    // Flatten: of the plane. Stamp: the middle of the image.
+    i32 point[3];
+    // Stamp: half its sides, and how high white is.
+    i32 half[2], height;
+    // Stamp: the first sample of its image in `images`, and how many there are.
+    u32 image, columns, rows;
+    // How hard a material it takes away; negative: no rule bears on it.
+    i32 power;
+    // Stamp: a rotation, and what to divide it by. Flatten: the first row is the normal.
+    i64 matrix[3][3], squared;
+    // Flatten: of the normal.
+    double length;
+};
+
+enum ResultFlags { CHANGED = 1, EXTENDED = 2, UNIFORM = 4, HAS_MATERIALS = 8, TOO_FAR = 16 };
 
 struct EditResult {
     u64 hash;
@@ -113,6 +140,37 @@ struct EditParams {
     // Records, materials, parts, counts.
     u32* counters;
     u32 record_capacity, material_capacity, part_capacity, count_capacity;
+};
+
+// What edits may not change, or not at once.
+struct Rules {
+    // Of each material.
+    u8 hardness[256];
+    // Bits of materials that no edit takes away, nor paints over.
+    u32 unbreakable[8];
+    // Nothing solid below this height is taken away.
+    i32 bedrock;
+    u32 boxes;
+};
+
+// Samples that nothing changes, both ends included.
+struct Protected {
+    i32 min[3], max[3];
+};
+
+struct CarefulParams {
+    EditParams edit;
+    const u32* windows;
+    // One for each tool.
+    const Chisel* chisels;
+    const u16* images;
+    // Null where there are none; protected boxes come right behind them.
+    const Rules* rules;
+    // How many bricks windows reach up and down.
+    i32 look;
+    // The last columns of the world along x and z.
+    i32 last[2];
+    u32 pad;
 };
 
 struct ColumnJob {
@@ -164,9 +222,11 @@ struct HeightsParams {
     u32 octaves, is_ridged, pad;
 };
 
-static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout.rs");
-static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout.rs");
-static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout.rs");
-static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout.rs");
-static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout.rs");
-static_assert(sizeof(HeightsParams) == 128, "see layout.rs");
+static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
+static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout/");
+static_assert(sizeof(Chisel) == 152 && sizeof(CarefulParams) == 152, "see layout/");
+static_assert(sizeof(Rules) == 296 && sizeof(Protected) == 24, "see layout/");
+static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
+static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");
+static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout/");
+static_assert(sizeof(HeightsParams) == 128, "see layout/");

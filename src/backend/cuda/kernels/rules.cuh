@@ -1,0 +1,106 @@
+// What rules say of a change, as volume/rules.rs does.
+#pragma once
+
+#include "surroundings.cuh"
+
+// What edits may not change, or not at once.
+struct Judge : Surroundings {
+    // Is a protected box near?
+    bool has_boxes;
+
+    // The protected boxes.
+    __device__ const Protected* boxes() const { return (const Protected*)(params.rules + 1); }
+
+    // Does one of the thread's share of boxes touch the brick or what is around it?
+    __device__ bool is_box_near(const i32* brick) const {
+        bool is_near = false;
+        for (u32 i = threadIdx.x; params.rules && i < params.rules->boxes; i += THREADS) {
+            bool is_touching = true;
+            for (i32 axis = 0; axis < 3; axis++) {
+                i32 low = brick[axis] * SIDE - 1;
+                is_touching &= boxes()[i].min[axis] <= low + AROUND - 1 && low <= boxes()[i].max[axis];
+            }
+            is_near |= is_touching;
+        }
+        return is_near;
+    }
+
+    __device__ bool is_protected(const i32* at) const {
+        bool is_inside = false;
+        for (u32 i = 0; has_boxes && i < params.rules->boxes; i++) {
+            const Protected& box = boxes()[i];
+            is_inside |= box.min[0] <= at[0] && at[0] <= box.max[0] && box.min[1] <= at[1] && at[1] <= box.max[1]
+                && box.min[2] <= at[2] && at[2] <= box.max[2];
+        }
+        return is_inside;
+    }
+
+    __device__ bool is_unbreakable(u32 material) const {
+        return params.rules->unbreakable[material / 32] >> material % 32 & 1;
+    }
+
+    // How much of a change is made that takes away what is solid at a sample of the brick or beside it, in 1/256; and why
+    // not all, or `FATES`.
+    __device__ i32 pace(const OwnColumn& column, i32 x, i32 y, i32 z, i32 power, u32& fate) const {
+        i32 at_y = column.low[1] + y, place = (z + 1) * WINDOW + x + 1;
+        u32 material = stored_at(x, y, z);
+        if (material == GROUND) material = ground_material(stack->columns[place], at_y * ONE - stack->heights[place]);
+        i32 hardness = params.rules->hardness[material];
+        fate = UNBREAKABLE;
+        if (at_y < params.rules->bedrock || is_unbreakable(material)) return 0;
+        fate = FATES;
+        if (power >= hardness) return ONE;
+        i32 part = largest((2 * power - hardness) * ONE / hardness, 0);
+        fate = part == 0 ? TOO_HARD : SLOWED;
+        return part;
+    }
+
+    // The density across a face of a sample.
+    __device__ i32 density_beside(i32 face, const OwnColumn& column, i32 y) const {
+        i32 way[3];
+        way_to(face, way);
+        return density(bench.around[around_at(column.x + way[0], y + way[1], column.z + way[2])]);
+    }
+
+    // The pace of what is solid there; 0 where it is protected.
+    __device__ i32 pace_beside(i32 face, const OwnColumn& column, const i32* at, i32 y, i32 power) const {
+        i32 way[3];
+        way_to(face, way);
+        i32 beside[3] = {at[0] + way[0], at[1] + way[1], at[2] + way[2]};
+        u32 why;
+        if (is_protected(beside)) return 0;
+        return pace(column, column.x + way[0], y + way[1], column.z + way[2], power, why);
+    }
+
+    static __device__ void way_to(i32 face, i32* way) {
+        for (i32 axis = 0; axis < 3; axis++) way[axis] = axis != face / 2 ? 0 : face & 1 ? -1 : 1;
+    }
+
+    // The density that a sample may have instead of the proposed one, and why it is another one, or `FATES`.
+    __device__ i32 judged(const OwnColumn& column, const i32* at, i32 y, i32 power, i32 proposed, u32& fate) const {
+        const Marked* own = bench.around + around_at(column.x, y, column.z);
+        i32 before = density(*own);
+        fate = PROTECTED;
+        if (is_protected(at)) return before;
+        fate = FATES;
+        if (proposed <= before) return proposed;
+        i32 least = ONE;
+        if (before < 0) {
+            least = pace(column, column.x, y, column.z, power, fate);
+        } else {
+            // Air beside what is solid holds its surface. It is air in any case, so nobody asks why.
+            for (i32 i = 0; i < 6; i++) {
+                if (density_beside(i, column, y) < 0) least = smallest(least, pace_beside(i, column, at, y, power));
+            }
+        }
+        i32 allowed = before + (i32)((((i64)proposed - before) * least + ONE - 1) >> 8);
+        if (before >= 0 || allowed < 0) return allowed;
+        // What turns to air beside ground that stays uncovers it, and takes nothing of it.
+        for (i32 i = 0; i < 6; i++) {
+            i32 beside = density_beside(i, column, y);
+            if (beside >= 0 || pace_beside(i, column, at, y, power) != 0) continue;
+            allowed = smallest(allowed, largest(ONE + beside, 0));
+        }
+        return allowed;
+    }
+};

@@ -1,0 +1,213 @@
+// What operations that sculpt make of a sample, in integers: brush/sculptor.rs, brush/blend.rs, brush/deed.rs,
+// brush/stamp.rs.
+#pragma once
+
+#include "threads.cuh"
+
+// A sample with one bit more: twice the density, and one more if it was cut off.
+typedef i32 Marked;
+
+// Samples of a brick's surroundings along a side: its own and one on each side. x fastest, then z, then y.
+constexpr i32 AROUND = SIDE + 2;
+
+// How far neighbours count as denser or thinner at most, and by how much sharpening changes a sample at most.
+constexpr i32 CONTRAST = 2 * ONE;
+constexpr i32 SHARPER = ONE / 4;
+
+// Where distances to planes and stamps stop.
+constexpr i64 FARTHEST_PLANE = 1 << 25;
+
+// The place of one of the brick's own samples, or of one beside them, in its surroundings.
+__device__ inline i32 around_at(i32 x, i32 y, i32 z) { return ((y + 1) * AROUND + z + 1) * AROUND + x + 1; }
+
+__device__ inline i32 density(Marked sample) { return sample >> 1; }
+
+__device__ inline bool is_cut(Marked sample) { return sample & 1; }
+
+__device__ inline i32 clamped(i32 value, i32 low, i32 high) { return smallest(largest(value, low), high); }
+
+// As it is stored.
+__device__ inline i32 storable(i32 density) { return clamped(density, -32767, 32767); }
+
+__device__ inline i32 sign_of(i32 value) { return (value > 0) - (value < 0); }
+
+__device__ inline i32 magnitude(i32 value) { return value < 0 ? -value : value; }
+
+// Rounded down; the divisor is positive.
+__device__ inline i64 divided(i64 value, i64 by) {
+    i64 quotient = value / by;
+    return quotient * by > value ? quotient - 1 : quotient;
+}
+
+__device__ inline i32 within_reach(i64 value) {
+    return (i32)(value < -FARTHEST_PLANE ? -FARTHEST_PLANE : value > FARTHEST_PLANE ? FARTHEST_PLANE : value);
+}
+
+// From a sample to the one across a face, six of them.
+__device__ inline i32 face(i32 number) {
+    i32 step = number < 2 ? 1 : number < 4 ? AROUND : AROUND * AROUND;
+    return number & 1 ? step : -step;
+}
+
+// The density, as far as anyone knows; says whether anyone does.
+__device__ inline bool middle_of(const Marked* own, i32& middle) {
+    middle = density(*own);
+    if (!is_cut(*own)) return true;
+    i32 sign = sign_of(middle), nearest = DEPTH;
+    bool is_known = false;
+#pragma unroll
+    for (i32 i = 0; i < 6; i++) {
+        Marked other = own[face(i)];
+        is_known |= !is_cut(other);
+        nearest = smallest(nearest, is_cut(other) ? DEPTH : density(other) * sign);
+    }
+    middle = sign * (largest(nearest, 0) + ONE);
+    return is_known;
+}
+
+// 64 times the way from the middle to the average of all.
+__device__ inline i32 way_to_average(const Marked* own, i32 middle) {
+    i32 sum = 0;
+#pragma unroll
+    for (i32 number = 14; number < 27; number++) {
+        // The second half of the neighbours; the first half lies opposite.
+        i32 dx = number % 3 - 1, dz = number / 3 % 3 - 1, dy = number / 9 - 1;
+        i32 along = (dx != 0) + (dy != 0) + (dz != 0);
+        // Weights of 1 2 1 along each axis, and what the way measures.
+        i32 weight = 8 >> along, length = along == 1 ? 256 : along == 2 ? 362 : 443;
+        i32 step = (dy * AROUND + dz) * AROUND + dx;
+        Marked there = own[step], opposite = own[-step];
+        // Where one side is not known, the other one has nothing to be compared with.
+        if ((is_cut(there) || is_cut(opposite)) && magnitude(middle) + length > DEPTH) continue;
+        i32 way = clamped(density(there) - middle, -CONTRAST, CONTRAST);
+        sum += weight * (way + clamped(density(opposite) - middle, -CONTRAST, CONTRAST));
+    }
+    return sum;
+}
+
+// A change that may make the sample solid only beside a solid one, and air only beside air.
+__device__ inline i32 attached(const Marked* own, i32 after) {
+    bool was_solid = *own < 0, is_solid = after < 0, has_like = was_solid == is_solid;
+#pragma unroll
+    for (i32 i = 0; i < 6; i++) has_like |= (own[face(i)] < 0) == is_solid;
+    return has_like ? after : was_solid ? -1 : 0;
+}
+
+// How much of the change is made at a distance from the shape, in 1/256.
+__device__ inline i32 weight_at(const Chisel& chisel, i32 outside) {
+    i32 inside = -outside, falloff = chisel.falloff;
+    if (inside < 0 || (inside == 0 && falloff > 0)) return 0;
+    if (inside >= falloff) return chisel.strength;
+    // 3 t^2 - 2 t^3: no kink at either end.
+    i32 t = inside * ONE / falloff, faded = (t * t * (3 * ONE - 2 * t)) >> 16;
+    return (faded * chisel.strength + ONE / 2) >> 8;
+}
+
+// A part of `whole`, in 1/256, away from zero.
+__device__ inline i32 part_of(i32 whole, i32 weight) {
+    i64 part = ((i64)magnitude(whole) * weight + ONE - 1) >> 8;
+    return (i32)(whole < 0 ? -part : part);
+}
+
+// How far a point lies from a plane, on the side of its normal.
+__device__ inline i32 above_plane(const Chisel& chisel, const i32* at) {
+    i64 along = 0;
+    for (i32 i = 0; i < 3; i++) along += ((i64)at[i] * ONE - chisel.point[i]) * chisel.matrix[0][i];
+    // Both are integers that doubles hold exactly.
+    return within_reach((i64)rint((double)along / chisel.length));
+}
+
+// The grey of a stamp's image, in 1/256 of a step between samples.
+__device__ inline i64 grey_at(const Chisel& chisel, const u16* images, i64 x, i64 y) {
+    const u16* image = images + chisel.image;
+    i64 column = x >> 8, row = y >> 8, last_column = (i64)chisel.columns - 2, last_row = (i64)chisel.rows - 2;
+    column = column < 0 ? 0 : column > last_column ? last_column : column;
+    row = row < 0 ? 0 : row > last_row ? last_row : row;
+    i64 right = x - column * ONE, down = y - row * ONE;
+    right = right < 0 ? 0 : right > ONE ? ONE : right;
+    down = down < 0 ? 0 : down > ONE ? ONE : down;
+    const u16* upper = image + row * chisel.columns + column;
+    const u16* lower = upper + chisel.columns;
+    i64 above = upper[0] * (ONE - right) + upper[1] * right, below = lower[0] * (ONE - right) + lower[1] * right;
+    return above * (ONE - down) + below * down;
+}
+
+// How far a point lies above the relief of a stamp; `beside`: how far beside its image, negative inside.
+__device__ inline i32 above_stamp(const Chisel& chisel, const u16* images, const i32* at, i32& beside) {
+    const i64 WHITE = 65535ll << 16;
+    i64 turned[3];
+#pragma unroll
+    for (i32 i = 0; i < 3; i++) {
+        i64 along = 0;
+#pragma unroll
+        for (i32 j = 0; j < 3; j++) along += chisel.matrix[j][i] * ((i64)at[j] * ONE - chisel.point[j]);
+        turned[i] = divided(along + chisel.squared / 2, chisel.squared);
+    }
+    i64 right = turned[0], up = turned[1], down = turned[2], half_x = chisel.half[0], half_z = chisel.half[1];
+    i64 beside_x = (right < 0 ? -right : right) - half_x, beside_z = (down < 0 ? -down : down) - half_z;
+    beside = within_reach(beside_x > beside_z ? beside_x : beside_z);
+    i64 x = (right + half_x) * ((i64)chisel.columns - 1) * ONE / (2 * half_x);
+    i64 y = (down + half_z) * ((i64)chisel.rows - 1) * ONE / (2 * half_z);
+    return within_reach(up - divided(grey_at(chisel, images, x, y) * chisel.height + WHITE / 2, WHITE));
+}
+
+// A height in steps, with a riser over the middle quarter of each.
+__device__ inline i32 terraced(i32 height, i32 step) {
+    i32 tread = (i32)divided(height, step) * step;
+    return tread + clamped((height - tread - step * 3 / 8) * 4, 0, step);
+}
+
+// The density of a sample after the operation, from its distance to the shape and what is around it; says whether there is
+// another one.
+__device__ inline bool sculpted(
+    const Chisel& chisel, const u16* images, const i32* at, i32 outside, const Marked* own, i32& after
+) {
+    if (outside > 0) return false;
+    i32 target = 0;
+    bool has_target = false;
+    if (chisel.stroke == FLATTEN) {
+        target = above_plane(chisel, at);
+        has_target = true;
+    } else if (chisel.stroke == LEVEL) {
+        target = at[1] * ONE - chisel.amounts[0];
+        has_target = true;
+    } else if (chisel.stroke == STAMP) {
+        i32 beside;
+        target = above_stamp(chisel, images, at, beside);
+        outside = largest(outside, beside);
+        has_target = true;
+    }
+    i32 weight = weight_at(chisel, outside);
+    if (weight == 0) return false;
+    i32 before = density(*own), middle;
+    if (has_target) {
+        after = before + part_of(target - before, weight);
+        return true;
+    }
+    if (!middle_of(own, middle)) return false;
+    i32 by = 0;
+    if (chisel.stroke == SMOOTH) {
+        by = way_to_average(own, middle) * weight / (64 * ONE);
+        after = attached(own, middle + by);
+    } else if (chisel.stroke == SHARPEN) {
+        by = clamped(way_to_average(own, middle) * weight / (64 * ONE), -SHARPER, SHARPER);
+        i32 low = before, high = before;
+#pragma unroll
+        for (i32 i = 0; i < 27; i++) {
+            i32 other = density(own[((i / 9 - 1) * AROUND + i / 3 % 3 - 1) * AROUND + i % 3 - 1]);
+            low = smallest(low, other);
+            high = largest(high, other);
+        }
+        after = attached(own, clamped(middle - by, low, high));
+    } else if (chisel.stroke == SHIFT) {
+        // An opposite shift takes it away again to the bit.
+        by = chisel.amounts[0];
+        by = sign_of(by) * ((magnitude(by) * weight + ONE / 2) >> 8);
+        after = middle + by;
+    } else {
+        i32 step = chisel.amounts[0], base = chisel.amounts[1], surface = at[1] * ONE - middle;
+        by = part_of(surface - (terraced(surface - base, step) + base), weight);
+        after = middle + by;
+    }
+    return by != 0;
+}

@@ -1,0 +1,127 @@
+// What edits read that look around, as volume/surroundings.rs and volume/careful.rs have it.
+#pragma once
+
+#include "edit.cuh"
+#include "sculpt.cuh"
+
+// What became of a voxel, or would have but for a rule.
+enum Fate { REMOVED, ADDED, PAINTED, PROTECTED, UNBREAKABLE, TOO_HARD, SLOWED, FATES };
+
+struct CarefulBench {
+    Workbench work;
+    // The brick with one sample more on all sides, as they were before.
+    Marked around[AROUND * AROUND * AROUND];
+    // Of the edit at hand: voxels of each material, for each fate.
+    u32 counts[FATES * 256];
+    // Bricks around, as `refs` of a mesh.
+    u32 refs[27];
+};
+
+// How far below and above itself new ground looks for what it is to be made of, in bricks: 64 voxels.
+constexpr i32 LOOK = 8;
+
+// What an edit reads: the brick and what is around it, as they were before the launch.
+struct Surroundings {
+    const CarefulParams& params;
+    CarefulBench& bench;
+    // The brick's entry in the windows, and the way to its neighbours.
+    const u32* window;
+    i32 to_x, to_z;
+    const Stack* stack;
+    // Are they there? Did new ground look farther than windows reach?
+    bool has_looked, is_too_far;
+
+    // Brings them, which the block then has to wait for.
+    __device__ void look(const EditJob& job, const Stack& own_stack) {
+        has_looked = true;
+        window = params.windows + job.window;
+        stack = &own_stack;
+        to_x = job.strides & 0xffff;
+        to_z = job.strides >> 16;
+        for (i32 i = threadIdx.x; i < 27; i += THREADS) {
+            bench.refs[i] = window[brick_at(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1)];
+        }
+        for (i32 i = threadIdx.x; i < FATES * 256; i += THREADS) bench.counts[i] = 0;
+        __syncthreads();
+        for (i32 i = threadIdx.x; i < AROUND * AROUND * AROUND; i += THREADS) {
+            // Beyond the world's rim all goes on as it is at the rim.
+            i32 x = inside(i % AROUND, job.brick[0], params.last[0]);
+            i32 z = inside(i / AROUND % AROUND, job.brick[2], params.last[1]), y = i / (AROUND * AROUND);
+            bench.around[i] = sample_around(x, y, z, job.brick[1] * SIDE, stack->heights[z * WINDOW + x]);
+        }
+    }
+
+    // The nearest of the surroundings' columns along an axis that lies in the world.
+    static __device__ i32 inside(i32 local, i32 brick, i32 last) {
+        i32 low = brick * SIDE - 1;
+        return smallest(largest(largest(local, -low), 0), largest(last - low, 0));
+    }
+
+    // The entry of a brick so far away.
+    __device__ i32 brick_at(i32 dx, i32 dy, i32 dz) const { return dx * to_x + dy + dz * to_z; }
+
+    // A sample of the surroundings, counted from one before the brick's lowest.
+    __device__ Marked sample_around(i32 x, i32 y, i32 z, i32 low, i32 height) const {
+        u32 ref = bench.refs[(((y + 7) >> 3) * 3 + ((z + 7) >> 3)) * 3 + ((x + 7) >> 3)];
+        i32 raw = ref == NONE ? PRISTINE : params.edit.bricks[ref >> 1].samples[index_at(x - 1, y - 1, z - 1)];
+        if (raw == PRISTINE) return ((low + y - 1) * ONE - height) * 2;
+        return raw * 2 + (raw == DEPTH || raw == -DEPTH);
+    }
+
+    // The index of a sample in its brick.
+    static __device__ i32 index_at(i32 x, i32 y, i32 z) { return (y & 7) * 64 + (z & 7) * SIDE + (x & 7); }
+
+    // The material stored in a brick.
+    __device__ u32 stored(u32 ref, i32 index) const {
+        return ref == NONE || !(ref & 1) ? GROUND : params.edit.bricks[ref >> 1].materials[index];
+    }
+
+    // The material stored at one of the brick's samples, or beside them.
+    __device__ u32 stored_at(i32 x, i32 y, i32 z) const {
+        return stored(window[brick_at(x >> 3, y >> 3, z >> 3)], index_at(x, y, z));
+    }
+
+    // Which samples of the column are solid in the brick so many bricks higher up: a bit for each y.
+    __device__ u32 solid_levels(u32 ref, const OwnColumn& column, i32 up) const {
+        if (ref == NONE) {
+            // As many as are below the surface.
+            i32 count = ((column.height + ONE - 1) >> 8) - (column.low[1] + up * SIDE);
+            return (1u << smallest(largest(count, 0), SIDE)) - 1;
+        }
+        const u32* solid = params.edit.bricks[ref >> 1].solid + column.z / 4;
+        u32 levels = 0;
+        for (i32 y = 0; y < SIDE; y++) levels |= (solid[y * 2] >> (column.z % 4 * SIDE + column.x) & 1) << y;
+        return levels;
+    }
+
+    // What a sample is made of that becomes solid: what lies straight below, else straight above, else beside it.
+    __device__ u32 new_material(const OwnColumn& column, i32 y) {
+        for (i32 down = 0; down <= LOOK; down++) {
+            if (down > params.look) {
+                is_too_far = true;
+                return GROUND;
+            }
+            u32 ref = window[-down], levels = solid_levels(ref, column, -down);
+            if (down == 0) levels &= (1u << y) - 1;
+            if (down == LOOK) levels &= 0xffu << y;
+            if (levels != 0) return stored(ref, index_at(column.x, 31 - __clz(levels), column.z));
+        }
+        for (i32 up = 0; up <= LOOK; up++) {
+            if (up > params.look) {
+                is_too_far = true;
+                return GROUND;
+            }
+            u32 ref = window[up], levels = solid_levels(ref, column, up);
+            if (up == 0) levels &= 0xfeu << y;
+            if (up == LOOK) levels &= (2u << y) - 1;
+            if (levels != 0) return stored(ref, index_at(column.x, __ffs(levels) - 1, column.z));
+        }
+        for (i32 side = 0; side < 4; side++) {
+            i32 dx = side == 0 ? -1 : side == 1 ? 1 : 0, dz = side == 2 ? -1 : side == 3 ? 1 : 0;
+            i32 x = column.x + dx, z = column.z + dz;
+            if (bench.around[around_at(x, y, z)] >= 0) continue;
+            return stored_at(x, y, z);
+        }
+        return GROUND;
+    }
+};

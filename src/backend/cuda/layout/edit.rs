@@ -1,0 +1,333 @@
+//! What edits are, and what became of bricks.
+
+use bytemuck::{Pod, Zeroable};
+use glam::IVec3;
+
+use super::{Address, NONE};
+use crate::brush::{Evaluator, Kind, Sculptor, Stroke};
+use crate::ground::GreyImage;
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
+use crate::volume::{self, RunRules};
+
+/// Most numbers in the `list` of one `edit` launch. Each may enter 256 counts and 8 parts.
+pub(crate) const MOST_LIST: usize = 1 << 23;
+
+/// A brick to be edited.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct EditJob {
+    /// Its [`BrickPos`].
+    pub brick: [i32; 3],
+    /// Reference of what it is now.
+    pub base: u32,
+    /// Slot for what it becomes; may be the one of `base`.
+    pub target: u32,
+    /// Slot of its stack.
+    pub stack: u32,
+    /// Its tools, in order: a range of `list`.
+    pub first: u32,
+    pub count: u32,
+    /// See [`cuts`].
+    pub cuts: u32,
+    /// For `careful`: its entry in the windows; from there to the next along x, and `<< 16` along z, along y it is 1.
+    pub window: u32,
+    pub strides: u32,
+    pub pad: u32,
+}
+
+/// An edit, all that is derived from it once included.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Tool {
+    /// Sphere, cuboid, cylinder, capsule, cone.
+    pub kind: u32,
+    /// Dig, add, paint.
+    pub operation: u32,
+    pub material: u32,
+    pub is_rough: u32,
+    /// The shape's origin: voxels, and 1/256 voxel from there.
+    pub home: [i32; 3],
+    pub rest: [i32; 3],
+    /// The lattice points that it reaches in the world, both ends included.
+    pub min: [i32; 3],
+    pub max: [i32; 3],
+    pub constants: [f32; 12],
+    pub amplitude: i32,
+    pub scale: i32,
+    pub seed: u32,
+    pub pad: u32,
+}
+
+/// What a tool that looks around needs besides. See `layout.cuh`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Chisel {
+    /// Plain, smooth, sharpen, flatten, level, shift, stamp, terrace.
+    pub stroke: u32,
+    /// Of new ground; [`NONE`] where what is around says it.
+    pub material: u32,
+    pub strength: i32,
+    pub falloff: i32,
+    pub amounts: [i32; 2],
+    pub point: [i32; 3],
+    pub half: [i32; 2],
+    pub height: i32,
+    pub image: u32,
+    pub columns: u32,
+    pub rows: u32,
+    /// Negative: no rule bears on it.
+    pub power: i32,
+    pub matrix: [[i64; 3]; 3],
+    pub squared: i64,
+    pub length: f64,
+}
+
+/// What became of a brick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct EditResult {
+    /// By how much the hash of the world's samples changes.
+    pub hash: u64,
+    /// See the constants.
+    pub flags: u32,
+    /// Entries of `records` and `materials`, [`NONE`] where nothing was written, also for lack of room.
+    pub record: u32,
+    pub material: u32,
+    /// The box around the samples that changed.
+    pub bounds: u32,
+    /// `sample | material << 16` of a uniform brick.
+    pub uniform: u32,
+    pub pad: u32,
+}
+
+impl EditResult {
+    /// Some sample changed; the brick is in its target slot. Without this flag nothing else is said.
+    pub const CHANGED: u32 = 1;
+    /// Some sample is edited now that had not been.
+    pub const EXTENDED: u32 = 2;
+    /// All samples are edited and alike; no record was written.
+    pub const UNIFORM: u32 = 4;
+    /// The brick has materials.
+    pub const HAS_MATERIALS: u32 = 8;
+    /// New ground looked farther for its material than windows reach. All that is said of the brick may be wrong.
+    pub const TOO_FAR: u32 = 16;
+}
+
+/// What an edit changed in one chunk's part of a brick.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct EditPart {
+    /// Number of the job.
+    pub job: u32,
+    /// Number of the tool.
+    pub edit: u32,
+    /// See [`part_chunk`].
+    pub part: u32,
+    /// The box around the samples that changed.
+    pub bounds: u32,
+}
+
+/// Voxels that an edit dealt with. There may be several for one edit, fate and material.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct EditCount {
+    /// Number of the tool.
+    pub edit: u32,
+    /// Removed (0), added (1), painted (2); protected (3), unbreakable (4), too hard (5), slowed (6); and `material << 8`.
+    pub fate: u32,
+    pub voxels: u32,
+    pub pad: u32,
+}
+
+/// The parameter of `edit`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct EditParams {
+    /// Slots of bricks, of stacks.
+    pub bricks: Address,
+    pub stacks: Address,
+    /// [`EditJob`]s, one for each block.
+    pub jobs: Address,
+    /// Numbers of tools.
+    pub list: Address,
+    pub tools: Address,
+    /// Out: an [`EditResult`] for each job.
+    pub results: Address,
+    /// Out: [`RECORD_BYTES`] each.
+    pub records: Address,
+    /// Out: [`MATERIAL_BYTES`] each.
+    pub materials: Address,
+    /// Out: [`EditPart`]s, [`EditCount`]s, in any order.
+    pub parts: Address,
+    pub counts: Address,
+    /// Records, materials, parts, counts: four `u32`, zero at the start, which go on past the capacities.
+    pub counters: Address,
+    pub record_capacity: u32,
+    pub material_capacity: u32,
+    pub part_capacity: u32,
+    pub count_capacity: u32,
+}
+
+/// What edits may not change, or not at once; [`Protected`] boxes come right behind.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Rules {
+    pub hardness: [u8; 256],
+    pub unbreakable: [u32; 8],
+    pub bedrock: i32,
+    /// How many.
+    pub boxes: u32,
+}
+
+/// Samples that nothing changes, both ends included.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Protected {
+    pub min: [i32; 3],
+    pub max: [i32; 3],
+}
+
+/// The parameter of `careful`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CarefulParams {
+    /// No job's target may be what another job, or an entry of `windows`, refers to.
+    pub edit: EditParams,
+    /// References of bricks. Of each job all 27 around must be there, and above and below as many as `look` says.
+    pub windows: Address,
+    /// A [`Chisel`] for each tool.
+    pub chisels: Address,
+    /// Samples of images, `u16` each.
+    pub images: Address,
+    /// [`Rules`], or 0.
+    pub rules: Address,
+    pub look: i32,
+    /// The last columns of the world along x and z.
+    pub last: [i32; 2],
+    pub pad: u32,
+}
+
+// layout.cuh says the same.
+const _: () =
+    assert!(size_of::<EditJob>() == 48 && size_of::<Tool>() == 128 && size_of::<EditResult>() == 32);
+const _: () =
+    assert!(size_of::<EditPart>() == 16 && size_of::<EditCount>() == 16 && size_of::<EditParams>() == 104);
+const _: () = assert!(size_of::<Chisel>() == 152 && size_of::<CarefulParams>() == 152);
+const _: () = assert!(size_of::<Rules>() == 296 && size_of::<Protected>() == 24);
+
+/// An edit that reaches these samples of the world; `None`: it reaches none.
+pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> Tool {
+    let of = evaluator.constants();
+    let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
+    let LatticeBox { min, max } = reach.unwrap_or(nothing);
+    let (amplitude, scale, seed) = of.grain.unwrap_or((0, 1, 0));
+    Tool {
+        kind: of.kind,
+        operation: match operation {
+            Kind::Dig => 0,
+            Kind::Add { .. } => 1,
+            Kind::Paint { .. } | Kind::Sculpt => 2,
+        },
+        material: operation.material().map_or(0, |material| material.0.into()),
+        is_rough: of.grain.is_some().into(),
+        home: of.home.to_array(),
+        rest: of.rest.to_array(),
+        min: min.to_array(),
+        max: max.to_array(),
+        constants: of.shape,
+        amplitude,
+        scale,
+        seed,
+        pad: 0,
+    }
+}
+
+/// What an edit that looks around needs besides; `image` says where the samples of an image begin.
+pub(crate) fn chisel(tool: &volume::Tool, image: impl FnOnce(&GreyImage) -> u32) -> Chisel {
+    let power = if tool.is_bound { tool.power.into() } else { -1 };
+    let Some(of) = tool.sculptor.as_ref().and_then(Sculptor::constants) else {
+        return Chisel { power, ..Chisel::default() };
+    };
+    let chisel = |stroke| Chisel {
+        power,
+        stroke,
+        material: of.material.map_or(NONE, |material| material.0.into()),
+        strength: of.strength,
+        falloff: of.falloff,
+        ..Chisel::default()
+    };
+    match &of.stroke {
+        Stroke::Smooth => chisel(1),
+        Stroke::Sharpen => chisel(2),
+        &Stroke::Flatten(point, normal, length) => {
+            let matrix = [normal.map(i64::from), [0; 3], [0; 3]];
+            Chisel { point, matrix, length, ..chisel(3) }
+        }
+        &Stroke::Level(height) => Chisel { amounts: [height, 0], ..chisel(4) },
+        &Stroke::Shift(by) => Chisel { amounts: [by, 0], ..chisel(5) },
+        Stroke::Stamp(press) => Chisel {
+            point: press.center,
+            half: press.half,
+            height: press.height,
+            image: image(press.image),
+            columns: press.image.width(),
+            rows: press.image.height(),
+            matrix: press.rows,
+            squared: press.squared,
+            ..chisel(6)
+        },
+        &Stroke::Terrace(step, base) => Chisel { amounts: [step, base], ..chisel(7) },
+    }
+}
+
+/// Rules, and what is protected.
+pub(crate) fn rules(run: &RunRules) -> (Rules, Vec<Protected>) {
+    let boxes = |samples: &LatticeBox| Protected { min: samples.min.to_array(), max: samples.max.to_array() };
+    let (of, boxes): (_, Vec<Protected>) = (run.rules, run.protected.iter().map(boxes).collect());
+    let mut rules = Rules {
+        hardness: [0; 256],
+        unbreakable: [0; 8],
+        bedrock: of.bedrock.unwrap_or(i32::MIN),
+        boxes: boxes.len() as u32,
+    };
+    of.hardness.iter().for_each(|(material, &hardness)| rules.hardness[usize::from(material.0)] = hardness);
+    of.unbreakable
+        .iter()
+        .for_each(|material| rules.unbreakable[usize::from(material.0 / 32)] |= 1 << (material.0 % 32));
+    (rules, boxes)
+}
+
+/// How many of a brick's samples along x (`<< 4`: y, `<< 8`: z) belong to the chunk of its lowest one; the rest, if any,
+/// belongs to the next.
+pub(crate) fn cuts(grid: ChunkGrid, brick: BrickPos) -> u32 {
+    let low = brick.origin();
+    let own = grid.chunk_samples(grid.chunk_of(low)).max.saturating_sub(low).saturating_add(IVec3::ONE);
+    let IVec3 { x, y, z } = own.clamp(IVec3::ZERO, IVec3::splat(8));
+    (x | y << 4 | z << 8) as u32
+}
+
+/// The chunk that a part of a brick belongs to: bits 0, 1, 2 of the part are set beyond the cut along x, y, z.
+pub(crate) fn part_chunk(grid: ChunkGrid, brick: BrickPos, part: u32) -> ChunkPos {
+    let beyond = [0, 1, 2].map(|axis| (part >> axis & 1) as i32);
+    ChunkPos::from_ivec3(grid.chunk_of(brick.origin()).as_ivec3() + IVec3::from_array(beyond))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_sample_is_in_the_part_of_its_chunk() {
+        for (size, width, depth) in [(8, 24, 20), (25, 64, 75), (9, 8, 10), (100, 104, 116)] {
+            let grid = ChunkGrid::new(size, width, depth);
+            let world = LatticeBox { min: IVec3::new(0, -30, 0), max: IVec3::new(width, 30, depth) };
+            for point in world.points() {
+                let brick = BrickPos::of(point);
+                let (inside, cuts) = ((point & 7).to_array(), cuts(grid, brick));
+                let is_beyond = |axis: usize| inside[axis] >= (cuts >> (axis * 4) & 15) as i32;
+                let part = (0..3).fold(0, |part, axis| part | u32::from(is_beyond(axis)) << axis);
+                assert_eq!(part_chunk(grid, brick, part), grid.chunk_of(point), "{point}");
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! What host and kernels hand each other: the other half of `kernels.cu`.
+//!
+//! All numbers are little-endian. Bricks on the device are called by a *reference*, `slot << 1 | has_materials`, or
+//! [`NONE`]. Samples of a brick are numbered `x + 8 z + 64 y`. Boxes inside a brick are one word, see [`pack_box`].
+
+mod edit;
+mod heights;
+mod mesh;
+
+use bytemuck::{Pod, Zeroable};
+use glam::IVec3;
+
+use crate::ground::{ColumnMaterial, Ground, MaterialId};
+use crate::lattice::{Column, LatticeBox};
+use crate::volume::{Brick, Sample};
+
+pub(crate) use edit::*;
+pub(crate) use heights::*;
+pub(crate) use mesh::*;
+
+/// An address on the device.
+pub(crate) type Address = u64;
+
+/// No brick; no entry.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Threads of a block, whichever the kernel.
+pub(crate) const THREADS: u32 = 128;
+
+/// Most jobs of one launch. Each block may ask for 7680 indices, and counters have 32 bits.
+pub(crate) const MOST_JOBS: usize = 1 << 19;
+
+/// Bytes of a brick's slot: a record, then materials.
+pub(crate) const BRICK_BYTES: usize = RECORD_BYTES + MATERIAL_BYTES;
+
+/// Bytes of a brick's samples and bits.
+pub(crate) const RECORD_BYTES: usize = size_of::<BrickRecord>();
+
+/// Bytes of a brick's materials.
+pub(crate) const MATERIAL_BYTES: usize = 512;
+
+/// A brick without its materials.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct BrickRecord {
+    /// Densities in 1/256 voxel, `i16::MIN` for pristine samples.
+    pub samples: [i16; 512],
+    /// A word for each y, bit `z * 8 + x`.
+    pub solid: [u64; 8],
+    pub edited: [u64; 8],
+}
+
+/// The columns around a stack of bricks, from one before its first on, 11 x 11 of them, x fastest.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct StackRecord {
+    /// In 1/256 voxel.
+    pub heights: [i32; 121],
+    /// `base | overlay << 8 | blend << 16`.
+    pub columns: [u32; 121],
+    pub pad: [u32; 2],
+}
+
+/// Bytes to be copied; addresses and size are multiples of 16.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ScatterJob {
+    pub to: Address,
+    pub from: Address,
+    pub bytes: u32,
+    pub pad: u32,
+}
+
+/// The parameter of `scatter`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ScatterParams {
+    /// [`ScatterJob`]s, one for each block.
+    pub jobs: Address,
+}
+
+// layout.cuh says the same.
+const _: () = assert!(size_of::<BrickRecord>() == 1152 && BRICK_BYTES == 1664);
+const _: () = assert!(size_of::<StackRecord>() == 976);
+const _: () = assert!(size_of::<ScatterJob>() == 24 && size_of::<ScatterParams>() == 8);
+
+/// Writes a brick as it is in a slot: [`BRICK_BYTES`], or [`RECORD_BYTES`] where `out` has no room for materials.
+pub(crate) fn brick_record(brick: &Brick, out: &mut [u8]) {
+    let record = BrickRecord {
+        samples: brick.samples().map(Sample::bits),
+        solid: *brick.solid(),
+        edited: *brick.edited(),
+    };
+    if let Some((place, rest)) = out.split_first_chunk_mut::<RECORD_BYTES>() {
+        *place = bytemuck::cast(record);
+        if let Some(place) = rest.first_chunk_mut::<MATERIAL_BYTES>() {
+            *place =
+                brick.materials().map_or([MaterialId::GROUND.0; 512], |all| all.map(|material| material.0));
+        }
+    }
+}
+
+/// The brick of a record and its materials, if it has any; `None` where a slice is too short.
+pub(crate) fn brick_of(record: &[u8], materials: Option<&[u8]>) -> Option<Brick> {
+    let record: BrickRecord = bytemuck::cast(*record.first_chunk::<RECORD_BYTES>()?);
+    let materials = match materials {
+        Some(materials) => Some(materials.first_chunk::<MATERIAL_BYTES>()?),
+        None => None,
+    };
+    Some(Brick::of_parts(&record.samples, record.solid, record.edited, materials))
+}
+
+/// The columns around the stack of bricks (x, z).
+pub(crate) fn stack_record(ground: &Ground, (x, z): (i32, i32)) -> StackRecord {
+    let low = Column::new(x * 8 - 1, z * 8 - 1);
+    let word = |material: ColumnMaterial| {
+        u32::from_le_bytes([material.base.0, material.overlay.0, material.blend, 0])
+    };
+    let heights = ground.heights::<11>(low);
+    let mut record = StackRecord { heights: [0; 121], columns: [0; 121], pad: [0; 2] };
+    record.heights.copy_from_slice(heights.as_flattened());
+    match ground.single_material() {
+        Some(material) => record.columns.fill(word(ColumnMaterial::solid(material))),
+        None => {
+            let columns = (0..11).flat_map(|z| (0..11).map(move |x| low.offset(x, z)));
+            let words = columns.map(|column| word(ground.column_material(column)));
+            record.columns.iter_mut().zip(words).for_each(|(place, word)| *place = word);
+        }
+    }
+    record
+}
+
+/// A box inside a brick, both ends included, as one word: lowest `x | y << 3 | z << 6`, and the same of the highest
+/// `<< 9`. `from` is the brick's lowest sample.
+pub(crate) fn pack_box(cells: LatticeBox, from: IVec3) -> u32 {
+    let pack = |at: IVec3| {
+        let IVec3 { x, y, z } = (at - from) & 7;
+        (x | y << 3 | z << 6) as u32
+    };
+    pack(cells.min) | pack(cells.max) << 9
+}
+
+/// What [`pack_box`] made of it.
+pub(crate) fn unpack_box(word: u32, from: IVec3) -> LatticeBox {
+    let unpack = |word: u32| from + IVec3::new(word as i32 & 7, word as i32 >> 3 & 7, word as i32 >> 6 & 7);
+    LatticeBox { min: unpack(word), max: unpack(word >> 9) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fastrand::Rng;
+
+    #[test]
+    fn boxes_go_through_a_word() {
+        let from = IVec3::new(-8, 16, -24);
+        let whole = LatticeBox { min: from, max: from + 7 };
+        for min in whole.points() {
+            let cells = LatticeBox { min, max: min.max(from + IVec3::new(7, 3, 5)) };
+            assert_eq!(unpack_box(pack_box(cells, from), from), cells);
+        }
+    }
+
+    #[test]
+    fn bricks_go_through_a_record() {
+        let mut rng = Rng::with_seed(3);
+        let mut brick = Brick::of_edited(&std::array::from_fn(|_| rng.i16(..)));
+        let mut bytes = [7; BRICK_BYTES];
+        for _ in 0..2 {
+            brick_record(&brick, &mut bytes);
+            let materials = brick.materials().map(|_| &bytes[RECORD_BYTES..]);
+            let found = brick_of(&bytes, materials).expect("all bytes are there");
+            assert_eq!(found.samples(), brick.samples());
+            assert_eq!((found.solid(), found.edited()), (brick.solid(), brick.edited()));
+            assert_eq!(found.materials(), brick.materials());
+            brick.set_material(300, MaterialId(9));
+        }
+        assert_eq!(bytes[RECORD_BYTES + 299..][..3], [255, 9, 255]);
+        assert!(brick_of(&bytes[..RECORD_BYTES - 1], None).is_none());
+    }
+}

@@ -1,0 +1,121 @@
+//! The device against the processor, bit by bit, and whatever can go wrong with it.
+//!
+//! A card is used where there is one, else the emulator. `BURROW_WORLDS` says how many random worlds.
+
+mod drivers;
+mod faults;
+mod same;
+
+use std::time::Duration;
+
+use fastrand::Rng;
+
+use super::device::Device;
+use super::driver::Card;
+use super::emulator::Emulator;
+use super::mapped::Mapped;
+use super::*;
+use crate::backend::Engine;
+use crate::prelude::*;
+use crate::terrain::{Drawn, World};
+
+#[path = "../../../../tests/worlds/mod.rs"]
+pub(super) mod worlds;
+
+/// A device to test, if there is any.
+pub(super) fn device() -> Option<Box<dyn Device>> {
+    match Card::open() {
+        Ok(card) => Some(Box::new(card)),
+        Err(_) => Some(Box::new(Emulator::start()?)),
+    }
+}
+
+/// An engine that does everything on a device, small as it may be.
+fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
+    let engine = Engine::from_cuda(Cuda::open_with(false, Some(budget), &[(4, 3.0)], || Ok(device)));
+    engine.wait(Duration::from_secs(60));
+    engine
+}
+
+/// Everything that is drawn, as bits.
+fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Vec<u32>)> {
+    let bits = |vertex: &crate::surface::Vertex| {
+        let mut bytes = Vec::with_capacity(32);
+        vertex.position.to_array().iter().for_each(|part| bytes.extend(part.to_le_bytes()));
+        vertex.normal.to_array().iter().for_each(|part| bytes.extend(part.to_bits().to_le_bytes()));
+        bytes.extend(vertex.materials.ids);
+        bytes.extend(vertex.materials.weights);
+        bytes
+    };
+    let all = world.drawn();
+    all.map(|(drawn, mesh)| (drawn, mesh.vertices.iter().flat_map(bits).collect(), mesh.indices)).collect()
+}
+
+/// The same brushes on the processor and on an engine, in the same transactions.
+fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
+    let seed = rng.u64(..);
+    let (ground, chunk_size) = worlds::random_ground(&mut Rng::with_seed(seed), index);
+    let settings = TerrainSettings { chunk_size, ..Default::default() };
+    let ground = Arc::new(ground);
+    let mut expected = Terrain::new(Arc::clone(&ground), &settings).expect("valid settings");
+    let mut found = Terrain::new(Arc::clone(&ground), &settings).expect("valid settings");
+    found.set_engine(engine.clone());
+    for _ in 0..rng.u32(1..5) {
+        let brush = |rng: &mut Rng| match rng.u32(0..4) {
+            0 => worlds::random_brush_at_a_face(rng, &ground, chunk_size),
+            _ => worlds::any_random_brush(rng, &ground),
+        };
+        let brushes: Vec<Brush> = (0..rng.u32(1..6)).map(|_| brush(rng)).collect();
+        assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
+    }
+    assert_same(expected.world(), found.world(), index);
+}
+
+/// Worlds are the same, bit by bit.
+fn assert_same(expected: &World, found: &World, index: u64) {
+    assert_eq!(expected.hash(), found.hash(), "world {index}");
+    assert!(drawn(expected) == drawn(found), "world {index}");
+    // What bricks hold, bits and materials included; and as much memory.
+    let bricks = |world: &World| {
+        let mut all: Vec<_> =
+            world.bricks().map(|(pos, brick)| (pos.0.to_array(), trial::contents(brick))).collect();
+        all.sort_unstable();
+        all
+    };
+    assert!(bricks(expected) == bricks(found), "world {index}");
+    assert_eq!(expected.memory().samples, found.memory().samples, "world {index}");
+    assert_eq!(expected.memory().materials, found.memory().materials, "world {index}");
+}
+
+/// Transactions on the processor and on engines that take turns, on ground that is given.
+fn compare_on(ground: Ground, chunk_size: u32, engines: &[&Engine], transactions: &[Vec<Brush>]) {
+    compare_under(DiggingRules::default(), ground, chunk_size, engines, transactions);
+}
+
+/// The same under rules.
+fn compare_under(
+    rules: DiggingRules,
+    ground: Ground,
+    chunk_size: u32,
+    engines: &[&Engine],
+    transactions: &[Vec<Brush>],
+) {
+    let settings = TerrainSettings { chunk_size, ..Default::default() };
+    let ground = Arc::new(ground);
+    let [mut expected, mut found] =
+        [0, 1].map(|_| Terrain::new(Arc::clone(&ground), &settings).expect("valid settings"));
+    [&mut expected, &mut found].into_iter().for_each(|terrain| terrain.set_rules(rules.clone()));
+    for (number, brushes) in transactions.iter().enumerate() {
+        found.set_engine(engines[number % engines.len()].clone());
+        assert_eq!(expected.apply(brushes), found.apply(brushes), "transaction {number}");
+        assert_same(expected.world(), found.world(), number as u64);
+    }
+    for engine in engines {
+        assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+    }
+}
+
+/// An engine whose kernels write short lists to the host's memory, as those of a card do.
+fn mapped() -> Option<Engine> {
+    Some(engine(Box::new(Mapped::new(Box::new(Emulator::start()?))), 64 << 20))
+}
