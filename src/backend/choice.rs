@@ -137,8 +137,8 @@ pub(super) struct Costs {
     pub mesh: [Curve; 2],
     /// Seconds to bring a brick to the card.
     pub upload: f64,
-    /// How much longer stages take than was measured: edits, meshing.
-    drift: [[f64; 2]; 2],
+    /// How much longer stages take than was measured: edits, meshing, and edits some of which look around.
+    drift: [[f64; 2]; 3],
 }
 
 /// Blocks that are meshed anew for each brick that edits may reach, roughly.
@@ -164,7 +164,7 @@ impl Default for Costs {
             rough: [0.0; 2],
             mesh: Default::default(),
             upload: 0.0,
-            drift: [[1.0; 2]; 2],
+            drift: [[1.0; 2]; 3],
         }
     }
 }
@@ -174,7 +174,7 @@ impl Costs {
     /// The stages of a transaction are chosen one by one. But what is edited on the processor has to be brought to the
     /// card before it is meshed there, and that counts already when edits are chosen.
     pub fn edit(&self, load: Load) -> Estimate {
-        let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * self.drift[0][on]);
+        let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * self.drift[kind(Stage::Edit, load)][on]);
         let blocks = (load.amount as f64 * BLOCKS_PER_BRICK) as usize;
         let mesh = [0, 1].map(|on| self.mesh[on].at(blocks) * self.drift[1][on]);
         let brought = mesh[1] + self.upload * load.amount as f64;
@@ -205,12 +205,21 @@ impl Costs {
             Stage::Mesh => self.mesh[on].at(load.amount),
         };
         let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
-        let drift = &mut self.drift[stage as usize];
+        let drift = &mut self.drift[kind(stage, load)];
         if expected > 0.0 {
             let found = (took.as_secs_f64() / expected).clamp(DRIFT[0], DRIFT[1]);
             drift[on] += (found - drift[on]) * LEARNING;
             drift[1 - on] += (1.0 - drift[1 - on]) * FORGETTING;
         }
+    }
+}
+
+/// Which drift is that of a stage.
+#[cfg(feature = "cuda")]
+fn kind(stage: Stage, load: Load) -> usize {
+    match stage {
+        Stage::Edit if load.careful > 0 => 2,
+        stage => stage as usize,
     }
 }
 

@@ -199,16 +199,15 @@ fn new_ground_far_from_all_other_finds_its_material() {
     let control =
         MaterialControl::Rules { base: MaterialId(1), rules: vec![rule(2, -50.0, 0.0), rule(3, 0.0, 60.0)] };
     let ground =
-        Ground::from_fn(30, 26, high).and_then(|ground| ground.with_materials(&control)).expect("valid");
+        Ground::from_fn(22, 20, high).and_then(|ground| ground.with_materials(&control)).expect("valid");
     let at = |x: f32, y: f32, z: f32| glam::Vec3::new(x, y, z);
-    let all = |y: f32, half: f32| Shape::cuboid(at(15.0, y, 13.0), at(16.0, half, 14.0));
-    let ball =
-        |x: f32, y: f32, material| Brush::add(Shape::sphere(at(x, y, 12.0), 3.0), MaterialId(material));
+    let all = |y: f32, half: f32| Shape::cuboid(at(11.0, y, 10.0), at(12.0, half, 11.0));
+    let ball = |x: f32, y: f32, material| Brush::add(Shape::sphere(at(x, y, 9.0), 3.0), MaterialId(material));
     let transactions = [
-        vec![ball(8.0, 20.0, 5), ball(18.0, 58.0, 6), ball(26.0, -20.0, 7)],
+        vec![ball(6.0, 20.0, 5), ball(13.0, 58.0, 6), ball(19.0, -20.0, 7)],
         vec![Brush::level(all(0.0, 46.0), 24.0)],
         vec![Brush::dig(all(-12.0, 9.0)), Brush::dig(all(12.0, 4.0))],
-        vec![Brush::flatten(all(0.0, 70.0), at(15.0, 40.0, 13.0), at(0.2, 1.0, 0.1))],
+        vec![Brush::flatten(all(0.0, 70.0), at(11.0, 40.0, 10.0), at(0.2, 1.0, 0.1))],
         // Down from a roof, and in the open where nothing is within reach.
         vec![
             Brush::dig(all(-20.0, 50.0)),
@@ -220,16 +219,16 @@ fn new_ground_far_from_all_other_finds_its_material() {
     compare_on(ground, 32, &[&first, &second], &transactions);
     // Between a floor and a roof: within reach of the one, of the other, of neither; there between walls, one voxel apart.
     let slab = |y: f32, material| Brush::add(all(y, 2.0), MaterialId(material));
-    let between = Brush::flatten(all(70.0, 20.0), at(15.0, 70.0, 13.0), at(0.5, 1.0, 0.2)).with_falloff(0.0);
+    let between = Brush::flatten(all(70.0, 20.0), at(11.0, 70.0, 10.0), at(0.5, 1.0, 0.2)).with_falloff(0.0);
     let wall = |x: f32, z: f32, half: [f32; 2], material| {
         let half = at(half[0], 3.0, half[1]);
         Brush::add(Shape::cuboid(at(x, 70.0, z), half), MaterialId(material))
     };
     let mut first_ones = vec![slab(0.0, 5), slab(140.0, 6)];
-    first_ones.extend([wall(9.0, 13.0, [1.5, 9.0], 3), wall(13.0, 13.0, [1.5, 9.0], 4)]);
-    first_ones.extend([wall(22.0, 8.0, [5.0, 1.5], 1), wall(22.0, 12.0, [5.0, 1.5], 2)]);
+    first_ones.extend([wall(6.0, 10.0, [1.5, 7.0], 3), wall(10.0, 10.0, [1.5, 7.0], 4)]);
+    first_ones.extend([wall(17.0, 5.0, [4.0, 1.5], 1), wall(17.0, 9.0, [4.0, 1.5], 2)]);
     let transactions = [first_ones, vec![between]];
-    let flat = || Ground::flat(30, 26, -100.0).expect("valid");
+    let flat = || Ground::flat(22, 20, -100.0).expect("valid");
     compare_on(flat(), 25, &[&first, &second], &transactions);
     // What is refused is counted by the material that it would have had.
     let samples = LatticeBox { min: IVec3::new(-9, 20, -9), max: IVec3::new(99, 120, 99) };
