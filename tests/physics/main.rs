@@ -4,5 +4,6 @@
 mod bumps;
 mod changes;
 mod crowd;
+mod holding;
 mod sources;
 mod stage;
