@@ -7,3 +7,4 @@ mod crowd;
 mod holding;
 mod sources;
 mod stage;
+mod walkers;
