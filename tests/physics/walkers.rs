@@ -54,7 +54,7 @@ fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
     let walkers: Vec<Entity> = (0..96).map(|number| stage.character(start(number), Vec2::X)).collect();
     stage.frames(seconds(0.5));
     let mut lowest = f32::INFINITY;
-    for frame in 0..seconds(24.0) {
+    for frame in 0..seconds(14.0) {
         if frame % 2 == 0 {
             // The same surface, but another's to draw: the tile loses it, and a chunk gets it.
             let ahead = 1.5 + (frame % 13) as f32 * 0.3;
@@ -67,7 +67,7 @@ fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
     }
     assert!(lowest > 8.0, "{lowest}");
     let went = walkers.iter().map(|&walker| stage.place(walker).x).fold(f32::INFINITY, f32::min);
-    assert!(went > 100.0, "{went}");
+    assert!(went > 60.0, "{went}");
 }
 
 #[test]
