@@ -1,7 +1,9 @@
-//! What a collider costs in the task, and which kind: `cargo bench --features avian --bench colliders`.
+//! What a collider costs in the task, and which kind: `cargo bench --features avian --bench colliders`. What colliders cost
+//! the main thread.
 //!
 //! For tiles and chunks of hills with tunnels: the crate's own shape, a triangle mesh of parry's that mends its inner
-//! edges, one that does not, and, for tiles that nobody dug, a height field.
+//! edges, one that does not, and, for tiles that nobody dug, a height field. Then the systems that look where colliders
+//! are wanted, on 4096 tiles; and commits, while somebody holds a snapshot of the world and while nobody does.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -9,10 +11,14 @@ use std::time::{Duration, Instant};
 use avian3d::parry::math::Vector;
 use avian3d::parry::shape::{HeightField, HeightFieldFlags, TriMesh, TriMeshFlags};
 use avian3d::parry::utils::Array2;
-use bevy_burrow::physics::GroundShape;
+use avian3d::prelude::{LinearVelocity, PhysicsPlugins};
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::physics::{
+    ColliderSource, GroundShape, PhysicsFigures, TerrainPhysicsPlugin, TerrainPhysicsSystems,
+};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
-use glam::Vec3;
 
 /// Rounds of which the fastest counts.
 const ROUNDS: u32 = 20;
@@ -45,6 +51,119 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
         println!();
+    }
+    upkeep()?;
+    println!();
+    commits()
+}
+
+/// When the systems of a frame began, and how long they took.
+#[derive(Resource, Default)]
+struct Clock(Option<Instant>, Vec<Duration>);
+
+/// Frames that are measured.
+const FRAMES: usize = 256;
+
+/// The systems in `Update` that see to colliders, and those of the plugin between them.
+fn upkeep() -> Result<(), Box<dyn std::error::Error>> {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, PhysicsPlugins::default(), BurrowPlugins, TerrainPhysicsPlugin))
+        .init_resource::<Clock>()
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(1.0 / 64.0)))
+        .add_systems(
+            Update,
+            (
+                (|mut clock: ResMut<Clock>| clock.0 = Some(Instant::now()))
+                    .before(TerrainPhysicsSystems::Near),
+                (|mut clock: ResMut<Clock>| {
+                    let spent = clock.0.map(|start| start.elapsed());
+                    clock.1.extend(spent);
+                })
+                .after(TerrainPhysicsSystems::Upkeep),
+            ),
+        );
+    app.finish();
+    app.cleanup();
+    let ground = Ground::flat(1024, 1024, 8.0)?;
+    app.world_mut().spawn(Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size: 1.0 })?);
+    let walk = Vec3::X * 5.0;
+    for number in 0..100 {
+        let place = Vec3::new(60.3 + 90.0 * (number % 10) as f32, 9.0, 60.0 + 90.0 * (number / 10) as f32);
+        let source =
+            (Transform::from_translation(place), ColliderSource { radius: 32.0 }, LinearVelocity(walk));
+        app.world_mut().spawn(source);
+    }
+    println!(
+        "4096 tiles, 100 sources; the systems of {FRAMES} frames\n| | mean µs | median µs | p99 µs |\n| --- | --- | --- | --- |"
+    );
+    let settle = |app: &mut App| {
+        for _ in 0..100_000 {
+            app.update();
+            std::thread::sleep(Duration::from_micros(200));
+            let figures = app.world().resource::<PhysicsFigures>().clone();
+            let is_busy =
+                app.world_mut().query::<&Terrain>().iter(app.world()).any(|t| t.is_busy() || t.queued() > 0);
+            if figures.colliders > 0 && figures.missing == 0 && !is_busy {
+                break;
+            }
+        }
+    };
+    for (what, walks, digs) in [
+        ("nothing happens", false, false),
+        ("a brush in each fourth frame", false, true),
+        ("the sources walk", true, false),
+        ("the sources walk, a brush in each fourth frame", true, true),
+    ] {
+        settle(&mut app);
+        app.world_mut().resource_mut::<Clock>().1.clear();
+        for frame in 0..FRAMES {
+            if walks {
+                let world = app.world_mut();
+                let mut sources = world.query_filtered::<&mut Transform, With<ColliderSource>>();
+                sources.iter_mut(world).for_each(|mut place| place.translation += walk / 64.0);
+            }
+            if digs && frame % 4 == 0 {
+                let place = Vec3::new(100.0 + 3.0 * frame as f32, 8.0, 150.0 + (frame % 7) as f32 * 100.0);
+                app.world_mut().write_message(Brush::dig(Shape::sphere(place, 3.0)));
+            }
+            app.update();
+        }
+        let mut spent = std::mem::take(&mut app.world_mut().resource_mut::<Clock>().1);
+        spent.sort_unstable();
+        let mean = spent.iter().sum::<Duration>().as_secs_f64() * 1e6 / spent.len().max(1) as f64;
+        println!("| {what} | {mean:.1} | {:.1} | {:.1} |", micros(&spent, 0.5), micros(&spent, 0.99));
+    }
+    Ok(())
+}
+
+fn micros(sorted: &[Duration], share: f64) -> f64 {
+    let at = (sorted.len().saturating_sub(1) as f64 * share) as usize;
+    sorted.get(at).map_or(0.0, |duration| duration.as_secs_f64() * 1e6)
+}
+
+/// What a snapshot that somebody holds makes of a commit.
+fn commits() -> Result<(), Box<dyn std::error::Error>> {
+    println!("| bricks | a snapshot is held | commit, median µs | p99 µs |\n| --- | --- | --- | --- |");
+    for side in [40.0, 200.0] {
+        let mut terrain = Terrain::new(Ground::flat(512, 512, 40.0)?, &TerrainSettings::default())?;
+        let (middle, half) = (Vec3::new(256.0, 30.0, 256.0), Vec3::new(side, 16.0, side));
+        terrain.apply([Brush::dig(Shape::cuboid(middle, half))]);
+        for is_held in [false, true] {
+            let mut spent = Vec::new();
+            for number in 0..100 {
+                let place = Vec3::new(60.0 + 4.0 * number as f32, 40.0, 20.0 + 400.0 * f32::from(is_held));
+                terrain.submit(&Brush::dig(Shape::sphere(place, 3.0)));
+                let commit = terrain.begin().ok_or("nothing to do")?.run();
+                let snapshot = is_held.then(|| terrain.snapshot());
+                let start = Instant::now();
+                terrain.commit(commit)?;
+                spent.push(start.elapsed());
+                drop(snapshot);
+            }
+            spent.sort_unstable();
+            let bricks = terrain.world().bricks().count();
+            println!("| {bricks} | {is_held} | {:.1} | {:.1} |", micros(&spent, 0.5), micros(&spent, 0.99));
+        }
     }
     Ok(())
 }

@@ -2,12 +2,14 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
+use avian3d::collision::collider::EnlargedAabb;
 use avian3d::parry::shape::SharedShape;
 use avian3d::prelude::*;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
 use super::PhysicsFigures;
+use super::columns::column;
 use super::near::Neighbourhood;
 use super::shape::GroundShape;
 use super::wake::{Change, GroundChanges};
@@ -91,10 +93,9 @@ impl Grounds {
 impl Companion for Grounds {
     /// Near sources, and a little farther off where there is a collider that has not gone yet.
     fn wants(&self, part: &Part) -> bool {
-        let distance = self.0.near.read().unwrap_or_else(PoisonError::into_inner).distance(part);
-        distance.is_some_and(|distance| {
-            distance <= 0.0 || (!is_far(part, distance) && self.shape(part).is_some())
-        })
+        let near = self.0.near.read().unwrap_or_else(PoisonError::into_inner);
+        let distance = near.distance((part.terrain, column(part.drawn)));
+        distance.is_some_and(|distance| distance <= 0.0 || self.shape(part).is_some())
     }
 
     fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
@@ -104,6 +105,9 @@ impl Companion for Grounds {
         }))
     }
 }
+
+/// What is added to the box around a collider, in metres: as much as avian adds itself.
+const MARGIN: f32 = 0.05;
 
 /// A collider on its way to its tile or chunk.
 pub(super) struct Prepared {
@@ -133,7 +137,10 @@ impl Prepared {
                 let terrain = world.get::<GlobalTransform>(self.part.terrain).copied().unwrap_or_default();
                 let place = terrain * Transform::from_translation(self.part.origin.as_vec3());
                 let change = Change::new(self.part.terrain, &place, self.part.voxel_size, low, high);
-                world.resource_mut::<GroundChanges>().0.push(change);
+                let mut changes = world.resource_mut::<GroundChanges>();
+                changes.add(self.part.drawn, change);
+                let count = changes.len();
+                world.resource_mut::<PhysicsFigures>().changes = count;
             }
             world.resource_mut::<PhysicsFigures>().swaps += 1;
             match (self.shape, old.and_then(|old| world.get_entity_mut(old).ok())) {
@@ -143,8 +150,14 @@ impl Prepared {
                     None
                 }
                 (Some(shape), Some(mut old)) => {
-                    // Under the same entity: who touches it keeps touching it.
-                    old.insert(Collider::from(SharedShape(shape)));
+                    // Under the same entity: who touches it keeps touching it. Avian looks for it by its old box up to
+                    // the next step; who walks before would sink where it has grown.
+                    let collider = Collider::from(SharedShape(shape));
+                    if let (Some(place), Some(turn)) = (old.get::<Position>(), old.get::<Rotation>()) {
+                        let bounds = collider.aabb(place.0, *turn).grow(Vec3::splat(MARGIN));
+                        old.insert((bounds, EnlargedAabb::new(bounds)));
+                    }
+                    old.insert(collider);
                     Some(old.id())
                 }
                 (Some(shape), None) => {
@@ -172,11 +185,6 @@ impl Prepared {
     }
 }
 
-/// Is a part so far from all sources that its collider goes? Those who walk along a border are not to make it come and go.
-pub(super) fn is_far(part: &Part, distance: f32) -> bool {
-    distance > part.size as f32
-}
-
 /// Takes a tile's or chunk's collider away.
 pub(super) fn detach(mut part: EntityWorldMut) {
     let Some(old) = part.take::<GroundCollider>() else { return };
@@ -187,9 +195,21 @@ pub(super) fn detach(mut part: EntityWorldMut) {
     });
 }
 
-/// Lets go of a shape whose collider is gone, whoever despawned it.
-pub(super) fn forget(gone: On<Remove, GroundBody>, bodies: Query<&GroundBody>, grounds: Res<Grounds>) {
-    let Ok(body) = bodies.get(gone.entity) else { return };
+/// Lets go of a shape whose collider is gone, whoever despawned it; its tile or chunk has no collider then.
+pub(super) fn forget(
+    gone: On<Remove, GroundBody>,
+    bodies: Query<&GroundBody>,
+    grounds: Res<Grounds>,
+    mut commands: Commands,
+) {
+    let gone = gone.entity;
+    let Ok(body) = bodies.get(gone) else { return };
     let mut shapes = grounds.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
     shapes.remove(&(body.terrain, body.drawn));
+    let Ok(mut part) = commands.get_entity(body.part) else { return };
+    part.queue_silenced(move |mut part: EntityWorldMut| {
+        if part.get::<GroundCollider>().is_some_and(|ground| ground.body == Some(gone)) {
+            part.remove::<GroundCollider>();
+        }
+    });
 }

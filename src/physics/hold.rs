@@ -1,12 +1,14 @@
 //! Bodies over ground that has no collider yet are held, so that they do not fall through it.
 
+use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
+use bevy::ecs::query::QueryData;
 use bevy::prelude::*;
 
 use super::character::Character;
-use super::upkeep::ReadyColumns;
+use super::columns::Columns;
 use super::{ColliderSource, PhysicsFigures};
-use crate::lattice::Column;
+use crate::lattice::{Column, TilePos};
 use crate::terrain::Terrain;
 
 /// How far ahead of a body ground must have colliders, in seconds: longer than any frame.
@@ -18,38 +20,125 @@ const CLEARANCE: f32 = 4.0;
 /// This body stands still until the ground under it has colliders: it is over a terrain that loads, or farther from all
 /// [`ColliderSource`]s than their radius.
 ///
-/// The plugin puts it on dynamic bodies, whose axes it locks, and on [`Character`]s, and takes it away again; the body goes
-/// on with the velocity it had. Bodies high above the ground are not held.
+/// The plugin puts it on dynamic bodies, whose axes it locks, and on [`Character`]s, and takes it away again. Bodies high
+/// above the ground are not held.
+///
+/// The body goes on with the velocity that it had, and with its axes locked as they were. What a game changes meanwhile
+/// counts: `LockedAxes`, and a velocity that is not zero, are kept for then. To stop a held body, set the velocity here.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default)]
 #[reflect(Component, Default)]
 pub struct HeldByGround {
-    velocity: Vec3,
-    spin: Vec3,
-    /// What was locked before.
+    /// The velocity that it goes on with, in metres per second. Not for characters, which have a motion of their own.
+    pub velocity: Vec3,
+    /// The angular velocity that it goes on with, in radians per second.
+    pub spin: Vec3,
+    /// Are all axes locked, because it is held?
+    is_locked: bool,
+    /// What would be locked otherwise.
     locked: Option<LockedAxes>,
+}
+
+impl HeldByGround {
+    /// Locks all axes, and remembers what was locked.
+    fn lock(&mut self, locked: Option<&LockedAxes>, entity: &mut EntityCommands) {
+        (self.is_locked, self.locked) = (true, locked.copied());
+        entity.try_insert(LockedAxes::ALL_LOCKED);
+    }
+}
+
+/// Are all axes locked?
+fn locks_all(locked: Option<&LockedAxes>) -> bool {
+    locked.is_some_and(|locked| locked.to_bits() == LockedAxes::ALL_LOCKED.to_bits())
+}
+
+/// A body as it can be held.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(super) struct Body {
+    entity: Entity,
+    kind: &'static RigidBody,
+    position: &'static Position,
+    velocity: &'static mut LinearVelocity,
+    spin: &'static mut AngularVelocity,
+    locked: Option<&'static LockedAxes>,
+    bounds: Option<&'static ColliderAabb>,
+    is_character: Has<Character>,
+    hold: Option<&'static mut HeldByGround>,
+}
+
+impl BodyItem<'_, '_> {
+    /// Does it move by what holding takes away: forces and steering?
+    fn can_be_held(&self) -> bool {
+        self.kind.is_dynamic() || self.is_character
+    }
+
+    /// Half its size in the world, in metres.
+    fn half(&self) -> Vec3 {
+        let half = self.bounds.map_or(Vec3::splat(0.5), |bounds| (bounds.max - bounds.min) / 2.0);
+        half.clamp(Vec3::ZERO, Vec3::splat(8.0))
+    }
+
+    /// Holds it, or holds on to it: what the game changed since is kept for later.
+    fn hold(&mut self, commands: &mut Commands) {
+        let (velocity, spin) = (self.velocity.0, self.spin.0);
+        let mut entity = commands.entity(self.entity);
+        let Some(hold) = &mut self.hold else {
+            let mut hold = HeldByGround { velocity, spin, ..default() };
+            if !self.is_character {
+                hold.lock(self.locked, &mut entity);
+                (self.velocity.0, self.spin.0) = (Vec3::ZERO, Vec3::ZERO);
+            }
+            entity.try_insert(hold);
+            return;
+        };
+        if self.is_character {
+            return;
+        }
+        if velocity != Vec3::ZERO {
+            (hold.velocity, self.velocity.0) = (velocity, Vec3::ZERO);
+        }
+        if spin != Vec3::ZERO {
+            (hold.spin, self.spin.0) = (spin, Vec3::ZERO);
+        }
+        if !hold.is_locked || !locks_all(self.locked) {
+            hold.lock(self.locked, &mut entity);
+        }
+    }
+
+    /// Lets go of it, if it is held.
+    fn release(&mut self, commands: &mut Commands) {
+        let Some(hold) = self.hold.as_deref().copied() else { return };
+        let mut entity = commands.entity(self.entity);
+        entity.try_remove::<HeldByGround>();
+        if !hold.is_locked {
+            return;
+        }
+        // Only what falls is to go on falling.
+        if self.kind.is_dynamic() {
+            // Told so by the change, avian wakes it.
+            let or = |now: Vec3, then: Vec3| if now == Vec3::ZERO { then } else { now };
+            self.velocity.0 = or(self.velocity.0, hold.velocity);
+            self.spin.0 = or(self.spin.0, hold.spin);
+        }
+        // Others are the game's own already.
+        if locks_all(self.locked) {
+            match hold.locked {
+                Some(locked) => entity.try_insert(locked),
+                None => entity.try_remove::<LockedAxes>(),
+            };
+        }
+    }
 }
 
 /// Holds bodies and lets them go.
 pub(super) fn hold(
     mut commands: Commands,
-    mut bodies: Query<
-        (
-            Entity,
-            &RigidBody,
-            &Position,
-            &mut LinearVelocity,
-            &mut AngularVelocity,
-            Option<&LockedAxes>,
-            Option<&ColliderAabb>,
-            Has<Character>,
-            Option<&HeldByGround>,
-        ),
-        Without<super::GroundBody>,
-    >,
+    mut bodies: Query<Body, Without<super::GroundBody>>,
     places: TransformHelper,
+    config: Option<Res<PhysicsTransformConfig>>,
     terrains: Query<(Entity, &Terrain)>,
     sources: Query<(), With<ColliderSource>>,
-    ready: Res<ReadyColumns>,
+    ready: Res<Columns>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let terrains: Vec<(Entity, &Terrain, Affine)> = terrains
@@ -59,40 +148,26 @@ pub(super) fn hold(
             Some((entity, terrain, Affine { inverse: place.affine().inverse(), size: terrain.voxel_size() }))
         })
         .collect();
+    let follows_transform = config.is_none_or(|config| config.transform_to_position);
     let mut held = 0;
-    for (entity, body, position, mut velocity, mut spin, locked, bounds, is_character, hold) in &mut bodies {
-        if !(body.is_dynamic() || is_character) {
-            continue;
-        }
-        let half = bounds.map_or(Vec3::splat(0.5), |bounds| (bounds.max - bounds.min) / 2.0);
-        let half = half.clamp(Vec3::ZERO, Vec3::splat(8.0));
-        let towards = hold.map_or(velocity.0, |hold| hold.velocity);
-        let lacks_ground = terrains.iter().any(|(terrain, model, affine)| {
-            affine.lacks_ground(*terrain, model, &ready, position.0, towards, half)
-        });
-        held += usize::from(lacks_ground);
-        let mut entity = commands.entity(entity);
-        match (lacks_ground, hold) {
-            (true, None) => {
-                let hold = HeldByGround { velocity: velocity.0, spin: spin.0, locked: locked.copied() };
-                entity.try_insert(hold);
-                if !is_character {
-                    (velocity.0, spin.0) = (Vec3::ZERO, Vec3::ZERO);
-                    entity.try_insert(LockedAxes::ALL_LOCKED);
-                }
-            }
-            (false, Some(hold)) => {
-                entity.try_remove::<HeldByGround>();
-                if !is_character {
-                    // Told so by the change, avian wakes it.
-                    (velocity.0, spin.0) = (hold.velocity, hold.spin);
-                    match hold.locked {
-                        Some(locked) => entity.try_insert(locked),
-                        None => entity.try_remove::<LockedAxes>(),
-                    };
-                }
-            }
-            _ => {}
+    for mut body in &mut bodies {
+        let lacks_ground = body.can_be_held() && {
+            let half = body.half();
+            let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
+            let lacks_ground = |place: Vec3| {
+                terrains.iter().any(|(terrain, model, affine)| {
+                    affine.lacks_ground(*terrain, model, &ready, place, towards, half)
+                })
+            };
+            // Where a game has just put it, physics will have it in its next step.
+            let put = || places.compute_global_transform(body.entity).ok().map(|put| put.translation());
+            lacks_ground(body.position.0) || follows_transform && put().is_some_and(lacks_ground)
+        };
+        if lacks_ground {
+            held += 1;
+            body.hold(&mut commands);
+        } else {
+            body.release(&mut commands);
         }
     }
     figures.held = held;
@@ -115,7 +190,7 @@ impl Affine {
         &self,
         terrain: Entity,
         model: &Terrain,
-        ready: &ReadyColumns,
+        ready: &Columns,
         place: Vec3,
         velocity: Vec3,
         half: Vec3,
@@ -138,7 +213,7 @@ impl Affine {
         }
         let (first, last) = (grid.tile_of_cell(first), grid.tile_of_cell(last));
         let mut tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| (x, z)));
-        let is_missing = |(x, z)| !ready.contains(terrain, crate::lattice::TilePos { x, z });
+        let is_missing = |(x, z)| !ready.is_ready((terrain, TilePos { x, z }));
         tiles.any(is_missing) && self.is_low(model, place, low.y as f32)
     }
 

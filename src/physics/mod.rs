@@ -47,6 +47,7 @@
 
 mod character;
 mod colliders;
+mod columns;
 mod cone;
 mod debris;
 mod hold;
@@ -97,6 +98,10 @@ pub struct PhysicsFigures {
     pub swaps: u64,
     /// Colliders that came too late, for their surface had changed again.
     pub stale: u64,
+    /// Tiles and chunks looked at so far, because something happened to them or a source came near or left.
+    pub looked_at: u64,
+    /// Tiles and chunks that changed, and that bodies have not been told of yet.
+    pub changes: usize,
     /// Bodies that are held.
     pub held: usize,
     /// Bodies woken so far.
@@ -113,7 +118,7 @@ impl Plugin for TerrainPhysicsPlugin {
             .init_resource::<GroundMaterial>()
             .init_resource::<wake::GroundChanges>()
             .init_resource::<upkeep::Work>()
-            .init_resource::<upkeep::ReadyColumns>();
+            .init_resource::<columns::Columns>();
         app.world_mut().resource_mut::<Companions>().add(grounds.clone());
         app.insert_resource(grounds)
             .configure_sets(
@@ -124,6 +129,8 @@ impl Plugin for TerrainPhysicsPlugin {
                 ),
             )
             .add_observer(colliders::forget)
+            .add_observer(columns::note_new)
+            .add_observer(columns::note_gone)
             .add_systems(Update, near::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))

@@ -1,12 +1,16 @@
 //! Where colliders are wanted.
 
+use std::sync::Arc;
+
 use avian3d::prelude::*;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::colliders::Grounds;
-use crate::plugin::Part;
-use crate::terrain::{Drawn, Terrain};
+use super::columns::ColumnKey;
+use crate::lattice::{ChunkGrid, TilePos};
+use crate::terrain::Terrain;
 
 /// How far ahead of a source colliders are made, in seconds.
 const AHEAD: f32 = 1.0;
@@ -32,25 +36,82 @@ impl Default for ColliderSource {
     }
 }
 
-/// Sources as terrains see them: places in voxels along x and z, and a radius.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Neighbourhood(HashMap<Entity, Vec<(Vec2, f32)>>);
+/// A place in voxels along x and z, and how far around it colliders are wanted.
+type Stop = (Vec2, f32);
 
-impl Neighbourhood {
-    /// How far the nearest source's radius ends from a part's column, in voxels; negative within it.
-    pub fn distance(&self, part: &Part) -> Option<f32> {
-        let size = part.size as f32;
-        let low = match part.drawn {
-            Drawn::Tile(tile) => Vec2::new(tile.x as f32, tile.z as f32) * size,
-            Drawn::Chunk(chunk) => Vec2::new(chunk.x as f32, chunk.z as f32) * size,
-        };
-        let sources = self.0.get(&part.terrain)?.iter();
-        let distance = |&(place, radius): &(Vec2, f32)| place.distance(place.clamp(low, low + size)) - radius;
-        sources.map(distance).min_by(f32::total_cmp)
+/// Where sources are over one terrain.
+#[derive(Debug)]
+struct Area {
+    grid: ChunkGrid,
+    stops: Vec<Stop>,
+    /// How far the nearest source's radius ends from a column, in voxels; negative within it. Columns farther off than a
+    /// chunk is wide are not in here.
+    columns: FxHashMap<TilePos, f32>,
+}
+
+impl Area {
+    fn new(grid: ChunkGrid, stops: Vec<Stop>) -> Self {
+        let (size, (width, depth)) = (grid.size() as f32, grid.tile_counts());
+        let mut columns = FxHashMap::default();
+        for &(place, radius) in &stops {
+            let reach = radius + size;
+            let (low, high) = ((place - reach) / size - 1.0, (place + reach) / size);
+            let (low, high) = (low.floor().as_ivec2().max(IVec2::ZERO), high.floor().as_ivec2());
+            for z in low.y..=high.y.min(depth - 1) {
+                for x in low.x..=high.x.min(width - 1) {
+                    let corner = Vec2::new(x as f32, z as f32) * size;
+                    let distance = place.distance(place.clamp(corner, corner + size)) - radius;
+                    if distance <= size {
+                        let nearest = columns.entry(TilePos { x, z }).or_insert(distance);
+                        *nearest = nearest.min(distance);
+                    }
+                }
+            }
+        }
+        Self { grid, stops, columns }
     }
 }
 
-/// Tells tasks where sources are.
+/// Sources as terrains see them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Neighbourhood(HashMap<Entity, Arc<Area>>);
+
+impl Neighbourhood {
+    /// How far the nearest source's radius ends from a column, in voxels; negative within it. `None` if that is farther
+    /// than a chunk is wide: colliders go there, but not before, for those who walk along a border are not to make them
+    /// come and go.
+    pub fn distance(&self, (terrain, column): ColumnKey) -> Option<f32> {
+        self.0.get(&terrain)?.columns.get(&column).copied()
+    }
+
+    /// Is it the very same?
+    pub fn is(&self, other: &Self) -> bool {
+        let is_in_other =
+            |(terrain, area): (_, &Arc<Area>)| other.0.get(terrain).is_some_and(|own| Arc::ptr_eq(own, area));
+        self.0.len() == other.0.len() && self.0.iter().all(is_in_other)
+    }
+
+    /// The columns that sources have come to since, or have left.
+    pub fn changes(&self, before: &Self, mut change: impl FnMut(ColumnKey)) {
+        let kind = |distance: Option<f32>| distance.map(|distance| distance <= 0.0);
+        for (side, other) in [(self, before), (before, self)] {
+            for (&terrain, area) in &side.0 {
+                let other = other.0.get(&terrain);
+                if other.is_some_and(|other| Arc::ptr_eq(other, area)) {
+                    continue;
+                }
+                for (&column, &distance) in &area.columns {
+                    let distance_there = other.and_then(|other| other.columns.get(&column).copied());
+                    if kind(Some(distance)) != kind(distance_there) {
+                        change((terrain, column));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Looks where sources are, and tells tasks.
 pub(super) fn find_near(
     grounds: Res<Grounds>,
     places: TransformHelper,
@@ -62,7 +123,8 @@ pub(super) fn find_near(
     for (terrain, model) in &terrains {
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
         let (inverse, size) = (place.affine().inverse(), model.voxel_size());
-        let stride = model.world().grid().size() as f32;
+        let grid = model.world().grid();
+        let stride = grid.size() as f32;
         let mut stops = Vec::new();
         for (source, &ColliderSource { radius }, velocity) in &sources {
             let Ok(place) = places.compute_global_transform(source) else { continue };
@@ -77,9 +139,11 @@ pub(super) fn find_near(
             let stop = |at: u32| from.lerp(to, at as f32 / count.max(1) as f32).round();
             stops.extend((0..=count).map(|at| (stop(at), radius / size + 1.0)));
         }
-        near.0.insert(terrain, stops);
+        let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
+        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));
+        near.0.insert(terrain, area);
     }
-    if *known != near {
+    if !near.is(&known) {
         grounds.set_near(near.clone());
         *known = near;
     }

@@ -1,46 +1,22 @@
 //! Colliders that no commit brings: those of ground that a source comes near to, and those that it leaves behind.
 
-use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
 use super::PhysicsFigures;
-use super::colliders::{GroundBody, GroundCollider, Grounds, Prepared, detach, is_far};
+use super::colliders::{Grounds, Prepared, detach};
+use super::columns::{Columns, Look, Parts};
 use super::near::Neighbourhood;
-use crate::lattice::{ChunkPos, TilePos};
-use crate::plugin::{Chunk, Part, ShownSurface, TerrainEntities, Tile};
-use crate::terrain::{Drawn, Terrain};
+use crate::plugin::{Part, TerrainEntities};
+use crate::terrain::{SurfaceRecipe, Terrain};
 
-/// Parts that one task makes colliders for: few, so that the nearest come soon and the snapshot is soon let go of.
+/// Parts that one task makes colliders for: few, so that the nearest come soon.
 const BATCH: usize = 16;
-
-/// The columns of chunks in which everything that has triangles has a collider.
-#[derive(Resource, Default)]
-pub(super) struct ReadyColumns(HashSet<(Entity, TilePos)>);
-
-impl ReadyColumns {
-    pub fn contains(&self, terrain: Entity, tile: TilePos) -> bool {
-        self.0.contains(&(terrain, tile))
-    }
-}
 
 /// The colliders under way.
 #[derive(Resource, Default)]
 pub(super) struct Work(Option<Task<Vec<(Entity, Prepared)>>>);
-
-/// Which tile or chunk an entity is.
-pub(super) fn drawn(tile: Option<&Tile>, chunk: Option<&Chunk>) -> Option<Drawn> {
-    let tile = tile.map(|&Tile { x, z }| Drawn::Tile(TilePos { x, z }));
-    tile.or(chunk.map(|&Chunk { x, y, z }| Drawn::Chunk(ChunkPos { x, y, z })))
-}
-
-fn column(drawn: Drawn) -> TilePos {
-    match drawn {
-        Drawn::Tile(tile) => tile,
-        Drawn::Chunk(chunk) => chunk.tile(),
-    }
-}
 
 /// Puts colliders that are done in their places.
 pub(super) fn finish(mut commands: Commands, mut work: ResMut<Work>) {
@@ -53,74 +29,45 @@ pub(super) fn finish(mut commands: Commands, mut work: ResMut<Work>) {
     }
 }
 
-/// A tile or chunk, and the collider it has.
-type Parts<'w, 's> = Query<
-    'w,
-    's,
-    (
-        Entity,
-        Ref<'static, ShownSurface>,
-        Option<Ref<'static, GroundCollider>>,
-        &'static ChildOf,
-        Option<&'static Tile>,
-        Option<&'static Chunk>,
-    ),
-    Or<(With<Tile>, With<Chunk>)>,
->;
-
-/// Looks at every part, when something is new: removes colliders that are far from all sources, and starts to make those
-/// that are missing, the nearest first.
+/// Looks at the columns that something happened in, or that sources came to or left: removes colliders that are far from
+/// all sources, and starts to make those that are missing, the nearest first.
 pub(super) fn tend(
     mut commands: Commands,
     grounds: Res<Grounds>,
     terrains: Query<(&Terrain, &TerrainEntities)>,
     parts: Parts,
-    mut gone: RemovedComponents<ShownSurface>,
-    mut detached: RemovedComponents<GroundBody>,
+    mut columns: ResMut<Columns>,
     mut work: ResMut<Work>,
-    mut ready: ResMut<ReadyColumns>,
     mut figures: ResMut<PhysicsFigures>,
     mut known: Local<Neighbourhood>,
 ) {
     let near = grounds.near();
-    let is_new = |shown: &Ref<ShownSurface>, ground: &Option<Ref<GroundCollider>>| {
-        shown.is_changed() || ground.as_ref().is_some_and(|ground| ground.is_changed())
-    };
-    let is_quiet = gone.read().count() + detached.read().count() == 0
-        && near == *known
-        && !parts.iter().any(|(_, shown, ground, ..)| is_new(&shown, &ground));
-    if is_quiet && figures.missing == 0 {
-        return;
+    let mut touched = columns.take_news(&parts);
+    if !near.is(&known) {
+        near.changes(&known, |column| touched.extend([column]));
+        *known = near;
     }
-    let mut columns: HashMap<(Entity, TilePos), bool> = HashMap::default();
-    let mut missing: Vec<(f32, Entity, Part)> = Vec::new();
-    let mut count = 0;
-    for (entity, shown, ground, parent, tile, chunk) in &parts {
-        let (Some(drawn), Ok((terrain, _))) = (drawn(tile, chunk), terrains.get(parent.parent())) else {
-            continue;
-        };
-        let world = terrain.world();
-        let part = Part::new(parent.parent(), terrain.voxel_size(), world.grid(), world.revision(), drawn);
-        let distance = near.distance(&part).unwrap_or(f32::INFINITY);
-        let mut has_collider = ground.as_ref().is_some_and(|ground| ground.body.is_some());
-        let is_outdated = ground.as_ref().is_none_or(|ground| ground.revision < shown.revision);
-        let goes = is_far(&part, distance);
-        if ground.is_some() && (goes || is_outdated && shown.is_empty) {
-            commands.entity(entity).queue_silenced(detach);
-            has_collider = false;
-        } else if is_outdated && !shown.is_empty && (distance <= 0.0 || ground.is_some()) {
-            missing.push((distance, entity, part));
-        }
-        count += usize::from(has_collider);
-        let is_there = ground.is_some() && !goes || shown.is_empty;
-        *columns.entry((part.terrain, column(drawn))).or_insert(true) &= is_there;
+    for column in touched {
+        let distance = known.distance(column);
+        let looked_at = columns.look(column, |part| {
+            let (shown, ground, ..) = parts.get(part).ok()?;
+            let is_outdated = ground.is_none_or(|ground| ground.revision < shown.revision);
+            let goes = ground.is_some() && (distance.is_none() || is_outdated && shown.is_empty);
+            if goes {
+                commands.entity(part).queue_silenced(detach);
+            }
+            let is_wanted = ground.is_some() || distance.is_some_and(|distance| distance <= 0.0);
+            Some(Look {
+                has_collider: !goes && ground.is_some_and(|ground| ground.body.is_some()),
+                is_missing: !goes && is_outdated && !shown.is_empty && is_wanted,
+                is_there: shown.is_empty || !goes && ground.is_some(),
+            })
+        });
+        figures.looked_at += looked_at as u64;
     }
-    ready.0 = columns.into_iter().filter(|(_, is_ready)| *is_ready).map(|(column, _)| column).collect();
-    (figures.colliders, figures.missing) = (count, missing.len());
-    *known = near;
-    if work.0.is_none() && !missing.is_empty() {
-        missing.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        work.0 = begin(&grounds, &terrains, missing);
+    (figures.colliders, figures.missing) = columns.counts();
+    if work.0.is_none() && figures.missing > 0 {
+        work.0 = begin(&grounds, &terrains, &columns, &known);
     }
 }
 
@@ -129,23 +76,39 @@ pub(super) fn tend(
 fn begin(
     grounds: &Grounds,
     terrains: &Query<(&Terrain, &TerrainEntities)>,
-    missing: Vec<(f32, Entity, Part)>,
+    columns: &Columns,
+    near: &Neighbourhood,
 ) -> Option<Task<Vec<(Entity, Prepared)>>> {
-    let snapshot = |terrain: Entity| {
-        let (model, entities) = terrains.get(terrain).ok()?;
-        entities.show(model.world()).then(|| (terrain, model.snapshot()))
+    let is_shown =
+        |&terrain: &Entity| terrains.get(terrain).is_ok_and(|(model, entities)| entities.show(model.world()));
+    let missing = columns.waiting().filter(is_shown).flat_map(|terrain| {
+        let distance = move |tile| near.distance((terrain, tile)).unwrap_or(f32::INFINITY);
+        columns.missing(terrain).map(move |(tile, part, drawn)| (distance(tile), terrain, part, drawn))
+    });
+    let mut missing: Vec<_> = missing.collect();
+    let nearer = |a: &(f32, Entity, Entity, _), b: &(f32, Entity, Entity, _)| {
+        a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2)))
     };
-    let (terrain, world) = missing.iter().find_map(|(_, _, part)| snapshot(part.terrain))?;
-    let grounds = grounds.clone();
-    let batch: Vec<(Entity, Part)> = missing
+    let terrain = missing.iter().min_by(|a, b| nearer(a, b))?.1;
+    missing.retain(|part| part.1 == terrain);
+    if missing.len() > BATCH {
+        missing.select_nth_unstable_by(BATCH, nearer);
+        missing.truncate(BATCH);
+    }
+    let (model, _) = terrains.get(terrain).ok()?;
+    let (world, voxel_size) = (model.world(), model.voxel_size());
+    let batch: Vec<(Entity, Part, SurfaceRecipe)> = missing
         .into_iter()
-        .filter(|(_, _, part)| part.terrain == terrain)
-        .map(|(_, entity, part)| (entity, part))
-        .take(BATCH)
+        .map(|(.., entity, drawn)| {
+            let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
+            (entity, part, world.recipe(drawn))
+        })
         .collect();
+    let grounds = grounds.clone();
     Some(AsyncComputeTaskPool::get().spawn(async move {
-        let prepare =
-            |&(entity, part): &(Entity, Part)| (entity, grounds.prepare(&part, &part.surface_in(&world)));
+        let prepare = |(entity, part, recipe): &(Entity, Part, SurfaceRecipe)| {
+            (*entity, grounds.prepare(part, &recipe.surface()))
+        };
         batch.par_iter().map(prepare).collect()
     }))
 }

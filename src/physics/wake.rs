@@ -2,11 +2,12 @@
 
 use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
+use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
 use super::PhysicsFigures;
 use super::character::{Character, CharacterMotion};
-use crate::terrain::Terrain;
+use crate::terrain::{Drawn, Terrain};
 
 /// How far from a change a body may sleep on, in metres.
 const NEAR: f32 = 0.2;
@@ -40,9 +41,33 @@ impl Change {
     }
 }
 
-/// Changes that bodies have not been told of.
+/// Changes that bodies have not been told of: one box for each tile or chunk, for much is dug while time stands still.
 #[derive(Resource, Default)]
-pub(super) struct GroundChanges(pub Vec<Change>);
+pub(super) struct GroundChanges {
+    boxes: Vec<Change>,
+    numbers: HashMap<(Entity, Drawn), usize>,
+}
+
+impl GroundChanges {
+    /// Adds a change of one tile or chunk of its terrain.
+    pub fn add(&mut self, drawn: Drawn, change: Change) {
+        let number = *self.numbers.entry((change.terrain, drawn)).or_insert(self.boxes.len());
+        match self.boxes.get_mut(number) {
+            Some(known) => (known.low, known.high) = (known.low.min(change.low), known.high.max(change.high)),
+            None => self.boxes.push(change),
+        }
+    }
+
+    /// How many boxes there are.
+    pub fn len(&self) -> usize {
+        self.boxes.len()
+    }
+
+    fn take(&mut self) -> Vec<Change> {
+        self.numbers.clear();
+        std::mem::take(&mut self.boxes)
+    }
+}
 
 /// Wakes and lifts bodies.
 pub(super) fn wake(
@@ -67,10 +92,11 @@ pub(super) fn wake(
     characters: Query<(), With<Character>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
-    if changes.0.is_empty() {
+    if changes.len() == 0 {
         return;
     }
-    let changes = std::mem::take(&mut changes.0);
+    let changes = changes.take();
+    figures.changes = 0;
     for (entity, body, own, sleeps, mut position, mut velocity, mut transform, motion, is_child) in
         &mut bodies
     {

@@ -24,14 +24,15 @@ pub(super) struct Walk<'a, 'w, 's> {
 }
 
 impl<'a, 'w, 's> Walk<'a, 'w, 's> {
+    /// A body that none of its `own` entities is in the way of.
     pub(super) fn new(
         mover: &'a MoveAndSlide<'w, 's>,
         collider: &'a Collider,
         layers: Option<&CollisionLayers>,
         character: &'a Character,
-        entity: Entity,
+        own: impl IntoIterator<Item = Entity>,
     ) -> Self {
-        let filter = SpatialQueryFilter::from_excluded_entities([entity])
+        let filter = SpatialQueryFilter::from_excluded_entities(own)
             .with_mask(layers.copied().unwrap_or_default().filters);
         Self { mover, collider, character, filter, level: character.steepest.clamp(0.0, 1.5).cos() }
     }
@@ -158,7 +159,10 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     /// The normal of the ground below a place's soles, within `reach`.
     fn floor_below(&self, place: Vec3, reach: f32) -> Option<Vec3> {
         let soles = place - Vec3::Y * (self.character.height / 2.0 - SKIN);
-        let hit = self.mover.spatial_query.cast_ray(soles, Dir3::NEG_Y, reach, true, &self.filter)?;
+        let query = &self.mover.spatial_query;
+        // As for all that moves, sensors are air.
+        let is_solid = |collider: Entity| self.mover.colliders.contains(collider);
+        let hit = query.cast_ray_predicate(soles, Dir3::NEG_Y, reach, true, &self.filter, &is_solid)?;
         Some(hit.normal)
     }
 }

@@ -23,6 +23,8 @@ mod loose;
 mod query;
 mod ray;
 mod receipt;
+#[cfg(any(feature = "avian", test))]
+mod recipe;
 mod redraw;
 mod steps;
 mod surface;
@@ -35,6 +37,8 @@ pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restor
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
+#[cfg(feature = "avian")]
+pub(crate) use recipe::SurfaceRecipe;
 pub use redraw::{MeshUpdates, TileUpdate};
 pub use surface::ChunkSurface;
 pub use transaction::Transaction;

@@ -154,3 +154,23 @@ fn a_loose_piece_becomes_a_body_with_its_volume() {
     }
     assert!(debris_collider(&Default::default(), 1.0).is_none());
 }
+
+#[test]
+fn what_is_dug_while_time_stands_still_does_not_pile_up() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+    stage.frames(seconds(4.0));
+    assert!(sleeps(&stage, ball));
+    let swaps = stage.figures().swaps;
+    stage.app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    for number in 0..40 {
+        stage.dig([pit(20.0, 8.0 - number as f32 / 10.0, 20.0, 2.0)]);
+    }
+    let (swaps, changes) = (stage.figures().swaps - swaps, stage.figures().changes);
+    assert!(swaps >= 40 && (1..10).contains(&changes), "{changes} changes of {swaps} colliders");
+    assert!(sleeps(&stage, ball));
+    stage.app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+    stage.frames(seconds(2.0));
+    assert!(stage.figures().changes == 0 && stage.figures().woken == 1);
+    assert!((2.0..4.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
+}

@@ -301,6 +301,6 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
         let (seams, plain) = (at_seams[kind].figures(), elsewhere[kind].figures());
         println!("{name}: (samples, p99, highest) at seams and borders {seams:?}, elsewhere {plain:?}");
         assert!(seams.0 > 100, "{name} met {} seams", seams.0);
-        assert!(seams.2 < 0.05, "{name} jump: {seams:?}");
+        assert!(seams.2.max(plain.2) < 0.05, "{name} jump: {seams:?}, elsewhere {plain:?}");
     }
 }

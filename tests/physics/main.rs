@@ -4,5 +4,7 @@
 mod bumps;
 mod changes;
 mod crowd;
+mod holding;
 mod sources;
 mod stage;
+mod walkers;

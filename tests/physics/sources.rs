@@ -135,3 +135,72 @@ fn no_collider_is_of_ground_that_is_not_shown_yet() {
         stage.settle();
     }
 }
+
+#[test]
+fn a_collider_that_a_game_despawns_is_made_again() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let ground = stage.ground();
+    let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+    stage.frames(2);
+    for &body in &ground {
+        stage.app.world_mut().despawn(body);
+    }
+    stage.settle();
+    assert_eq!(stage.ground().len(), ground.len());
+    stage.frames((1.0 / STEP) as usize);
+    assert!((stage.place(ball).y - 8.5).abs() < 0.05, "{}", stage.place(ball));
+}
+
+#[test]
+fn colliders_on_their_way_do_not_keep_the_world_from_being_edited_in_place() {
+    let (mut stage, entity) = Stage::with_ground(level(256, 1.0));
+    for _ in 0..8 {
+        let bodies = stage.ground();
+        let world = stage.app.world_mut();
+        for body in bodies {
+            let part = world.get::<GroundBody>(body).expect("a body of ground").part;
+            world.entity_mut(part).remove::<GroundCollider>();
+            world.despawn(body);
+        }
+        // Who else holds the world: its terrain, and this test.
+        let mut frames = 0;
+        stage.frames_until("the colliders are there", |stage| {
+            let world = stage.terrain(entity).snapshot();
+            assert_eq!(std::sync::Arc::strong_count(&world), 2, "while {:?}", stage.figures());
+            frames += 1;
+            frames > 3 && stage.figures().missing == 0
+        });
+    }
+}
+
+#[test]
+fn upkeep_looks_only_where_something_happens() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(1024, 1.0));
+    let place = |number: i32| {
+        Transform::from_xyz(80.3 + 90.0 * (number % 10) as f32, 9.0, 80.0 + 90.0 * (number / 10) as f32)
+    };
+    let source = |number| (place(number), ColliderSource { radius: 24.0 }, LinearVelocity(Vec3::X * 6.4));
+    let sources: Vec<Entity> =
+        (0..100).map(|number| stage.app.world_mut().spawn(source(number)).id()).collect();
+    stage.settle();
+    let tiles = stage.app.world_mut().query::<&Tile>().iter(stage.app.world()).count() as u64;
+    let looked_at = |stage: &Stage| stage.figures().looked_at;
+    let before = looked_at(&stage);
+    stage.frames(64);
+    assert_eq!(looked_at(&stage), before, "nothing happened");
+    stage.dig([pit(80.0, 8.0, 80.0, 4.0)]);
+    let after_dig = looked_at(&stage);
+    assert!((1..40).contains(&(after_dig - before)), "{} for a pit", after_dig - before);
+    for _ in 0..64 {
+        for &source in &sources {
+            stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x += 0.1;
+        }
+        stage.frame();
+    }
+    stage.settle();
+    let walked = looked_at(&stage) - after_dig;
+    println!("in {tiles} tiles, {walked} were looked at while 100 sources walked for a second");
+    assert!((100..tiles).contains(&walked), "{walked}");
+    assert!(stage.figures().colliders >= 100 * 9);
+}

@@ -1,0 +1,84 @@
+//! What one tile's or chunk's surface is made from, without the rest of the world.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use super::surface::ChunkSurface;
+use super::world::{Drawn, World};
+use crate::ground::Ground;
+use crate::lattice::{ChunkGrid, TilePos};
+use crate::surface::SurfaceMesh;
+use crate::surface::mask::Borders;
+use crate::surface::tile::{self, Rings};
+
+/// All that the surface of one tile or chunk is made from, for somebody who makes it elsewhere: unlike a snapshot it leaves
+/// the world alone, and the next commit has nothing to copy.
+pub(crate) struct SurfaceRecipe(Source);
+
+enum Source {
+    Nothing,
+    Tile { tile: TilePos, grid: ChunkGrid, ground: Arc<Ground>, borders: Borders, rings: Arc<Rings> },
+    Chunk(Arc<ChunkSurface>),
+}
+
+impl World {
+    /// What the surface of a tile or chunk is made from, as it is now.
+    pub(crate) fn recipe(&self, drawn: Drawn) -> SurfaceRecipe {
+        SurfaceRecipe(match drawn {
+            Drawn::Tile(tile) if self.grid.has_tile(tile) => Source::Tile {
+                tile,
+                grid: self.grid,
+                ground: Arc::clone(&self.ground),
+                borders: tile::borders(&self.view(), tile),
+                rings: self.rings.get(&tile).cloned().unwrap_or_default(),
+            },
+            Drawn::Tile(_) => Source::Nothing,
+            Drawn::Chunk(chunk) => self.surfaces.get(&chunk).cloned().map_or(Source::Nothing, Source::Chunk),
+        })
+    }
+}
+
+impl SurfaceRecipe {
+    /// The surface, relative to the origin of the tile or chunk; empty where nothing is drawn.
+    pub fn surface(&self) -> Cow<'_, SurfaceMesh> {
+        match &self.0 {
+            Source::Nothing => Cow::default(),
+            Source::Tile { tile, grid, ground, borders, rings } => {
+                let mut vertices = tile::columns(ground, *grid, *tile);
+                vertices.extend_from_slice(rings.vertices());
+                Cow::Owned(SurfaceMesh { vertices, indices: tile::indices(*grid, *tile, borders, rings) })
+            }
+            Source::Chunk(surface) => Cow::Borrowed(surface.mesh()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::prelude::*;
+
+    #[test]
+    fn a_recipe_makes_the_surface_that_the_world_has() {
+        let noise = NoiseHeights { seed: 5, scale: 20.0, amplitude: 9.0, base: 4.0, ..Default::default() };
+        let ground = Ground::from_noise(70, 60, &noise).expect("valid hills");
+        let settings = TerrainSettings { chunk_size: 16, ..Default::default() };
+        let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
+        for number in 0..12 {
+            let place =
+                Vec3::new((number * 23 % 70) as f32, (number * 7 % 12) as f32, (number * 31 % 60) as f32);
+            terrain.apply([Brush::dig(Shape::sphere(place, 5.0))]);
+            if number % 4 == 3 {
+                terrain.undo();
+            }
+            let world = terrain.world();
+            for (drawn, mesh) in world.drawn() {
+                assert!(*world.recipe(drawn).surface() == mesh, "{drawn:?} after {number} digs");
+            }
+        }
+        let outside = Drawn::Tile(TilePos { x: 90, z: 0 });
+        assert!(terrain.world().recipe(outside).surface().is_empty());
+    }
+}

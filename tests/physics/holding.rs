@@ -1,0 +1,121 @@
+//! Bodies that are held over ground without colliders, while the game goes on changing them.
+
+use std::time::Duration;
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::physics::{Character, ColliderSource, HeldByGround};
+
+use crate::stage::{STEP, Stage, level};
+
+/// Places that bodies are to be put at, in the next `Update`.
+#[derive(Resource, Default)]
+struct Teleports(Vec<(Entity, Vec3)>);
+
+fn teleport(mut teleports: ResMut<Teleports>, mut bodies: Query<&mut Transform>) {
+    for (body, place) in teleports.0.drain(..) {
+        bodies.get_mut(body).expect("the body is there").translation = place;
+    }
+}
+
+fn source(stage: &mut Stage, x: f32, z: f32) {
+    let place = Transform::from_xyz(x, 8.0, z);
+    stage.app.world_mut().spawn((place, ColliderSource { radius: 20.0 }));
+    stage.settle();
+}
+
+/// A ball just above ground that has no collider.
+fn held_ball() -> (Stage, Entity) {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    let ball = stage.ball(Vec3::new(120.0, 8.6, 120.0), 0.5, Vec3::ZERO);
+    stage.frames_until("the ball is held", |stage| stage.is_held(ball));
+    stage.frames(20);
+    (stage, ball)
+}
+
+fn get<C: Component + Clone>(stage: &Stage, body: Entity) -> Option<C> {
+    stage.app.world().get::<C>(body).cloned()
+}
+
+#[test]
+fn who_is_teleported_over_ground_without_colliders_is_held_before_the_next_step() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    source(&mut stage, 40.0, 40.0);
+    stage.app.init_resource::<Teleports>().add_systems(Update, teleport);
+    let ball = stage.ball(Vec3::new(40.0, 8.5, 40.0), 0.5, Vec3::ZERO);
+    let person = stage.character(Vec3::new(44.0, 8.0, 40.0), Vec2::ZERO);
+    stage.frames(30);
+    let places = [
+        (ball, Vec3::new(200.0, 8.6, 200.0)),
+        (person, Character::default().standing_at(Vec3::new(204.0, 8.1, 200.0)).translation),
+    ];
+    stage.app.world_mut().get_mut::<LinearVelocity>(ball).expect("a body").y = -20.0;
+    stage.app.world_mut().resource_mut::<Teleports>().0.extend(places);
+    stage.frame();
+    // A hitch of the machine: many steps in a frame.
+    let hitch = TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(12.0 * STEP));
+    stage.app.insert_resource(hitch);
+    stage.frames(2);
+    stage.app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(STEP)));
+    for (body, place) in places {
+        assert!(stage.is_held(body), "{}", stage.place(body));
+        assert!(stage.place(body).distance(place) < 0.01, "{} for {place}", stage.place(body));
+    }
+    source(&mut stage, 200.0, 200.0);
+    stage.frames((2.0 / STEP) as usize);
+    assert!(!stage.is_held(ball) && !stage.is_held(person));
+    assert!((stage.place(ball).y - 8.5).abs() < 0.05 && (stage.feet(person).y - 8.0).abs() < 0.05);
+}
+
+#[test]
+fn axes_that_a_game_locks_or_frees_on_a_held_body_are_so_when_it_is_let_go() {
+    let locks: [Option<LockedAxes>; 2] = [Some(LockedAxes::ROTATION_LOCKED), None];
+    for locked in locks {
+        let (mut stage, ball) = held_ball();
+        let place = stage.place(ball);
+        let mut body = stage.app.world_mut().entity_mut(ball);
+        match locked {
+            Some(locked) => body.insert(locked),
+            None => body.remove::<LockedAxes>(),
+        };
+        stage.frames(60);
+        assert!(stage.is_held(ball) && stage.place(ball).distance(place) < 0.02, "{}", stage.place(ball));
+        source(&mut stage, 120.0, 120.0);
+        stage.frames(4);
+        assert!(!stage.is_held(ball));
+        let bits = |locked: Option<LockedAxes>| locked.map(|locked| locked.to_bits());
+        assert_eq!(bits(get(&stage, ball)), bits(locked));
+    }
+}
+
+#[test]
+fn a_held_body_goes_on_with_the_velocity_that_the_game_gave_it() {
+    let (mut stage, ball) = held_ball();
+    let place = stage.place(ball);
+    stage.app.world_mut().entity_mut(ball).insert(LinearVelocity(Vec3::X * 6.0));
+    stage.frames(60);
+    assert!(stage.is_held(ball) && stage.place(ball).distance(place) < 0.2, "{}", stage.place(ball));
+    source(&mut stage, 120.0, 120.0);
+    stage.frames((0.5 / STEP) as usize);
+    assert!(!stage.is_held(ball) && stage.place(ball).x > place.x + 1.0, "{}", stage.place(ball));
+}
+
+#[test]
+fn a_held_body_that_moves_no_longer_by_itself_is_let_go() {
+    for kind in [RigidBody::Kinematic, RigidBody::Static] {
+        let (mut stage, ball) = held_ball();
+        let place = stage.place(ball);
+        stage.app.world_mut().entity_mut(ball).insert(kind);
+        stage.frames(2);
+        assert!(!stage.is_held(ball) && get::<LockedAxes>(&stage, ball).is_none(), "{kind:?}");
+        stage.frames(30);
+        assert!(stage.place(ball).distance(place) < 0.01, "{kind:?}: {}", stage.place(ball));
+        stage.app.world_mut().entity_mut(ball).insert(RigidBody::Dynamic);
+        stage.frames(2);
+        assert!(stage.is_held(ball), "{kind:?}");
+        assert_eq!(stage.app.world_mut().query::<&HeldByGround>().iter(stage.app.world()).count(), 1);
+    }
+}

@@ -1,0 +1,140 @@
+//! Walking bodies as games build them: with a shield, in a trigger, on a vehicle, crouching.
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+use bevy_burrow::physics::{Character, CharacterSteering};
+use bevy_burrow::prelude::*;
+
+use crate::stage::{STEP, Stage, level};
+
+fn seconds(count: f32) -> usize {
+    (count / STEP) as usize
+}
+
+#[test]
+fn a_walker_is_not_in_the_way_of_its_own_shield() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let bare = stage.character(Vec3::new(10.0, 8.0, 20.0), Vec2::X);
+    let armed = stage.character(Vec3::new(10.0, 8.0, 30.0), Vec2::X);
+    let shield = (Collider::cuboid(0.2, 1.2, 0.8), Transform::from_xyz(0.45, 0.0, 0.0), ChildOf(armed));
+    stage.app.world_mut().spawn(shield);
+    stage.frames(seconds(3.0));
+    let [bare, armed] = [bare, armed].map(|walker| stage.place(walker));
+    assert!(bare.x > 22.0 && (armed.x - bare.x).abs() < 0.1, "{armed} beside {bare}");
+    assert!((armed.y - bare.y).abs() < 0.02 && (armed.z - 30.0).abs() < 0.02, "{armed} beside {bare}");
+}
+
+#[test]
+fn a_trigger_over_a_step_is_nothing_to_stumble_on() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    for z in [20.0, 40.0] {
+        let step = (Collider::cuboid(10.0, 1.0, 8.0), Transform::from_xyz(25.0, 7.8, z));
+        stage.app.world_mut().spawn((RigidBody::Static, step));
+    }
+    let trigger = (Collider::cuboid(8.0, 6.0, 8.0), Transform::from_xyz(20.0, 9.0, 40.0));
+    stage.app.world_mut().spawn((RigidBody::Static, Sensor, trigger));
+    // So careful that the step's edge is too steep: only a look ahead finds its top.
+    let walkers = [20.0, 40.0].map(|z| {
+        let walker = stage.character(Vec3::new(18.5, 8.0, z), Vec2::X);
+        stage.app.world_mut().get_mut::<Character>(walker).expect("a walker").steepest = 0.6;
+        walker
+    });
+    stage.frames(seconds(2.0));
+    for walker in walkers {
+        let feet = stage.feet(walker);
+        assert!((21.0..29.0).contains(&feet.x) && (feet.y - 8.3).abs() < 0.05, "{feet}");
+    }
+}
+
+#[test]
+fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
+    let (mut stage, _) = Stage::with_ground(level(160, 1.0));
+    let start =
+        |number: usize| Vec3::new(6.0 + 1.3 * (number % 4) as f32, 8.0, 6.5 + 6.1 * (number / 4) as f32);
+    let walkers: Vec<Entity> = (0..96).map(|number| stage.character(start(number), Vec2::X)).collect();
+    stage.frames(seconds(0.5));
+    let mut lowest = f32::INFINITY;
+    for frame in 0..seconds(14.0) {
+        if frame % 2 == 0 {
+            // The same surface, but another's to draw: the tile loses it, and a chunk gets it.
+            let ahead = 1.5 + (frame % 13) as f32 * 0.3;
+            let place = stage.feet(walkers[frame * 7 % walkers.len()]) + Vec3::X * ahead;
+            stage.send(Brush::paint(Shape::sphere(place, 1.5), MaterialId(2)));
+        }
+        stage.frame();
+        let feet = walkers.iter().map(|&walker| stage.feet(walker).y);
+        lowest = feet.fold(lowest, f32::min);
+    }
+    assert!(lowest > 8.0, "{lowest}");
+    let went = walkers.iter().map(|&walker| stage.place(walker).x).fold(f32::INFINITY, f32::min);
+    assert!(went > 60.0, "{went}");
+}
+
+#[test]
+fn a_walker_below_a_parent_walks_in_the_world() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let turned = Quat::from_rotation_y(1.2);
+    let vehicle = Transform::from_xyz(12.0, 3.0, 7.0).with_rotation(turned).with_scale(Vec3::splat(2.0));
+    let parent = stage.app.world_mut().spawn(vehicle).id();
+    let character = Character::default();
+    let place = character.standing_at(Vec3::new(20.0, 8.1, 30.0));
+    let local = GlobalTransform::from(place).reparented_to(&GlobalTransform::from(vehicle));
+    // Children are as large as their parents, and so are their colliders.
+    let local = local.with_rotation(turned.inverse()).with_scale(Vec3::splat(0.5));
+    let steering = CharacterSteering { direction: Vec2::X, ..default() };
+    let walker = stage.app.world_mut().spawn((character.clone(), steering, local, ChildOf(parent))).id();
+    let place = |stage: &Stage| stage.app.world().get::<Position>(walker).expect("a body").0;
+    stage.frames(seconds(2.0));
+    let feet = character.feet(place(&stage));
+    assert!((28.0..31.0).contains(&feet.x) && (feet.z - 30.0).abs() < 0.05, "{feet}");
+    assert!((feet.y - 8.0).abs() < 0.05 && stage.motion(walker).grounded, "{feet}");
+    // Who stands is carried along.
+    stage.app.world_mut().get_mut::<CharacterSteering>(walker).expect("a walker").direction = Vec2::ZERO;
+    stage.frames(seconds(1.0));
+    let before = place(&stage);
+    stage.app.world_mut().get_mut::<Transform>(parent).expect("a vehicle").translation.x += 5.0;
+    stage.frames(seconds(0.5));
+    assert!(place(&stage).distance(before + Vec3::X * 5.0) < 0.05, "{} from {before}", place(&stage));
+}
+
+/// The height of a walker's capsule.
+fn tall(stage: &Stage, walker: Entity) -> f32 {
+    let collider = stage.app.world().get::<Collider>(walker).expect("a walker has a collider");
+    let aabb = collider.aabb(Vec3::ZERO, Quat::IDENTITY);
+    aabb.max.y - aabb.min.y
+}
+
+#[test]
+fn a_walker_that_crouches_is_lower_and_keeps_its_feet_on_the_ground() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let walker = stage.character(Vec3::new(20.0, 8.0, 30.0), Vec2::ZERO);
+    stage.frames(seconds(1.0));
+    for height in [1.0, 1.8, 1.2] {
+        let character = |stage: &mut Stage| {
+            let mut character = stage.app.world_mut().get_mut::<Character>(walker).expect("a walker");
+            character.height = height;
+            character.clone()
+        };
+        let character = character(&mut stage);
+        for _ in 0..seconds(0.5) {
+            stage.frame();
+            let feet = character.feet(stage.place(walker));
+            assert!((feet.y - 8.0).abs() < 0.03, "{height} m tall, at {feet}");
+        }
+        assert!((tall(&stage, walker) - height).abs() < 0.01, "{} for {height}", tall(&stage, walker));
+        assert!(stage.motion(walker).grounded);
+    }
+}
+
+#[test]
+fn a_walker_keeps_the_collider_of_the_game_while_its_size_stays() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let walker = stage.character(Vec3::new(20.0, 8.0, 30.0), Vec2::ZERO);
+    stage.frames(2);
+    stage.app.world_mut().entity_mut(walker).insert(Collider::cuboid(0.8, 1.5, 0.8));
+    for speed in [3.0, 4.0] {
+        stage.app.world_mut().get_mut::<Character>(walker).expect("a walker").walk_speed = speed;
+        stage.frames(2);
+        assert_eq!(tall(&stage, walker), 1.5);
+    }
+}
