@@ -39,6 +39,11 @@ impl Film {
         Self { studio, fps, every, played: 0, drawn: 0, is_warm: false }
     }
 
+    /// Frames that are drawn, in a second of film.
+    pub fn rate(&self) -> f32 {
+        (f64::from(self.fps) / self.every) as f32
+    }
+
     /// Frames that were drawn so far.
     pub fn drawn(&self) -> usize {
         self.drawn

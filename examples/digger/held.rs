@@ -66,6 +66,8 @@ fn grip(
     };
     let wood = dye(Color::srgb(0.45, 0.29, 0.16), 0.85, 0.0);
     let steel = dye(Color::srgb(0.52, 0.55, 0.58), 0.42, 0.55);
+    // So near to the wall that the lamp would burn anything brighter.
+    let gunmetal = dye(Color::srgb(0.27, 0.28, 0.30), 0.55, 0.4);
     let dark = dye(Color::srgb(0.10, 0.10, 0.11), 0.5, 0.3);
     let red = dye(Color::srgb(0.66, 0.16, 0.10), 0.6, 0.0);
     let bristle = dye(Color::srgb(0.80, 0.72, 0.52), 0.95, 0.0);
@@ -116,14 +118,14 @@ fn grip(
             Tool::Drill,
             vec![
                 // Motor, its bands and vents, the gearbox, and the chuck.
-                along(&red, 0.036, 0.120, 0.020),
-                along(&dark, 0.033, 0.016, 0.086),
-                along(&steel, 0.0372, 0.006, 0.062),
-                along(&steel, 0.0372, 0.006, -0.030),
-                along(&dark, 0.029, 0.030, -0.055),
+                along(&red, 0.032, 0.120, 0.020),
+                along(&dark, 0.029, 0.016, 0.086),
+                along(&steel, 0.0332, 0.006, 0.062),
+                along(&steel, 0.0332, 0.006, -0.030),
+                along(&dark, 0.026, 0.030, -0.055),
                 along(&steel, 0.019, 0.028, -0.084),
-                part(&block, &dark, at(0.0, 0.085, 0.016).with_scale(Vec3::new(0.022, 0.006, 0.060))),
-                part(&block, &dark, at(-0.035, 0.058, 0.016).with_scale(Vec3::new(0.006, 0.018, 0.060))),
+                part(&block, &dark, at(0.0, 0.081, 0.016).with_scale(Vec3::new(0.022, 0.006, 0.060))),
+                part(&block, &dark, at(-0.031, 0.058, 0.016).with_scale(Vec3::new(0.006, 0.018, 0.060))),
                 // The grip with its trigger, and the handle for the other hand.
                 part(
                     &block,
@@ -184,17 +186,17 @@ fn grip(
                             let place = at(0.0, 0.05, -0.165).with_rotation(pitch(-FRAC_PI_2));
                             let mut bit = model.spawn((Bit, place, Visibility::Inherited));
                             bit.with_children(|bit| {
-                                let core = Vec3::new(0.009, 0.14, 0.009);
-                                bit.spawn(piece(part(&tube, &steel, Transform::from_scale(core))));
-                                let tip = Vec3::new(0.016, 0.045, 0.016);
-                                bit.spawn(piece(part(&cone, &steel, at(0.0, 0.085, 0.0).with_scale(tip))));
+                                let core = Vec3::new(0.011, 0.14, 0.011);
+                                bit.spawn(piece(part(&tube, &dark, Transform::from_scale(core))));
+                                let tip = Vec3::new(0.020, 0.050, 0.020);
+                                bit.spawn(piece(part(&cone, &gunmetal, at(0.0, 0.085, 0.0).with_scale(tip))));
                                 for step in 0..THREAD {
                                     let turn = Quat::from_rotation_y(step as f32 * 0.55);
                                     let y = -0.058 + 0.128 * step as f32 / THREAD as f32;
                                     let plate = at(0.0, y, 0.0)
                                         .with_rotation(turn * Quat::from_rotation_x(0.35))
-                                        .with_scale(Vec3::new(0.036, 0.004, 0.011));
-                                    bit.spawn(piece(part(&block, &dark, plate)));
+                                        .with_scale(Vec3::new(0.048, 0.0035, 0.012));
+                                    bit.spawn(piece(part(&block, &gunmetal, plate)));
                                 }
                             });
                         }

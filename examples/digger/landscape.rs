@@ -56,8 +56,7 @@ const SCALE: ImageScale = ImageScale {
     voxels_per_sample: 3,
     low: 0.0,
     high: 120.0,
-    // The finest octave is 3 voxels wide. One of 2 would rise and fall from column to column, and hatch every meadow.
-    detail: Some(Detail { amplitude: 1.3, scale: 13.0, octaves: 3, seed: 17 }),
+    detail: Some(Detail { amplitude: 1.2, scale: 9.0, octaves: 4, seed: 17 }),
 };
 
 /// Loads the survey, makes ground of it and spawns the terrain; [`Places`] is a resource from then on.

@@ -105,7 +105,7 @@ fn fill_pools(
     let mut puff = |base_color: LinearRgba, fade: usize, unlit: bool| {
         let alpha = 1.0 - (fade as f32 + 0.5) / FADES as f32;
         materials.add(StandardMaterial {
-            base_color: base_color.with_alpha(alpha * if unlit { 0.9 } else { 0.32 }).into(),
+            base_color: base_color.with_alpha(alpha * if unlit { 0.9 } else { 0.30 }).into(),
             base_color_texture: Some(art.puff.clone()),
             alpha_mode: if unlit { AlphaMode::Add } else { AlphaMode::Blend },
             perceptual_roughness: 1.0,
@@ -114,7 +114,8 @@ fn fill_pools(
             ..default()
         })
     };
-    let pale = |at: usize| color(at).mix(&LinearRgba::rgb(0.62, 0.57, 0.5), 0.55);
+    // Nor is dust to glow where the lamp meets it.
+    let pale = |at: usize| color(at).mix(&LinearRgba::rgb(0.62, 0.57, 0.5), 0.55) * 0.6;
     let dust = (0..MATERIALS.len()).flat_map(|at| (0..FADES).map(move |fade| (at, fade))).collect::<Vec<_>>();
     let dust = dust.into_iter().map(|(at, fade)| puff(pale(at), fade, false)).collect();
     let fire = (0..FADES)

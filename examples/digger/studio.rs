@@ -8,6 +8,7 @@ use std::f32::consts::PI;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use avian3d::prelude::Position;
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
 use bevy::render::render_resource::{PollType, TextureFormat};
@@ -203,14 +204,22 @@ impl Studio {
     }
 
     /// Puts the player's feet to a place, as only a script can.
+    ///
+    /// # Errors
+    /// When the ground there gets no colliders.
     pub fn stand_at(&mut self, feet: Vec3) -> Result {
         let place = Character::default().standing_at(feet);
         self.put(place)?;
+        // Physics take it over with their next step only, and between the scenes of a film no time passes.
+        self.put(Position(place.translation))?;
         self.put(CharacterMotion::default())?;
         // One frame to see that there is no ground, and the others until there is.
         self.step();
         let start = Instant::now();
-        while self.is_held() && start.elapsed() < PATIENCE {
+        while self.is_held() {
+            if start.elapsed() > PATIENCE {
+                return Err(format!("there is no ground to stand on at {feet}").into());
+            }
             self.step();
         }
         Ok(())

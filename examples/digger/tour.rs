@@ -107,11 +107,13 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
     let places: Places = studio.resource();
     let all = (ALL * options.fps as f32).round() as usize;
     let film = Film::new(studio, options.fps, all, options.frames.map_or(all, |frames| frames as usize));
+    // Where a fade has hardly a frame, it is no fade but a black picture.
+    let fades = film.rate() * FADE >= 3.0;
     let bar = ProgressBar::new((ALL * 10.0) as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {elapsed} of about {duration} {msg}") {
         bar.set_style(style);
     }
-    let mut tour = Tour { film, bar, is_first: true };
+    let mut tour = Tour { film, bar, fades, is_first: true };
     tour.hang_curtain();
     tour.flight(&places)?;
     tour.pickaxe(&places.hillside)?;
@@ -127,6 +129,8 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
 struct Tour {
     film: Film,
     bar: ProgressBar,
+    /// Is there a curtain between scenes?
+    fades: bool,
     /// Has no scene been played yet?
     is_first: bool,
 }
@@ -162,14 +166,14 @@ impl Tour {
         self.bar.set_message(name);
         self.film.settle()?;
         // Nobody begins with a black picture.
-        let hangs = if std::mem::take(&mut self.is_first) { 0.0 } else { 1.0 };
+        let (fades, hangs) = (self.fades, if std::mem::take(&mut self.is_first) { 0.0 } else { 1.0 });
         self.film.play(seconds, |studio, t| {
             direct(studio, t)?;
             let curtain = (hangs - t * seconds / FADE).max(1.0 - (1.0 - t) * seconds / FADE).clamp(0.0, 1.0);
             let world = studio.world();
             let mut sheets = world.query_filtered::<&mut BackgroundColor, With<Curtain>>();
             for mut sheet in sheets.iter_mut(world) {
-                sheet.0 = Color::BLACK.with_alpha(curtain);
+                sheet.0 = Color::BLACK.with_alpha(if fades { curtain } else { 0.0 });
             }
             Ok(())
         })?;
