@@ -75,7 +75,7 @@ const MANNERS: [Manner; 7] = [
     },
     Manner {
         label: "painter",
-        purpose: "turns the ground into the chosen material",
+        purpose: "paints the ground with what was dug",
         period: 0.26,
         hit: 0.12,
         reach: 40.0,

@@ -63,7 +63,7 @@ const KNOBS: [Knob; 9] = [
         turn: |settings, by| step(&mut settings.day_minutes, by, 5.0, 0.0, 120.0),
     },
     Knob {
-        label: "Brush of pickaxe and builder",
+        label: "Size of the brush",
         value: |settings| format!("{:.1} m", settings.radius),
         turn: |settings, by| step(&mut settings.radius, by, 0.5, 1.0, 12.0),
     },
@@ -75,7 +75,7 @@ const KNOBS: [Knob; 9] = [
         },
     },
     Knob {
-        label: "Build only what was dug",
+        label: "Use only what was dug",
         value: |settings| yes(settings.survival),
         turn: |settings, _| settings.survival = !settings.survival,
     },
