@@ -15,8 +15,10 @@ use crate::player::{Player, Scripted};
 /// How thick the walls are, and how far they reach up and down: farther than anyone jumps, and than most dig.
 const THICK: f32 = 8.0;
 const REACH: f32 = 1500.0;
-/// So far below all air there is, nobody got by himself.
-const DEEP: f32 = 3.0;
+/// So far below all air there is, nobody stays for long: whoever is built over is lifted out.
+const DEEP: f32 = 4.0;
+/// Looks, two a second, at which somebody has to be lost before he is brought back.
+const LOOKS: u32 = 4;
 
 /// Keeps the player in the world.
 pub struct RimPlugin;
@@ -70,13 +72,17 @@ fn bring_back(
     places: Option<Res<Places>>,
     players: Query<(Entity, &Character, &Transform), (With<Player>, Without<Scripted>)>,
     mut hints: MessageWriter<Hint>,
+    mut looks: Local<u32>,
 ) {
     let Some(places) = places else { return };
     for (player, character, place) in &players {
         let feet = character.feet(place.translation);
-        if !is_lost(feet, &terrains.spans(feet.x, feet.z)) {
+        let lost = is_lost(feet, &terrains.spans(feet.x, feet.z));
+        *looks = if lost { *looks + 1 } else { 0 };
+        if *looks < LOOKS {
             continue;
         }
+        *looks = 0;
         let start = start(&places, |place| terrains.height(place.x, place.y));
         let place = character.standing_at(start + Vec3::Y * 0.1);
         commands.entity(player).insert((place, Position(place.translation), CharacterMotion::default()));
