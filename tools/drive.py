@@ -31,7 +31,7 @@ def play(function):
 
 @play
 def digger(stage):
-    """Starts the game from its title, digs, changes the radius, digs again, takes it back, throws a bomb, pauses."""
+    """Starts from the title, digs, changes the radius, digs, takes it back, throws a bomb, pauses, begins a new game."""
 
     def page(name, since):
         stage.wait(r"^page " + name, since)
@@ -114,6 +114,24 @@ def digger(stage):
     stage.key("Escape")
     page("Paused Menu", since)
     stage.shoot("9_pause")
+
+    for _ in range(4):
+        stage.key("Down")
+    since = stage.mark()
+    stage.key("Return")
+    page("Title Menu", since)
+    stage.shoot("10_title")
+    stage.key("Down")
+    since = stage.mark()
+    stage.key("Return")
+    stage.wait(r"^ready", since)
+    page("Playing None", since)
+    stage.settle(2.0)
+    since = stage.mark()
+    stage.key("z")
+    stage.wait(r"^history there is nothing to undo", since)
+    stage.say("a new game begins on land that nobody has dug")
+    stage.shoot("11_new_game")
 
 
 @play

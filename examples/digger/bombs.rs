@@ -7,6 +7,7 @@ use bevy_burrow::physics::{Character, CharacterMotion};
 use bevy_burrow::prelude::*;
 
 use crate::inventory::Inventory;
+use crate::landscape::NewGame;
 use crate::particles::{Burst, Matter};
 use crate::player::Tremor;
 use crate::tools::{Strike, Tool};
@@ -63,6 +64,7 @@ impl Plugin for BombsPlugin {
             .add_systems(Update, burn_fuses.before(BurrowSystems::Collect))
             .add_systems(Update, fade_flashes)
             .add_observer(throw)
+            .add_observer(defuse)
             .add_observer(explode)
             .add_observer(shake);
     }
@@ -124,6 +126,12 @@ fn burn_fuses(mut commands: Commands, time: Res<Time>, mut bombs: Query<(Entity,
             commands.entity(entity).despawn();
             commands.trigger(Blast { place: place.translation });
         }
+    }
+}
+
+fn defuse(_: On<NewGame>, mut commands: Commands, bombs: Query<Entity, With<Bomb>>) {
+    for bomb in &bombs {
+        commands.entity(bomb).despawn();
     }
 }
 

@@ -5,6 +5,7 @@ use std::f32::consts::TAU;
 use bevy::light::light_consts::lux;
 use bevy::prelude::*;
 
+use crate::landscape::NewGame;
 use crate::light::{Eyes, Skylight, Sun};
 use crate::settings::Settings;
 use crate::sky::SkyMaterial;
@@ -158,8 +159,15 @@ pub struct DayPlugin;
 
 impl Plugin for DayPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Clock>().add_systems(Update, (tick, shine, mix_colors).chain());
+        app.init_resource::<Clock>()
+            .add_observer(wind_back)
+            .add_systems(Update, (tick, shine, mix_colors).chain());
     }
+}
+
+/// Every game begins in the afternoon.
+fn wind_back(_: On<NewGame>, mut clock: ResMut<Clock>) {
+    clock.hour = AFTERNOON;
 }
 
 pub fn tick(time: Res<Time>, settings: Res<Settings>, mut clock: ResMut<Clock>) {

@@ -5,12 +5,13 @@ use bevy::asset::RenderAssetUsages;
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::physics::debris_collider;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::PieceFate;
 
-use crate::landscape;
+use crate::landscape::{self, NewGame};
 use crate::particles::{Burst, Matter};
 
 /// Pieces up to so many voxels vanish, others up to so many fall.
@@ -27,7 +28,11 @@ impl Plugin for DebrisPlugin {
     fn build(&self, app: &mut App) {
         app.add_observer(look_for_pieces)
             .add_systems(Startup, mix)
-            .add_systems(Update, (break_off, take_shape, crumble).chain().after(BurrowSystems::Commit));
+            .add_systems(
+                Update,
+                (break_off, clear_away, take_shape, crumble).chain().after(BurrowSystems::Commit),
+            )
+            .add_observer(clear_all);
     }
 }
 
@@ -79,6 +84,49 @@ fn break_off(
                 .spawn(async move { Some((mesh(&surface), debris_collider(&surface, 1.0)?)) });
             commands.spawn(Shaping(task, corner, material, half));
         }
+    }
+}
+
+/// Where undo or redo put ground, there is no room for what had fallen from it.
+fn clear_away(
+    mut commands: Commands,
+    mut steps: MessageReader<HistoryMoved>,
+    pieces: Query<(Entity, &Piece, &Transform)>,
+    shaping: Query<(Entity, &Shaping)>,
+) {
+    for HistoryMoved { receipt, .. } in steps.read() {
+        let Ok(Restored { bounds: Some(bounds), added, .. }) = &receipt.outcome else { continue };
+        if added.total() == 0 {
+            continue;
+        }
+        let whole = pieces.iter().map(|(entity, piece, place)| {
+            let middle = place.translation + place.rotation * piece.half;
+            (entity, middle, piece.half.length())
+        });
+        let coming = shaping
+            .iter()
+            .map(|(entity, &Shaping(_, corner, _, half))| (entity, corner + half, half.length()));
+        for (entity, middle, reach) in whole.chain(coming) {
+            if meets(*bounds, middle, reach) {
+                commands.entity(entity).despawn();
+            }
+        }
+    }
+}
+
+/// Does a ball reach into a box?
+fn meets(bounds: LatticeBox, middle: Vec3, reach: f32) -> bool {
+    middle.distance(middle.clamp(bounds.min.as_vec3(), bounds.max.as_vec3())) < reach
+}
+
+/// A new game has no old rubble.
+fn clear_all(
+    _: On<NewGame>,
+    mut commands: Commands,
+    pieces: Query<Entity, Or<(With<Piece>, With<Shaping>)>>,
+) {
+    for piece in &pieces {
+        commands.entity(piece).despawn();
     }
 }
 
@@ -147,5 +195,38 @@ fn crumble(
             bursts.write(chips);
             commands.entity(entity).despawn();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_burrow::terrain::HistoryStep;
+
+    use super::*;
+
+    /// One piece in a box from 10 to 20, one far from it, and a step that put ground there or took some.
+    fn left_after(dig: bool) -> Vec<f32> {
+        let ground = Ground::from_fn(64, 64, |_, _| 15.0).expect("a small world");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
+        let ball = Shape::sphere(Vec3::splat(15.0), 4.0);
+        terrain.apply([if dig { Brush::dig(ball) } else { Brush::add(ball, landscape::ROCK) }]);
+        let receipt = terrain.undo();
+        assert_eq!(receipt.step, HistoryStep::Undo);
+        let mut app = App::new();
+        app.add_message::<HistoryMoved>().add_systems(Update, clear_away);
+        for at in [14.0, 40.0] {
+            let piece = Piece { left: 9.0, material: landscape::ROCK, half: Vec3::ONE };
+            app.world_mut().spawn((piece, Transform::from_translation(Vec3::splat(at))));
+        }
+        app.world_mut().write_message(HistoryMoved { terrain: None, receipt });
+        app.update();
+        let mut pieces = app.world_mut().query_filtered::<&Transform, With<Piece>>();
+        pieces.iter(app.world()).map(|place| place.translation.x).collect()
+    }
+
+    #[test]
+    fn what_fell_makes_room_for_ground_that_comes_back() {
+        assert_eq!(left_after(true), [40.0]);
+        assert_eq!(left_after(false), [14.0, 40.0]);
     }
 }

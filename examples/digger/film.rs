@@ -1,7 +1,8 @@
 //! A camera for films: every frame takes the same time, shows every edit that was sent before it, and becomes a
 //! picture. The same script gives the same film on every machine, however slow it draws.
 
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
@@ -9,7 +10,12 @@ use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_dis
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::prelude::*;
 
+use crate::pixels;
 use crate::studio::{Developed, PATIENCE, Studio};
+
+/// Why a frame of the film is not on the disk.
+#[derive(Resource, Default)]
+struct Spoilt(Option<String>);
 
 /// A film that is being made.
 pub struct Film {
@@ -27,9 +33,15 @@ pub struct Film {
 
 impl Film {
     /// `drawn` of all `frames` are drawn, evenly spread.
-    pub fn new(studio: Studio, fps: u32, frames: usize, drawn: usize) -> Self {
+    pub fn new(mut studio: Studio, fps: u32, frames: usize, drawn: usize) -> Self {
+        studio.world().init_resource::<Spoilt>();
         let every = frames as f64 / drawn.clamp(1, frames.max(1)) as f64;
         Self { studio, fps, every, played: 0, drawn: 0, is_warm: false }
+    }
+
+    /// Frames that are drawn, in a second of film.
+    pub fn rate(&self) -> f32 {
+        (f64::from(self.fps) / self.every) as f32
     }
 
     /// Frames that were drawn so far.
@@ -104,10 +116,16 @@ impl Film {
             return Ok(());
         };
         let path = self.path(self.drawn);
-        let mut save = save_to_disk(path);
-        let develop = move |picture: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| {
+        let mut save = save_to_disk(path.clone());
+        let develop = move |picture: On<ScreenshotCaptured>,
+                            mut developed: ResMut<Developed>,
+                            mut spoilt: ResMut<Spoilt>| {
             save(picture);
             developed.0 += 1;
+            // Whoever saves tells nobody but the log.
+            if let Err(error) = pixels::check_is_whole(&path) {
+                spoilt.0.get_or_insert(error.to_string());
+            }
         };
         self.studio.world().spawn(Screenshot::image(image)).observe(develop);
         self.studio.step_and_draw();
@@ -119,7 +137,7 @@ impl Film {
     /// Waits until no more than some pictures are on their way to the disk.
     ///
     /// # Errors
-    /// When they don't come.
+    /// When they don't come, or can't be written.
     pub fn develop(&mut self, on_their_way: usize) -> Result {
         if self.studio.film.is_none() {
             return Ok(());
@@ -132,12 +150,35 @@ impl Film {
             self.pass(Duration::ZERO);
             self.studio.app.update();
         }
-        Ok(())
+        match &self.studio.world().resource::<Spoilt>().0 {
+            Some(error) => Err(error.clone().into()),
+            None => Ok(()),
+        }
     }
 
     fn path(&self, number: usize) -> PathBuf {
-        self.studio.folder.join(format!("frame_{number:05}.png"))
+        frame_path(&self.studio.folder, number)
     }
+}
+
+fn frame_path(folder: &Path, number: usize) -> PathBuf {
+    folder.join(format!("frame_{number:05}.png"))
+}
+
+/// Frames of an earlier film go, or some of them would be in the video of this one.
+///
+/// # Errors
+/// When they can't be removed.
+pub fn clear(folder: &Path) -> Result {
+    for number in 0.. {
+        let path = frame_path(folder, number);
+        match std::fs::remove_file(&path) {
+            Ok(()) => {}
+            Err(error) if error.kind() == ErrorKind::NotFound => break,
+            Err(error) => return Err(format!("{}: {error}", path.display()).into()),
+        }
+    }
+    Ok(())
 }
 
 /// Is no edit on its way, anywhere?

@@ -10,6 +10,8 @@ use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
 use bevy_burrow::prelude::*;
 
 use crate::input::{Action, Actions};
+use crate::phase::Phase;
+use crate::player::Playing;
 use crate::ui;
 
 /// Frames that are seen, one bar each.
@@ -25,7 +27,7 @@ impl Plugin for FramesPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Frames>()
             .add_systems(Startup, hang_up)
-            .add_systems(Update, toggle)
+            .add_systems(Update, toggle.in_set(Playing).run_if(in_state(Phase::Playing)))
             .add_systems(Last, (take_time, draw.run_if(is_shown)).chain());
     }
 }

@@ -47,6 +47,9 @@ impl Plugin for HeldPlugin {
 /// Where the hand rests, seen from the eyes: so near that no wall comes between.
 const REST: Vec3 = Vec3::new(0.155, -0.165, -0.30);
 
+/// Plates of the drill's thread.
+const THREAD: usize = 16;
+
 fn grip(
     mut commands: Commands,
     eyes: Single<Entity, With<Eyes>>,
@@ -63,6 +66,8 @@ fn grip(
     };
     let wood = dye(Color::srgb(0.45, 0.29, 0.16), 0.85, 0.0);
     let steel = dye(Color::srgb(0.52, 0.55, 0.58), 0.42, 0.55);
+    // So near to the wall that the lamp would burn anything brighter.
+    let gunmetal = dye(Color::srgb(0.27, 0.28, 0.30), 0.55, 0.4);
     let dark = dye(Color::srgb(0.10, 0.10, 0.11), 0.5, 0.3);
     let red = dye(Color::srgb(0.66, 0.16, 0.10), 0.6, 0.0);
     let bristle = dye(Color::srgb(0.80, 0.72, 0.52), 0.95, 0.0);
@@ -86,6 +91,11 @@ fn grip(
     let part = |mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, place: Transform| -> Part {
         (mesh.clone(), material.clone(), place)
     };
+    // A drum on the drill's axis, which points ahead.
+    let along = |material: &Handle<StandardMaterial>, radius: f32, length: f32, z: f32| -> Part {
+        let place = at(0.0, 0.05, z).with_rotation(pitch(FRAC_PI_2));
+        part(&tube, material, place.with_scale(Vec3::new(radius, length, radius)))
+    };
     let models: [(Tool, Vec<Part>); 7] = [
         (
             Tool::Pickaxe,
@@ -107,24 +117,30 @@ fn grip(
         (
             Tool::Drill,
             vec![
-                part(
-                    &tube,
-                    &red,
-                    at(0.0, 0.06, 0.03)
-                        .with_rotation(pitch(FRAC_PI_2))
-                        .with_scale(Vec3::new(0.052, 0.15, 0.052)),
-                ),
-                part(
-                    &tube,
-                    &dark,
-                    at(0.0, 0.06, -0.062)
-                        .with_rotation(pitch(FRAC_PI_2))
-                        .with_scale(Vec3::new(0.036, 0.04, 0.036)),
-                ),
+                // Motor, its bands and vents, the gearbox, and the chuck.
+                along(&red, 0.032, 0.120, 0.020),
+                along(&dark, 0.029, 0.016, 0.086),
+                along(&steel, 0.0332, 0.006, 0.062),
+                along(&steel, 0.0332, 0.006, -0.030),
+                along(&dark, 0.026, 0.030, -0.055),
+                along(&steel, 0.019, 0.028, -0.084),
+                part(&block, &dark, at(0.0, 0.081, 0.016).with_scale(Vec3::new(0.022, 0.006, 0.060))),
+                part(&block, &dark, at(-0.031, 0.058, 0.016).with_scale(Vec3::new(0.006, 0.018, 0.060))),
+                // The grip with its trigger, and the handle for the other hand.
                 part(
                     &block,
                     &dark,
-                    at(0.0, -0.02, 0.06).with_rotation(pitch(0.25)).with_scale(Vec3::new(0.03, 0.12, 0.04)),
+                    at(0.0, -0.018, 0.052)
+                        .with_rotation(pitch(0.25))
+                        .with_scale(Vec3::new(0.028, 0.105, 0.036)),
+                ),
+                part(&block, &red, at(0.0, 0.002, 0.026).with_scale(Vec3::new(0.012, 0.024, 0.012))),
+                part(
+                    &tube,
+                    &dark,
+                    at(-0.060, 0.050, -0.052)
+                        .with_rotation(Quat::from_rotation_z(FRAC_PI_2))
+                        .with_scale(Vec3::new(0.011, 0.075, 0.011)),
                 ),
             ],
         ),
@@ -166,10 +182,23 @@ fn grip(
                             model.spawn(piece(part));
                         }
                         if tool == Tool::Drill {
-                            let place = at(0.0, 0.06, -0.15)
-                                .with_rotation(pitch(-FRAC_PI_2))
-                                .with_scale(Vec3::new(0.030, 0.15, 0.030));
-                            model.spawn((Bit, piece(part(&cone, &steel, place))));
+                            // Upright as it is made: a core, a tip, and a thread of plates around it.
+                            let place = at(0.0, 0.05, -0.165).with_rotation(pitch(-FRAC_PI_2));
+                            let mut bit = model.spawn((Bit, place, Visibility::Inherited));
+                            bit.with_children(|bit| {
+                                let core = Vec3::new(0.011, 0.14, 0.011);
+                                bit.spawn(piece(part(&tube, &dark, Transform::from_scale(core))));
+                                let tip = Vec3::new(0.020, 0.050, 0.020);
+                                bit.spawn(piece(part(&cone, &gunmetal, at(0.0, 0.085, 0.0).with_scale(tip))));
+                                for step in 0..THREAD {
+                                    let turn = Quat::from_rotation_y(step as f32 * 0.55);
+                                    let y = -0.058 + 0.128 * step as f32 / THREAD as f32;
+                                    let plate = at(0.0, y, 0.0)
+                                        .with_rotation(turn * Quat::from_rotation_x(0.35))
+                                        .with_scale(Vec3::new(0.048, 0.0035, 0.012));
+                                    bit.spawn(piece(part(&block, &gunmetal, plate)));
+                                }
+                            });
                         }
                         if matches!(tool, Tool::Builder | Tool::Painter) {
                             let place = match tool {
@@ -265,7 +294,9 @@ fn pose(tool: Tool, phase: Option<f32>) -> (Quat, Vec3) {
         ),
         Tool::Drill => {
             let shake = phase.map_or(0.0, |t| (t * 19.0).sin() * 0.004);
-            (Quat::from_rotation_y(0.10), Vec3::new(shake, shake * 0.7, -0.02 * through))
+            // Its bit leads to the middle of the view, or nobody would see it behind the motor.
+            let turn = Quat::from_rotation_y(0.26) * Quat::from_rotation_x(0.10);
+            (turn, Vec3::new(shake - 0.005, shake * 0.7 - 0.012, -0.07 - 0.02 * through))
         }
         Tool::Builder | Tool::Bomb | Tool::Lamp => (
             lean * Quat::from_rotation_x(0.5 * back - 0.5 * through),

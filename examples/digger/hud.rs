@@ -58,6 +58,10 @@ struct Crosshair;
 #[derive(Component)]
 struct Slot(Tool);
 
+/// The key that takes the tool of a slot.
+#[derive(Component)]
+struct SlotKey(Action);
+
 #[derive(Component)]
 struct ToolName;
 
@@ -95,8 +99,14 @@ fn write_all(mut commands: Commands, art: Res<Art>) {
             ..default()
         };
         hud.spawn((top, children![(Hints, ui::text("", 19.0, ui::GOLD))]));
-        let keys = Node { position_type: PositionType::Absolute, left: px(16), bottom: px(14), ..default() };
-        hud.spawn((keys, children![(KeyLine, ui::text("", 13.0, ui::GREY))]));
+        let keys = Node {
+            position_type: PositionType::Absolute,
+            left: px(14),
+            bottom: px(12),
+            padding: UiRect::axes(px(9), px(6)),
+            ..default()
+        };
+        hud.spawn((ui::panel(keys), children![(KeyLine, ui::text("", 13.0, ui::GREY))]));
     });
 }
 
@@ -126,7 +136,8 @@ fn spawn_slots(hud: &mut ChildSpawnerCommands, art: &Art) {
         ..default()
     };
     hud.spawn(bottom).with_children(|bottom| {
-        bottom.spawn((ToolName, ui::text("", 15.0, ui::WHITE)));
+        let sign = Node { padding: UiRect::axes(px(11), px(3)), ..default() };
+        bottom.spawn((ui::panel(sign), children![(ToolName, ui::text("", 15.0, ui::WHITE))]));
         bottom.spawn(Node { column_gap: px(5), ..default() }).with_children(|bar| {
             for (at, tool) in Tool::ALL.into_iter().enumerate() {
                 let slot = Node {
@@ -148,7 +159,7 @@ fn spawn_slots(hud: &mut ChildSpawnerCommands, art: &Art) {
                     BorderColor::all(ui::EDGE),
                     children![
                         (ImageNode::new(art.tools[at].clone()), icon),
-                        (number, ui::text((at + 1).to_string(), 11.0, ui::GREY)),
+                        (number, SlotKey(tool.slot()), ui::text("", 11.0, ui::GREY)),
                     ],
                 ));
             }
@@ -190,9 +201,13 @@ fn spawn_materials(hud: &mut ChildSpawnerCommands, art: &Art) {
                     ..default()
                 };
                 let swatch = Node { width: px(14), height: px(14), ..default() };
+                // A light edge, without which coal could not be told from the list's own ground.
+                let frame = Node { padding: UiRect::all(px(1)), ..default() };
                 let color = Color::from(landscape::colour(material));
                 list.spawn((Row(material), row, BackgroundColor::DEFAULT)).with_children(|row| {
-                    row.spawn((ImageNode::new(art.swatch.clone()).with_color(brighter(color)), swatch));
+                    let edge = BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.45));
+                    let picture = ImageNode::new(art.swatch.clone()).with_color(brighter(color));
+                    row.spawn((frame, edge, children![(picture, swatch)]));
                     let grow = Node { flex_grow: 1.0, ..default() };
                     row.spawn((ui::text(name, 13.0, ui::WHITE), grow));
                     row.spawn((Count(material), ui::text("", 13.0, ui::GREY)));
@@ -204,8 +219,9 @@ fn spawn_materials(hud: &mut ChildSpawnerCommands, art: &Art) {
 
 /// Ground is lit by the sun, swatches by nothing.
 fn brighter(color: Color) -> Color {
-    let color = color.to_linear() * 1.9;
-    Color::linear_rgb(color.red.min(1.0), color.green.min(1.0), color.blue.min(1.0))
+    let lit = |channel: f32| (1.9 * channel + 0.035).min(1.0);
+    let color = color.to_linear();
+    Color::linear_rgb(lit(color.red), lit(color.green), lit(color.blue))
 }
 
 fn show(
@@ -313,15 +329,20 @@ fn tell_finds(
     }
 }
 
-fn tell_keys(settings: Res<Settings>, mut line: Single<&mut Text, With<KeyLine>>) {
-    if settings.is_changed() {
-        let key = |action| settings.bindings.first(action);
-        line.0 = format!(
-            "{} help   {} headlamp   {} undo   {} pause",
-            key(Action::Help),
-            key(Action::Headlamp),
-            key(Action::Undo),
-            key(Action::Pause)
-        );
+fn tell_keys(
+    settings: Res<Settings>,
+    mut line: Single<&mut Text, (With<KeyLine>, Without<SlotKey>)>,
+    mut slots: Query<(&SlotKey, &mut Text)>,
+) {
+    if !settings.is_changed() {
+        return;
+    }
+    let lines = [Action::Help, Action::Headlamp, Action::Undo, Action::Pause]
+        .map(|action| format!("{}  {}", settings.bindings.first(action), action.label()));
+    line.0 = lines.join("\n");
+    for (slot, mut text) in &mut slots {
+        // There is no room for more than a short name.
+        let key = settings.bindings.first(slot.0);
+        text.0 = if key.len() <= 5 { key } else { String::new() };
     }
 }

@@ -1,4 +1,4 @@
-//! Facts about keys, buttons and what they mean.
+//! Facts about devices and what is made of them.
 
 use std::collections::HashSet;
 
@@ -7,6 +7,8 @@ use bevy::input::gamepad::{
     RawGamepadEvent,
 };
 use bevy::input::keyboard::{Key, KeyboardInput};
+use bevy::input::mouse::MouseWheel;
+use bevy::input::touch::TouchPhase;
 use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
 
 use super::*;
@@ -36,50 +38,9 @@ fn actions(app: &App) -> &Actions {
 }
 
 #[test]
-fn every_action_has_a_key_and_no_key_has_two_actions() {
-    let bindings = Bindings::default();
-    let mut seen = HashSet::new();
-    for (action, label) in Action::ALL {
-        assert!(!bindings.of(action).is_empty(), "{label}");
-        assert!(bindings.of(action).iter().all(|binding| seen.insert(*binding)), "{label}");
-    }
+fn no_action_is_another_one() {
     let bits: HashSet<u64> = Action::ALL.iter().map(|(action, _)| action.bit()).collect();
     assert_eq!(bits.len(), Action::ALL.len());
-}
-
-#[test]
-fn bindings_are_written_as_words_and_read_again() {
-    for binding in Action::ALL.iter().flat_map(|(action, _)| Bindings::default().of(*action).to_vec()) {
-        assert_eq!(Binding::try_from(String::from(binding)), Ok(binding));
-    }
-    for (text, reads) in [
-        ("KeyW", true),
-        ("Mouse Left", true),
-        ("Pad South", true),
-        ("Wheel Up", true),
-        ("KeyÄ", false),
-        ("Mouse Other", false),
-        ("Unidentified", false),
-        ("Pad", false),
-        ("", false),
-    ] {
-        assert_eq!(Binding::try_from(text.to_string()).is_ok(), reads, "{text}");
-    }
-}
-
-#[test]
-fn who_loses_a_key_is_told_and_a_gamepad_keeps_its_own() {
-    let mut bindings = Bindings::default();
-    let space = Binding::Key(KeyCode::Space);
-    assert_eq!(bindings.rebind(Action::Headlamp, space), Some(Action::Jump));
-    assert_eq!(bindings.of(Action::Headlamp), [space, Binding::Pad(GamepadButton::North)]);
-    assert_eq!(bindings.of(Action::Jump), [Binding::Pad(GamepadButton::South)]);
-    // The same again changes nothing.
-    let before = bindings.clone();
-    assert_eq!(bindings.rebind(Action::Headlamp, space), None);
-    assert_eq!(bindings, before);
-    assert_eq!(bindings.rebind(Action::Form, Binding::Pad(GamepadButton::North)), Some(Action::Headlamp));
-    assert_eq!(bindings.of(Action::Headlamp), [space]);
 }
 
 #[test]
@@ -137,13 +98,26 @@ fn a_gamepad_walks_looks_and_digs() {
     assert!(actions(&app).look.x > 0.0 && actions(&app).look.y == 0.0);
 }
 
+fn scroll(app: &mut App, unit: MouseScrollUnit, y: f32) -> i32 {
+    let (phase, window) = (TouchPhase::Moved, Entity::PLACEHOLDER);
+    app.world_mut().write_message(MouseWheel { unit, x: 0.0, y, window, phase });
+    app.update();
+    actions(app).growth
+}
+
 #[test]
-fn bindings_of_another_version_cost_nobody_the_others() {
-    let text = r#"{ "jump": ["KeyJ", "KeyNone"], "fly": ["KeyF"], "undo": ["KeyW"] }"#;
-    let mut bindings: Bindings = serde_json::from_str(text).expect("unknown names are left out");
-    bindings.complete();
-    assert_eq!(bindings.of(Action::Jump), [Binding::Key(KeyCode::KeyJ)]);
-    assert_eq!(bindings.of(Action::Headlamp), Bindings::default().of(Action::Headlamp));
-    // W undoes here, so it can't walk as well.
-    assert_eq!(bindings.of(Action::Forward), [Binding::Key(KeyCode::ArrowUp)]);
+fn a_notch_of_the_wheel_is_a_step_and_a_touchpad_scrolls_for_one() {
+    let mut app = app();
+    assert_eq!(scroll(&mut app, MouseScrollUnit::Line, 1.0), 1);
+    assert_eq!(scroll(&mut app, MouseScrollUnit::Line, -3.0), -3);
+    for (unit, by) in [(MouseScrollUnit::Line, 0.1), (MouseScrollUnit::Pixel, 4.0)] {
+        let steps: i32 = (0..50).map(|_| scroll(&mut app, unit, by)).sum();
+        assert_eq!(steps, 5, "{unit:?}");
+        // The other way round counts from its own begin.
+        scroll(&mut app, unit, 0.5 * by);
+        let steps: i32 = (0..20).map(|_| scroll(&mut app, unit, -by)).sum();
+        assert_eq!(steps, -2, "{unit:?}");
+    }
+    app.update();
+    assert_eq!(actions(&app).growth, 0);
 }

@@ -1,34 +1,56 @@
 //! What was dug and not yet built: receipts fill it, and what is built is taken from it.
 //!
 //! A brush is answered some frames after it was sent. Until then what it may take is pledged, so that a fast hand
-//! can't spend the same ground twice; the receipt says what it really took.
+//! can't spend the same ground twice; the receipt says what it really took. What each transaction did to the stock is
+//! kept, so that undo and redo do just the opposite: the ground's own history knows of pieces that fell and of paint,
+//! but not of what they were worth.
+
+use std::collections::VecDeque;
 
 use bevy::prelude::*;
 use bevy_burrow::plugin::{HistoryMoved, Redo, Undo};
 use bevy_burrow::prelude::*;
-use bevy_burrow::volume::Tally;
+use bevy_burrow::terrain::{HistoryStep, PieceFate};
 
 use crate::hud::Hint;
 use crate::input::{Action, Actions};
-use crate::landscape::{CONCRETE, MATERIALS};
+use crate::landscape::{CONCRETE, MATERIALS, NewGame};
 use crate::phase::Phase;
 use crate::player::Playing;
 
 /// Tags from here on belong to the hand. Brushes of scripts have others, and cost nothing.
-const FIRST: u64 = 1 << 32;
+pub const FIRST: u64 = 1 << 32;
+/// Transactions that can be undone at most; the ground's own history ends long before.
+const PAST: usize = 1 << 16;
+
+/// So many voxels of each material more, or less.
+type Change = [i64; MATERIALS.len()];
 
 /// Voxels of each material.
 #[derive(Resource, Clone, Debug)]
 pub struct Inventory {
-    stock: [i64; MATERIALS.len()],
+    /// Never below 0.
+    stock: Change,
     pledges: Vec<(u64, MaterialId, i64)>,
     next: u64,
+    /// What the transaction that is being entered did, once it has changed some ground.
+    open: Option<Change>,
+    /// What transactions did, those that can be undone and those that can be done again; the nearest stand last.
+    past: VecDeque<Change>,
+    future: Vec<Change>,
 }
 
 impl Default for Inventory {
     /// Nothing but some concrete, which no hill has.
     fn default() -> Self {
-        let mut inventory = Self { stock: default(), pledges: Vec::new(), next: FIRST };
+        let mut inventory = Self {
+            stock: default(),
+            pledges: Vec::new(),
+            next: FIRST,
+            open: None,
+            past: VecDeque::new(),
+            future: Vec::new(),
+        };
         inventory.gain(CONCRETE, 600);
         inventory
     }
@@ -57,33 +79,86 @@ impl Inventory {
         self.pledges.push((tag, material, voxels));
     }
 
-    /// More of a material, or less.
-    pub fn gain(&mut self, material: MaterialId, voxels: i64) {
-        if let Some(stock) = self.stock.get_mut(usize::from(material.0)) {
-            *stock += voxels;
-        }
+    /// More of a material, or less, as far as there is any; says by how much it really changed.
+    pub fn gain(&mut self, material: MaterialId, voxels: i64) -> i64 {
+        let Some(stock) = self.stock.get_mut(usize::from(material.0)) else { return 0 };
+        let before = *stock;
+        *stock = before.saturating_add(voxels).max(0);
+        *stock - before
     }
 
-    /// Enters what became of a brush, if it was the hand's; says what came and went.
+    /// Enters what became of a brush; if it was the hand's, says what came and went. Whatever fell off is the player's
+    /// as well, and paint is used up as what is built is.
     pub fn enter(&mut self, receipt: &Receipt) -> Vec<(MaterialId, i64)> {
+        self.pledges.retain(|pledge| pledge.0 != receipt.tag);
+        let Ok(applied) = &receipt.outcome else { return Vec::new() };
+        if applied.bounds.is_some() {
+            self.open.get_or_insert_default();
+        }
         if receipt.tag < FIRST {
             return Vec::new();
         }
-        self.pledges.retain(|pledge| pledge.0 != receipt.tag);
-        let Ok(applied) = &receipt.outcome else { return Vec::new() };
-        self.enter_tallies(&applied.removed, &applied.added)
-    }
-
-    /// Enters what came and what went; says the same as a list.
-    fn enter_tallies(&mut self, removed: &Tally, added: &Tally) -> Vec<(MaterialId, i64)> {
-        let came = removed.iter().map(|(material, voxels)| (material, voxels as i64));
-        let went = added.iter().map(|(material, voxels)| (material, -(voxels as i64)));
-        let changes: Vec<_> = came.chain(went).collect();
-        for &(material, voxels) in &changes {
-            self.gain(material, voxels);
+        let fallen = applied.loose.iter().filter(|piece| piece.fate != PieceFate::Left);
+        let came = fallen.map(|piece| &piece.materials).chain([&applied.removed]);
+        let came = came.flat_map(|tally| tally.iter()).map(|(material, voxels)| (material, voxels as i64));
+        let went = [&applied.added, &applied.painted].into_iter().flat_map(|tally| tally.iter());
+        // A shovel takes and fills at once: only the difference counts.
+        let mut sums = Change::default();
+        for (material, voxels) in came.chain(went.map(|(material, voxels)| (material, -(voxels as i64)))) {
+            if let Some(sum) = sums.get_mut(usize::from(material.0)) {
+                *sum += voxels;
+            }
+        }
+        let changes = self.change(&sums);
+        if let Some(open) = &mut self.open {
+            for &(MaterialId(material), by) in &changes {
+                open[usize::from(material)] += by;
+            }
         }
         changes
     }
+
+    /// All receipts of a transaction are entered.
+    pub fn close(&mut self) {
+        if let Some(change) = self.open.take() {
+            self.past.push_back(change);
+            self.future.clear();
+            if self.past.len() > PAST {
+                self.past.pop_front();
+            }
+        }
+    }
+
+    /// Enters a step through history; says what came and went.
+    pub fn step(&mut self, step: HistoryStep) -> Vec<(MaterialId, i64)> {
+        match step {
+            HistoryStep::Undo => {
+                let Some(change) = self.past.pop_back() else { return Vec::new() };
+                self.future.push(change);
+                self.change(&change.map(|by| -by))
+            }
+            HistoryStep::Redo => {
+                let Some(change) = self.future.pop() else { return Vec::new() };
+                self.past.push_back(change);
+                self.change(&change)
+            }
+        }
+    }
+
+    /// As it was at first, for a new game; brushes that are under way are still the old ones.
+    pub fn empty(&mut self) {
+        *self = Self { next: self.next, ..default() };
+    }
+
+    fn change(&mut self, change: &Change) -> Vec<(MaterialId, i64)> {
+        let each = MATERIALS.iter().map(|&(material, _)| material).zip(change);
+        let changes: Vec<_> = each.map(|(material, &by)| (material, self.gain(material, by))).collect();
+        changes.into_iter().filter(|(_, by)| *by != 0).collect()
+    }
+}
+
+fn empty(_: On<NewGame>, mut inventory: ResMut<Inventory>) {
+    inventory.empty();
 }
 
 /// Undo and redo give back and take, as digging and building did.
@@ -95,8 +170,8 @@ fn enter_history(
 ) {
     for HistoryMoved { receipt, .. } in steps.read() {
         match &receipt.outcome {
-            Ok(restored) => {
-                let entered = inventory.enter_tallies(&restored.removed, &restored.added);
+            Ok(_) => {
+                let entered = inventory.step(receipt.step);
                 changes.write_batch(entered.into_iter().map(|(material, by)| StockChanged { material, by }));
             }
             Err(nothing) => {
@@ -130,11 +205,13 @@ impl Plugin for InventoryPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Inventory>()
             .add_message::<StockChanged>()
-            .add_systems(Update, (enter_receipts, enter_history).after(BurrowSystems::Commit))
+            .add_observer(empty)
+            .add_systems(Update, (enter_receipts, enter_history).chain().after(BurrowSystems::Commit))
             .add_systems(Update, step_through_history.in_set(Playing).run_if(in_state(Phase::Playing)));
     }
 }
 
+/// Receipts of a transaction come all in one frame.
 fn enter_receipts(
     mut receipts: MessageReader<BrushApplied>,
     mut inventory: ResMut<Inventory>,
@@ -144,6 +221,8 @@ fn enter_receipts(
         let entered = inventory.enter(receipt);
         changes.write_batch(entered.into_iter().map(|(material, by)| StockChanged { material, by }));
     }
+    // A frame shows one transaction at most.
+    inventory.close();
 }
 
 #[cfg(test)]

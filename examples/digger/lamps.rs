@@ -9,12 +9,16 @@ use bevy::time::common_conditions::on_timer;
 use bevy_burrow::prelude::*;
 
 use crate::hud::Hint;
+use crate::landscape::NewGame;
 use crate::tools::{Strike, Tool};
 
 /// As many as can be up at once; the oldest makes way for one more.
 pub const LAMPS: usize = 24;
 /// Luminous power in lumens, as a game needs it and not as a shop sells it.
 const POWER: f32 = 2_200_000.0;
+
+/// The bulb's middle, from the foot.
+const BULB: Vec3 = Vec3::new(0.0, 0.38, 0.0);
 
 /// A lamp, and the ground it holds on to.
 #[derive(Component, Clone, Copy, Debug)]
@@ -45,6 +49,7 @@ impl Plugin for LampsPlugin {
             .add_systems(Startup, open_workshop)
             .add_systems(Update, fall.run_if(on_timer(Duration::from_millis(200))))
             .add_observer(place)
+            .add_observer(take_down)
             .add_observer(forget);
     }
 }
@@ -109,22 +114,57 @@ fn lamp(workshop: &Workshop, place: Vec3, normal: Vec3) -> impl Bundle {
         Transform::from_translation(place).with_rotation(upright),
         children![
             part(&workshop.post.0, &workshop.post.1, 0.12),
-            part(&workshop.bulb.0, &workshop.bulb.1, 0.38),
+            part(&workshop.bulb.0, &workshop.bulb.1, BULB.y),
             part(&workshop.cap, &workshop.post.1, 0.50),
             (light, Transform::from_xyz(0.0, 0.55, 0.0)),
         ],
     )
 }
 
-/// What lost its ground is gone.
-fn fall(mut commands: Commands, terrains: Terrains, lamps: Query<(Entity, &Lamp)>) {
-    for (entity, lamp) in &lamps {
-        if !terrains.is_solid(lamp.root) {
+/// What lost its ground is gone, and so is what is buried: a light in a hill would shine through it.
+fn fall(mut commands: Commands, terrains: Terrains, lamps: Query<(Entity, &Lamp, &Transform)>) {
+    for (entity, lamp, place) in &lamps {
+        if !terrains.is_solid(lamp.root) || terrains.is_solid(place.transform_point(BULB)) {
             commands.entity(entity).despawn();
         }
     }
 }
 
+/// A new game begins in the dark.
+fn take_down(_: On<NewGame>, mut commands: Commands, lamps: Query<Entity, With<Lamp>>) {
+    for lamp in &lamps {
+        commands.entity(lamp).despawn();
+    }
+}
+
 fn forget(gone: On<Remove, Lamp>, mut lamps: ResMut<Lamps>) {
     lamps.0.retain(|lamp| *lamp != gone.entity);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lamp_goes_with_its_ground_and_when_it_is_buried() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, BurrowPlugins)).init_resource::<Lamps>().add_observer(forget);
+        app.finish();
+        app.cleanup();
+        let ground = Ground::from_fn(64, 64, |_, _| 20.0).expect("a small world");
+        app.world_mut().spawn(Terrain::new(ground, &TerrainSettings::default()).expect("default settings"));
+        app.update();
+        let mut stands = |foot: Vec3| {
+            let lamp = (Lamp { root: foot - Vec3::Y * 0.4 }, Transform::from_translation(foot));
+            let lamp = app.world_mut().spawn(lamp).id();
+            app.world_mut().resource_mut::<Lamps>().0.push_back(lamp);
+            app.world_mut().run_system_cached(fall).expect("a system");
+            let stands = app.world().get_entity(lamp).is_ok();
+            assert_eq!(app.world().resource::<Lamps>().0.contains(&lamp), stands);
+            stands
+        };
+        assert!(stands(Vec3::new(30.0, 20.0, 30.0)));
+        assert!(!stands(Vec3::new(30.0, 25.0, 30.0)), "in the air");
+        assert!(!stands(Vec3::new(30.0, 12.0, 30.0)), "in the ground");
+    }
 }

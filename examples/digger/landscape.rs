@@ -4,12 +4,14 @@
 //! Everything slow happens in a task; meanwhile the app draws and answers.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::TerrainError;
 
 use crate::places::Places;
 
@@ -67,9 +69,19 @@ impl Plugin for LandscapePlugin {
             Path::new(SURVEY_PATH),
             SURVEY,
         );
-        app.add_systems(Startup, open_survey).add_systems(Update, (shape_ground, spawn_terrain, give_up));
+        app.add_observer(begin_anew)
+            .add_systems(Startup, open_survey)
+            .add_systems(Update, (shape_ground, spawn_terrain, give_up));
     }
 }
+
+/// The land is to be as it was at first, and so is all that a game changes. Whoever keeps some of that observes it.
+#[derive(Event, Clone, Copy, Debug)]
+pub struct NewGame;
+
+/// The ground as nobody has dug it yet.
+#[derive(Resource, Clone)]
+struct Untouched(Arc<Ground>);
 
 /// The picture on its way in.
 #[derive(Resource)]
@@ -77,7 +89,7 @@ struct Survey(Handle<HeightmapImage>);
 
 /// The ground on its way.
 #[derive(Resource)]
-struct Shaping(Task<Result<(Terrain, Places), String>>);
+struct Shaping(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
 
 /// The terrain's entity is there before its terrain: its look makes the textures be painted meanwhile.
 fn open_survey(mut commands: Commands, assets: Res<AssetServer>) {
@@ -94,14 +106,30 @@ fn shape_ground(mut commands: Commands, survey: Option<Res<Survey>>, images: Res
 }
 
 /// Ground from the survey, a terrain of it, and the places worth digging at.
-fn shape(survey: &GreyImage) -> Result<(Terrain, Places), String> {
+fn shape(survey: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
     let ground = Ground::from_image(survey, &SCALE)
         .and_then(|ground| ground.with_materials(&vegetation()))
         .map_err(|error| error.to_string())?;
     let places = Places::find(&ground)?;
-    let settings = TerrainSettings { chunk_size: 32, voxel_size: 1.0 };
-    let terrain = Terrain::new(ground, &settings).map_err(|error| error.to_string())?;
-    Ok((terrain, places))
+    let ground = Arc::new(ground);
+    let terrain = on(&ground).map_err(|error| error.to_string())?;
+    Ok((ground, terrain, places))
+}
+
+/// A terrain that nobody has dug yet.
+fn on(ground: &Arc<Ground>) -> Result<Terrain, TerrainError> {
+    Terrain::new(Arc::clone(ground), &TerrainSettings { chunk_size: 32, voxel_size: 1.0 })
+}
+
+/// Old ground goes, with everything that was on its way to it; it is seen until the new one has loaded.
+fn begin_anew(
+    _: On<NewGame>,
+    mut commands: Commands,
+    ground: Res<Untouched>,
+    country: Single<Entity, With<GroundLook>>,
+) -> Result {
+    commands.entity(*country).insert(on(&ground.0)?);
+    Ok(())
 }
 
 /// Grass where it is flat enough, rock where it is steep, snow on the tops and sand in the valley.
@@ -134,8 +162,9 @@ fn spawn_terrain(
     let Some(shaped) = shaping.and_then(|mut shaping| check_ready(&mut shaping.0)) else { return };
     commands.remove_resource::<Shaping>();
     match shaped {
-        Ok((terrain, places)) => {
+        Ok((ground, terrain, places)) => {
             commands.insert_resource(places);
+            commands.insert_resource(Untouched(ground));
             commands.entity(*country).insert(terrain);
         }
         Err(reason) => {

@@ -10,7 +10,9 @@ use bevy::render::renderer::RenderAdapterInfo;
 use bevy_burrow::prelude::*;
 
 use crate::input::{Action, Actions};
+use crate::landscape::NewGame;
 use crate::phase::Phase;
+use crate::player::Playing;
 use crate::settings::{Quality, Settings, SettingsFile};
 
 /// The way to the sun on a late afternoon, of length 1: from the south-west.
@@ -54,12 +56,13 @@ impl Plugin for LightPlugin {
         app.insert_resource(Skylight { color: Color::WHITE, brightness: 1000.0 })
             .insert_resource(GlobalAmbientLight { brightness: 1000.0, ..default() })
             .init_resource::<LampSwitch>()
+            .add_observer(put_out)
             .add_systems(Startup, (open_eyes, let_there_be_sun, spare_software))
             .add_systems(
                 Update,
                 (
                     apply_settings.run_if(resource_exists_and_changed::<Settings>),
-                    press_switch.run_if(in_state(Phase::Playing)),
+                    press_switch.in_set(Playing).run_if(in_state(Phase::Playing)),
                     (switch_lamps, darken_caves),
                 )
                     .chain(),
@@ -179,6 +182,10 @@ fn press_switch(actions: Res<Actions>, mut switch: ResMut<LampSwitch>) {
     if actions.just_pressed(Action::Headlamp) {
         switch.0 = !switch.0;
     }
+}
+
+fn put_out(_: On<NewGame>, mut switch: ResMut<LampSwitch>) {
+    switch.0 = false;
 }
 
 fn switch_lamps(

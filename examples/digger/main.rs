@@ -20,7 +20,9 @@
 //! | `F1` `F3` | panel, frame times |
 //! | `H`, `Esc` | help, pause |
 //!
-//! A gamepad does all of that too, with `--features examples,gamepad`.
+//! A gamepad does that too, all but the panel and the frame times, with `--features examples,gamepad`; its shoulders go
+//! through the tools, and its sticks through the menus.
+//! The title leads on with a game that was left, or begins a new one: fresh land, and nothing in the bag.
 //!
 //! Without a display or a graphics adapter, or with `--headless`, it plays a script instead: a walk up to a hillside, a
 //! tunnel with a bend and a room, a bridge, a pit across a chunk corner. Pictures and a summary go to `--out`. With
@@ -29,10 +31,10 @@
 //! | file | subject |
 //! | --- | --- |
 //! | `phase.rs`, `menu.rs` and `menu/`, `ui.rs`, `art.rs` | title, pause, settings, controls, help |
-//! | `input.rs`, `settings.rs` | actions and their keys; what the player may set |
-//! | `player.rs`, `body.rs` | the player's eyes and body |
-//! | `tools.rs`, `held.rs` | the tools, and how they look in hand |
-//! | `work.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
+//! | `input.rs`, `bindings.rs`, `settings.rs` | actions and their keys; what the player may set |
+//! | `player.rs`, `body.rs`, `rim.rs` | the player's eyes and body, and where the world ends |
+//! | `tools.rs`, `form.rs`, `preview.rs`, `held.rs` | the tools, what they would do, and how they look in hand |
+//! | `work.rs`, `amount.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
 //! | `bombs.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what shines, what falls and crumbles |
 //! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
@@ -41,12 +43,15 @@
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
 //! | `report.rs`, `tell.rs` | receipts, times and the summary; what goes on |
 
+mod amount;
 mod art;
+mod bindings;
 mod body;
 mod bombs;
 mod day;
 mod debris;
 mod film;
+mod form;
 mod frames;
 mod headless;
 mod held;
@@ -62,9 +67,13 @@ mod offscreen;
 mod panel;
 mod particles;
 mod phase;
+#[path = "../shared/pixels.rs"]
+mod pixels;
 mod places;
 mod player;
+mod preview;
 mod report;
+mod rim;
 mod script;
 mod settings;
 mod sky;
@@ -144,6 +153,9 @@ fn main() -> ExitCode {
     let options = Options::parse();
     let renderer = offscreen::find_renderer();
     if options.tour {
+        if options.headless {
+            println!("--tour is filmed without a window anyway, and instead of the script");
+        }
         return tour::run(&options, renderer);
     }
     if options.headless || !has_display() || renderer.is_none() {
@@ -173,7 +185,9 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
         .add_plugins((
             body::BodyPlugin,
             player::PlayerPlugin,
+            rim::RimPlugin,
             tools::ToolsPlugin,
+            preview::PreviewPlugin,
             held::HeldPlugin,
             work::WorkPlugin,
             inventory::InventoryPlugin,

@@ -6,7 +6,8 @@ use bevy_burrow::panel::{BurrowPanel, BurrowPanelPlugin};
 
 use crate::input::{Action, Actions};
 use crate::phase::{self, Phase};
-use crate::player::Playing;
+use crate::player::{self, Playing};
+use crate::tools;
 
 /// Opens and closes the panel.
 pub struct PanelPlugin;
@@ -16,21 +17,25 @@ impl Plugin for PanelPlugin {
         let mut panel = BurrowPanel::default();
         // The hand has its own tools; the figures are what is missing.
         (panel.is_open, panel.shows_brush) = (false, false);
-        app.insert_resource(panel)
-            .add_plugins((BurrowPanelPlugin, BurrowDebugPlugin))
-            .configure_sets(Update, Playing.run_if(panel_is_closed))
-            .add_systems(
-                Update,
-                (
-                    toggle.run_if(in_state(Phase::Playing)),
-                    (phase::leave_mouse, listen).run_if(panel_opened),
-                    (phase::take_mouse, listen).run_if(panel_closed.and_then(in_state(Phase::Playing))),
-                )
-                    .chain()
-                    .before(Playing),
-            )
-            .add_systems(OnExit(Phase::Playing), close);
+        app.insert_resource(panel).add_plugins((BurrowPanelPlugin, BurrowDebugPlugin));
+        share_input(app);
     }
+}
+
+/// Mouse and keys are the panel's while it is open, and the player's otherwise.
+fn share_input(app: &mut App) {
+    app.configure_sets(Update, Playing.run_if(panel_is_closed))
+        .add_systems(
+            Update,
+            (
+                toggle.run_if(in_state(Phase::Playing)),
+                (phase::leave_mouse, listen, player::stand_still, tools::put_down).run_if(panel_opened),
+                (phase::take_mouse, listen).run_if(panel_closed.and_then(in_state(Phase::Playing))),
+            )
+                .chain()
+                .before(Playing),
+        )
+        .add_systems(OnExit(Phase::Playing), close);
 }
 
 fn panel_is_closed(panel: Res<BurrowPanel>) -> bool {
@@ -59,3 +64,7 @@ fn listen(mut actions: ResMut<Actions>) {
 fn close(mut panel: ResMut<BurrowPanel>) {
     panel.is_open = false;
 }
+
+#[cfg(test)]
+#[path = "panel_tests.rs"]
+mod tests;

@@ -43,6 +43,8 @@ struct Mote {
     velocity: Vec3,
     spin: Vec3,
     size: f32,
+    /// Longer or flatter than round, along its own axes.
+    form: Vec3,
     age: f32,
     life: f32,
     matter: Option<Matter>,
@@ -93,16 +95,17 @@ fn fill_pools(
     let color = |at: usize| colors.0.get(at).copied().unwrap_or(LinearRgba::WHITE);
     let chip_materials = std::array::from_fn(|at| {
         materials.add(StandardMaterial {
-            base_color: color(at).into(),
-            perceptual_roughness: 0.95,
-            reflectance: 0.15,
+            // The headlamp shines on chips from a step away: as bright as the wall behind them, they would be white.
+            base_color: (color(at) * 0.5).with_alpha(1.0).into(),
+            perceptual_roughness: 1.0,
+            reflectance: 0.0,
             ..default()
         })
     });
     let mut puff = |base_color: LinearRgba, fade: usize, unlit: bool| {
         let alpha = 1.0 - (fade as f32 + 0.5) / FADES as f32;
         materials.add(StandardMaterial {
-            base_color: base_color.with_alpha(alpha * if unlit { 0.9 } else { 0.32 }).into(),
+            base_color: base_color.with_alpha(alpha * if unlit { 0.9 } else { 0.30 }).into(),
             base_color_texture: Some(art.puff.clone()),
             alpha_mode: if unlit { AlphaMode::Add } else { AlphaMode::Blend },
             perceptual_roughness: 1.0,
@@ -111,7 +114,8 @@ fn fill_pools(
             ..default()
         })
     };
-    let pale = |at: usize| color(at).mix(&LinearRgba::rgb(0.62, 0.57, 0.5), 0.55);
+    // Nor is dust to glow where the lamp meets it.
+    let pale = |at: usize| color(at).mix(&LinearRgba::rgb(0.62, 0.57, 0.5), 0.55) * 0.6;
     let dust = (0..MATERIALS.len()).flat_map(|at| (0..FADES).map(move |fade| (at, fade))).collect::<Vec<_>>();
     let dust = dust.into_iter().map(|(at, fade)| puff(pale(at), fade, false)).collect();
     let fire = (0..FADES)
@@ -120,7 +124,9 @@ fn fill_pools(
             puff(LinearRgba::rgb(2.6, 1.7 * heat, 0.9 * heat * heat), fade, true)
         })
         .collect();
-    let shard = meshes.add(Tetrahedron::default());
+    // Pebbles with flat sides; each is stretched in its own way.
+    let pebble = Sphere::new(0.6).mesh().ico(0).unwrap_or_else(|_| Sphere::new(0.6).mesh().build());
+    let shard = meshes.add(pebble.with_duplicated_vertices().with_computed_flat_normals());
     let sheet = meshes.add(Rectangle::default());
     let mut pool = |count: usize, mesh: &Handle<Mesh>, is_chip: bool| -> Vec<Entity> {
         let mote = |_| {
@@ -188,22 +194,25 @@ fn scatter(
             let Ok((mut mote, mut place, mut visibility)) = motes.get_mut(entity) else { continue };
             let way = (burst.out * 1.2 + pools.way()).normalize_or(Vec3::Y);
             let (size, life) = match burst.matter {
-                Matter::Chips(_) => (pools.between(0.05, 0.17), pools.between(0.7, 1.6)),
+                // Many crumbs, and a lump now and then.
+                Matter::Chips(_) => (0.035 + 0.10 * pools.between(0.0, 1.0).powi(3), pools.between(0.7, 1.6)),
                 Matter::Dust(_) => (pools.between(0.5, 1.1), pools.between(0.7, 1.5)),
                 Matter::Fire => (pools.between(0.9, 2.2), pools.between(0.25, 0.55)),
             };
             let speed = burst.speed * pools.between(0.35, 1.2);
+            let form = if is_chip { Vec3::ONE + 0.45 * pools.way() } else { Vec3::ONE };
             *mote = Mote {
                 velocity: way * speed,
                 spin: pools.way() * pools.between(2.0, 14.0),
                 size,
+                form,
                 age: 0.0,
                 life,
                 matter: Some(burst.matter),
             };
             *place = Transform::from_translation(burst.place + pools.way() * 0.25)
                 .with_rotation(Quat::from_scaled_axis(pools.way() * 3.0))
-                .with_scale(Vec3::splat(size));
+                .with_scale(form * size);
             *visibility = Visibility::Inherited;
             if let Some(material) = pools.material(burst.matter, 0.0) {
                 commands.entity(entity).insert(MeshMaterial3d(material.clone()));
@@ -247,7 +256,7 @@ fn fly(
                 place.translation = next;
             }
             place.rotate(Quat::from_scaled_axis(mote.spin * dt));
-            place.scale = Vec3::splat(mote.size * (4.0 * (1.0 - part)).min(1.0));
+            place.scale = mote.form * (mote.size * (4.0 * (1.0 - part)).min(1.0));
         } else {
             mote.velocity *= (-2.2 * dt).exp();
             mote.velocity.y += 0.5 * dt;

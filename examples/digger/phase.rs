@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 use bevy::window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused};
+use bevy_burrow::panel::BurrowPanel;
 
 use crate::input::{Action, Actions};
 
@@ -73,16 +74,21 @@ pub fn leave_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) 
     }
 }
 
-/// The pause key, the help key, and whatever takes the window away.
+/// The pause key, Escape whatever it is, the help key, and whatever takes the window away. While the panel is open,
+/// letters are typed into it.
 fn pause(
     actions: Res<Actions>,
+    keys: Res<ButtonInput<KeyCode>>,
+    panel: Option<Res<BurrowPanel>>,
     mut focus: MessageReader<WindowFocused>,
     mut phase: ResMut<NextState<Phase>>,
     mut page: ResMut<NextState<Page>>,
 ) {
     let lost = focus.read().any(|event| !event.focused);
-    let help = actions.just_pressed(Action::Help);
-    if actions.just_pressed(Action::Pause) || help || lost {
+    let plays = panel.is_none_or(|panel| !panel.is_open);
+    let help = actions.just_pressed(Action::Help) && plays;
+    let pause = actions.just_pressed(Action::Pause) && plays || keys.just_pressed(KeyCode::Escape);
+    if pause || help || lost {
         phase.set(Phase::Paused);
         page.set(if help { Page::Help } else { Page::Menu });
     }

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use bevy::input::InputPlugin as DevicePlugin;
+use bevy::input::keyboard::{Key, KeyboardInput};
+use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
 use bevy::state::app::StatesPlugin;
 use bevy::time::TimeUpdateStrategy;
 
 use super::*;
+use crate::bindings::Binding;
 use crate::day::Clock;
 use crate::input::InputPlugin;
 use crate::settings::Settings;
@@ -69,4 +71,35 @@ fn help_and_a_lost_window_pause_too() {
     app.update();
     app.update();
     assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
+}
+
+#[test]
+fn escape_pauses_whatever_else_does() {
+    let mut app = app();
+    let mut settings = app.world_mut().resource_mut::<Settings>();
+    settings.bindings.rebind(Action::Pause, Binding::Key(KeyCode::KeyP));
+    settings.bindings.rebind(Action::Jump, Binding::Key(KeyCode::KeyP));
+    app.world_mut().write_message(KeyboardInput {
+        key_code: KeyCode::Escape,
+        logical_key: Key::Escape,
+        state: ButtonState::Pressed,
+        text: None,
+        repeat: false,
+        window: Entity::PLACEHOLDER,
+    });
+    app.update();
+    app.update();
+    assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
+}
+
+#[test]
+fn letters_that_are_typed_into_the_panel_open_no_help() {
+    let mut app = app();
+    // It is open unless told otherwise.
+    app.init_resource::<BurrowPanel>();
+    press(&mut app, Action::Help);
+    assert_eq!(phase(&app), (Phase::Playing, Page::None));
+    app.world_mut().resource_mut::<BurrowPanel>().is_open = false;
+    press(&mut app, Action::Help);
+    assert_eq!(phase(&app), (Phase::Paused, Page::Help));
 }

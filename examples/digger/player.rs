@@ -6,9 +6,11 @@ use bevy_burrow::prelude::*;
 
 use crate::body::{self, Body};
 use crate::input::{Action, Actions};
+use crate::landscape::NewGame;
 use crate::light::Eyes;
 use crate::phase::Phase;
 use crate::places::Places;
+use crate::rim;
 use crate::settings::Settings;
 
 /// Who digs here.
@@ -50,6 +52,7 @@ impl Plugin for PlayerPlugin {
         app.init_resource::<Tremor>()
             .configure_sets(Update, Playing.before(BurrowSystems::Collect))
             .add_observer(arrive)
+            .add_observer(leave)
             .add_systems(
                 Update,
                 (
@@ -76,11 +79,17 @@ impl Player {
 
 fn arrive(ready: On<TerrainReady>, mut commands: Commands, terrains: Query<&Terrain>, places: Res<Places>) {
     let Ok(terrain) = terrains.get(ready.entity) else { return };
-    let start = places.hillside.start().as_dvec2();
-    let height = terrain.world().height(start.x, start.y).unwrap_or_default();
-    let feet = Vec3::new(start.x as f32, height as f32, start.y as f32);
+    let height = |place: Vec2| terrain.world().height(place.x.into(), place.y.into());
+    let feet = rim::start(&places, |place| height(place).map(|height| height as f32));
     let hill = places.hillside.mouth + Vec3::Y * 2.5;
     commands.spawn((Name::new("player"), Player::looking(feet, hill), body::standing_at(feet)));
+}
+
+/// Another one arrives when the land is there.
+fn leave(_: On<NewGame>, mut commands: Commands, players: Query<Entity, With<Player>>) {
+    for player in &players {
+        commands.entity(player).despawn();
+    }
 }
 
 fn look(actions: Res<Actions>, settings: Res<Settings>, mut players: Query<&mut Player>) {
@@ -105,7 +114,8 @@ fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut CharacterSteer
     }
 }
 
-fn stand_still(mut players: Query<&mut CharacterSteering, Without<Scripted>>) {
+/// Walks no further by itself.
+pub fn stand_still(mut players: Query<&mut CharacterSteering, Without<Scripted>>) {
     for mut steering in &mut players {
         *steering = default();
     }

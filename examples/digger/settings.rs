@@ -4,15 +4,16 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
-use crate::input::Bindings;
+use crate::bindings::Bindings;
+use crate::form::Form;
 use crate::phase::Page;
-use crate::tools::Form;
 
 /// What the player may set. A file without some of it has the rest by default; what it does not know is ignored.
-#[derive(Resource, Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[derive(Resource, Clone, Debug, PartialEq, Serialize)]
 pub struct Settings {
     /// Times as fast as usual.
     pub sensitivity: f32,
@@ -71,20 +72,48 @@ pub enum SettingsError {
     Content { path: PathBuf, error: serde_json::Error },
 }
 
+/// Settings as a file had them.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    pub settings: Settings,
+    /// What in it could not be read, and has its default.
+    pub unread: Vec<String>,
+}
+
 impl Settings {
-    /// Reads a file; a missing one means defaults.
+    /// Reads a file, each setting by itself: what one of them can't be read for costs nobody the others. A missing file
+    /// means defaults.
     ///
     /// # Errors
-    /// When it can't be read or understood.
-    pub fn read(path: &Path) -> Result<Self, SettingsError> {
+    /// When the file can't be read, or is none of settings at all.
+    pub fn read(path: &Path) -> Result<Found, SettingsError> {
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::default()),
             Err(error) => return Err(SettingsError::File { path: path.into(), error }),
         };
-        let read: Self = serde_json::from_str(&text)
+        let fields: Map<String, Value> = serde_json::from_str(&text)
             .map_err(|error| SettingsError::Content { path: path.into(), error })?;
-        Ok(read.within_reason())
+        let Found { settings, unread } = Self::of(fields);
+        Ok(Found { settings: settings.within_reason(), unread })
+    }
+
+    fn of(mut fields: Map<String, Value>) -> Found {
+        let mut unread = Vec::new();
+        let defaults = Self::default();
+        let settings = Self {
+            sensitivity: take(&mut fields, "sensitivity", defaults.sensitivity, &mut unread),
+            invert_y: take(&mut fields, "invert_y", defaults.invert_y, &mut unread),
+            field_of_view: take(&mut fields, "field_of_view", defaults.field_of_view, &mut unread),
+            view_distance: take(&mut fields, "view_distance", defaults.view_distance, &mut unread),
+            quality: take(&mut fields, "quality", defaults.quality, &mut unread),
+            day_minutes: take(&mut fields, "day_minutes", defaults.day_minutes, &mut unread),
+            radius: take(&mut fields, "radius", defaults.radius, &mut unread),
+            form: take(&mut fields, "form", defaults.form, &mut unread),
+            survival: take(&mut fields, "survival", defaults.survival, &mut unread),
+            bindings: take(&mut fields, "bindings", defaults.bindings, &mut unread),
+        };
+        Found { settings, unread }
     }
 
     /// Writes a file, whole or not at all.
@@ -120,6 +149,20 @@ impl Settings {
     }
 }
 
+/// A setting of a file, or its default.
+fn take<T: DeserializeOwned>(
+    fields: &mut Map<String, Value>,
+    name: &str,
+    default: T,
+    unread: &mut Vec<String>,
+) -> T {
+    let Some(value) = fields.remove(name) else { return default };
+    serde_json::from_value(value).unwrap_or_else(|error| {
+        unread.push(format!("{name}: {error}"));
+        default
+    })
+}
+
 /// Where the settings are kept; nowhere for scripts.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct SettingsFile(pub Option<PathBuf>);
@@ -145,23 +188,37 @@ pub struct SettingsPlugin(pub SettingsFile);
 
 impl Plugin for SettingsPlugin {
     fn build(&self, app: &mut App) {
-        let read = self.0.0.as_deref().map_or_else(|| Ok(Settings::default()), Settings::read);
-        let settings = read.unwrap_or_else(|error| {
-            // A broken file costs nobody the game.
-            warn!("the settings are ignored: {error}");
-            Settings::default()
-        });
+        let read = self.0.0.as_deref().map_or_else(|| Ok(Found::default()), Settings::read);
+        // A broken file costs nobody the game.
+        let Found { settings, unread } = read
+            .unwrap_or_else(|error| Found { settings: Settings::default(), unread: vec![error.to_string()] });
+        for setting in &unread {
+            warn!("settings have their defaults: {setting}");
+        }
         app.insert_resource(settings)
             .insert_resource(self.0.clone())
+            .insert_resource(Broken(!unread.is_empty()))
             .add_systems(OnExit(Page::Settings), save)
             .add_systems(OnExit(Page::Controls), save);
     }
 }
 
-fn save(settings: Res<Settings>, file: Res<SettingsFile>) {
-    if let Some(path) = &file.0
-        && let Err(error) = settings.write(path)
-    {
+/// Is there something in the file that was not understood? It is set aside then, before the file is written anew: another
+/// version of the game may know what it means.
+#[derive(Resource)]
+struct Broken(bool);
+
+fn save(settings: Res<Settings>, file: Res<SettingsFile>, mut broken: ResMut<Broken>) {
+    let Some(path) = &file.0 else { return };
+    if broken.0 {
+        let aside = path.with_extension("json.broken");
+        if let Err(error) = std::fs::rename(path, &aside) {
+            warn!("the settings are not kept: {}: {error}", aside.display());
+            return;
+        }
+        broken.0 = false;
+    }
+    if let Err(error) = settings.write(path) {
         warn!("the settings are not kept: {error}");
     }
 }

@@ -1,7 +1,8 @@
 //! Facts about the file of settings.
 
 use super::*;
-use crate::input::{Action, Binding};
+use crate::bindings::Binding;
+use crate::input::Action;
 
 /// A file of its own for each test.
 fn file(name: &str) -> PathBuf {
@@ -17,7 +18,8 @@ fn write_text(path: &Path, text: &str) {
 
 #[test]
 fn a_missing_file_means_defaults() {
-    assert_eq!(Settings::read(&file("missing")).expect("no error"), Settings::default());
+    let found = Settings::read(&file("missing")).expect("no error");
+    assert_eq!((found.settings, found.unread), (Settings::default(), vec![]));
 }
 
 #[test]
@@ -33,34 +35,74 @@ fn what_is_written_is_read_again() {
     };
     settings.bindings.rebind(Action::Use, Binding::Key(KeyCode::KeyX));
     settings.write(&path).expect("a folder that is made");
-    assert_eq!(Settings::read(&path).expect("what was written"), settings);
+    let found = Settings::read(&path).expect("what was written");
+    assert_eq!((found.settings, found.unread), (settings, vec![]));
     assert!(!path.with_extension("new").exists());
 }
 
+/// The game's settings, as it starts with this file.
+fn start(path: &Path) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, bevy::state::app::StatesPlugin))
+        .init_state::<Page>()
+        .add_plugins(SettingsPlugin(SettingsFile(Some(path.into()))));
+    app.update();
+    app
+}
+
+/// Opens the page of settings and leaves it.
+fn visit(app: &mut App) {
+    for page in [Page::Settings, Page::Menu] {
+        app.world_mut().resource_mut::<NextState<Page>>().set(page);
+        app.update();
+    }
+}
+
+fn text(path: &Path) -> String {
+    std::fs::read_to_string(path).expect("a file")
+}
+
 #[test]
-fn a_broken_file_is_reported_and_ignored() {
-    for (name, text) in
-        [("empty", ""), ("half", r#"{ "sensitivity": 1."#), ("other", r#"{ "invert_y": "often" }"#)]
-    {
+fn a_broken_file_is_reported_and_set_aside() {
+    for (name, words) in [("empty", ""), ("half", r#"{ "sensitivity": 1."#), ("other", "[1, 2]")] {
         let path = file(name);
-        write_text(&path, text);
+        write_text(&path, words);
         let error = Settings::read(&path).expect_err(name).to_string();
         assert!(error.contains("digger.json"), "{error}");
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, bevy::state::app::StatesPlugin))
-            .init_state::<Page>()
-            .add_plugins(SettingsPlugin(SettingsFile(Some(path.clone()))));
+        let mut app = start(&path);
         assert_eq!(*app.world().resource::<Settings>(), Settings::default());
         // Nor is it lost: nobody has changed a setting yet.
-        app.update();
-        assert_eq!(std::fs::read_to_string(&path).expect("still there"), text);
+        assert_eq!(text(&path), words);
+        visit(&mut app);
+        assert_eq!(text(&path.with_extension("json.broken")), words);
+        assert!(Settings::read(&path).is_ok_and(|found| found.unread.is_empty()));
     }
+}
+
+#[test]
+fn what_a_newer_version_wrote_costs_nobody_the_rest() {
+    let path = file("newer");
+    let words = r#"{ "quality": "ultra", "sensitivity": 2.0, "form": 7, "bindings": { "jump": ["KeyJ"], "pause": [] } }"#;
+    write_text(&path, words);
+    let mut app = start(&path);
+    let settings = app.world().resource::<Settings>().clone();
+    assert_eq!((settings.sensitivity, settings.quality), (2.0, Quality::Medium));
+    assert_eq!(settings.bindings.of(Action::Jump), [Binding::Key(KeyCode::KeyJ)]);
+    assert!(!settings.bindings.of(Action::Pause).is_empty());
+    visit(&mut app);
+    assert_eq!(text(&path.with_extension("json.broken")), words);
+    let found = Settings::read(&path).expect("its own file");
+    assert_eq!((found.settings, found.unread), (settings, vec![]));
+    // What was set aside is not replaced by what is fine.
+    visit(&mut app);
+    assert_eq!(text(&path.with_extension("json.broken")), words);
 }
 
 #[test]
 fn an_old_file_keeps_what_it_has() {
     let path = file("old");
     write_text(&path, r#"{ "sensitivity": 0.5, "gamma": 2.2, "field_of_view": 900.0 }"#);
-    let settings = Settings::read(&path).expect("unknown names are left out");
-    assert_eq!(settings, Settings { sensitivity: 0.5, field_of_view: 110.0, ..default() });
+    let found = Settings::read(&path).expect("unknown names are left out");
+    assert_eq!(found.settings, Settings { sensitivity: 0.5, field_of_view: 110.0, ..default() });
+    assert!(found.unread.is_empty());
 }

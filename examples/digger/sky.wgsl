@@ -70,7 +70,8 @@ fn fragment(in: VertexOutput) -> @location(0) vec4<f32> {
     let sun = max(dot(way, sky.sun.xyz), 0.0);
     let near_horizon = exp(-5.0 * up);
     let level = normalize(way.xz + vec2(0.0001, 0.0));
-    let sunward = 0.5 + 0.5 * dot(level, normalize(sky.sun.xz + vec2(0.0001, 0.0)));
+    // Two ways of length 1 may be a little more than opposite, and no power of a negative number is one.
+    let sunward = max(0.5 + 0.5 * dot(level, normalize(sky.sun.xz + vec2(0.0001, 0.0))), 0.0);
     let spread = 0.10 * pow(sun, 6.0) + 0.30 * pow(sun, 60.0) + sky.glow.a * exp(-7.0 * up) * pow(sunward, 3.0);
     let glow = sky.glow.rgb * spread;
     var color = mix(sky.zenith.rgb, sky.horizon.rgb, near_horizon) + glow * smoothstep(-0.06, 0.06, way.y);

@@ -5,9 +5,10 @@
 //! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
 
 use std::f32::consts::PI;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use avian3d::prelude::Position;
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
 use bevy::render::render_resource::{PollType, TextureFormat};
@@ -26,6 +27,7 @@ use crate::hud::ShowHud;
 use crate::input::{Action, Actions};
 use crate::light::{Eyes, LampSwitch};
 use crate::phase::Phase;
+use crate::pixels;
 use crate::player::{Drone, Player, Scripted};
 use crate::report::{EditTime, FrameTimes, Logbook};
 use crate::tools::Hand;
@@ -73,7 +75,8 @@ impl Studio {
     /// # Errors
     /// When the folder can't be made or the landscape doesn't load.
     pub fn open(options: &Options, renderer: Option<RenderResources>) -> Result<Self> {
-        std::fs::create_dir_all(&options.out)?;
+        std::fs::create_dir_all(&options.out)
+            .map_err(|error| format!("{}: {error}", options.out.display()))?;
         let renders = renderer.is_some();
         let engine = options.backend.engine();
         if options.headless {
@@ -96,7 +99,7 @@ impl Studio {
         let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
-        world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32);
+        world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32, true);
         // A bright afternoon that lasts, and no title.
         world.resource_mut::<Clock>().runs = false;
         world.resource_mut::<ShowHud>().0 = false;
@@ -201,14 +204,22 @@ impl Studio {
     }
 
     /// Puts the player's feet to a place, as only a script can.
+    ///
+    /// # Errors
+    /// When the ground there gets no colliders.
     pub fn stand_at(&mut self, feet: Vec3) -> Result {
         let place = Character::default().standing_at(feet);
         self.put(place)?;
+        // Physics take it over with their next step only, and between the scenes of a film no time passes.
+        self.put(Position(place.translation))?;
         self.put(CharacterMotion::default())?;
         // One frame to see that there is no ground, and the others until there is.
         self.step();
         let start = Instant::now();
-        while self.is_held() && start.elapsed() < PATIENCE {
+        while self.is_held() {
+            if start.elapsed() > PATIENCE {
+                return Err(format!("there is no ground to stand on at {feet}").into());
+            }
             self.step();
         }
         Ok(())
@@ -317,7 +328,7 @@ impl Studio {
         let Some(film) = self.film.clone() else { return Ok(()) };
         let path = self.folder.join(name).with_extension("png");
         if path.exists() {
-            std::fs::remove_file(&path)?;
+            std::fs::remove_file(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         }
         self.film_runs(true);
         // Shaders and the sky come in over some frames; later on, lights need a few to find what they shine on.
@@ -339,7 +350,7 @@ impl Studio {
         while self.app.world().resource::<Developed>().0 == before && start.elapsed() < PATIENCE {
             self.step_and_draw();
         }
-        if !is_picture(&path) {
+        if !pixels::show_something(&path) {
             return Err(format!("{} was not written, or shows nothing", path.display()).into());
         }
         self.pictures.push(path);
@@ -395,10 +406,4 @@ fn wait_for_player(app: &mut App, renders: bool) -> Result<Entity> {
         std::thread::sleep(Duration::from_millis(2));
     }
     Err("the landscape did not load".into())
-}
-
-/// Is there a picture that shows more than one colour?
-fn is_picture(path: &Path) -> bool {
-    // A frame of one colour is compressed to next to nothing.
-    std::fs::metadata(path).is_ok_and(|file| file.len() > 20_000)
 }

@@ -5,10 +5,10 @@
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use crate::form::{Aim, Form};
 use crate::input::{Action, Actions};
-use crate::landscape::{MATERIALS, ROCK};
+use crate::landscape::{MATERIALS, NewGame, ROCK};
 use crate::light::Eyes;
 use crate::phase::Phase;
 use crate::player::Playing;
@@ -75,7 +75,7 @@ const MANNERS: [Manner; 7] = [
     },
     Manner {
         label: "painter",
-        purpose: "turns the ground into the chosen material",
+        purpose: "paints the ground with what was dug",
         period: 0.26,
         hit: 0.12,
         reach: 40.0,
@@ -131,68 +131,15 @@ impl Tool {
         (self.manner().radius.0, self.manner().radius.1)
     }
 
+    /// The action that takes it.
+    pub const fn slot(self) -> Action {
+        Self::SLOTS[self as usize]
+    }
+
     /// The tool that lies `by` slots further.
     fn after(self, by: usize) -> Self {
         Self::ALL[(self as usize + by) % Self::ALL.len()]
     }
-}
-
-/// The form of what is built.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Form {
-    #[default]
-    Sphere,
-    Cube,
-    /// From where the player looks further along the look.
-    Capsule,
-}
-
-impl Form {
-    pub const fn next(self) -> Self {
-        match self {
-            Self::Sphere => Self::Cube,
-            Self::Cube => Self::Capsule,
-            Self::Capsule => Self::Sphere,
-        }
-    }
-
-    pub const fn label(self) -> &'static str {
-        match self {
-            Self::Sphere => "sphere",
-            Self::Cube => "cube",
-            Self::Capsule => "beam",
-        }
-    }
-
-    /// The shape of this form for a look that met the ground.
-    pub fn shape(self, aim: &Aim, radius: f32) -> Shape {
-        match self {
-            Self::Sphere => Shape::sphere(aim.place, radius),
-            Self::Cube => Shape::cuboid(aim.place, Vec3::splat(radius)),
-            Self::Capsule => Shape::capsule(aim.place, aim.place + aim.along * 3.0 * radius, radius),
-        }
-    }
-
-    /// Voxels in a shape of radius 1.
-    pub const fn volume(self) -> f32 {
-        const BALL: f32 = 4.0 / 3.0 * std::f32::consts::PI;
-        match self {
-            Self::Sphere => BALL,
-            Self::Cube => 8.0,
-            Self::Capsule => BALL + 3.0 * std::f32::consts::PI,
-        }
-    }
-}
-
-/// Where the look meets the ground.
-#[derive(Clone, Copy, Debug)]
-pub struct Aim {
-    pub place: Vec3,
-    /// The way of the look.
-    pub along: Vec3,
-    /// Out of the ground.
-    pub normal: Vec3,
 }
 
 /// What the hand holds and what it is about to do.
@@ -269,6 +216,11 @@ impl Swing {
     }
 }
 
+/// The tool sinks, and what it was about to do it does not.
+pub fn put_down(mut swing: ResMut<Swing>) {
+    *swing = default();
+}
+
 /// A tool hits.
 #[derive(Event, Clone, Copy, Debug)]
 pub struct Strike {
@@ -285,10 +237,27 @@ pub struct ToolsPlugin;
 impl Plugin for ToolsPlugin {
     fn build(&self, app: &mut App) {
         let hand = Hand::new(app.world().resource::<Settings>());
-        app.insert_resource(hand).init_resource::<Swing>().add_systems(Startup, lift_gizmos).add_systems(
+        app.insert_resource(hand).init_resource::<Swing>().add_observer(begin_anew).add_systems(
             Update,
-            (aim, choose, swing, show_preview).chain().in_set(Playing).run_if(in_state(Phase::Playing)),
+            (follow_settings, (aim, choose, swing).chain().in_set(Playing).run_if(in_state(Phase::Playing))),
         );
+    }
+}
+
+fn begin_anew(_: On<NewGame>, settings: Res<Settings>, mut hand: ResMut<Hand>) {
+    *hand = Hand::new(&settings);
+}
+
+/// A radius or a form that was just set is in the hand at once; other settings leave it alone.
+fn follow_settings(settings: Res<Settings>, mut hand: ResMut<Hand>, mut last: Local<Option<(f32, Form)>>) {
+    let now = (settings.radius, settings.form);
+    let Some((radius, form)) = last.replace(now) else { return };
+    if radius != now.0 {
+        hand.set_radius(Tool::Pickaxe, now.0);
+        hand.set_radius(Tool::Builder, now.0);
+    }
+    if form != now.1 {
+        hand.form = now.1;
     }
 }
 
@@ -351,40 +320,6 @@ fn swing(
     }
 }
 
-/// A brush is half inside the ground, and all of it should be seen.
-fn lift_gizmos(mut store: ResMut<GizmoConfigStore>) {
-    let (config, _) = store.config_mut::<DefaultGizmoConfigGroup>();
-    config.depth_bias = -1.0;
-    config.line.width = 1.5;
-}
-
-/// The rim of what a tool would change, laid on the ground.
-fn show_preview(hand: Res<Hand>, mut gizmos: Gizmos) {
-    let Some(aim) = hand.aim.filter(|_| hand.preview) else { return };
-    let colour = Color::srgba(1.0, 0.85, 0.25, 0.75);
-    let radius = hand.radius(hand.tool);
-    match (hand.tool, hand.form) {
-        (Tool::Pickaxe | Tool::Shovel | Tool::Drill | Tool::Painter, _) => {
-            let flat = Quat::from_rotation_arc(Vec3::Z, aim.normal.normalize_or(Vec3::Y));
-            let place = aim.place + aim.normal * 0.05;
-            gizmos.circle(Isometry3d::new(place, flat), radius, colour).resolution(48);
-        }
-        (Tool::Builder, Form::Sphere) => {
-            gizmos.sphere(aim.place, radius, colour).resolution(48);
-        }
-        (Tool::Builder, Form::Cube) => {
-            gizmos.cube(Transform::from_translation(aim.place).with_scale(Vec3::splat(2.0 * radius)), colour);
-        }
-        (Tool::Builder, Form::Capsule) => {
-            let end = aim.place + aim.along * 3.0 * radius;
-            gizmos.sphere(aim.place, radius, colour).resolution(32);
-            gizmos.sphere(end, radius, colour).resolution(32);
-            gizmos.line(aim.place, end, colour);
-        }
-        (Tool::Bomb | Tool::Lamp, _) => {}
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -399,6 +334,28 @@ mod tests {
                 assert!((hits as f32 - due).abs() <= 2.0, "{tool:?} at {fps}: {hits} of {due}");
             }
         }
+    }
+
+    #[test]
+    fn what_is_set_is_in_the_hand_at_once_and_the_wheel_is_left_alone() {
+        let settings = Settings::default();
+        let mut app = App::new();
+        app.insert_resource(Hand::new(&settings))
+            .insert_resource(settings)
+            .add_systems(Update, follow_settings);
+        app.update();
+        app.world_mut().resource_mut::<Hand>().set_radius(Tool::Builder, 5.0);
+        app.world_mut().resource_mut::<Settings>().invert_y = true;
+        app.update();
+        assert_eq!(app.world().resource::<Hand>().radius(Tool::Builder), 5.0);
+        app.world_mut().resource_mut::<Settings>().radius = 2.5;
+        app.world_mut().resource_mut::<Settings>().form = Form::Cube;
+        app.update();
+        let hand = app.world().resource::<Hand>();
+        assert_eq!(
+            (hand.radius(Tool::Builder), hand.radius(Tool::Pickaxe), hand.form),
+            (2.5, 2.5, Form::Cube)
+        );
     }
 
     #[test]

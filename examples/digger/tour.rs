@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::Options;
 use crate::art::Art;
 use crate::day::{AFTERNOON, Clock};
-use crate::film::Film;
+use crate::film::{Film, clear};
 use crate::held::ShowHand;
 use crate::hud::ShowHud;
 use crate::input::Action;
@@ -40,7 +40,8 @@ const FADE: f32 = 0.4;
 /// Makes the film, and a video of it where there is ffmpeg.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     if renderer.is_none() {
-        eprintln!("There is no graphics adapter, not even in software: the tour is played without pictures.");
+        eprintln!("There is no graphics adapter, not even in software: nothing can be filmed.");
+        return ExitCode::FAILURE;
     }
     match film(options, renderer) {
         Ok((frames, took)) => {
@@ -49,8 +50,7 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
                 took.as_secs_f64(),
                 options.out.display()
             );
-            join(&options.out, options.fps, frames);
-            ExitCode::SUCCESS
+            join(&options.out, options.fps, frames)
         }
         Err(error) => {
             eprintln!("The tour failed: {error}");
@@ -59,24 +59,36 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     }
 }
 
-/// Frames to a video.
-fn join(folder: &Path, fps: u32, frames: usize) {
+/// Frames to a video. Where there is no ffmpeg, frames are all there is to be.
+fn join(folder: &Path, fps: u32, frames: usize) -> ExitCode {
     let rate = (frames as f32 / ALL).clamp(1.0, fps as f32).to_string();
     let video = folder.join("tour.mp4");
     let arguments = ["-y", "-loglevel", "error", "-framerate", &rate, "-i"];
-    let encoding = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"];
+    // The colours of a video go by twos, so its sides have to.
+    let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
+    let count = frames.to_string();
+    let encoding = ["-frames:v", &count, "-vf", even, "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"];
     let pattern = folder.join("frame_%05d.png");
     let mut ffmpeg = Command::new("ffmpeg");
     match ffmpeg.args(arguments).arg(&pattern).args(encoding).arg(&video).status() {
-        Ok(status) if status.success() => println!("video: {}", video.display()),
-        Ok(status) => eprintln!("ffmpeg made no video: {status}"),
-        Err(_) => println!(
-            "There is no ffmpeg here. Where there is: ffmpeg {} {} {} {}",
-            arguments.join(" "),
-            pattern.display(),
-            encoding.join(" "),
-            video.display()
-        ),
+        Ok(status) if status.success() => {
+            println!("video: {}", video.display());
+            ExitCode::SUCCESS
+        }
+        Ok(status) => {
+            eprintln!("ffmpeg made no video: {status}");
+            ExitCode::FAILURE
+        }
+        Err(_) => {
+            println!(
+                "There is no ffmpeg here. Where there is: ffmpeg {} {} {} {}",
+                arguments.join(" "),
+                pattern.display(),
+                encoding.join(" "),
+                video.display()
+            );
+            ExitCode::SUCCESS
+        }
     }
 }
 
@@ -91,14 +103,17 @@ struct Signature;
 fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, Duration)> {
     let start = Instant::now();
     let studio = Studio::open(options, renderer)?;
+    clear(&options.out)?;
     let places: Places = studio.resource();
     let all = (ALL * options.fps as f32).round() as usize;
     let film = Film::new(studio, options.fps, all, options.frames.map_or(all, |frames| frames as usize));
+    // Where a fade has hardly a frame, it is no fade but a black picture.
+    let fades = film.rate() * FADE >= 3.0;
     let bar = ProgressBar::new((ALL * 10.0) as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {elapsed} of about {duration} {msg}") {
         bar.set_style(style);
     }
-    let mut tour = Tour { film, bar };
+    let mut tour = Tour { film, bar, fades, is_first: true };
     tour.hang_curtain();
     tour.flight(&places)?;
     tour.pickaxe(&places.hillside)?;
@@ -114,6 +129,10 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
 struct Tour {
     film: Film,
     bar: ProgressBar,
+    /// Is there a curtain between scenes?
+    fades: bool,
+    /// Has no scene been played yet?
+    is_first: bool,
 }
 
 impl Tour {
@@ -137,7 +156,7 @@ impl Tour {
         sign(self.studio(), alpha);
     }
 
-    /// A scene: the curtain goes up at its begin and down at its end.
+    /// A scene: the curtain goes up at its begin, but for the first one, and down at its end.
     fn scene(
         &mut self,
         name: &'static str,
@@ -146,13 +165,15 @@ impl Tour {
     ) -> Result {
         self.bar.set_message(name);
         self.film.settle()?;
+        // Nobody begins with a black picture.
+        let (fades, hangs) = (self.fades, if std::mem::take(&mut self.is_first) { 0.0 } else { 1.0 });
         self.film.play(seconds, |studio, t| {
             direct(studio, t)?;
-            let curtain = (1.0 - t * seconds / FADE).max(1.0 - (1.0 - t) * seconds / FADE).clamp(0.0, 1.0);
+            let curtain = (hangs - t * seconds / FADE).max(1.0 - (1.0 - t) * seconds / FADE).clamp(0.0, 1.0);
             let world = studio.world();
             let mut sheets = world.query_filtered::<&mut BackgroundColor, With<Curtain>>();
             for mut sheet in sheets.iter_mut(world) {
-                sheet.0 = Color::BLACK.with_alpha(curtain);
+                sheet.0 = Color::BLACK.with_alpha(if fades { curtain } else { 0.0 });
             }
             Ok(())
         })?;

@@ -62,7 +62,7 @@ pub struct Turned {
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct Focus(pub usize);
 
-/// While this is there, keys and buttons mean nothing to menus.
+/// While this is there, neither keys and buttons nor clicks mean anything to menus.
 #[derive(Resource)]
 pub struct Deaf;
 
@@ -84,6 +84,10 @@ pub fn button(order: usize, words: &str, width: f32) -> impl Bundle {
     )
 }
 
+/// In `Update`, when menus answer to the mouse.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Pointing;
+
 /// Makes menus answer.
 pub struct UiPlugin;
 
@@ -98,21 +102,27 @@ impl Plugin for UiPlugin {
                     .run_if(not(resource_exists::<Deaf>)),
             )
             .add_systems(Update, fit_window)
-            .add_systems(Update, (point, light_up).chain().run_if(not(in_state(Page::None))))
+            .add_systems(Update, (point.in_set(Pointing), light_up).chain().run_if(not(in_state(Page::None))))
             .add_systems(StateTransition, forget_focus.run_if(state_changed::<Page>));
     }
 }
 
 /// Everything is laid out for 1280 x 720, and as large as the window allows.
-fn fit_window(windows: Query<&Window, Changed<Window>>, mut scale: ResMut<UiScale>) {
+fn fit_window(windows: Query<&Window>, page: Res<State<Page>>, mut scale: ResMut<UiScale>) {
     if let Some(window) = windows.iter().next() {
-        scale.0 = scale_for(window.width(), window.height());
+        let fit = scale_for(window.width(), window.height(), **page == Page::None);
+        if scale.0 != fit {
+            scale.0 = fit;
+        }
     }
 }
 
-/// How large everything is in a window or a picture.
-pub fn scale_for(width: f32, height: f32) -> f32 {
-    (width / 1280.0).min(height / 720.0).clamp(0.4, 3.0)
+/// How large everything is in a window or a picture. Menus fill it; while someone plays there is room enough to keep what
+/// is written legible in a small one.
+pub fn scale_for(width: f32, height: f32, plays: bool) -> f32 {
+    let fit = (width / 1280.0).min(height / 720.0);
+    let least = if plays { (width / 850.0).min(height / 470.0).min(0.75) } else { 0.0 };
+    fit.max(least).clamp(0.4, 3.0)
 }
 
 fn forget_focus(mut focus: ResMut<Focus>) {
@@ -126,10 +136,13 @@ fn point(
     arrows: Query<(&Arrow, &Interaction, &ChildOf), Changed<Interaction>>,
     parents: Query<&ChildOf>,
     all: Query<&Item>,
+    deaf: Option<Res<Deaf>>,
     mut focus: ResMut<Focus>,
 ) {
+    let listens = deaf.is_none();
     for (entity, item, interaction) in &items {
         match interaction {
+            Interaction::Pressed if !listens => {}
             Interaction::Pressed => commands.trigger(Chosen { entity }),
             Interaction::Hovered => focus.0 = item.0,
             Interaction::None => {}
@@ -143,10 +156,16 @@ fn point(
         if *interaction != Interaction::None {
             focus.0 = item.0;
         }
-        if *interaction == Interaction::Pressed {
+        if *interaction == Interaction::Pressed && listens {
             commands.trigger(Turned { entity: owner, by: arrow.0 });
         }
     }
+}
+
+/// Which way a stick is pushed along an axis: a way that it was pushed lasts until it is let go.
+fn tilt(now: f32, before: i32) -> i32 {
+    let enough = |way: f32| now * way > if before as f32 == way { 0.35 } else { 0.65 };
+    i32::from(enough(1.0)) - i32::from(enough(-1.0))
 }
 
 /// Arrow keys and Enter, or a gamepad's.
@@ -156,20 +175,28 @@ fn press_keys(
     pads: Query<&Gamepad>,
     items: Query<(Entity, &Item)>,
     mut focus: ResMut<Focus>,
+    mut pushed: Local<IVec2>,
 ) {
     use GamepadButton as G;
     use KeyCode as K;
     let pressed = |some: &[KeyCode], button: GamepadButton| {
         keys.any_just_pressed(some.iter().copied()) || pads.iter().any(|pad| pad.just_pressed(button))
     };
+    let stick = pads.iter().map(Gamepad::left_stick).sum::<Vec2>();
+    let tilted = IVec2::new(tilt(stick.x, pushed.x), tilt(stick.y, pushed.y));
+    let before = std::mem::replace(&mut *pushed, tilted);
+    let is_pushed = |way: IVec2| {
+        let along = |tilt: IVec2| tilt * way.abs() == way;
+        along(tilted) && !along(before)
+    };
     let count = items.iter().count();
     if count == 0 {
         return;
     }
-    if pressed(&[K::ArrowDown, K::KeyS], G::DPadDown) {
+    if pressed(&[K::ArrowDown, K::KeyS], G::DPadDown) || is_pushed(IVec2::NEG_Y) {
         focus.0 = (focus.0 + 1) % count;
     }
-    if pressed(&[K::ArrowUp, K::KeyW], G::DPadUp) {
+    if pressed(&[K::ArrowUp, K::KeyW], G::DPadUp) || is_pushed(IVec2::Y) {
         focus.0 = (focus.0 + count - 1) % count;
     }
     let Some((entity, _)) = items.iter().find(|(_, item)| item.0 == focus.0) else { return };
@@ -179,7 +206,7 @@ fn press_keys(
     for (keys, button, by) in
         [(&[K::ArrowRight, K::KeyD], G::DPadRight, 1), (&[K::ArrowLeft, K::KeyA], G::DPadLeft, -1)]
     {
-        if pressed(keys, button) {
+        if pressed(keys, button) || is_pushed(IVec2::X * by) {
             commands.trigger(Turned { entity, by });
         }
     }
@@ -195,5 +222,41 @@ fn light_up(focus: Res<Focus>, mut items: Query<(&Item, &mut BackgroundColor, &m
             Color::NONE
         }));
         edge.set_if_neq(BorderColor::all(if lit { GOLD } else { Color::NONE }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pushed_stick_is_one_step_until_it_is_let_go() {
+        let mut steps = Vec::new();
+        let mut before = 0;
+        for now in [0.1, 0.5, 0.7, 1.0, 0.6, 0.5, 0.2, 0.7, 0.0, -0.9, -0.5, 0.8] {
+            let after = tilt(now, before);
+            if after != before && after != 0 {
+                steps.push(after);
+            }
+            before = after;
+        }
+        assert_eq!(steps, [1, 1, -1, 1]);
+    }
+
+    #[test]
+    fn what_is_written_over_the_game_stays_legible_in_a_small_window() {
+        for (width, height, menu, game) in [
+            (1280.0, 720.0, 1.0, 1.0),
+            (2560.0, 1440.0, 2.0, 2.0),
+            (640.0, 360.0, 0.5, 0.75),
+            (960.0, 540.0, 0.75, 0.75),
+            (64.0, 64.0, 0.4, 0.4),
+        ] {
+            let scales = [false, true].map(|plays| scale_for(width, height, plays));
+            assert!(
+                (scales[0] - menu).abs() < 1e-3 && (scales[1] - game).abs() < 0.02,
+                "{width}: {scales:?}"
+            );
+        }
     }
 }

@@ -5,12 +5,17 @@ use std::f32::consts::TAU;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
+use crate::inventory::FIRST;
 use crate::landscape::{CLAY, COAL, GOLD};
 use crate::places::Places;
 
 /// How many, and how far from the middle of the hill.
 const VEINS: u32 = 42;
 const AROUND: f32 = 85.0;
+/// Of their brushes; neither the hand nor a script has it.
+const TAG: u64 = FIRST - 1;
+/// Bytes that the ground's history may take once veins are hidden.
+const HISTORY: usize = 64 << 20;
 /// Metres below the surface.
 const DEPTHS: (f32, f32) = (3.5, 24.0);
 
@@ -19,7 +24,7 @@ pub struct VeinsPlugin;
 
 impl Plugin for VeinsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_observer(hide);
+        app.add_observer(hide).add_systems(Update, seal.after(BurrowSystems::Commit));
     }
 }
 
@@ -33,6 +38,18 @@ fn hide(
     let middle = places.hillside.mouth.xz() + places.hillside.inward * 45.0;
     let height = |place: Vec2| terrain.world().height(place.x.into(), place.y.into());
     brushes.write_batch(veins(middle, height));
+}
+
+/// Veins are part of the land: nobody takes them back, and nobody who undoes his first blow.
+fn seal(mut receipts: MessageReader<BrushApplied>, mut terrains: Query<&mut Terrain>) {
+    if receipts.read().filter(|answer| answer.receipt.tag == TAG).count() == 0 {
+        return;
+    }
+    for mut terrain in &mut terrains {
+        // Without room for it, history is empty.
+        terrain.set_undo_budget(0);
+        terrain.set_undo_budget(HISTORY);
+    }
 }
 
 /// The same ones in every game.
@@ -53,7 +70,7 @@ fn veins(middle: Vec2, height: impl Fn(Vec2) -> Option<f64>) -> Vec<Brush> {
             _ => GOLD,
         };
         let brush = Brush::paint(Shape::capsule(from, to, radius), material);
-        Some(brush.with_roughness(Roughness::new(0.8, 2.4, seed)))
+        Some(brush.with_roughness(Roughness::new(0.8, 2.4, seed)).with_tag(TAG))
     };
     (0..VEINS).filter_map(vein).collect()
 }
@@ -75,5 +92,30 @@ mod tests {
             .sum();
         assert!(painted > 100, "{painted}");
         assert!(terrain.world().check_seams().is_flawless());
+    }
+
+    #[test]
+    fn veins_can_not_be_undone() {
+        let ground = Ground::from_fn(256, 256, |_, _| 60.0).expect("a world");
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, BurrowPlugins))
+            .add_systems(Update, seal.after(BurrowSystems::Commit));
+        app.finish();
+        app.cleanup();
+        let terrain = app.world_mut().spawn(terrain).id();
+        let all = veins(Vec2::splat(128.0), |_| Some(60.0));
+        app.world_mut().resource_mut::<Messages<Brush>>().write_batch(all);
+        let start = std::time::Instant::now();
+        let of = |app: &App| {
+            let terrain = app.world().get::<Terrain>(terrain).expect("a terrain");
+            (terrain.world().bricks().count(), terrain.history().undos)
+        };
+        while of(&app).0 == 0 && start.elapsed().as_secs() < 60 {
+            app.update();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let (bricks, undos) = of(&app);
+        assert!(bricks > 0 && undos == 0, "{bricks} bricks, {undos} undos");
     }
 }

@@ -6,12 +6,14 @@ use std::collections::VecDeque;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
+use crate::amount;
+use crate::form::Aim;
 use crate::hud::Hint;
 use crate::inventory::Inventory;
 use crate::particles::{Burst, Matter};
 use crate::player::Tremor;
 use crate::settings::Settings;
-use crate::tools::{Aim, Hand, Strike, Tool};
+use crate::tools::{Hand, Strike, Tool};
 
 /// Hits whose receipts are awaited at most; older ones are forgotten.
 const AWAITED: usize = 64;
@@ -97,23 +99,13 @@ fn build(
         return;
     }
     let Some(aim) = strike.aim else { return };
-    let mut radius = hand.radius(Tool::Builder);
     let tag = inventory.tag();
-    if settings.survival {
-        // As large as what is left allows.
-        let free = inventory.free(hand.material);
-        radius = radius.min((free.max(0) as f32 / hand.form.volume()).cbrt());
-        if radius < Tool::Builder.radii().0 * 0.8 {
-            hints.write(Hint::new(format!(
-                "not enough {}: dig some first",
-                crate::landscape::name(hand.material)
-            )));
-            return;
-        }
-        let voxels = (hand.form.volume() * radius.powi(3)).ceil() as i64;
-        inventory.pledge(tag, hand.material, voxels.min(free));
-    }
-    brushes.write(Brush::add(hand.form.shape(&aim, radius), hand.material).with_tag(tag));
+    let shape = |radius: f32| hand.form.shape(&aim, radius);
+    let Some(radius) = afford(&settings, &hand, Tool::Builder, shape, tag, &mut inventory) else {
+        hints.write(too_little(&hand));
+        return;
+    };
+    brushes.write(Brush::add(shape(radius), hand.material).with_tag(tag));
     bursts.write(Burst {
         place: aim.place + aim.normal * 0.5,
         out: aim.normal,
@@ -123,15 +115,44 @@ fn build(
     });
 }
 
+/// As large as what is left of the material allows, which is pledged; `None` where that is next to nothing.
+fn afford(
+    settings: &Settings,
+    hand: &Hand,
+    tool: Tool,
+    shape: impl Fn(f32) -> Shape,
+    tag: u64,
+    inventory: &mut Inventory,
+) -> Option<f32> {
+    let wish = hand.radius(tool);
+    if !settings.survival {
+        return Some(wish);
+    }
+    let (radius, voxels) = amount::largest(wish, 0.8 * tool.radii().0, inventory.free(hand.material), shape)?;
+    inventory.pledge(tag, hand.material, voxels);
+    Some(radius)
+}
+
+fn too_little(hand: &Hand) -> Hint {
+    Hint::new(format!("not enough {}: dig some first", crate::landscape::name(hand.material)))
+}
+
+/// Paint is made of the material, so it takes some.
 fn paint(
     strike: On<Strike>,
     hand: Res<Hand>,
+    settings: Res<Settings>,
     mut inventory: ResMut<Inventory>,
     mut brushes: MessageWriter<Brush>,
+    mut hints: MessageWriter<Hint>,
 ) {
     let Some(aim) = strike.aim.filter(|_| strike.tool == Tool::Painter) else { return };
-    let shape = Shape::sphere(aim.place, hand.radius(Tool::Painter));
-    brushes.write(Brush::paint(shape, hand.material).with_tag(inventory.tag()));
+    let tag = inventory.tag();
+    let shape = |radius: f32| Shape::sphere(aim.place, radius);
+    match afford(&settings, &hand, Tool::Painter, shape, tag, &mut inventory) {
+        Some(radius) => drop(brushes.write(Brush::paint(shape(radius), hand.material).with_tag(tag))),
+        None => drop(hints.write(too_little(&hand))),
+    }
 }
 
 /// Chips of each material that was broken, as many as it was.

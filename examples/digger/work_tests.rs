@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::landscape::{CONCRETE, ROCK};
-use crate::tools::Form;
 
 fn app() -> App {
     let mut app = App::new();
@@ -43,17 +42,32 @@ fn nothing_is_built_of_nothing() {
 }
 
 #[test]
-fn what_is_built_is_as_large_as_the_stock_allows_and_is_pledged() {
+fn what_is_built_or_painted_is_as_large_as_the_stock_allows_and_is_pledged() {
+    for tool in [Tool::Builder, Tool::Painter] {
+        let mut app = app();
+        choose(&mut app, CONCRETE);
+        app.world_mut().resource_mut::<Hand>().set_radius(tool, 12.0);
+        let mut free = app.world().resource::<Inventory>().free(CONCRETE);
+        let mut radii = Vec::new();
+        // All of it is on its way in the end, so there is none for another one.
+        while let [Brush { shape: shape @ Shape::Sphere { radius, .. }, .. }] = strike(&mut app, tool)[..] {
+            free -= amount::voxels(&shape);
+            assert_eq!(app.world().resource::<Inventory>().free(CONCRETE), free);
+            radii.push(radius);
+        }
+        assert!((0..60).contains(&free) && radii[0] > 4.0, "{free}: {radii:?}");
+        assert_eq!(hints(&mut app), 1);
+    }
+}
+
+#[test]
+fn nothing_is_painted_with_nothing() {
     let mut app = app();
-    choose(&mut app, CONCRETE);
-    app.world_mut().resource_mut::<Hand>().set_radius(Tool::Builder, 12.0);
-    let free = app.world().resource::<Inventory>().free(CONCRETE);
-    let brushes = strike(&mut app, Tool::Builder);
-    let [Brush { shape: Shape::Sphere { radius, .. }, .. }] = brushes[..] else { panic!("{brushes:?}") };
-    assert!(radius > 1.0 && Form::Sphere.volume() * radius.powi(3) <= free as f32 * 1.001, "{radius}");
-    // All of it is on its way, so there is none for another one.
-    assert_eq!(strike(&mut app, Tool::Builder), []);
+    choose(&mut app, ROCK);
+    assert_eq!(strike(&mut app, Tool::Painter), []);
     assert_eq!(hints(&mut app), 1);
+    app.world_mut().resource_mut::<Settings>().survival = false;
+    assert_eq!(strike(&mut app, Tool::Painter).len(), 1);
 }
 
 #[test]

@@ -50,7 +50,7 @@ pub struct Options {
     #[arg(long, default_value_t = 1000)]
     balls: usize,
     /// Seconds of the game's time to play without a window.
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 20.0, value_parser = seconds)]
     seconds: f32,
     /// Width of pictures, in pixels.
     #[arg(long, default_value_t = 960, value_parser = clap::value_parser!(u32).range(64..=8192))]
@@ -58,6 +58,12 @@ pub struct Options {
     /// Height of pictures, in pixels.
     #[arg(long, default_value_t = 540, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
+}
+
+/// From a second to an hour: time for all pictures, and an end.
+fn seconds(text: &str) -> Result<f32, String> {
+    let seconds: f32 = text.parse().map_err(|error| format!("{error}"))?;
+    if (1.0..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("it is not within 1 to 3600".into()) }
 }
 
 fn main() -> ExitCode {

@@ -45,8 +45,8 @@ pub struct Options {
     /// Brushes that go in with each tick.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..))]
     per_tick: u64,
-    /// Ticks a second; 0 for as many as there can be.
-    #[arg(long, default_value_t = 0.0)]
+    /// Ticks a second, up to 1000; 0 for as many as there can be.
+    #[arg(long, default_value_t = 0.0, value_parser = ticks)]
     ticks: f64,
     /// Cells along the world's sides.
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=8192))]
@@ -57,6 +57,11 @@ pub struct Options {
     /// Prints no receipts, only the end.
     #[arg(long)]
     quiet: bool,
+}
+
+fn ticks(text: &str) -> Result<f64, String> {
+    let ticks: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    if (0.0..=1000.0).contains(&ticks) { Ok(ticks) } else { Err("it is not within 0 to 1000".into()) }
 }
 
 fn main() -> ExitCode {

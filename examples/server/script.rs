@@ -16,6 +16,9 @@ use serde::Deserialize;
 use crate::Options;
 use crate::ledger::Ledger;
 
+/// Brushes that wait for the ground at most before others are sent.
+const MOST_WAITING: usize = 1024;
+
 /// A line of a script.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Line {
@@ -38,15 +41,18 @@ pub struct Source {
     ready: VecDeque<Result<Line, String>>,
     /// Read by a thread of its own, so that a silent player holds nobody up.
     coming: Option<Mutex<Receiver<Result<Line, String>>>>,
+    /// Made up only when their turn comes.
+    made_up: Option<Box<dyn Iterator<Item = Line> + Send + Sync>>,
     per_tick: u64,
     sent: u64,
 }
 
 /// Opens what the options name.
 pub fn open(options: &Options) -> Result<Source> {
-    let mut source = Source { ready: VecDeque::new(), coming: None, per_tick: options.per_tick, sent: 0 };
+    let mut source =
+        Source { ready: VecDeque::new(), coming: None, made_up: None, per_tick: options.per_tick, sent: 0 };
     match options.script.as_deref() {
-        None => source.ready = made_up(options).map(Ok).collect(),
+        None => source.made_up = Some(Box::new(made_up(options))),
         Some(path) if path == Path::new("-") => {
             let (sender, receiver) = sync_channel(1024);
             std::thread::spawn(move || {
@@ -121,14 +127,21 @@ fn send(
 ) {
     let source = &mut *source;
     let is_open = source.receive();
+    // Who sends faster than the ground is dug waits, or memory would fill with what waits.
+    let is_full = terrains.iter().any(|terrain| terrain.queued() >= MOST_WAITING);
+    let due = if is_full { 0 } else { source.per_tick };
     let is_idle = terrains.iter().all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
-    for _ in 0..source.per_tick {
+    for _ in 0..due {
         // A step is no part of a batch: what it undoes should not depend on how fast the server is.
         let is_step = matches!(source.ready.front(), Some(Ok(Line::Undo | Line::Redo)));
         if is_step && !(is_idle && ledger.answered >= source.sent) {
             break;
         }
-        let Some(line) = source.ready.pop_front() else { break };
+        let made_up = || source.made_up.as_mut().and_then(Iterator::next).map(Ok);
+        let Some(line) = source.ready.pop_front().or_else(made_up) else {
+            source.made_up = None;
+            break;
+        };
         match line {
             Ok(line) => {
                 source.sent += 1;
@@ -150,7 +163,8 @@ fn send(
             break;
         }
     }
-    if !is_open && source.ready.is_empty() && ledger.answered >= source.sent && is_idle && !ledger.is_done {
+    let is_over = !is_open && source.ready.is_empty() && source.made_up.is_none();
+    if is_over && ledger.answered >= source.sent && is_idle && !ledger.is_done {
         ledger.is_done = true;
         exit.write(if ledger.faults == 0 { AppExit::Success } else { AppExit::error() });
     }

@@ -3,10 +3,11 @@
 use bevy::prelude::*;
 
 use super::go_to;
-use crate::input::{Action, Actions, Binding};
+use crate::bindings::Binding;
+use crate::input::{Action, Actions, Turns};
 use crate::phase::Page;
 use crate::settings::Settings;
-use crate::ui::{self, Chosen, Deaf, Item};
+use crate::ui::{self, Chosen, Deaf, Item, Pointing};
 
 /// The page of controls.
 pub struct ControlsPlugin;
@@ -14,7 +15,7 @@ pub struct ControlsPlugin;
 impl Plugin for ControlsPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(OnEnter(Page::Controls), open)
-            .add_systems(Update, (bind, show_keys).chain().run_if(in_state(Page::Controls)))
+            .add_systems(Update, (bind.after(Pointing), show_keys).chain().run_if(in_state(Page::Controls)))
             .add_systems(OnExit(Page::Controls), stop_waiting);
     }
 }
@@ -22,6 +23,10 @@ impl Plugin for ControlsPlugin {
 /// The action that waits for its new key.
 #[derive(Resource, Clone, Copy)]
 struct Waiting(Action);
+
+/// The row of an action.
+#[derive(Component, Clone, Copy, PartialEq, Eq)]
+struct Row(Action);
 
 /// The text with an action's keys.
 #[derive(Component)]
@@ -75,21 +80,24 @@ fn row(order: usize, action: Action, label: &str) -> impl Bundle {
         ..default()
     };
     let texts = children![ui::text(label, 16.0, ui::WHITE), (Keys(action), ui::text("", 16.0, ui::GOLD))];
-    (Item(order), node, BackgroundColor::DEFAULT, BorderColor::all(Color::NONE), texts)
+    (Row(action), Item(order), node, BackgroundColor::DEFAULT, BorderColor::all(Color::NONE), texts)
 }
 
 fn reset(_: On<Chosen>, mut settings: ResMut<Settings>) {
     settings.bindings = default();
 }
 
-/// The first key or button that comes after an action was chosen is its own; Escape leaves all as it is.
+/// The first key, button or turn of the wheel that comes after an action was chosen is its own. Escape leaves all as it
+/// is, unless it is for the pause; so does a click on anything else of the page, which is what was meant by it then.
 fn bind(
     mut commands: Commands,
     waiting: Option<Res<Waiting>>,
     mut settings: ResMut<Settings>,
     keys: Res<ButtonInput<KeyCode>>,
     mouse: Res<ButtonInput<MouseButton>>,
+    turns: Res<Turns>,
     pads: Query<&Gamepad>,
+    items: Query<(Entity, &Interaction, Option<&Row>), With<Item>>,
     mut actions: ResMut<Actions>,
     mut notes: Query<&mut Text, With<Note>>,
 ) {
@@ -102,8 +110,16 @@ fn bind(
     let key = keys.get_just_pressed().next().map(|&key| Binding::Key(key));
     let button = mouse.get_just_pressed().next().map(|&button| Binding::Mouse(button));
     let pad = pads.iter().find_map(|pad| pad.get_just_pressed().next().map(|&button| Binding::Pad(button)));
-    let Some(binding) = key.or(button).or(pad) else { return };
-    let note = if binding == Binding::Key(KeyCode::Escape) {
+    let Some(binding) = key.or(button).or(pad).or(turns.binding()) else { return };
+    let is_click = binding == Binding::Mouse(MouseButton::Left);
+    let elsewhere = items
+        .iter()
+        .find(|(_, interaction, row)| {
+            is_click && **interaction == Interaction::Pressed && *row != Some(&Row(action))
+        })
+        .map(|(entity, ..)| entity);
+    let is_no_key = binding == Binding::Key(KeyCode::Escape) && action != Action::Pause;
+    let note = if elsewhere.is_some() || is_no_key {
         format!("{} keeps its keys", action.label())
     } else {
         match settings.bindings.rebind(action, binding) {
@@ -117,6 +133,9 @@ fn bind(
     commands.remove_resource::<Waiting>();
     commands.remove_resource::<Deaf>();
     actions.forget();
+    if let Some(entity) = elsewhere {
+        commands.trigger(Chosen { entity });
+    }
 }
 
 fn show_keys(
@@ -143,3 +162,7 @@ fn stop_waiting(mut commands: Commands) {
     commands.remove_resource::<Waiting>();
     commands.remove_resource::<Deaf>();
 }
+
+#[cfg(test)]
+#[path = "controls_tests.rs"]
+mod tests;

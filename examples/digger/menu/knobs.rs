@@ -63,19 +63,19 @@ const KNOBS: [Knob; 9] = [
         turn: |settings, by| step(&mut settings.day_minutes, by, 5.0, 0.0, 120.0),
     },
     Knob {
-        label: "Brush, at first",
+        label: "Size of the brush",
         value: |settings| format!("{:.1} m", settings.radius),
         turn: |settings, by| step(&mut settings.radius, by, 0.5, 1.0, 12.0),
     },
     Knob {
-        label: "Form, at first",
+        label: "Form of what is built",
         value: |settings| settings.form.label().into(),
         turn: |settings, by| {
             settings.form = if by < 0 { settings.form.next().next() } else { settings.form.next() }
         },
     },
     Knob {
-        label: "Build only what was dug",
+        label: "Use only what was dug",
         value: |settings| yes(settings.survival),
         turn: |settings, _| settings.survival = !settings.survival,
     },

@@ -6,6 +6,7 @@ use bevy_burrow::view::GroundLoading;
 
 use super::go_to;
 use crate::art::Art;
+use crate::landscape::NewGame;
 use crate::light::Eyes;
 use crate::phase::{Page, Phase};
 use crate::places::Places;
@@ -20,14 +21,25 @@ pub struct TitlePlugin;
 
 impl Plugin for TitlePlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(OnEnter(Phase::Title), open_menu)
+        app.init_resource::<Start>()
+            .add_systems(OnEnter(Phase::Title), open_menu)
             .add_systems(OnEnter(Page::Menu), open.run_if(in_state(Phase::Title)))
-            .add_systems(OnExit(Phase::Title), land)
+            .add_systems(OnExit(Phase::Title), (land, begin))
             .add_systems(
                 Update,
-                (fly.run_if(resource_exists::<Places>), tell_progress).run_if(in_state(Phase::Title)),
+                (fly.run_if(resource_exists::<Places>), (tell_progress, play).chain())
+                    .run_if(in_state(Phase::Title)),
             );
     }
+}
+
+/// How far it is with the game.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+struct Start {
+    /// Is there one to go on with?
+    has_begun: bool,
+    /// Does somebody want to play as soon as there is land?
+    is_wanted: bool,
 }
 
 /// Says that the landscape is on its way; gone when it is there.
@@ -38,7 +50,7 @@ fn open_menu(mut page: ResMut<NextState<Page>>) {
     page.set(Page::Menu);
 }
 
-fn open(mut commands: Commands, art: Option<Res<Art>>) {
+fn open(mut commands: Commands, art: Option<Res<Art>>, game: Res<Start>) {
     let Some(art) = art else { return };
     let left = Node {
         padding: UiRect::left(px(84)),
@@ -61,26 +73,45 @@ fn open(mut commands: Commands, art: Option<Res<Art>>) {
         left.spawn((ImageNode::new(art.logo.clone()), logo));
         let below = Node { margin: UiRect::bottom(px(34)), ..default() };
         left.spawn((ui::text("real land, and all of it can be dug", 17.0, ui::GREY), below));
-        left.spawn(ui::button(0, "Dig", 260.0)).observe(start);
-        left.spawn(ui::button(1, "Settings", 260.0)).observe(go_to(Page::Settings));
-        left.spawn(ui::button(2, "Controls", 260.0)).observe(go_to(Page::Controls));
-        left.spawn(ui::button(3, "Help", 260.0)).observe(go_to(Page::Help));
-        left.spawn(ui::button(4, "Quit", 260.0)).observe(quit);
+        let mut orders = 0..;
+        let mut button = |words: &'static str| ui::button(orders.next().unwrap_or_default(), words, 260.0);
+        left.spawn(button(if game.has_begun { "Go on" } else { "Dig" })).observe(start);
+        if game.has_begun {
+            left.spawn(button("New game")).observe(start_anew);
+        }
+        left.spawn(button("Settings")).observe(go_to(Page::Settings));
+        left.spawn(button("Controls")).observe(go_to(Page::Controls));
+        left.spawn(button("Help")).observe(go_to(Page::Help));
+        left.spawn(button("Quit")).observe(quit);
         let word = Node { margin: UiRect::top(px(26)), ..default() };
         left.spawn((Progress, ui::text("", 15.0, ui::GOLD), word));
     });
 }
 
+fn start(_: On<Chosen>, mut game: ResMut<Start>) {
+    game.is_wanted = true;
+}
+
+/// All that was dug is whole again, and what was dug is lost.
+fn start_anew(_: On<Chosen>, mut commands: Commands, mut game: ResMut<Start>) {
+    commands.trigger(NewGame);
+    game.is_wanted = true;
+}
+
 /// Once there is someone to play.
-fn start(
-    _: On<Chosen>,
+fn play(
+    game: Res<Start>,
     players: Query<(), With<Player>>,
     painting: Res<GroundLoading>,
     mut phase: ResMut<NextState<Phase>>,
 ) {
-    if !players.is_empty() && painting.is_ready() {
+    if game.is_wanted && !players.is_empty() && painting.is_ready() {
         phase.set(Phase::Playing);
     }
+}
+
+fn begin(mut game: ResMut<Start>) {
+    *game = Start { has_begun: true, is_wanted: false };
 }
 
 fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
