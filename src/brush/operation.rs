@@ -8,7 +8,8 @@ use crate::ground::MaterialId;
 /// What happens inside the shape.
 ///
 /// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All others
-/// *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change nothing outside.
+/// *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change nothing outside. Beyond the
+/// world's rim they take all to go on as it is at the rim.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Operation {
     /// Takes ground away.

@@ -3,7 +3,7 @@
 //! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], so exactly that number says
 //! "at least as far". Operations that move a surface have to know how far away it is, or the whole middle of a cave would
 //! turn solid at once. So a sample that was *cut off* counts as one voxel farther than its nearest face neighbour, and is
-//! left alone while all of those were cut off too.
+//! left alone while all of those were cut off too. Beyond the world's rim all goes on as it is at the rim.
 
 use glam::IVec3;
 

@@ -25,8 +25,10 @@ impl Witness {
                 ((t * t * (768 - 2 * t) / 65_536) * strength + 128) / 256
             }
         };
-        let (own, depth) = (self.distance(point), bevy_burrow::brush::DEPTH);
-        let is_cut = |at: IVec3| self.samples.get(&at).is_some_and(|&(distance, _)| distance.abs() == depth);
+        let distance = |at: IVec3| self.distance(self.at_rim(at));
+        let (own, depth) = (distance(point), bevy_burrow::brush::DEPTH);
+        let is_cut =
+            |at: IVec3| self.samples.get(&self.at_rim(at)).is_some_and(|&(own, _)| own.abs() == depth);
         let away = |whole: i64| (whole.signum() * ((whole.abs() * i64::from(weight) + 255) / 256)) as i32;
         let to = |target: i32| own + away(i64::from(target) - i64::from(own));
         let faces = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
@@ -42,7 +44,7 @@ impl Witness {
         if is_cut(point) {
             let sign = own.signum();
             let known = faces.iter().filter(|&&face| !is_cut(face));
-            let nearest = known.map(|&face| self.distance(face) * sign).min()?;
+            let nearest = known.map(|&face| distance(face) * sign).min()?;
             let others = faces.iter().filter(|&&face| is_cut(face)).map(|_| depth).min();
             middle = sign * (nearest.min(others.unwrap_or(i32::MAX)).max(0) + 256);
         }
@@ -55,13 +57,13 @@ impl Witness {
                 let weight = [8, 4, 2, 1][step.abs().element_sum() as usize];
                 let is_known = |at: IVec3| !is_cut(at) || middle.abs() + length <= depth;
                 if is_known(point + step) && is_known(point - step) {
-                    sum += weight * (self.distance(point + step) - middle).clamp(-512, 512);
+                    sum += weight * (distance(point + step) - middle).clamp(-512, 512);
                 }
             }
             sum
         };
         let attached = |after: i32| {
-            let same = |at: &IVec3| (self.distance(*at) < 0) == (after < 0);
+            let same = |at: &IVec3| (distance(*at) < 0) == (after < 0);
             if (own < 0) == (after < 0) || faces.iter().any(same) { after } else { -i32::from(own < 0) }
         };
         let shift = |voxels: f32| (units(voxels) * weight + 128) / 256;
@@ -74,7 +76,7 @@ impl Witness {
                 0 => None,
                 by => {
                     let around = LatticeBox::point(point).grown(1);
-                    let all: Vec<i32> = around.points().map(|at| self.distance(at)).collect();
+                    let all: Vec<i32> = around.points().map(|at| distance(at)).collect();
                     let (low, high) = (all.iter().min()?, all.iter().max()?);
                     Some(attached((middle - by).clamp(*low, *high)))
                 }
@@ -93,6 +95,12 @@ impl Witness {
         }
     }
 
+    /// Beyond the world's rim all goes on as it is at the rim.
+    fn at_rim(&self, at: IVec3) -> IVec3 {
+        let ground = self.terrain.world().ground();
+        IVec3::new(at.x.clamp(0, ground.width()), at.y, at.z.clamp(0, ground.depth()))
+    }
+
     /// What a sample is made of that becomes solid.
     fn new_material(&self, brush: &Brush, point: IVec3) -> MaterialId {
         if let Some(material) = brush.blend.material {
@@ -100,7 +108,7 @@ impl Witness {
         }
         let column = (1..=64).map(|by| -by).chain(1..=64).map(|by| point + IVec3::Y * by);
         let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|step| point + step);
-        let solid = column.chain(beside).find(|&at| self.distance(at) < 0);
+        let solid = column.chain(beside).find(|&at| self.distance(self.at_rim(at)) < 0);
         let stored = solid.and_then(|at| self.samples.get(&at));
         stored.map_or(MaterialId::GROUND, |&(_, material)| material)
     }
