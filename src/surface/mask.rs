@@ -167,7 +167,8 @@ impl Borders {
             (own & !FIRST) >> 1 | (words[1][2] & FIRST) << 7,
             own << 8 | words[0][1] >> 56,
         ];
-        if own | sides[0] | sides[1] | sides[2] | sides[3] == 0 {
+        let any = sides.iter().fold(own, |any, side| any | side);
+        if any == 0 {
             return;
         }
         let (from, end) = ((x * 8).max(self.low.x), (x * 8 + 8).min(self.low.x + self.width as i32));
@@ -175,7 +176,11 @@ impl Borders {
             let Ok(along) = usize::try_from(z * 8 + row - self.low.z) else { continue };
             let start = along * self.width + (from - self.low.x) as usize;
             let Some(cells) = self.cells.get_mut(start..start + (end - from) as usize) else { return };
-            let lanes = |word: u64| spread((word >> (row * 8)) as u8);
+            let of_row = |word: u64| (word >> (row * 8)) as u8;
+            if of_row(any) == 0 {
+                continue;
+            }
+            let lanes = |word: u64| spread(of_row(word));
             let flags =
                 (0..).zip(sides).fold(lanes(own) << 4, |flags, (side, word)| flags | lanes(word) << side);
             cells.copy_from_slice(&flags.to_le_bytes()[(from - x * 8) as usize..][..cells.len()]);
