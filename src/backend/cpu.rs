@@ -41,7 +41,10 @@ impl Compute for Cpu {
                 keep(parts);
                 copy
             };
-            then(&groups(blocks).par_iter().map(copy).collect::<Vec<_>>());
+            let parts: Vec<Parts> = groups(blocks).par_iter().map(copy).collect();
+            then(&parts);
+            // Freeing many lists takes its time.
+            parts.into_par_iter().for_each(drop);
             return;
         }
         let parts = [mesh(view, blocks)];

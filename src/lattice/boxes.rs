@@ -71,9 +71,20 @@ impl LatticeBox {
 
     /// Every point of the box, x fastest, then z, then y.
     pub fn points(self) -> impl Iterator<Item = IVec3> {
-        (self.min.y..=self.max.y).flat_map(move |y| {
-            (self.min.z..=self.max.z)
-                .flat_map(move |z| (self.min.x..=self.max.x).map(move |x| IVec3::new(x, y, z)))
+        let Self { min, max } = self;
+        let mut next = Some(min);
+        std::iter::from_fn(move || {
+            let point = next?;
+            next = if point.x < max.x {
+                Some(point.with_x(point.x + 1))
+            } else if point.z < max.z {
+                Some(IVec3::new(min.x, point.y, point.z + 1))
+            } else if point.y < max.y {
+                Some(IVec3::new(min.x, point.y + 1, min.z))
+            } else {
+                None
+            };
+            Some(point)
         })
     }
 }

@@ -176,7 +176,10 @@ impl ChunkGrid {
 
     /// The chunks that hold some sample of a box.
     pub fn chunks_of(self, samples: LatticeBox) -> impl Iterator<Item = ChunkPos> {
-        let (low, high) = (self.chunk_of(samples.min), self.chunk_of(samples.max));
+        let low = self.chunk_of(samples.min);
+        // Mostly it is one, and divisions are dear.
+        let is_one = self.chunk_samples(low).contains(samples.max);
+        let high = if is_one { low } else { self.chunk_of(samples.max) };
         LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() }.points().map(ChunkPos::from_ivec3)
     }
 

@@ -66,6 +66,14 @@ impl Parts {
         self.indices.clear();
     }
 
+    /// The vertices and indices of the part with this number, if there is one.
+    pub fn get(&self, number: usize) -> Option<(&[Vertex], &[u16])> {
+        let part = self.list.get(number)?;
+        let before = number.checked_sub(1).and_then(|before| self.list.get(before));
+        let (vertex, index) = before.map_or((0, 0), |before| (before.vertices, before.indices));
+        Some((self.vertices.get(vertex..part.vertices)?, self.indices.get(index..part.indices)?))
+    }
+
     /// Each part with its vertices and its indices.
     pub fn iter(&self) -> impl Iterator<Item = (Block, &[Vertex], &[u16])> {
         let (mut vertex, mut index) = (0, 0);
@@ -348,13 +356,14 @@ pub(crate) fn prepare() {
     LazyLock::force(&SLOTS);
 }
 
-/// Cells of a stack that belong to the mask because of samples around some of its bricks (rule 2): a corner of a cube of
-/// their sheet is edited. As 8x8 cells, bit `z * 8 + x`. The window must reach one brick further.
-pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos]) -> u64 {
-    let Some(stack) = bricks.first().map(|&brick| stack_of(brick)) else { return 0 };
+/// Cells of a stack that belong to the mask, those `before` and those that samples around some of its bricks put there
+/// (rule 2): a corner of a cube of their sheet is edited. As 8x8 cells, bit `z * 8 + x`. The window must reach one brick
+/// further.
+pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos], before: u64) -> u64 {
+    let Some(stack) = bricks.first().map(|&brick| stack_of(brick)) else { return before };
     let heights = corners::heights(view.samples.ground(), Column::new(stack.0 * 8, stack.1 * 8));
     let range = corners::range(&heights);
-    let mut cells = 0;
+    let mut cells = corners::spread(before);
     for &brick in bricks {
         let low = brick.origin().y;
         if pristine_side(range, low).is_some() {
@@ -372,6 +381,11 @@ pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos]) 
     }
     let cells = cells & world_cells(view, stack);
     (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))
+}
+
+/// Lattice y of the cubes that the pristine surface crosses over a stack of bricks.
+pub(crate) fn stack_sheet(ground: &Ground, (x, z): (i32, i32)) -> Range<i32> {
+    sheet(ground.heights::<9>(Column::new(x * 8, z * 8)).into_iter().flatten())
 }
 
 /// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.

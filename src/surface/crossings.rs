@@ -1,11 +1,11 @@
 //! Vertices of a block, made from lists of lattice edges: the vertex function (rule 4) for many edges at once.
 //!
 //! What it computes, and in which order of operations, is what [`vertex`](super::vertex::vertex) says; the results have
-//! the same bits. Here the edges of one axis are taken eight at a time: their samples are gathered into vectors, one for
-//! each place around an edge, and every step is done for all eight.
+//! the same bits. Here the edges of one axis are taken four at a time (lists are short): their samples are gathered into
+//! vectors, one for each place around an edge, and every step is done for all four.
 
 use glam::{IVec3, Vec3};
-use wide::{f32x8, i32x8};
+use wide::{f32x4, i32x4};
 
 use super::apron::{AREA, Apron, Marked, Neighbours, SIDE};
 use super::corners::PLACES;
@@ -17,7 +17,7 @@ use crate::lattice::{ONE, SNAP};
 use crate::volume::Brick;
 
 /// Edges taken together.
-const LANES: usize = 8;
+const LANES: usize = 4;
 
 /// A lattice edge, by its lower end: layer and corner of a brick's cells.
 #[derive(Clone, Copy)]
@@ -136,7 +136,7 @@ impl Site<'_, '_> {
     }
 }
 
-/// Crossings of up to eight edges along one axis. Of flags, each edge has one bit.
+/// Crossings of up to four edges along one axis. Of flags, each edge has one bit.
 struct Batch {
     /// Steps of 1/4096 voxel from the lower end.
     steps: [i32; LANES],
@@ -164,8 +164,8 @@ impl Batch {
             apron.samples()[first..].first_chunk().unwrap_or(&[0; NEAR])
         });
         let at = |place: usize| {
-            let [a, b, c, d, e, f, g, h] = near;
-            i32x8::new([a[place], b[place], c[place], d[place], e[place], f[place], g[place], h[place]])
+            let [a, b, c, d] = near;
+            i32x4::new([a[place], b[place], c[place], d[place]])
         };
         let around = |end: usize, step: usize| [at(end - step), at(end + step)];
         // Both ends, one before and one after them along the edge, and around both ends along the other two axes.
@@ -175,18 +175,18 @@ impl Batch {
         let (p, q) = (at(p), at(q));
         let is_edited = p | q;
         let stencil = is_edited | before | after | pb | pb2 | qb | qb2 | pc | pc2 | qc | qc2;
-        let flags = |marked: i32x8| (marked << 31u32).to_bitmask();
+        let flags = |marked: i32x4| (marked << 31u32).to_bitmask();
 
         let mut steps = linear_steps(p >> 1u32, q >> 1u32);
         if AXIS == 1 {
             // A pristine vertical edge is crossed at the height itself, its upper end included.
-            let exact = -(p >> 1u32) * i32x8::splat(SNAP / ONE);
+            let exact = -(p >> 1u32) * i32x4::splat(SNAP / ONE);
             steps = ((is_edited << 31u32) >> 31u32).select(steps, exact);
         }
-        let t = steps.round_float() / f32x8::splat(SNAP as f32);
-        let rise = |low: i32x8, high: i32x8| ((high >> 1u32) - (low >> 1u32)).round_float();
+        let t = steps.round_float() / f32x4::splat(SNAP as f32);
+        let rise = |low: i32x4, high: i32x4| ((high >> 1u32) - (low >> 1u32)).round_float();
         // a + (b - a) * t, in this order; no fused operation.
-        let blend = |a: f32x8, b: f32x8| a + (b - a) * t;
+        let blend = |a: f32x4, b: f32x4| a + (b - a) * t;
         let own = [
             blend(rise(before, q), rise(p, after)),
             blend(rise(pb, pb2), rise(qb, qb2)),
@@ -195,8 +195,8 @@ impl Batch {
         let [x, y, z] = AXES[AXIS].map(|component| own[component]);
         let length = (x * x + y * y + z * z).sqrt();
         // Where the gradient vanishes, up.
-        let is_sloped = length.simd_gt(f32x8::splat(0.0));
-        let unit = |v: f32x8, flat: f32| is_sloped.select(v / length, f32x8::splat(flat)).to_array();
+        let is_sloped = length.simd_gt(f32x4::splat(0.0));
+        let unit = |v: f32x4, flat: f32| is_sloped.select(v / length, f32x4::splat(flat)).to_array();
         Self {
             steps: steps.to_array(),
             normals: [unit(x, 0.0), unit(y, 1.0), unit(z, 0.0)],
@@ -210,7 +210,7 @@ impl Batch {
 /// Where the surface crosses edges between densities `p` and `q`, one of them negative: linear, to the nearest step of
 /// 1/4096, halves up, and not at the ends.
 #[inline(always)]
-fn linear_steps(p: i32x8, q: i32x8) -> i32x8 {
+fn linear_steps(p: i32x4, q: i32x4) -> i32x4 {
     // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, as its
     // divisor is below 2^25; so the bias decides halves and nothing else.
     const SHIFT: f64 = 6_755_399_441_055_744.0;
@@ -222,7 +222,7 @@ fn linear_steps(p: i32x8, q: i32x8) -> i32x8 {
         let share = f64::from(SNAP) * f64::from(p[lane]) / f64::from(sum[lane]);
         steps[lane] = (share + BIAS + SHIFT).to_bits() as i32;
     }
-    i32x8::new(steps).max(i32x8::splat(1)).min(i32x8::splat(SNAP - 1))
+    i32x4::new(steps).max(i32x4::splat(1)).min(i32x4::splat(SNAP - 1))
 }
 
 /// The stored materials around a block's corners.

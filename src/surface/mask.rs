@@ -58,9 +58,14 @@ impl Mask {
         before.unwrap_or_default()
     }
 
+    /// The 8x8 cells of a word that was put in or laid.
+    pub(crate) fn get_word(&self, word: (i32, i32)) -> Option<u64> {
+        self.0.get(&word).copied()
+    }
+
     /// The 8x8 cells of a word.
     pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
-        self.0.get(&word).copied().unwrap_or_default()
+        self.get_word(word).unwrap_or_default()
     }
 
     /// How many cells are in the mask.
@@ -114,7 +119,7 @@ impl<'a> MaskView<'a> {
 
     /// The word of 8x8 cells that starts at (8 x, 8 z): bit `z * 8 + x`.
     pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
-        let newer = self.newer.and_then(|newer| newer.0.get(&word).copied());
+        let newer = self.newer.and_then(|newer| newer.get_word(word));
         newer.unwrap_or_else(|| self.committed.word(word))
     }
 
@@ -122,21 +127,14 @@ impl<'a> MaskView<'a> {
     pub fn borders(&self, low: Column, high: Column) -> Borders {
         let (width, depth) = ((high.x - low.x).max(0) as usize, (high.z - low.z).max(0) as usize);
         let mut borders = Borders { low, width, cells: vec![0; width * depth] };
-        let xs = low.x >> 3..=(high.x - 1) >> 3;
-        for z in low.z >> 3..=(high.z - 1) >> 3 {
-            // The words around the one at x: [dz + 1][dx + 1].
-            let mut words = [0; 3].map(|_: i32| [0; 3]);
-            let column = |x: i32| [-1, 0, 1].map(|dz| self.word((x, z + dz)));
-            let mut shift = |next: [u64; 3]| {
-                for (row, word) in words.iter_mut().zip(next) {
-                    *row = [row[1], row[2], word];
-                }
-                words
-            };
-            shift(column(xs.start() - 1));
-            shift(column(*xs.start()));
-            for x in xs.clone() {
-                borders.mark((x, z), &shift(column(x + 1)));
+        let (first, last) = ((low.x >> 3, low.z >> 3), ((high.x - 1) >> 3, (high.z - 1) >> 3));
+        // With those around them, each looked up once.
+        let row = |z: i32| (first.0 - 1..=last.0 + 1).map(move |x| self.word((x, z)));
+        let words: Vec<u64> = (first.1 - 1..=last.1 + 1).flat_map(row).collect();
+        let rows: Vec<&[u64]> = words.chunks((last.0 - first.0 + 3).max(1) as usize).collect();
+        for (z, rows) in (first.1..).zip(rows.windows(3)) {
+            for (at, x) in (first.0..=last.0).enumerate() {
+                borders.mark((x, z), &[0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx])));
             }
         }
         borders
@@ -169,7 +167,8 @@ impl Borders {
             (own & !FIRST) >> 1 | (words[1][2] & FIRST) << 7,
             own << 8 | words[0][1] >> 56,
         ];
-        if own | sides[0] | sides[1] | sides[2] | sides[3] == 0 {
+        let any = sides.iter().fold(own, |any, side| any | side);
+        if any == 0 {
             return;
         }
         let (from, end) = ((x * 8).max(self.low.x), (x * 8 + 8).min(self.low.x + self.width as i32));
@@ -177,7 +176,11 @@ impl Borders {
             let Ok(along) = usize::try_from(z * 8 + row - self.low.z) else { continue };
             let start = along * self.width + (from - self.low.x) as usize;
             let Some(cells) = self.cells.get_mut(start..start + (end - from) as usize) else { return };
-            let lanes = |word: u64| spread((word >> (row * 8)) as u8);
+            let of_row = |word: u64| (word >> (row * 8)) as u8;
+            if of_row(any) == 0 {
+                continue;
+            }
+            let lanes = |word: u64| spread(of_row(word));
             let flags =
                 (0..).zip(sides).fold(lanes(own) << 4, |flags, (side, word)| flags | lanes(word) << side);
             cells.copy_from_slice(&flags.to_le_bytes()[(from - x * 8) as usize..][..cells.len()]);

@@ -54,14 +54,10 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     let mut indices = Vec::with_capacity(first.len() * (high.z - low.z) as usize + rings.fans.len());
     for z in low.z..high.z {
         let (row, base) = (borders.row(z), (z - low.z) as u32 * width);
-        // Runs of whole cells are the first row's, moved.
-        if row.iter().fold(0, |all, flags| all | flags) == 0 {
-            indices.extend(first.iter().map(|&index| index + base));
-            continue;
-        }
         let mut rest = row;
         while !rest.is_empty() {
-            let whole = rest.iter().position(|&flags| flags != 0).unwrap_or(rest.len());
+            // Runs of whole cells are the first row's, moved.
+            let whole = whole_cells(rest);
             let from = row.len() - rest.len();
             indices.extend(first[from * 6..(from + whole) * 6].iter().map(|&index| index + base));
             let cut = rest[whole..].iter().position(|&flags| flags == 0).unwrap_or(rest.len() - whole);
@@ -70,6 +66,13 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     }
     indices.extend_from_slice(&rings.fans);
     indices
+}
+
+/// How many cells at the beginning of a row have no flag.
+fn whole_cells(row: &[u8]) -> usize {
+    // Eight at a time as long as it goes.
+    let eights = row.as_chunks::<8>().0.iter().take_while(|flags| **flags == [0; 8]).count() * 8;
+    eights + row[eights..].iter().position(|&flags| flags != 0).unwrap_or(row.len() - eights)
 }
 
 /// The rings of one tile: triangles of cells that border on the mask, and the vertices they have there.

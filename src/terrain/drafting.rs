@@ -21,8 +21,6 @@ pub(super) struct Drafting<'a> {
 /// What edits make of a world.
 pub(super) struct Drafted {
     pub draft: Draft,
-    /// Its bricks, to be laid over those of the world.
-    pub over: Bricks,
     /// What was cut off, by the number of the edit.
     pub pieces: BTreeMap<usize, Vec<LoosePiece>>,
 }
@@ -37,8 +35,7 @@ impl Drafting<'_> {
     pub fn together(&self, edits: &[&Edit]) -> Drafted {
         let world = self.world;
         let draft = self.draft(world.samples(), edits, world.sample_hash, &world.uniform);
-        let over = draft.bricks.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
-        Drafted { draft, over, pieces: BTreeMap::new() }
+        Drafted { draft, pieces: BTreeMap::new() }
     }
 
     /// What edits make of samples of this hash; bricks of a `known` kind are shared.
@@ -84,10 +81,10 @@ impl Drafting<'_> {
             all.effects.append(&mut effects);
         }
         all.bricks = bricks.into_values().collect();
-        let kinds = all.bricks.iter().filter_map(|drafted| drafted.brick.uniform());
+        let kinds = all.bricks.iter().filter_map(|drafted| drafted.kind);
         let fresh = kinds.filter(|kind| !world.uniform.contains_key(kind));
         all.uniform = fresh.filter_map(|kind| Some((kind, Arc::clone(known.get(&kind)?)))).collect();
-        Drafted { draft: all, over, pieces }
+        Drafted { draft: all, pieces }
     }
 }
 
@@ -104,15 +101,14 @@ fn lay<'d>(over: &mut Bricks, lowest: &mut Lowest, drafted: impl IntoIterator<It
 fn merge(bricks: &mut BTreeMap<[i32; 3], DraftedBrick>, mut drafted: DraftedBrick) {
     let key = [drafted.pos.0.x, drafted.pos.0.z, drafted.pos.0.y];
     if let Some(own) = bricks.get(&key) {
-        drafted.changed = drafted.changed.union(own.changed);
-        drafted.is_extended |= own.is_extended;
+        drafted.after(own);
     }
     bricks.insert(key, drafted);
 }
 
 /// A brick that is all alike is replaced by the one of its kind.
 fn share(known: &mut UniformBricks, drafted: &mut DraftedBrick) {
-    if let Some(kind) = drafted.brick.uniform() {
+    if let Some(kind) = drafted.kind {
         drafted.brick = Arc::clone(known.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
     }
 }

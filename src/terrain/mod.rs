@@ -15,6 +15,7 @@
 
 mod change;
 mod commit;
+mod dirty;
 mod drafting;
 mod field_log;
 mod history;

@@ -1,31 +1,34 @@
 //! A transaction: edits in order, or one step through history, from a snapshot to a commit.
 //!
 //! ```text
-//! edits -> bricks, fields, receipts -> mask -> dirty blocks -> parts -> chunk meshes
-//!                                         \-> touched tiles -> index lists
+//! edits -> bricks -> mask -> dirty blocks -> parts -> chunk meshes
+//!                \       \-> touched tiles -> index lists
+//!                 \-> fields, receipts
 //! step  -> bricks, fields, mask of another time -> the same
 //! ```
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use web_time::Instant;
 
 use super::change::{Change, replaced_bytes};
 use super::commit::{Commit, Stages};
+use super::dirty::{dirty_cells, joined_mask, sheets_in_reach};
 use super::drafting::{Drafted, Drafting};
-use super::field_log::{FieldLog, news_of_replaced};
+use super::field_log::{FieldLog, FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
-use super::loose::LooseSettings;
+use super::loose::{LoosePiece, LooseSettings};
 use super::receipt::{Applied, Receipt};
-use super::redraw::{self, MeshUpdates};
+use super::redraw::{self, MeshUpdates, side_by_side, timed};
 use super::world::World;
 use super::{Submission, Work};
 use crate::backend::{Compute, Cpu, Engine};
 use crate::brush::Edit;
-use crate::lattice::LatticeBox;
+use crate::lattice::{ChunkPos, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, DraftedBrick, Fields, Replaced, UniformBricks, pristine_brick};
+use crate::volume::{Bricks, Draft, DraftedBrick, Fields, Replaced, UniformBricks, pristine_brick};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.
@@ -38,6 +41,17 @@ pub struct Transaction {
     pub(super) loose: Option<LooseSettings>,
     /// Without one, the processor.
     pub(super) engine: Option<Engine>,
+}
+
+/// What edits come to, meshes aside.
+struct Entered {
+    receipts: Vec<Receipt>,
+    news: Vec<(ChunkPos, FieldNews)>,
+    next_field: u64,
+    change: Change,
+    /// Bytes of bricks that the change takes away from the world.
+    replaced_bytes: usize,
+    uniform: UniformBricks,
 }
 
 impl Transaction {
@@ -75,25 +89,46 @@ impl Transaction {
     fn edit(&self, submissions: &[Submission], backend: &dyn Compute) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
-        let Drafted { draft, over: bricks, mut pieces } = Stages::time(&mut stages.edit, || {
+        let Drafted { draft, pieces } = Stages::time(&mut stages.edit, || {
             let drafting = Drafting { world, backend };
             match &self.loose {
                 Some(settings) => drafting.one_by_one(&edits, settings),
                 None => drafting.together(&edits),
             }
         });
-        let samples = world.samples().over(&bricks);
+        let drafted = &draft.bricks;
+        let lay =
+            || timed(|| drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect());
+        let look = || (timed(|| dirty_cells(world.grid, drafted)), timed(|| sheets_in_reach(world, drafted)));
+        let ((bricks, edit), ((dirty, meshing), (near, ring))): ((Bricks, _), _) =
+            side_by_side(drafted.len(), lay, look);
+        stages.edit += edit;
+        stages.meshing += meshing;
+        stages.ring += ring;
 
-        let before = WorldView { samples, ..world.view() };
-        let (added, dirty) = redraw::disturb(&before, &draft.bricks, &mut stages);
-        let mut mask = Mask::default();
-        for (word, cells) in added.words() {
-            mask.lay_word(word, cells | world.mask.word(word));
-        }
+        let before = WorldView { samples: world.samples().over(&bricks), ..world.view() };
+        let mask = Stages::time(&mut stages.ring, || joined_mask(&before, &near));
         let view = WorldView { mask: MaskView::new(&world.mask).over(&mask), ..before };
-        let meshes = redraw::updates(world, &view, backend, &draft.bricks, dirty, &added, &mut stages);
+        let meshes = || redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
+        let enter = || self.enter(submissions, draft, pieces, &mask);
+        let (meshes, entered) = side_by_side(dirty.len(), meshes, enter);
 
-        let mut log = FieldLog::new(world);
+        let mut commit = self.commit(entered.change, entered.replaced_bytes, meshes, entered.uniform);
+        (commit.receipts, commit.news) = (entered.receipts, entered.news);
+        commit.next_field = entered.next_field;
+        stages.whole = start.elapsed();
+        Commit { stages, ..commit }
+    }
+
+    /// Enters what edits did into fields and receipts, and what they change in the world.
+    fn enter(
+        &self,
+        submissions: &[Submission],
+        draft: Draft,
+        mut pieces: BTreeMap<usize, Vec<LoosePiece>>,
+        mask: &Mask,
+    ) -> Entered {
+        let mut log = FieldLog::new(&self.world);
         let mut effects = draft.effects.into_iter().enumerate();
         let receipts = submissions.iter().map(|submission| {
             let outcome = match &submission.edit {
@@ -119,10 +154,8 @@ impl Transaction {
             mask: mask.words().collect(),
             sample_hash: draft.hash,
         };
-        let mut commit = self.commit(change, meshes, draft.uniform);
-        (commit.receipts, commit.news, commit.next_field) = (receipts, news, next_field);
-        stages.whole = start.elapsed();
-        Commit { stages, ..commit }
+        let replaced_bytes = replaced_bytes(&self.world, &change.bricks);
+        Entered { receipts, news, next_field, change, replaced_bytes, uniform: draft.uniform }
     }
 
     /// Puts in place what a step through history holds.
@@ -138,23 +171,20 @@ impl Transaction {
                 let brick = after.clone().unwrap_or_else(missing);
                 if let Some(own) = own {
                     let brick = Arc::clone(&brick);
-                    changed.push(DraftedBrick { pos: *pos, brick, changed: own, is_extended: false });
+                    changed.push(DraftedBrick::new(*pos, brick, own, false));
                 }
                 bricks.insert(*pos, brick);
             }
         });
-        let (mut mask, mut turned) = (Mask::default(), Mask::default());
-        for &(word, cells) in &change.mask {
-            mask.lay_word(word, cells);
-            turned.insert_word(word, cells ^ world.mask.word(word));
-        }
+        let mut mask = Mask::default();
+        change.mask.iter().for_each(|&(word, cells)| mask.lay_word(word, cells));
         let view = WorldView {
             samples: world.samples().over(&bricks),
             mask: MaskView::new(&world.mask).over(&mask),
             grid: world.grid,
         };
-        let dirty = Stages::time(&mut stages.meshing, || redraw::dirty_cells(&view, &changed));
-        let meshes = redraw::updates(world, &view, backend, &changed, dirty, &turned, &mut stages);
+        let dirty = Stages::time(&mut stages.meshing, || dirty_cells(world.grid, &changed));
+        let meshes = redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
 
         let nothing = Fields::default();
         let news = change.fields.iter().flat_map(|(chunk, after)| {
@@ -165,7 +195,8 @@ impl Transaction {
         let bounds = changed.iter().map(|drafted| drafted.changed).reduce(LatticeBox::union);
         let Replaced { removed, added, painted } = replaced;
         let restored = Restored { bounds, removed, added, painted };
-        let mut commit = self.commit(change, meshes, UniformBricks::default());
+        let replaced_bytes = replaced_bytes(world, &change.bricks);
+        let mut commit = self.commit(change, replaced_bytes, meshes, UniformBricks::default());
         commit.moved = Some(HistoryReceipt { step, outcome: Ok(restored) });
         commit.news = news;
         stages.whole = start.elapsed();
@@ -173,10 +204,16 @@ impl Transaction {
     }
 
     /// A commit of what is the same for edits and steps.
-    fn commit(&self, change: Change, meshes: MeshUpdates, uniform: UniformBricks) -> Commit {
+    fn commit(
+        &self,
+        change: Change,
+        replaced_bytes: usize,
+        meshes: MeshUpdates,
+        uniform: UniformBricks,
+    ) -> Commit {
         Commit {
             ticket: self.ticket,
-            replaced_bytes: replaced_bytes(&self.world, &change.bricks),
+            replaced_bytes,
             change,
             uniform,
             next_field: self.world.next_field,

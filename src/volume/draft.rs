@@ -18,8 +18,9 @@ use super::brick::UniformBricks;
 use super::ledger::{Fate, Ledger};
 use super::runs::runs;
 use super::workpiece::Workpiece;
-use super::{Brick, Bricks, DiggingRules, Refused, SampleView, Tally};
+use super::{Brick, Bricks, DiggingRules, Refused, Sample, SampleView, Tally};
 use crate::brush::{Edit, Evaluator, Kind, Sculptor};
+use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, sort_by_place};
 
 /// What one edit changed in one chunk.
@@ -67,6 +68,22 @@ pub struct DraftedBrick {
     pub changed: LatticeBox,
     /// Is a sample among them that had never been edited?
     pub is_extended: bool,
+    /// What all samples were edited to, where that is the same.
+    pub kind: Option<(Sample, MaterialId)>,
+}
+
+impl DraftedBrick {
+    /// A brick that changed. Looks at all of its samples, so whoever changed them should call this.
+    pub(crate) fn new(pos: BrickPos, brick: Arc<Brick>, changed: LatticeBox, is_extended: bool) -> Self {
+        let kind = brick.uniform();
+        Self { pos, brick, changed, is_extended, kind }
+    }
+
+    /// Takes in that it had changed before.
+    pub(crate) fn after(&mut self, earlier: &Self) {
+        self.changed = self.changed.union(earlier.changed);
+        self.is_extended |= earlier.is_extended;
+    }
 }
 
 /// What a list of edits makes of a world.
@@ -237,26 +254,23 @@ impl<'a> EditWork<'a> {
 #[derive(Default)]
 struct Changes {
     newer: Bricks,
-    /// Where they changed, and whether a sample was edited for the first time.
-    notes: FxHashMap<BrickPos, (LatticeBox, bool)>,
+    drafted: FxHashMap<BrickPos, DraftedBrick>,
 }
 
 impl Changes {
     fn take(&mut self, bricks: Vec<DraftedBrick>) {
-        for DraftedBrick { pos, brick, changed, is_extended } in bricks {
-            self.newer.insert(pos, brick);
-            let note = self.notes.entry(pos).or_insert((changed, is_extended));
-            *note = (note.0.union(changed), note.1 | is_extended);
+        for mut drafted in bricks {
+            self.newer.insert(drafted.pos, Arc::clone(&drafted.brick));
+            if let Some(earlier) = self.drafted.get(&drafted.pos) {
+                drafted.after(earlier);
+            }
+            self.drafted.insert(drafted.pos, drafted);
         }
     }
 
     /// All of them, by position.
     fn bricks(self) -> Vec<DraftedBrick> {
-        let drafted = |(pos, brick)| {
-            let &(changed, is_extended) = self.notes.get(&pos)?;
-            Some(DraftedBrick { pos, brick, changed, is_extended })
-        };
-        let mut bricks: Vec<_> = self.newer.into_iter().filter_map(drafted).collect();
+        let mut bricks: Vec<_> = self.drafted.into_values().collect();
         bricks.sort_unstable_by_key(|drafted| (drafted.pos.0.x, drafted.pos.0.z, drafted.pos.0.y));
         bricks
     }
@@ -290,8 +304,7 @@ impl Draft {
         if !earlier.newer.is_empty() {
             draft.bricks = earlier.bricks();
             // Kinds that came and went.
-            let kinds: FxHashSet<_> =
-                draft.bricks.iter().filter_map(|drafted| drafted.brick.uniform()).collect();
+            let kinds: FxHashSet<_> = draft.bricks.iter().filter_map(|drafted| drafted.kind).collect();
             draft.uniform.retain(|kind, _| kinds.contains(kind));
         }
         draft
@@ -318,7 +331,7 @@ impl Draft {
         }
         self.bricks.reserve(ledger.bricks.len());
         for mut drafted in ledger.bricks {
-            if let Some(kind) = drafted.brick.uniform() {
+            if let Some(kind) = drafted.kind {
                 let known = uniform.get(&kind);
                 let fresh = || Arc::clone(self.uniform.entry(kind).or_insert(drafted.brick));
                 drafted.brick = known.cloned().unwrap_or_else(fresh);

@@ -79,6 +79,6 @@ pub(crate) fn take_out(
     });
     let chunks = chunks.collect();
     let is_extended = base.map_or([0; 8], |base| *base.edited()) != *brick.edited();
-    let drafted = DraftedBrick { pos, brick: Arc::new(brick), changed: around, is_extended };
+    let drafted = DraftedBrick::new(pos, Arc::new(brick), around, is_extended);
     Some(TakenOut { drafted, hash, chunks })
 }

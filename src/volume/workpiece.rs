@@ -87,8 +87,7 @@ impl<'a> Workpiece<'a> {
         ledger.hash = ledger.hash.wrapping_add(self.hash_change(&brick));
         let before = self.base.map_or([0; 8], |brick| *brick.edited());
         let is_extended = before != *brick.edited();
-        let brick = Arc::new(brick);
-        ledger.bricks.push(DraftedBrick { pos: self.pos, brick, changed, is_extended });
+        ledger.bricks.push(DraftedBrick::new(self.pos, Arc::new(brick), changed, is_extended));
     }
 
     /// The samples as they are now.

@@ -130,12 +130,9 @@ impl EditOutput {
                 };
                 let (pos, Some(brick)) = (job.pos(), self.brick(result, tag)) else { continue };
                 ledger.hash = ledger.hash.wrapping_add(result.hash);
-                ledger.bricks.push(DraftedBrick {
-                    pos,
-                    brick: Arc::new(brick),
-                    changed: layout::unpack_box(result.bounds, pos.origin()),
-                    is_extended: result.flags & EditResult::EXTENDED != 0,
-                });
+                let changed = layout::unpack_box(result.bounds, pos.origin());
+                let is_extended = result.flags & EditResult::EXTENDED != 0;
+                ledger.bricks.push(DraftedBrick::new(pos, Arc::new(brick), changed, is_extended));
             }
             ledger
         };

@@ -1,0 +1,250 @@
+//! Where changed samples show: the cells that join the mask, and the blocks that may draw something else than before.
+//!
+//! Bricks come in order of their stacks all along, so every step goes stack by stack and needs no other, and threads share
+//! them.
+
+use std::ops::RangeInclusive;
+
+use glam::IVec3;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
+use crate::surface::Mask;
+use crate::surface::block::{self, Block};
+use crate::surface::vertex::WorldView;
+use crate::surface::window::{self, Window};
+use crate::volume::DraftedBrick;
+
+use super::world::World;
+
+/// From how many bricks on what is cheap for each is spread over threads: waking these takes as long as some hundred of
+/// them.
+const PARALLEL_PLACES: usize = 512;
+
+/// Cells by the bricks that hold them: by stacks of bricks, each from below.
+pub(super) type ByBrick = Vec<(BrickPos, LatticeBox)>;
+
+/// The cells that changed samples show in.
+pub(super) fn dirty_cells(grid: ChunkGrid, changed: &[DraftedBrick]) -> ByBrick {
+    // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
+    let around = |drafted: &DraftedBrick| {
+        let (x, changed) = (drafted.pos.0.x, drafted.changed);
+        in_world(grid, changed.min - 2, changed.max + 1).map(|cells| (x, cells))
+    };
+    by_brick(&changed.iter().filter_map(around).collect::<Vec<_>>())
+}
+
+/// The bricks of whose sheet a cell may join the mask: one that a sample edited for the first time is a corner of.
+pub(super) fn sheets_in_reach(world: &World, changed: &[DraftedBrick]) -> Vec<BrickPos> {
+    // A sample is a corner of the cells one below it.
+    let around = |drafted: &DraftedBrick| {
+        (drafted.pos.0.x, LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max })
+    };
+    let boxes: Vec<_> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
+    let near = by_brick(&boxes);
+    if near.len() < PARALLEL_PLACES {
+        near.chunk_by(same_stack).flat_map(|stack| at_sheet(world, stack)).collect()
+    } else {
+        near.par_chunk_by(same_stack).flat_map_iter(|stack| at_sheet(world, stack)).collect()
+    }
+}
+
+/// Those bricks of a stack that the pristine surface passes through; none where all of its cells are in the mask.
+fn at_sheet(world: &World, stack: &[(BrickPos, LatticeBox)]) -> impl Iterator<Item = BrickPos> {
+    let is_open = world.mask.word(place(&stack[0])) != u64::MAX;
+    let rows = if is_open { block::stack_sheet(&world.ground, place(&stack[0])) } else { 0..0 };
+    let bricks = stack.iter().map(|&(brick, _)| brick);
+    bricks.filter(move |brick| is_open && brick.origin().y < rows.end && rows.start < brick.origin().y + 8)
+}
+
+/// Rule 2 for the cells of some bricks: the words of the mask that change. Edited samples stay edited, so cells only ever
+/// join it.
+pub(super) fn joined_mask(view: &WorldView, near: &[BrickPos]) -> Mask {
+    let mut windows = Vec::new();
+    let mut rest = near;
+    while let Some((count, places)) = window::shared(rest.iter().copied()) {
+        let (bricks, others) = rest.split_at(count);
+        windows.push((bricks, places));
+        rest = others;
+    }
+    let disturbed = |&(bricks, places): &(&[BrickPos], LatticeBox)| {
+        let window = Window::new(&view.samples, places);
+        let mut found = Vec::new();
+        for stack in bricks.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
+            let word = (stack[0].0.x, stack[0].0.z);
+            let before = view.mask.word(word);
+            let cells = block::disturbed(view, &window, stack, before);
+            if cells != before {
+                found.push((word, cells));
+            }
+        }
+        found
+    };
+    let words: Vec<_> = if near.len() < PARALLEL_PLACES {
+        windows.iter().flat_map(disturbed).collect()
+    } else {
+        windows.par_iter().flat_map_iter(disturbed).collect()
+    };
+    let mut mask = Mask::default();
+    words.into_iter().for_each(|(word, cells)| mask.insert_word(word, cells));
+    mask
+}
+
+/// Every block that may draw something else than before, by stacks of bricks, each from below. A word of the mask turns
+/// only where samples change, so its cells lie in stacks that have `dirty` cells.
+pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
+    let add = |stack: &[(BrickPos, LatticeBox)], found: &mut Vec<Block>| {
+        let blocks_of = |&(brick, cells): &(BrickPos, LatticeBox)| {
+            view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
+        };
+        match sheet_near(world, view, newer, place(&stack[0])) {
+            Some(sheet) => found.extend(with_sheet(stack, sheet).iter().flat_map(blocks_of)),
+            None => found.extend(stack.iter().flat_map(blocks_of)),
+        }
+    };
+    if dirty.len() < PARALLEL_PLACES {
+        let mut found = Vec::with_capacity(dirty.len());
+        dirty.chunk_by(same_stack).for_each(|stack| add(stack, &mut found));
+        return found;
+    }
+    let blocks = |stack: &[(BrickPos, LatticeBox)]| {
+        let mut found = Vec::new();
+        add(stack, &mut found);
+        found
+    };
+    dirty.par_chunk_by(same_stack).flat_map_iter(blocks).collect()
+}
+
+fn place((brick, _): &(BrickPos, LatticeBox)) -> (i32, i32) {
+    (brick.0.x, brick.0.z)
+}
+
+fn same_stack(a: &(BrickPos, LatticeBox), b: &(BrickPos, LatticeBox)) -> bool {
+    place(a) == place(b)
+}
+
+/// The box from `low` to `high` as far as it lies in the world.
+fn in_world(grid: ChunkGrid, low: IVec3, high: IVec3) -> Option<LatticeBox> {
+    let last = IVec3::new(grid.width() - 1, i32::MAX, grid.depth() - 1);
+    LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last))
+}
+
+/// A cell that joins the mask draws its sheet, and one that leaves it draws it no longer; beside it, vertices leave the
+/// mask's border or come to it. The box around all of these in a stack of bricks.
+fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) -> Option<LatticeBox> {
+    let mut cells = 0;
+    for (dx, dz) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dz| (dx, dz))) {
+        let word = (stack.0 - dx, stack.1 - dz);
+        if let Some(own) = newer.get_word(word) {
+            cells |= grown_into(own ^ world.mask.word(word), dx, dz);
+        }
+    }
+    if cells == 0 {
+        return None;
+    }
+    let drawn = cells & (view.mask.word(stack) | world.mask.word(stack));
+    let low = Column::new(stack.0 * 8, stack.1 * 8);
+    let rows = (drawn != 0).then(|| block::sheet_rows(view.samples.ground(), low, drawn))?;
+    in_world(view.grid, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))
+}
+
+/// The cells of a stack, and those of a box in it.
+fn with_sheet(stack: &[(BrickPos, LatticeBox)], sheet: LatticeBox) -> ByBrick {
+    let mut all = stack.to_vec();
+    for brick in BrickPos::covering(sheet) {
+        let Some(cells) = brick.samples().intersection(sheet) else { continue };
+        match all.binary_search_by_key(&brick.0.y, |(own, _)| own.0.y) {
+            Ok(at) => all[at].1 = all[at].1.union(cells),
+            Err(at) => all.insert(at, (brick, cells)),
+        }
+    }
+    all
+}
+
+/// How many places for bricks a table may have for each box.
+const PLACES: u64 = 64;
+
+/// The bricks that hold cells of these boxes, each with the box around its own of them. Every box belongs to something
+/// whose x, in bricks, stands beside it, at most one brick away; by that number they are sorted.
+fn by_brick(boxes: &[(i32, LatticeBox)]) -> ByBrick {
+    let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return ByBrick::new() };
+    if boxes.len() < PARALLEL_PLACES {
+        return those_within(first.0 - 1..=last.0 + 1, boxes);
+    }
+    let slab = |x: i32| {
+        let from = boxes.partition_point(|(home, _)| *home < x - 1);
+        let near = boxes[from..].partition_point(|(home, _)| *home <= x + 1);
+        those_within(x..=x, &boxes[from..from + near])
+    };
+    (first.0 - 1..last.0 + 2).into_par_iter().map(slab).collect::<Vec<_>>().concat()
+}
+
+/// Those of the bricks whose x lies in a range.
+fn those_within(xs: RangeInclusive<i32>, boxes: &[(i32, LatticeBox)]) -> ByBrick {
+    let within = |cells: &LatticeBox| {
+        let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
+        LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
+    };
+    let Some(all) = boxes.iter().filter_map(|(_, cells)| within(cells)).reduce(LatticeBox::union) else {
+        return ByBrick::new();
+    };
+    // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
+    let size = all.size();
+    let is_dense = all.volume() <= PLACES * boxes.len() as u64;
+    let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
+    let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
+    let mut found = ByBrick::with_capacity(boxes.len() * 4);
+    let mut enter = |brick: IVec3, cells: LatticeBox| {
+        let number = if is_dense {
+            let at = brick - all.min;
+            &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize]
+        } else {
+            index.entry(BrickPos(brick)).or_default()
+        };
+        if *number == 0 {
+            found.push((BrickPos(brick), cells));
+            *number = found.len() as u32;
+        } else {
+            let own = &mut found[*number as usize - 1].1;
+            *own = own.union(cells);
+        }
+    };
+    for (_, cells) in boxes {
+        let Some(bricks) = within(cells) else { continue };
+        // Of the cells, those from a brick's first to its last.
+        let own = |brick: i32, low: i32, high: i32| (low.max(brick * 8), high.min(brick * 8 + 7));
+        for x in bricks.min.x..=bricks.max.x {
+            let (low_x, high_x) = own(x, cells.min.x, cells.max.x);
+            for z in bricks.min.z..=bricks.max.z {
+                let (low_z, high_z) = own(z, cells.min.z, cells.max.z);
+                for y in bricks.min.y..=bricks.max.y {
+                    let (low_y, high_y) = own(y, cells.min.y, cells.max.y);
+                    let (min, max) = (IVec3::new(low_x, low_y, low_z), IVec3::new(high_x, high_y, high_z));
+                    enter(IVec3::new(x, y, z), LatticeBox { min, max });
+                }
+            }
+        }
+    }
+    if is_dense {
+        let numbers = table.iter().filter(|&&number| number != 0);
+        return numbers.map(|&number| found[number as usize - 1]).collect();
+    }
+    found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
+    found
+}
+
+/// 8x8 cells and the cells beside and diagonally beside them, as far as they lie in the word (dx, dz) further.
+pub(super) fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
+    const FIRST: u64 = 0x0101_0101_0101_0101;
+    let along = match dx {
+        -1 => (cells & FIRST) << 7,
+        0 => cells | (cells & !(FIRST << 7)) << 1 | (cells & !FIRST) >> 1,
+        _ => (cells & FIRST << 7) >> 7,
+    };
+    match dz {
+        -1 => along << 56,
+        0 => along | along << 8 | along >> 8,
+        _ => along >> 56,
+    }
+}
