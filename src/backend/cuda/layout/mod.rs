@@ -3,6 +3,7 @@
 //! All numbers are little-endian. Bricks on the device are called by a *reference*, `slot << 1 | has_materials`, or
 //! [`NONE`]. Samples of a brick are numbered `x + 8 z + 64 y`. Boxes inside a brick are one word, see [`pack_box`].
 
+mod careful;
 mod edit;
 mod heights;
 mod mesh;
@@ -14,6 +15,7 @@ use crate::ground::{ColumnMaterial, Ground, MaterialId};
 use crate::lattice::{Column, LatticeBox};
 use crate::volume::{Brick, Sample};
 
+pub(crate) use careful::*;
 pub(crate) use edit::*;
 pub(crate) use heights::*;
 pub(crate) use mesh::*;

@@ -1,0 +1,192 @@
+//! Edits of random worlds.
+
+mod run;
+
+use std::sync::Arc;
+
+use fastrand::Rng;
+use glam::{IVec3, Vec3};
+
+use super::super::layout::EditResult;
+use super::{Device, seeds, worlds};
+use crate::brush::{Brush, DEPTH, Edit, Roughness, Shape};
+use crate::ground::{ColumnMaterial, Ground, MaterialControl, MaterialId};
+use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
+use crate::terrain::{Terrain, TerrainSettings};
+use crate::volume::{Brick, Bricks, EditWork, Ledger, SampleView};
+use run::{EditRoom, EditRun};
+
+/// Edits of all kinds: those of the worlds, larger ones that leave bricks all alike, and such as give ground its look back.
+fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
+    let sculpts = rng.bool();
+    let mut brushes = Vec::new();
+    for _ in 0..rng.usize(1..6) {
+        let mut brush = match rng.u32(0..6) {
+            0 => worlds::random_brush_at_a_face(rng, ground, chunk_size),
+            1 | 2 if sculpts => worlds::random_sculpting_brush(rng, ground),
+            _ => worlds::random_brush(rng, ground),
+        };
+        match rng.u32(0..8) {
+            0 => {
+                let center = worlds::random_brush(rng, ground).shape;
+                let at = Edit::quantize(&Brush::dig(center))
+                    .map_or(IVec3::ZERO, |edit| edit.reach().min)
+                    .as_vec3();
+                brush.shape = Shape::cuboid(at, Vec3::new(17.0, 13.0, 15.0));
+            }
+            1 => {
+                brush = Brush { operation: Brush::paint(brush.shape, MaterialId::GROUND).operation, ..brush }
+            }
+            2 => brush = Brush { operation: Brush::add(brush.shape, MaterialId::GROUND).operation, ..brush },
+            3 => {
+                let roughness = Roughness::new(rng.f32() * 8.0, 1.0 + rng.f32() * 30.0, rng.u32(..));
+                brush = brush.with_roughness(roughness);
+            }
+            4 => {
+                // Deeper than stored densities reach.
+                let column = Column::new(rng.i32(0..ground.width()), rng.i32(0..ground.depth()));
+                let y = ground.height(column) as f32 / 256.0 - 90.0 - rng.f32() * 80.0;
+                let shape = Shape::sphere(Vec3::new(column.x as f32, y, column.z as f32), 4.0);
+                brush = Brush::paint(shape, MaterialId(rng.u8(..)));
+            }
+            _ => {}
+        }
+        brush.power = rng.u8(..) | rng.u8(..);
+        brushes.push(brush);
+        if rng.u32(0..4) == 0 {
+            brushes.extend(brushes.last().cloned());
+        }
+    }
+    brushes.iter().filter_map(|brush| Edit::quantize(brush).ok()).collect()
+}
+
+/// What the CPU makes of edits.
+fn ledger_of(work: &EditWork) -> Ledger {
+    let mut all = Ledger::default();
+    work.run(|mut ledger| {
+        all.bricks.append(&mut ledger.bricks);
+        all.parts.append(&mut ledger.parts);
+        all.counts.append(&mut ledger.counts);
+        all.hash = all.hash.wrapping_add(ledger.hash);
+    });
+    all
+}
+
+/// Applies edits to a world on both sides, with room enough and then without; returns how many bricks changed.
+fn compare_edits(
+    device: &mut Device,
+    (samples, grid): (SampleView, ChunkGrid),
+    edits: &[Edit],
+    rng: &mut Rng,
+) -> usize {
+    let edits: Vec<&Edit> = edits.iter().collect();
+    let rules = worlds::random_rules(rng, samples.ground());
+    let work = EditWork::new(samples, grid, &edits);
+    let work = work.under((rng.u32(0..3) == 0).then_some(&rules));
+    let ledger = ledger_of(&work);
+    let most = EditRoom {
+        records: ledger.bricks.len(),
+        materials: ledger.bricks.iter().filter(|drafted| drafted.brick.materials().is_some()).count(),
+        parts: ledger.parts.len(),
+        counts: ledger.counts.len(),
+    };
+    let run = EditRun::new(device, &work, rng, most, FAR);
+    assert_eq!(run.counters[2..], [most.parts as u32, most.counts as u32]);
+    run.check_bricks(&ledger, true);
+    run.check_effects(&ledger, &work);
+
+    let mut less = |room: usize| if rng.bool() { room } else { rng.usize(0..=room) };
+    let room = EditRoom {
+        records: less(most.records),
+        materials: less(most.materials),
+        parts: less(most.parts),
+        counts: less(most.counts),
+    };
+    let short = EditRun::new(device, &work, rng, room, FAR);
+    short.check_bricks(&ledger, false);
+    assert_eq!(short.counters, run.counters, "counters go on past the room");
+    // Windows that end near the brick do, or it is told that they don't.
+    let near = EditRun::new(device, &work, rng, most, 1);
+    if near.results.iter().all(|result| result.flags & EditResult::TOO_FAR == 0) {
+        near.check_bricks(&ledger, true);
+        near.check_effects(&ledger, &work);
+    }
+    ledger.bricks.len()
+}
+
+/// How far windows have to reach up and down that are always enough.
+const FAR: i32 = 8;
+
+#[test]
+fn edits_are_those_of_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    let mut bricks = 0;
+    for (seed, mut rng) in seeds(40) {
+        let terrain = worlds::random_world(&mut rng, seed);
+        let world = terrain.world();
+        let edits = random_edits(&mut rng, world.ground(), world.grid().size() as u32);
+        bricks += compare_edits(&mut device, (world.samples(), world.grid()), &edits, &mut rng);
+    }
+    println!("{bricks} edited bricks are the same");
+}
+
+#[test]
+fn edits_at_the_ends_of_the_lattice_are_those_of_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    for (seed, mut rng) in seeds(12) {
+        let side = if rng.bool() { 1.0 } else { -1.0 };
+        let height = |x: i32, z: i32| side * (32_760.0 - f64::from((x * 7 + z * 5) % 23) * 0.7);
+        let ground = Ground::from_fn(30, 27, height).expect("a ground");
+        let materials = ColumnMaterial { base: MaterialId(3), overlay: MaterialId(4), blend: 200 };
+        let ground = ground
+            .with_materials(&MaterialControl::Uniform(materials))
+            .unwrap_or_else(|error| panic!("{error}"));
+        let settings =
+            TerrainSettings { chunk_size: worlds::CHUNK_SIZES[seed as usize % 4], ..Default::default() };
+        let mut terrain = Terrain::new(ground, &settings).expect("a terrain");
+        for _ in 0..3 {
+            let world = terrain.world();
+            let edits = random_edits(&mut rng, world.ground(), settings.chunk_size);
+            compare_edits(&mut device, (world.samples(), world.grid()), &edits, &mut rng);
+            edits.iter().for_each(|edit| terrain.submit_edit(edit));
+            terrain.apply(std::iter::empty::<Brush>());
+        }
+    }
+}
+
+/// A brick that no brush would leave behind: any density beside any other, many of them cut off.
+fn noise_brick(rng: &mut Rng) -> Brick {
+    let mut sample = || match rng.u32(0..6) {
+        0 => DEPTH as i16,
+        1 => -DEPTH as i16,
+        2 => rng.i16(..),
+        _ => rng.i16(-300..300),
+    };
+    let mut brick = Brick::of_edited(&std::array::from_fn(|_| sample()));
+    if rng.bool() {
+        (0..512).for_each(|index| brick.set_material(index, MaterialId(rng.u8(0..4))));
+    }
+    brick
+}
+
+#[test]
+fn noise_is_sculpted_like_on_the_cpu() {
+    let Some(mut device) = Device::start() else { return };
+    for (seed, mut rng) in seeds(24) {
+        let ground = worlds::random_ground(&mut rng, seed).0;
+        let grid =
+            ChunkGrid::new(worlds::CHUNK_SIZES[seed as usize % 4] as i32, ground.width(), ground.depth());
+        let near = LatticeBox::point(IVec3::ONE).grown(1).points();
+        let mut bricks = Bricks::default();
+        for pos in near.map(BrickPos).filter(|_| rng.u32(0..6) > 0).collect::<Vec<_>>() {
+            bricks.insert(pos, Arc::new(noise_brick(&mut rng)));
+        }
+        let brush = |rng: &mut Rng| {
+            let place = Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 16.0 + 4.0;
+            let shape = Shape::sphere(place, 2.0 + rng.f32() * 5.0);
+            worlds::sculpting_brush(rng, shape, place)
+        };
+        let edits: Vec<Edit> = (0..3).filter_map(|_| Edit::quantize(&brush(&mut rng)).ok()).collect();
+        compare_edits(&mut device, (SampleView::new(&ground, &bricks), grid), &edits, &mut rng);
+    }
+}
