@@ -76,7 +76,7 @@ impl Witness {
                 0 => None,
                 by => {
                     let around = LatticeBox::point(point).grown(1);
-                    let all: Vec<i32> = around.points().map(|at| distance(at)).collect();
+                    let all: Vec<i32> = around.points().map(distance).collect();
                     let (low, high) = (all.iter().min()?, all.iter().max()?);
                     Some(attached((middle - by).clamp(*low, *high)))
                 }
