@@ -121,6 +121,7 @@ def digger(stage):
     stage.key("Return")
     page("Title Menu", since)
     stage.shoot("10_title")
+    # The first item is lit: "Go on".
     stage.key("Down")
     since = stage.mark()
     stage.key("Return")

@@ -94,7 +94,8 @@ const MANNERS: [Manner; 7] = [
         purpose: "stays where it is put, and lights a cave",
         period: 0.50,
         hit: 0.16,
-        reach: 8.0,
+        // Across a room.
+        reach: 14.0,
         radius: (0.3, 0.3, 0.3),
     },
 ];

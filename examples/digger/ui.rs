@@ -5,7 +5,7 @@
 use bevy::prelude::*;
 
 use crate::input::ReadsDevices;
-use crate::phase::Page;
+use crate::phase::{Page, Phase};
 
 pub const SHADE: Color = Color::srgba(0.03, 0.035, 0.05, 0.72);
 pub const EDGE: Color = Color::srgba(1.0, 1.0, 1.0, 0.16);
@@ -103,7 +103,9 @@ impl Plugin for UiPlugin {
             )
             .add_systems(Update, fit_window)
             .add_systems(Update, (point.in_set(Pointing), light_up).chain().run_if(not(in_state(Page::None))))
-            .add_systems(StateTransition, forget_focus.run_if(state_changed::<Page>));
+            .add_systems(StateTransition, forget_focus.run_if(state_changed::<Page>))
+            // The menus of the pause and of the title are both called that.
+            .add_systems(OnEnter(Phase::Title), forget_focus);
     }
 }
 

@@ -41,7 +41,8 @@ pub struct HistoryReceipt {
     pub outcome: Result<Restored, HistoryRejection>,
 }
 
-/// What a step through history changed. Inventories that follow receipts have to follow this as well.
+/// What a step through history changed. Inventories that follow receipts have to follow this as well; what fell as loose
+/// pieces is among it here, though it is not among a receipt's `removed`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restored {
     /// Box around all samples that changed.
