@@ -50,6 +50,8 @@ mod body;
 mod bombs;
 mod day;
 mod debris;
+#[path = "../shared/display.rs"]
+mod display;
 mod film;
 mod form;
 mod frames;
@@ -158,7 +160,7 @@ fn main() -> ExitCode {
         }
         return tour::run(&options, renderer);
     }
-    if options.headless || !has_display() || renderer.is_none() {
+    if options.headless || !display::has_display() || renderer.is_none() {
         return script::run(&options, renderer);
     }
     // The one that was found knows nothing of windows: the window's app gets its own.
@@ -217,9 +219,4 @@ fn open_window(options: &Options) -> App {
         app.add_plugins(tell::TellPlugin);
     }
     app
-}
-
-/// Can a window be opened? The examples are built for X11 on Linux; elsewhere there is always a desktop.
-fn has_display() -> bool {
-    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }

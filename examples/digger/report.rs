@@ -101,6 +101,8 @@ pub struct Report {
     pub pictures: Vec<PathBuf>,
     pub frames: FrameTimes,
     pub drawn: FrameTimes,
+    /// How long until the land was there and painted, and all in all.
+    pub ready: Duration,
     pub took: Duration,
 }
 
@@ -118,9 +120,10 @@ impl fmt::Display for Report {
         let renderer = self.renderer.as_deref().unwrap_or("no renderer, hence no pictures");
         writeln!(
             f,
-            "digger: {} x {} voxels, {renderer}, {:.0} s",
+            "digger: {} x {} voxels, {renderer}, ready after {:.1} s, {:.0} s in all",
             self.size.0,
             self.size.1,
+            self.ready.as_secs_f64(),
             self.took.as_secs_f64()
         )?;
         writeln!(f, "  edits         {} applied, {} rejected", logbook.applied, logbook.rejected)?;

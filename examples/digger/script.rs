@@ -54,6 +54,7 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> 
     let bar = ProgressBar::new_spinner().with_message("loading the landscape");
     bar.enable_steady_tick(Duration::from_millis(100));
     let studio = Studio::open(options, renderer)?;
+    let ready = start.elapsed();
     let places: Places = studio.resource();
     let mut stage = Stage { studio, bar };
     stage.prepare(&places);
@@ -65,7 +66,8 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> 
     stage.pit(places.corner)?;
     stage.seam(&places.hillside)?;
     stage.bar.set_message("checking every seam");
-    let report = stage.report(&places, start)?;
+    let report = stage.report(&places)?;
+    let report = Report { ready, took: start.elapsed(), ..report };
     stage.bar.finish_and_clear();
     Ok(report)
 }
@@ -215,7 +217,7 @@ impl Stage {
         hand.set_radius(Tool::Builder, 3.0);
     }
 
-    fn report(&mut self, places: &Places, start: Instant) -> Result<Report> {
+    fn report(&mut self, places: &Places) -> Result<Report> {
         let renderer = self.studio.renderer();
         let engine: BurrowEngine = self.studio.resource();
         let (engine, figures) = (engine.state(), engine.figures());
@@ -237,7 +239,8 @@ impl Stage {
             stages: (figures.cpu, figures.cuda),
             frames: self.studio.frames.clone(),
             drawn: self.studio.drawn.clone(),
-            took: start.elapsed(),
+            ready: Duration::ZERO,
+            took: Duration::ZERO,
         })
     }
 }
