@@ -66,12 +66,12 @@ impl Parts {
         self.indices.clear();
     }
 
-    /// The vertices and indices of the part with this number.
-    pub fn get(&self, number: usize) -> (&[Vertex], &[u16]) {
-        let start = number.checked_sub(1).map(|before| &self.list[before]);
-        let (vertex, index) = start.map_or((0, 0), |before| (before.vertices, before.indices));
-        let part = &self.list[number];
-        (&self.vertices[vertex..part.vertices], &self.indices[index..part.indices])
+    /// The vertices and indices of the part with this number, if there is one.
+    pub fn get(&self, number: usize) -> Option<(&[Vertex], &[u16])> {
+        let part = self.list.get(number)?;
+        let before = number.checked_sub(1).and_then(|before| self.list.get(before));
+        let (vertex, index) = before.map_or((0, 0), |before| (before.vertices, before.indices));
+        Some((self.vertices.get(vertex..part.vertices)?, self.indices.get(index..part.indices)?))
     }
 
     /// Each part with its vertices and its indices.

@@ -111,15 +111,17 @@ fn mesh_blocks(
 /// The surfaces of chunks with the parts of these blocks in place of old ones.
 fn assemble(world: &World, blocks: &[Block], parts: &[Parts]) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
     // Of each list, the block that its parts begin with.
-    let mut firsts = Vec::with_capacity(parts.len());
-    parts.iter().fold(0, |first, parts| {
-        firsts.push(first);
-        first + parts.list.len()
-    });
+    let count = |end: &mut usize, parts: &Parts| {
+        let first = *end;
+        *end += parts.list.len();
+        Some(first)
+    };
+    let firsts: Vec<usize> = parts.iter().scan(0, count).collect();
     let fresh = |&number: &u32| {
-        let list = firsts.partition_point(|&first| first <= number as usize).saturating_sub(1);
-        let (vertices, indices) = parts[list].get(number as usize - firsts[list]);
-        Fresh { key: key(blocks[number as usize].brick), vertices, indices }
+        let number = number as usize;
+        let list = firsts.partition_point(|&first| first <= number).checked_sub(1)?;
+        let (vertices, indices) = parts.get(list)?.get(number - firsts[list])?;
+        Some(Fresh { key: key(blocks[number].brick), vertices, indices })
     };
     let chunk = |number: u32| blocks[number as usize].chunk;
     let mut order = order_of_places(blocks, |block| block.chunk.as_ivec3().to_array());
@@ -129,7 +131,7 @@ fn assemble(world: &World, blocks: &[Block], parts: &[Parts]) -> Vec<(ChunkPos, 
         let chunk = chunk(numbers[0]);
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
-        Some((chunk, Arc::new(old.updated(numbers.iter().map(fresh))?)))
+        Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh))?)))
     };
     if blocks.len() >= PARALLEL_PARTS {
         chunks.par_iter_mut().filter_map(update).collect()
