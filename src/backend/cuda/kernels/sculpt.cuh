@@ -53,7 +53,7 @@ __device__ inline i32 face(i32 number) {
 __device__ inline bool middle_of(const Marked* own, i32& middle) {
     middle = density(*own);
     if (!is_cut(*own)) return true;
-    i32 sign = sign_of(middle), nearest = DEPTH;
+    i32 sign = sign_of(middle), nearest = 1 << 30;
     bool is_known = false;
 #pragma unroll
     for (i32 i = 0; i < 6; i++) {

@@ -19,6 +19,15 @@ fn a_device_that_can_not_be_opened_is_no_device() {
     }
 }
 
+#[test]
+#[ignore = "takes the emulator a minute"]
+fn a_device_passes_the_whole_trial() {
+    let Some(device) = device() else { return };
+    let name = device.name();
+    let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, || Ok(device)));
+    assert_eq!(engine.wait(Duration::from_secs(600)), EngineState::Cuda(name));
+}
+
 /// What the test below starts in a process of its own.
 #[test]
 #[ignore = "looks at the machine's driver"]

@@ -156,7 +156,10 @@ fn edits_at_the_ends_of_the_lattice_are_those_of_the_cpu() {
 
 /// A brick that no brush would leave behind: any density beside any other, many of them cut off.
 fn noise_brick(rng: &mut Rng) -> Brick {
+    // Some are so deep that what was cut off is nearer the surface than all around it.
+    let deep = [0, 0, 1, -1][rng.usize(0..4)];
     let mut sample = || match rng.u32(0..6) {
+        kind if deep != 0 => deep * if kind == 0 { DEPTH as i16 } else { rng.i16(900..1500) },
         0 => DEPTH as i16,
         1 => -DEPTH as i16,
         2 => rng.i16(..),
