@@ -246,7 +246,7 @@ fn sweep(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
         "dirty blocks", "CPU", "CUDA", "Auto"
     );
     let mut worst = 0.0f64;
-    for count in [1, 2, 4, 8, 16, 32, 64, 128, 256, 512] {
+    for count in [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024] {
         let mut times = [(); 3].map(|()| Times::default());
         let mut ratios = Sample::default();
         let mut blocks = 0;
