@@ -163,15 +163,23 @@ struct Outcome {
     hash: u64,
     /// The stages that went to the card.
     on_card: u64,
+    /// What was expected of processor and card, in milliseconds: all choices together.
+    expected: [f64; 2],
 }
 
 /// Runs a transaction, which stays as it is.
 fn run(transaction: &Transaction, engine: &Engine) -> Outcome {
-    let before = engine.figures().cuda;
+    let before = engine.figures();
     let commit = transaction.clone().run_on(engine);
-    let on_card = engine.figures().cuda - before;
+    let figures = engine.figures();
+    let on_card = figures.cuda - before.cuda;
+    let fresh = (figures.cuda + figures.cpu - before.cuda - before.cpu) as usize;
+    let estimates = figures.choices.iter().rev().take(fresh).filter_map(|choice| choice.estimate);
+    let expected = estimates.fold([0.0; 2], |[cpu, cuda], estimate| {
+        [cpu + estimate.cpu.as_secs_f64() * 1e3, cuda + estimate.cuda.as_secs_f64() * 1e3]
+    });
     let hash = commit.sample_hash();
-    Outcome { commit, hash, on_card }
+    Outcome { commit, hash, on_card, expected }
 }
 
 fn main() {
@@ -207,7 +215,7 @@ fn main() {
         brushes.iter().for_each(|brush| terrain.submit(brush));
         let transaction = terrain.begin().expect("brushes wait");
         let mut times = [const { Vec::new() }; 3];
-        let (mut hashes, mut vertices, mut on_card) = (Vec::new(), 0, [0; 3]);
+        let (mut hashes, mut vertices, mut on_card, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
         // The first round warms memory and threads.
         for round in 0..=arguments.repeats {
             // In turns: whoever comes later finds caches warm.
@@ -216,6 +224,8 @@ fn main() {
                 let outcome = run(&transaction, engine);
                 hashes.push(outcome.hash);
                 on_card[i] = outcome.on_card;
+                // In the end, of Auto.
+                expected = if i == 2 { outcome.expected } else { expected };
                 let meshes = outcome.commit.meshes.chunks.iter();
                 vertices = meshes.map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
                 if round > 0 {
@@ -226,6 +236,8 @@ fn main() {
         let [cpu, cuda, auto] = times.map(|times| format!("{:>9.2}", median(times)));
         println!("{:<24}{:>9}{vertices:>10}{cpu}{cuda}{auto}", scene.name, brushes.len());
         assert!(hashes.windows(2).all(|pair| pair[0] == pair[1]), "all engines make the same world");
+        let [cpu, cuda] = expected;
         println!("{:<24}stages on the card: {on_card:?}; samples {:016x} on all", "", hashes[0]);
+        println!("{:<24}Auto expected {cpu:.1} ms of the processor, {cuda:.1} of the card", "");
     }
 }

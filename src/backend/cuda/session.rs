@@ -119,7 +119,7 @@ fn record_bytes(brick: &Brick) -> usize {
 }
 
 /// How many bricks are looked at to see how many are missing.
-const LOOKS: usize = 32;
+const LOOKS: usize = 128;
 
 /// Of what a device may use, the part for stacks.
 const STACKS_SHARE: usize = 8;
@@ -173,15 +173,21 @@ impl Session {
         self.missing(view.samples, blocks.len(), |at| blocks[at].brick)
     }
 
-    /// How many of so many bricks are not here, with the stacks that they belong to; judged by some of them.
+    /// How many of so many bricks, sorted by place, are not here, with the stacks that they belong to; judged by some of
+    /// them. One that is needed several times counts where it comes first.
     fn missing(&self, view: SampleView, count: usize, pos: impl Fn(usize) -> BrickPos) -> usize {
         let step = count.div_ceil(LOOKS).max(1);
+        let stack = |pos: BrickPos| (pos.0.x, pos.0.z);
+        let is_here = |brick: &Brick| self.bricks.find(brick.tag.get()).is_some();
         let mut missing = 0;
         for at in (0..count).step_by(step) {
-            let pos = pos(at);
-            let is_here = |brick: &Brick| self.bricks.find(brick.tag.get()).is_some();
-            missing += usize::from(view.brick(pos).is_some_and(|brick| !is_here(brick)));
-            missing += usize::from(self.stacks.find(view.ground(), (pos.0.x, pos.0.z)).is_none());
+            let (own, before) = (pos(at), at.checked_sub(1).map(&pos));
+            if before != Some(own) {
+                missing += usize::from(view.brick(own).is_some_and(|brick| !is_here(brick)));
+            }
+            if before.map(stack) != Some(stack(own)) {
+                missing += usize::from(self.stacks.find(view.ground(), stack(own)).is_none());
+            }
         }
         missing * step
     }
