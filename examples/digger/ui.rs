@@ -134,7 +134,9 @@ fn forget_focus(mut focus: ResMut<Focus>) {
 /// The mouse.
 fn point(
     mut commands: Commands,
-    items: Query<(Entity, &Item, &Interaction), Changed<Interaction>>,
+    items: Query<(Entity, &Interaction), (With<Item>, Changed<Interaction>)>,
+    hovered: Query<(&Item, &Interaction)>,
+    mut moves: MessageReader<CursorMoved>,
     arrows: Query<(&Arrow, &Interaction, &ChildOf), Changed<Interaction>>,
     parents: Query<&ChildOf>,
     all: Query<&Item>,
@@ -142,13 +144,16 @@ fn point(
     mut focus: ResMut<Focus>,
 ) {
     let listens = deaf.is_none();
-    for (entity, item, interaction) in &items {
-        match interaction {
-            Interaction::Pressed if !listens => {}
-            Interaction::Pressed => commands.trigger(Chosen { entity }),
-            Interaction::Hovered => focus.0 = item.0,
-            Interaction::None => {}
+    for (entity, interaction) in &items {
+        if *interaction == Interaction::Pressed && listens {
+            commands.trigger(Chosen { entity });
         }
+    }
+    // A page that opens below a mouse that rests lights its first item, and not the one that happens to be there.
+    if moves.read().count() > 0
+        && let Some((item, _)) = hovered.iter().find(|(_, interaction)| **interaction == Interaction::Hovered)
+    {
+        focus.0 = item.0;
     }
     for (arrow, interaction, parent) in &arrows {
         let owner = std::iter::once(parent.parent()).chain(parents.iter_ancestors(parent.parent()));
