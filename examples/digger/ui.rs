@@ -94,6 +94,7 @@ pub struct UiPlugin;
 impl Plugin for UiPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Focus>()
+            .add_message::<CursorMoved>()
             .add_systems(
                 PreUpdate,
                 press_keys
