@@ -3,6 +3,7 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
@@ -110,11 +111,7 @@ impl Film {
 
     /// Draws a frame into a file.
     fn expose(&mut self) -> Result {
-        let Some(image) = self.studio.film.clone() else {
-            self.studio.app.update();
-            self.drawn += 1;
-            return Ok(());
-        };
+        let image = self.studio.film.clone().ok_or("there is nothing to draw with")?;
         let path = self.path(self.drawn);
         let mut save = save_to_disk(path.clone());
         let develop = move |picture: On<ScreenshotCaptured>,
@@ -139,9 +136,6 @@ impl Film {
     /// # Errors
     /// When they don't come, or can't be written.
     pub fn develop(&mut self, on_their_way: usize) -> Result {
-        if self.studio.film.is_none() {
-            return Ok(());
-        }
         let start = Instant::now();
         while self.studio.world().resource::<Developed>().0 + on_their_way < self.drawn {
             if start.elapsed() > PATIENCE {
@@ -185,4 +179,37 @@ pub fn clear(folder: &Path) -> Result {
 fn is_all_ready(terrains: Terrains) -> bool {
     const FAR: f32 = 1.0e5;
     terrains.is_ready(Vec3::splat(-FAR), Vec3::splat(FAR))
+}
+
+/// Frames to a video, so many of them a second. Where there is no ffmpeg, frames are all there is to be.
+pub fn join(folder: &Path, rate: f32, frames: usize) -> ExitCode {
+    let rate = rate.to_string();
+    let video = folder.join("tour.mp4");
+    let arguments = ["-y", "-loglevel", "error", "-framerate", &rate, "-i"];
+    // The colours of a video go by twos, so its sides have to.
+    let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
+    let count = frames.to_string();
+    let encoding = ["-frames:v", &count, "-vf", even, "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"];
+    let pattern = folder.join("frame_%05d.png");
+    let mut ffmpeg = Command::new("ffmpeg");
+    match ffmpeg.args(arguments).arg(&pattern).args(encoding).arg(&video).status() {
+        Ok(status) if status.success() => {
+            println!("video: {}", video.display());
+            ExitCode::SUCCESS
+        }
+        Ok(status) => {
+            eprintln!("ffmpeg made no video: {status}");
+            ExitCode::FAILURE
+        }
+        Err(_) => {
+            println!(
+                "There is no ffmpeg here. Where there is: ffmpeg {} {} {} {}",
+                arguments.join(" "),
+                pattern.display(),
+                encoding.join(" "),
+                video.display()
+            );
+            ExitCode::SUCCESS
+        }
+    }
 }

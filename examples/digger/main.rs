@@ -20,8 +20,8 @@
 //! | `F1` `F3` | panel, frame times |
 //! | `H`, `Esc` | help, pause |
 //!
-//! A gamepad does that too, all but the panel and the frame times, with `--features examples,gamepad`; its shoulders go
-//! through the tools, and its sticks through the menus.
+//! A gamepad does that too, all but the panel and the frame times, with `--features examples,gamepad`: its sticks walk and
+//! look, its shoulders go through the tools, and its left stick or its cross through the menus.
 //! The title leads on with a game that was left, or begins a new one: fresh land, and nothing in the bag.
 //!
 //! Without a display or a graphics adapter, or with `--headless`, it plays a script instead: a walk up to a hillside, a

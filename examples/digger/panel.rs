@@ -29,8 +29,9 @@ fn share_input(app: &mut App) {
             Update,
             (
                 toggle.run_if(in_state(Phase::Playing)),
-                (phase::leave_mouse, listen, player::stand_still, tools::put_down).run_if(panel_opened),
-                (phase::take_mouse, listen).run_if(panel_closed.and_then(in_state(Phase::Playing))),
+                (phase::leave_mouse, phase::listen, player::stand_still, tools::put_down)
+                    .run_if(panel_opened),
+                (phase::take_mouse, phase::listen).run_if(panel_closed.and_then(in_state(Phase::Playing))),
             )
                 .chain()
                 .before(Playing),
@@ -54,11 +55,6 @@ fn toggle(actions: Res<Actions>, mut panel: ResMut<BurrowPanel>) {
     if actions.just_pressed(Action::Panel) {
         panel.is_open = !panel.is_open;
     }
-}
-
-/// A click on the panel digs nothing once it is closed.
-fn listen(mut actions: ResMut<Actions>) {
-    actions.forget();
 }
 
 fn close(mut panel: ResMut<BurrowPanel>) {

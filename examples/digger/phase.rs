@@ -49,8 +49,8 @@ fn close_menus(mut page: ResMut<NextState<Page>>) {
     page.set(Page::None);
 }
 
-/// The click that chose "dig" digs nothing.
-fn listen(mut actions: ResMut<Actions>) {
+/// The click that chose "dig" digs nothing, and neither does one on the panel once it is closed.
+pub fn listen(mut actions: ResMut<Actions>) {
     actions.forget();
 }
 

@@ -92,8 +92,7 @@ impl Hillside {
     /// The middle of the room.
     pub fn room(&self) -> Vec3 {
         let [_, _, end] = self.floor();
-        end + Vec3::new(self.onward.x, 0.0, self.onward.y) * (ROOM_RADIUS - 2.0)
-            + Vec3::Y * (ROOM_RADIUS - 2.0)
+        end + flat(self.onward) * (ROOM_RADIUS - 2.0) + Vec3::Y * (ROOM_RADIUS - 2.0)
     }
 }
 
@@ -173,8 +172,7 @@ impl Relief<'_> {
         let tunnel = along(mouth, bend).skip(4).chain(along(bend, end)).all(|place| under(place, roof));
         let room = hillside.room();
         let around = (0..8).map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 8.0) * ROOM_RADIUS);
-        tunnel
-            && around.into_iter().all(|offset| under(room + Vec3::new(offset.x, 0.0, offset.y), ROOM_RADIUS))
+        tunnel && around.into_iter().all(|offset| under(room + flat(offset), ROOM_RADIUS))
     }
 
     /// Two banks of one height, along an axis so that a bridge has straight edges, over ground at least 7 lower.
@@ -224,4 +222,9 @@ impl Relief<'_> {
         });
         found.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(score, _)| *score < 20.0).map(|(_, corner)| corner)
     }
+}
+
+/// A level way in the world.
+pub fn flat(way: Vec2) -> Vec3 {
+    Vec3::new(way.x, 0.0, way.y)
 }

@@ -1,8 +1,8 @@
 //! What a tool would change, drawn on the ground.
 
 use bevy::prelude::*;
+use bevy_burrow::debug::draw_shape;
 
-use crate::form::Form;
 use crate::phase::Phase;
 use crate::player::Playing;
 use crate::tools::{Hand, Tool};
@@ -24,29 +24,18 @@ fn lift_gizmos(mut store: ResMut<GizmoConfigStore>) {
     config.line.width = 1.5;
 }
 
-/// The rim of what a tool would change, laid on the ground.
+/// The rim of what a tool would change, laid on the ground, or the body that it would build.
 fn show_preview(hand: Res<Hand>, mut gizmos: Gizmos) {
     let Some(aim) = hand.aim.filter(|_| hand.preview) else { return };
     let colour = Color::srgba(1.0, 0.85, 0.25, 0.75);
     let radius = hand.radius(hand.tool);
-    match (hand.tool, hand.form) {
-        (Tool::Pickaxe | Tool::Shovel | Tool::Drill | Tool::Painter, _) => {
+    match hand.tool {
+        Tool::Pickaxe | Tool::Shovel | Tool::Drill | Tool::Painter => {
             let flat = Quat::from_rotation_arc(Vec3::Z, aim.normal.normalize_or(Vec3::Y));
             let place = aim.place + aim.normal * 0.05;
             gizmos.circle(Isometry3d::new(place, flat), radius, colour).resolution(48);
         }
-        (Tool::Builder, Form::Sphere) => {
-            gizmos.sphere(aim.place, radius, colour).resolution(48);
-        }
-        (Tool::Builder, Form::Cube) => {
-            gizmos.cube(Transform::from_translation(aim.place).with_scale(Vec3::splat(2.0 * radius)), colour);
-        }
-        (Tool::Builder, Form::Capsule) => {
-            let end = aim.place + aim.along * 3.0 * radius;
-            gizmos.sphere(aim.place, radius, colour).resolution(32);
-            gizmos.sphere(end, radius, colour).resolution(32);
-            gizmos.line(aim.place, end, colour);
-        }
-        (Tool::Bomb | Tool::Lamp, _) => {}
+        Tool::Builder => draw_shape(&mut gizmos, &hand.form.shape(&aim, radius), colour),
+        Tool::Bomb | Tool::Lamp => {}
     }
 }

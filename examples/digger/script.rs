@@ -11,7 +11,7 @@ use bevy_burrow::terrain::World as Model;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Options;
-use crate::places::{Hillside, Places, Ravine, TUNNEL_RADIUS};
+use crate::places::{Hillside, Places, Ravine, TUNNEL_RADIUS, flat};
 use crate::report::{Logbook, Report};
 use crate::studio::Studio;
 use crate::tools::{Hand, Tool};
@@ -243,9 +243,4 @@ impl Stage {
             took: Duration::ZERO,
         })
     }
-}
-
-/// A level way in the world.
-fn flat(way: Vec2) -> Vec3 {
-    Vec3::new(way.x, 0.0, way.y)
 }

@@ -359,10 +359,9 @@ impl Studio {
 
     /// Takes a picture from anywhere.
     pub fn shoot_from(&mut self, name: &str, eye: Vec3, at: Vec3) -> Result {
-        let place = Transform::from_translation(eye).looking_at(at, Vec3::Y);
-        self.app.world_mut().entity_mut(self.eyes).insert((Drone, place));
+        self.fly_to(eye, at);
         let shot = self.shoot(name);
-        self.app.world_mut().entity_mut(self.eyes).remove::<Drone>();
+        self.land();
         shot
     }
 

@@ -1,7 +1,6 @@
 //! A minute of play, as a film: a flight, a pickaxe, a tunnel, bombs, a bridge, a sunset, and lamps in a cave.
 
-use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use bevy::math::cubic_splines::{CubicCardinalSpline, CubicCurve, CubicGenerator};
@@ -13,13 +12,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::Options;
 use crate::art::Art;
 use crate::day::{AFTERNOON, Clock};
-use crate::film::{Film, clear};
+use crate::film::{Film, clear, join};
 use crate::held::ShowHand;
 use crate::hud::ShowHud;
 use crate::input::Action;
 use crate::landscape::CONCRETE;
 use crate::particles::{Burst, Matter};
-use crate::places::{Hillside, Places};
+use crate::places::{Hillside, Places, flat};
 use crate::studio::Studio;
 use crate::tools::{Hand, Tool};
 use crate::ui;
@@ -50,44 +49,11 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
                 took.as_secs_f64(),
                 options.out.display()
             );
-            join(&options.out, options.fps, frames)
+            join(&options.out, (frames as f32 / ALL).clamp(1.0, options.fps as f32), frames)
         }
         Err(error) => {
             eprintln!("The tour failed: {error}");
             ExitCode::FAILURE
-        }
-    }
-}
-
-/// Frames to a video. Where there is no ffmpeg, frames are all there is to be.
-fn join(folder: &Path, fps: u32, frames: usize) -> ExitCode {
-    let rate = (frames as f32 / ALL).clamp(1.0, fps as f32).to_string();
-    let video = folder.join("tour.mp4");
-    let arguments = ["-y", "-loglevel", "error", "-framerate", &rate, "-i"];
-    // The colours of a video go by twos, so its sides have to.
-    let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
-    let count = frames.to_string();
-    let encoding = ["-frames:v", &count, "-vf", even, "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"];
-    let pattern = folder.join("frame_%05d.png");
-    let mut ffmpeg = Command::new("ffmpeg");
-    match ffmpeg.args(arguments).arg(&pattern).args(encoding).arg(&video).status() {
-        Ok(status) if status.success() => {
-            println!("video: {}", video.display());
-            ExitCode::SUCCESS
-        }
-        Ok(status) => {
-            eprintln!("ffmpeg made no video: {status}");
-            ExitCode::FAILURE
-        }
-        Err(_) => {
-            println!(
-                "There is no ffmpeg here. Where there is: ffmpeg {} {} {} {}",
-                arguments.join(" "),
-                pattern.display(),
-                encoding.join(" "),
-                video.display()
-            );
-            ExitCode::SUCCESS
         }
     }
 }
@@ -447,9 +413,4 @@ fn centre(shape: &Shape) -> Vec3 {
         Shape::Cylinder { base, axis, .. } | Shape::Cone { base, axis, .. } => base + axis / 2.0,
         Shape::Capsule { from, to, .. } => from.midpoint(to),
     }
-}
-
-/// A level way in the world.
-fn flat(way: Vec2) -> Vec3 {
-    Vec3::new(way.x, 0.0, way.y)
 }

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
 use crate::landscape::{CLAY, COAL, CONCRETE, GOLD, ROCK};
-use crate::places::{Hillside, ROOM_RADIUS, Ravine, TUNNEL_RADIUS};
+use crate::places::{Hillside, ROOM_RADIUS, Ravine, TUNNEL_RADIUS, flat};
 
 /// Metres of tunnel that one brush digs.
 const ROUND: f32 = 4.0;
@@ -46,7 +46,7 @@ pub fn tunnel_length(hillside: &Hillside) -> f32 {
 /// The room: a hollow with a pillar, and veins of ore in its walls.
 pub fn room(hillside: &Hillside) -> Vec<Brush> {
     let middle = hillside.room();
-    let onward = Vec3::new(hillside.onward.x, 0.0, hillside.onward.y);
+    let onward = flat(hillside.onward);
     let aside = onward.cross(Vec3::Y);
     let dig = |place: Vec3, radius: f32| {
         Brush::dig(Shape::sphere(place, radius)).with_roughness(Roughness::new(0.9, 4.5, 11))
@@ -74,7 +74,7 @@ pub fn room(hillside: &Hillside) -> Vec<Brush> {
 /// Seams of clay and coal around the second leg of the tunnel, a little tilted, and nests of gold.
 pub fn strata(hillside: &Hillside) -> Vec<Brush> {
     let [_, bend, end] = hillside.floor();
-    let onward = Vec3::new(hillside.onward.x, 0.0, hillside.onward.y);
+    let onward = flat(hillside.onward);
     let aside = onward.cross(Vec3::Y);
     let middle = bend.midpoint(end);
     let turn = Quat::from_rotation_arc(Vec3::X, onward) * Quat::from_euler(EulerRot::ZYX, 0.10, 0.0, 0.06);

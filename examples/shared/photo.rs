@@ -48,6 +48,10 @@ impl Photographer {
     /// # Errors
     /// When it is not written, or shows nothing.
     pub fn shoot(&self, app: &mut App, path: &Path) -> Result {
+        // An old one would be taken for it.
+        if path.exists() {
+            std::fs::remove_file(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        }
         self.film_runs(app, true);
         (0..4).for_each(|_| draw(app));
         let before = app.world().resource::<Developed>().0;

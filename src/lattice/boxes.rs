@@ -69,10 +69,10 @@ impl LatticeBox {
         size.x.saturating_mul(size.y).saturating_mul(size.z)
     }
 
-    /// Every point of the box, x fastest, then z, then y.
+    /// Every point of the box, x fastest, then z, then y; none of one turned inside out.
     pub fn points(self) -> impl Iterator<Item = IVec3> {
         let Self { min, max } = self;
-        let mut next = Some(min);
+        let mut next = Self::new(min, max).map(|own| own.min);
         std::iter::from_fn(move || {
             let point = next?;
             next = if point.x < max.x {
@@ -120,6 +120,8 @@ mod tests {
         let flat = LatticeBox { min: IVec3::MIN.with_y(3), max: IVec3::new(i32::MAX, 3, i32::MIN) };
         assert_eq!(flat.volume(), 1 << 32);
         // Turned inside out.
-        assert_eq!(LatticeBox { min: IVec3::MAX, max: IVec3::MIN }.volume(), 0);
+        let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
+        assert_eq!((nothing.volume(), nothing.points().count()), (0, 0));
+        assert_eq!(LatticeBox { min: IVec3::X, max: IVec3::new(0, 3, 3) }.points().count(), 0);
     }
 }

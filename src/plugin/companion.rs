@@ -9,7 +9,7 @@ use super::ShownSurface;
 use super::meshes::{Ready, Wardrobe};
 use crate::lattice::ChunkGrid;
 use crate::surface::SurfaceMesh;
-use crate::terrain::{Drawn, World};
+use crate::terrain::Drawn;
 
 /// A tile or chunk that a task works on.
 #[derive(Clone, Copy, Debug)]
@@ -41,14 +41,6 @@ impl Part {
             Drawn::Chunk(chunk) => grid.origin(chunk),
         };
         Self { terrain, drawn, origin, size: grid.size(), voxel_size, revision }
-    }
-
-    /// The surface of this part in a world of the right revision.
-    pub(crate) fn surface_in(&self, world: &World) -> SurfaceMesh {
-        match self.drawn {
-            Drawn::Tile(tile) => world.tile_mesh(tile),
-            Drawn::Chunk(chunk) => world.chunk_mesh(chunk),
-        }
     }
 }
 

@@ -1,6 +1,5 @@
 //! New terrains: all their meshes are made in a task, and shown in one frame when all of them are there.
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -102,7 +101,8 @@ fn make_all(world: &World, workshop: &Workshop, (terrain, voxel_size): (Entity, 
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
     let make = |&drawn: &Drawn| {
         let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
-        workshop.make(&part, false, || Cow::Owned(part.surface_in(world)))
+        let recipe = world.recipe(drawn);
+        workshop.make(&part, false, || recipe.surface())
     };
     all.par_iter().map(make).collect()
 }

@@ -18,18 +18,18 @@ use crate::lattice::{ChunkGrid, Column, ONE, TilePos};
 pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
     let borders = borders(world, tile);
     let rings = Rings::new(world, tile, &borders);
-    let mut vertices = columns(world.samples.ground(), world.grid, tile);
-    vertices.extend_from_slice(&rings.vertices);
+    let vertices = vertices(world.samples.ground(), world.grid, tile, &rings);
     SurfaceMesh { vertices, indices: indices(world.grid, tile, &borders, &rings) }
 }
 
-/// The vertices of a tile's columns, x fastest.
-pub fn columns(ground: &Ground, grid: ChunkGrid, tile: TilePos) -> Vec<Vertex> {
+/// The vertices of a tile: those of its columns, x fastest, then those of its rings.
+pub fn vertices(ground: &Ground, grid: ChunkGrid, tile: TilePos, rings: &Rings) -> Vec<Vertex> {
     let (low, high) = grid.tile_cells(tile);
-    let mut vertices = Vec::with_capacity(column_count(low, high) as usize);
+    let mut vertices = Vec::with_capacity(column_count(low, high) as usize + rings.vertices.len());
     for z in low.z..=high.z {
         vertices.extend((low.x..=high.x).map(|x| height_vertex(ground, Column::new(x, z), low.at(0))));
     }
+    vertices.extend_from_slice(&rings.vertices);
     vertices
 }
 

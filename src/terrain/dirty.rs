@@ -26,13 +26,12 @@ const PARALLEL_PLACES: usize = 512;
 pub(super) type ByBrick = Vec<(BrickPos, LatticeBox)>;
 
 /// The cells that changed samples show in.
-pub(super) fn dirty_cells(grid: ChunkGrid, changed: &[DraftedBrick]) -> ByBrick {
+pub(super) fn dirty_cells(grid: ChunkGrid, changed: impl Iterator<Item = (BrickPos, LatticeBox)>) -> ByBrick {
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
-    let around = |drafted: &DraftedBrick| {
-        let (x, changed) = (drafted.pos.0.x, drafted.changed);
-        in_world(grid, changed.min - 2, changed.max + 1).map(|cells| (x, cells))
+    let around = |(pos, changed): (BrickPos, LatticeBox)| {
+        in_world(grid, changed.min - 2, changed.max + 1).map(|cells| (pos.0.x, cells))
     };
-    by_brick(&changed.iter().filter_map(around).collect::<Vec<_>>())
+    by_brick(&changed.filter_map(around).collect::<Vec<_>>())
 }
 
 /// The bricks of whose sheet a cell may join the mask: one that a sample edited for the first time is a corner of.

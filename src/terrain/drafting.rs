@@ -51,8 +51,8 @@ impl Drafting<'_> {
         let mut all = Draft { hash: world.sample_hash, ..Draft::default() };
         let mut bricks: BTreeMap<[i32; 3], DraftedBrick> = BTreeMap::new();
         let mut known = world.uniform.clone();
-        // Under rules an edit looks at what those before it left, so each comes by itself.
-        let is_free = |edit: &Edit| world.rules().is_none() && !can_remove(edit);
+        // Where one reads what another one left, `Draft::make` sees to it.
+        let is_free = |edit: &Edit| !can_remove(edit);
         for group in edits.chunk_by(|a, b| is_free(a) && is_free(b)) {
             let base = world.samples().over(&over);
             let Draft { bricks: mut drafted, mut effects, hash, uniform } =

@@ -24,7 +24,7 @@ mod loose;
 mod query;
 mod ray;
 mod receipt;
-#[cfg(any(feature = "avian", test))]
+#[cfg(any(feature = "plugin", test))]
 mod recipe;
 mod redraw;
 mod steps;

@@ -43,11 +43,10 @@ impl SurfaceRecipe {
     pub fn surface(&self) -> Cow<'_, SurfaceMesh> {
         match &self.0 {
             Source::Nothing => Cow::default(),
-            Source::Tile { tile, grid, ground, borders, rings } => {
-                let mut vertices = tile::columns(ground, *grid, *tile);
-                vertices.extend_from_slice(rings.vertices());
-                Cow::Owned(SurfaceMesh { vertices, indices: tile::indices(*grid, *tile, borders, rings) })
-            }
+            Source::Tile { tile, grid, ground, borders, rings } => Cow::Owned(SurfaceMesh {
+                vertices: tile::vertices(ground, *grid, *tile, rings),
+                indices: tile::indices(*grid, *tile, borders, rings),
+            }),
             Source::Chunk(surface) => Cow::Borrowed(surface.mesh()),
         }
     }

@@ -42,8 +42,7 @@ pub struct TileUpdate {
 impl TileUpdate {
     /// The tile's whole mesh, its columns included.
     pub fn mesh(&self) -> SurfaceMesh {
-        let mut vertices = tile::columns(&self.ground, self.grid, self.tile);
-        vertices.extend_from_slice(self.rings.vertices());
+        let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
         SurfaceMesh { vertices, indices: self.indices.clone() }
     }
 }

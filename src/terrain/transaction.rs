@@ -28,7 +28,7 @@ use crate::brush::Edit;
 use crate::lattice::{ChunkPos, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, Draft, DraftedBrick, Fields, Replaced, UniformBricks, pristine_brick};
+use crate::volume::{Bricks, Draft, Fields, Replaced, UniformBricks, pristine_brick};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.
@@ -99,7 +99,8 @@ impl Transaction {
         let drafted = &draft.bricks;
         let lay =
             || timed(|| drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect());
-        let look = || (timed(|| dirty_cells(world.grid, drafted)), timed(|| sheets_in_reach(world, drafted)));
+        let boxes = || drafted.iter().map(|drafted| (drafted.pos, drafted.changed));
+        let look = || (timed(|| dirty_cells(world.grid, boxes())), timed(|| sheets_in_reach(world, drafted)));
         let ((bricks, edit), ((dirty, meshing), (near, ring))): ((Bricks, _), _) =
             side_by_side(drafted.len(), lay, look);
         stages.edit += edit;
@@ -169,10 +170,7 @@ impl Transaction {
                 let own = replaced.count(&world.ground, *pos, before, after.as_deref());
                 let missing = || Arc::new(pristine_brick(&world.ground, *pos));
                 let brick = after.clone().unwrap_or_else(missing);
-                if let Some(own) = own {
-                    let brick = Arc::clone(&brick);
-                    changed.push(DraftedBrick::new(*pos, brick, own, false));
-                }
+                changed.extend(own.map(|own| (*pos, own)));
                 bricks.insert(*pos, brick);
             }
         });
@@ -183,7 +181,7 @@ impl Transaction {
             mask: MaskView::new(&world.mask).over(&mask),
             grid: world.grid,
         };
-        let dirty = Stages::time(&mut stages.meshing, || dirty_cells(world.grid, &changed));
+        let dirty = Stages::time(&mut stages.meshing, || dirty_cells(world.grid, changed.iter().copied()));
         let meshes = redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
 
         let nothing = Fields::default();
@@ -192,7 +190,7 @@ impl Transaction {
             news_of_replaced(before, after).into_iter().map(|news| (*chunk, news))
         });
         let news = news.collect();
-        let bounds = changed.iter().map(|drafted| drafted.changed).reduce(LatticeBox::union);
+        let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
         let Replaced { removed, added, painted } = replaced;
         let restored = Restored { bounds, removed, added, painted };
         let replaced_bytes = replaced_bytes(world, &change.bricks);

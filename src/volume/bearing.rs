@@ -1,5 +1,5 @@
 //! Where digging rules bear: on which edits, and on which samples of a brick. A world may have thousands of protected
-//! boxes; an edit pays for those that it comes near.
+//! boxes: edits look through them once or twice, bricks through those that are near, and samples look up a bit.
 
 use glam::IVec3;
 

@@ -37,7 +37,8 @@ pub struct DiggingRules {
     pub unbreakable: BTreeSet<MaterialId>,
     /// Nothing solid below this height, in voxels, is taken away.
     pub bedrock: Option<i32>,
-    /// Samples that no operation changes at all, paint included. An edit pays for the boxes that it comes near.
+    /// Samples that no operation changes at all, paint included. An edit looks through all boxes, its bricks
+    /// only through those near the edits of its run.
     pub protected: Vec<LatticeBox>,
 }
 

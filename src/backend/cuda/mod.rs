@@ -7,9 +7,9 @@
 //!           vertices, indices    <--what is used-
 //! ```
 //!
-//! Edits that look around, sculpting ones and all under rules, take a kernel of their own, which gets windows of bricks too.
-//! They come run by run, as the processor takes them: what one run changed is on the device already when the next one
-//! reads it. A fault in the middle leaves the runs that came back as they are, and the processor does the rest.
+//! Edits that look around, sculpting ones and those that rules bear on, take a kernel of their own, which gets windows of
+//! bricks too. They come run by run, as the processor takes them: what one run changed is on the device already when the
+//! next one reads it. A fault in the middle leaves the runs that came back as they are, and the processor does the rest.
 //!
 //! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
 //! - [`session`](self::session) keeps bricks and heights on it, with a budget; `slots` says where, and which go first.

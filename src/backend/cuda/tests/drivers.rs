@@ -20,7 +20,7 @@ fn a_device_that_can_not_be_opened_is_no_device() {
 }
 
 #[test]
-#[ignore = "takes the emulator a minute"]
+#[ignore = "every engine does the same when it opens a card; the emulator takes 16 s"]
 fn a_device_passes_the_whole_trial() {
     let Some(device) = device() else { return };
     let name = device.name();
