@@ -4,6 +4,9 @@
 
 mod worlds;
 
+use std::collections::BTreeMap;
+
+use bevy_burrow::lattice::SNAP;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::Vec3;
@@ -61,4 +64,35 @@ fn a_brush_row_over_the_steepest_real_ground_leaves_no_open_edge() {
     let report = terrain.world().check_seams();
     println!("{report}");
     assert!(report.is_flawless(), "{report}");
+}
+
+#[test]
+fn ground_dug_through_the_rim_is_shaded_there_as_it_is_inside() {
+    for (chunk_size, along, across) in [(8, Vec3::X, Vec3::Z), (25, Vec3::Z, Vec3::X)] {
+        let ground = Ground::flat(42, 42, 10.3).expect("finite heights");
+        let settings = TerrainSettings { chunk_size, ..Default::default() };
+        let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
+        let rod = |y: f32, beside: f32| {
+            let middle = across * beside + Vec3::Y * y;
+            Shape::capsule(middle - along * 30.0, middle + along * 72.0, 3.0)
+        };
+        terrain.apply([Brush::dig(rod(10.0, 8.0)), Brush::dig(rod(2.0, 21.0)), Brush::add(rod(11.0, 34.0), MaterialId(2))]);
+
+        // Everything goes straight through the world, so a vertex is shaded like the one beside it, all along.
+        let mut normals: BTreeMap<[i32; 2], Vec3> = BTreeMap::new();
+        let (mut vertices, mut at_rim) = (0, 0);
+        let world = terrain.world();
+        for chunk in world.drawn_chunks() {
+            let mesh = world.chunk_mesh(chunk);
+            for vertex in &mesh.vertices {
+                let place = vertex.position + world.grid().origin(chunk) * SNAP;
+                let [here, beside] = if along == Vec3::X { [place.x, place.z] } else { [place.z, place.x] };
+                let first = *normals.entry([beside, place.y]).or_insert(vertex.normal);
+                assert!(first.distance(vertex.normal) < 1.0e-6, "{place}: {} or {first}", vertex.normal);
+                vertices += 1;
+                at_rim += usize::from(here == 0 || here == 42 * SNAP);
+            }
+        }
+        assert!(vertices > 2_000 && at_rim > 80, "{vertices} vertices, {at_rim} at the rim");
+    }
 }

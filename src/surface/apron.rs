@@ -100,6 +100,40 @@ impl Apron {
             }
         }
     }
+
+    /// Lets densities go on beyond the world's rim, one sample far, as gradients look no further. The rows and layers are
+    /// those that were filled, `columns` those of the world, along x and z.
+    pub fn go_on_beyond(
+        &mut self,
+        [xs, zs]: &[RangeInclusive<usize>; 2],
+        layers: RangeInclusive<usize>,
+        rows: RangeInclusive<usize>,
+    ) {
+        for layer in self.0.chunks_exact_mut(AREA).take(layers.end() + 1).skip(*layers.start()) {
+            for (to, rim, inner) in beyond(zs).filter(|(to, ..)| rows.contains(to)) {
+                for x in 0..SIDE {
+                    layer[to * SIDE + x] = straight_on(layer[rim * SIDE + x], layer[inner * SIDE + x]);
+                }
+            }
+            for (to, rim, inner) in beyond(xs) {
+                for row in layer.chunks_exact_mut(SIDE).take(rows.end() + 1).skip(*rows.start()) {
+                    row[to] = straight_on(row[rim], row[inner]);
+                }
+            }
+        }
+    }
+}
+
+/// The places one beyond the world's, each with the two before it.
+fn beyond(world: &RangeInclusive<usize>) -> impl Iterator<Item = (usize, usize, usize)> {
+    let (first, last) = (*world.start(), *world.end());
+    let before = (first > 0).then(|| (first - 1, first, first + 1));
+    before.into_iter().chain((last + 1 < SIDE).then(|| (last + 1, last, last - 1)))
+}
+
+/// Of two samples in a row, what comes before the first if densities go on as they come.
+fn straight_on(rim: Marked, inner: Marked) -> Marked {
+    ((rim >> 1) * 2 - (inner >> 1)) << 1
 }
 
 /// One row: a sample of the brick before, eight of the middle one, two of the one after. `at` is where the row begins in

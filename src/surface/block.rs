@@ -148,7 +148,11 @@ impl Mesher {
         let (near, far) = (all.trailing_zeros() / Z, all.ilog2() / Z);
         // The apron starts one before the cells; the gradients at the corners beyond them look one further.
         let rows = near as usize..=far as usize + 3;
-        self.apron.fill(around, &stack.heights, bottom..=top + 3, rows);
+        let layers = bottom..=top + 3;
+        self.apron.fill(around, &stack.heights, layers.clone(), rows.clone());
+        if let Some(columns) = stack.rim() {
+            self.apron.go_on_beyond(&columns, layers, rows);
+        }
         self.list_edges(&cubes.solid, &drawn, bottom, top);
         self.crossings.make(&self.apron, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);

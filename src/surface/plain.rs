@@ -8,7 +8,7 @@ use glam::IVec3;
 use super::cases::{self, Edge};
 use super::mask::cell_sheet;
 use super::mesh::SurfaceMesh;
-use super::vertex::{Lattice, WorldView, vertex};
+use super::vertex::{Lattice, WorldView, over_the_rim, vertex};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BRICK, BrickPos, Column, LatticeBox};
 use crate::volume::{Brick, Sample};
@@ -75,7 +75,7 @@ impl<'a> Apron<'a> {
 
 impl Lattice for Apron<'_> {
     fn distance(&self, point: IVec3) -> i32 {
-        self.distances[self.index(point)]
+        over_the_rim(self.world.grid, point, |point| self.distances[self.index(point)])
     }
     fn is_edited(&self, point: IVec3) -> bool {
         self.edited[self.index(point)]

@@ -1,6 +1,8 @@
 //! What all blocks of one stack of bricks share: heights, cells of the mask and the world's rim, normals and materials of
 //! columns.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 
 use super::apron::SIDE;
@@ -56,6 +58,17 @@ impl<'a> Stack<'a> {
             has_mix: [false; 81],
             single: ground.single_material().map(MaterialMix::pure),
         }
+    }
+
+    /// The world's columns along x and along z among those of the apron; `None` where all are.
+    pub fn rim(&self) -> Option<[RangeInclusive<usize>; 2]> {
+        let (grid, all) = (self.view.grid, 0..=SIDE - 1);
+        let own = |low: i32, cells: i32| {
+            let place = |at: i32| (at - low + 1).clamp(0, SIDE as i32 - 1) as usize;
+            place(0)..=place(cells)
+        };
+        let columns = [own(self.low.x, grid.width()), own(self.low.z, grid.depth())];
+        (columns != [all.clone(), all]).then_some(columns)
     }
 
     /// Are the pristine samples of the nine layers from `y` on all solid (`Some(true)`), or all air?

@@ -13,7 +13,7 @@ use crate::volume::SampleView;
 
 /// What the vertex function reads of the world.
 pub trait Lattice {
-    /// Density at a lattice point, 1/256 voxel.
+    /// Density at a lattice point, 1/256 voxel. Gradients look one point beyond the world's rim.
     fn distance(&self, point: IVec3) -> i32;
     /// Was the sample at a lattice point edited?
     fn is_edited(&self, point: IVec3) -> bool;
@@ -38,7 +38,7 @@ pub struct WorldView<'a> {
 
 impl Lattice for WorldView<'_> {
     fn distance(&self, point: IVec3) -> i32 {
-        self.samples.distance(point)
+        over_the_rim(self.grid, point, |point| self.samples.distance(point))
     }
     fn is_edited(&self, point: IVec3) -> bool {
         self.samples.is_edited(point)
@@ -52,6 +52,14 @@ impl Lattice for WorldView<'_> {
     fn is_volumetric(&self, cell: Column) -> Option<bool> {
         self.grid.has_cell(cell).then(|| self.mask.contains(cell))
     }
+}
+
+/// Density at a point, from those of the world's own points. Nobody edits what lies beyond the rim; there densities go on as
+/// they come, in straight lines, so that ground dug at the rim isn't shaded as a wall.
+pub(super) fn over_the_rim(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
+    let last = IVec3::new(grid.width(), point.y, grid.depth());
+    let rim = point.clamp(IVec3::Y * point.y, last);
+    if rim == point { own(point) } else { 2 * own(rim) - own(2 * rim - point) }
 }
 
 const UNIT: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];

@@ -158,13 +158,11 @@ impl World {
         self.spans(x, z).last().map(|span| span.floor)
     }
 
-    /// Is the place inside the ground? Places outside the world are not.
+    /// Is the place inside the ground? Places outside the world are not, and neither is one that is no number.
     pub fn is_solid(&self, place: DVec3) -> bool {
         let spans = self.spans(place.x, place.z);
-        !spans.is_empty()
-            && !spans
-                .iter()
-                .any(|span| span.floor <= place.y && span.ceiling.is_none_or(|top| place.y <= top))
+        let is_open = |span: &Span| span.floor <= place.y && span.ceiling.is_none_or(|top| place.y <= top);
+        !place.y.is_nan() && !spans.is_empty() && !spans.iter().any(is_open)
     }
 
     /// The surface's unit normal where it is nearest to `place` along y, `None` outside the world.

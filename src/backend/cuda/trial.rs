@@ -168,11 +168,12 @@ fn ground() -> Result<Ground, Fault> {
     made.map_err(|error| Fault::Failed(error.to_string()))
 }
 
-/// The middle of a brush at the surface; they lie side by side.
+/// The middle of a brush at the surface; they lie side by side. A small first one reaches as few bricks as a stroke can:
+/// below the smallest amount that was measured nothing is known.
 fn place(ground: &Ground, i: i32, radius: f32) -> Vec3 {
-    let (x, z) = (16 + i % 8 * 31, 16 + i / 8 * 29);
+    let (x, z) = (12 + i % 8 * 31, 12 + i / 8 * 29);
     let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;
-    Vec3::new(x as f32 + 0.3, height - 0.2 * radius, z as f32 - 0.4)
+    Vec3::new(x as f32 - 0.3, height - 0.2 * radius, z as f32 - 0.4)
 }
 
 /// Rules of every kind.

@@ -42,8 +42,18 @@ struct Crossing {
     Vector gradient;
 };
 
-__device__ inline Crossing crossing_on(const Marked* apron, const Edge& edge) {
+// The central difference at a sample, the last one of the world's being number `last`: beyond the rim densities go on as
+// they come.
+__device__ inline i32 rise(Marked before, Marked own, Marked after, i32 at, i32 last) {
+    i32 low = at == 0 ? own : before, high = at == last ? own : after;
+    i32 rise = (high >> 1) - (low >> 1);
+    return at == 0 || at == last ? 2 * rise : rise;
+}
+
+__device__ inline Crossing crossing_on(const Site& site, const Marked* apron, const Edge& edge) {
     const i32 STRIDES[3] = {1, AREA, WINDOW};
+    // No rim above, and none below.
+    const i32 AT[3] = {site.low[0] + edge.x, 1, site.low[2] + edge.z}, LAST[3] = {site.params.width, 0, site.params.depth};
     const Marked* p = apron + (edge.y + 1) * AREA + edge.window;
     const Marked* q = p + (edge.axis == 0 ? 1 : edge.axis == 1 ? AREA : WINDOW);
     Crossing crossing;
@@ -59,7 +69,8 @@ __device__ inline Crossing crossing_on(const Marked* apron, const Edge& edge) {
     for (i32 i = 0; i < 3; i++) {
         Marked p0 = p[-STRIDES[i]], p1 = p[STRIDES[i]], q0 = q[-STRIDES[i]], q1 = q[STRIDES[i]];
         stencil |= p0 | p1 | q0 | q1;
-        components[i] = lerp((float)((p1 >> 1) - (p0 >> 1)), (float)((q1 >> 1) - (q0 >> 1)), t);
+        i32 low = rise(p0, *p, p1, AT[i], LAST[i]), high = rise(q0, *q, q1, AT[i] + (edge.axis == i), LAST[i]);
+        components[i] = lerp((float)low, (float)high, t);
     }
     crossing.is_stencil_pristine = !(stencil & 1);
     crossing.gradient = {components[0], components[1], components[2]};

@@ -235,7 +235,7 @@ __device__ inline void make_vertices(const Site& site, MeshBench& bench, u32 bas
     u64 to = (u64)bench.vertex + base;
     if (lane() < count) {
         Edge edge = edge_at(bench.edges[base + lane()]);
-        Crossing crossing = crossing_on(bench.apron, edge);
+        Crossing crossing = crossing_on(site, bench.apron, edge);
         Vector normal = normal_of(site, bench, edge, crossing);
         normals[lane() * 3] = normal.x;
         normals[lane() * 3 + 1] = normal.y;
