@@ -76,7 +76,11 @@ fn ground_dug_through_the_rim_is_shaded_there_as_it_is_inside() {
             let middle = across * beside + Vec3::Y * y;
             Shape::capsule(middle - along * 30.0, middle + along * 72.0, 3.0)
         };
-        terrain.apply([Brush::dig(rod(10.0, 8.0)), Brush::dig(rod(2.0, 21.0)), Brush::add(rod(11.0, 34.0), MaterialId(2))]);
+        terrain.apply([
+            Brush::dig(rod(10.0, 8.0)),
+            Brush::dig(rod(2.0, 21.0)),
+            Brush::add(rod(11.0, 34.0), MaterialId(2)),
+        ]);
 
         // Everything goes straight through the world, so a vertex is shaded like the one beside it, all along.
         let mut normals: BTreeMap<[i32; 2], Vec3> = BTreeMap::new();
