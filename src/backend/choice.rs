@@ -3,6 +3,8 @@
 use std::time::Duration;
 
 #[cfg(feature = "cuda")]
+use super::PARALLEL_BLOCKS;
+#[cfg(feature = "cuda")]
 use crate::volume::{EditWork, Tool};
 
 /// A stage of a transaction that a backend does.
@@ -137,8 +139,9 @@ pub(super) struct Costs {
     pub mesh: [Curve; 2],
     /// Seconds to bring a brick to the card.
     pub upload: f64,
-    /// How much longer stages take than was measured: edits, meshing, and edits some of which look around.
-    drift: [[f64; 2]; 3],
+    /// How much longer stages take than was measured: edits, meshing, edits some of which look around, and meshing of so
+    /// little that the processor does it on one thread.
+    drift: [[f64; 2]; 4],
 }
 
 /// Blocks that are meshed anew for each brick that edits may reach, roughly.
@@ -164,7 +167,7 @@ impl Default for Costs {
             rough: [0.0; 2],
             mesh: Default::default(),
             upload: 0.0,
-            drift: [[1.0; 2]; 3],
+            drift: [[1.0; 2]; 4],
         }
     }
 }
@@ -175,8 +178,7 @@ impl Costs {
     /// card before it is meshed there, and that counts already when edits are chosen.
     pub fn edit(&self, load: Load) -> Estimate {
         let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * self.drift[kind(Stage::Edit, load)][on]);
-        let blocks = (load.amount as f64 * BLOCKS_PER_BRICK) as usize;
-        let mesh = [0, 1].map(|on| self.mesh[on].at(blocks) * self.drift[1][on]);
+        let mesh = self.meshing((load.amount as f64 * BLOCKS_PER_BRICK) as usize);
         let brought = mesh[1] + self.upload * load.amount as f64;
         estimate(cpu + mesh[0].min(brought), cuda + self.upload * load.missing as f64 + mesh[0].min(mesh[1]))
     }
@@ -193,8 +195,14 @@ impl Costs {
 
     /// Meshing blocks.
     pub fn mesh(&self, load: Load) -> Estimate {
-        let [cpu, cuda] = [0, 1].map(|on| self.mesh[on].at(load.amount) * self.drift[1][on]);
+        let [cpu, cuda] = self.meshing(load.amount);
         estimate(cpu, cuda + self.upload * load.missing as f64)
+    }
+
+    /// Seconds that meshing takes on both, where nothing is missing.
+    fn meshing(&self, blocks: usize) -> [f64; 2] {
+        let drift = self.drift[kind(Stage::Mesh, Load { amount: blocks, ..Load::default() })];
+        [0, 1].map(|on| self.mesh[on].at(blocks) * drift[on])
     }
 
     /// Takes in how long a stage took that was expected to take so long, the other one's part not counted.
@@ -219,6 +227,7 @@ impl Costs {
 fn kind(stage: Stage, load: Load) -> usize {
     match stage {
         Stage::Edit if load.careful > 0 => 2,
+        Stage::Mesh if load.amount < PARALLEL_BLOCKS => 3,
         stage => stage as usize,
     }
 }
@@ -278,6 +287,9 @@ mod tests {
         assert_eq!(expected(&costs), [50, 50]);
         (0..30).for_each(|_| costs.learn(Stage::Mesh, load, true, Duration::from_micros(100)));
         assert_eq!(expected(&costs), [50, 99]);
+        // What one thread does says nothing of what all do, and the other way round.
+        let few = costs.mesh(Load { amount: 40, ..load });
+        assert_eq!([few.cpu, few.cuda].map(|time| time.as_micros()), [40, 40]);
         // And forgotten while the other one is used.
         (0..400).for_each(|_| costs.learn(Stage::Mesh, load, false, Duration::from_micros(50)));
         assert_eq!(expected(&costs), [50, 50]);

@@ -51,7 +51,7 @@ fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Vec<u32>)> {
     all.map(|(drawn, mesh)| (drawn, mesh.vertices.iter().flat_map(bits).collect(), mesh.indices)).collect()
 }
 
-/// The same brushes on the processor and on an engine, in the same transactions.
+/// The same brushes on the processor and on an engine, in the same transactions; in every fourth world under rules.
 fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
     let seed = rng.u64(..);
     let (ground, chunk_size) = worlds::random_ground(&mut Rng::with_seed(seed), index);
@@ -60,6 +60,11 @@ fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
     let mut expected = Terrain::new(Arc::clone(&ground), &settings).expect("valid settings");
     let mut found = Terrain::new(Arc::clone(&ground), &settings).expect("valid settings");
     found.set_engine(engine.clone());
+    if index % 4 == 3 {
+        let rules = worlds::random_rules(rng, &ground);
+        expected.set_rules(rules.clone());
+        found.set_rules(rules);
+    }
     for _ in 0..rng.u32(1..5) {
         let brush = |rng: &mut Rng| match rng.u32(0..4) {
             0 => worlds::random_brush_at_a_face(rng, &ground, chunk_size),
