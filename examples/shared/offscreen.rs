@@ -1,6 +1,7 @@
 //! An app without a window. Examples, benchmarks and tests have it in common; each takes it in by its path.
 
 use std::panic;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use bevy::app::PluginsState;
 use bevy::log::{Level, LogPlugin};
@@ -34,15 +35,19 @@ pub fn build(renderer: Option<RenderResources>, add: impl FnOnce(&mut App)) -> A
             (settings.into(), "bevy_render=off,bevy_gizmos_render=off,bevy_gltf=off")
         }
     };
+    let mut plugins = DefaultPlugins
+        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+        .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
+        .set(LogPlugin { level: Level::WARN, filter: filter.into(), ..default() })
+        .disable::<WinitPlugin>()
+        .disable::<PipelinedRenderingPlugin>();
+    // A process has one logger, whichever of its apps comes first.
+    static LOGS: AtomicBool = AtomicBool::new(false);
+    if LOGS.swap(true, Ordering::Relaxed) {
+        plugins = plugins.disable::<LogPlugin>();
+    }
     let mut app = App::new();
-    app.add_plugins(
-        DefaultPlugins
-            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
-            .set(RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
-            .set(LogPlugin { level: Level::WARN, filter: filter.into(), ..default() })
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>(),
-    );
+    app.add_plugins(plugins);
     add(&mut app);
     while app.plugins_state() == PluginsState::Adding {
         bevy::tasks::tick_global_task_pools_on_main_thread();

@@ -36,8 +36,9 @@
 //! - **Nothing falls through.** An old collider stays until the new one takes its place; a collider that was made from an
 //!   older world than the one that is shown is thrown away. Colliders are made within the radius of a source, and where it
 //!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has.
-//! - **Dug ground lets go.** Bodies that sleep where a surface changed are woken. Bodies that were built over are lifted to
-//!   the nearest air, for ground has one side only.
+//! - **Dug ground lets go.** Bodies that sleep where a surface changed are woken. Bodies that were built over, or get squeezed
+//!   into the ground soon after it changed near them, are lifted to the nearest air, for ground has one side only. Sensors
+//!   and bodies whose layers have nothing to do with the ground are left alone.
 //!
 //! Avian optimises its trees in tasks on the pool that also runs transactions, and waits for them: a large transaction
 //! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.
@@ -65,6 +66,7 @@ pub use near::ColliderSource;
 pub use shape::GroundShape;
 
 use avian3d::collider_tree::ColliderTreeOptimization;
+use avian3d::prelude::PhysicsSystems;
 use bevy::prelude::*;
 
 use crate::plugin::{BurrowSystems, Companions};
@@ -82,7 +84,8 @@ pub enum TerrainPhysicsSystems {
     Upkeep,
     /// In `PostUpdate`: bodies over ground without colliders are held, others let go.
     Hold,
-    /// In `FixedPreUpdate`: bodies where ground changed are woken, or lifted out of it.
+    /// In `FixedPreUpdate`: bodies where ground changed are woken, and lifted out of it. After each step, those that it
+    /// pushed into the ground are lifted too.
     Wake,
 }
 
@@ -117,6 +120,7 @@ impl Plugin for TerrainPhysicsPlugin {
             .init_resource::<PhysicsFigures>()
             .init_resource::<GroundMaterial>()
             .init_resource::<wake::GroundChanges>()
+            .init_resource::<wake::Watched>()
             .init_resource::<upkeep::Work>()
             .init_resource::<columns::Columns>();
         app.world_mut().resource_mut::<Companions>().add(grounds.clone());
@@ -134,7 +138,11 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_systems(Update, near::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
-            .add_systems(FixedPreUpdate, wake::wake.in_set(TerrainPhysicsSystems::Wake));
+            .add_systems(
+                FixedPreUpdate,
+                (wake::wake, wake::rescue).chain().in_set(TerrainPhysicsSystems::Wake),
+            )
+            .add_systems(FixedPostUpdate, wake::rescue.after(PhysicsSystems::Last));
     }
 
     fn finish(&self, app: &mut App) {

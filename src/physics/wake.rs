@@ -1,12 +1,15 @@
-//! Bodies where ground changed: those that sleep are woken, those that were built over are lifted.
+//! Bodies where ground changed: those that sleep are woken, those that were built over are lifted, at once or when they are
+//! squeezed into it a moment later.
 
 use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
+use bevy::ecs::system::SystemParam;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
-use super::PhysicsFigures;
 use super::character::{Character, CharacterMotion};
+use super::colliders::GroundMaterial;
+use super::{GroundBody, PhysicsFigures};
 use crate::terrain::{Drawn, Terrain};
 
 /// How far from a change a body may sleep on, in metres.
@@ -14,6 +17,10 @@ const NEAR: f32 = 0.2;
 
 /// How high above the ground a lifted body starts, in metres.
 const GAP: f32 = 0.02;
+
+/// How often bodies near a change are looked at afterwards, twice in a step: for a second as a rule. One that is built over
+/// in part is still in the air, but between what pushes it up and what pushes it down it may leave through either.
+const WATCHED: u8 = 128;
 
 /// Where a collider changed, in world space.
 #[derive(Clone, Copy, Debug)]
@@ -69,27 +76,40 @@ impl GroundChanges {
     }
 }
 
-/// Wakes and lifts bodies.
+/// Bodies near which a terrain changed a moment ago, and how often they will be looked at.
+#[derive(Resource, Default)]
+pub(super) struct Watched(HashMap<(Entity, Entity), u8>);
+
+/// What may be in the way of ground: the box around those colliders of a body that are. Sensors are nowhere in the way, and
+/// neither is what the ground lets through.
+#[derive(SystemParam)]
+pub(super) struct Solids<'w, 's> {
+    colliders: Query<'w, 's, (&'static ColliderAabb, Option<&'static CollisionLayers>), Without<Sensor>>,
+    characters: Query<'w, 's, (), With<Character>>,
+    ground: Res<'w, GroundMaterial>,
+}
+
+impl Solids<'_, '_> {
+    /// `None` of a body that nothing moves.
+    fn bounds(&self, entity: Entity, body: &RigidBody, own: &RigidBodyColliders) -> Option<ColliderAabb> {
+        if !body.is_dynamic() && !self.characters.contains(entity) {
+            return None;
+        }
+        let meets = |layers: Option<&CollisionLayers>| {
+            self.ground.layers.interacts_with(layers.copied().unwrap_or_default())
+        };
+        let solid = self.colliders.iter_many(own).filter(|(_, layers)| meets(*layers));
+        solid.map(|(bounds, _)| *bounds).reduce(|a, b| a.merged(b))
+    }
+}
+
+/// Wakes bodies near changes, and has them watched.
 pub(super) fn wake(
     mut commands: Commands,
     mut changes: ResMut<GroundChanges>,
-    mut bodies: Query<
-        (
-            Entity,
-            &RigidBody,
-            &RigidBodyColliders,
-            Has<Sleeping>,
-            &mut Position,
-            &mut LinearVelocity,
-            &mut Transform,
-            Option<&mut CharacterMotion>,
-            Has<ChildOf>,
-        ),
-        Without<super::GroundBody>,
-    >,
-    colliders: Query<&ColliderAabb>,
-    terrains: Query<(&Terrain, &GlobalTransform)>,
-    characters: Query<(), With<Character>>,
+    mut watched: ResMut<Watched>,
+    bodies: Query<(Entity, &RigidBody, &RigidBodyColliders, Has<Sleeping>), Without<GroundBody>>,
+    solids: Solids,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     if changes.len() == 0 {
@@ -97,27 +117,41 @@ pub(super) fn wake(
     }
     let changes = changes.take();
     figures.changes = 0;
-    for (entity, body, own, sleeps, mut position, mut velocity, mut transform, motion, is_child) in
-        &mut bodies
-    {
-        let is_character = characters.contains(entity);
-        if !(body.is_dynamic() || is_character) {
-            continue;
-        }
-        let Some(bounds) = colliders.iter_many(own).copied().reduce(|a, b| a.merged(b)) else { continue };
+    for (entity, body, own, sleeps) in &bodies {
+        let Some(bounds) = solids.bounds(entity, body, own) else { continue };
         let mut near = changes.iter().filter(|change| change.meets(&bounds)).peekable();
-        if near.peek().is_none() {
-            continue;
-        }
-        if sleeps {
+        if near.peek().is_some() && sleeps {
             commands.queue_silenced(WakeBody(entity));
             figures.woken += 1;
         }
-        let lift = near.find_map(|change| {
-            let (terrain, place) = terrains.get(change.terrain).ok()?;
-            lift(terrain, place, position.0, &bounds)
-        });
-        if let Some(lift) = lift {
+        watched.0.extend(near.map(|change| ((entity, change.terrain), WATCHED)));
+    }
+}
+
+/// Lifts bodies that are watched out of the ground: before each step, and after it, so that nobody sees them there.
+pub(super) fn rescue(
+    mut watched: ResMut<Watched>,
+    mut bodies: Query<(
+        &RigidBody,
+        &RigidBodyColliders,
+        &mut Position,
+        &mut LinearVelocity,
+        &mut Transform,
+        Option<&mut CharacterMotion>,
+        Has<ChildOf>,
+    )>,
+    solids: Solids,
+    terrains: Query<(&Terrain, &GlobalTransform)>,
+    mut figures: ResMut<PhysicsFigures>,
+) {
+    watched.0.retain(|&(entity, terrain), looks| {
+        *looks -= 1;
+        let (Ok(body), Ok((terrain, place))) = (bodies.get_mut(entity), terrains.get(terrain)) else {
+            return false;
+        };
+        let (body, own, mut position, mut velocity, mut transform, motion, is_child) = body;
+        let Some(bounds) = solids.bounds(entity, body, own) else { return false };
+        if let Some(lift) = lift(terrain, place, position.0, &bounds) {
             position.0.y += lift;
             if !is_child {
                 transform.translation.y += lift;
@@ -128,7 +162,8 @@ pub(super) fn wake(
             }
             figures.lifted += 1;
         }
-    }
+        *looks > 0
+    });
 }
 
 /// How far up a body must go to be in the air: none if its middle is.

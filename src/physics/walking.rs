@@ -10,6 +10,12 @@ use super::character::{Character, CharacterMotion, CharacterSteering};
 /// The distance that is always kept from everything, in metres.
 const SKIN: f32 = 0.01;
 
+/// How far a step is taken at least, in metres.
+const ONTO: f32 = 3.0 * SKIN;
+
+/// How far behind an edge, and from how far above it, the ground is looked for that a body stands on, in metres.
+const EDGE: f32 = 0.03;
+
 /// How far below the soles the ground may sink for the body to stay on it, as a share of the step height.
 const CLING: f32 = 1.0;
 
@@ -72,9 +78,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         let mut after = CharacterMotion { velocity, grounded: false, ground_normal: Vec3::ZERO };
         if velocity.y <= 0.0 {
             let reach = if grounded { self.character.step_height * CLING } else { 2.0 * SKIN };
-            if let Some((down, normal)) = self.floor(place, reach)
-                && normal.y >= self.level
-            {
+            if let Some((down, normal)) = self.footing(place, reach) {
                 place.y -= down;
                 after.velocity.y = 0.0;
                 (after.grounded, after.ground_normal) = (true, normal);
@@ -111,13 +115,12 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         };
         let up = cast(from, Vec3::Y * height).map_or(height, |hit| hit.distance);
         let above = from + Vec3::Y * up;
-        let (ahead, slid) = self.slide(above, velocity.with_y(0.0), &[], dt);
-        // A step is looked for a little ahead: the capsule's round foot would stand on its edge.
-        let (down, normal) = self.floor(ahead, up + SKIN)?;
-        let toes = velocity.with_y(0.0).normalize_or_zero() * (self.character.radius * 0.75);
-        let is_flat = |place: Vec3| self.floor_below(place, up + height).is_some_and(|n| n.y >= self.level);
-        (normal.y >= self.level || is_flat(ahead + toes))
-            .then_some((ahead - Vec3::Y * down, slid.with_y(0.0)))
+        // Far enough to come over the edge, from which it kept its distance.
+        let level = velocity.with_y(0.0);
+        let least = ONTO / dt;
+        let (ahead, slid) = self.slide(above, level.normalize_or_zero() * level.length().max(least), &[], dt);
+        let (down, _) = self.footing(ahead, up + SKIN)?;
+        Some((ahead - Vec3::Y * down, slid.with_y(0.0).clamp_length_max(level.length())))
     }
 
     /// Moves and slides along what is in the way. What is too steep to stand on is a wall for those on the ground.
@@ -150,19 +153,24 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     }
 
     /// How far the body may sink until it stands, within `reach`, and the normal of what it stands on.
-    fn floor(&self, place: Vec3, reach: f32) -> Option<(f32, Vec3)> {
+    fn footing(&self, place: Vec3, reach: f32) -> Option<(f32, Vec3)> {
         let way = Vec3::NEG_Y * reach;
         let hit = self.mover.cast_move(self.collider, place, Quat::IDENTITY, way, SKIN, &self.filter)?;
-        Some((hit.distance, hit.normal1))
+        if hit.normal1.y >= self.level {
+            return Some((hit.distance, hit.normal1));
+        }
+        // The round foot of a body that comes to an edge slowly touches that from the side. What it stands on is behind it.
+        let behind = hit.point1 - hit.normal1.with_y(0.0).normalize_or_zero() * EDGE;
+        let normal = self.ground_at(behind + Vec3::Y * EDGE, 2.0 * EDGE)?;
+        (normal.y >= self.level).then_some((hit.distance, normal))
     }
 
-    /// The normal of the ground below a place's soles, within `reach`.
-    fn floor_below(&self, place: Vec3, reach: f32) -> Option<Vec3> {
-        let soles = place - Vec3::Y * (self.character.height / 2.0 - SKIN);
+    /// The normal of the ground below a place, within `reach`.
+    fn ground_at(&self, place: Vec3, reach: f32) -> Option<Vec3> {
         let query = &self.mover.spatial_query;
         // As for all that moves, sensors are air.
         let is_solid = |collider: Entity| self.mover.colliders.contains(collider);
-        let hit = query.cast_ray_predicate(soles, Dir3::NEG_Y, reach, true, &self.filter, &is_solid)?;
+        let hit = query.cast_ray_predicate(place, Dir3::NEG_Y, reach, true, &self.filter, &is_solid)?;
         Some(hit.normal)
     }
 }

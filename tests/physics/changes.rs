@@ -1,9 +1,12 @@
 //! What changing ground does to bodies that rest on it, hang on it, or stand where it comes.
 
+use std::f32::consts::TAU;
+
 use avian3d::prelude::*;
 use bevy::prelude::*;
 use bevy_burrow::physics::{Character, GroundBody, GroundShape, debris_collider};
 use bevy_burrow::prelude::*;
+use fastrand::Rng;
 
 use crate::stage::{STEP, Stage, level, pit};
 
@@ -43,6 +46,50 @@ fn who_is_built_over_comes_out_on_top() {
         assert!(!model.is_solid(stage.place(body).as_dvec3()), "{}", stage.place(body));
     }
     assert!(stage.feet(person).y > 10.0 && stage.figures().lifted >= 2);
+}
+
+#[test]
+fn who_is_built_over_in_part_is_not_squeezed_into_the_ground() {
+    let mut rng = Rng::with_seed(5);
+    let (mut stage, terrain) = Stage::with_ground(level(256, 1.0));
+    let places = (0..20)
+        .flat_map(|x| (0..20).map(move |z| Vec3::new(9.3 + 12.0 * x as f32, 8.5, 9.6 + 12.0 * z as f32)));
+    let balls: Vec<Entity> = places.map(|place| stage.ball(place, 0.5, Vec3::ZERO)).collect();
+    stage.frames(seconds(0.5));
+    for round in 0..8 {
+        // From all sides, more or less from above: not as far as the middle, or just beyond.
+        let brush = |&ball: &Entity| {
+            let (turn, tilt, radius) = (rng.f32() * TAU, rng.f32() * 1.2 - 0.3, 1.5 + 2.5 * rng.f32());
+            let way = Vec3::new(turn.cos() * tilt.cos(), tilt.sin(), turn.sin() * tilt.cos());
+            let center = stage.place(ball) + way * (radius - 0.1 + 0.4 * rng.f32());
+            Brush::add(Shape::sphere(center, radius), MaterialId(2))
+        };
+        let brushes: Vec<Brush> = balls.iter().map(brush).collect();
+        stage.dig(brushes);
+        stage.frames(seconds(1.0));
+        let model = stage.terrain(terrain).world();
+        let inside = balls.iter().filter(|&&ball| model.is_solid(stage.place(ball).as_dvec3())).count();
+        assert_eq!(inside, 0, "of {} balls in round {round}", balls.len());
+    }
+    assert!(stage.figures().lifted > 800, "{:?}", stage.figures());
+}
+
+#[test]
+fn what_ground_lets_through_is_not_lifted_out_of_it() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let ghosts = [20.0, 24.0].map(|x| {
+        let ghost = stage.ball(Vec3::new(x, 7.4, 20.0), 0.5, Vec3::ZERO);
+        stage.app.world_mut().entity_mut(ghost).insert(GravityScale(0.0));
+        ghost
+    });
+    stage.app.world_mut().entity_mut(ghosts[0]).insert(Sensor);
+    stage.app.world_mut().entity_mut(ghosts[1]).insert(CollisionLayers::NONE);
+    stage.frames(seconds(0.2));
+    stage.dig([Brush::add(Shape::sphere(Vec3::new(22.0, 8.0, 20.0), 5.0), MaterialId(2))]);
+    stage.frames(seconds(0.2));
+    for ghost in ghosts {
+        assert!((stage.place(ghost).y - 7.4).abs() < 0.01, "{}", stage.place(ghost));
+    }
 }
 
 #[test]

@@ -47,6 +47,36 @@ fn a_trigger_over_a_step_is_nothing_to_stumble_on() {
 }
 
 #[test]
+fn a_walker_takes_a_step_however_slow_it_is_and_comes_down_again() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let mut walkers = Vec::new();
+    for (row, top) in [(15.0, 0.3), (30.0, 0.5), (45.0, 0.58)] {
+        let step = (Collider::cuboid(2.0, 1.0, 10.0), Transform::from_xyz(25.0, 7.5 + top, row));
+        stage.app.world_mut().spawn((RigidBody::Static, step));
+        for (number, speed) in (0..5).zip([0.3, 0.6, 1.0, 2.0, 5.0]) {
+            let start = Vec3::new(23.2, 8.0, row - 3.0 + 1.5 * number as f32);
+            walkers.push((stage.character(start, Vec2::X * speed / 5.0), top, speed));
+        }
+    }
+    for _ in 0..seconds(18.0) {
+        stage.frame();
+        for &(walker, top, speed) in &walkers {
+            let feet = stage.feet(walker);
+            // The soles keep a skin's width from what they stand on.
+            let expected = match feet.x {
+                24.1..25.9 => 8.0 + top,
+                26.5..30.0 => 8.0,
+                _ => continue,
+            };
+            assert!((feet.y - expected).abs() < 0.05, "at {speed} m/s over {top} m: {feet}");
+        }
+        walkers.retain(|&(walker, ..)| stage.feet(walker).x < 30.0);
+    }
+    let late = walkers.iter().find(|&&(walker, ..)| stage.feet(walker).x < 26.5);
+    assert_eq!(late.map(|(_, top, speed)| (top, speed)), None, "still before the step");
+}
+
+#[test]
 fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
     let (mut stage, _) = Stage::with_ground(level(160, 1.0));
     let start =
