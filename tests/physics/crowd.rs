@@ -129,7 +129,8 @@ fn nobody_falls_through_ground_that_is_dug_under_a_crowd() {
     for _ in 0..balls {
         let place = somewhere(&mut rng);
         // Half of them start below the open sky, the others wherever there is air: in tunnels too.
-        let spans = stage.terrain(terrain).world().spans(place.x.into(), place.y.into());
+        let mut spans = stage.terrain(terrain).world().spans(place.x.into(), place.y.into());
+        spans.retain(|span| span.ceiling.is_none_or(|top| top - span.floor > 1.2));
         let span = if rng.bool() { spans.last() } else { rng.choice(spans.iter()) };
         let Some(span) = span else { continue };
         let room = span.ceiling.map_or(12.0, |top| (top - span.floor - 1.0).max(0.0)) as f32;
