@@ -142,10 +142,12 @@ pub(super) fn rescue(
     )>,
     solids: Solids,
     terrains: Query<(&Terrain, &GlobalTransform)>,
+    time: Res<Time<Physics>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     watched.0.retain(|&(entity, terrain), looks| {
-        *looks -= 1;
+        // While time stands still nobody is squeezed.
+        *looks -= u8::from(!time.is_paused());
         let (Ok(body), Ok((terrain, place))) = (bodies.get_mut(entity), terrains.get(terrain)) else {
             return false;
         };

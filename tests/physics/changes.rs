@@ -66,6 +66,10 @@ fn who_is_built_over_in_part_is_not_squeezed_into_the_ground() {
         };
         let brushes: Vec<Brush> = balls.iter().map(brush).collect();
         stage.dig(brushes);
+        // However long the game stands still in between.
+        stage.app.world_mut().resource_mut::<Time<Physics>>().pause();
+        stage.frames(seconds(3.0));
+        stage.app.world_mut().resource_mut::<Time<Physics>>().unpause();
         stage.frames(seconds(1.0));
         let model = stage.terrain(terrain).world();
         let inside = balls.iter().filter(|&&ball| model.is_solid(stage.place(ball).as_dvec3())).count();
