@@ -37,8 +37,8 @@
 //!   older world than the one that is shown is thrown away. Colliders are made within the radius of a source, and where it
 //!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has.
 //! - **Dug ground lets go.** Bodies that sleep where a surface changed are woken. Bodies that were built over, or get squeezed
-//!   into the ground soon after it changed near them, are lifted to the nearest air, for ground has one side only. Sensors
-//!   and bodies whose layers have nothing to do with the ground are left alone.
+//!   into the ground soon after it changed near them, are lifted to the nearest air above, for ground has one side only.
+//!   Sensors and bodies whose layers have nothing to do with the ground are left alone.
 //!
 //! Avian optimises its trees in tasks on the pool that also runs transactions, and waits for them: a large transaction
 //! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.

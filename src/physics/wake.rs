@@ -142,12 +142,13 @@ pub(super) fn rescue(
     )>,
     solids: Solids,
     terrains: Query<(&Terrain, &GlobalTransform)>,
-    time: Res<Time<Physics>>,
+    time: Option<Res<Time<Physics>>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
+    // While time stands still nobody is squeezed.
+    let passes = time.is_none_or(|time| !time.is_paused());
     watched.0.retain(|&(entity, terrain), looks| {
-        // While time stands still nobody is squeezed.
-        *looks -= u8::from(!time.is_paused());
+        *looks -= u8::from(passes);
         let (Ok(body), Ok((terrain, place))) = (bodies.get_mut(entity), terrains.get(terrain)) else {
             return false;
         };

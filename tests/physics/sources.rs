@@ -1,8 +1,11 @@
 //! Colliders come with sources and go with them, and nothing falls where they are missing.
 
+use std::time::Duration;
+
 use avian3d::prelude::*;
 use bevy::prelude::*;
-use bevy_burrow::physics::{ColliderSource, GroundBody, GroundCollider};
+use bevy::time::TimeUpdateStrategy;
+use bevy_burrow::physics::{ColliderSource, GroundBody, GroundCollider, TerrainPhysicsPlugin};
 use bevy_burrow::plugin::ShownSurface;
 use bevy_burrow::prelude::*;
 
@@ -203,4 +206,15 @@ fn upkeep_looks_only_where_something_happens() {
     println!("in {tiles} tiles, {walked} were looked at while 100 sources walked for a second");
     assert!((100..tiles).contains(&walked), "{walked}");
     assert!(stage.figures().colliders >= 100 * 9);
+}
+
+#[test]
+fn an_app_without_a_physics_engine_runs_all_the_same() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, BurrowPlugins, TerrainPhysicsPlugin))
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(STEP)));
+    app.world_mut().spawn(level(32, 1.0));
+    app.finish();
+    app.cleanup();
+    (0..20).for_each(|_| app.update());
 }
