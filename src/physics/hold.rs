@@ -3,10 +3,13 @@
 use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
+use bevy::math::bounding::{Aabb2d, AabbCast2d};
+use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
 
 use super::character::Character;
 use super::columns::Columns;
+use super::near::{ahead, half};
 use super::{ColliderSource, PhysicsFigures};
 use crate::lattice::{Column, TilePos};
 use crate::terrain::Terrain;
@@ -39,6 +42,11 @@ pub struct HeldByGround {
 }
 
 impl HeldByGround {
+    /// The velocity that was taken away from it, if one was.
+    pub(super) fn stopped(&self) -> Option<Vec3> {
+        self.is_locked.then_some(self.velocity)
+    }
+
     /// Locks all axes, and remembers what was locked.
     fn lock(&mut self, locked: Option<&LockedAxes>, entity: &mut EntityCommands) {
         (self.is_locked, self.locked) = (true, locked.copied());
@@ -70,12 +78,6 @@ impl BodyItem<'_, '_> {
     /// Does it move by what holding takes away: forces and steering?
     fn can_be_held(&self) -> bool {
         self.kind.is_dynamic() || self.is_character
-    }
-
-    /// Half its size in the world, in metres.
-    fn half(&self) -> Vec3 {
-        let half = self.bounds.map_or(Vec3::splat(0.5), |bounds| (bounds.max - bounds.min) / 2.0);
-        half.clamp(Vec3::ZERO, Vec3::splat(8.0))
     }
 
     /// Holds it, or holds on to it: what the game changed since is kept for later.
@@ -152,7 +154,7 @@ pub(super) fn hold(
     let mut held = 0;
     for mut body in &mut bodies {
         let lacks_ground = body.can_be_held() && {
-            let half = body.half();
+            let half = half(body.bounds);
             let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
             let lacks_ground = |place: Vec3| {
                 terrains.iter().any(|(terrain, model, affine)| {
@@ -180,7 +182,7 @@ pub(super) fn hold(
 
 /// From the world to a terrain.
 struct Affine {
-    inverse: bevy::math::Affine3A,
+    inverse: Affine3A,
     size: f32,
 }
 
@@ -195,26 +197,33 @@ impl Affine {
         velocity: Vec3,
         half: Vec3,
     ) -> bool {
-        if !(place.is_finite() && velocity.is_finite()) {
+        let grid = model.world().grid();
+        let from = self.inverse.transform_point3(place);
+        let way = self.inverse.transform_vector3(velocity * AHEAD);
+        if !(from.is_finite() && way.is_finite()) {
             return false;
         }
-        let ahead = place + velocity * AHEAD;
-        let (low, high) = (place.min(ahead) - half, place.max(ahead) + half);
-        let [low, high] = [low, high].map(|corner| self.inverse.transform_point3(corner));
-        let (low, high) = (low.min(high).floor().as_ivec3(), low.max(high).floor().as_ivec3());
-        let grid = model.world().grid();
+        let (way, half) = (ahead(way, grid), Vec3::from(self.inverse.matrix3.abs() * Vec3A::from(half)));
+        let (low, high) = (from.min(from + way) - half, from.max(from + way) + half);
+        let (first, last) = (low.floor().as_ivec3(), high.floor().as_ivec3());
         // A body that is off the terrain has nothing to wait for.
         let (first, last) = (
-            Column::new(low.x.max(0), low.z.max(0)),
-            Column::new(high.x.min(grid.width() - 1), high.z.min(grid.depth() - 1)),
+            Column::new(first.x.max(0), first.z.max(0)),
+            Column::new(last.x.min(grid.width() - 1), last.z.min(grid.depth() - 1)),
         );
         if first.x > last.x || first.z > last.z {
             return false;
         }
         let (first, last) = (grid.tile_of_cell(first), grid.tile_of_cell(last));
-        let mut tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| (x, z)));
-        let is_missing = |(x, z)| !ready.is_ready((terrain, TilePos { x, z }));
-        tiles.any(is_missing) && self.is_low(model, place, low.y as f32)
+        let mut tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| TilePos { x, z }));
+        let body = Aabb2d::new(Vec2::ZERO, half.xz());
+        let way = AabbCast2d::new(body, from.xz(), Dir2::new(way.xz()).unwrap_or(Dir2::X), way.xz().length());
+        let is_missing = |tile: TilePos| {
+            let corner = Vec2::new(tile.x as f32, tile.z as f32) * grid.size() as f32;
+            let bounds = Aabb2d { min: corner, max: corner + grid.size() as f32 };
+            !ready.is_ready((terrain, tile)) && way.aabb_collision_at(bounds).is_some()
+        };
+        tiles.any(is_missing) && self.is_low(model, place, low.y)
     }
 
     /// Is its lowest point near the ground, or under some of it?

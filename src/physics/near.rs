@@ -7,6 +7,7 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use rustc_hash::FxHashMap;
 
+use super::HeldByGround;
 use super::colliders::Grounds;
 use super::columns::ColumnKey;
 use crate::lattice::{ChunkGrid, TilePos};
@@ -15,13 +16,24 @@ use crate::terrain::Terrain;
 /// How far ahead of a source colliders are made, in seconds.
 const AHEAD: f32 = 1.0;
 
-/// Places that a way ahead is looked at in, at most.
+/// Places that a way ahead is looked at in, at most: one for each chunk's width of it.
 const STOPS: u32 = 64;
+
+/// What counts of a way ahead, in voxels: as much of it as colliders are made for.
+pub(super) fn ahead(way: Vec3, grid: ChunkGrid) -> Vec3 {
+    way.clamp_length_max(STOPS as f32 * grid.size() as f32)
+}
+
+/// Half a body's size in the world, in metres.
+pub(super) fn half(bounds: Option<&ColliderAabb>) -> Vec3 {
+    let half = bounds.map_or(Vec3::splat(0.5), |bounds| (bounds.max - bounds.min) / 2.0);
+    half.clamp(Vec3::ZERO, Vec3::splat(8.0))
+}
 
 /// Ground around this entity has colliders, in all columns of chunks within its radius; elsewhere it has none.
 ///
-/// Put it on players and on whatever else needs ground. With a `LinearVelocity`, ground where it will be in a second has
-/// colliders too. Bodies need not be sources: those too far from any are [held](super::HeldByGround).
+/// Put it on players and on whatever else needs ground. With a `LinearVelocity`, ground where it will be in a second, or on
+/// the next 64 chunks of its way, has colliders too. Bodies need not be sources: those too far from any are [held](super::HeldByGround).
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(Transform)]
@@ -116,7 +128,13 @@ pub(super) fn find_near(
     grounds: Res<Grounds>,
     places: TransformHelper,
     terrains: Query<(Entity, &Terrain)>,
-    sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>)>,
+    sources: Query<(
+        Entity,
+        &ColliderSource,
+        Option<&LinearVelocity>,
+        Option<&HeldByGround>,
+        Option<&ColliderAabb>,
+    )>,
     mut known: Local<Neighbourhood>,
 ) {
     let mut near = Neighbourhood::default();
@@ -126,18 +144,23 @@ pub(super) fn find_near(
         let grid = model.world().grid();
         let stride = grid.size() as f32;
         let mut stops = Vec::new();
-        for (source, &ColliderSource { radius }, velocity) in &sources {
+        for (source, &ColliderSource { radius }, velocity, hold, bounds) in &sources {
             let Ok(place) = places.compute_global_transform(source) else { continue };
-            let from = place.translation();
-            let to = from + velocity.map_or(Vec3::ZERO, |velocity| velocity.0 * AHEAD);
-            let [from, to] = [from, to].map(|place| inverse.transform_point3(place).xz());
-            if !(from.is_finite() && to.is_finite() && radius >= 0.0) {
+            // One that is held goes on as it came, once there is ground where it was going.
+            let velocity = hold.and_then(HeldByGround::stopped).or(velocity.map(|velocity| velocity.0));
+            let from = inverse.transform_point3(place.translation());
+            let way = inverse.transform_vector3(velocity.unwrap_or_default() * AHEAD);
+            if !(from.is_finite() && way.is_finite() && radius >= 0.0) {
                 continue;
             }
-            let count = ((from.distance(to) / stride).ceil() as u32).min(STOPS);
+            let (from, way) = (from.xz(), ahead(way, grid).xz());
+            let count = (way.length() / stride).ceil();
+            let apart = way / count.max(1.0);
+            // Nor is a body held for want of ground that it reaches itself, or that is between two stops.
+            let radius = radius.max(half(bounds).xz().length()) / size + (apart.length() / 2.0).ceil();
             // Not every hair's breadth of a move is news.
-            let stop = |at: u32| from.lerp(to, at as f32 / count.max(1) as f32).round();
-            stops.extend((0..=count).map(|at| (stop(at), radius / size + 1.0)));
+            let stop = |at: u32| (from + apart * at as f32).round();
+            stops.extend((0..=count as u32).map(|at| (stop(at), radius + 1.0)));
         }
         let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
         let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));

@@ -74,6 +74,26 @@ fn a_source_that_races_along_never_leaves_its_body_without_ground() {
 }
 
 #[test]
+fn a_source_that_is_held_has_ground_made_where_it_was_going() {
+    // The ground that each needs before it goes on is farther off than its radius: ahead, to both sides, or below its rim.
+    let cases = [
+        (Vec3::X * 60.0, 0.5, 1.0),
+        (Vec3::new(300.0, 0.0, 300.0), 0.5, 1.0),
+        (Vec3::new(-3000.0, 0.0, 40.0), 0.5, 0.0),
+        (Vec3::ZERO, 6.0, 1.0),
+    ];
+    for (velocity, ball_radius, radius) in cases {
+        let mut stage = Stage::new();
+        stage.app.world_mut().spawn(level(512, 1.0));
+        let ball = stage.ball(Vec3::new(259.0, 8.1 + ball_radius, 259.0), ball_radius, velocity);
+        stage.app.world_mut().entity_mut(ball).insert(ColliderSource { radius });
+        stage.frame();
+        assert!(stage.is_held(ball), "the ground is not there yet");
+        stage.frames_until("it is let go", |stage| !stage.is_held(ball));
+    }
+}
+
+#[test]
 fn edits_far_from_all_sources_are_there_when_one_comes() {
     let mut stage = Stage::new();
     let terrain = stage.app.world_mut().spawn(level(256, 1.0)).id();
