@@ -195,6 +195,14 @@ pub(super) fn attach(
     }
 }
 
+/// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
+/// view or gets another material.
+fn look_again(mut child: EntityWorldMut) {
+    if let Some(mut visibility) = child.get_mut::<ViewVisibility>() {
+        visibility.set_changed();
+    }
+}
+
 /// Puts a mesh in place of an entity's old one, under the same handle.
 fn swap(
     commands: &mut Commands,
@@ -217,7 +225,7 @@ fn swap(
                 warn!("a mesh could not be swapped: {error}");
             }
             if let Some(mesh) = fresh {
-                child.try_insert(Mesh3d(assets.add(mesh)));
+                child.try_insert(Mesh3d(assets.add(mesh))).queue_silenced(look_again);
             }
             child.try_insert((bounds, NoAutoAabb));
         }

@@ -20,7 +20,9 @@ mod debug_views;
 mod landscape;
 #[path = "../../examples/shared/offscreen.rs"]
 mod offscreen;
+mod own_textures;
 mod panel;
+mod return_of_ground;
 mod sameness;
 mod studio;
 mod tunnel;
@@ -39,6 +41,8 @@ fn ground_looks_as_approved() {
     tunnel::shoot(&mut studio, &mut album);
     sameness::shoot(&mut studio, &mut album);
     ways::shoot(&mut studio, &mut album);
+    own_textures::shoot(&mut studio, &mut album);
+    return_of_ground::shoot(&mut studio, &mut album);
     album.close();
 }
 

@@ -7,7 +7,8 @@ use bevy::camera::RenderTarget;
 use bevy::ecs::component::Mutable;
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
-use bevy::render::render_resource::TextureFormat;
+use bevy::render::RenderApp;
+use bevy::render::render_resource::{PipelineCache, TextureFormat};
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::prelude::*;
@@ -169,6 +170,12 @@ impl Studio {
         for _ in 0..2 {
             self.app.update();
         }
+        // What waits for its shader is not drawn.
+        let waiting = Instant::now();
+        while self.waits_for_shaders() {
+            assert!(waiting.elapsed() < PATIENCE, "a shader never came");
+            self.app.update();
+        }
         let taken = Arc::new(Mutex::new(None));
         let place = Arc::clone(&taken);
         let shot = Screenshot::image(self.film.clone());
@@ -185,6 +192,11 @@ impl Studio {
             }
             assert!(start.elapsed() < PATIENCE, "no picture was taken");
         }
+    }
+
+    fn waits_for_shaders(&self) -> bool {
+        let pipelines = self.app.sub_app(RenderApp).world().resource::<PipelineCache>();
+        pipelines.waiting_pipelines().next().is_some()
     }
 
     fn film_runs(&mut self, runs: bool) {

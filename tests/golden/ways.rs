@@ -8,8 +8,8 @@ use crate::album::{Album, flip};
 use crate::landscape::hills;
 use crate::studio::Studio;
 
-/// Mean FLIP between two ways: colours of the deferred way have eight bits.
-const CLOSE: f32 = 0.05;
+/// Mean FLIP between two ways: colours of the deferred way have eight bits. It is 0.009.
+const CLOSE: f32 = 0.015;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     set_up(studio);

@@ -1,0 +1,64 @@
+//! A game's own textures are what the ground is drawn with, and the project's own come back.
+
+use bevy::asset::RenderAssetUsages;
+use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
+use bevy::prelude::*;
+use bevy::render::render_resource::{
+    Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
+};
+use bevy_burrow::prelude::*;
+
+use crate::album::{Album, flip};
+use crate::landscape::hills;
+use crate::studio::Studio;
+
+/// Layers: as many as the project's own textures have.
+const LAYERS: u32 = 12;
+
+/// Textures of one texel in each layer.
+fn plain(studio: &mut Studio, texel: [u8; 4], format: TextureFormat) -> Handle<Image> {
+    let size = Extent3d { width: 1, height: 1, depth_or_array_layers: LAYERS };
+    let mut image =
+        Image::new_fill(size, TextureDimension::D2, &texel, format, RenderAssetUsages::RENDER_WORLD);
+    let repeat = ImageAddressMode::Repeat;
+    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+        address_mode_u: repeat,
+        address_mode_v: repeat,
+        ..ImageSamplerDescriptor::linear()
+    });
+    image.texture_view_descriptor =
+        Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() });
+    studio.app.world_mut().resource_mut::<Assets<Image>>().add(image)
+}
+
+/// From now on the ground is drawn with these.
+fn dress(studio: &mut Studio, textures: GroundTextures) {
+    studio.app.world_mut().insert_resource(textures);
+    studio.app.update();
+    studio.until("textures", |app| app.world().resource::<GroundLoading>().is_ready());
+}
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    studio.terrain(hills(64), GroundLook::default());
+    let middle = Vec3::new(32.0, studio.height(32.0, 32.0), 32.0);
+    studio.apply([Brush::dig(Shape::sphere(middle, 5.0))]);
+    studio.look(middle + Vec3::new(4.0, 12.0, 6.0), middle);
+    let own = studio.app.world().resource::<GroundTextures>().clone();
+    let before = studio.picture();
+    let albedo = plain(studio, [200, 20, 200, 128], TextureFormat::Rgba8UnormSrgb);
+    let relief = plain(studio, [128, 128, 255, 230], TextureFormat::Rgba8Unorm);
+    dress(studio, GroundTextures::Images { albedo, relief });
+    let mauve = studio.picture();
+    let is_mauve = |texel: &&image::Rgb<u8>| {
+        let [red, green, blue] = texel.0.map(u32::from);
+        red.min(blue) > green + 8 && red.abs_diff(blue) < 100
+    };
+    let share = mauve.pixels().filter(is_mauve).count() as f32 / mauve.pixels().len() as f32;
+    println!("a game's own textures: {:.1} % of the picture has their colour", 100.0 * share);
+    album.check(share > 0.99, || {
+        format!("only {share} of the picture has the colour of the game's own textures")
+    });
+    dress(studio, own);
+    let (apart, _) = flip(&before, &studio.picture());
+    album.check(apart < 1e-4, || format!("the project's own textures came back as others: FLIP {apart:.5}"));
+}

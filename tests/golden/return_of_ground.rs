@@ -1,0 +1,44 @@
+//! Chunks and tiles whose surface went and came back are drawn again.
+
+use bevy::prelude::*;
+use bevy_burrow::prelude::*;
+
+use crate::album::{Album, flip};
+use crate::studio::Studio;
+
+/// Height of the level ground: the middle of a chunk, so that all of its surface is in one layer of chunks.
+const HEIGHT: f64 = 16.0;
+
+pub fn shoot(studio: &mut Studio, album: &mut Album) {
+    let level = || Ground::flat(96, 96, HEIGHT).expect("valid ground");
+    // In the middle of the tile and chunk at 32 to 64; the larger one takes all of that tile.
+    let middle = Vec3::new(48.0, HEIGHT as f32, 48.0);
+    let hole = || Brush::dig(Shape::sphere(middle, 6.0));
+    let yard = || Brush::dig(Shape::cuboid(middle, Vec3::new(20.0, 3.0, 20.0)));
+    // A chunk with a field in it stays, whether there is a surface in it or not.
+    let vein = || Brush::paint(Shape::sphere(middle - Vec3::Y * 11.0, 3.0), MaterialId(7));
+    for (what, dig) in [("a hole", &hole as &dyn Fn() -> Brush), ("a yard", &yard)] {
+        studio.terrain(level(), GroundLook::default());
+        studio.look(middle + Vec3::new(10.0, 34.0, 30.0), middle);
+        studio.apply([vein()]);
+        let untouched = studio.picture();
+        studio.apply([dig()]);
+        let dug = studio.picture();
+        for round in 0..2 {
+            undo(studio);
+            let (apart, _) = flip(&untouched, &studio.picture());
+            album.check(apart < 1e-4, || {
+                format!("{what} undone {round}: FLIP {apart:.5} from what was there")
+            });
+            studio.apply([dig()]);
+            let (apart, _) = flip(&dug, &studio.picture());
+            album.check(apart < 1e-4, || format!("{what} dug again {round}: FLIP {apart:.5} from the first"));
+        }
+    }
+}
+
+fn undo(studio: &mut Studio) {
+    let commits = studio.app.world().resource::<BurrowFigures>().commits;
+    studio.app.world_mut().write_message(Undo::default());
+    studio.until("the step back", |app| app.world().resource::<BurrowFigures>().commits > commits);
+}
