@@ -4,8 +4,8 @@
 #   tools/instructions.sh            fails where a count grew by more than 3 %, and says what shrank
 #   tools/instructions.sh --update   writes the counts as the new baseline
 #
-# Counts depend on the compiler: the baseline names the one it was made with, and under another one they are shown but
-# nothing fails. Nor does it where valgrind can't be had: then nothing is counted.
+# Counts depend on the compiler and the C library: the baseline names those it was made with, and under others they are
+# shown but nothing fails. What the library would choose by the processor at hand it does not choose here. Nor does it where valgrind can't be had: then nothing is counted.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -39,7 +39,8 @@ trap 'rm -f "$counts"' EXIT
 
 # count NAME: the workload's name and its instructions.
 count() {
-    valgrind --tool=callgrind --toggle-collect='*counted_workload*' --callgrind-out-file=/dev/null "$bench" "$1" 2>&1 |
+    GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512VL,-AVX512F,-AVX2,-AVX,-ERMS,-FSRM \
+        valgrind --tool=callgrind --toggle-collect='*counted_workload*' --callgrind-out-file=/dev/null "$bench" "$1" 2>&1 |
         awk -v name="$1" '/Collected :/ { count = $NF } { last = $0 }
             END { if (!count) { print name ": " last > "/dev/stderr"; exit 1 } print name, count }'
 }
@@ -48,7 +49,8 @@ for name in $("$bench"); do
     count "$name" >>"$counts"
 done
 LC_ALL=C sort -o "$counts" "$counts"
-compiler="# instructions, $(rustc --version), $(rustc -vV | sed -n 's/^host: //p')"
+library=$(getconf GNU_LIBC_VERSION 2>/dev/null || echo 'another C library')
+compiler="# instructions, $(rustc --version), $(rustc -vV | sed -n 's/^host: //p'), $library"
 
 if $update; then
     { echo "$compiler"; cat "$counts"; } >"$baseline"
@@ -58,7 +60,7 @@ fi
 
 fatal=1
 if ! grep -qxF "$compiler" "$baseline"; then
-    printf 'another compiler than that of the baseline, so nothing fails; --update makes a new one\n%s\n%s\n' \
+    printf 'another compiler or C library than those of the baseline, so nothing fails; --update makes a new one\n%s\n%s\n' \
         "$(head -n 1 "$baseline")" "$compiler"
     fatal=0
 fi

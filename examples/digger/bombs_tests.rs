@@ -24,7 +24,7 @@ fn app() -> App {
     let ground = Ground::from_fn(64, 64, |_, _| 20.0).expect("a small world");
     app.world_mut().spawn(Terrain::new(ground, &TerrainSettings::default()).expect("default settings"));
     app.world_mut().spawn((ColliderSource { radius: 64.0 }, Transform::from_xyz(32.0, 20.0, 32.0)));
-    for _ in 0..1000 {
+    for _ in 0..30_000 {
         app.update();
         if ground_is_there(&mut app) {
             return app;
@@ -47,7 +47,7 @@ fn throw_from(app: &mut App, place: Vec3, velocity: Vec3) -> Entity {
 
 /// Lets frames pass until nothing waits for colliders.
 fn let_go(app: &mut App) {
-    for _ in 0..1000 {
+    for _ in 0..30_000 {
         app.update();
         let mut held = app.world_mut().query_filtered::<(), With<HeldByGround>>();
         if held.iter(app.world()).next().is_none() {
@@ -91,7 +91,7 @@ fn a_blast_takes_a_hole_and_what_it_took_is_in_the_inventory() {
         .after(BurrowSystems::Commit),
     );
     let bomb = throw_from(&mut app, Vec3::new(30.0, 20.5, 30.0), Vec3::ZERO);
-    for _ in 0..2000 {
+    for _ in 0..60_000 {
         app.update();
         if app.world().resource::<Inventory>().stock(MaterialId(0)) > 0 {
             break;

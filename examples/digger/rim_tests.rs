@@ -22,7 +22,7 @@ fn app(feet: Vec3) -> (App, Entity) {
     let ground = Ground::from_fn(SIDE as u32, SIDE as u32, |_, _| 20.0).expect("a small world");
     app.world_mut().spawn(Terrain::new(ground, &TerrainSettings::default()).expect("default settings"));
     let player = app.world_mut().spawn((Player::default(), body::standing_at(feet))).id();
-    for _ in 0..2000 {
+    for _ in 0..60_000 {
         app.update();
         if app.world().get::<CharacterMotion>(player).is_some_and(|motion| motion.grounded) {
             return (app, player);

@@ -36,6 +36,11 @@ impl Backend {
         }
     }
 
+    /// Backends that compute nothing here, and why.
+    pub fn missing() -> Vec<(Self, NoBackend)> {
+        Self::ALL.into_iter().filter_map(|backend| Some((backend, backend.open().err()?))).collect()
+    }
+
     /// The paper's name for it.
     pub const fn title(self) -> &'static str {
         match self {

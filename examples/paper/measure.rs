@@ -131,19 +131,16 @@ impl Measurements {
     }
 }
 
-/// Runs the experiment; `progress` is told after each run of edits.
-pub fn measure(setup: Setup, mut progress: impl FnMut()) -> Result<Measurements, PaperError> {
+/// Runs the experiment on all backends but those that are missing; `progress` is told after each run of edits.
+pub fn measure(
+    setup: Setup,
+    missing: Vec<(Backend, NoBackend)>,
+    mut progress: impl FnMut(),
+) -> Result<Measurements, PaperError> {
     let scene = setup.scene()?;
-    let mut missing = Vec::new();
-    let mut subjects = Vec::new();
-    for backend in Backend::ALL {
-        match backend.open() {
-            Ok(_) => {
-                subjects.extend(CHUNK_SIZES.map(|chunk_size| Subject::Hybrid { backend, chunk_size }));
-            }
-            Err(reason) => missing.push((backend, reason)),
-        }
-    }
+    let is_here = |backend: &Backend| missing.iter().all(|(other, _)| other != backend);
+    let hybrid = |backend| CHUNK_SIZES.map(|chunk_size| Subject::Hybrid { backend, chunk_size });
+    let mut subjects: Vec<Subject> = Backend::ALL.into_iter().filter(is_here).flat_map(hybrid).collect();
     subjects.extend(Output::BOTH.map(Subject::Full));
 
     let mut measured: Vec<Measured> = Vec::new();

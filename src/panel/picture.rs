@@ -100,6 +100,7 @@ mod tests {
                 None,
             )
         };
+        let _ = fs::remove_dir_all(&folder);
         for name in ["burrow_0001.png", "burrow_0002.png"] {
             let path = write(image(), &folder).expect("written");
             assert!(path.ends_with(name), "{path:?}");

@@ -85,10 +85,15 @@ fn a_source_that_is_held_has_ground_made_where_it_was_going() {
     for (velocity, ball_radius, radius) in cases {
         let mut stage = Stage::new();
         stage.app.world_mut().spawn(level(512, 1.0));
+        // Without a source, ground is shown and has no colliders.
+        stage.frames_until("the ground is shown", |stage| {
+            let world = stage.app.world_mut();
+            world.query::<&Tile>().iter(world).next().is_some()
+        });
         let ball = stage.ball(Vec3::new(259.0, 8.1 + ball_radius, 259.0), ball_radius, velocity);
         stage.app.world_mut().entity_mut(ball).insert(ColliderSource { radius });
         stage.frame();
-        assert!(stage.is_held(ball), "the ground is not there yet");
+        assert!(stage.is_held(ball), "there is no collider yet");
         stage.frames_until("it is let go", |stage| !stage.is_held(ball));
     }
 }
