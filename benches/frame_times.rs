@@ -1,15 +1,18 @@
 //! What digging costs a frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`.
 //!
-//! A walk over the real landscape in textures, shadows and fog, drawn without a window, 60 frames a second. On each backend
-//! it is walked digging, 20 brushes of radius 3 a second, and then again over the dug ground with nothing to do. A frame
-//! is timed from its start until the graphics card has drawn it, so one frame overlaps no other, as it would in a game.
-//! Last come frames of which a part is left out, to see where their time goes.
+//! A walk over the real landscape in textures, shadows and fog, drawn without a window, at most 60 frames a second. On each
+//! backend it is walked digging, 20 brushes of radius 3 a second by the clock, and then again over the dug ground with
+//! nothing to do. Colliders are made near a body that walks along, and balls lie about there. A frame is timed from its
+//! start until the graphics card has drawn it, so one frame overlaps no other, as it would in a game. What the plugin takes
+//! is all that happens from before its first system in `Update` to after its last one, whatever runs in between, and all
+//! of its systems beside the steps of physics. Last come frames of which a part is left out, to see where their time goes.
 
 #[path = "../examples/shared/offscreen.rs"]
 mod offscreen;
 
 use std::time::{Duration, Instant};
 
+use avian3d::prelude::*;
 use bevy::camera::RenderTarget;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
@@ -18,13 +21,18 @@ use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::ground::{GreyImage, ImageLimits, ImageScale};
 use bevy_burrow::lattice::Column;
+use bevy_burrow::physics::{ColliderSource, TerrainPhysicsPlugin, TerrainPhysicsSystems};
 use bevy_burrow::prelude::*;
 
 /// Time from frame to frame.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
-/// Frames from brush to brush.
-const BRUSH_EVERY: usize = 3;
+/// Time from brush to brush.
+const BRUSH: Duration = Duration::from_millis(50);
+
+/// Frames from ball to ball, and how many lie about.
+const BALL_EVERY: usize = 20;
+const BALLS: usize = 100;
 
 /// Frames of which a part is left out.
 const PARTIAL: usize = 240;
@@ -51,16 +59,25 @@ fn main() {
         }
         let mut medians = [[0.0; 2]; 2];
         for (pass, is_digging) in [true, false].into_iter().enumerate() {
-            let (mut all, mut systems, before) = (Vec::new(), Vec::new(), walk.commits());
+            let (mut all, mut systems, mut core) = (Vec::new(), Vec::new(), Vec::new());
+            let (start, before) = (Instant::now(), walk.figures());
+            walk.next_brush = start;
             for number in 0..frames {
-                let (took, plugin) = walk.frame(number, is_digging);
-                all.push(took);
-                systems.push(plugin);
+                all.push(walk.frame(number, is_digging));
+                systems.push(walk.app.world_mut().resource_mut::<Clock>().take());
+                core.push(walk.figures().main_thread);
             }
-            let what = if is_digging { "digging" } else { "the same, nothing to do" };
-            let commits = walk.commits() - before;
-            medians[pass] = report(&format!("{backend:?}, {what}, {commits} commits: frames"), all);
-            report("    the plugin's systems in these", systems);
+            let (what, after) =
+                (if is_digging { "digging" } else { "the same, nothing to do" }, walk.figures());
+            println!(
+                "{backend:?}, {what}: {} brushes in {} commits, {:.1} brushes a second",
+                after.brushes - before.brushes,
+                after.commits - before.commits,
+                (after.brushes - before.brushes) as f64 / start.elapsed().as_secs_f64(),
+            );
+            medians[pass] = report("    frames", all);
+            report("    the plugin in these, physics included", systems);
+            report("    of that, brushes taken in, commits and starts", core);
         }
         let [p50, p99] = [0, 1].map(|at| medians[0][at] / medians[1][at]);
         println!("{backend:?}: digging over nothing to do: p50 {p50:.2}, p99 {p99:.2}");
@@ -79,11 +96,58 @@ fn report(what: &str, mut times: Vec<Duration>) -> [f64; 2] {
     [at(0.5), at(0.99)]
 }
 
+/// What the plugin's systems took in this frame, and when those that run now began.
+#[derive(Resource, Default)]
+struct Clock {
+    spent: Duration,
+    began: Option<Instant>,
+}
+
+impl Clock {
+    fn take(&mut self) -> Duration {
+        std::mem::take(&mut self.spent)
+    }
+}
+
+fn start_clock(mut clock: ResMut<Clock>) {
+    clock.began = Some(Instant::now());
+}
+
+/// Has the world to itself: what the systems before it asked for has been done.
+fn stop_clock(world: &mut World) {
+    let mut clock = world.resource_mut::<Clock>();
+    if let Some(began) = clock.began.take() {
+        clock.spent += began.elapsed();
+    }
+}
+
+/// Times all systems of the plugin, on the main thread and in the order of a frame.
+fn add_clocks(app: &mut App) {
+    use TerrainPhysicsSystems::{Hold, Near, Upkeep, Wake};
+    app.init_resource::<Clock>()
+        .add_systems(FixedPreUpdate, (start_clock.before(Wake), stop_clock.after(Wake)))
+        .add_systems(
+            FixedPostUpdate,
+            (start_clock.before(Wake).after(PhysicsSystems::Last), stop_clock.after(Wake)),
+        )
+        .add_systems(
+            Update,
+            (
+                start_clock.before(Near).before(BurrowSystems::Load),
+                stop_clock.after(Upkeep).after(BurrowSystems::Dress),
+            ),
+        )
+        .add_systems(PostUpdate, (start_clock.before(Hold), stop_clock.after(Hold)));
+}
+
 /// An app that walks over a landscape.
 struct Walk {
     app: App,
     camera: Entity,
     path: Vec<Vec3>,
+    balls: Vec<Entity>,
+    /// When the next brush is due.
+    next_brush: Instant,
 }
 
 impl Walk {
@@ -92,7 +156,9 @@ impl Walk {
         engine.wait(Duration::from_secs(30));
         let renderer = offscreen::find_renderer().expect("a graphics adapter");
         let mut app = offscreen::build(Some(renderer), |app| {
-            app.add_plugins(BurrowPlugins).insert_resource(BurrowEngine(engine));
+            app.add_plugins((BurrowPlugins, PhysicsPlugins::default(), TerrainPhysicsPlugin))
+                .insert_resource(BurrowEngine(engine));
+            add_clocks(app);
         });
         let ground = ground();
         let path = path(&ground);
@@ -102,8 +168,8 @@ impl Walk {
         let film = world.resource_mut::<Assets<Image>>().add(film);
         let fog =
             DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
-        let camera =
-            world.spawn((Camera3d::default(), RenderTarget::from(film), fog, Transform::default())).id();
+        let camera = (Camera3d::default(), RenderTarget::from(film), fog, Transform::default());
+        let camera = world.spawn((camera, ColliderSource { radius: 48.0 })).id();
         let shadows =
             CascadeShadowConfigBuilder { num_cascades: 3, maximum_distance: 150.0, ..default() }.build();
         world.spawn((
@@ -113,7 +179,7 @@ impl Walk {
         ));
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         world.spawn((terrain, GroundLook::default()));
-        let mut walk = Self { app, camera, path };
+        let mut walk = Self { app, camera, path, balls: Vec::new(), next_brush: Instant::now() };
         // The ground is there when its textures are painted and its tiles are shown.
         let start = Instant::now();
         while !walk.is_shown() {
@@ -133,7 +199,7 @@ impl Walk {
     /// Frames without one thing more.
     fn leave_out(&mut self, what: &str, change: fn(&mut Self)) {
         change(self);
-        let took = (0..PARTIAL).map(|number| self.frame(number, false).0);
+        let took = (0..PARTIAL).map(|number| self.frame(number, false));
         report(&format!("    {what}: frames"), took.collect());
     }
 
@@ -149,12 +215,12 @@ impl Walk {
         self.path.iter_mut().for_each(|place| place.y += 1e5);
     }
 
-    fn commits(&self) -> u64 {
-        self.app.world().resource::<BurrowFigures>().commits
+    fn figures(&self) -> BurrowFigures {
+        self.app.world().resource::<BurrowFigures>().clone()
     }
 
-    /// One frame: how long it took, and the plugin's systems in it.
-    fn frame(&mut self, number: usize, is_digging: bool) -> (Duration, Duration) {
+    /// One frame, and how long it took.
+    fn frame(&mut self, number: usize, is_digging: bool) -> Duration {
         let start = Instant::now();
         let at = self.path[number % self.path.len()];
         let ahead = self.path[(number + 90) % self.path.len()];
@@ -162,17 +228,23 @@ impl Walk {
         if let Some(mut camera) = world.get_mut::<Transform>(self.camera) {
             *camera = Transform::from_translation(at + Vec3::Y * 6.0).looking_at(ahead, Vec3::Y);
         }
-        if is_digging && number.is_multiple_of(BRUSH_EVERY) {
+        while is_digging && self.next_brush <= start {
             world.write_message(Brush::dig(Shape::sphere(ahead, 3.0)));
+            self.next_brush += BRUSH;
+        }
+        if number.is_multiple_of(BALL_EVERY) {
+            let place = Transform::from_translation(ahead + Vec3::Y * 8.0);
+            self.balls.push(world.spawn((RigidBody::Dynamic, Collider::sphere(0.4), place)).id());
+            if self.balls.len() > BALLS {
+                world.despawn(self.balls.remove(0));
+            }
         }
         self.app.update();
-        let world = self.app.world();
-        let plugin = world.resource::<BurrowFigures>().main_thread;
-        let drawn = world.resource::<RenderDevice>().poll(PollType::wait_indefinitely());
+        let drawn = self.app.world().resource::<RenderDevice>().poll(PollType::wait_indefinitely());
         assert!(drawn.is_ok(), "the frame is never done: {drawn:?}");
         let took = start.elapsed();
         std::thread::sleep(FRAME.saturating_sub(took));
-        (took, plugin)
+        took
     }
 }
 

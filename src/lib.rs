@@ -49,7 +49,7 @@
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
 //! | to know what happened | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to take it back | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
-//! | cut off ground to fall | the `LooseGround` component, `LoosePieceFound` messages; [`LooseSettings`](terrain::LooseSettings) |
+//! | cut off ground to fall | the `LooseGround` component, `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`); [`LooseSettings`](terrain::LooseSettings) |
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
@@ -117,6 +117,8 @@
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
+//! | `interop` | experimental: surfaces that CUDA writes where Vulkan draws them, on Linux | |
+//! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
 //! Without any feature the model alone is built, with no Bevy at all. Bevy's own `multi_threaded` feature, part of its

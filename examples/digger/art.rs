@@ -33,7 +33,7 @@ const INKS: [(char, [u8; 3]); 14] = [
 ];
 
 /// The tools, in the order of the slots.
-const TOOLS: [[&str; 16]; 7] = [
+const TOOLS: [[&str; 16]; 8] = [
     [
         "................",
         "....ssSSS.......",
@@ -160,6 +160,24 @@ const TOOLS: [[&str; 16]; 7] = [
         "................",
         "................",
     ],
+    [
+        "................",
+        "................",
+        ".....rrrrrr.....",
+        "...rrrrrrrrrr...",
+        "..rroorrrrrrrr..",
+        "..roorrrrrrrYY..",
+        ".rrorrrrrrYYYYr.",
+        ".rrrrrrrYYYYrrr.",
+        ".rrrrrYYYYrrrrr.",
+        ".rrrYYYYrrrrrrr.",
+        ".rYYYYrrrrrrrrk.",
+        "..YYrrrrrrrrrk..",
+        "..rrrrrrrrrrkk..",
+        "...rrrrrrrrkk...",
+        ".....rrrkkk.....",
+        "................",
+    ],
 ];
 
 /// The pictures, once they are drawn.
@@ -168,7 +186,7 @@ pub struct Art {
     /// The name of the game.
     pub logo: Handle<Image>,
     /// In the order of the slots.
-    pub tools: [Handle<Image>; 7],
+    pub tools: [Handle<Image>; 8],
     /// A rough square, white; materials tint it.
     pub swatch: Handle<Image>,
     /// A soft disc, for smoke and sparks.

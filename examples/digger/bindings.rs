@@ -117,7 +117,7 @@ impl Default for Bindings {
         use Binding::{Key, Mouse, Pad, WheelDown, WheelUp};
         use GamepadButton as G;
         use KeyCode as K;
-        let all: [(Action, &[Binding]); 29] = [
+        let all: [(Action, &[Binding]); 30] = [
             (A::Forward, &[Key(K::KeyW), Key(K::ArrowUp)]),
             (A::Back, &[Key(K::KeyS), Key(K::ArrowDown)]),
             (A::Left, &[Key(K::KeyA), Key(K::ArrowLeft)]),
@@ -133,6 +133,7 @@ impl Default for Bindings {
             (A::Slot5, &[Key(K::Digit5)]),
             (A::Slot6, &[Key(K::Digit6)]),
             (A::Slot7, &[Key(K::Digit7)]),
+            (A::Slot8, &[Key(K::Digit8)]),
             (A::NextTool, &[Pad(G::RightTrigger)]),
             (A::PreviousTool, &[Pad(G::LeftTrigger)]),
             (A::NextMaterial, &[Key(K::KeyE), Pad(G::DPadRight)]),

@@ -71,6 +71,7 @@ fn grip(
     let dark = dye(Color::srgb(0.10, 0.10, 0.11), 0.5, 0.3);
     let red = dye(Color::srgb(0.66, 0.16, 0.10), 0.6, 0.0);
     let bristle = dye(Color::srgb(0.80, 0.72, 0.52), 0.95, 0.0);
+    let rubber = dye(Color::hsl(8.0, 0.75, 0.45), 0.55, 0.0);
     let sample = dye(Color::WHITE, 0.95, 0.0);
     let glow = materials.add(StandardMaterial {
         base_color: Color::linear_rgb(2.6, 1.7, 0.6),
@@ -96,7 +97,7 @@ fn grip(
         let place = at(0.0, 0.05, z).with_rotation(pitch(FRAC_PI_2));
         part(&tube, material, place.with_scale(Vec3::new(radius, length, radius)))
     };
-    let models: [(Tool, Vec<Part>); 7] = [
+    let models: [(Tool, Vec<Part>); 8] = [
         (
             Tool::Pickaxe,
             vec![
@@ -169,6 +170,7 @@ fn grip(
                 part(&tube, &dark, at(0.0, 0.13, 0.0).with_scale(Vec3::new(0.046, 0.012, 0.046))),
             ],
         ),
+        (Tool::Ball, vec![part(&ball, &rubber, at(0.0, 0.06, 0.0).with_scale(Vec3::splat(0.055)))]),
     ];
     let piece =
         |(mesh, material, place): Part| (Mesh3d(mesh), MeshMaterial3d(material), place, NotShadowCaster);
@@ -298,7 +300,7 @@ fn pose(tool: Tool, phase: Option<f32>) -> (Quat, Vec3) {
             let turn = Quat::from_rotation_y(0.26) * Quat::from_rotation_x(0.10);
             (turn, Vec3::new(shake - 0.005, shake * 0.7 - 0.012, -0.07 - 0.02 * through))
         }
-        Tool::Builder | Tool::Bomb | Tool::Lamp => (
+        Tool::Builder | Tool::Bomb | Tool::Lamp | Tool::Ball => (
             lean * Quat::from_rotation_x(0.5 * back - 0.5 * through),
             Vec3::new(-0.02 * through, 0.05 * back + 0.02 * through, 0.05 * back - 0.10 * through),
         ),

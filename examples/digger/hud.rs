@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use bevy::prelude::*;
+use bevy_burrow::panel::BurrowPanel;
 use bevy_burrow::prelude::*;
 
 use crate::art::Art;
@@ -228,9 +229,11 @@ fn show(
     shown: Res<ShowHud>,
     phase: Res<State<Phase>>,
     eyes: Single<Has<Drone>, With<Eyes>>,
+    panel: Res<BurrowPanel>,
     mut hud: Single<&mut Visibility, With<Hud>>,
 ) {
-    let is_shown = shown.0 && *phase.get() == Phase::Playing && !*eyes;
+    // The panel is read without anything shining through it.
+    let is_shown = shown.0 && *phase.get() == Phase::Playing && !*eyes && !panel.is_open;
     hud.set_if_neq(if is_shown { Visibility::Inherited } else { Visibility::Hidden });
 }
 
@@ -251,7 +254,7 @@ fn mark_tool(
             format!("builder  {} of {}  {radius:.2} m", hand.form.label(), landscape::name(hand.material))
         }
         Tool::Painter => format!("painter  {}  {radius:.2} m", landscape::name(hand.material)),
-        Tool::Bomb | Tool::Lamp => hand.tool.label().into(),
+        Tool::Bomb | Tool::Lamp | Tool::Ball => hand.tool.label().into(),
         tool => format!("{}  {radius:.2} m", tool.label()),
     };
     name.set_if_neq(Text::new(words));
@@ -277,7 +280,7 @@ fn count_materials(
 
 /// The crosshair fades where the tool does not reach.
 fn aim(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Crosshair>>) {
-    let reaches = hand.aim.is_some() || hand.tool == Tool::Bomb;
+    let reaches = hand.aim.is_some() || matches!(hand.tool, Tool::Bomb | Tool::Ball);
     dot.set_if_neq(BackgroundColor(ui::WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
 }
 

@@ -30,6 +30,7 @@ pub enum Action {
     Slot5,
     Slot6,
     Slot7,
+    Slot8,
     NextTool,
     PreviousTool,
     NextMaterial,
@@ -48,7 +49,7 @@ pub enum Action {
 
 impl Action {
     /// All of them, in the order of the page of controls, with what they are called there.
-    pub const ALL: [(Self, &str); 29] = [
+    pub const ALL: [(Self, &str); 30] = [
         (Self::Forward, "forward"),
         (Self::Back, "back"),
         (Self::Left, "left"),
@@ -68,6 +69,7 @@ impl Action {
         (Self::Slot5, "painter"),
         (Self::Slot6, "bomb"),
         (Self::Slot7, "lamp"),
+        (Self::Slot8, "ball"),
         (Self::NextTool, "next tool"),
         (Self::PreviousTool, "previous tool"),
         (Self::NextMaterial, "next material"),

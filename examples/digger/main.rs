@@ -35,7 +35,7 @@
 //! | `player.rs`, `body.rs`, `rim.rs` | the player's eyes and body, and where the world ends |
 //! | `tools.rs`, `form.rs`, `preview.rs`, `held.rs` | the tools, what they would do, and how they look in hand |
 //! | `work.rs`, `amount.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
-//! | `bombs.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what shines, what falls and crumbles |
+//! | `bombs.rs`, `balls.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what bounces, what shines, what falls and crumbles |
 //! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
@@ -45,6 +45,7 @@
 
 mod amount;
 mod art;
+mod balls;
 mod bindings;
 mod body;
 mod bombs;
@@ -195,6 +196,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             inventory::InventoryPlugin,
             particles::ParticlesPlugin,
             bombs::BombsPlugin,
+            balls::BallsPlugin,
             lamps::LampsPlugin,
         ))
         .add_plugins((
@@ -214,7 +216,7 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
-    app.add_plugins((veins::VeinsPlugin, debris::DebrisPlugin));
+    app.add_plugins((veins::VeinsPlugin, debris::RubblePlugin));
     if options.tell {
         app.add_plugins(tell::TellPlugin);
     }

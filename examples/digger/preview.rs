@@ -36,6 +36,6 @@ fn show_preview(hand: Res<Hand>, mut gizmos: Gizmos) {
             gizmos.circle(Isometry3d::new(place, flat), radius, colour).resolution(48);
         }
         Tool::Builder => draw_shape(&mut gizmos, &hand.form.shape(&aim, radius), colour),
-        Tool::Bomb | Tool::Lamp => {}
+        Tool::Bomb | Tool::Lamp | Tool::Ball => {}
     }
 }

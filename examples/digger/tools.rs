@@ -1,4 +1,4 @@
-//! The seven tools, and what the hand does with them: aim, choose, swing.
+//! The eight tools, and what the hand does with them: aim, choose, swing.
 //!
 //! A held button swings the tool again and again; in the moment of the hit a [`Strike`] is triggered, and whoever is
 //! responsible for the tool observes it.
@@ -25,6 +25,7 @@ pub enum Tool {
     Painter,
     Bomb,
     Lamp,
+    Ball,
 }
 
 /// How a tool is used.
@@ -40,7 +41,7 @@ struct Manner {
     radius: (f32, f32, f32),
 }
 
-const MANNERS: [Manner; 7] = [
+const MANNERS: [Manner; 8] = [
     Manner {
         label: "pickaxe",
         purpose: "breaks the ground, blow by blow",
@@ -98,14 +99,30 @@ const MANNERS: [Manner; 7] = [
         reach: 14.0,
         radius: (0.3, 0.3, 0.3),
     },
+    Manner {
+        label: "ball",
+        purpose: "bounces, and rolls to where it is deepest",
+        period: 0.50,
+        hit: 0.20,
+        reach: 40.0,
+        radius: (0.3, 0.3, 0.3),
+    },
 ];
 
 impl Tool {
     /// In the order of their slots.
-    pub const ALL: [Self; 7] =
-        [Self::Pickaxe, Self::Shovel, Self::Drill, Self::Builder, Self::Painter, Self::Bomb, Self::Lamp];
+    pub const ALL: [Self; 8] = [
+        Self::Pickaxe,
+        Self::Shovel,
+        Self::Drill,
+        Self::Builder,
+        Self::Painter,
+        Self::Bomb,
+        Self::Lamp,
+        Self::Ball,
+    ];
 
-    const SLOTS: [Action; 7] = [
+    const SLOTS: [Action; 8] = [
         Action::Slot1,
         Action::Slot2,
         Action::Slot3,
@@ -113,6 +130,7 @@ impl Tool {
         Action::Slot5,
         Action::Slot6,
         Action::Slot7,
+        Action::Slot8,
     ];
 
     const fn manner(self) -> &'static Manner {
@@ -149,7 +167,7 @@ pub struct Hand {
     pub tool: Tool,
     pub form: Form,
     pub material: MaterialId,
-    radii: [f32; 7],
+    radii: [f32; 8],
     /// What is aimed at, if the tool reaches it.
     pub aim: Option<Aim>,
     /// Show what a dig would take?

@@ -83,6 +83,7 @@ fn every_tool_sends_its_own_brush_or_none() {
         (Tool::Painter, 1),
         (Tool::Bomb, 0),
         (Tool::Lamp, 0),
+        (Tool::Ball, 0),
     ] {
         let sent = strike(&mut app, tool);
         assert_eq!(sent.len(), brushes, "{tool:?}");

@@ -1,40 +1,258 @@
-//! Colliders for loose pieces of ground.
+//! Loose pieces of ground that fall as bodies.
 
 use avian3d::prelude::*;
-use bevy::math::Vec3;
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
-use crate::lattice::SNAP;
-use crate::surface::SurfaceMesh;
+use super::debris_collider;
+use crate::ground::MaterialId;
+use crate::lattice::LatticeBox;
+use crate::plugin::{BurrowSystems, HistoryMoved, LoosePieceFound, MaterialColors, Wardrobe, tell};
+use crate::terrain::{PieceFate, Restored, Terrain};
 
-/// How much of its hull a piece may lack, as a share, to be taken for convex.
-const HOLLOW: f32 = 0.25;
-
-/// Cells along the longest side by which a piece that is not convex is cut into convex ones.
-const RESOLUTION: u32 = 24;
-
-/// A collider for a body that a loose piece of ground becomes: its convex hull, or several hulls where one would be far
-/// from it. In metres from the origin of the piece's mesh, which must be closed; `None` for a piece without volume.
+/// Ground that broke off falls as a body. Put a [`LooseGround`](crate::plugin::LooseGround) with some `debris` on the
+/// terrain, and pieces up to so many voxels fall; the collider is made in a task, and with `Assets<Mesh>` a mesh too.
 ///
-/// It takes milliseconds, and tens of them for a large piece that is not convex: call it in a task.
-pub fn debris_collider(piece: &SurfaceMesh, voxel_size: f32) -> Option<Collider> {
-    let scale = voxel_size / SNAP as f32;
-    let vertices: Vec<Vec3> = piece.vertices.iter().map(|vertex| vertex.position.as_vec3() * scale).collect();
-    let triangles: Vec<[u32; 3]> = piece
-        .indices
-        .chunks_exact(3)
-        .map(|t| [t[0], t[1], t[2]])
-        .filter(|t| t.iter().all(|&corner| (corner as usize) < vertices.len()))
-        .collect();
-    let corners = |t: &[u32; 3]| t.map(|corner| vertices[corner as usize] - vertices[0]);
-    let volume: f32 = triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
-    let hull = Collider::convex_hull(vertices.clone())?;
-    let full = hull.mass_properties(1.0).mass;
-    if !full.is_finite() || full <= 0.0 {
-        return None;
+/// ```no_run
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// # use bevy_burrow::physics::{DebrisPlugin, DebrisSettings};
+/// # fn game(app: &mut App, terrain: Terrain) {
+/// app.add_plugins(DebrisPlugin).insert_resource(DebrisSettings { stay: 60.0, ..default() });
+/// app.world_mut().spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
+/// # }
+/// ```
+#[derive(Default)]
+pub struct DebrisPlugin;
+
+/// How debris behaves. Changes count for pieces that fall later.
+#[derive(Resource, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Resource, Default)]
+pub struct DebrisSettings {
+    /// Pieces at once. While there are as many, others vanish.
+    pub most: usize,
+    /// Seconds that a piece lies about before it crumbles.
+    pub stay: f32,
+    /// How slippery pieces are.
+    pub friction: Friction,
+    /// How bouncy they are.
+    pub restitution: Restitution,
+}
+
+impl Default for DebrisSettings {
+    fn default() -> Self {
+        Self { most: 24, stay: 25.0, friction: Friction::new(0.9), restitution: Restitution::new(0.05) }
     }
-    if volume >= full * (1.0 - HOLLOW) {
-        return Some(hull);
+}
+
+/// A piece of ground that fell, or falls: on the body, whose `Transform` is at the piece's lower corner. Its mesh is a
+/// child, with the terrain's `MeshMaterial3d<StandardMaterial>` or a plain one.
+#[derive(Component, Clone, Debug, PartialEq)]
+#[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
+pub struct Debris {
+    /// The terrain that it was part of.
+    pub terrain: Entity,
+    /// The tag of the brush that cut it off.
+    pub tag: u64,
+    /// What most of it is made of.
+    pub material: MaterialId,
+    /// How large it is, in voxels.
+    pub voxels: u64,
+    /// From its lower corner to the middle of its bounds, in metres.
+    pub half: Vec3,
+    /// Seconds until it crumbles.
+    pub left: f32,
+}
+
+impl Debris {
+    /// The middle of a piece that is here.
+    pub fn middle(&self, place: &Transform) -> Vec3 {
+        place.translation + place.rotation * self.half
     }
-    let parameters = VhacdParameters { resolution: RESOLUTION, ..VhacdParameters::default() };
-    Some(Collider::convex_decomposition_with_config(vertices, triangles, parameters))
+}
+
+/// A piece has lain about for long enough; it is despawned right after this.
+#[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DebrisCrumbled {
+    /// The piece's entity.
+    pub entity: Entity,
+}
+
+/// A piece whose collider and mesh are being made.
+#[derive(Component)]
+struct Shaping {
+    debris: Debris,
+    place: Transform,
+    voxel_size: f32,
+    task: Task<(Option<Collider>, Option<Mesh>)>,
+}
+
+impl Plugin for DebrisPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<DebrisSettings>().add_observer(clear).add_systems(
+            Update,
+            (break_off, make_room, take_shape, crumble).chain().after(BurrowSystems::Commit),
+        );
+    }
+}
+
+fn break_off(
+    mut commands: Commands,
+    settings: Res<DebrisSettings>,
+    mut found: MessageReader<LoosePieceFound>,
+    terrains: Query<(&Terrain, &MaterialColors)>,
+    places: TransformHelper,
+    pieces: Query<(), Or<(With<Debris>, With<Shaping>)>>,
+    meshes: Option<Res<Assets<Mesh>>>,
+) {
+    let mut room = settings.most.saturating_sub(pieces.count());
+    for found in found.read().filter(|found| found.piece.fate == PieceFate::BrokeOff) {
+        let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
+        let Ok(ground) = places.compute_global_transform(found.terrain) else { continue };
+        let Some(surface) = found.piece.mesh.clone().filter(|_| room > 0) else { continue };
+        room -= 1;
+        let (voxel_size, bounds) = (terrain.voxel_size(), found.piece.bounds);
+        let most = found.piece.materials.iter().max_by_key(|(_, voxels)| *voxels);
+        let debris = Debris {
+            terrain: found.terrain,
+            tag: found.tag,
+            material: most.map_or_else(MaterialId::default, |(material, _)| material),
+            voxels: found.piece.voxels,
+            half: (bounds.max - bounds.min).as_vec3() * (voxel_size / 2.0),
+            left: settings.stay,
+        };
+        let place = Transform::from_translation(ground.transform_point(found.origin()));
+        let wardrobe = meshes.is_some().then(|| Wardrobe::new(terrain.world(), colors));
+        let task = AsyncComputeTaskPool::get().spawn(async move {
+            let mesh = wardrobe.and_then(|wardrobe| wardrobe.build_at(bounds.min, &surface));
+            (debris_collider(&surface, voxel_size), mesh.map(|(mesh, _)| mesh))
+        });
+        let place = place.with_rotation(ground.rotation());
+        commands.spawn(Shaping { debris, place, voxel_size, task });
+    }
+}
+
+/// Where undo or redo put ground, there is no room for what had fallen from it.
+fn make_room(
+    mut commands: Commands,
+    mut steps: MessageReader<HistoryMoved>,
+    terrains: Query<&Terrain>,
+    places: TransformHelper,
+    pieces: Query<(Entity, &Debris, &Transform)>,
+    shaping: Query<(Entity, &Shaping)>,
+) {
+    for HistoryMoved { terrain, receipt } in steps.read() {
+        let Some(entity) = *terrain else { continue };
+        let (Ok(terrain), Ok(ground)) = (terrains.get(entity), places.compute_global_transform(entity))
+        else {
+            continue;
+        };
+        let Ok(Restored { bounds: Some(bounds), added, .. }) = &receipt.outcome else { continue };
+        if added.total() == 0 {
+            continue;
+        }
+        let local = ground.affine().inverse();
+        let all = pieces
+            .iter()
+            .chain(shaping.iter().map(|(entity, Shaping { debris, place, .. })| (entity, debris, place)));
+        for (entity, debris, place) in all {
+            let middle = local.transform_point3(debris.middle(place));
+            if meets(*bounds, middle, debris.half.length() / terrain.voxel_size()) {
+                commands.entity(entity).try_despawn();
+            }
+        }
+    }
+}
+
+/// Does a ball reach into a box?
+fn meets(bounds: LatticeBox, middle: Vec3, reach: f32) -> bool {
+    middle.distance(middle.clamp(bounds.min.as_vec3(), bounds.max.as_vec3())) < reach
+}
+
+fn take_shape(
+    mut commands: Commands,
+    settings: Res<DebrisSettings>,
+    mut shaping: Query<(Entity, &mut Shaping)>,
+    mut meshes: Option<ResMut<Assets<Mesh>>>,
+    mut dress: Dress,
+) {
+    for (entity, mut piece) in &mut shaping {
+        let Some((collider, mesh)) = check_ready(&mut piece.task) else { continue };
+        let mut entity = commands.entity(entity);
+        let Some(collider) = collider else {
+            entity.try_despawn();
+            continue;
+        };
+        let DebrisSettings { friction, restitution, .. } = *settings;
+        entity.try_remove::<Shaping>().try_insert((
+            Name::new("debris"),
+            piece.debris.clone(),
+            piece.place,
+            collider,
+            friction,
+            restitution,
+        ));
+        if let (Some(mesh), Some(meshes)) = (mesh, &mut meshes) {
+            let scale = Transform::from_scale(Vec3::splat(piece.voxel_size));
+            let look = dress.look(piece.debris.terrain);
+            entity.with_child((Mesh3d(meshes.add(mesh)), scale, look));
+        }
+    }
+}
+
+fn crumble(mut commands: Commands, time: Res<Time>, mut pieces: Query<(Entity, &mut Debris)>) {
+    for (entity, mut debris) in &mut pieces {
+        debris.left -= time.delta_secs();
+        if debris.left <= 0.0 {
+            tell(&mut commands, DebrisCrumbled { entity });
+            commands.entity(entity).try_despawn();
+        }
+    }
+}
+
+/// A terrain that goes, or makes way for another one, takes along what fell from it.
+fn clear(
+    gone: On<Discard, Terrain>,
+    mut commands: Commands,
+    pieces: Query<(Entity, &Debris)>,
+    shaping: Query<(Entity, &Shaping)>,
+) {
+    let all = pieces.iter().chain(shaping.iter().map(|(entity, piece)| (entity, &piece.debris)));
+    for (entity, _) in all.filter(|(_, debris)| debris.terrain == gone.entity) {
+        commands.entity(entity).try_despawn();
+    }
+}
+
+/// What meshes of pieces are drawn with.
+#[cfg(feature = "render")]
+#[derive(bevy::ecs::system::SystemParam)]
+struct Dress<'w, 's> {
+    terrains: Query<'w, 's, &'static MeshMaterial3d<StandardMaterial>>,
+    materials: Option<ResMut<'w, Assets<StandardMaterial>>>,
+    rubble: Local<'s, Option<Handle<StandardMaterial>>>,
+}
+
+#[cfg(feature = "render")]
+impl Dress<'_, '_> {
+    /// The terrain's own material, or one that shows the colours of vertices.
+    fn look(&mut self, terrain: Entity) -> MeshMaterial3d<StandardMaterial> {
+        if let Ok(own) = self.terrains.get(terrain) {
+            return own.clone();
+        }
+        if let (None, Some(materials)) = (&*self.rubble, &mut self.materials) {
+            let plain = StandardMaterial { perceptual_roughness: 0.95, reflectance: 0.15, ..default() };
+            *self.rubble = Some(materials.add(plain));
+        }
+        MeshMaterial3d(self.rubble.clone().unwrap_or_default())
+    }
+}
+
+/// Without a renderer meshes have no look.
+#[cfg(not(feature = "render"))]
+#[derive(bevy::ecs::system::SystemParam)]
+struct Dress;
+
+#[cfg(not(feature = "render"))]
+impl Dress {
+    fn look(&mut self, _: Entity) {}
 }

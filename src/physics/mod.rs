@@ -22,7 +22,7 @@
 //! | --- | --- |
 //! | ground that can be stood on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on whatever moves about |
 //! | a first-person body | [`Character`], steered by [`CharacterSteering`], moved by [`CharacterPlugin`] |
-//! | a body for a loose piece of ground | [`debris_collider`] |
+//! | ground that breaks off to fall | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of its own |
 //! | to know whose collider was hit | [`GroundBody`] on the collider's entity |
 //! | to know what goes on | [`PhysicsFigures`] |
 //!
@@ -30,7 +30,7 @@
 //!
 //! - **One commit.** A collider is made from the same arrays as the mesh, in the same task, and swapped in the same frame.
 //!   It has exactly the triangles that are drawn: none where the tile is dug away, none twice. Servers without meshes have
-//!   the same colliders.
+//!   the same colliders. Only where a source comes while a transaction is under way does the collider follow a task later.
 //! - **No bump.** Triangles know their neighbours, those of other tiles and chunks included, see [`GroundShape`]; a body
 //!   that rolls over a border or a seam feels the surface, and not where it is cut.
 //! - **Nothing falls through.** An old collider stays until the new one takes its place; a collider that was made from an
@@ -38,7 +38,8 @@
 //!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has.
 //! - **Dug ground lets go.** Bodies that sleep where a surface changed are woken. Bodies that were built over, or get squeezed
 //!   into the ground soon after it changed near them, are lifted to the nearest air above, for ground has one side only.
-//!   Sensors and bodies whose layers have nothing to do with the ground are left alone.
+//!   So is whoever gets into the ground in another way, an eighth of a second later. Sensors, bodies whose layers have
+//!   nothing to do with the ground, and those that sleep or cannot move up and down are left alone there.
 //!
 //! Avian optimises its trees in tasks on the pool that also runs transactions, and waits for them: a large transaction
 //! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.
@@ -52,6 +53,7 @@ mod columns;
 mod cone;
 mod debris;
 mod hold;
+mod hull;
 mod near;
 mod shape;
 mod upkeep;
@@ -60,8 +62,9 @@ mod walking;
 
 pub use character::{Character, CharacterMotion, CharacterPlugin, CharacterSteering, CharacterSystems};
 pub use colliders::{GroundBody, GroundCollider, GroundMaterial};
-pub use debris::debris_collider;
+pub use debris::{Debris, DebrisCrumbled, DebrisPlugin, DebrisSettings};
 pub use hold::HeldByGround;
+pub use hull::debris_collider;
 pub use near::ColliderSource;
 pub use shape::GroundShape;
 
@@ -84,8 +87,9 @@ pub enum TerrainPhysicsSystems {
     Upkeep,
     /// In `PostUpdate`: bodies over ground without colliders are held, others let go.
     Hold,
-    /// In `FixedPreUpdate`: bodies where ground changed are woken, and lifted out of it. After each step, those that it
-    /// pushed into the ground are lifted too.
+    /// In `FixedPreUpdate`: bodies where ground changed are woken, and lifted out of it, and so are others that are in it.
+    /// In `FixedPostUpdate`, after each step, those that it pushed into the
+    /// ground are lifted too.
     Wake,
 }
 
@@ -140,9 +144,12 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
             .add_systems(
                 FixedPreUpdate,
-                (wake::wake, wake::rescue).chain().in_set(TerrainPhysicsSystems::Wake),
+                (wake::wake, wake::patrol, wake::rescue).chain().in_set(TerrainPhysicsSystems::Wake),
             )
-            .add_systems(FixedPostUpdate, wake::rescue.after(PhysicsSystems::Last));
+            .add_systems(
+                FixedPostUpdate,
+                wake::rescue.after(PhysicsSystems::Last).in_set(TerrainPhysicsSystems::Wake),
+            );
     }
 
     fn finish(&self, app: &mut App) {

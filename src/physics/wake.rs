@@ -22,6 +22,9 @@ const GAP: f32 = 0.02;
 /// in part is still in the air, but between what pushes it up and what pushes it down it may leave through either.
 const WATCHED: u8 = 128;
 
+/// In so many steps every body is looked at once, wherever it is.
+const TURNS: usize = 8;
+
 /// Where a collider changed, in world space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Change {
@@ -76,7 +79,7 @@ impl GroundChanges {
     }
 }
 
-/// Bodies near which a terrain changed a moment ago, and how often they will be looked at.
+/// Bodies near which a terrain changed a moment ago, or that were found in it; and how often they will be looked at.
 #[derive(Resource, Default)]
 pub(super) struct Watched(HashMap<(Entity, Entity), u8>);
 
@@ -125,6 +128,32 @@ pub(super) fn wake(
             figures.woken += 1;
         }
         watched.0.extend(near.map(|change| ((entity, change.terrain), WATCHED)));
+    }
+}
+
+/// Has bodies watched that are in the ground, some in each step: ground has one side only, and whoever got in where nothing
+/// changed, pressed by others or put there, would fall for ever. What is to be buried sleeps, or cannot move up and down.
+pub(super) fn patrol(
+    mut watched: ResMut<Watched>,
+    bodies: Query<
+        (Entity, &RigidBody, &RigidBodyColliders, &Position, Option<&LockedAxes>),
+        (Without<GroundBody>, Without<Sleeping>),
+    >,
+    solids: Solids,
+    terrains: Query<(Entity, &Terrain, &GlobalTransform)>,
+    mut turn: Local<usize>,
+) {
+    *turn = (*turn + 1) % TURNS;
+    let ground: Vec<_> =
+        terrains.iter().map(|(entity, model, place)| (entity, model, place.affine().inverse())).collect();
+    for (entity, body, own, position, locked) in bodies.iter().skip(*turn).step_by(TURNS) {
+        let is_free = locked.is_none_or(|locked| !locked.is_translation_y_locked());
+        for (terrain, model, inverse) in ground.iter().filter(|_| is_free) {
+            let place = inverse.transform_point3(position.0);
+            if model.world().is_buried(place.as_dvec3()) && solids.bounds(entity, body, own).is_some() {
+                watched.0.entry((entity, *terrain)).or_insert(1);
+            }
+        }
     }
 }
 
@@ -179,7 +208,8 @@ fn lift(terrain: &Terrain, place: &GlobalTransform, middle: Vec3, bounds: &Colli
     }
     let size = f64::from(terrain.voxel_size());
     let tall = f64::from(bounds.max.y - bounds.min.y) / size;
-    let below = f64::from(middle.y - bounds.min.y) / size;
+    // The box is as old as the last step, and somebody may have been lifted since.
+    let below = (f64::from(middle.y - bounds.min.y) / size).clamp(0.0, tall.max(0.0));
     let fits = |floor: f64, ceiling: Option<f64>| ceiling.is_none_or(|ceiling| ceiling - floor >= tall);
     let spans = world.spans(local.x, local.z);
     let above = spans.iter().filter(|span| span.floor >= local.y && fits(span.floor, span.ceiling));

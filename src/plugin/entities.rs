@@ -135,7 +135,7 @@ fn spawn_below(commands: &mut Commands, parent: Entity, bundle: impl Bundle) -> 
 }
 
 /// Triggers an event, unless its entity is gone by the time the command runs.
-pub(super) fn tell<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Commands, event: E) {
+pub(crate) fn tell<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Commands, event: E) {
     commands.queue(move |world: &mut bevy::ecs::world::World| {
         if world.get_entity(event.event_target()).is_ok() {
             world.trigger(event);

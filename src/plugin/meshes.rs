@@ -34,18 +34,18 @@ pub const ATTRIBUTE_GROUND_COVER: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundCover", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
 
 /// A mesh ready to be swapped in, with its bounds; `None` where nothing is to be drawn.
-pub(super) type Ready = Option<(Mesh, Aabb)>;
+pub(crate) type Ready = Option<(Mesh, Aabb)>;
 
 /// What a mesh is made of beside its surface: colours, and the ground as it was before anyone dug.
 #[derive(Clone)]
-pub(super) struct Wardrobe {
+pub(crate) struct Wardrobe {
     colors: MaterialColors,
     ground: Arc<Ground>,
     grid: ChunkGrid,
 }
 
 impl Wardrobe {
-    pub(super) fn new(world: &World, colors: &MaterialColors) -> Self {
+    pub(crate) fn new(world: &World, colors: &MaterialColors) -> Self {
         Self { colors: colors.clone(), ground: world.shared_ground(), grid: world.grid() }
     }
 
@@ -59,7 +59,7 @@ impl Wardrobe {
     }
 
     /// Builds the Bevy mesh of a surface whose positions count from this point.
-    pub(super) fn build_at(&self, origin: IVec3, surface: &SurfaceMesh) -> Ready {
+    pub(crate) fn build_at(&self, origin: IVec3, surface: &SurfaceMesh) -> Ready {
         if surface.is_empty() {
             return None;
         }

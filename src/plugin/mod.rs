@@ -30,11 +30,13 @@ mod times;
 pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
-pub(crate) use entities::TerrainEntities;
+pub(crate) use entities::{TerrainEntities, tell};
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
 pub use load::TerrainReady;
+#[cfg(feature = "avian")]
+pub(crate) use meshes::Wardrobe;
 pub use meshes::{
     ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };

@@ -165,6 +165,18 @@ impl World {
         !place.y.is_nan() && !spans.is_empty() && !spans.iter().any(is_open)
     }
 
+    /// Is the place in a cell of nothing but ground? Faster than [`is_solid`](Self::is_solid), which is true of it then,
+    /// and of places nearer to the surface.
+    pub fn is_buried(&self, place: DVec3) -> bool {
+        let limit = DVec3::splat(f64::from(LIMIT));
+        let cell = place.clamp(-limit, limit).floor().as_ivec3();
+        let samples = self.samples();
+        let mut corners = LatticeBox { min: cell, max: cell + 1 }.points();
+        place.is_finite()
+            && self.grid.has_cell(Column::of(cell))
+            && corners.all(|corner| samples.is_solid(corner))
+    }
+
     /// The surface's unit normal where it is nearest to `place` along y, `None` outside the world.
     pub fn normal(&self, place: DVec3) -> Option<Vec3> {
         let apart = |crossing: &Crossing| (crossing.y - place.y).abs();

@@ -4,6 +4,7 @@
 mod bumps;
 mod changes;
 mod crowd;
+mod debris;
 mod holding;
 mod sources;
 mod stage;

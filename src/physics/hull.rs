@@ -1,0 +1,40 @@
+//! Colliders for loose pieces of ground: convex hulls.
+
+use avian3d::prelude::*;
+use bevy::math::Vec3;
+
+use crate::lattice::SNAP;
+use crate::surface::SurfaceMesh;
+
+/// How much of its hull a piece may lack, as a share, to be taken for convex.
+const HOLLOW: f32 = 0.25;
+
+/// Cells along the longest side by which a piece that is not convex is cut into convex ones.
+const RESOLUTION: u32 = 24;
+
+/// A collider for a body that a loose piece of ground becomes: its convex hull, or several hulls where one would be far
+/// from it. In metres from the origin of the piece's mesh, which must be closed; `None` for a piece without volume.
+///
+/// It takes milliseconds, and tens of them for a large piece that is not convex: call it in a task.
+pub fn debris_collider(piece: &SurfaceMesh, voxel_size: f32) -> Option<Collider> {
+    let scale = voxel_size / SNAP as f32;
+    let vertices: Vec<Vec3> = piece.vertices.iter().map(|vertex| vertex.position.as_vec3() * scale).collect();
+    let triangles: Vec<[u32; 3]> = piece
+        .indices
+        .chunks_exact(3)
+        .map(|t| [t[0], t[1], t[2]])
+        .filter(|t| t.iter().all(|&corner| (corner as usize) < vertices.len()))
+        .collect();
+    let corners = |t: &[u32; 3]| t.map(|corner| vertices[corner as usize] - vertices[0]);
+    let volume: f32 = triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
+    let hull = Collider::convex_hull(vertices.clone())?;
+    let full = hull.mass_properties(1.0).mass;
+    if !full.is_finite() || full <= 0.0 {
+        return None;
+    }
+    if volume >= full * (1.0 - HOLLOW) {
+        return Some(hull);
+    }
+    let parameters = VhacdParameters { resolution: RESOLUTION, ..VhacdParameters::default() };
+    Some(Collider::convex_decomposition_with_config(vertices, triangles, parameters))
+}

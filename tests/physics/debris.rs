@@ -1,0 +1,111 @@
+//! Ground that breaks off falls, and makes room for ground that comes back.
+
+use bevy::prelude::*;
+use bevy_burrow::physics::{Debris, DebrisCrumbled, DebrisSettings};
+use bevy_burrow::prelude::*;
+
+use crate::stage::{STEP, Stage, level};
+
+/// A slab on a pillar, on level ground at 8 voxels; what cuts it off takes the pillar away.
+const PILLAR: Vec3 = Vec3::new(32.0, 14.0, 32.0);
+const SLAB: Vec3 = Vec3::new(32.0, 22.0, 32.0);
+
+/// How often debris has crumbled.
+#[derive(Resource, Default)]
+struct Crumbled(usize);
+
+/// A stage with such a table on a terrain that stands somewhere, and its entity. Pieces stay for so many seconds.
+fn stage(voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
+    let mut terrain = level(64, voxel_size);
+    terrain.apply([
+        Brush::add(Shape::cuboid(PILLAR * voxel_size, Vec3::new(1.2, 8.0, 1.2) * voxel_size), MaterialId(2)),
+        Brush::add(Shape::cuboid(SLAB * voxel_size, Vec3::new(6.2, 2.2, 6.2) * voxel_size), MaterialId(3)),
+    ]);
+    let (mut stage, entity) = Stage::with_ground(terrain);
+    stage
+        .app
+        .init_resource::<Crumbled>()
+        .add_observer(|_: On<DebrisCrumbled>, mut crumbled: ResMut<Crumbled>| crumbled.0 += 1);
+    stage.app.insert_resource(DebrisSettings { stay, ..default() });
+    let loose = LooseGround { crumbs: 8, debris: 9000, ..default() };
+    let mut entity_mut = stage.app.world_mut().entity_mut(entity);
+    entity_mut.insert(loose);
+    entity_mut.get_mut::<Transform>().expect("terrains have one").translation = place;
+    stage.frame();
+    stage.settle();
+    (stage, entity)
+}
+
+/// Cuts the table's slab off, on a terrain that stands somewhere.
+fn saw(voxel_size: f32, place: Vec3) -> Brush {
+    let half = Vec3::new(4.0, 1.2, 4.0) * voxel_size;
+    Brush::dig(Shape::cuboid(place + PILLAR * voxel_size, half)).with_tag(9)
+}
+
+fn pieces(stage: &mut Stage) -> Vec<(Debris, Transform)> {
+    let world = stage.app.world_mut();
+    world.query::<(&Debris, &Transform)>().iter(world).map(|(debris, at)| (debris.clone(), *at)).collect()
+}
+
+#[test]
+fn a_slab_that_is_sawn_off_falls_and_lies_on_the_ground() {
+    for (voxel_size, place) in [(1.0, Vec3::ZERO), (0.5, Vec3::new(100.0, -20.0, 7.0))] {
+        let (mut stage, terrain) = stage(voxel_size, place, 1e9);
+        stage.dig([saw(voxel_size, place)]);
+        stage.frames_until("the slab takes shape", |stage| !pieces(stage).is_empty());
+        let [(debris, at)] = &pieces(&mut stage)[..] else { panic!("one piece") };
+        assert_eq!((debris.terrain, debris.tag, debris.material), (terrain, 9, MaterialId(3)));
+        let middle = debris.middle(at);
+        let home = place + SLAB * voxel_size;
+        // The upper end of the pillar falls with it.
+        assert!(middle.distance(home) < 3.0 * voxel_size, "{middle} is not {home}");
+        stage.frames((4.0 / STEP) as usize);
+        let [(debris, at)] = &pieces(&mut stage)[..] else { panic!("it stays") };
+        // It may lie on what is left of the pillar, but not in the ground, and not up where it was.
+        let height = (debris.middle(at).y - place.y) / voxel_size;
+        assert!((9.5..19.0).contains(&height), "{height}");
+    }
+}
+
+#[test]
+fn what_fell_makes_room_for_ground_that_comes_back() {
+    let (mut stage, _) = stage(1.0, Vec3::ZERO, 1e9);
+    let hash = {
+        let world = stage.app.world_mut();
+        world.query::<&Terrain>().single(world).expect("one terrain").world().hash()
+    };
+    stage.dig([saw(1.0, Vec3::ZERO)]);
+    stage.frames_until("the slab takes shape", |stage| !pieces(stage).is_empty());
+    stage.app.world_mut().write_message(Undo::default()).expect("the plugin added the message");
+    stage.frames_until("it goes", |stage| pieces(stage).is_empty());
+    let world = stage.app.world_mut();
+    assert_eq!(world.query::<&Terrain>().single(world).expect("one terrain").world().hash(), hash);
+    assert_eq!(world.resource::<Crumbled>().0, 0, "it did not crumble, it went back");
+}
+
+#[test]
+fn debris_crumbles_in_its_time_and_goes_with_its_terrain() {
+    let (mut stage, terrain) = stage(1.0, Vec3::ZERO, 0.5);
+    stage.dig([saw(1.0, Vec3::ZERO)]);
+    stage.frames_until("it crumbles", |stage| stage.app.world().resource::<Crumbled>().0 == 1);
+    stage.frame();
+    assert!(pieces(&mut stage).is_empty());
+    // Another piece, of a terrain that makes way for the next one.
+    stage.app.world_mut().resource_mut::<DebrisSettings>().stay = 1e9;
+    let again = Brush::add(Shape::cuboid(SLAB, Vec3::new(3.2, 2.2, 3.2)), MaterialId(3));
+    let corner = Brush::dig(Shape::cuboid(SLAB - Vec3::Y * 2.0, Vec3::new(6.0, 1.0, 6.0)));
+    stage.dig([again, corner]);
+    stage.frames_until("it takes shape", |stage| !pieces(stage).is_empty());
+    stage.app.world_mut().entity_mut(terrain).insert(level(64, 1.0));
+    stage.frames(2);
+    assert!(pieces(&mut stage).is_empty());
+}
+
+#[test]
+fn there_is_no_more_debris_than_the_settings_say() {
+    let (mut stage, _) = stage(1.0, Vec3::ZERO, 1e9);
+    stage.app.world_mut().resource_mut::<DebrisSettings>().most = 0;
+    stage.dig([saw(1.0, Vec3::ZERO)]);
+    stage.frames(100);
+    assert!(pieces(&mut stage).is_empty());
+}
