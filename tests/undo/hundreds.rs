@@ -1,0 +1,165 @@
+//! Five hundred edits of every kind, undone and done again one by one: all of them, or as many as a budget has room for.
+
+use allocation_counter::measure;
+use bevy_burrow::prelude::*;
+use fastrand::Rng;
+
+use crate::scripts::{Account, any_brush, terrain};
+use crate::state::{Screen, State};
+use crate::worlds::random_ground;
+
+const EDITS: usize = 500;
+
+/// A ground, the chunk size it gets, whether there are rules and loose pieces (see [`terrain`]), and a seed; all of them
+/// small, so that hundreds of states are soon compared.
+type Start = (u64, u32, u64, u64);
+
+/// A terrain, what it looks like, and all that it was and will be.
+struct Walker {
+    name: String,
+    terrain: Terrain,
+    screen: Screen,
+    budget: usize,
+    /// The states that steps back lead to, and those that steps forth lead to, next ones last.
+    past: Vec<State>,
+    future: Vec<State>,
+    now: State,
+}
+
+impl Walker {
+    fn new((ground, chunk_size, index, seed): Start, budget: usize) -> (Self, Rng) {
+        let mut rng = Rng::with_seed(seed);
+        let (ground, _) = random_ground(&mut rng, ground);
+        let mut terrain = terrain(&mut rng, ground, chunk_size, index);
+        terrain.set_undo_budget(budget);
+        let new = Self {
+            name: format!("world {index}, chunks of {chunk_size}, {budget} bytes"),
+            screen: Screen::of(terrain.world()),
+            now: State::of(terrain.world()),
+            terrain,
+            budget,
+            past: Vec::new(),
+            future: Vec::new(),
+        };
+        (new, rng)
+    }
+
+    /// Runs the one thing that waits. History is within its budget before and after.
+    fn play(&mut self) -> Vec<Receipt> {
+        let receipts = self.screen.play(&mut self.terrain);
+        let history = self.terrain.history();
+        assert!(history.bytes <= self.budget, "{}: {history:?}", self.name);
+        assert_eq!(self.terrain.memory().undo, history.bytes, "{}", self.name);
+        assert!(
+            history.undos <= self.past.len() + 1 && history.redos <= self.future.len() + 1,
+            "{}",
+            self.name
+        );
+        receipts
+    }
+
+    fn edit(&mut self, rng: &mut Rng, turn: usize, account: &mut Account) {
+        let world = self.terrain.world();
+        let brush = any_brush(rng, world.ground(), world.grid().size() as u32);
+        let hash = world.hash();
+        self.terrain.submit(&brush);
+        let receipts = self.play();
+        account.enter(&brush, &receipts[0]);
+        let world = self.terrain.world();
+        let is_changed = receipts[0].outcome.as_ref().is_ok_and(|applied| applied.bounds.is_some());
+        assert_eq!(world.hash() != hash, is_changed, "{}, edit {turn}: {brush:?}", self.name);
+        if is_changed {
+            self.past.push(std::mem::replace(&mut self.now, State::of(world)));
+        } else {
+            self.now.check(world, &format!("{}, edit {turn} without effect", self.name));
+        }
+        if turn.is_multiple_of(10) {
+            let report = world.check_seams();
+            assert!(report.is_flawless(), "{}, edit {turn}: {report}", self.name);
+            self.screen.check(world, &self.name);
+        }
+    }
+
+    /// One step; was there one?
+    fn step(&mut self, step: HistoryStep) -> bool {
+        match step {
+            HistoryStep::Undo => self.terrain.submit_undo(),
+            HistoryStep::Redo => self.terrain.submit_redo(),
+        }
+        self.play();
+        let [HistoryReceipt { step: done, outcome }] = &self.terrain.take_history_receipts()[..] else {
+            panic!("{}: one receipt for a step", self.name)
+        };
+        assert_eq!(*done, step);
+        let what = format!("{}, {step:?} to {}", self.name, self.past.len());
+        let nothing = match step {
+            HistoryStep::Undo => HistoryRejection::NothingToUndo,
+            HistoryStep::Redo => HistoryRejection::NothingToRedo,
+        };
+        assert!(outcome.as_ref().err().is_none_or(|why| *why == nothing), "{}: {outcome:?}", self.name);
+        if outcome.is_ok() {
+            let (from, to) = match step {
+                HistoryStep::Undo => (&mut self.past, &mut self.future),
+                HistoryStep::Redo => (&mut self.future, &mut self.past),
+            };
+            let next = from.pop().expect("a step leads to what was");
+            to.push(std::mem::replace(&mut self.now, next));
+        }
+        self.now.check(self.terrain.world(), &what);
+        if self.past.len().is_multiple_of(10) {
+            self.screen.check(self.terrain.world(), &what);
+        }
+        outcome.is_ok()
+    }
+
+    /// As many steps as there are.
+    fn walk(&mut self, step: HistoryStep) -> usize {
+        let count = (0..).take_while(|_| self.step(step)).count();
+        self.screen.check(self.terrain.world(), &self.name);
+        let report = self.terrain.world().check_seams();
+        assert!(report.is_flawless(), "{}: {report}", self.name);
+        count
+    }
+}
+
+#[test]
+fn five_hundred_edits_of_every_kind_are_undone_and_redone_to_the_bit() {
+    let starts: [Start; 2] = [(8, 128, 0, 530), (0, 8, 2, 500)];
+    let mut account = Account::default();
+    for start in starts {
+        let (mut walker, mut rng) = Walker::new(start, 64 << 20);
+        (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut account));
+        let steps = walker.past.len();
+        assert!(steps > 400, "{steps} are not many");
+        assert_eq!(walker.terrain.history().undos, steps, "the budget holds all of {steps}");
+        // Whatever edits may do from now on, steps do.
+        walker.terrain.set_rules(DiggingRules::default().with_bedrock(i32::MAX));
+        assert_eq!(walker.walk(HistoryStep::Undo), steps);
+        assert!(walker.now.is_pristine());
+        assert_eq!(walker.walk(HistoryStep::Redo), steps);
+    }
+    account.check(20);
+}
+
+#[test]
+fn of_five_hundred_edits_a_tight_budget_keeps_the_last() {
+    let starts: [(Start, usize); 2] = [((12, 25, 3, 511), 300_000), ((0, 8, 2, 500), 1_000_000)];
+    let (mut account, mut lost) = (Account::default(), 0);
+    for (start, budget) in starts {
+        let (mut walker, mut rng) = Walker::new(start, budget);
+        (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut account));
+        let (steps, kept) = (walker.past.len(), walker.terrain.history().undos);
+        assert!(0 < kept && kept < steps / 2, "{}: {kept} of {steps} steps are kept", walker.name);
+        // A step forth may take more bytes than the one back, for which the oldest ones go.
+        let back = walker.walk(HistoryStep::Undo);
+        let forth = walker.walk(HistoryStep::Redo);
+        assert!(0 < back && back <= kept && forth <= back, "{}: {kept}, {back}, {forth}", walker.name);
+        println!("{}: {steps} steps, {kept} kept, {back} back, {forth} forth", walker.name);
+        lost += kept - forth;
+        let history = walker.terrain.history();
+        let freed = measure(|| walker.terrain.set_undo_budget(0));
+        assert_eq!(-freed.bytes_current, history.bytes as i64, "{}: {history:?}", walker.name);
+    }
+    assert!(lost > 0, "no step was lost on the way");
+    account.check(20);
+}

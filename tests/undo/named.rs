@@ -1,0 +1,107 @@
+//! Single cases: steps among brushes, steps without effect, steps given up, names of fields.
+
+use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::{FieldNews, HistoryRejection, HistoryStep};
+use glam::{IVec3, Vec3};
+
+fn ball(x: f32, y: f32, z: f32, radius: f32) -> Brush {
+    Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius))
+}
+
+fn level() -> Terrain {
+    Terrain::new(Ground::flat(64, 64, 10.0).expect("flat ground"), &TerrainSettings::default())
+        .expect("valid settings")
+}
+
+#[test]
+fn steps_keep_their_place_among_brushes() {
+    let mut terrain = level();
+    let pristine = terrain.world().hash();
+    terrain.submit_undo();
+    terrain.submit(&ball(10.0, 10.0, 10.0, 3.0).with_tag(1));
+    terrain.submit(&ball(12.0, 10.0, 10.0, 3.0).with_tag(2));
+    terrain.submit_undo();
+    terrain.submit(&ball(40.0, 10.0, 40.0, 3.0).with_tag(3));
+    terrain.submit_redo();
+    terrain.submit_undo();
+    terrain.submit_undo();
+    terrain.submit_redo();
+    let sent =
+        [HistoryStep::Undo, HistoryStep::Undo, HistoryStep::Redo, HistoryStep::Undo, HistoryStep::Undo];
+    assert_eq!(terrain.queued(), 9);
+    let own = terrain.apply([ball(40.0, 10.0, 10.0, 3.0).with_tag(4)]);
+    assert_eq!(own.iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [4]);
+    assert_eq!(terrain.take_answered().iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [1, 2, 3]);
+    let moves = terrain.take_history_receipts();
+    let is_done: Vec<bool> = moves.iter().map(|receipt| receipt.outcome.is_ok()).collect();
+    // Nothing yet; both balls; not after the third; the third; nothing; the third again.
+    assert_eq!(is_done, [false, true, false, true, false, true]);
+    assert_eq!(moves.iter().map(|receipt| receipt.step).take(5).collect::<Vec<_>>(), sent);
+    assert_eq!(terrain.history().undos, 2);
+    terrain.undo();
+    assert_ne!(terrain.world().hash(), pristine);
+    terrain.undo();
+    assert_eq!(terrain.world().hash(), pristine);
+}
+
+#[test]
+fn edits_that_change_nothing_are_no_steps_and_leave_what_can_be_redone() {
+    let mut terrain = level();
+    terrain.apply([ball(10.0, 10.0, 10.0, 3.0)]);
+    assert!(terrain.undo().outcome.is_ok());
+    terrain.apply([ball(10.0, 40.0, 10.0, 3.0), ball(-90.0, 10.0, 10.0, 3.0)]);
+    assert_eq!((terrain.history().undos, terrain.history().redos), (0, 1));
+    terrain.apply([ball(50.0, 10.0, 10.0, 3.0)]);
+    assert_eq!((terrain.history().undos, terrain.history().redos), (1, 0));
+    assert_eq!(terrain.redo().outcome, Err(HistoryRejection::NothingToRedo));
+}
+
+#[test]
+fn a_step_that_is_given_up_is_not_lost() {
+    let mut terrain = level();
+    let pristine = terrain.world().hash();
+    terrain.apply([ball(10.0, 10.0, 10.0, 3.0)]);
+    terrain.submit_undo();
+    let lost = terrain.begin().expect("a step waits").run();
+    assert!(!terrain.is_ready(LatticeBox::point(IVec3::new(10, 10, 10))));
+    assert!(terrain.is_ready(LatticeBox::point(IVec3::new(50, 10, 50))));
+    terrain.abandon();
+    assert!(terrain.commit(lost).is_err());
+    assert!(!terrain.is_ready(LatticeBox::point(IVec3::new(10, 10, 10))));
+    let again = terrain.begin().expect("it waits again").run();
+    // Meanwhile its budget goes; the step is done all the same.
+    terrain.set_undo_budget(0);
+    terrain.commit(again).expect("it is waited for");
+    assert_eq!(terrain.world().hash(), pristine);
+    assert!(terrain.take_history_receipts().iter().all(|receipt| receipt.outcome.is_ok()));
+    assert_eq!(terrain.history(), Default::default());
+}
+
+#[test]
+fn fields_come_back_under_their_names_and_new_ones_get_new_names() {
+    let mut terrain = level();
+    let field = |terrain: &mut Terrain, brush: Brush| {
+        terrain.apply([brush])[0].outcome.as_ref().expect("it reaches the world").chunks[0].field
+    };
+    let a = field(&mut terrain, ball(8.0, 10.0, 8.0, 2.0));
+    let b = field(&mut terrain, ball(20.0, 10.0, 8.0, 2.0));
+    let trench = Shape::capsule(Vec3::new(8.0, 10.0, 8.0), Vec3::new(20.0, 10.0, 8.0), 2.0);
+    assert_eq!(field(&mut terrain, Brush::dig(trench)), a, "they merged");
+    terrain.submit_undo();
+    let commit = terrain.begin().expect("a step waits").run();
+    let news = commit.field_news().to_vec();
+    terrain.commit(commit).expect("nobody else commits");
+    assert_eq!(
+        news.iter().map(|news| news.1).collect::<Vec<_>>(),
+        [FieldNews::Changed(a), FieldNews::Created(b)]
+    );
+    terrain.submit_redo();
+    let commit = terrain.begin().expect("a step waits").run();
+    let news: Vec<_> = commit.field_news().iter().map(|news| news.1).collect();
+    assert_eq!(news, [FieldNews::Changed(a), FieldNews::Merged { gone: b, into: a }]);
+    terrain.commit(commit).expect("nobody else commits");
+    (0..3).for_each(|_| assert!(terrain.undo().outcome.is_ok()));
+    let c = field(&mut terrain, ball(8.0, 10.0, 8.0, 2.0));
+    assert!(c > b, "{c:?} was the name of another field");
+}

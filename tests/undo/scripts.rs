@@ -1,0 +1,107 @@
+//! Random terrains to edit, brushes for them, and an account of what these did.
+
+use std::collections::BTreeMap;
+
+use bevy_burrow::prelude::*;
+use bevy_burrow::volume::Tally;
+use fastrand::Rng;
+
+use crate::worlds::{any_random_brush, random_brush_at_a_face, random_rules};
+
+const OPERATIONS: [&str; 11] =
+    ["dig", "add", "paint", "smooth", "sharpen", "flatten", "level", "raise", "lower", "stamp", "terrace"];
+
+const SHAPES: [&str; 5] = ["sphere", "box", "cylinder", "capsule", "cone"];
+
+const EFFECTS: [&str; 6] =
+    ["protected", "unbreakable", "too hard", "slowed", "crumbs removed", "debris broken off"];
+
+/// Any brush: all operations and shapes, at the rim and at chunk faces too, and of any power.
+pub fn any_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
+    let brush = match rng.u32(0..6) {
+        0 => random_brush_at_a_face(rng, ground, chunk_size),
+        _ => any_random_brush(rng, ground),
+    };
+    brush.with_power(rng.u8(..) | rng.u8(..))
+}
+
+/// A terrain that nobody has edited. Of every four indices, two have digging rules and two look for loose pieces; one has
+/// both.
+pub fn terrain(rng: &mut Rng, ground: Ground, chunk_size: u32, index: u64) -> Terrain {
+    let rules = random_rules(rng, &ground);
+    let mut terrain =
+        Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
+    if matches!(index % 4, 1 | 2) {
+        terrain.set_rules(rules);
+    }
+    if matches!(index % 4, 2 | 3) {
+        terrain.set_loose(Some(LooseSettings { largest: 3000, crumbs: 6, debris: 400 }));
+    }
+    terrain
+}
+
+/// How often each kind of brush came, and how often it changed something; and what rules and loose pieces did to them.
+#[derive(Debug, Default)]
+pub struct Account {
+    kinds: BTreeMap<&'static str, (usize, usize)>,
+    effects: BTreeMap<&'static str, u64>,
+}
+
+impl Account {
+    pub fn enter(&mut self, brush: &Brush, receipt: &Receipt) {
+        let Ok(applied) = &receipt.outcome else { return };
+        for kind in [operation(brush), shape(brush)] {
+            let (came, changed) = self.kinds.entry(kind).or_default();
+            *came += 1;
+            *changed += usize::from(applied.bounds.is_some());
+        }
+        let refused = &applied.refused;
+        let voxels = [&refused.protected, &refused.unbreakable, &refused.too_hard, &refused.slowed];
+        let fell =
+            |fate| applied.loose.iter().filter(|piece| piece.fate == fate).map(|piece| piece.voxels).sum();
+        let counts =
+            voxels.map(Tally::total).into_iter().chain([fell(PieceFate::Removed), fell(PieceFate::BrokeOff)]);
+        for (effect, count) in EFFECTS.into_iter().zip(counts) {
+            *self.effects.entry(effect).or_default() += count;
+        }
+    }
+
+    /// Fails unless each operation and each shape changed something so many times, and each reason to refuse and each fate
+    /// of a loose piece came about.
+    pub fn check(&self, least: usize) {
+        println!("{self:?}");
+        for kind in OPERATIONS.iter().chain(&SHAPES) {
+            let changed = self.kinds.get(kind).map_or(0, |&(_, changed)| changed);
+            assert!(changed >= least, "{kind} changed something {changed} times: {self:?}");
+        }
+        for effect in EFFECTS {
+            assert!(self.effects.get(effect).is_some_and(|&voxels| voxels > 0), "{effect}: {self:?}");
+        }
+    }
+}
+
+fn operation(brush: &Brush) -> &'static str {
+    match brush.operation {
+        Operation::Dig => "dig",
+        Operation::Add { .. } => "add",
+        Operation::Paint { .. } => "paint",
+        Operation::Smooth => "smooth",
+        Operation::Sharpen => "sharpen",
+        Operation::Flatten { .. } => "flatten",
+        Operation::Level { .. } => "level",
+        Operation::Raise { .. } => "raise",
+        Operation::Lower { .. } => "lower",
+        Operation::Stamp(_) => "stamp",
+        Operation::Terrace { .. } => "terrace",
+    }
+}
+
+fn shape(brush: &Brush) -> &'static str {
+    match brush.shape {
+        Shape::Sphere { .. } => "sphere",
+        Shape::Cuboid { .. } => "box",
+        Shape::Cylinder { .. } => "cylinder",
+        Shape::Capsule { .. } => "capsule",
+        Shape::Cone { .. } => "cone",
+    }
+}

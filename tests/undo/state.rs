@@ -1,0 +1,133 @@
+//! What a world is, and what somebody sees of it.
+
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{Hash, Hasher};
+
+use bevy_burrow::lattice::Column;
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::volume::Field;
+use rustc_hash::FxHasher;
+
+/// Everything that a world is, but for what counts its commits. Of samples and meshes it keeps hashes, so that hundreds of
+/// states can be kept.
+#[derive(Debug)]
+pub struct State {
+    hash: u64,
+    /// Every edited sample with its density and material, by brick.
+    bricks: BTreeMap<[i32; 3], u64>,
+    fields: BTreeMap<[i32; 3], Vec<Field>>,
+    mask: Vec<Column>,
+    /// Every bit of every mesh.
+    meshes: Vec<(Drawn, u64)>,
+    /// Bytes of what meshes and rings were assembled from.
+    parts: usize,
+}
+
+impl State {
+    pub fn of(world: &World) -> Self {
+        let mut mask: Vec<Column> = world.mask().iter().collect();
+        mask.sort_unstable_by_key(|cell| (cell.x, cell.z));
+        let bricks = world.bricks().map(|(pos, brick)| {
+            let samples = brick.edited_samples(pos);
+            (pos.0.to_array(), hash_of(|hasher| samples.for_each(|sample| sample.hash(hasher))))
+        });
+        Self {
+            hash: world.hash(),
+            bricks: bricks.collect(),
+            fields: world
+                .fields()
+                .map(|(chunk, fields)| (chunk.as_ivec3().to_array(), fields.iter().copied().collect()))
+                .collect(),
+            mask,
+            meshes: world.drawn().map(|(drawn, mesh)| (drawn, mesh_hash(&mesh))).collect(),
+            parts: world.memory().parts,
+        }
+    }
+
+    /// Has nobody edited anything?
+    pub fn is_pristine(&self) -> bool {
+        self.bricks.is_empty() && self.fields.is_empty() && self.mask.is_empty()
+    }
+
+    /// Fails unless the world is in this state; says where it differs. Seams are a matter of meshes alone: where these are
+    /// the same, seams are.
+    pub fn check(&self, world: &World, what: &str) {
+        let now = Self::of(world);
+        assert_eq!(self.hash, now.hash, "{what}: hash");
+        assert_eq!(self.bricks, now.bricks, "{what}: samples or materials");
+        assert_eq!(self.mask, now.mask, "{what}: mask");
+        assert_eq!(self.fields, now.fields, "{what}: fields");
+        for (before, after) in self.meshes.iter().zip(&now.meshes) {
+            assert!(before == after, "{what}: mesh of {:?} or {:?}", before.0, after.0);
+        }
+        assert_eq!(self.meshes.len(), now.meshes.len(), "{what}: what is drawn");
+        assert_eq!(self.parts, now.parts, "{what}: parts and rings");
+    }
+}
+
+fn hash_of(write: impl FnOnce(&mut FxHasher)) -> u64 {
+    let mut hasher = FxHasher::default();
+    write(&mut hasher);
+    hasher.finish()
+}
+
+/// Of positions, normals, materials and weights, bit by bit, and of the triangles between them.
+fn mesh_hash(mesh: &SurfaceMesh) -> u64 {
+    hash_of(|hasher| {
+        for vertex in &mesh.vertices {
+            let normal = vertex.normal.to_array().map(f32::to_bits);
+            (vertex.position, normal, vertex.materials.ids, vertex.materials.weights).hash(hasher);
+        }
+        mesh.indices.hash(hasher);
+    })
+}
+
+/// What somebody sees who swaps only the meshes that commits name.
+pub struct Screen(HashMap<Drawn, SurfaceMesh>);
+
+impl Screen {
+    pub fn of(world: &World) -> Self {
+        Self(world.drawn().collect())
+    }
+
+    /// Runs and commits everything that waits; gives the receipts of its brushes.
+    pub fn play(&mut self, terrain: &mut Terrain) -> Vec<Receipt> {
+        let mut receipts = Vec::new();
+        while let Some(transaction) = terrain.begin() {
+            let commit = transaction.run();
+            for (tile, update) in &commit.meshes.tiles {
+                self.0.insert(Drawn::Tile(*tile), update.mesh());
+            }
+            for (chunk, surface) in &commit.meshes.chunks {
+                self.0.insert(Drawn::Chunk(*chunk), surface.mesh().clone());
+            }
+            receipts.extend(terrain.commit(commit).expect("nobody else commits"));
+        }
+        receipts
+    }
+
+    pub fn check(&self, world: &World, what: &str) {
+        let drawn: HashMap<Drawn, SurfaceMesh> = world.drawn().collect();
+        for (drawn, mesh) in self.0.iter().filter(|(_, mesh)| !mesh.is_empty()) {
+            assert!(world.drawn_mesh_is(*drawn, mesh), "{what}: {drawn:?} shows something else");
+        }
+        let shown = |(drawn, mesh): &(&Drawn, &SurfaceMesh)| mesh.is_empty() || self.0.contains_key(drawn);
+        assert!(drawn.iter().all(|pair| shown(&pair)), "{what}: something is not shown");
+    }
+}
+
+/// The mesh of what is drawn, and is it this one?
+trait MeshOf {
+    fn drawn_mesh_is(&self, drawn: Drawn, mesh: &SurfaceMesh) -> bool;
+}
+
+impl MeshOf for World {
+    fn drawn_mesh_is(&self, drawn: Drawn, mesh: &SurfaceMesh) -> bool {
+        match drawn {
+            Drawn::Tile(tile) => self.tile_mesh(tile) == *mesh,
+            Drawn::Chunk(chunk) => self.chunk_mesh(chunk) == *mesh,
+        }
+    }
+}
