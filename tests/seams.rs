@@ -5,38 +5,98 @@
 mod worlds;
 
 use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
 
 use bevy_burrow::lattice::SNAP;
 use bevy_burrow::prelude::*;
+use bevy_burrow::surface::MaterialMix;
+use bevy_burrow::terrain::{Drawn, World};
 use fastrand::Rng;
-use glam::Vec3;
+use glam::{IVec3, Vec3};
+use rustc_hash::FxHashMap;
 use worlds::{random_world, real_ground, world_count};
+
+/// How many vertices that meet at one place were compared, and how many of them have more than one material: by what meets
+/// there.
+#[derive(Debug, Default)]
+struct Met(BTreeMap<&'static str, [usize; 2]>);
+
+impl Met {
+    fn kind(a: Drawn, b: Drawn) -> &'static str {
+        match (a, b) {
+            (Drawn::Tile(a), Drawn::Tile(b)) if a == b => "parts of a tile",
+            (Drawn::Tile(_), Drawn::Tile(_)) => "two tiles",
+            (Drawn::Chunk(a), Drawn::Chunk(b)) if a == b => "parts of a chunk",
+            (Drawn::Chunk(_), Drawn::Chunk(_)) => "two chunks",
+            _ => "tile and chunk",
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (kind, [all, mixed]) in &other.0 {
+            let own = self.0.entry(kind).or_default();
+            (own[0], own[1]) = (own[0] + all, own[1] + mixed);
+        }
+    }
+
+    /// Fails unless all drawn vertices of a place have the same materials, by the same weights.
+    fn check_materials(&mut self, world: &World, what: &str) {
+        let mut first: FxHashMap<IVec3, (Drawn, MaterialMix)> = FxHashMap::default();
+        for (drawn, mesh) in world.drawn() {
+            // Tiles keep vertices that no triangle has.
+            let mut is_drawn = vec![false; mesh.vertices.len()];
+            mesh.indices.iter().for_each(|&index| is_drawn[index as usize] = true);
+            let origin = world.origin(drawn) * SNAP;
+            for (vertex, _) in mesh.vertices.iter().zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
+                let (place, own) = (origin + vertex.position, vertex.materials);
+                let (other, theirs) = match first.entry(place) {
+                    Entry::Vacant(place) => {
+                        place.insert((drawn, own));
+                        continue;
+                    }
+                    Entry::Occupied(met) => *met.get(),
+                };
+                let at = place.as_dvec3() / f64::from(SNAP);
+                assert_eq!(own, theirs, "{what}: materials of {drawn:?} and {other:?} at {at}");
+                let [all, mixed] = self.0.entry(Self::kind(drawn, other)).or_default();
+                *all += 1;
+                *mixed += usize::from(own.weights[0] < 255);
+            }
+        }
+    }
+}
 
 #[test]
 fn random_worlds_are_flawless() {
     let worlds = world_count(300);
     let threads = std::thread::available_parallelism().map_or(2, |n| n.get() as u64);
-    let (mut triangles, mut cells) = (0, 0);
+    let (mut triangles, mut cells, mut met) = (0, 0, Met::default());
     std::thread::scope(|scope| {
         let soak = |thread: u64| {
-            let (mut triangles, mut cells) = (0, 0);
+            let (mut triangles, mut cells, mut met) = (0, 0, Met::default());
             for index in (thread..worlds).step_by(threads as usize) {
                 let terrain = random_world(&mut Rng::with_seed(index), index);
                 let report = terrain.world().check_seams();
                 assert!(report.is_flawless(), "world {index}: {report}");
+                met.check_materials(terrain.world(), &format!("world {index}"));
                 triangles += report.triangles;
                 cells += terrain.world().mask().len();
             }
-            (triangles, cells)
+            (triangles, cells, met)
         };
         let runs: Vec<_> = (0..threads).map(|thread| scope.spawn(move || soak(thread))).collect();
         for run in runs {
-            let (t, c) = run.join().expect("a world failed; see above");
+            let (t, c, m) = run.join().expect("a world failed; see above");
             triangles += t;
             cells += c;
+            met.add(&m);
         }
     });
     assert!(cells > 0, "no world was dug at its surface");
+    println!("vertices that meet in seams, and those of more than one material: {met:?}");
+    for kind in ["two tiles", "two chunks", "tile and chunk"] {
+        assert!(met.0.get(kind).is_some_and(|[_, mixed]| *mixed > 0), "{kind}: {met:?}");
+    }
     println!(
         "{worlds} worlds, {triangles} triangles, {cells} cells drawn by marching cubes: all closed, all manifold"
     );
