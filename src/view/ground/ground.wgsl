@@ -244,9 +244,9 @@ fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32)
     return sum;
 }
 
+// The sine of the slope and not its tangent: up to 45 degrees, and not up to walls that turn away from lamp and eye.
 fn lean_of(relief: vec4<f32>) -> vec2<f32> {
-    let lean = relief.xy * 2.0 - 1.0;
-    return lean / sqrt(max(1.0 - dot(lean, lean), 0.05));
+    return relief.xy * 2.0 - 1.0;
 }
 
 // A layer from all sides that show.
@@ -403,6 +403,13 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
     return best;
 }
 
+// A normal bent towards the eye, where relief turns away from it more than the ground does: what can be seen is not turned
+// away, and a lamp at the eye lights it.
+fn facing(normal: vec3<f32>, ground_normal: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
+    let lacking = 0.3 * max(dot(ground_normal, eye), 0.0) - dot(normal, eye);
+    return normalize(normal + max(lacking, 0.0) * eye);
+}
+
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutput {
 #ifdef VISIBILITY_RANGE_DITHER
@@ -480,7 +487,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     pbr_input.diffuse_occlusion *= finish.x;
     pbr_input.specular_occlusion *= finish.x;
     lean -= dot(lean, site.normal) * site.normal;
-    pbr_input.N = normalize(normalize(site.normal + lean) * turn);
+    pbr_input.N = facing(normalize(normalize(site.normal + lean) * turn), normalize(in.world_normal), pbr_input.V);
 
 #ifdef PREPASS_PIPELINE
     return deferred_output(plain, pbr_input);
