@@ -146,6 +146,9 @@ fn vertex(in: Vertex) -> Varying {
     return out;
 }
 
+// How much coarser colours are far away.
+const FAR_BLUR: f32 = 3.0;
+
 // A place on the ground, as far as textures care.
 struct Site {
     // Metres in the terrain's space, and how it changes from pixel to pixel.
@@ -223,8 +226,8 @@ fn fetch_pieces(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair
     return sum;
 }
 
-// A layer laid on from one side.
-fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32) -> Pair {
+// A layer laid on from one side. One that is bedded is not turned, far away, on walls: its beds stay level.
+fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32, is_level: bool) -> Pair {
     var sum = Pair(vec4(0.0), vec4(0.0));
     if far < 1.0 {
         if is_fine() {
@@ -235,10 +238,19 @@ fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32)
     }
     if far > 0.0 {
         // Six times as large, and turned, so that it does not repeat along with the near one.
-        let turn = mat2x2<f32>(0.1333, 0.1, -0.1, 0.1333);
-        let large = fetch(layer, turn * uv, turn * dx, turn * dy);
-        // The relief would have to be turned back; far away it is half of it.
-        let lean = (large.relief.xy - 0.5) * mat2x2<f32>(0.8, 0.6, -0.6, 0.8) * 0.6 + 0.5;
+        let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_level);
+        let turn = mat2x2<f32>(way.x, way.y, -way.y, way.x);
+        let scale = turn * (1.0 / 6.0);
+        let at = scale * uv;
+        let at_dx = scale * dx;
+        let at_dy = scale * dy;
+        // Colours from coarser levels: joints six times as large as they are would be seen as what they are.
+        let large = Pair(
+            textureSampleGrad(albedo_texture, albedo_sampler, at, layer, FAR_BLUR * at_dx, FAR_BLUR * at_dy),
+            textureSampleGrad(relief_texture, relief_sampler, at, layer, at_dx, at_dy),
+        );
+        // The relief is turned back; far away it is half of it.
+        let lean = (large.relief.xy - 0.5) * turn * 0.6 + 0.5;
         sum = add(sum, Pair(large.albedo, vec4(lean, large.relief.zw)), far);
     }
     return sum;
@@ -252,6 +264,9 @@ fn lean_of(relief: vec4<f32>) -> vec2<f32> {
 // A layer from all sides that show.
 fn layer_at(layer: u32, site: Site) -> Texels {
     let settings = ground.layers[layer];
+    // What shows from above and below, if that is another one: then this one is bedded.
+    let top = ground.tints[layer].w;
+    let is_bedded = top >= 0.0 && top < f32(textureNumLayers(albedo_texture));
     let place = site.place * settings.x;
     let dx = site.dx * settings.x;
     let dy = site.dy * settings.x;
@@ -265,7 +280,8 @@ fn layer_at(layer: u32, site: Site) -> Texels {
             let uv = select(select(vec2(place.x, -place.y), place.xz, is_y), vec2(place.z, -place.y), is_x);
             let uv_dx = select(select(vec2(dx.x, -dx.y), dx.xz, is_y), vec2(dx.z, -dx.y), is_x);
             let uv_dy = select(select(vec2(dy.x, -dy.y), dy.xz, is_y), vec2(dy.z, -dy.y), is_x);
-            let pair = fetch_side(i32(layer), uv, uv_dx, uv_dy, site.far);
+            let texture = select(i32(layer), i32(top), is_y && is_bedded);
+            let pair = fetch_side(texture, uv, uv_dx, uv_dy, site.far, is_bedded && !is_y);
             let lean = lean_of(pair.relief);
             texels.color += pair.albedo * weight;
             texels.finish += pair.relief.zw * weight;
@@ -479,7 +495,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     // No two places have quite the same tint.
     let mood = clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0) * ground.detail.x;
     color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(mood, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-mood, 0.0));
-    color *= 1.0 + 0.16 * ground.detail.x * fine.z;
+    color *= 1.0 + (0.16 + 0.3 * site.far) * ground.detail.x * fine.z;
 
     pbr_input.material.base_color = vec4(pbr_input.material.base_color.rgb * color, 1.0);
     pbr_input.material.perceptual_roughness = clamp(finish.y, 0.089, 1.0);

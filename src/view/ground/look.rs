@@ -50,11 +50,21 @@ pub struct GroundLayer {
     pub tint: LinearRgba,
     /// What it does below the surface, where it is the ground's own and nobody built it.
     pub kind: GroundLayerKind,
+    /// The layer of the textures that floors and ceilings show instead: for what lies in beds, whose laminae run along
+    /// walls and not over floors.
+    pub top: Option<u8>,
 }
 
 impl Default for GroundLayer {
     fn default() -> Self {
-        Self { metres: 4.0, relief: 1.0, metallic: 0.0, tint: LinearRgba::WHITE, kind: GroundLayerKind::Body }
+        Self {
+            metres: 4.0,
+            relief: 1.0,
+            metallic: 0.0,
+            tint: LinearRgba::WHITE,
+            kind: GroundLayerKind::Body,
+            top: None,
+        }
     }
 }
 
@@ -79,7 +89,8 @@ pub struct GroundStrata {
     pub soil: (u8, f32),
     /// The layer below the soil, and how thick it is in metres.
     pub subsoil: (u8, f32),
-    /// Rock below, in beds that repeat from bottom to top: layers, each a quarter of the whole.
+    /// Rock below, in beds that repeat from bottom to top: layers, each about a quarter of the whole. The first one also
+    /// crusts natural faces, here and there.
     pub beds: [u8; 4],
     /// Metres from one bed to its repetition.
     pub height: f32,
@@ -122,6 +133,7 @@ impl Default for GroundLook {
     fn default() -> Self {
         let layer = |metres, relief, kind| GroundLayer { metres, relief, kind, ..default() };
         let body = |metres| layer(metres, 1.0, GroundLayerKind::Body);
+        let bedded = |metres, top| GroundLayer { top: Some(top), ..body(metres) };
         let gold = GroundLayer { metallic: 0.35, ..body(2.5) };
         Self {
             layers: vec![
@@ -134,8 +146,8 @@ impl Default for GroundLook {
                 body(2.5),
                 gold,
                 body(3.0),
-                body(5.0),
-                body(4.0),
+                bedded(5.0, 12),
+                bedded(4.0, 13),
                 body(2.5),
             ],
             strata: GroundStrata::default(),

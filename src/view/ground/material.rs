@@ -12,7 +12,7 @@ use bevy::render::render_resource::{
 };
 use bevy::shader::{ShaderDefVal, ShaderRef};
 
-use super::look::{GroundLayerKind, GroundLook, GroundQuality, MAX_LAYERS};
+use super::look::{GroundLayer, GroundLayerKind, GroundLook, GroundQuality, MAX_LAYERS};
 use crate::plugin::{
     ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };
@@ -49,6 +49,7 @@ pub(super) struct GroundUniform {
     pub place: Mat4,
     /// 1 / metres, relief, metallic, kind.
     layers: [Vec4; MAX_LAYERS],
+    /// Tint; the texture that shows from above, -1 for the same one.
     tints: [Vec4; MAX_LAYERS],
     /// Layers of soil and subsoil, how deep each reaches.
     soil: Vec4,
@@ -83,7 +84,10 @@ impl GroundUniform {
                 };
                 Vec4::new(1.0 / layer.metres.max(0.01), layer.relief, layer.metallic, kind)
             }),
-            tints: std::array::from_fn(|at| layer(at).tint.to_vec4()),
+            tints: std::array::from_fn(|at| {
+                let GroundLayer { tint, top, .. } = layer(at);
+                tint.to_vec3().extend(top.map_or(-1.0, f32::from))
+            }),
             soil: Vec4::new(number(strata.soil.0), number(strata.subsoil.0), strata.soil.1, strata.subsoil.1),
             beds: Vec4::from_array(strata.beds.map(number)),
             rock: Vec4::new(strata.height.max(0.1), strata.bend, number(strata.seam.0), strata.seam.1),

@@ -39,7 +39,7 @@ pub(super) struct Scatter {
 }
 
 /// All layers, in the order of the default material ids.
-pub(super) const RECIPES: [Recipe; 12] = [
+pub(super) const RECIPES: [Recipe; 14] = [
     Recipe { name: "rock", relief: 0.45, metres: 6.0, paint: rock, scatter: None },
     Recipe {
         name: "grass",
@@ -62,6 +62,9 @@ pub(super) const RECIPES: [Recipe; 12] = [
     Recipe { name: "sandstone", relief: 0.28, metres: 5.0, paint: sandstone, scatter: None },
     Recipe { name: "shale", relief: 0.26, metres: 4.0, paint: shale, scatter: None },
     Recipe { name: "gravel", relief: 0.16, metres: 2.5, paint: gravel, scatter: None },
+    // What bedded layers show from above; no materials of their own.
+    Recipe { name: "sandstone from above", relief: 0.22, metres: 5.0, paint: sandstone_top, scatter: None },
+    Recipe { name: "shale from above", relief: 0.18, metres: 4.0, paint: shale_top, scatter: None },
 ];
 
 fn mix(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
@@ -72,27 +75,30 @@ fn lit(color: [f32; 3], factor: f32) -> [f32; 3] {
     color.map(|part| part * factor)
 }
 
-/// Grey, craggy, cracked, with lichen.
+/// Grey and craggy, with lichen. Joints are a matter of relief more than of colour, and most of them end somewhere: a net of
+/// dark lines is what an eye finds again wherever the layer repeats.
 fn rock(u: f32, v: f32) -> Point {
-    let (wu, wv) = (u + 0.03 * octaves(u, v, 4, 3, 11), v + 0.03 * octaves(u, v, 4, 3, 12));
-    let crag = ridges(wu, wv, 4, 5, 13);
+    let (wu, wv) = (u + 0.06 * octaves(u, v, 4, 4, 11), v + 0.06 * octaves(u, v, 4, 4, 12));
+    let crag = ridges(wu, wv, 3, 6, 13);
     let slab = cells(wu, wv, 5, 14);
-    let small = cells(wu, wv, 14, 15);
-    let crack = smooth(0.0, 0.07, slab.second - slab.nearest);
-    let chip = smooth(0.0, 0.10, small.second - small.nearest);
-    let grain = octaves(u, v, 48, 3, 16);
-    let facet =
-        0.5 + 0.5 * (slab.offset[0] * (slab.name - 0.5) + slab.offset[1] * (slab.name * 7.0 % 1.0 - 0.5));
-    let height = 0.42 * facet + 0.38 * crag * crag + 0.08 * small.name + 0.05 * grain;
-    let height = (height * (0.45 + 0.55 * crack) * (0.85 + 0.15 * chip)).clamp(0.0, 1.0);
-    let tone = 0.30 + 0.22 * slab.name + 0.10 * octaves(u, v, 3, 3, 17) + 0.07 * grain;
-    let color = mix([0.34, 0.31, 0.28], [0.60, 0.575, 0.54], tone.clamp(0.0, 1.0) * 1.3);
-    let rust = smooth(0.25, 0.7, octaves(u, v, 5, 4, 18));
-    let color = mix(color, [0.47, 0.37, 0.27], 0.45 * rust);
-    let lichen = smooth(0.30, 0.55, octaves(u, v, 9, 4, 19)) * smooth(0.3, 0.6, height);
-    let color = mix(color, [0.52, 0.54, 0.40], 0.35 * lichen);
-    let dark = (0.45 + 0.55 * crack) * (0.8 + 0.2 * chip) * (0.75 + 0.5 * height);
-    Point { color: lit(color, dark), height, roughness: 0.86 + 0.08 * grain }
+    let small = cells(wu, wv, 13, 15);
+    let open = smooth(-0.15, 0.45, octaves(u, v, 3, 3, 20));
+    let crack = 1.0 - open * (1.0 - smooth(0.0, 0.07, slab.second - slab.nearest));
+    let chip = 1.0 - 0.6 * (1.0 - open) * (1.0 - smooth(0.0, 0.10, small.second - small.nearest));
+    let grain = octaves(u, v, 40, 4, 16);
+    let tilt = slab.offset[0] * (slab.name - 0.5) + slab.offset[1] * (slab.name * 7.0 % 1.0 - 0.5);
+    let facet = 0.5 + 0.5 * tilt * smooth(0.0, 0.3, slab.second - slab.nearest);
+    let lump = octaves(wu, wv, 7, 5, 21);
+    let height = 0.22 * facet + 0.42 * crag * crag + 0.26 * lump + 0.05 * grain + 0.08;
+    let height = (height * (0.70 + 0.30 * crack) * (0.88 + 0.12 * chip)).clamp(0.0, 1.0);
+    let tone = 0.40 + 0.10 * (slab.name - 0.5) + 0.18 * octaves(u, v, 3, 5, 17) + 0.20 * lump + 0.16 * grain;
+    let color = mix([0.33, 0.305, 0.275], [0.62, 0.595, 0.56], tone.clamp(0.0, 1.0) * 1.15);
+    let rust = smooth(0.20, 0.75, octaves(u, v, 5, 5, 18));
+    let color = mix(color, [0.49, 0.385, 0.28], 0.45 * rust);
+    let lichen = smooth(0.25, 0.60, octaves(u, v, 9, 5, 19)) * smooth(0.3, 0.6, height);
+    let color = mix(color, [0.52, 0.54, 0.40], 0.30 * lichen);
+    let dark = (0.86 + 0.14 * crack) * (0.95 + 0.05 * chip) * (0.70 + 0.60 * height);
+    Point { color: lit(color, dark), height, roughness: 0.88 + 0.08 * grain }
 }
 
 /// What lies between the blades of grass.
@@ -218,47 +224,97 @@ fn soil(u: f32, v: f32) -> Point {
     Point { color: lit(color, 0.7 + 0.45 * height), height, roughness: 0.95 - 0.1 * pebble }
 }
 
-/// Layers along `v`, each with a number of its own: laminae of sediment.
+/// Layers along `v`, each with a number and a thickness of its own: laminae of sediment. The number, and the way to the next
+/// border, 0 there and 1 in the middle.
 fn laminae(u: f32, v: f32, count: i32, bend: f32, seed: u32) -> (f32, f32) {
     let at = (v + bend * octaves(u, v, 3, 4, seed)) * count as f32;
-    let layer = at.floor() as i32;
-    let name = chance(layer.rem_euclid(count), 7, seed);
+    let border = |number: i32| number as f32 + 0.7 * (chance(number.rem_euclid(count), 8, seed) - 0.5);
+    let near = at.floor() as i32;
+    let layer = if at < border(near) {
+        near - 1
+    } else if at < border(near + 1) {
+        near
+    } else {
+        near + 1
+    };
+    let (low, high) = (border(layer), border(layer + 1));
+    let within = (at - low) / (high - low);
+    (chance(layer.rem_euclid(count), 7, seed), within.min(1.0 - within) * 2.0)
+}
+
+/// Sheets that lie flat, each worn away up to a ragged border: what [`laminae`] are from above. As they, a number and the
+/// way to the next border.
+fn sheets(u: f32, v: f32, count: f32, seed: u32) -> (f32, f32) {
+    let at = (1.5 + octaves(u, v, 2, 6, seed)) * count;
     let within = at - at.floor();
-    (name, within.min(1.0 - within) * 2.0)
+    (chance(at.floor() as i32, 9, seed), within.min(1.0 - within) * 2.0)
 }
 
 /// Warm, in soft beds.
 fn sandstone(u: f32, v: f32) -> Point {
     let (bed, middle) = laminae(u, v, 9, 0.035, 101);
     let (fine, _) = laminae(u, v, 46, 0.035, 101);
-    let grain = octaves(u, v, 70, 2, 104);
-    let worn = octaves(u, v, 6, 4, 105);
-    let ledge = smooth(0.0, 0.3, middle);
-    let height = ((0.35 + 0.45 * bed) * (0.55 + 0.45 * ledge) + 0.10 * fine + 0.16 * worn + 0.04 * grain)
+    let grain = octaves(u, v, 70, 3, 104);
+    let worn = octaves(u, v, 5, 5, 105);
+    // Joints between beds open and close.
+    let ledge = 1.0 - smooth(-0.35, 0.35, octaves(u, v, 4, 3, 106)) * (1.0 - smooth(0.0, 0.35, middle));
+    let height = ((0.35 + 0.30 * bed) * (0.65 + 0.35 * ledge) + 0.08 * fine + 0.24 * worn + 0.06 * grain)
         .clamp(0.0, 1.0);
-    let tone = (0.25 + 0.35 * bed + 0.22 * fine + 0.14 * worn + 0.10 * grain).clamp(0.0, 1.0);
-    let color = mix([0.47, 0.36, 0.26], [0.76, 0.66, 0.50], tone);
-    let color = mix(color, [0.56, 0.33, 0.22], 0.5 * smooth(0.75, 0.95, bed));
-    Point { color: lit(color, 0.72 + 0.28 * ledge), height, roughness: 0.92 }
+    let color = sand_color(0.25 + 0.26 * bed + 0.18 * fine + 0.20 * worn + 0.14 * grain);
+    let color = mix(color, [0.56, 0.36, 0.25], 0.45 * smooth(0.72, 0.95, bed + 0.15 * worn));
+    Point { color: lit(color, 0.82 + 0.18 * ledge), height, roughness: 0.92 }
+}
+
+/// The same from above: grain, and here and there a sheet that is worn away.
+fn sandstone_top(u: f32, v: f32) -> Point {
+    let (sheet, middle) = sheets(u, v, 2.5, 131);
+    let grain = octaves(u, v, 70, 3, 134);
+    let worn = octaves(u, v, 5, 5, 135);
+    let edge = smooth(0.0, 0.12, middle);
+    let height = (0.34 + 0.16 * sheet + 0.26 * worn + 0.07 * grain).clamp(0.0, 1.0) * (0.9 + 0.1 * edge);
+    let color = sand_color(0.38 + 0.14 * sheet + 0.26 * worn + 0.16 * grain);
+    let rust = smooth(0.1, 0.8, octaves(u, v, 3, 5, 136));
+    let color = mix(color, [0.56, 0.36, 0.25], 0.30 * rust);
+    Point { color: lit(color, 0.92 + 0.06 * edge), height, roughness: 0.93 }
+}
+
+fn sand_color(tone: f32) -> [f32; 3] {
+    mix([0.45, 0.35, 0.255], [0.74, 0.64, 0.485], tone.clamp(0.0, 1.0))
 }
 
 /// Dark plates, thin and sharp.
 fn shale(u: f32, v: f32) -> Point {
     let (plate, middle) = laminae(u, v, 22, 0.03, 111);
-    let block = cells(u * 0.999, v, 7, 114);
-    let joint = smooth(0.0, 0.05, block.second - block.nearest);
-    let ledge = smooth(0.0, 0.35, middle);
-    let worn = octaves(u, v, 8, 4, 115);
+    let block = cells(u + 0.02 * octaves(u, v, 6, 4, 112), v * 0.999, 7, 114);
+    let open = smooth(-0.1, 0.4, octaves(u, v, 4, 3, 113));
+    let joint = 1.0 - open * (1.0 - smooth(0.0, 0.05, block.second - block.nearest));
+    let ledge = smooth(0.0, 0.45, middle);
+    let worn = octaves(u, v, 8, 5, 115);
     let height =
-        ((0.25 + 0.6 * plate) * (0.5 + 0.5 * ledge) * (0.6 + 0.4 * joint) + 0.12 * worn).clamp(0.0, 1.0);
-    let tone = (0.3 + 0.45 * plate + 0.2 * worn + 0.15 * (block.name - 0.5)).clamp(0.0, 1.0);
-    let color = mix([0.17, 0.18, 0.205], [0.40, 0.41, 0.43], tone);
-    let color = mix(color, [0.40, 0.31, 0.24], 0.3 * smooth(0.2, 0.6, octaves(u, v, 4, 3, 116)));
+        ((0.25 + 0.4 * plate) * (0.65 + 0.35 * ledge) * (0.75 + 0.25 * joint) + 0.20 * worn).clamp(0.0, 1.0);
+    let color = shale_color(u, v, 0.3 + 0.36 * plate + 0.25 * worn + 0.12 * (block.name - 0.5));
     Point {
-        color: lit(color, (0.6 + 0.4 * ledge) * (0.6 + 0.4 * joint)),
+        color: lit(color, (0.76 + 0.24 * ledge) * (0.84 + 0.16 * joint)),
         height,
         roughness: 0.7 + 0.12 * worn,
     }
+}
+
+/// The same from above: flakes.
+fn shale_top(u: f32, v: f32) -> Point {
+    let (sheet, middle) = sheets(u, v, 6.0, 141);
+    let flake = cells(u + 0.03 * octaves(u, v, 6, 4, 142), v + 0.03 * octaves(u, v, 6, 4, 143), 9, 144);
+    let worn = octaves(u, v, 8, 5, 145);
+    let edge = smooth(0.0, 0.25, middle);
+    let height =
+        (0.20 + 0.35 * sheet + 0.10 * flake.name + 0.20 * worn).clamp(0.0, 1.0) * (0.85 + 0.15 * edge);
+    let color = shale_color(u, v, 0.32 + 0.24 * sheet + 0.25 * worn + 0.16 * (flake.name - 0.5));
+    Point { color: lit(color, 0.82 + 0.14 * edge), height, roughness: 0.7 + 0.12 * worn }
+}
+
+fn shale_color(u: f32, v: f32, tone: f32) -> [f32; 3] {
+    let color = mix([0.18, 0.185, 0.205], [0.42, 0.425, 0.44], tone.clamp(0.0, 1.0));
+    mix(color, [0.40, 0.32, 0.255], 0.35 * smooth(0.1, 0.6, octaves(u, v, 4, 5, 116)))
 }
 
 /// Round stones of many colours.
