@@ -343,9 +343,11 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
     let sunk = max(in.origin.x, 0.0);
     // Borders between strata are ragged, but not at the surface itself.
     var depth = sunk;
+    var grit = vec4(0.0);
     if sunk > 0.0 {
-        let grit = noise_at(site.place, 5.0).x;
-        depth = max(sunk + (0.7 * grit + 0.35 * fine.x + 0.5 * broad.x) * min(1.4 * sunk, 1.0), 0.0);
+        let inside = min(1.4 * sunk, 1.0);
+        grit = noise_at(site.place, 5.0) * inside;
+        depth = max(sunk + 0.7 * grit.x + (0.35 * fine.x + 0.5 * broad.x) * inside, 0.0);
     }
     let steep = 1.0 - smoothstep(ground.far.x, ground.far.y, site.normal.y + 0.08 * fine.y);
     let bare = own * max(steep, smoothstep(0.10, 0.40, depth));
@@ -376,25 +378,45 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
         mass = put(mass, u32(ground.soil.y), subsoil);
         var rock = max(all - soil - subsoil, 0.0);
         if rock > 0.0 {
-            let up = site.place.y + ground.rock.y * (0.7 * broad.z + 0.12 * fine.z);
+            // Beds dip, roll and bend.
+            let flat = site.place.xz;
+            let roll = 0.012 * dot(flat, vec2(0.8, -0.6)) + sin(0.013 * flat.x + 1.6 * sin(0.009 * flat.y));
+            let up = site.place.y + ground.rock.y * (roll + 0.7 * broad.z + 0.16 * fine.z);
             let within = fract(up / ground.rock.x);
-            let seam_off = abs(within - 0.61) * ground.rock.x + 0.15 * fine.x;
+            let seam_off = abs(within - 0.61) * ground.rock.x + 0.15 * fine.x + 0.12 * grit.y;
             let seam = rock * smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
-                * (1.0 - smoothstep(0.42, 0.5, seam_off / max(ground.rock.w, 0.001)));
+                * (1.0 - smoothstep(0.30, 0.52, seam_off / max(ground.rock.w, 0.001)));
             mass = put(mass, u32(ground.rock.z), seam);
             rock -= seam;
-            // Veins are where two kinds of noise cross 0 together: threads in space.
-            let thread = length(fine.yw + 0.25 * broad.yw);
-            let width = 0.30 * ground.vein.z * smoothstep(-0.1, 0.25, broad.x);
+            // Veins are where two kinds of noise cross 0 together: threads in space. They thin out, so that heights of the
+            // textures draw their outline.
+            let thread = length(fine.yw + 0.25 * broad.yw + 0.05 * grit.zw);
+            let width = 0.22 * ground.vein.z * smoothstep(-0.1, 0.25, broad.x);
             let vein = rock * smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01))
-                * (1.0 - smoothstep(0.7, 1.0, thread / max(width, 0.001)));
+                * (1.0 - smoothstep(0.25, 1.0, thread / max(width, 0.001)));
             mass = put(mass, u32(ground.vein.y), vein);
             rock -= vein;
+            // Four beds, each as thick as noise has it: borders stray from the quarters by up to 0.36 of one.
             let bed = within * 4.0;
-            let beds = ground.beds;
-            let here = select(select(beds.x, beds.y, bed >= 1.0), select(beds.z, beds.w, bed >= 3.0), bed >= 2.0);
-            let next = select(select(beds.y, beds.z, bed >= 1.0), select(beds.w, beds.x, bed >= 3.0), bed >= 2.0);
-            let passed = smoothstep(0.93, 1.0, fract(bed));
+            let quarter = floor(bed);
+            let borders = clamp(0.8 * vec4(broad.x, broad.w, broad.y, -broad.x), vec4(-0.36), vec4(0.36));
+            let odd = quarter == 1.0 || quarter == 3.0;
+            let below_it = select(select(borders.w, borders.x, odd), select(borders.y, borders.z, odd), quarter >= 2.0);
+            let above_it = select(select(borders.x, borders.y, odd), select(borders.z, borders.w, odd), quarter >= 2.0);
+            let part = bed - quarter;
+            // The nearest border, and the bed below it.
+            let is_low = part < 0.5;
+            let off = select(part - 1.0 - above_it, part - below_it, is_low);
+            let number = u32(quarter + select(4.0, 3.0, is_low)) % 4u;
+            let here = ground.beds[number];
+            let next = ground.beds[(number + 1u) % 4u];
+            let soft = min(0.02 * ground.rock.x, 0.5);
+            let passed = smoothstep(-soft, soft, 0.25 * ground.rock.x * off + 0.7 * soft * grit.x);
+            // Weather leaves a crust, which hides the beds of natural faces in patches.
+            let spread = smoothstep(-0.03, 0.22, 0.8 * broad.y + 0.5 * fine.x);
+            let crust = rock * spread * (1.0 - smoothstep(0.4, 1.6, sunk));
+            rock -= crust;
+            mass = put(mass, u32(ground.beds.x), crust);
             mass = put(mass, u32(here), rock * (1.0 - passed));
             mass = put(mass, u32(next), rock * passed);
         }
@@ -405,7 +427,7 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
     // Where layers meet, they do so in patches, and not along the lattice.
     let most = max(max(mass.a, mass.b), max(mass.c, mass.d));
     if max(max(most.x, most.y), max(most.z, most.w)) < 0.985 {
-        let patches = 1.0 + 0.75 * noise_at(site.place, 7.0);
+        let patches = clamp(1.0 + 1.5 * noise_at(site.place, 4.5), vec4(0.15), vec4(2.0));
         mass = Mass(mass.a * patches, mass.b * patches, mass.c * patches, mass.d * patches);
     }
     var best = Choice(vec3(0u), vec4(0.0));

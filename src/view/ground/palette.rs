@@ -57,7 +57,7 @@ pub(super) const RECIPES: [Recipe; 14] = [
     Recipe { name: "clay", relief: 0.10, metres: 4.0, paint: clay, scatter: None },
     Recipe { name: "concrete", relief: 0.02, metres: 4.0, paint: concrete, scatter: None },
     Recipe { name: "coal", relief: 0.18, metres: 2.5, paint: coal, scatter: None },
-    Recipe { name: "gold", relief: 0.20, metres: 2.5, paint: gold, scatter: None },
+    Recipe { name: "gold", relief: 0.10, metres: 2.5, paint: gold, scatter: None },
     Recipe { name: "soil", relief: 0.14, metres: 3.0, paint: soil, scatter: None },
     Recipe { name: "sandstone", relief: 0.28, metres: 5.0, paint: sandstone, scatter: None },
     Recipe { name: "shale", relief: 0.26, metres: 4.0, paint: shale, scatter: None },
@@ -191,19 +191,22 @@ fn coal(u: f32, v: f32) -> Point {
     Point { color: lit(color, 0.5 + 0.5 * edge), height, roughness: 0.34 + 0.3 * name }
 }
 
-/// Nuggets in dark quartz.
+/// Nuggets and threads in dark quartz. The metal stands high and the stone low: where a vein thins out, the metal goes on
+/// for a while in whatever is around it.
 fn gold(u: f32, v: f32) -> Point {
     let (tilt, edge, name) = facets(u, v, 8, 81);
-    let (wu, wv) = (u + 0.05 * octaves(u, v, 4, 3, 85), v + 0.05 * octaves(u, v, 4, 3, 86));
-    let vein = smooth(0.84, 0.93, ridges(wu, wv, 4, 2, 87));
-    let nugget = cells(u, v, 16, 88);
-    let lump = if nugget.name > 0.6 { 1.0 - smooth(0.14, 0.36, nugget.nearest) } else { 0.0 };
+    let (wu, wv) = (u + 0.07 * octaves(u, v, 4, 4, 85), v + 0.07 * octaves(u, v, 4, 4, 86));
+    let rich = octaves(u, v, 3, 3, 90);
+    let vein = smooth(0.86 - 0.05 * rich, 0.96, ridges(wu, wv, 4, 2, 87));
+    let nugget = cells(wu, wv, 15, 88);
+    let size = 0.12 + 0.30 * (nugget.name - 0.6) + 0.08 * rich;
+    let lump = if nugget.name > 0.6 { 1.0 - smooth(0.5 * size, 1.3 * size, nugget.nearest) } else { 0.0 };
     let metal = (vein + lump).min(1.0);
-    let stone = mix([0.24, 0.21, 0.20], [0.46, 0.42, 0.40], name * 0.7 + 0.3 * tilt);
+    let stone = mix([0.27, 0.245, 0.23], [0.45, 0.42, 0.395], name * 0.5 + 0.2 * tilt + 0.15 + 0.2 * rich);
     let shine =
-        mix([0.72, 0.48, 0.10], [1.0, 0.82, 0.32], (0.5 + 0.6 * octaves(u, v, 24, 3, 89)).clamp(0.0, 1.0));
-    let height = (0.55 * tilt * (0.5 + 0.5 * edge) + 0.4 * metal).clamp(0.0, 1.0);
-    Point { color: mix(lit(stone, 0.55 + 0.45 * edge), shine, metal), height, roughness: 0.75 - 0.42 * metal }
+        mix([0.66, 0.44, 0.10], [0.98, 0.80, 0.34], (0.5 + 0.6 * octaves(u, v, 24, 3, 89)).clamp(0.0, 1.0));
+    let height = (0.26 * tilt * (0.5 + 0.5 * edge) + 0.6 * metal).clamp(0.0, 1.0);
+    Point { color: mix(lit(stone, 0.85 + 0.15 * edge), shine, metal), height, roughness: 0.75 - 0.40 * metal }
 }
 
 /// Crumbs, pebbles, and rootlets.
