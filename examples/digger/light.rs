@@ -18,10 +18,14 @@ use crate::settings::{Quality, Settings, SettingsFile};
 /// The way to the sun on a late afternoon, of length 1: from the south-west.
 pub const SUN: Vec3 = Vec3::new(-0.58, 0.64, 0.504);
 
-/// Luminous power of the headlamp in lumens, as a game needs it and not as a shop sells it.
-const LAMP: f32 = 18_000_000.0;
+/// Luminous power of the headlamp's beam in lumens, as a game needs it and not as a shop sells it.
+const BEAM: f32 = 12_000_000.0;
+/// The same of the wide light around the beam: one light for both would burn what is near or not reach what is far.
+const FLOOD: f32 = 2_400_000.0;
 /// The same of the little light that shows the player's own hands then.
 const HANDS: f32 = 9_000.0;
+/// Metres from which on both have their whole power; nearer by, the player dims them.
+const FULL: f32 = 13.0;
 /// Brightness of the sky's light deep in a cave.
 const DARK: f32 = 30.0;
 
@@ -63,7 +67,7 @@ impl Plugin for LightPlugin {
                 (
                     apply_settings.run_if(resource_exists_and_changed::<Settings>),
                     press_switch.in_set(Playing).run_if(in_state(Phase::Playing)),
-                    (switch_lamps, darken_caves),
+                    (switch_lamps, dim_lamps, darken_caves).chain(),
                 )
                     .chain(),
             );
@@ -92,17 +96,20 @@ fn spare_software(
 }
 
 fn open_eyes(mut commands: Commands) {
-    let lamp = SpotLight {
+    let beam = SpotLight {
         color: Color::srgb(1.0, 0.93, 0.80),
         intensity: 0.0,
         range: 70.0,
         radius: 0.05,
-        inner_angle: 0.15,
-        outer_angle: 1.0,
+        inner_angle: 0.05,
+        outer_angle: 0.8,
         shadow_maps_enabled: true,
         ..default()
     };
-    let hands = PointLight { color: lamp.color, intensity: 0.0, range: 1.6, ..default() };
+    // What it shines on is what the eyes see: it needs no shadows.
+    let flood =
+        SpotLight { range: 24.0, inner_angle: 0.3, outer_angle: 1.3, shadow_maps_enabled: false, ..beam };
+    let hands = PointLight { color: beam.color, intensity: 0.0, range: 1.6, ..default() };
     commands.spawn((
         Name::new("eyes"),
         Eyes,
@@ -117,7 +124,8 @@ fn open_eyes(mut commands: Commands) {
         DistanceFog { directional_light_exponent: 12.0, ..default() },
         children![
             // A little to the side of the eyes, so that its shadows are seen, and before the hands, which it would burn.
-            (Headlamp(LAMP), lamp, Transform::from_xyz(0.22, 0.12, -0.34)),
+            (Headlamp(BEAM), beam, Transform::from_xyz(0.22, 0.12, -0.34)),
+            (Headlamp(FLOOD), flood, Transform::from_xyz(0.22, 0.12, -0.34)),
             (Headlamp(HANDS), hands, Transform::from_xyz(-0.05, 0.16, -0.12)),
         ],
     ));
@@ -190,17 +198,42 @@ fn put_out(_: On<NewGame>, mut switch: ResMut<LampSwitch>) {
 
 fn switch_lamps(
     switch: Res<LampSwitch>,
-    mut spots: Query<(&Headlamp, &mut SpotLight)>,
+    mut spots: Query<&mut SpotLight, With<Headlamp>>,
     mut points: Query<(&Headlamp, &mut PointLight)>,
 ) {
     if switch.is_changed() {
-        let power = |lamp: &Headlamp| if switch.0 { lamp.0 } else { 0.0 };
-        for (lamp, mut light) in &mut spots {
-            light.intensity = power(lamp);
+        // They come up by and by.
+        for mut light in &mut spots {
+            light.intensity = 0.0;
         }
         for (lamp, mut light) in &mut points {
-            light.intensity = power(lamp);
+            light.intensity = if switch.0 { lamp.0 } else { 0.0 };
         }
+    }
+}
+
+/// The headlamp is as strong as what it falls on is far: rock before the player's nose is seen, and not burnt.
+fn dim_lamps(
+    time: Res<Time>,
+    switch: Res<LampSwitch>,
+    terrains: Terrains,
+    eyes: Single<&GlobalTransform, With<Eyes>>,
+    mut lamps: Query<(&Headlamp, &mut SpotLight)>,
+) {
+    if !switch.0 {
+        return;
+    }
+    // Ahead, and around the beam's rim.
+    let ways = [(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25)]
+        .map(|(right, up)| eyes.rotation() * Vec3::new(right, up, -1.0));
+    let far = |way: Vec3| {
+        let ray = Ray3d::new(eyes.translation(), Dir3::new(way).unwrap_or(Dir3::NEG_Z));
+        terrains.raycast(ray, FULL).map_or(FULL, |hit| hit.distance.max(0.5))
+    };
+    let metres = (ways.map(|way| far(way).ln()).iter().sum::<f32>() / ways.len() as f32).exp();
+    let share = (metres / FULL).powf(1.6);
+    for (lamp, mut light) in &mut lamps {
+        light.intensity += (share * lamp.0 - light.intensity) * (1.0 - (-8.0 * time.delta_secs()).exp());
     }
 }
 
