@@ -1,6 +1,8 @@
 //! A line on standard output for whatever happened: what was done can be followed, and checked by a script.
 
 use bevy::prelude::*;
+use bevy::render::render_resource::PipelineCache;
+use bevy::render::{Render, RenderApp, RenderSystems};
 use bevy_burrow::panel::{BrushTool, PanelPlaces};
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
@@ -18,8 +20,30 @@ impl Plugin for JournalPlugin {
         .add_systems(
             Update,
             (tell_look, tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
-        );
+        )
+        .add_systems(Last, tell_frame.run_if(tells_all));
+        let tells = app.world().get_resource::<TellAll>().is_some_and(|tells| tells.0);
+        if let (true, Some(renderer)) = (tells, app.get_sub_app_mut(RenderApp)) {
+            renderer.add_systems(Render, tell_pipelines.in_set(RenderSystems::Cleanup));
+        }
     }
+}
+
+/// How many pipelines are still being compiled: until there are none, something is missing in the picture.
+fn tell_pipelines(pipelines: Res<PipelineCache>, mut last: Local<Option<usize>>) {
+    let now = pipelines.waiting_pipelines().count();
+    if last.replace(now) != Some(now) {
+        println!("pipelines {now}");
+    }
+}
+
+/// The last line of a frame.
+fn tell_frame() {
+    println!("frame");
+}
+
+fn tells_all(tells: Res<TellAll>) -> bool {
+    tells.0
 }
 
 /// The ground's textures take a moment: from now on it can be seen.
@@ -78,13 +102,9 @@ fn tell_tool(tool: Res<BrushTool>) {
     }
 }
 
-/// Each frame, and where the panel's widgets are whenever that changes: `tools/drive.py` clicks on them.
+/// Where the panel's widgets are whenever that changes: `tools/drive.py` clicks on them.
 fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
-    if !tells.0 {
-        return;
-    }
-    println!("frame");
-    if !places.is_changed() {
+    if !tells.0 || !places.is_changed() {
         return;
     }
     for (name, place) in &places.0 {
@@ -95,6 +115,6 @@ fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
     }
 }
 
-/// Should frames and places be told?
+/// Should frames, pipelines and places be told? To be there before [`JournalPlugin`].
 #[derive(Resource, Default)]
 pub struct TellAll(pub bool);

@@ -96,7 +96,7 @@ fn main() -> ExitCode {
 
 /// Everything that needs no window.
 fn editor(app: &mut App, options: &Options) {
-    app.add_plugins((
+    app.insert_resource(journal::TellAll(options.tell)).add_plugins((
         BurrowPlugins,
         BurrowPanelPlugin,
         BurrowDebugPlugin,
@@ -104,6 +104,5 @@ fn editor(app: &mut App, options: &Options) {
         stroke::StrokePlugin,
         journal::JournalPlugin,
     ));
-    app.insert_resource(journal::TellAll(options.tell));
     app.world_mut().resource_mut::<bevy_burrow::panel::BurrowPanel>().pictures = options.out.clone();
 }
