@@ -1,9 +1,13 @@
 //! Says on standard output what goes on, a line each: for programs that play the game with a real mouse and keys.
 
 use bevy::prelude::*;
+use bevy::render::render_resource::PipelineCache;
+use bevy::render::{Render, RenderApp, RenderSystems};
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
+use bevy_burrow::view::GroundLoading;
 
+use crate::light::Eyes;
 use crate::phase::{Page, Phase};
 use crate::player::Player;
 use crate::tools::Hand;
@@ -13,10 +17,29 @@ pub struct TellPlugin;
 
 impl Plugin for TellPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Last, (tell_frame, tell_page, tell_ready, tell_brush, tell_edits, tell_history));
+        app.add_systems(
+            Last,
+            (
+                (tell_page, tell_ready, tell_look, tell_brush, tell_aim, tell_edits, tell_history, tell_eyes),
+                tell_frame,
+            )
+                .chain(),
+        );
+        if let Some(renderer) = app.get_sub_app_mut(RenderApp) {
+            renderer.add_systems(Render, tell_pipelines.in_set(RenderSystems::Cleanup));
+        }
     }
 }
 
+/// How many pipelines are still being compiled: until there are none, something is missing in the picture.
+fn tell_pipelines(pipelines: Res<PipelineCache>, mut last: Local<Option<usize>>) {
+    let now = pipelines.waiting_pipelines().count();
+    if last.replace(now) != Some(now) {
+        println!("pipelines {now}");
+    }
+}
+
+/// The last line of a frame.
 fn tell_frame() {
     println!("frame");
 }
@@ -33,11 +56,44 @@ fn tell_ready(players: Query<(), Added<Player>>) {
     }
 }
 
+fn tell_look(painting: Res<GroundLoading>, mut is_told: Local<bool>) {
+    if !*is_told && painting.is_ready() {
+        *is_told = true;
+        println!("painted");
+    }
+}
+
 fn tell_brush(hand: Res<Hand>, mut last: Local<String>) {
     let now = format!("tool {} radius={:.2}", hand.tool.label(), hand.radius(hand.tool));
     if *last != now {
         println!("{now}");
         *last = now;
+    }
+}
+
+/// How far away is what the tool would hit, in decimetres' precision?
+fn tell_aim(hand: Res<Hand>, eyes: Single<&Transform, With<Eyes>>, mut last: Local<String>) {
+    let now = match hand.aim {
+        Some(aim) => format!("aim {:.1}", aim.place.distance(eyes.translation)),
+        None => "aim none".into(),
+    };
+    if *last != now {
+        println!("{now}");
+        *last = now;
+    }
+}
+
+/// Are the eyes in the air, or has ground come over them?
+fn tell_eyes(
+    eyes: Single<&Transform, With<Eyes>>,
+    terrains: Query<&Terrain>,
+    mut last: Local<Option<&'static str>>,
+) {
+    let Some(terrain) = terrains.iter().next() else { return };
+    let place = eyes.translation / terrain.voxel_size();
+    let now = if terrain.world().is_solid(place.as_dvec3()) { "ground" } else { "air" };
+    if last.replace(now) != Some(now) {
+        println!("eyes in {now}");
     }
 }
 
