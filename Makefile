@@ -66,8 +66,9 @@ test-examples:
 		--height-range 0 150 --edits examples/export/edits.jsonl --chunk-size 32 --out '$(PROOF)/export'
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
 
+# They are drawn on a display of their own, which needs the libraries of any other.
 drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where there is none
-	@tools/setup.sh drive
+	@DISPLAY=$${DISPLAY:-:0} tools/setup.sh drive
 	cargo build $(WITH_BEVY) --example sculpt --example digger
 	@for play in sculpt digger; do \
 		python3 tools/drive.py $$play --out out/drive/$$play; status=$$?; \
