@@ -438,6 +438,9 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
     // Less what the first one that is left out has, so that none comes or goes with a jump.
     let left_out = select(best.weights.z, best.weights.w, is_fine());
     best.weights = max(best.weights - left_out, vec4(0.0));
+    // Where all are alike, little is left of any: the first one counts as whole, or the place would be black.
+    best.weights.x = max(best.weights.x, 0.00001);
+    best.weights /= best.weights.x;
     return best;
 }
 
