@@ -12,7 +12,7 @@ use bevy_burrow::terrain::World;
 use bevy_burrow::volume::Tally;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
-use worlds::{random_brush, random_brush_at_a_face, random_ground, world_count};
+use worlds::{random_brush, random_brush_at_a_face, random_ground, random_sculpting_brush, world_count};
 
 const STEPS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
 
@@ -79,9 +79,9 @@ fn check_piece(world: &World, piece: &LoosePiece, what: &str) {
     assert_eq!(piece.materials.iter().collect::<BTreeMap<_, _>>(), tally, "{what}");
 }
 
-/// Digs that leave much hanging: rough ones, thin walls, balls in the air that are cut through.
+/// Edits that leave much hanging: rough digs, thin walls, balls in the air that are cut through, and sculpting of all that.
 fn crumbling_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
-    let brush = match rng.u32(0..6) {
+    let brush = match rng.u32(0..9) {
         0 => random_brush_at_a_face(rng, ground, chunk_size),
         1 => {
             // A cut right through hills and what hangs over them.
@@ -89,7 +89,13 @@ fn crumbling_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
             let y = (low as f32 + (high - low) as f32 * rng.f32()) / 256.0 + rng.f32() * 6.0;
             let middle = Vec3::new(ground.width() as f32, 2.0 * y, ground.depth() as f32) / 2.0;
             let half = Vec3::new(middle.x.min(40.0) + 1.0, 1.1, middle.z.min(40.0) + 1.0);
-            Brush::dig(Shape::cuboid(middle, half))
+            let slab = Shape::cuboid(middle, half);
+            if rng.bool() { Brush::dig(slab) } else { Brush::level(slab, y - 2.0).with_falloff(0.0) }
+        }
+        2 => random_sculpting_brush(rng, ground),
+        3 => {
+            let shape = random_brush(rng, ground).shape;
+            Brush { shape, ..random_sculpting_brush(rng, ground) }
         }
         _ => random_brush(rng, ground),
     };
@@ -198,7 +204,7 @@ fn cut_off(before: &World, after: &World) -> Vec<Piece> {
 
 #[test]
 fn edits_take_out_what_they_cut_off_and_nothing_else() {
-    let (mut removed, mut broken, mut left) = (0, 0, 0);
+    let (mut removed, mut broken, mut left, mut sculpted) = (0, 0, 0, 0);
     for index in 0..world_count(150) {
         let mut rng = Rng::with_seed(52_000 + index);
         let (ground, chunk_size) = small_world(&mut rng, index);
@@ -222,6 +228,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
                 cut_off(&before, &plain).into_iter().filter(|piece| piece.len() <= 3000).collect();
             let own: BTreeSet<Piece> = applied.loose.iter().map(samples_of).collect();
             assert_eq!(own, expected, "{what}");
+            sculpted += if brush.operation.is_sculpting() { own.len() } else { 0 };
 
             let mut gone = Piece::new();
             for piece in &applied.loose {
@@ -280,8 +287,9 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             assert_eq!(terrain.world().hash(), after, "{what}: redone");
         }
     }
-    println!("{removed} removed, {broken} broken off, {left} left");
+    println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting");
     assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
+    assert!(sculpted > 10, "{sculpted} were cut off by sculpting");
 }
 
 #[test]
