@@ -157,9 +157,9 @@ fn grip(
         (
             Tool::Bomb,
             vec![
-                part(&ball, &dark, at(0.0, 0.05, 0.0).with_scale(Vec3::splat(0.062))),
-                part(&tube, &dark, at(0.0, 0.112, 0.0).with_scale(Vec3::new(0.018, 0.02, 0.018))),
-                part(&ball, &glow, at(0.0, 0.135, 0.0).with_scale(Vec3::splat(0.012))),
+                part(&ball, &dark, at(0.0, 0.03, 0.0).with_scale(Vec3::splat(0.042))),
+                part(&tube, &dark, at(0.0, 0.072, 0.0).with_scale(Vec3::new(0.012, 0.014, 0.012))),
+                part(&ball, &glow, at(0.0, 0.088, 0.0).with_scale(Vec3::splat(0.008))),
             ],
         ),
         (
@@ -170,7 +170,7 @@ fn grip(
                 part(&tube, &dark, at(0.0, 0.13, 0.0).with_scale(Vec3::new(0.046, 0.012, 0.046))),
             ],
         ),
-        (Tool::Ball, vec![part(&ball, &rubber, at(0.0, 0.06, 0.0).with_scale(Vec3::splat(0.055)))]),
+        (Tool::Ball, vec![part(&ball, &rubber, at(0.0, 0.03, 0.0).with_scale(Vec3::splat(0.040)))]),
     ];
     let piece =
         |(mesh, material, place): Part| (Mesh3d(mesh), MeshMaterial3d(material), place, NotShadowCaster);

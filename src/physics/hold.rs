@@ -5,6 +5,7 @@ use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
 use bevy::math::bounding::{Aabb2d, AabbCast2d};
 use bevy::math::{Affine3A, Vec3A};
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::character::Character;
@@ -143,6 +144,7 @@ pub(super) fn hold(
     ready: Res<Columns>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
+    let start = Instant::now();
     let terrains: Vec<(Entity, &Terrain, Affine)> = terrains
         .iter()
         .filter_map(|(entity, terrain)| {
@@ -178,6 +180,7 @@ pub(super) fn hold(
             "bodies over a terrain are held still: there is no ColliderSource, so ground has no colliders"
         );
     }
+    figures.main_thread += start.elapsed();
 }
 
 /// From the world to a terrain.

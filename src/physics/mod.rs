@@ -68,6 +68,8 @@ pub use hull::debris_collider;
 pub use near::ColliderSource;
 pub use shape::GroundShape;
 
+use std::time::Duration;
+
 use avian3d::collider_tree::ColliderTreeOptimization;
 use avian3d::prelude::PhysicsSystems;
 use bevy::prelude::*;
@@ -115,6 +117,9 @@ pub struct PhysicsFigures {
     pub woken: u64,
     /// Bodies lifted out of the ground so far.
     pub lifted: u64,
+    /// What all of this took on the main thread since the frame began, but for colliders that came with commits, which
+    /// count there.
+    pub main_thread: Duration,
 }
 
 impl Plugin for TerrainPhysicsPlugin {
@@ -139,6 +144,7 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_observer(colliders::forget)
             .add_observer(columns::note_new)
             .add_observer(columns::note_gone)
+            .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
             .add_systems(Update, near::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))

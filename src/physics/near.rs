@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use avian3d::prelude::*;
 use bevy::platform::collections::HashMap;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::HeldByGround;
 use super::colliders::Grounds;
 use super::columns::ColumnKey;
+use super::{HeldByGround, PhysicsFigures};
 use crate::lattice::{ChunkGrid, TilePos};
 use crate::terrain::Terrain;
 
@@ -136,7 +137,9 @@ pub(super) fn find_near(
         Option<&ColliderAabb>,
     )>,
     mut known: Local<Neighbourhood>,
+    mut figures: ResMut<PhysicsFigures>,
 ) {
+    let start = Instant::now();
     let mut near = Neighbourhood::default();
     for (terrain, model) in &terrains {
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
@@ -170,4 +173,5 @@ pub(super) fn find_near(
         grounds.set_near(near.clone());
         *known = near;
     }
+    figures.main_thread += start.elapsed();
 }

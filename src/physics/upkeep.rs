@@ -1,5 +1,9 @@
 //! Colliders that no commit brings: those of ground that a source comes near to, and those that it leaves behind.
 
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
@@ -14,19 +18,38 @@ use crate::terrain::{SurfaceRecipe, Terrain};
 /// Parts that one task makes colliders for: few, so that the nearest come soon.
 const BATCH: usize = 16;
 
+/// How long a frame puts colliders in their places; at least one.
+const FRAME_TIME: Duration = Duration::from_micros(150);
+
 /// The colliders under way.
 #[derive(Resource, Default)]
-pub(super) struct Work(Option<Task<Vec<(Entity, Prepared)>>>);
+pub(super) struct Work {
+    task: Option<Task<Vec<(Entity, Prepared)>>>,
+    /// Done, and waiting for their frame.
+    done: VecDeque<(Entity, Prepared)>,
+}
 
 /// Puts colliders that are done in their places.
 pub(super) fn finish(mut commands: Commands, mut work: ResMut<Work>) {
-    let Some(done) = work.0.as_mut().and_then(check_ready) else { return };
-    work.0 = None;
-    for (entity, prepared) in done {
-        if let Ok(mut part) = commands.get_entity(entity) {
-            part.queue_silenced(move |part: EntityWorldMut| prepared.attach(part));
+    if let Some(done) = work.task.as_mut().and_then(check_ready) {
+        (work.task, work.done) = (None, done.into());
+    }
+    if !work.done.is_empty() {
+        commands.queue(place);
+    }
+}
+
+fn place(world: &mut World) {
+    let start = Instant::now();
+    while let Some((entity, prepared)) = world.resource_mut::<Work>().done.pop_front() {
+        if let Ok(part) = world.get_entity_mut(entity) {
+            prepared.attach(part);
+        }
+        if start.elapsed() >= FRAME_TIME {
+            break;
         }
     }
+    world.resource_mut::<PhysicsFigures>().main_thread += start.elapsed();
 }
 
 /// Looks at the columns that something happened in, or that sources came to or left: removes colliders that are far from
@@ -41,6 +64,7 @@ pub(super) fn tend(
     mut figures: ResMut<PhysicsFigures>,
     mut known: Local<Neighbourhood>,
 ) {
+    let start = Instant::now();
     let near = grounds.near();
     let mut touched = columns.take_news(&parts);
     if !near.is(&known) {
@@ -66,9 +90,10 @@ pub(super) fn tend(
         figures.looked_at += looked_at as u64;
     }
     (figures.colliders, figures.missing) = columns.counts();
-    if work.0.is_none() && figures.missing > 0 {
-        work.0 = begin(&grounds, &terrains, &columns, &known);
+    if work.task.is_none() && work.done.is_empty() && figures.missing > 0 {
+        work.task = begin(&grounds, &terrains, &columns, &known);
     }
+    figures.main_thread += start.elapsed();
 }
 
 /// Starts on the nearest of the missing colliders, all of one terrain. One whose world is not shown yet has to wait: its

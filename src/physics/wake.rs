@@ -5,6 +5,7 @@ use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::collections::HashMap;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::character::{Character, CharacterMotion};
@@ -118,6 +119,7 @@ pub(super) fn wake(
     if changes.len() == 0 {
         return;
     }
+    let start = Instant::now();
     let changes = changes.take();
     figures.changes = 0;
     for (entity, body, own, sleeps) in &bodies {
@@ -129,6 +131,7 @@ pub(super) fn wake(
         }
         watched.0.extend(near.map(|change| ((entity, change.terrain), WATCHED)));
     }
+    figures.main_thread += start.elapsed();
 }
 
 /// Has bodies watched that are in the ground, some in each step: ground has one side only, and whoever got in where nothing
@@ -142,7 +145,9 @@ pub(super) fn patrol(
     solids: Solids,
     terrains: Query<(Entity, &Terrain, &GlobalTransform)>,
     mut turn: Local<usize>,
+    mut figures: ResMut<PhysicsFigures>,
 ) {
+    let start = Instant::now();
     *turn = (*turn + 1) % TURNS;
     let ground: Vec<_> =
         terrains.iter().map(|(entity, model, place)| (entity, model, place.affine().inverse())).collect();
@@ -155,6 +160,7 @@ pub(super) fn patrol(
             }
         }
     }
+    figures.main_thread += start.elapsed();
 }
 
 /// Lifts bodies that are watched out of the ground: before each step, and after it, so that nobody sees them there.
@@ -174,6 +180,7 @@ pub(super) fn rescue(
     time: Option<Res<Time<Physics>>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
+    let start = Instant::now();
     // While time stands still nobody is squeezed.
     let passes = time.is_none_or(|time| !time.is_paused());
     watched.0.retain(|&(entity, terrain), looks| {
@@ -196,6 +203,7 @@ pub(super) fn rescue(
         }
         *looks > 0
     });
+    figures.main_thread += start.elapsed();
 }
 
 /// How far up a body must go to be in the air: none if its middle is.

@@ -115,8 +115,12 @@ pub(super) fn commit_transactions(
             done.push((transaction.number, entity));
         }
     }
+    if done.is_empty() {
+        return;
+    }
     // The oldest first: whoever had to wait for the budget is next.
     done.sort_unstable();
+    commands.queue(|world: &mut World| world.insert_resource(Applying(Instant::now())));
     let mut swapped = 0;
     for (_, entity) in done {
         let Ok((_, mut terrain, mut entities, mut transaction)) = terrains.get_mut(entity) else { continue };
@@ -179,7 +183,16 @@ pub(super) fn commit_transactions(
         figures.commit_times.push(took);
         figures.main_thread += took;
     }
+    commands.queue(|world: &mut World| {
+        if let Some(Applying(start)) = world.remove_resource() {
+            world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
+        }
+    });
 }
+
+/// When the entities that a frame's commits change began to be changed.
+#[derive(Resource)]
+struct Applying(Instant);
 
 /// Tells which surface an entity shows, and does to it what goes with that.
 pub(super) fn attach(

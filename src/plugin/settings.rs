@@ -99,6 +99,7 @@ pub struct BurrowFigures {
     pub transactions: Times,
     /// How long the latest commits took on the main thread.
     pub commit_times: Times,
-    /// What this frame's intake, commits and starts of transactions took together on the main thread.
+    /// What this frame's intake, commits and starts of transactions took together on the main thread: systems, and changes
+    /// to entities.
     pub main_thread: Duration,
 }

@@ -17,9 +17,10 @@ struct Crumbled(usize);
 /// A stage with such a table on a terrain that stands somewhere, and its entity. Pieces stay for so many seconds.
 fn stage(voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
     let mut terrain = level(64, voxel_size);
+    // The model counts in voxels.
     terrain.apply([
-        Brush::add(Shape::cuboid(PILLAR * voxel_size, Vec3::new(1.2, 8.0, 1.2) * voxel_size), MaterialId(2)),
-        Brush::add(Shape::cuboid(SLAB * voxel_size, Vec3::new(6.2, 2.2, 6.2) * voxel_size), MaterialId(3)),
+        Brush::add(Shape::cuboid(PILLAR, Vec3::new(1.2, 8.0, 1.2)), MaterialId(2)),
+        Brush::add(Shape::cuboid(SLAB, Vec3::new(6.2, 2.2, 6.2)), MaterialId(3)),
     ]);
     let (mut stage, entity) = Stage::with_ground(terrain);
     stage
