@@ -30,7 +30,7 @@ fn crumble(
 ) {
     let Ok((piece, transform)) = pieces.get(crumbled.entity) else { return };
     let burst = Burst {
-        place: piece.middle(transform),
+        place: transform.translation,
         out: Vec3::Y,
         count: 18,
         speed: 2.5,

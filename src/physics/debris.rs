@@ -6,8 +6,9 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::debris_collider;
 use crate::ground::MaterialId;
-use crate::lattice::LatticeBox;
+use crate::lattice::{LatticeBox, SNAP};
 use crate::plugin::{BurrowSystems, HistoryMoved, LoosePieceFound, MaterialColors, Wardrobe, tell};
+use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, Restored, Terrain};
 
 /// Ground that broke off falls as a body. Put a [`LooseGround`](crate::plugin::LooseGround) with some `debris` on the
@@ -45,8 +46,7 @@ impl Default for DebrisSettings {
     }
 }
 
-/// A piece of ground that fell, or falls: on the body, whose `Transform` is at the piece's lower corner. Its mesh is a
-/// child, with the terrain's `MeshMaterial3d<StandardMaterial>` or a plain one.
+/// A piece of ground that fell, or falls: on the body, whose `Transform` is in the middle of the piece. Its mesh is a child, with the terrain's `MeshMaterial3d<StandardMaterial>` or a plain one.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
@@ -58,17 +58,10 @@ pub struct Debris {
     pub material: MaterialId,
     /// How large it is, in voxels.
     pub voxels: u64,
-    /// From its lower corner to the middle of its bounds, in metres.
+    /// Half the sides of its bounds as it was in the ground, in metres.
     pub half: Vec3,
     /// Seconds until it crumbles.
     pub left: f32,
-}
-
-impl Debris {
-    /// The middle of a piece that is here.
-    pub fn middle(&self, place: &Transform) -> Vec3 {
-        place.translation + place.rotation * self.half
-    }
 }
 
 /// A piece has lain about for long enough; it is despawned right after this.
@@ -83,7 +76,7 @@ pub struct DebrisCrumbled {
 struct Shaping {
     debris: Debris,
     place: Transform,
-    voxel_size: f32,
+    scale: f32,
     task: Task<(Option<Collider>, Option<Mesh>)>,
 }
 
@@ -111,24 +104,28 @@ fn break_off(
         let Ok(ground) = places.compute_global_transform(found.terrain) else { continue };
         let Some(surface) = found.piece.mesh.clone().filter(|_| room > 0) else { continue };
         room -= 1;
-        let (voxel_size, bounds) = (terrain.voxel_size(), found.piece.bounds);
+        let (scale, bounds) = (ground.scale().x, found.piece.bounds);
+        let size = bounds.max - bounds.min;
         let most = found.piece.materials.iter().max_by_key(|(_, voxels)| *voxels);
         let debris = Debris {
             terrain: found.terrain,
             tag: found.tag,
             material: most.map_or_else(MaterialId::default, |(material, _)| material),
             voxels: found.piece.voxels,
-            half: (bounds.max - bounds.min).as_vec3() * (voxel_size / 2.0),
+            half: size.as_vec3() * (scale / 2.0),
             left: settings.stay,
         };
-        let place = Transform::from_translation(ground.transform_point(found.origin()));
+        let place =
+            Transform::from_translation(ground.transform_point(found.origin() + size.as_vec3() / 2.0))
+                .with_rotation(ground.rotation());
         let wardrobe = meshes.is_some().then(|| Wardrobe::new(terrain.world(), colors));
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let mesh = wardrobe.and_then(|wardrobe| wardrobe.build_at(bounds.min, &surface));
-            (debris_collider(&surface, voxel_size), mesh.map(|(mesh, _)| mesh))
+            let mut surface = SurfaceMesh::clone(&surface);
+            surface.vertices.iter_mut().for_each(|vertex| vertex.position -= size * (SNAP / 2));
+            (debris_collider(&surface, scale), mesh.map(|(mesh, _)| mesh))
         });
-        let place = place.with_rotation(ground.rotation());
-        commands.spawn(Shaping { debris, place, voxel_size, task });
+        commands.spawn(Shaping { debris, place, scale, task });
     }
 }
 
@@ -136,17 +133,13 @@ fn break_off(
 fn make_room(
     mut commands: Commands,
     mut steps: MessageReader<HistoryMoved>,
-    terrains: Query<&Terrain>,
     places: TransformHelper,
     pieces: Query<(Entity, &Debris, &Transform)>,
     shaping: Query<(Entity, &Shaping)>,
 ) {
     for HistoryMoved { terrain, receipt } in steps.read() {
         let Some(entity) = *terrain else { continue };
-        let (Ok(terrain), Ok(ground)) = (terrains.get(entity), places.compute_global_transform(entity))
-        else {
-            continue;
-        };
+        let Ok(ground) = places.compute_global_transform(entity) else { continue };
         let Ok(Restored { bounds: Some(bounds), added, .. }) = &receipt.outcome else { continue };
         if added.total() == 0 {
             continue;
@@ -156,8 +149,8 @@ fn make_room(
             .iter()
             .chain(shaping.iter().map(|(entity, Shaping { debris, place, .. })| (entity, debris, place)));
         for (entity, debris, place) in all {
-            let middle = local.transform_point3(debris.middle(place));
-            if meets(*bounds, middle, debris.half.length() / terrain.voxel_size()) {
+            let middle = local.transform_point3(place.translation);
+            if meets(*bounds, middle, debris.half.length() / ground.scale().x) {
                 commands.entity(entity).try_despawn();
             }
         }
@@ -193,9 +186,11 @@ fn take_shape(
             restitution,
         ));
         if let (Some(mesh), Some(meshes)) = (mesh, &mut meshes) {
-            let scale = Transform::from_scale(Vec3::splat(piece.voxel_size));
-            let look = dress.look(piece.debris.terrain);
-            entity.with_child((Mesh3d(meshes.add(mesh)), scale, look));
+            let place = Transform::from_translation(-piece.debris.half).with_scale(Vec3::splat(piece.scale));
+            let shown = (Mesh3d(meshes.add(mesh)), place, dress.look(piece.debris.terrain));
+            entity.queue_silenced(move |mut body: EntityWorldMut| {
+                body.with_child(shown);
+            });
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use avian3d::prelude::*;
+use bevy::math::Vec3A;
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -160,7 +161,8 @@ pub(super) fn find_near(
             let count = (way.length() / stride).ceil();
             let apart = way / count.max(1.0);
             // Nor is a body held for want of ground that it reaches itself, or that is between two stops.
-            let radius = radius.max(half(bounds).xz().length()) / size + (apart.length() / 2.0).ceil();
+            let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(half(bounds))).xz().length();
+            let radius = (radius / size).max(own) + (apart.length() / 2.0).ceil();
             // Not every hair's breadth of a move is news.
             let stop = |at: u32| (from + apart * at as f32).round();
             stops.extend((0..=count as u32).map(|at| (stop(at), radius + 1.0)));

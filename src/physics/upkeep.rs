@@ -18,7 +18,7 @@ use crate::terrain::{SurfaceRecipe, Terrain};
 /// Parts that one task makes colliders for: few, so that the nearest come soon.
 const BATCH: usize = 16;
 
-/// How long a frame puts colliders in their places; at least one.
+/// How long a frame puts colliders in their places: at least one, and all of them while a body is held.
 const FRAME_TIME: Duration = Duration::from_micros(150);
 
 /// The colliders under way.
@@ -45,7 +45,7 @@ fn place(world: &mut World) {
         if let Ok(part) = world.get_entity_mut(entity) {
             prepared.attach(part);
         }
-        if start.elapsed() >= FRAME_TIME {
+        if start.elapsed() >= FRAME_TIME && world.resource::<PhysicsFigures>().held == 0 {
             break;
         }
     }
@@ -120,6 +120,7 @@ fn begin(
         missing.select_nth_unstable_by(BATCH, nearer);
         missing.truncate(BATCH);
     }
+    missing.sort_unstable_by(nearer);
     let (model, _) = terrains.get(terrain).ok()?;
     let (world, voxel_size) = (model.world(), model.voxel_size());
     let batch: Vec<(Entity, Part, SurfaceRecipe)> = missing

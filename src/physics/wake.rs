@@ -3,7 +3,9 @@
 
 use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
+use bevy::ecs::query::QueryData;
 use bevy::ecs::system::SystemParam;
+use bevy::math::Affine3A;
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -11,7 +13,8 @@ use bevy::prelude::*;
 use super::character::{Character, CharacterMotion};
 use super::colliders::GroundMaterial;
 use super::{GroundBody, PhysicsFigures};
-use crate::terrain::{Drawn, Terrain};
+use crate::plugin::TerrainEntities;
+use crate::terrain::{Drawn, Terrain, World as TerrainWorld};
 
 /// How far from a change a body may sleep on, in metres.
 const NEAR: f32 = 0.2;
@@ -88,7 +91,12 @@ pub(super) struct Watched(HashMap<(Entity, Entity), u8>);
 /// neither is what the ground lets through.
 #[derive(SystemParam)]
 pub(super) struct Solids<'w, 's> {
-    colliders: Query<'w, 's, (&'static ColliderAabb, Option<&'static CollisionLayers>), Without<Sensor>>,
+    colliders: Query<
+        'w,
+        's,
+        (&'static ColliderAabb, Option<&'static CollisionLayers>),
+        (Without<Sensor>, Without<ColliderDisabled>),
+    >,
     characters: Query<'w, 's, (), With<Character>>,
     ground: Res<'w, GroundMaterial>,
 }
@@ -112,7 +120,10 @@ pub(super) fn wake(
     mut commands: Commands,
     mut changes: ResMut<GroundChanges>,
     mut watched: ResMut<Watched>,
-    bodies: Query<(Entity, &RigidBody, &RigidBodyColliders, Has<Sleeping>), Without<GroundBody>>,
+    bodies: Query<
+        (Entity, &RigidBody, &RigidBodyColliders, Has<Sleeping>),
+        (Without<GroundBody>, Without<RigidBodyDisabled>),
+    >,
     solids: Solids,
     mut figures: ResMut<PhysicsFigures>,
 ) {
@@ -139,23 +150,36 @@ pub(super) fn wake(
 pub(super) fn patrol(
     mut watched: ResMut<Watched>,
     bodies: Query<
-        (Entity, &RigidBody, &RigidBodyColliders, &Position, Option<&LockedAxes>),
-        (Without<GroundBody>, Without<Sleeping>),
+        (Entity, &RigidBody, &RigidBodyColliders, Place, Option<&LockedAxes>),
+        (Without<GroundBody>, Without<Sleeping>, Without<RigidBodyDisabled>),
     >,
     solids: Solids,
-    terrains: Query<(Entity, &Terrain, &GlobalTransform)>,
+    terrains: Query<(Entity, &Terrain, &GlobalTransform, &TerrainEntities)>,
     mut turn: Local<usize>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
     *turn = (*turn + 1) % TURNS;
-    let ground: Vec<_> =
-        terrains.iter().map(|(entity, model, place)| (entity, model, place.affine().inverse())).collect();
+    // Ground that nobody sees yet is no ground yet.
+    let ground: Vec<_> = terrains
+        .iter()
+        .filter(|(_, model, _, entities)| entities.show(model.world()))
+        .map(|(entity, model, place, _)| (entity, model.world(), place.affine().inverse()))
+        .collect();
     for (entity, body, own, position, locked) in bodies.iter().skip(*turn).step_by(TURNS) {
         let is_free = locked.is_none_or(|locked| !locked.is_translation_y_locked());
-        for (terrain, model, inverse) in ground.iter().filter(|_| is_free) {
-            let place = inverse.transform_point3(position.0);
-            if model.world().is_buried(place.as_dvec3()) && solids.bounds(entity, body, own).is_some() {
+        let middle = position.middle();
+        let local = |inverse: &Affine3A| inverse.transform_point3(middle).as_dvec3();
+        // Terrains may be above each other: air of one is air.
+        let is_in_air = |(_, world, inverse): &(Entity, &TerrainWorld, Affine3A)| {
+            let place = local(inverse);
+            world.height(place.x, place.z).is_some() && !world.is_solid(place)
+        };
+        for (terrain, world, inverse) in ground.iter().filter(|_| is_free) {
+            if world.is_buried(local(inverse))
+                && solids.bounds(entity, body, own).is_some()
+                && !ground.iter().any(is_in_air)
+            {
                 watched.0.entry((entity, *terrain)).or_insert(1);
             }
         }
@@ -170,6 +194,8 @@ pub(super) fn rescue(
         &RigidBody,
         &RigidBodyColliders,
         &mut Position,
+        &Rotation,
+        Option<&ComputedCenterOfMass>,
         &mut LinearVelocity,
         &mut Transform,
         Option<&mut CharacterMotion>,
@@ -188,9 +214,10 @@ pub(super) fn rescue(
         let (Ok(body), Ok((terrain, place))) = (bodies.get_mut(entity), terrains.get(terrain)) else {
             return false;
         };
-        let (body, own, mut position, mut velocity, mut transform, motion, is_child) = body;
+        let (body, own, mut position, rotation, center, mut velocity, mut transform, motion, is_child) = body;
         let Some(bounds) = solids.bounds(entity, body, own) else { return false };
-        if let Some(lift) = lift(terrain, place, position.0, &bounds) {
+        let middle = middle(&position, rotation, center);
+        if let Some(lift) = lift(terrain, place, middle, &bounds) {
             position.0.y += lift;
             if !is_child {
                 transform.translation.y += lift;
@@ -206,6 +233,25 @@ pub(super) fn rescue(
     figures.main_thread += start.elapsed();
 }
 
+/// Where a body is.
+#[derive(QueryData)]
+pub(super) struct Place {
+    position: &'static Position,
+    rotation: &'static Rotation,
+    center: Option<&'static ComputedCenterOfMass>,
+}
+
+impl PlaceItem<'_, '_> {
+    fn middle(&self) -> Vec3 {
+        middle(self.position, self.rotation, self.center)
+    }
+}
+
+/// The middle of a body, which need not be where its shapes count from: it is in the ground if that is.
+fn middle(position: &Position, rotation: &Rotation, center: Option<&ComputedCenterOfMass>) -> Vec3 {
+    position.0 + center.map_or(Vec3::ZERO, |center| rotation * center.0)
+}
+
 /// How far up a body must go to be in the air: none if its middle is.
 fn lift(terrain: &Terrain, place: &GlobalTransform, middle: Vec3, bounds: &ColliderAabb) -> Option<f32> {
     let affine = place.affine();
@@ -214,7 +260,7 @@ fn lift(terrain: &Terrain, place: &GlobalTransform, middle: Vec3, bounds: &Colli
     if !local.is_finite() || !world.is_solid(local) {
         return None;
     }
-    let size = f64::from(terrain.voxel_size());
+    let size = f64::from(place.scale().y);
     let tall = f64::from(bounds.max.y - bounds.min.y) / size;
     // The box is as old as the last step, and somebody may have been lifted since.
     let below = (f64::from(middle.y - bounds.min.y) / size).clamp(0.0, tall.max(0.0));

@@ -1,10 +1,12 @@
 //! Chunks and tiles whose surface went and came back are drawn again.
 
+use std::time::Instant;
+
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
 use crate::album::{Album, flip};
-use crate::studio::Studio;
+use crate::studio::{PATIENCE, Studio};
 
 /// Height of the level ground: the middle of a chunk, so that all of its surface is in one layer of chunks.
 const HEIGHT: f64 = 16.0;
@@ -20,25 +22,31 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     for (what, dig) in [("a hole", &hole as &dyn Fn() -> Brush), ("a yard", &yard)] {
         studio.terrain(level(), GroundLook::default());
         studio.look(middle + Vec3::new(10.0, 34.0, 30.0), middle);
-        studio.apply([vein()]);
+        while_looking(studio, vein());
         let untouched = studio.picture();
-        studio.apply([dig()]);
+        while_looking(studio, dig());
         let dug = studio.picture();
         for round in 0..2 {
-            undo(studio);
+            while_looking(studio, Undo::default());
             let (apart, _) = flip(&untouched, &studio.picture());
             album.check(apart < 1e-4, || {
                 format!("{what} undone {round}: FLIP {apart:.5} from what was there")
             });
-            studio.apply([dig()]);
+            while_looking(studio, dig());
             let (apart, _) = flip(&dug, &studio.picture());
             album.check(apart < 1e-4, || format!("{what} dug again {round}: FLIP {apart:.5} from the first"));
         }
     }
 }
 
-fn undo(studio: &mut Studio) {
-    let commits = studio.app.world().resource::<BurrowFigures>().commits;
-    studio.app.world_mut().write_message(Undo::default());
-    studio.until("the step back", |app| app.world().resource::<BurrowFigures>().commits > commits);
+/// Sends a brush or a step, and waits for its commit. The camera runs all the while: what comes into view anew is drawn in
+/// any case.
+fn while_looking(studio: &mut Studio, message: impl Message) {
+    let commits = |studio: &Studio| studio.app.world().resource::<BurrowFigures>().commits;
+    let (before, start) = (commits(studio), Instant::now());
+    studio.app.world_mut().write_message(message);
+    while commits(studio) == before {
+        assert!(start.elapsed() < PATIENCE, "nothing is committed");
+        studio.app.update();
+    }
 }

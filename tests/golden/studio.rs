@@ -20,7 +20,7 @@ use crate::offscreen;
 pub const SIZE: (u32, u32) = (480, 270);
 
 /// Longest wait for anything.
-const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// One studio at a time: a software renderer takes all cores.
 static OPEN: Mutex<()> = Mutex::new(());

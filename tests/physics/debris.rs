@@ -56,16 +56,29 @@ fn a_slab_that_is_sawn_off_falls_and_lies_on_the_ground() {
         stage.frames_until("the slab takes shape", |stage| !pieces(stage).is_empty());
         let [(debris, at)] = &pieces(&mut stage)[..] else { panic!("one piece") };
         assert_eq!((debris.terrain, debris.tag, debris.material), (terrain, 9, MaterialId(3)));
-        let middle = debris.middle(at);
+        let middle = at.translation;
         let home = place + SLAB * voxel_size;
         // The upper end of the pillar falls with it.
         assert!(middle.distance(home) < 3.0 * voxel_size, "{middle} is not {home}");
         stage.frames((4.0 / STEP) as usize);
-        let [(debris, at)] = &pieces(&mut stage)[..] else { panic!("it stays") };
+        let [(_, at)] = &pieces(&mut stage)[..] else { panic!("it stays") };
         // It may lie on what is left of the pillar, but not in the ground, and not up where it was.
-        let height = (debris.middle(at).y - place.y) / voxel_size;
+        let height = (at.translation.y - place.y) / voxel_size;
         assert!((9.5..19.0).contains(&height), "{height}");
+        assert_eq!(stage.figures().lifted, 0);
     }
+}
+
+#[test]
+fn a_boulder_that_rolls_is_never_taken_for_one_in_the_ground() {
+    let (mut stage, _) = stage(1.0, Vec3::ZERO, 1e9);
+    // Rounder than the box around it, whose corners turn through the ground.
+    stage.dig([Brush::add(Shape::sphere(SLAB + Vec3::new(0.0, 6.0, 0.0), 7.0), MaterialId(2))]);
+    stage.dig([saw(1.0, Vec3::ZERO), Brush::dig(Shape::cuboid(SLAB, Vec3::new(9.0, 2.5, 9.0)))]);
+    stage.frames_until("pieces take shape", |stage| !pieces(stage).is_empty());
+    stage.frames((6.0 / STEP) as usize);
+    assert!(!pieces(&mut stage).is_empty());
+    assert_eq!(stage.figures().lifted, 0);
 }
 
 #[test]
