@@ -107,6 +107,7 @@ mod tests {
         let strike = |tool| Strike { tool, aim: None, eye: Vec3::ZERO, along: Vec3::X };
         for _ in 0..BALLS + 3 {
             app.world_mut().trigger(strike(Tool::Ball));
+            app.world_mut().flush();
         }
         app.world_mut().trigger(strike(Tool::Bomb));
         let mut balls = app.world_mut().query::<(&Ball, &LinearVelocity)>();
@@ -115,6 +116,7 @@ mod tests {
         assert_eq!(left, Vec::from_iter(3..BALLS + 3));
         assert!(balls.iter(app.world()).all(|(_, velocity)| velocity.x > 10.0));
         app.world_mut().trigger(NewGame);
+        app.world_mut().flush();
         assert_eq!(balls.iter(app.world()).count(), 0);
     }
 }
