@@ -46,7 +46,8 @@ impl Default for DebrisSettings {
     }
 }
 
-/// A piece of ground that fell, or falls: on the body, whose `Transform` is in the middle of the piece. Its mesh is a child, with the terrain's `MeshMaterial3d<StandardMaterial>` or a plain one.
+/// A piece of ground that fell, or falls: on the body, whose `Transform` is in the middle of the piece. Its mesh is a
+/// child, with the terrain's `MeshMaterial3d<StandardMaterial>` or a plain one.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
