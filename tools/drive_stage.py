@@ -130,16 +130,6 @@ class Stage:
         self.xdo("click", "--delay", 0, button)
         self.rest()
 
-    def settle(self, quiet=2.0):
-        """Waits until the program has had nothing to say for a while."""
-        deadline = time.monotonic() + self.patience
-        while time.monotonic() < deadline:
-            before = self.mark()
-            time.sleep(quiet)
-            if self.mark() == before:
-                return
-        raise Failed("the program does not come to rest")
-
     def drag(self, a, b, steps=6):
         self.move(*a)
         self.press()

@@ -1,8 +1,9 @@
 //! Says on standard output what goes on, a line each: for programs that play the game with a real mouse and keys.
 
+#[path = "../shared/tell.rs"]
+mod told;
+
 use bevy::prelude::*;
-use bevy::render::render_resource::PipelineCache;
-use bevy::render::{Render, RenderApp, RenderSystems};
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
@@ -21,27 +22,12 @@ impl Plugin for TellPlugin {
             Last,
             (
                 (tell_page, tell_ready, tell_look, tell_brush, tell_aim, tell_edits, tell_history, tell_eyes),
-                tell_frame,
+                told::tell_frame,
             )
                 .chain(),
         );
-        if let Some(renderer) = app.get_sub_app_mut(RenderApp) {
-            renderer.add_systems(Render, tell_pipelines.in_set(RenderSystems::Cleanup));
-        }
+        told::tell_pipelines(app);
     }
-}
-
-/// How many pipelines are still being compiled: until there are none, something is missing in the picture.
-fn tell_pipelines(pipelines: Res<PipelineCache>, mut last: Local<Option<usize>>) {
-    let now = pipelines.waiting_pipelines().count();
-    if last.replace(now) != Some(now) {
-        println!("pipelines {now}");
-    }
-}
-
-/// The last line of a frame.
-fn tell_frame() {
-    println!("frame");
 }
 
 fn tell_page(phase: Res<State<Phase>>, page: Res<State<Page>>) {

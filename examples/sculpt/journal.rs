@@ -1,8 +1,9 @@
 //! A line on standard output for whatever happened: what was done can be followed, and checked by a script.
 
+#[path = "../shared/tell.rs"]
+mod told;
+
 use bevy::prelude::*;
-use bevy::render::render_resource::PipelineCache;
-use bevy::render::{Render, RenderApp, RenderSystems};
 use bevy_burrow::panel::{BrushTool, PanelPlaces};
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
@@ -21,25 +22,11 @@ impl Plugin for JournalPlugin {
             Update,
             (tell_look, tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
         )
-        .add_systems(Last, tell_frame.run_if(tells_all));
-        let tells = app.world().get_resource::<TellAll>().is_some_and(|tells| tells.0);
-        if let (true, Some(renderer)) = (tells, app.get_sub_app_mut(RenderApp)) {
-            renderer.add_systems(Render, tell_pipelines.in_set(RenderSystems::Cleanup));
+        .add_systems(Last, told::tell_frame.run_if(tells_all));
+        if app.world().get_resource::<TellAll>().is_some_and(|tells| tells.0) {
+            told::tell_pipelines(app);
         }
     }
-}
-
-/// How many pipelines are still being compiled: until there are none, something is missing in the picture.
-fn tell_pipelines(pipelines: Res<PipelineCache>, mut last: Local<Option<usize>>) {
-    let now = pipelines.waiting_pipelines().count();
-    if last.replace(now) != Some(now) {
-        println!("pipelines {now}");
-    }
-}
-
-/// The last line of a frame.
-fn tell_frame() {
-    println!("frame");
 }
 
 fn tells_all(tells: Res<TellAll>) -> bool {

@@ -2,14 +2,15 @@
 
 #[path = "pixels.rs"]
 mod pixels;
+#[path = "shaders.rs"]
+mod shaders;
 
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy::render::RenderApp;
-use bevy::render::render_resource::{PipelineCache, PollType, TextureFormat};
+use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::RenderDevice;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
 
@@ -57,7 +58,7 @@ impl Photographer {
         (0..4).for_each(|_| draw(app));
         wait_until(app, |app| {
             draw(app);
-            draws_all(app)
+            !shaders::are_missing(app)
         })?;
         let before = app.world().resource::<Developed>().0;
         let mut save = save_to_disk(path.to_owned());
@@ -91,13 +92,6 @@ pub fn wait_until(app: &mut App, mut is_so: impl FnMut(&mut App) -> bool) -> Res
         }
     }
     Ok(())
-}
-
-/// Is everything drawn, and nothing left out that waits for its shader?
-fn draws_all(app: &App) -> bool {
-    let render = app.get_sub_app(RenderApp);
-    let pipelines = render.and_then(|render| render.world().get_resource::<PipelineCache>());
-    pipelines.is_none_or(|pipelines| pipelines.waiting_pipelines().next().is_none())
 }
 
 /// A frame, drawn to its end.

@@ -3,7 +3,6 @@
 
 use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
-use bevy::ecs::query::QueryData;
 use bevy::ecs::system::SystemParam;
 use bevy::math::Affine3A;
 use bevy::platform::collections::HashMap;
@@ -150,7 +149,15 @@ pub(super) fn wake(
 pub(super) fn patrol(
     mut watched: ResMut<Watched>,
     bodies: Query<
-        (Entity, &RigidBody, &RigidBodyColliders, Place, Option<&LockedAxes>),
+        (
+            Entity,
+            &RigidBody,
+            &RigidBodyColliders,
+            &Position,
+            &Rotation,
+            Option<&ComputedCenterOfMass>,
+            Option<&LockedAxes>,
+        ),
         (Without<GroundBody>, Without<Sleeping>, Without<RigidBodyDisabled>),
     >,
     solids: Solids,
@@ -166,16 +173,18 @@ pub(super) fn patrol(
         .filter(|(_, model, _, entities)| entities.show(model.world()))
         .map(|(entity, model, place, _)| (entity, model.world(), place.affine().inverse()))
         .collect();
-    for (entity, body, own, position, locked) in bodies.iter().skip(*turn).step_by(TURNS) {
-        let is_free = locked.is_none_or(|locked| !locked.is_translation_y_locked());
-        let middle = position.middle();
+    for (entity, body, own, position, rotation, center, locked) in bodies.iter().skip(*turn).step_by(TURNS) {
+        if locked.is_some_and(LockedAxes::is_translation_y_locked) {
+            continue;
+        }
+        let middle = middle(position, rotation, center);
         let local = |inverse: &Affine3A| inverse.transform_point3(middle).as_dvec3();
         // Terrains may be above each other: air of one is air.
         let is_in_air = |(_, world, inverse): &(Entity, &TerrainWorld, Affine3A)| {
             let place = local(inverse);
             world.height(place.x, place.z).is_some() && !world.is_solid(place)
         };
-        for (terrain, world, inverse) in ground.iter().filter(|_| is_free) {
+        for (terrain, world, inverse) in &ground {
             if world.is_buried(local(inverse))
                 && solids.bounds(entity, body, own).is_some()
                 && !ground.iter().any(is_in_air)
@@ -231,20 +240,6 @@ pub(super) fn rescue(
         *looks > 0
     });
     figures.main_thread += start.elapsed();
-}
-
-/// Where a body is.
-#[derive(QueryData)]
-pub(super) struct Place {
-    position: &'static Position,
-    rotation: &'static Rotation,
-    center: Option<&'static ComputedCenterOfMass>,
-}
-
-impl PlaceItem<'_, '_> {
-    fn middle(&self) -> Vec3 {
-        middle(self.position, self.rotation, self.center)
-    }
 }
 
 /// The middle of a body, which need not be where its shapes count from: it is in the ground if that is.

@@ -24,6 +24,8 @@ mod own_textures;
 mod panel;
 mod return_of_ground;
 mod sameness;
+#[path = "../../examples/shared/shaders.rs"]
+mod shaders;
 mod studio;
 mod tunnel;
 mod ways;

@@ -7,14 +7,13 @@ use bevy::camera::RenderTarget;
 use bevy::ecs::component::Mutable;
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
-use bevy::render::RenderApp;
-use bevy::render::render_resource::{PipelineCache, TextureFormat};
+use bevy::render::render_resource::TextureFormat;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::prelude::*;
 use image::RgbImage;
 
-use crate::offscreen;
+use crate::{offscreen, shaders};
 
 /// Width and height of pictures.
 pub const SIZE: (u32, u32) = (480, 270);
@@ -172,7 +171,7 @@ impl Studio {
         }
         // What waits for its shader is not drawn.
         let waiting = Instant::now();
-        while self.waits_for_shaders() {
+        while shaders::are_missing(&self.app) {
             assert!(waiting.elapsed() < PATIENCE, "a shader never came");
             self.app.update();
         }
@@ -192,11 +191,6 @@ impl Studio {
             }
             assert!(start.elapsed() < PATIENCE, "no picture was taken");
         }
-    }
-
-    fn waits_for_shaders(&self) -> bool {
-        let pipelines = self.app.sub_app(RenderApp).world().resource::<PipelineCache>();
-        pipelines.waiting_pipelines().next().is_some()
     }
 
     fn film_runs(&mut self, runs: bool) {

@@ -225,3 +225,17 @@ fn what_is_dug_while_time_stands_still_does_not_pile_up() {
     assert!(stage.figures().changes == 0 && stage.figures().woken == 1);
     assert!((2.0..4.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
 }
+
+#[test]
+fn who_is_put_into_the_ground_is_lifted_and_what_is_buried_on_purpose_stays() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    // In ground where nothing ever changed.
+    let deep = |x: f32| Vec3::new(x, -30.0, 20.0);
+    let [lost, kept, off] = [10.0, 20.0, 30.0].map(|x| stage.ball(deep(x), 0.5, Vec3::ZERO));
+    stage.app.world_mut().entity_mut(kept).insert(LockedAxes::ALL_LOCKED);
+    stage.app.world_mut().entity_mut(off).insert(RigidBodyDisabled);
+    stage.frames(seconds(3.0));
+    assert!((8.3..8.7).contains(&stage.place(lost).y), "{}", stage.place(lost));
+    assert_eq!((stage.place(kept), stage.place(off)), (deep(20.0), deep(30.0)));
+    assert_eq!(stage.figures().lifted, 1);
+}

@@ -115,6 +115,7 @@ fn what_is_solid_is_what_the_samples_say() {
 
 #[test]
 fn places_between_the_samples_are_solid_below_the_surface() {
+    let (mut solid, mut buried) = (0, 0);
     for (name, terrain) in dug_worlds() {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(80));
         let soup = Soup::of(world);
@@ -128,9 +129,16 @@ fn places_between_the_samples_are_solid_below_the_surface() {
                 continue;
             }
             let above = crossings.iter().filter(|crossing| crossing.0 > place.y).count();
-            assert_eq!(world.is_solid(place), above % 2 == 1, "{name}: {place:?} between {crossings:?}");
+            let is_solid = world.is_solid(place);
+            assert_eq!(is_solid, above % 2 == 1, "{name}: {place:?} between {crossings:?}");
+            // Where all corners around it are.
+            assert!(is_solid || !world.is_buried(place), "{name}: {place:?} is buried in air");
+            solid += usize::from(is_solid);
+            buried += usize::from(world.is_buried(place));
         }
     }
+    println!("{buried} of {solid} solid places are in cells of nothing but ground");
+    assert!(buried > solid / 4 && buried < solid);
 }
 
 #[test]

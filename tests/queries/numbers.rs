@@ -29,6 +29,7 @@ fn numbers_that_mean_nothing_have_no_answer() {
                 assert_eq!(world.is_solid(broken), bad == f64::NEG_INFINITY, "{broken}");
                 let _ = world.normal(broken);
             }
+            assert!(!world.is_buried(broken), "{broken}");
             let _ = world.material_under(broken);
         }
         for (x, z) in [(bad, 3.0), (3.0, bad), (bad, bad)] {
