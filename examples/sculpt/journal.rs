@@ -83,8 +83,12 @@ fn tell_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>)
 fn tell_tool(tool: Res<BrushTool>) {
     if tool.is_changed() {
         println!(
-            "tool operation={:?} shape={:?} radius={:.2} material={}",
-            tool.operation, tool.shape, tool.radius, tool.material
+            "tool operation={:?} shape={:?} radius={:.2} material={} stamp={:?}",
+            tool.operation,
+            tool.shape,
+            tool.radius,
+            tool.material,
+            tool.stamp.name.as_deref().unwrap_or_default()
         );
     }
 }

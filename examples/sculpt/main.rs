@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! cargo run --release --features examples --example sculpt
+//! cargo run --release --features examples --example sculpt -- --stamp assets/stamps/crater.png
 //! cargo run --release --features examples --example sculpt -- --headless --out out/sculpt
 //! ```
 //!
@@ -16,6 +17,7 @@
 //! | `H` | takes the height under the mouse for levelling |
 //! | `F1` | shows and hides the panel |
 //! | `F12` | saves a picture |
+//! | a PNG dropped on the window | is stamped from now on, as with `--stamp`: plain grey, white is high |
 //! | `Esc` | quits |
 //!
 //! With `--headless`, or without a display, a script sculpts instead and leaves pictures in `--out`, the panel in them.
@@ -25,6 +27,7 @@
 //! | --- | --- |
 //! | `scene.rs` | landscape, sun, camera |
 //! | `stroke.rs` | aim, preview, strokes, keys |
+//! | `stamps.rs` | stamps from files |
 //! | `journal.rs` | a line for each receipt |
 //! | `script.rs` | what it does without a window |
 
@@ -37,6 +40,7 @@ mod offscreen;
 mod photo;
 mod scene;
 mod script;
+mod stamps;
 mod stroke;
 
 use std::path::PathBuf;
@@ -44,7 +48,7 @@ use std::process::ExitCode;
 
 use bevy::prelude::*;
 use bevy_burrow::debug::BurrowDebugPlugin;
-use bevy_burrow::panel::BurrowPanelPlugin;
+use bevy_burrow::panel::{BrushTool, BurrowPanel, BurrowPanelPlugin};
 use bevy_burrow::prelude::*;
 use clap::Parser;
 
@@ -63,6 +67,9 @@ struct Options {
     /// Height of the window or the pictures, in pixels.
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
+    /// Image to stamp: a PNG of plain grey with 8 or 16 bits, 2 to 256 samples a side; white is high.
+    #[arg(long, value_name = "FILE")]
+    stamp: Option<PathBuf>,
     /// Write each frame, and where the panel's widgets are, to standard output: for scripts that click on them.
     #[arg(long)]
     tell: bool,
@@ -87,7 +94,10 @@ fn main() -> ExitCode {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     editor(&mut app, &options);
-    app.add_plugins(stroke::MousePlugin);
+    app.add_plugins((stroke::MousePlugin, stamps::DropPlugin));
+    if let Some(file) = &options.stamp {
+        stamps::take(file, &mut app.world_mut().resource_mut::<BrushTool>());
+    }
     match app.run() {
         AppExit::Success => ExitCode::SUCCESS,
         AppExit::Error(code) => ExitCode::from(code.get()),
@@ -104,5 +114,5 @@ fn editor(app: &mut App, options: &Options) {
         stroke::StrokePlugin,
         journal::JournalPlugin,
     ));
-    app.world_mut().resource_mut::<bevy_burrow::panel::BurrowPanel>().pictures = options.out.clone();
+    app.world_mut().resource_mut::<BurrowPanel>().pictures = options.out.clone();
 }

@@ -12,7 +12,7 @@ use bevy_burrow::prelude::*;
 use crate::photo::{Photographer, wait_until};
 use crate::scene::MIDDLE;
 use crate::stroke::Aim;
-use crate::{Options, offscreen};
+use crate::{Options, offscreen, stamps};
 
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
@@ -26,6 +26,7 @@ struct Stage {
 
 /// Plays the script.
 pub fn play(options: &Options) -> Result {
+    let stamp = stamps::read_or_crater(options.stamp.as_deref())?;
     std::fs::create_dir_all(&options.out)?;
     let mut stage = Stage::open(options)?;
     stage.wait_until(|world| {
@@ -56,7 +57,8 @@ pub fn play(options: &Options) -> Result {
     stage.frames(40);
     stage.shoot("1_dug_and_built")?;
 
-    // Sculpt: each operation at a place of its own.
+    // Sculpt: each operation at a place of its own, and last the image of a file.
+    let before = stage.strokes;
     let soft = |tool: &mut BrushTool| (tool.radius, tool.falloff, tool.strength) = (9.0, 6.0, 1.0);
     for (operation, place, strokes) in [
         (ToolOperation::Raise, Vec2::new(-34.0, -14.0), 4),
@@ -80,16 +82,22 @@ pub fn play(options: &Options) -> Result {
             stage.stroke(place)?;
         }
     }
+    stage.take(ToolOperation::Stamp, ToolShape::Sphere, |tool| {
+        (tool.radius, tool.amount, tool.falloff, tool.strength) = (8.0, 4.0, 1.0, 1.0);
+        (tool.align, tool.stamp) = (ToolAlign::Surface, stamp);
+    });
+    stage.stroke(Vec2::new(-2.0, 24.0))?;
+    let sculpted = stage.strokes - before;
     stage.frames(40);
     stage.shoot("2_sculpted")?;
 
     // Back to before the sculpting, and half of the way forth again.
-    for _ in 0..22 {
+    for _ in 0..sculpted {
         stage.step(PanelAction::Undo)?;
     }
     stage.frames(40);
     stage.shoot("3_undone")?;
-    for _ in 0..22 {
+    for _ in 0..sculpted {
         stage.step(PanelAction::Redo)?;
     }
 

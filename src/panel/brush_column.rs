@@ -4,8 +4,8 @@ use bevy_egui::egui::{self, Color32, CornerRadius, Pos2, Rect, Shape, Stroke, St
 
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, FAINT};
-use super::widgets::{choice, section, slider, swatches, switch, tiles};
-use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolShape};
+use super::widgets::{choice, figure, metres, section, slider, swatches, switch, tiles};
+use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolOperation, ToolShape};
 
 /// Draws the column.
 pub fn show(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) {
@@ -17,8 +17,9 @@ pub fn show(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) 
     section(ui, "Surface", true, |ui| surface(ui, tool));
     section(ui, "Stroke", true, |ui| {
         slider(ui, "Rate", &mut tool.rate, 1.0..=30.0, |slider| slider.max_decimals(0).suffix(" /s"));
-        slider(ui, "Power", &mut tool.power, 0..=u8::MAX, |slider| slider)
-            .on_hover_text("How hard the material may be that it takes away");
+        slider(ui, "Power", &mut tool.power, 0..=u8::MAX, |slider| slider).on_hover_text(
+            "How hard the material may be that it takes away, where the terrain has digging rules",
+        );
     });
 }
 
@@ -44,6 +45,9 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool) {
     }
     let row = tool.operation.row();
     ui.label(egui::RichText::new(row.help).color(FAINT).size(11.0));
+    if tool.operation == ToolOperation::Stamp {
+        figure(ui, "Image", tool.stamp.label());
+    }
     for need in row.needs {
         match need {
             Need::Material => continue,
@@ -54,10 +58,6 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool) {
             Need::Step => slider(ui, "Step", &mut tool.step, 1.0..=32.0, metres),
         };
     }
-}
-
-fn metres(slider: egui::Slider<'_>) -> egui::Slider<'_> {
-    slider.fixed_decimals(1).suffix(" m")
 }
 
 fn percent(slider: egui::Slider<'_>) -> egui::Slider<'_> {
@@ -107,7 +107,7 @@ fn length(slider: egui::Slider<'_>) -> egui::Slider<'_> {
 
 fn material(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) {
     let all: Vec<(Color32, &str)> = materials.iter().map(|(color, name)| (*color, name.as_str())).collect();
-    if let Some(at) = swatches(ui, &all, usize::from(tool.material)) {
+    if let Some(at) = swatches(ui, "", &all, usize::from(tool.material)) {
         tool.material = u8::try_from(at).unwrap_or(u8::MAX);
     }
     let name = materials.get(usize::from(tool.material)).map_or("?", |(_, name)| name);

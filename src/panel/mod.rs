@@ -25,6 +25,7 @@ mod brush_column;
 mod operations;
 mod picture;
 mod plot;
+mod rules_section;
 mod state;
 mod survey;
 mod theme;
@@ -41,8 +42,9 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Color32, Id, Order, RichText, ScrollArea, Ui, Vec2};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
-use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, MaterialColors, Redo, Undo};
+use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, LooseGround, MaterialColors, Redo, Undo};
 use crate::terrain::Terrain;
+use rules_section::Customs;
 use survey::Survey;
 use world_column::{Content, TerrainLine};
 
@@ -133,22 +135,27 @@ fn draw(
     figures: Res<BurrowFigures>,
     survey: Res<Survey>,
     terrains: Query<(Entity, &Terrain)>,
-    looks: Query<(Option<&Name>, &MaterialColors)>,
+    parts: Query<(Option<&Name>, &MaterialColors, Option<&LooseGround>)>,
     mut places: ResMut<PanelPlaces>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
+    mut commands: Commands,
 ) {
     let Ok(context) = contexts.ctx_mut() else { return };
     if !panel.is_open {
         return;
     }
     let chosen = survey::chosen(&panel, &terrains);
-    let colors = chosen.and_then(|entity| looks.get(entity).ok()).map(|(_, colors)| colors.clone());
-    let materials = materials(&panel, &colors.unwrap_or_default());
+    let part = chosen.and_then(|entity| parts.get(entity).ok());
+    let materials = materials(&panel, &part.map(|(_, colors, _)| colors.clone()).unwrap_or_default());
+    let customs =
+        chosen.and_then(|entity| terrains.get(entity).ok()).map_or_else(Customs::default, |(_, terrain)| {
+            Customs::of(terrain, part.and_then(|(.., loose)| loose))
+        });
     let mut lines: Vec<TerrainLine> = terrains
         .iter()
         .map(|(entity, terrain)| {
-            let name = looks.get(entity).ok().and_then(|(name, _)| name);
+            let name = parts.get(entity).ok().and_then(|(name, ..)| name);
             let name = name.map_or_else(|| format!("Terrain {entity}"), |name| name.to_string());
             TerrainLine { entity, name, terrain }
         })
@@ -156,6 +163,7 @@ fn draw(
     lines.sort_unstable_by_key(|line| line.entity);
 
     let (mut new_tool, mut new_panel, mut new_settings) = (tool.clone(), panel.clone(), settings.clone());
+    let mut new_customs = customs.clone();
     let mut pressed = Vec::new();
     if panel.shows_brush {
         column(context, "burrow brush", Align2::LEFT_TOP, "Brush", |ui| {
@@ -170,6 +178,8 @@ fn draw(
                 figures: &figures,
                 survey: &survey,
                 settings: &mut new_settings,
+                customs: &mut new_customs,
+                materials: &materials,
                 actions: &mut pressed,
             };
             world_column::show(ui, &mut new_panel, &mut content);
@@ -186,6 +196,9 @@ fn draw(
     panel.set_if_neq(new_panel);
     settings.set_if_neq(new_settings);
     places.set_if_neq(widgets::places(context));
+    if let Some(entity) = chosen {
+        new_customs.enact(&customs, entity, &mut commands);
+    }
     actions.write_batch(pressed);
 }
 
@@ -245,6 +258,7 @@ mod tests {
         tool: BrushTool,
         panel: BurrowPanel,
         settings: BurrowSettings,
+        customs: Customs,
         terrains: Vec<Terrain>,
         actions: Vec<PanelAction>,
         places: PanelPlaces,
@@ -263,6 +277,7 @@ mod tests {
                 tool: BrushTool::default(),
                 panel: BurrowPanel::default(),
                 settings: BurrowSettings::default(),
+                customs: Customs::default(),
                 terrains: (0..terrains).map(terrain).collect(),
                 actions: Vec::new(),
                 places: PanelPlaces::default(),
@@ -302,6 +317,8 @@ mod tests {
                         figures: &figures,
                         survey: &survey,
                         settings: &mut self.settings,
+                        customs: &mut self.customs,
+                        materials: &materials,
                         actions: &mut actions,
                     };
                     world_column::show(ui, &mut self.panel, &mut content);
@@ -376,6 +393,36 @@ mod tests {
         screen.frame(vec![Event::PointerMoved(to)]);
         screen.frame(vec![Screen::button(to, false)]);
         assert!(screen.tool.radius > 2.0 * small, "{} {small}", screen.tool.radius);
+    }
+
+    #[test]
+    fn rules_and_loose_pieces_are_set_where_they_are_shown() {
+        let mut screen = Screen::new(1280.0, 1600.0, 1);
+        let click = |screen: &mut Screen, name: &str| {
+            let at = screen.middle(name);
+            screen.click(at);
+            screen.frame(Vec::new());
+        };
+        for section in ["Digging rules", "Loose pieces"] {
+            click(&mut screen, section);
+        }
+        assert_eq!(screen.customs, Customs::default());
+        for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Found after digs", "are found"] {
+            click(&mut screen, name);
+        }
+        let Customs { rules, loose } = screen.customs.clone();
+        let clay = crate::ground::MaterialId(4);
+        assert_eq!((rules.bedrock, rules.unbreakable.first()), (Some(0), Some(&clay)));
+        assert!((100..160).contains(&rules.hardness[&clay]), "{rules:?}");
+        let default = LooseGround::default();
+        let largest = loose.expect("switched on").largest;
+        assert_eq!(loose, Some(LooseGround { largest, ..default }));
+        assert!((100..1000).contains(&largest), "the middle of a logarithmic slider: {largest}");
+        for name in ["Bedrock", "Unbreakable", "Found after digs"] {
+            click(&mut screen, name);
+        }
+        assert_eq!((screen.customs.rules.bedrock, screen.customs.loose), (None, None));
+        assert!(screen.customs.rules.unbreakable.is_empty());
     }
 
     #[test]

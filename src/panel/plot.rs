@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use bevy_egui::egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2};
 
 use super::theme::{BRIGHT, FAINT, SLATE};
+use super::widgets::note;
 
 /// Values that a line keeps.
 const KEPT: usize = 180;
@@ -37,6 +38,7 @@ pub fn line(
     now: &str,
 ) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 40.0), Sense::hover());
+    note(ui, label, rect);
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, CornerRadius::same(5), SLATE.gamma_multiply(0.7));
     let values: Vec<f32> = values.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 }).collect();

@@ -25,6 +25,8 @@ pub struct BurrowPanel {
     pub undo_mebibytes: usize,
     /// Where pictures are saved, as `burrow_0001.png` and so on.
     pub pictures: PathBuf,
+    /// The material whose hardness is shown.
+    pub(super) material: usize,
     /// What the panel has to say: the last seam check, the last picture.
     pub(super) note: Option<Note>,
 }
@@ -54,6 +56,7 @@ impl Default for BurrowPanel {
             materials: names.map(String::from).to_vec(),
             undo_mebibytes: 64,
             pictures: PathBuf::from("pictures"),
+            material: 0,
             note: None,
         }
     }
@@ -91,7 +94,7 @@ pub struct PanelInput {
 }
 
 /// Where the panel's widgets were drawn in the last frame, by name, in logical pixels from the window's upper left corner.
-/// Of a slider it is the rail.
+/// Of a slider it is the rail, of a section its heading, of a figure its line.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct PanelPlaces(pub HashMap<String, Rect>);

@@ -40,7 +40,6 @@ pub struct Survey {
     /// One value for each frame.
     pub frame_ms: Line,
     pub swaps: Line,
-    pub queue: Line,
     pub main_thread_us: Line,
     pub swaps_now: u64,
     pub queued: usize,
@@ -66,7 +65,6 @@ pub(super) fn follow_frames(
     survey.queued = terrains.iter().map(|(_, terrain)| terrain.queued()).sum();
     survey.frame_ms.push(time.delta_secs() * 1e3);
     survey.swaps.push(survey.swaps_now as f32);
-    survey.queue.push(survey.queued as f32);
     survey.main_thread_us.push(figures.main_thread.as_secs_f32() * 1e6);
 }
 

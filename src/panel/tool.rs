@@ -100,12 +100,31 @@ impl Default for BrushTool {
 
 /// What a [`BrushTool`] stamps: an image of heights, white is high. Without one, a ridge of the panel's own.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct StampImage(pub Option<Arc<GreyImage>>);
+pub struct StampImage {
+    /// The heights, 2 to 256 samples a side; other images make brushes that are rejected.
+    pub image: Option<Arc<GreyImage>>,
+    /// What the panel calls the image.
+    pub name: Option<Name>,
+}
 
 impl StampImage {
+    /// An image with a name.
+    pub fn new(name: impl Into<Name>, image: impl Into<Arc<GreyImage>>) -> Self {
+        Self { image: Some(image.into()), name: Some(name.into()) }
+    }
+
+    /// What the panel says: the image's name, or else its size.
+    pub(super) fn label(&self) -> String {
+        match (&self.image, &self.name) {
+            (None, _) => "Ridge".into(),
+            (Some(_), Some(name)) => name.to_string(),
+            (Some(image), None) => format!("{} x {} samples", image.width(), image.height()),
+        }
+    }
+
     /// The image; `None` only if there can be none at all.
     pub(super) fn image(&self) -> Option<Arc<GreyImage>> {
-        self.0.clone().or_else(|| RIDGE.clone())
+        self.image.clone().or_else(|| RIDGE.clone())
     }
 }
 
@@ -318,6 +337,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_stamped_has_a_name() {
+        let image = GreyImage::from_samples(3, 2, vec![0; 6]).expect("six samples");
+        let named = StampImage::new("Dunes", image);
+        let unnamed = StampImage { name: None, ..named.clone() };
+        let labels = [&StampImage::default(), &named, &unnamed].map(StampImage::label);
+        assert_eq!(labels, ["Ridge", "Dunes", "3 x 2 samples"]);
     }
 
     #[test]

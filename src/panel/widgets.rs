@@ -15,7 +15,7 @@ use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
 struct Drawn(PanelPlaces);
 
 /// Notes where a widget is, if it can be seen.
-fn note(ui: &Ui, name: &str, rect: Rect) {
+pub fn note(ui: &Ui, name: &str, rect: Rect) {
     if !ui.is_rect_visible(rect) {
         return;
     }
@@ -37,6 +37,7 @@ pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl Fn
     let mut is_open = ui.data(|data| data.get_temp(id)).unwrap_or(is_open_at_first);
     ui.add_space(4.0);
     let (rect, response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 20.0), Sense::click());
+    note(ui, name, rect);
     let response = response.on_hover_cursor(CursorIcon::PointingHand);
     if response.clicked() {
         is_open = !is_open;
@@ -124,8 +125,9 @@ pub fn choice(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
     clicked
 }
 
-/// Coloured squares, of which one is chosen; says which one was clicked. Names show when hovered.
-pub fn swatches(ui: &mut Ui, colors: &[(Color32, &str)], chosen: usize) -> Option<usize> {
+/// Coloured squares, of which one is chosen; says which one was clicked. Names show when hovered; `prefix` goes before
+/// them where places are noted.
+pub fn swatches(ui: &mut Ui, prefix: &str, colors: &[(Color32, &str)], chosen: usize) -> Option<usize> {
     const COLUMNS: usize = 8;
     let gap = 5.0;
     let side = (ui.available_width() - gap * (COLUMNS - 1) as f32) / COLUMNS as f32;
@@ -136,7 +138,7 @@ pub fn swatches(ui: &mut Ui, colors: &[(Color32, &str)], chosen: usize) -> Optio
             for (column, (color, name)) in line.iter().enumerate() {
                 let at = row * COLUMNS + column;
                 let (rect, response) = ui.allocate_exact_size(Vec2::splat(side), Sense::click());
-                note(ui, name, rect);
+                note(ui, &format!("{prefix}{name}"), rect);
                 let edge = match (at == chosen, response.hovered()) {
                     (true, _) => Stroke::new(2.0, BRIGHT),
                     (false, true) => Stroke::new(1.0, FAINT),
@@ -173,6 +175,11 @@ pub fn slider<N: Numeric>(
     .inner
 }
 
+/// The format of a slider in metres.
+pub fn metres(slider: Slider<'_>) -> Slider<'_> {
+    slider.fixed_decimals(1).suffix(" m")
+}
+
 /// A name at the left and a figure at the right.
 pub fn figure(ui: &mut Ui, name: &str, value: impl Into<String>) {
     figure_in(ui, name, value, BRIGHT);
@@ -180,12 +187,13 @@ pub fn figure(ui: &mut Ui, name: &str, value: impl Into<String>) {
 
 /// The same in a colour.
 pub fn figure_in(ui: &mut Ui, name: &str, value: impl Into<String>, color: Color32) {
-    ui.horizontal(|ui| {
+    let line = ui.horizontal(|ui| {
         ui.label(RichText::new(name).color(FAINT).size(12.0));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add(bevy_egui::egui::Label::new(RichText::new(value).color(color).size(12.0)).truncate());
         });
     });
+    note(ui, name, line.response.rect);
 }
 
 /// A switch with its name.

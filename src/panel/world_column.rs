@@ -4,6 +4,7 @@ use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
 
 use super::plot;
+use super::rules_section::{self, Customs};
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::survey::{Counts, Survey};
 use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
@@ -26,6 +27,8 @@ pub struct Content<'a> {
     pub figures: &'a BurrowFigures,
     pub survey: &'a Survey,
     pub settings: &'a mut BurrowSettings,
+    pub customs: &'a mut Customs,
+    pub materials: &'a [(Color32, String)],
     pub actions: &'a mut Vec<PanelAction>,
 }
 
@@ -40,6 +43,10 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     }
     if let Some((state, stages, last)) = &content.survey.engine {
         section(ui, "Engine", true, |ui| engine(ui, state, *stages, last.as_ref()));
+    }
+    if let Some(line) = chosen {
+        let voxel = line.terrain.voxel_size();
+        rules_section::show(ui, content.customs, &mut panel.material, content.materials, voxel);
     }
     section(ui, "Settings", false, |ui| settings(ui, panel, content.settings));
 }

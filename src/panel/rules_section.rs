@@ -1,0 +1,156 @@
+//! What brushes may do to the chosen terrain: digging rules, loose pieces.
+
+use bevy::ecs::system::Commands;
+use bevy::prelude::Entity;
+use bevy_egui::egui::{Color32, RichText, Ui};
+
+use super::theme::FAINT;
+use super::widgets::{count, figure, metres, section, slider, swatches, switch};
+use crate::ground::MaterialId;
+use crate::plugin::LooseGround;
+use crate::terrain::Terrain;
+use crate::volume::DiggingRules;
+
+/// A terrain's rules, to be changed where they are shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Customs {
+    pub rules: DiggingRules,
+    pub loose: Option<LooseGround>,
+}
+
+impl Customs {
+    pub fn of(terrain: &Terrain, loose: Option<&LooseGround>) -> Self {
+        Self { rules: terrain.world().rules().cloned().unwrap_or_default(), loose: loose.copied() }
+    }
+
+    /// Hands what differs on to the terrain.
+    pub fn enact(self, before: &Self, entity: Entity, commands: &mut Commands) {
+        let mut terrain = commands.entity(entity);
+        if self.loose != before.loose {
+            match self.loose {
+                Some(loose) => terrain.insert(loose),
+                None => terrain.remove::<LooseGround>(),
+            };
+        }
+        if self.rules != before.rules {
+            terrain.entry::<Terrain>().and_modify(|mut terrain| terrain.set_rules(self.rules));
+        }
+    }
+}
+
+/// Draws both sections; `material` is the one whose hardness is shown.
+pub fn show(
+    ui: &mut Ui,
+    customs: &mut Customs,
+    material: &mut usize,
+    materials: &[(Color32, String)],
+    voxel: f32,
+) {
+    section(ui, "Digging rules", false, |ui| rules(ui, &mut customs.rules, material, materials, voxel));
+    section(ui, "Loose pieces", false, |ui| loose(ui, &mut customs.loose));
+}
+
+fn rules(
+    ui: &mut Ui,
+    rules: &mut DiggingRules,
+    material: &mut usize,
+    materials: &[(Color32, String)],
+    voxel: f32,
+) {
+    let mut has_bedrock = rules.bedrock.is_some();
+    if switch(ui, "Bedrock", &mut has_bedrock).changed() {
+        rules.bedrock = has_bedrock.then_some(0);
+    }
+    if let Some(bedrock) = &mut rules.bedrock {
+        let mut height = *bedrock as f32 * voxel;
+        let below = slider(ui, "Below", &mut height, -128.0..=256.0, metres);
+        // Only then: not every height comes back from metres as it was.
+        if below.on_hover_text("Nothing solid below this height is taken away").changed() {
+            *bedrock = (height / voxel).round() as i32;
+        }
+    }
+    let colors: Vec<(Color32, &str)> =
+        materials.iter().map(|(color, name)| (*color, name.as_str())).collect();
+    if let Some(at) = swatches(ui, "Rule of ", &colors, *material) {
+        *material = at;
+    }
+    if let (Some((_, name)), Ok(id)) = (materials.get(*material), u8::try_from(*material)) {
+        ui.label(RichText::new(name).size(12.0));
+        let id = MaterialId(id);
+        let mut hardness = rules.hardness.get(&id).copied().unwrap_or_default();
+        if slider(ui, "Hardness", &mut hardness, 0..=u8::MAX, |slider| slider)
+            .on_hover_text("A brush of this power digs as ever, of half of it or less not at all")
+            .changed()
+        {
+            rules.hardness.insert(id, hardness);
+            rules.hardness.retain(|_, hardness| *hardness > 0);
+        }
+        let mut is_unbreakable = rules.unbreakable.contains(&id);
+        if switch(ui, "Unbreakable", &mut is_unbreakable).changed() {
+            match is_unbreakable {
+                true => rules.unbreakable.insert(id),
+                false => rules.unbreakable.remove(&id),
+            };
+        }
+    }
+    if !rules.protected.is_empty() {
+        figure(ui, "Protected boxes", count(rules.protected.len()));
+    }
+}
+
+fn loose(ui: &mut Ui, loose: &mut Option<LooseGround>) {
+    let mut is_on = loose.is_some();
+    if switch(ui, "Found after digs", &mut is_on).changed() {
+        *loose = is_on.then(LooseGround::default);
+    }
+    let Some(loose) = loose else { return };
+    ui.label(RichText::new("In voxels, the largest that ...").color(FAINT).size(11.0));
+    let sizes = [
+        ("vanish", &mut loose.crumbs, "Pieces up to this size vanish"),
+        ("break off", &mut loose.debris, "Larger ones, up to this size, come out of the ground"),
+        ("are found", &mut loose.largest, "What is larger than this counts as tied to the world"),
+    ];
+    for (name, size, help) in sizes {
+        slider(ui, name, size, 0..=1 << 16, |slider| slider.logarithmic(true)).on_hover_text(help);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::{DetectChanges, World};
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::terrain::TerrainSettings;
+
+    #[test]
+    fn what_differs_and_nothing_else_is_handed_on() {
+        let mut world = World::new();
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        let terrain = world.spawn(Terrain::new(ground, &TerrainSettings::default()).expect("valid")).id();
+        let read = |world: &World| {
+            let entity = world.entity(terrain);
+            Customs::of(entity.get().expect("it is there"), entity.get())
+        };
+        let rules = DiggingRules::default().with_bedrock(i32::MIN).with_hardness(MaterialId(3), 9);
+        let loose = Some(LooseGround { crumbs: 5, ..LooseGround::default() });
+        let steps = [
+            Customs { rules: rules.clone(), loose: None },
+            Customs { rules: rules.clone(), loose },
+            Customs { rules: DiggingRules::default(), loose },
+            Customs::default(),
+        ];
+        for step in steps {
+            let before = read(&world);
+            assert_ne!(before, step);
+            step.clone().enact(&before, terrain, &mut world.commands());
+            world.flush();
+            assert_eq!(read(&world), step);
+            world.clear_trackers();
+            step.clone().enact(&step, terrain, &mut world.commands());
+            world.flush();
+            let terrain = world.entity(terrain).get_ref::<Terrain>().expect("it is there");
+            assert!(!terrain.is_changed() && !terrain.is_added());
+        }
+    }
+}
