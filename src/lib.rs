@@ -26,13 +26,23 @@
 //! fn landscape(mut commands: Commands) -> Result {
 //!     let ground = Ground::from_noise(512, 512, &NoiseHeights::default())?;
 //!     let terrain = Terrain::new(ground, &TerrainSettings::default())?;
-//!     commands.spawn((terrain, GroundLook::default()));
+//!     commands.spawn((terrain, GroundLook::default())); // or a MeshMaterial3d of your own
+//!     let (eye, middle) = (Vec3::new(256.0, 60.0, 330.0), Vec3::new(256.0, 0.0, 256.0));
+//!     commands.spawn((Camera3d::default(), Transform::from_translation(eye).looking_at(middle, Vec3::Y)));
+//!     commands.spawn((DirectionalLight::default(), Transform::from_xyz(1.0, 1.0, 0.5).looking_at(Vec3::ZERO, Vec3::Y)));
 //!     Ok(())
 //! }
 //!
-//! fn dig(mut brushes: MessageWriter<Brush>, mouse: Res<ButtonInput<MouseButton>>) {
-//!     if mouse.just_pressed(MouseButton::Left) {
-//!         brushes.write(Brush::dig(Shape::sphere(Vec3::new(256.0, 0.0, 256.0), 6.0)));
+//! fn dig(
+//!     mouse: Res<ButtonInput<MouseButton>>,
+//!     eye: Single<&Transform, With<Camera>>,
+//!     terrains: Terrains,
+//!     mut brushes: MessageWriter<Brush>,
+//! ) {
+//!     if mouse.just_pressed(MouseButton::Left)
+//!         && let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 500.0)
+//!     {
+//!         brushes.write(Brush::dig(Shape::sphere(hit.position, 6.0)));
 //!     }
 //! }
 //! # }
@@ -162,7 +172,7 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, HeightmapImage, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Redo,
+        Field, GroundPiece, HeightmapImage, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Redo,
         TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile, Undo,
     };
     pub use crate::terrain::{
@@ -171,8 +181,8 @@ pub mod prelude {
     };
     #[cfg(feature = "render")]
     pub use crate::view::{
-        GroundLayer, GroundLayerKind, GroundLoading, GroundLook, GroundMaterial, GroundQuality, GroundStrata,
-        GroundTextures, TerrainMaterialPlugin,
+        GroundArrays, GroundLayer, GroundLayerImages, GroundLayerKind, GroundLoading, GroundLook,
+        GroundMaterial, GroundQuality, GroundStrata, GroundTextures, TerrainMaterialPlugin,
     };
     pub use crate::volume::{DiggingRules, Refused, Scenario};
 }

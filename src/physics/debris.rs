@@ -7,7 +7,9 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, SNAP};
-use crate::plugin::{BurrowSystems, HistoryMoved, LoosePieceFound, MaterialColors, Wardrobe, tell};
+use crate::plugin::{
+    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, Wardrobe, tell,
+};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, Restored, Terrain};
 
@@ -47,7 +49,7 @@ impl Default for DebrisSettings {
 }
 
 /// A piece of ground that fell, or falls: on the body, whose `Transform` is in the middle of the piece. Its mesh is a
-/// child, with the terrain's `MeshMaterial3d<StandardMaterial>` or a plain one.
+/// child, a [`GroundPiece`], and looks as it did in the ground.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
@@ -77,6 +79,8 @@ pub struct DebrisCrumbled {
 struct Shaping {
     debris: Debris,
     place: Transform,
+    /// Where its mesh counts from, in voxels, and metres of a voxel.
+    origin: IVec3,
     scale: f32,
     task: Task<(Option<Collider>, Option<Mesh>)>,
 }
@@ -85,7 +89,10 @@ impl Plugin for DebrisPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<DebrisSettings>().add_observer(clear).add_systems(
             Update,
-            (break_off, make_room, take_shape, crumble).chain().after(BurrowSystems::Commit),
+            (break_off, make_room, take_shape, crumble)
+                .chain()
+                .after(BurrowSystems::Commit)
+                .before(BurrowSystems::Dress),
         );
     }
 }
@@ -126,7 +133,7 @@ fn break_off(
             surface.vertices.iter_mut().for_each(|vertex| vertex.position -= size * (SNAP / 2));
             (debris_collider(&surface, scale), mesh.map(|(mesh, _)| mesh))
         });
-        commands.spawn(Shaping { debris, place, scale, task });
+        commands.spawn(Shaping { debris, place, origin: bounds.min, scale, task });
     }
 }
 
@@ -168,7 +175,6 @@ fn take_shape(
     settings: Res<DebrisSettings>,
     mut shaping: Query<(Entity, &mut Shaping)>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
-    mut dress: Dress,
 ) {
     for (entity, mut piece) in &mut shaping {
         let Some((collider, mesh)) = check_ready(&mut piece.task) else { continue };
@@ -188,7 +194,8 @@ fn take_shape(
         ));
         if let (Some(mesh), Some(meshes)) = (mesh, &mut meshes) {
             let place = Transform::from_translation(-piece.debris.half).with_scale(Vec3::splat(piece.scale));
-            let shown = (Mesh3d(meshes.add(mesh)), place, dress.look(piece.debris.terrain));
+            let part = GroundPiece { terrain: piece.debris.terrain, origin: piece.origin };
+            let shown = (part, Mesh3d(meshes.add(mesh)), place);
             entity.queue_silenced(move |mut body: EntityWorldMut| {
                 body.with_child(shown);
             });
@@ -217,38 +224,4 @@ fn clear(
     for (entity, _) in all.filter(|(_, debris)| debris.terrain == gone.entity) {
         commands.entity(entity).try_despawn();
     }
-}
-
-/// What meshes of pieces are drawn with.
-#[cfg(feature = "render")]
-#[derive(bevy::ecs::system::SystemParam)]
-struct Dress<'w, 's> {
-    terrains: Query<'w, 's, &'static MeshMaterial3d<StandardMaterial>>,
-    materials: Option<ResMut<'w, Assets<StandardMaterial>>>,
-    rubble: Local<'s, Option<Handle<StandardMaterial>>>,
-}
-
-#[cfg(feature = "render")]
-impl Dress<'_, '_> {
-    /// The terrain's own material, or one that shows the colours of vertices.
-    fn look(&mut self, terrain: Entity) -> MeshMaterial3d<StandardMaterial> {
-        if let Ok(own) = self.terrains.get(terrain) {
-            return own.clone();
-        }
-        if let (None, Some(materials)) = (&*self.rubble, &mut self.materials) {
-            let plain = StandardMaterial { perceptual_roughness: 0.95, reflectance: 0.15, ..default() };
-            *self.rubble = Some(materials.add(plain));
-        }
-        MeshMaterial3d(self.rubble.clone().unwrap_or_default())
-    }
-}
-
-/// Without a renderer meshes have no look.
-#[cfg(not(feature = "render"))]
-#[derive(bevy::ecs::system::SystemParam)]
-struct Dress;
-
-#[cfg(not(feature = "render"))]
-impl Dress {
-    fn look(&mut self, _: Entity) {}
 }

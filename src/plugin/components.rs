@@ -62,6 +62,37 @@ pub struct Field {
     pub revision: u64,
 }
 
+/// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
+/// gets the terrain's material, and what is drawn on it stays where it was in the ground, wherever it goes.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// # fn system(
+/// #     mut commands: Commands,
+/// #     mut found: MessageReader<LoosePieceFound>,
+/// #     terrains: Query<(&Terrain, &MaterialColors)>,
+/// #     mut meshes: ResMut<Assets<Mesh>>,
+/// # ) {
+/// for found in found.read() {
+///     let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
+///     let Some(mesh) = found.mesh(terrain, colors) else { continue };
+///     let piece = GroundPiece { terrain: found.terrain, origin: found.piece.bounds.min };
+///     let place = Transform::from_translation(found.origin()); // below the terrain, which may be scaled
+///     commands.entity(found.terrain).with_child((piece, Mesh3d(meshes.add(mesh)), place));
+/// }
+/// # }
+/// ```
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+#[require(Transform, Visibility)]
+pub struct GroundPiece {
+    /// The terrain that it was part of.
+    pub terrain: Entity,
+    /// Where its mesh counts from, in voxels of the terrain.
+    pub origin: IVec3,
+}
+
 impl From<TilePos> for Tile {
     fn from(tile: TilePos) -> Self {
         Self { x: tile.x, z: tile.z }

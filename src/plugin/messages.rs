@@ -33,6 +33,19 @@ pub struct BrushApplied {
 /// Steps are queued with brushes, in one order. Bevy keeps messages of one type in theirs, and none between types: those
 /// of one frame are taken as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. A transaction takes
 /// the brushes of one frame together, and those of several frames where another one was under way; it is undone whole.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// fn keys(keys: Res<ButtonInput<KeyCode>>, mut undo: MessageWriter<Undo>, mut redo: MessageWriter<Redo>) {
+///     if keys.just_pressed(KeyCode::KeyZ) {
+///         undo.write(Undo::default());
+///     }
+///     if keys.just_pressed(KeyCode::KeyY) {
+///         redo.write(Redo::default());
+///     }
+/// }
+/// ```
 #[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Undo {
     /// The terrain's entity; `None` for every terrain there is.
@@ -75,7 +88,8 @@ impl LoosePieceFound {
     }
 
     /// The piece as a mesh like those of chunks, for any material that they can have; `None` unless it broke off. It wants
-    /// the terrain, which knows how deep in the ground the piece was.
+    /// the terrain, which knows how deep in the ground the piece was. With a [`GroundPiece`](super::GroundPiece) it is drawn
+    /// as the terrain is.
     pub fn mesh(&self, terrain: &Terrain, colors: &MaterialColors) -> Option<Mesh> {
         let surface = self.piece.mesh.as_ref()?;
         let ready = Wardrobe::new(terrain.world(), colors).build_at(self.piece.bounds.min, surface);

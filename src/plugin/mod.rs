@@ -28,7 +28,7 @@ mod settings;
 mod times;
 
 pub use companion::{Attachment, Companion, Companions, Part};
-pub use components::{Chunk, Field, MaterialColors, ShownSurface, Tile};
+pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, tell};
 pub use heightmap::{
@@ -60,7 +60,7 @@ use crate::terrain::Terrain;
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
 /// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
-/// | `TerrainMaterialPlugin<StandardMaterial>` | dresses tiles and chunks (feature `render`) |
+/// | `TerrainMaterialPlugin<StandardMaterial>` | dresses tiles, chunks and pieces (feature `render`) |
 /// | `GroundPlugin` | layers of texture for terrains with a `GroundLook` (feature `render`) |
 #[derive(Default)]
 pub struct BurrowPlugins;
@@ -87,7 +87,7 @@ pub enum BurrowSystems {
     Commit,
     /// Queued brushes start as transactions.
     Begin,
-    /// New tiles and chunks get their terrain's material.
+    /// New tiles, chunks and pieces get their terrain's material.
     Dress,
 }
 

@@ -4,10 +4,11 @@ use std::marker::PhantomData;
 
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, Chunk, Tile};
+use crate::plugin::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
-/// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles and chunks, and again whenever it changes.
+/// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles and chunks, and again whenever it changes; and to
+/// each [`GroundPiece`] once.
 ///
 /// `BurrowPlugins` has it for `StandardMaterial`; add it for each material type of your own. Vertex colours carry the
 /// terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
@@ -25,7 +26,9 @@ impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
         app.add_systems(
             Update,
-            (undress::<M>, dress_new::<M>, dress_all::<M>).chain().in_set(BurrowSystems::Dress),
+            (undress::<M>, dress_new::<M>, dress_all::<M>, dress_pieces::<M>)
+                .chain()
+                .in_set(BurrowSystems::Dress),
         );
     }
 }
@@ -66,6 +69,18 @@ fn dress_all<M: Material>(
     for (material, children) in &terrains {
         for child in children.iter().filter(|&child| drawn.contains(child)) {
             commands.entity(child).try_insert(material.clone());
+        }
+    }
+}
+
+fn dress_pieces<M: Material>(
+    mut commands: Commands,
+    bare: Query<(Entity, &GroundPiece), Without<MeshMaterial3d<M>>>,
+    terrains: Query<&MeshMaterial3d<M>, With<Terrain>>,
+) {
+    for (entity, piece) in &bare {
+        if let Ok(material) = terrains.get(piece.terrain) {
+            commands.entity(entity).try_insert(material.clone());
         }
     }
 }

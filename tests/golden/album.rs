@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bevy::math::UVec2;
 use image::RgbImage;
 
 /// Mean FLIP above which a picture counts as another one.
@@ -66,13 +67,25 @@ pub fn flip(a: &RgbImage, b: &RgbImage) -> (f32, RgbImage) {
     if a.dimensions() != b.dimensions() {
         return (1.0, b.clone());
     }
-    let of =
-        |picture: &RgbImage| nv_flip::FlipImageRgb8::with_data(picture.width(), picture.height(), picture);
-    let map = nv_flip::flip(of(a), of(b), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
+    let map = flip_map(a, b);
     let seen = map.apply_color_lut(&nv_flip::magma_lut());
     let mean = nv_flip::FlipPool::from_image(&map).mean();
     let seen = RgbImage::from_raw(seen.width(), seen.height(), seen.to_vec()).unwrap_or_else(|| b.clone());
     (mean, seen)
+}
+
+/// The FLIP of each pixel of two pictures of one size.
+fn flip_map(a: &RgbImage, b: &RgbImage) -> nv_flip::FlipImageFloat {
+    let of =
+        |picture: &RgbImage| nv_flip::FlipImageRgb8::with_data(picture.width(), picture.height(), picture);
+    nv_flip::flip(of(a), of(b), nv_flip::DEFAULT_PIXELS_PER_DEGREE)
+}
+
+/// The mean FLIP of some pixels of two pictures of one size.
+pub fn flip_at(a: &RgbImage, b: &RgbImage, pixels: &[UVec2]) -> f32 {
+    let map = flip_map(a, b).to_vec();
+    let sum: f32 = pixels.iter().map(|pixel| map[(pixel.y * a.width() + pixel.x) as usize]).sum();
+    sum / pixels.len().max(1) as f32
 }
 
 /// Leaves a picture where one can look at it.

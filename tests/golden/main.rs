@@ -22,6 +22,7 @@ mod landscape;
 mod offscreen;
 mod own_textures;
 mod panel;
+mod pieces;
 mod return_of_ground;
 mod sameness;
 #[path = "../../examples/shared/shaders.rs"]
@@ -33,6 +34,8 @@ mod ways;
 use album::Album;
 use bevy::app::App;
 use bevy::pbr::DefaultOpaqueRendererMethod;
+use bevy_burrow::backend::{Backend, Engine};
+use bevy_burrow::prelude::BurrowEngine;
 use studio::Studio;
 
 #[test]
@@ -45,6 +48,7 @@ fn ground_looks_as_approved() {
     ways::shoot(&mut studio, &mut album);
     own_textures::shoot(&mut studio, &mut album);
     return_of_ground::shoot(&mut studio, &mut album);
+    pieces::shoot(&mut studio, &mut album);
     album.close();
 }
 
@@ -62,7 +66,8 @@ fn debug_views_look_as_approved() {
 #[test]
 fn the_panel_looks_as_approved() {
     let add = |app: &mut App| {
-        app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin);
+        app.add_plugins(bevy_burrow::panel::BurrowPanelPlugin)
+            .insert_resource(BurrowEngine(Engine::new(Backend::Cpu)));
     };
     let Some(mut studio) = Studio::open(add) else { return };
     let mut album = Album::default();

@@ -1,34 +1,25 @@
 //! A game's own textures are what the ground is drawn with, and the project's own come back.
 
 use bevy::asset::RenderAssetUsages;
-use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::prelude::*;
-use bevy::render::render_resource::{
-    Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
-};
+use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
 use bevy_burrow::prelude::*;
 
 use crate::album::{Album, flip};
 use crate::landscape::hills;
 use crate::studio::Studio;
 
-/// Layers: as many as the project's own textures have.
-const LAYERS: u32 = 12;
+/// Layers: as many as the default look names.
+const LAYERS: usize = 14;
 
-/// Textures of one texel in each layer.
-fn plain(studio: &mut Studio, texel: [u8; 4], format: TextureFormat) -> Handle<Image> {
-    let size = Extent3d { width: 1, height: 1, depth_or_array_layers: LAYERS };
-    let mut image =
-        Image::new_fill(size, TextureDimension::D2, &texel, format, RenderAssetUsages::RENDER_WORLD);
-    let repeat = ImageAddressMode::Repeat;
-    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
-        address_mode_u: repeat,
-        address_mode_v: repeat,
-        ..ImageSamplerDescriptor::linear()
-    });
-    image.texture_view_descriptor =
-        Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() });
-    studio.app.world_mut().resource_mut::<Assets<Image>>().add(image)
+/// Textures of one colour, with all mip levels.
+fn plain(studio: &mut Studio, texel: [u8; 4]) -> GroundTextures {
+    let size = Extent3d { width: 16, height: 16, ..default() };
+    let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
+    let albedo = Image::new_fill(size, TextureDimension::D2, &texel, format, usage);
+    let layers = vec![GroundLayerImages { albedo, ..default() }; LAYERS];
+    let arrays = GroundArrays::pack(layers).expect("plain pictures fit");
+    arrays.add_to(&mut studio.app.world_mut().resource_mut::<Assets<Image>>())
 }
 
 /// From now on the ground is drawn with these.
@@ -45,9 +36,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.look(middle + Vec3::new(4.0, 12.0, 6.0), middle);
     let own = studio.app.world().resource::<GroundTextures>().clone();
     let before = studio.picture();
-    let albedo = plain(studio, [200, 20, 200, 128], TextureFormat::Rgba8UnormSrgb);
-    let relief = plain(studio, [128, 128, 255, 230], TextureFormat::Rgba8Unorm);
-    dress(studio, GroundTextures::Images { albedo, relief });
+    let textures = plain(studio, [200, 20, 200, 128]);
+    dress(studio, textures);
     let mauve = studio.picture();
     let is_mauve = |texel: &&image::Rgb<u8>| {
         let [red, green, blue] = texel.0.map(u32::from);

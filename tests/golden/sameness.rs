@@ -1,14 +1,19 @@
 //! The seam from close by: ground that was handed to marching cubes looks as it did before, wherever the sun stands.
 
-use bevy::prelude::*;
-use bevy_burrow::prelude::*;
+use std::collections::BTreeSet;
 
-use crate::album::{Album, flip, keep};
+use bevy::prelude::*;
+use bevy_burrow::lattice::Column;
+use bevy_burrow::prelude::*;
+use image::RgbImage;
+
+use crate::album::{Album, flip, flip_at, keep};
 use crate::landscape::hills;
 use crate::studio::Studio;
 
-/// Mean FLIP that counts as noise: a third of what it is when the camera moves by a quarter of a pixel (0.022), and less
-/// than half of what a spot of another material gives (0.018). The test prints and checks both.
+/// Mean FLIP that counts as noise, in the whole picture and along the seam: a third of what it is when the camera moves by
+/// a quarter of a pixel (0.022), less than half of what a spot of another material gives (0.018), and a sixteenth of what a
+/// line along the seam gives there (0.12). The test prints and checks them all.
 const NOISE: f32 = 0.007;
 
 /// Sun directions all around, low, middle and high.
@@ -48,16 +53,31 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let cells = studio.one::<Terrain>().world().mask().len();
     album.check(cells > 80, || format!("only {cells} cells were handed over"));
     let after = photograph(studio);
+    album.compare("seam_field", &after[1]);
+    let seam = seam(studio);
+    let band = grown(&seam, 2);
+    album.check(seam.len() > 300, || format!("only {} pixels of the seam are seen", seam.len()));
+    // The measure along the seam sees a line that is a little darker, and lighter, than the ground.
+    for shade in [0.85, 1.15] {
+        let drawn = flip_at(&after[1], &with_line(&after[1], &seam, shade), &band);
+        println!("a line along the seam, {shade} as light: FLIP {drawn:.5} there");
+        album.check(drawn > 10.0 * NOISE, || format!("a line went unnoticed: FLIP {drawn:.5}"));
+    }
     for (hour, (before, after)) in before.iter().zip(&after).enumerate() {
         let (mean, map) = flip(before, after);
         let apart = before.iter().zip(after.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
-        println!("sun {hour}: FLIP {mean:.5} with and without the field, largest difference {apart} of 255");
-        if mean > NOISE {
+        let along = flip_at(before, after, &band);
+        println!(
+            "sun {hour}: FLIP {mean:.5} with and without the field, {along:.5} along the seam, largest difference \
+             {apart} of 255"
+        );
+        if mean.max(along) > NOISE {
             keep(&format!("seam_{hour}"), "without", before);
             keep(&format!("seam_{hour}"), "with", after);
             keep(&format!("seam_{hour}"), "difference", &map);
         }
         album.check(mean <= NOISE, || format!("sun {hour}: FLIP {mean:.5} with and without the field"));
+        album.check(along <= NOISE, || format!("sun {hour}: FLIP {along:.5} along the seam"));
     }
     // The same measure sees faults.
     studio.sun(suns().nth(1).unwrap_or(Vec3::Y));
@@ -68,4 +88,58 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     println!("a spot of another material: FLIP {painted:.5}; a small hole in it: {dug:.5}");
     album.check(painted > 2.0 * NOISE, || format!("a painted spot went unnoticed: FLIP {painted:.5}"));
     studio.sun(Vec3::new(1.0, 0.9, 0.4));
+}
+
+/// The pixels that the seam crosses: where a cell that marching cubes draws borders on one of the heightmap's.
+fn seam(studio: &mut Studio) -> BTreeSet<(u32, u32)> {
+    let world = studio.one::<Terrain>().snapshot();
+    let eye = studio.app.world().entity(studio.camera);
+    let (camera, place) = (eye.get::<Camera>(), eye.get::<GlobalTransform>());
+    let (camera, place) = (camera.expect("a camera"), place.expect("a place"));
+    let mut pixels = BTreeSet::new();
+    for cell in world.mask().iter() {
+        let sides = [
+            ((0, 0), (1, 0), (0, -1)),
+            ((0, 1), (1, 1), (0, 1)),
+            ((0, 0), (0, 1), (-1, 0)),
+            ((1, 0), (1, 1), (1, 0)),
+        ];
+        let is_seam = |side: &(_, _, (i32, i32))| !world.mask().contains(cell.offset(side.2.0, side.2.1));
+        for (from, to, _) in sides.into_iter().filter(is_seam) {
+            let corner = |at: (i32, i32)| {
+                let Column { x, z } = cell.offset(at.0, at.1);
+                let height = world.height(x.into(), z.into()).expect("within the world");
+                Vec3::new(x as f32, height as f32, z as f32)
+            };
+            let (from, to) = (corner(from), corner(to));
+            let points = (0..=64).map(|step| from.lerp(to, step as f32 / 64.0));
+            pixels.extend(points.filter_map(|point| {
+                let pixel = camera.world_to_viewport(place, point).ok()?;
+                let is_seen =
+                    pixel.cmpge(Vec2::ZERO).all() && pixel.cmplt(camera.logical_viewport_size()?).all();
+                is_seen.then_some((pixel.x as u32, pixel.y as u32))
+            }));
+        }
+    }
+    pixels
+}
+
+/// These pixels, and those so near.
+fn grown(pixels: &BTreeSet<(u32, u32)>, by: u32) -> Vec<UVec2> {
+    let (width, height) = crate::studio::SIZE;
+    let near = |at: u32, end: u32| at.saturating_sub(by)..=(at + by).min(end - 1);
+    let all: BTreeSet<(u32, u32)> = pixels
+        .iter()
+        .flat_map(|&(x, y)| near(x, width).flat_map(move |x| near(y, height).map(move |y| (x, y))))
+        .collect();
+    all.into_iter().map(UVec2::from).collect()
+}
+
+/// A picture whose pixels along the seam are darker or lighter.
+fn with_line(picture: &RgbImage, seam: &BTreeSet<(u32, u32)>, shade: f32) -> RgbImage {
+    let mut drawn = picture.clone();
+    for &(x, y) in seam {
+        drawn.get_pixel_mut(x, y).0.iter_mut().for_each(|value| *value = (f32::from(*value) * shade) as u8);
+    }
+    drawn
 }

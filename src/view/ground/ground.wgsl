@@ -34,6 +34,7 @@ struct Ground {
     vein: vec4<f32>,
     far: vec4<f32>,
     detail: vec4<f32>,
+    is_piece: u32,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(100) var<uniform> ground: Ground;
@@ -109,6 +110,19 @@ fn kinds_from(first: u32) -> vec4<f32> {
         ground.layers[first + 2u].w,
         ground.layers[first + 3u].w,
     );
+}
+
+// From world space to metres of the terrain, as it was when the mesh was part of it.
+fn place_from_world(instance_index: u32) -> mat4x4<f32> {
+    if ground.is_piece == 0u {
+        return ground.place;
+    }
+    // Of a mesh that is turned, moved and scaled the same along all axes.
+    let mesh = mesh_functions::get_world_from_local(instance_index);
+    let turn = transpose(mat3x3<f32>(mesh[0].xyz, mesh[1].xyz, mesh[2].xyz)) * (1.0 / dot(mesh[0].xyz, mesh[0].xyz));
+    let local_from_world =
+        mat4x4<f32>(vec4(turn[0], 0.0), vec4(turn[1], 0.0), vec4(turn[2], 0.0), vec4(-(turn * mesh[3].xyz), 1.0));
+    return ground.place * local_from_world;
 }
 
 @vertex
@@ -476,8 +490,9 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     var pbr_input = pbr_input_from_standard_material(plain, is_front);
 
     var site: Site;
-    let turn = mat3x3<f32>(ground.place[0].xyz, ground.place[1].xyz, ground.place[2].xyz);
-    site.place = (ground.place * in.world_position).xyz;
+    let place = place_from_world(in.instance_index);
+    let turn = mat3x3<f32>(place[0].xyz, place[1].xyz, place[2].xyz);
+    site.place = (place * in.world_position).xyz;
     site.dx = dpdx(site.place);
     site.dy = dpdy(site.place);
     site.normal = normalize(turn * in.world_normal);

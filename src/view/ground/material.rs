@@ -20,7 +20,7 @@ use crate::plugin::{
 /// What terrains with a [`GroundLook`] are drawn with: Bevy's own material, whose colour, roughness and relief come from
 /// layers of texture. Shadows, fog, prepasses and deferred rendering work as ever.
 ///
-/// Meshes without the attributes of a terrain show layer 0, so debris can share it.
+/// Meshes without the attributes of a terrain show layer 0.
 pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
 
 /// The part of a [`GroundMaterial`] that is not Bevy's.
@@ -45,7 +45,7 @@ pub struct GroundExtension {
 /// What the shader reads of a [`GroundLook`]; as `ground.wgsl` has it.
 #[derive(ShaderType, Clone, Debug)]
 pub(super) struct GroundUniform {
-    /// From world space to metres of the terrain.
+    /// From world space to metres of the terrain; of a piece, from its mesh to these metres.
     pub place: Mat4,
     /// 1 / metres, relief, metallic, kind.
     layers: [Vec4; MAX_LAYERS],
@@ -63,6 +63,8 @@ pub(super) struct GroundUniform {
     far: Vec4,
     /// Variety, quality, metres of a voxel, number of layers.
     detail: Vec4,
+    /// 1 for pieces, which move by themselves.
+    is_piece: u32,
 }
 
 impl GroundUniform {
@@ -104,7 +106,19 @@ impl GroundUniform {
                 scale.y,
                 count as f32,
             ),
+            is_piece: 0,
         }
+    }
+
+    /// The same for a piece whose mesh counts from a voxel.
+    pub(super) fn of_piece(self, origin: IVec3) -> Self {
+        let voxel = self.detail.z;
+        let place = Mat4::from_scale_rotation_translation(
+            Vec3::splat(voxel),
+            Quat::IDENTITY,
+            origin.as_vec3() * voxel,
+        );
+        Self { place, is_piece: 1, ..self }
     }
 }
 

@@ -19,11 +19,13 @@ mod bake;
 mod look;
 mod material;
 mod noise;
+mod pack;
 mod palette;
 mod textures;
 
 pub use look::{GroundLayer, GroundLayerKind, GroundLook, GroundQuality, GroundStrata, MAX_LAYERS};
 pub use material::{GroundExtension, GroundMaterial};
+pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
 use bevy::asset::embedded_asset;
@@ -31,7 +33,7 @@ use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
 use super::TerrainMaterialPlugin;
-use crate::plugin::BurrowSystems;
+use crate::plugin::{BurrowSystems, GroundPiece};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -52,7 +54,7 @@ impl Plugin for GroundPlugin {
         ))
         .add_systems(
             Update,
-            (textures::load_textures, dress, undress, follow)
+            (textures::load_textures, dress, undress, follow, dress_pieces)
                 .chain()
                 .before(BurrowSystems::Dress)
                 .after(BurrowSystems::Begin),
@@ -113,5 +115,20 @@ fn follow(
         if let Some(mut material) = materials.get_mut(&material.0) {
             material.extension.uniform = GroundUniform::new(look, place);
         }
+    }
+}
+
+/// Gives each piece of a terrain a material of its own, which knows where in the ground it was.
+fn dress_pieces(
+    mut commands: Commands,
+    bare: Query<(Entity, &GroundPiece), Without<MeshMaterial3d<GroundMaterial>>>,
+    terrains: Query<&MeshMaterial3d<GroundMaterial>, With<Terrain>>,
+    mut materials: ResMut<Assets<GroundMaterial>>,
+) {
+    for (entity, piece) in &bare {
+        let terrain = terrains.get(piece.terrain).ok();
+        let Some(mut own) = terrain.and_then(|terrain| materials.get(&terrain.0)).cloned() else { continue };
+        own.extension.uniform = own.extension.uniform.of_piece(piece.origin);
+        commands.entity(entity).try_insert(MeshMaterial3d(materials.add(own)));
     }
 }

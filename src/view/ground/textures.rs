@@ -4,6 +4,7 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::bake::{Baked, Meter, bake};
+use super::look::{GroundLook, MAX_LAYERS};
 
 /// Which textures the ground is drawn with. Insert it before the first [`GroundLook`](super::GroundLook), or change it
 /// at any time.
@@ -22,7 +23,8 @@ pub enum GroundTextures {
         anisotropy: u16,
     },
     /// A game's own: two arrays with one layer for each material id, alike in number and size, with mip levels and
-    /// samplers that repeat.
+    /// samplers that repeat. [`GroundArrays`](super::GroundArrays) makes them of ordinary pictures;
+    /// a warning tells of arrays that differ, or have fewer layers than a look names.
     Images {
         /// sRGB colours, heights in alpha.
         albedo: Handle<Image>,
@@ -48,6 +50,8 @@ pub struct GroundLoading {
     pub(super) ready: Option<Textures>,
     /// Are those the ones that were wanted last?
     is_current: bool,
+    /// What was wrong with them when somebody last looked.
+    misfit: Option<Misfit>,
 }
 
 /// What materials are made with.
@@ -56,6 +60,34 @@ pub(super) struct Textures {
     pub albedo: Handle<Image>,
     pub relief: Handle<Image>,
     pub noise: Handle<Image>,
+}
+
+/// Why arrays don't fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+enum Misfit {
+    #[error("albedo has {albedo} layers, relief {relief}")]
+    Unequal { albedo: u32, relief: u32 },
+    #[error("they have {layers} layers, the GroundLook of {terrain} names {named}")]
+    TooFew { layers: u32, terrain: Entity, named: u32 },
+}
+
+impl Misfit {
+    fn find<'a>(
+        [albedo, relief]: [u32; 2],
+        looks: impl Iterator<Item = (Entity, &'a GroundLook)>,
+    ) -> Option<Self> {
+        if albedo != relief {
+            return Some(Self::Unequal { albedo, relief });
+        }
+        let named = |look: &GroundLook| {
+            let layers = look.layers.iter().zip(1..).take(MAX_LAYERS);
+            layers.map(|(layer, count)| layer.top.map_or(0, |top| u32::from(top) + 1).max(count)).max()
+        };
+        let (terrain, named) = looks
+            .map(|(terrain, look)| (terrain, named(look).unwrap_or(1)))
+            .max_by_key(|&(terrain, named)| (named, terrain))?;
+        (named > albedo).then_some(Self::TooFew { layers: albedo, terrain, named })
+    }
 }
 
 impl GroundLoading {
@@ -75,7 +107,7 @@ impl GroundLoading {
 pub(super) fn load_textures(
     mut loading: ResMut<GroundLoading>,
     settings: Res<GroundTextures>,
-    looks: Query<(), With<super::GroundLook>>,
+    looks: Query<(Entity, &GroundLook)>,
     mut images: ResMut<Assets<Image>>,
     server: Option<Res<AssetServer>>,
 ) {
@@ -93,7 +125,7 @@ pub(super) fn load_textures(
             GroundTextures::Images { .. } => (16, 1),
         };
         loading.meter = Meter::default();
-        (loading.baked, loading.is_current) = (None, false);
+        (loading.baked, loading.is_current, loading.misfit) = (None, false, None);
         let meter = loading.meter.clone();
         loading.task = Some(AsyncComputeTaskPool::get().spawn(async move { bake(side, anisotropy, &meter) }));
     }
@@ -108,9 +140,17 @@ pub(super) fn load_textures(
             Textures { albedo: albedo.clone(), relief: relief.clone(), noise }
         }
     };
-    let is_there = |image: &Handle<Image>| images.contains(image);
-    if is_there(&textures.albedo) && is_there(&textures.relief) {
+    if let (Some(albedo), Some(relief)) = (images.get(&textures.albedo), images.get(&textures.relief)) {
         loading.is_current = true;
+        let counts = [albedo, relief].map(|image| image.texture_descriptor.array_layer_count());
+        let misfit = Misfit::find(counts, looks.iter());
+        // In every frame, but told once per change.
+        if let Some(misfit) = misfit
+            && loading.misfit != Some(misfit)
+        {
+            warn!("the arrays of GroundTextures don't fit: {misfit}");
+        }
+        loading.misfit = misfit;
         if loading.ready.as_ref() != Some(&textures) {
             loading.ready = Some(textures);
         }
@@ -118,5 +158,22 @@ pub(super) fn load_textures(
         && [&textures.albedo, &textures.relief].iter().any(|image| server.load_state(*image).is_failed())
     {
         warn_once!("the ground has no look: an image of GroundTextures can't be loaded");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_must_be_alike_and_hold_what_looks_name() {
+        let terrain = Entity::PLACEHOLDER;
+        let look = GroundLook::default();
+        let find = |counts| Misfit::find(counts, [(terrain, &look)].into_iter());
+        assert_eq!(find([14, 12]), Some(Misfit::Unequal { albedo: 14, relief: 12 }));
+        // Twelve layers, and two that are seen from above.
+        assert_eq!(find([13, 13]), Some(Misfit::TooFew { layers: 13, terrain, named: 14 }));
+        assert_eq!(find([14, 14]), None);
+        assert_eq!(find([20, 20]), None);
     }
 }

@@ -1,0 +1,347 @@
+//! A game's own pictures, packed into the arrays that the ground is drawn with.
+
+use bevy::asset::RenderAssetUsages;
+use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor, IntoDynamicImageError};
+use bevy::prelude::*;
+use bevy::render::render_resource::{
+    Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
+};
+use rayon::prelude::*;
+
+use super::GroundTextures;
+
+/// Most texels along a side.
+const MAX_SIDE: u32 = 4096;
+/// Most layers: what any graphics card takes, and as many as a `u8` can name.
+const MAX_ARRAY_LAYERS: usize = 256;
+
+/// The pictures of one layer, as texture libraries have them. All are square, as large as those of the other layers, and
+/// have 8 bits per channel. Their bytes are taken as they are in the file, whether it was loaded as sRGB or not.
+#[derive(Clone, Debug, Default)]
+pub struct GroundLayerImages {
+    /// Colours in sRGB; heights in alpha, unless [`height`](Self::height) has them.
+    pub albedo: Image,
+    /// Heights in red, 0 low to 255 high: what is higher is on top where layers meet. Without it, and with an albedo that
+    /// is opaque throughout, the layer lies flat at half height.
+    pub height: Option<Image>,
+    /// A normal map as [`StandardMaterial`] takes it, x right and y up; none is flat.
+    pub normal: Option<Image>,
+    /// Is the normal map made for DirectX, with a green channel that points down?
+    pub flip_normal_map_y: bool,
+    /// Occlusion in red, as glTF has it; none is no occlusion.
+    pub occlusion: Option<Image>,
+    /// Perceptual roughness in green, as glTF has it; none is 0.9. A picture that holds occlusion too is given twice.
+    pub roughness: Option<Image>,
+}
+
+/// Why pictures can't be packed into [`GroundArrays`].
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GroundArraysError {
+    /// There is no layer, or there are too many.
+    #[error("{layers} layers were given: ground takes 1 to {MAX_ARRAY_LAYERS}")]
+    Layers {
+        /// Layers given.
+        layers: usize,
+    },
+    /// A picture is empty, too large, not square, no power of two, or several in one.
+    #[error(
+        "the {picture} of layer {layer} has {size} texels: it must be one square picture, \
+         a power of two up to {MAX_SIDE} along a side"
+    )]
+    Size {
+        /// Which picture.
+        picture: &'static str,
+        /// The layer's number.
+        layer: usize,
+        /// Width, height, and depth or number of layers.
+        size: UVec3,
+    },
+    /// A picture is larger or smaller than the first one.
+    #[error(
+        "the {picture} of layer {layer} is {side} texels wide, the albedo of layer 0 {expected}: all must be alike"
+    )]
+    Unequal {
+        /// Which picture.
+        picture: &'static str,
+        /// The layer's number.
+        layer: usize,
+        /// Texels along its side.
+        side: u32,
+        /// Texels along the side of the first albedo.
+        expected: u32,
+    },
+    /// A picture has another format than grey or RGBA of 8 bits per channel, or its bytes are not in the main world.
+    #[error("the {picture} of layer {layer} can't be packed: {source}")]
+    Unreadable {
+        /// Which picture.
+        picture: &'static str,
+        /// The layer's number.
+        layer: usize,
+        /// What Bevy says.
+        source: IntoDynamicImageError,
+    },
+}
+
+/// What [`GroundTextures::Images`] holds, made of a game's own pictures, with all mip levels.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy::tasks::{AsyncComputeTaskPool, Task};
+/// # use bevy_burrow::prelude::*;
+/// # use bevy_burrow::view::GroundArraysError;
+/// // Behind a loading screen: clones of images that are loaded, one item for each material id.
+/// fn pack(layers: Vec<GroundLayerImages>) -> Task<Result<GroundArrays, GroundArraysError>> {
+///     AsyncComputeTaskPool::get().spawn(async move { GroundArrays::pack(layers) })
+/// }
+///
+/// // When the task is done.
+/// fn take_over(arrays: GroundArrays, images: &mut Assets<Image>, commands: &mut Commands) {
+///     commands.insert_resource(arrays.add_to(images));
+/// }
+///
+/// let rock = GroundLayerImages { albedo: Image::default(), ..default() };
+/// let grass = GroundLayerImages { normal: Some(Image::default()), ..rock.clone() };
+/// let arrays = GroundArrays::pack([rock, grass])?;
+/// assert_eq!(arrays.albedo.texture_descriptor.array_layer_count(), 2);
+/// # Ok::<(), GroundArraysError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct GroundArrays {
+    /// Colours and heights.
+    pub albedo: Image,
+    /// Normals, occlusion and roughness.
+    pub relief: Image,
+}
+
+impl GroundArrays {
+    /// Packs the pictures of all layers, in the order of their numbers. Takes up to seconds, over all of rayon's threads:
+    /// work for a task or a loading screen. Colours are averaged as light, normals keep their length. Samplers repeat,
+    /// with fourfold anisotropic filtering; both images can be given others.
+    ///
+    /// # Errors
+    ///
+    /// [`GroundArraysError`] names the picture that doesn't fit, and its layer.
+    pub fn pack(layers: impl IntoIterator<Item = GroundLayerImages>) -> Result<Self, GroundArraysError> {
+        let layers: Vec<_> = layers.into_iter().collect();
+        let side = match layers.first() {
+            Some(first) if layers.len() <= MAX_ARRAY_LAYERS => first.albedo.width(),
+            _ => return Err(GroundArraysError::Layers { layers: layers.len() }),
+        };
+        let packed: Vec<_> = layers
+            .into_par_iter()
+            .enumerate()
+            .map(|(layer, images)| pack_layer(layer, images, side))
+            .collect();
+        // The first error by number, whichever came first.
+        let packed: Vec<_> = packed.into_iter().collect::<Result<_, _>>()?;
+        let (albedo, relief): (Vec<_>, Vec<_>) = packed.into_iter().unzip();
+        Ok(Self {
+            albedo: array(&albedo, side, TextureFormat::Rgba8UnormSrgb),
+            relief: array(&relief, side, TextureFormat::Rgba8Unorm),
+        })
+    }
+
+    /// Adds both arrays to the images of the app: insert what comes back as a resource.
+    pub fn add_to(self, images: &mut Assets<Image>) -> GroundTextures {
+        GroundTextures::Images { albedo: images.add(self.albedo), relief: images.add(self.relief) }
+    }
+}
+
+type Texels = Vec<[u8; 4]>;
+
+/// One layer of both arrays, with all mip levels; all its pictures must be as wide as the first one of all layers.
+fn pack_layer(
+    layer: usize,
+    images: GroundLayerImages,
+    expected: u32,
+) -> Result<(Vec<u8>, Vec<u8>), GroundArraysError> {
+    let read = |picture: &'static str, image: Image| {
+        let Extent3d { width: side, height, depth_or_array_layers: depth } = image.texture_descriptor.size;
+        if side != height || depth != 1 || !side.is_power_of_two() || side > MAX_SIDE {
+            return Err(GroundArraysError::Size { picture, layer, size: UVec3::new(side, height, depth) });
+        }
+        if side != expected {
+            return Err(GroundArraysError::Unequal { picture, layer, side, expected });
+        }
+        texels(image).map_err(|source| GroundArraysError::Unreadable { picture, layer, source })
+    };
+    // No texels where there is no picture: nothing is laid over what is there.
+    let overlay = |picture, image: Option<Image>| image.map_or(Ok(vec![]), |image| read(picture, image));
+    let mut albedo = read("albedo", images.albedo)?;
+    // No heights are in an opaque albedo, and at 255 the layer would be on top of all others.
+    if images.height.is_none() && albedo.iter().all(|texel| texel[3] == u8::MAX) {
+        albedo.iter_mut().for_each(|texel| texel[3] = 128);
+    }
+    for (texel, [height, ..]) in albedo.iter_mut().zip(overlay("height", images.height)?) {
+        texel[3] = height;
+    }
+    let mut relief: Texels = vec![[128, 128, 255, 230]; albedo.len()];
+    for (texel, [x, y, ..]) in relief.iter_mut().zip(overlay("normal", images.normal)?) {
+        // In the arrays, y runs down.
+        let y = if images.flip_normal_map_y { y } else { 255 - y };
+        (texel[0], texel[1]) = (x, y);
+    }
+    for (texel, [occlusion, ..]) in relief.iter_mut().zip(overlay("occlusion", images.occlusion)?) {
+        texel[2] = occlusion;
+    }
+    for (texel, [_, roughness, ..]) in relief.iter_mut().zip(overlay("roughness", images.roughness)?) {
+        texel[3] = roughness;
+    }
+    Ok((levels(albedo, expected, mean_color), levels(relief, expected, mean_relief)))
+}
+
+/// The bytes of a picture, four to a texel.
+fn texels(mut image: Image) -> Result<Texels, IntoDynamicImageError> {
+    match image.texture_descriptor.format {
+        // The same bytes; Bevy's conversion knows them by one name only.
+        TextureFormat::Rgba8Unorm => image.texture_descriptor.format = TextureFormat::Rgba8UnormSrgb,
+        // Bevy reads grey and alpha there, others red and green.
+        format @ TextureFormat::Rg8Unorm => return Err(IntoDynamicImageError::UnsupportedFormat(format)),
+        _ => {}
+    }
+    Ok(image.try_into_dynamic()?.into_rgba8().pixels().map(|texel| texel.0).collect())
+}
+
+/// A picture and all its mip levels, one after another.
+fn levels(picture: Texels, side: u32, mean: fn([[u8; 4]; 4]) -> [u8; 4]) -> Vec<u8> {
+    let mut bytes = picture.as_flattened().to_vec();
+    let (mut level, mut side) = (picture, side as usize);
+    while side > 1 {
+        let half = side / 2;
+        level = (0..half * half)
+            .map(|texel| {
+                let at = 2 * (texel / half) * side + 2 * (texel % half);
+                mean([at, at + 1, at + side, at + side + 1].map(|at| level[at]))
+            })
+            .collect();
+        bytes.extend_from_slice(level.as_flattened());
+        side = half;
+    }
+    bytes
+}
+
+/// Colours are averaged as light.
+fn mean_color(four: [[u8; 4]; 4]) -> [u8; 4] {
+    let [a, b, c, d] = four.map(|texel| LinearRgba::from(Srgba::from_u8_array(texel)));
+    Srgba::from((a + b + c + d) / 4.0).to_u8_array()
+}
+
+/// Normals are averaged as directions.
+fn mean_relief(four: [[u8; 4]; 4]) -> [u8; 4] {
+    let [a, b, c, d] = four.map(|[x, y, ..]| {
+        let lean = Vec2::new(x.into(), y.into()) / 127.5 - 1.0;
+        lean.extend((1.0 - lean.length_squared()).max(0.0).sqrt())
+    });
+    let lean = ((a + b + c + d).normalize_or(Vec3::Z).truncate() + 1.0) * 127.5;
+    let mean = |channel: usize| four.map(|texel| f32::from(texel[channel])).iter().sum::<f32>() / 4.0;
+    [lean.x, lean.y, mean(2), mean(3)].map(|value| value.round() as u8)
+}
+
+/// An image array of layers that hold all their mip levels.
+fn array(layers: &[Vec<u8>], side: u32, format: TextureFormat) -> Image {
+    let size = Extent3d { width: side, height: side, depth_or_array_layers: layers.len() as u32 };
+    let mut image = Image::new_uninit(size, TextureDimension::D2, format, RenderAssetUsages::RENDER_WORLD);
+    image.data = Some(layers.concat());
+    image.texture_descriptor.mip_level_count = side.ilog2() + 1;
+    image.texture_view_descriptor =
+        Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() });
+    let mut sampler = ImageSamplerDescriptor::linear();
+    sampler.set_address_mode(ImageAddressMode::Repeat).set_anisotropic_filter(4);
+    image.sampler = ImageSampler::Descriptor(sampler);
+    image
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(side: u32, texel: [u8; 4]) -> Image {
+        let size = Extent3d { width: side, height: side, depth_or_array_layers: 1 };
+        let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
+        Image::new_fill(size, TextureDimension::D2, &texel, format, usage)
+    }
+
+    fn layer(albedo: Image) -> GroundLayerImages {
+        GroundLayerImages { albedo, ..default() }
+    }
+
+    #[test]
+    fn four_times_the_same_is_the_same() {
+        for (x, y) in (0..=255_u8).flat_map(|x| (0..=255_u8).map(move |y| (x, y))) {
+            assert_eq!(mean_color([[x, y, 255 - x, y]; 4]), [x, y, 255 - x, y]);
+            let lean = Vec2::new(x.into(), y.into()) / 127.5 - 1.0;
+            if lean.length() < 1.0 {
+                assert_eq!(mean_relief([[x, y, x, y]; 4]), [x, y, x, y]);
+            }
+        }
+    }
+
+    #[test]
+    fn colors_are_averaged_as_light_and_normals_as_directions() {
+        let [black, white] = [[0, 0, 0, 0], [255; 4]];
+        assert_eq!(mean_color([black, white, white, black]), [188, 188, 188, 128]);
+        // 45 degrees to the right and 45 down: a plain mean is 172.5.
+        let [right, down] = [[217, 128, 0, 10], [128, 217, 0, 20]];
+        assert_eq!(mean_relief([right, right, down, down]), [179, 179, 0, 15]);
+    }
+
+    #[test]
+    fn layers_keep_their_order_and_their_colour_at_every_level() {
+        let colors = [[200, 20, 90, 60], [1, 2, 3, 4], [250, 251, 252, 253]];
+        let arrays = GroundArrays::pack(colors.map(|color| GroundLayerImages {
+            normal: Some(plain(8, [100, 150, 255, 255])),
+            roughness: Some(plain(8, [0, color[1], 0, 255])),
+            occlusion: Some(plain(8, [color[0], 0, 0, 255])),
+            ..layer(plain(8, color))
+        }))
+        .unwrap();
+        let reliefs = colors.map(|[red, green, ..]| [100, 105, red, green]);
+        for (image, expected) in [(arrays.albedo, colors), (arrays.relief, reliefs)] {
+            let expected: Vec<_> = expected.iter().flat_map(|texel| [*texel; 64 + 16 + 4 + 1]).collect();
+            assert_eq!(image.data.as_deref(), Some(expected.as_flattened()));
+            assert_eq!(image.texture_descriptor.mip_level_count, 4);
+            assert_eq!(image.texture_descriptor.array_layer_count(), 3);
+        }
+    }
+
+    #[test]
+    fn heights_come_from_a_picture_or_are_half() {
+        let height = |layer| GroundArrays::pack([layer]).unwrap().albedo.data.unwrap()[3];
+        let opaque = layer(plain(1, [9, 9, 9, 255]));
+        assert_eq!(height(opaque.clone()), 128);
+        let mut grey = plain(1, [70; 4]);
+        (grey.texture_descriptor.format, grey.data) = (TextureFormat::R8Unorm, Some(vec![70]));
+        assert_eq!(height(GroundLayerImages { height: Some(grey), ..opaque }), 70);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        use GroundArraysError::{Layers, Size, Unequal, Unreadable};
+        let fault = |layers: Vec<GroundLayerImages>| GroundArrays::pack(layers).unwrap_err();
+        assert!(matches!(fault(vec![]), Layers { layers: 0 }));
+        assert!(matches!(fault(vec![layer(Image::default()); 257]), Layers { layers: 257 }));
+        for size in [[0, 0, 1], [3, 3, 1], [4, 8, 1], [8192, 8192, 1], [4, 4, 2], [4, 4, 0]] {
+            let [width, height, depth_or_array_layers] = size;
+            let mut image = Image::default_uninit();
+            image.texture_descriptor.size = Extent3d { width, height, depth_or_array_layers };
+            let found = fault(vec![layer(image)]);
+            assert!(
+                matches!(found, Size { picture: "albedo", layer: 0, size: at } if at == UVec3::from(size))
+            );
+        }
+        let good = layer(plain(4, [7; 4]));
+        let small = GroundLayerImages { normal: Some(plain(2, [7; 4])), ..good.clone() };
+        let found = fault(vec![good.clone(), small]);
+        assert!(matches!(found, Unequal { picture: "normal", layer: 1, side: 2, expected: 4 }), "{found}");
+        let mut broken = [(); 4].map(|()| plain(4, [7; 4]));
+        broken[0].texture_descriptor.format = TextureFormat::Rgba16Unorm;
+        broken[1].texture_descriptor.format = TextureFormat::Bc7RgbaUnorm;
+        broken[2].data = None;
+        broken[3].data = Some(vec![7; 63]);
+        for image in broken {
+            let found = fault(vec![good.clone(), GroundLayerImages { height: Some(image), ..good.clone() }]);
+            assert!(matches!(found, Unreadable { picture: "height", layer: 1, .. }), "{found}");
+        }
+    }
+}
