@@ -11,7 +11,9 @@ export PATH := $(HOME)/.cargo/bin:$(PATH)
 export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
 WITHOUT_BEVY := --no-default-features --features cuda
-WITH_BEVY := --release --features examples
+comma := ,
+# Features besides: `make run MORE=gamepad` compiles some crates more.
+WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
 
 # Tests of the plugin open with #![cfg(feature = ...)]; the others test the model, and need not run twice.
 PLUGIN_TESTS := $(patsubst tests/%,--test %,$(patsubst %/main,%,$(basename \
@@ -24,12 +26,12 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run example test test-model test-plugin test-examples drive soak paper pictures bench bench-backends peers instructions ptx
+.PHONY: help setup run example test test-model test-plugin test-examples drive soak crowd paper pictures bench bench-backends peers instructions ptx
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
-run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only)
+run: ## Install what is missing, then dig: first person on a real landscape (ARGS="--headless" for pictures only, MORE=gamepad)
 	@tools/setup.sh run
 	cargo run $(WITH_BEVY) --example digger -- $(ARGS)
 
@@ -49,7 +51,7 @@ test-model:
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::
-	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example server
+	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example sculpt --example server
 	cargo test $(WITH_BEVY) --doc
 
 # The examples as a user starts them; whatever an earlier run left is not taken for theirs.
@@ -57,6 +59,8 @@ test-examples:
 	rm -rf '$(PROOF)'
 	cargo run $(WITH_BEVY) --example digger -- --headless --width 640 --height 360 --out '$(PROOF)/digger'
 	@pictures=$$(ls '$(PROOF)/digger' | grep -c '\.png$$'); echo "digger: $$pictures pictures"; [ "$$pictures" -ge 6 ]
+	cargo run $(WITH_BEVY) --example digger -- --tour --fps 10 --frames 12 --width 320 --height 180 --out '$(PROOF)/tour'
+	@pictures=$$(ls '$(PROOF)/tour' | grep -c '\.png$$'); echo "tour: $$pictures pictures"; [ "$$pictures" -ge 12 ]
 	cargo run $(WITH_BEVY) --example sculpt -- --headless --width 960 --height 540 --out '$(PROOF)/sculpt'
 	@pictures=$$(ls '$(PROOF)/sculpt' | grep -c '\.png$$'); echo "sculpt: $$pictures pictures"; [ "$$pictures" -ge 5 ]
 	cargo run $(WITH_BEVY) --example physics -- --headless --seconds 3 --balls 150 --out '$(PROOF)/physics'
@@ -67,7 +71,7 @@ test-examples:
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
 
 # They are drawn on a display of their own, which needs the libraries of any other.
-drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where there is none
+drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips where it can't be installed
 	@DISPLAY=$${DISPLAY:-:0} tools/setup.sh drive
 	cargo build $(WITH_BEVY) --example sculpt --example digger
 	@for play in sculpt digger; do \
@@ -78,6 +82,10 @@ drive: ## Play sculpt and the digger by real mouse and keys under Xvfb; skips wh
 soak: ## Dig WORLDS (10000) random worlds; look at every seam, and compare every mesh with the plain mesher
 	@tools/setup.sh build
 	BURROW_WORLDS=$(WORLDS) cargo test --release $(WITHOUT_BEVY) --test seams --test plain --test increments -- --nocapture
+
+crowd: ## 1,000 balls and 100 walkers for a minute, on ground that is dug ten times a second; nobody falls through or jumps
+	@tools/setup.sh test
+	BURROW_CROWD=1000 cargo test $(WITH_BEVY) --test physics crowd -- --nocapture
 
 paper: ## Do the paper's experiment again and write docs/RESULTS.md (REPEATS=10)
 	@tools/setup.sh build

@@ -1,57 +1,220 @@
 //! What it costs to look for loose pieces, and to undo: digs of some 100 voxels, a transaction each.
+//!
+//! The same digs are done with every look in turns, each undone before the next, so that all of them find the world as it
+//! was built. What a look adds is the time of a dig less that of the same dig where nobody looks, pair by pair.
+//!
+//! A search ends at [`LooseSettings::largest`] voxels. A body just below that is searched whole, found and described; one
+//! just above it costs all that a search may take, and larger ones of its make cost no more. The make counts, for a search
+//! goes from brick to brick: of all bodies of so many voxels a ball has the fewest bricks, a sheet one voxel thick has more
+//! than four times as many, and a tangle of threads would have more still. The bound is one for each piece: a dig that cuts
+//! several necks at once pays for each.
 
+use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
 use glam::Vec3;
 
-use crate::landscape::{Places, dig, landscape, one_thread};
+use crate::landscape::{Places, dig, ground, landscape, one_thread};
 use crate::stages::{self, Played};
+use crate::statistics::Sample;
 
 /// A ball of this radius has 100 voxels.
 const RADIUS: f32 = 2.88;
 
-/// A pillar with a ball on it, over a place: 2 voxels thick, and 100 voxels large.
-fn mushroom(at: Vec3) -> [Brush; 2] {
-    let (foot, head) = (at - Vec3::Y * 3.0, at + Vec3::Y * 9.0);
-    let pillar = Shape::capsule(foot, head, 1.2);
-    [Brush::add(pillar, MaterialId(1)), Brush::add(Shape::sphere(head, RADIUS), MaterialId(2))]
-}
+/// A neck of this radius loses some 100 voxels to a ball of radius [`CUT`].
+const NECK: f32 = 2.6;
+const CUT: f32 = 3.0;
 
-/// Digs into ground, under what then falls, and into the roof of a hall.
-pub fn section() {
-    type Scene = (&'static str, fn(&mut Terrain), fn(Vec3) -> Brush);
-    let scenes: [Scene; 3] = [
-        ("into the ground", |_| {}, |at| dig(at, RADIUS)),
-        (
-            "cuts off 150 voxels",
-            |terrain| drop(terrain.apply(Places::new(200).iter().flat_map(mushroom))),
-            |at| dig(at + Vec3::Y * 3.0, RADIUS),
-        ),
-        (
-            "into the roof of a hall of 30 x 9 x 30",
-            |terrain| {
-                let hall =
-                    |at: Vec3| Brush::dig(Shape::cuboid(at - Vec3::Y * 24.0, Vec3::new(15.0, 4.5, 15.0)));
-                terrain.apply(Places::new(200).iter().map(hall));
-            },
-            |at| dig(at - Vec3::Y * 20.0, RADIUS),
-        ),
-    ];
-    let looks: [(&str, Option<LooseSettings>); 3] = [
+/// How high bodies hang above the ground under their necks.
+const LIFT: f32 = 26.0;
+
+/// Which of the [`looks`] reports pieces, and leaves them where they are.
+const REPORTED: usize = 1;
+
+/// What is looked for, from nothing on.
+fn looks() -> [(&'static str, Option<LooseSettings>); 3] {
+    [
         ("nobody looks", None),
         ("reported", Some(LooseSettings::default())),
-        ("taken out, with meshes", Some(LooseSettings { debris: 4096, ..Default::default() })),
+        ("taken out, with meshes", Some(LooseSettings { debris: 1 << 15, ..Default::default() })),
+    ]
+}
+
+/// Digs of some 100 voxels, and what stands where they are done.
+struct Scene {
+    name: &'static str,
+    build: fn(Vec3) -> Vec<Brush>,
+    dig: fn(Vec3) -> Brush,
+}
+
+/// A pillar with a ball on it, over a place: 2 voxels thick, and 100 voxels large.
+fn mushroom(at: Vec3) -> Vec<Brush> {
+    let (foot, head) = (at - Vec3::Y * 3.0, at + Vec3::Y * 9.0);
+    let pillar = Shape::capsule(foot, head, 1.2);
+    vec![Brush::add(pillar, MaterialId(1)), Brush::add(Shape::sphere(head, RADIUS), MaterialId(2))]
+}
+
+fn hall(at: Vec3) -> Vec<Brush> {
+    vec![Brush::dig(Shape::cuboid(at - Vec3::Y * 24.0, Vec3::new(15.0, 4.5, 15.0)))]
+}
+
+/// A body over a place that nothing but its neck ties to the ground.
+fn on_a_neck(at: Vec3, body: Shape) -> Vec<Brush> {
+    let neck = Shape::capsule(at - Vec3::Y * 3.0, at + Vec3::Y * (LIFT + 4.0), NECK);
+    vec![Brush::add(neck, MaterialId(1)), Brush::add(body, MaterialId(2))]
+}
+
+fn ball(at: Vec3, radius: f32) -> Vec<Brush> {
+    on_a_neck(at, Shape::sphere(at + Vec3::Y * (LIFT + radius), radius))
+}
+
+/// A sheet one voxel thick and 512 high.
+fn sheet(at: Vec3, half_width: f32) -> Vec<Brush> {
+    let half = Vec3::new(half_width, 256.0, 0.6);
+    on_a_neck(at, Shape::cuboid(at + Vec3::Y * (LIFT + half.y), half))
+}
+
+/// How far the ground around a place rises above it, within so many columns to each side.
+fn rise(at: Vec3, reach: i32) -> f32 {
+    let (ground, x, z) = (ground(), at.x as i32, at.z as i32);
+    let columns = (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dz| Column::new(x + dx, z + dz)));
+    let top = columns.map(|column| ground.height(column)).max().expect("there are columns");
+    top as f32 / 256.0 - at.y
+}
+
+/// Places where bodies on necks touch neither the ground nor each other.
+fn open_places(count: usize) -> Vec<Vec3> {
+    let mut open: Vec<Vec3> = Vec::new();
+    for at in Places::new(600).iter() {
+        let is_apart = |other: &Vec3| (other.x - at.x).abs().max((other.z - at.z).abs()) >= 80.0;
+        if open.len() < count && open.iter().all(is_apart) && rise(at, 6) < 3.0 && rise(at, 32) < 16.0 {
+            open.push(at);
+        }
+    }
+    assert_eq!(open.len(), count, "there are too few open places");
+    open
+}
+
+fn voxels(pieces: &[LoosePiece]) -> f64 {
+    pieces.iter().map(|piece| piece.voxels).sum::<u64>() as f64
+}
+
+/// Voxels of what digs cut off, and of what was reported of it.
+struct Loose {
+    cut_off: Sample,
+    found: Sample,
+}
+
+/// Undoes a dig.
+fn bring_back(terrain: &mut Terrain, hash: u64) {
+    assert!(terrain.undo().outcome.is_ok(), "a dig can be undone");
+    assert_eq!(terrain.world().hash(), hash, "undone, a dig leaves nothing");
+}
+
+/// Does the same digs with every look, in turns, and prints what each takes and what it adds.
+fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
+    let (looks, before) = (looks(), terrain.world().hash());
+    let mut played = looks.map(|_| Played::default());
+    let (mut dug, mut found) = (Sample::default(), Sample::default());
+    // Each look is at other places in a turn: none digs where another one has just warmed the caches.
+    let first = |look: usize| look * digs.len() / looks.len();
+    for turn in 0..digs.len() {
+        for (look, (_, settings)) in looks.iter().enumerate() {
+            terrain.set_loose(*settings);
+            let applied = played[look].play(terrain, &digs[(turn + first(look)) % digs.len()]);
+            dug.push(applied.removed.total() as f64);
+            if look == REPORTED {
+                found.push(voxels(&applied.loose));
+            }
+            bring_back(terrain, before);
+        }
+    }
+    // What is loose whatever its size, untimed.
+    terrain.set_loose(None);
+    let everything = LooseSettings { largest: u32::MAX, ..Default::default() };
+    let mut cut_off = Sample::default();
+    for dig in digs {
+        let around = Played::default().play(terrain, dig).bounds.expect("a dig changes the ground");
+        cut_off.push(voxels(&terrain.world().loose_pieces(around.grown(1), &everything)));
+        bring_back(terrain, before);
+    }
+
+    for ((look, _), played) in looks.iter().zip(&played) {
+        stages::row(&format!("{name}: {look}"), played);
+    }
+    // In order of the digs.
+    let times = |look: usize| {
+        let mut times: Vec<f64> =
+            played[look].stages.iter().map(|stages| stages.whole.as_secs_f64()).collect();
+        times.rotate_right(first(look));
+        times
+    };
+    let alone = times(0);
+    for (look, (what, _)) in looks.iter().enumerate().skip(1) {
+        let own = times(look);
+        let pairs = || own.iter().zip(&alone);
+        let more: Sample = pairs().map(|(with, without)| (with - without) * 1e6).collect();
+        let ratio: Sample = pairs().map(|(with, without)| with / without).collect();
+        println!(
+            "    {what}: {:.1} us more, p99 {:.1}; {:.2} times as long, p99 {:.2}; medians of {} pairs",
+            more.median(),
+            more.percentile(0.99),
+            ratio.median(),
+            ratio.percentile(0.99),
+            more.len()
+        );
+    }
+    println!(
+        "    voxels, medians: {} dug, {} cut off, {} of them found",
+        dug.median(),
+        cut_off.median(),
+        found.median()
+    );
+    Loose { cut_off, found }
+}
+
+/// Digs into ground, under what then falls, and into the roof of a hall; and through the necks of bodies about as large as
+/// is looked for.
+pub fn section() {
+    let scenes = [
+        Scene { name: "into the ground", build: |_| Vec::new(), dig: |at| dig(at, RADIUS) },
+        Scene { name: "cuts off 150 voxels", build: mushroom, dig: |at| dig(at + Vec3::Y * 3.0, RADIUS) },
+        Scene {
+            name: "into the roof of a hall of 30 x 9 x 30",
+            build: hall,
+            dig: |at| dig(at - Vec3::Y * 20.0, RADIUS),
+        },
+    ];
+    let through_the_neck: fn(Vec3) -> Brush = |at| dig(at + Vec3::Y * 7.0, CUT);
+    let bodies = [
+        Scene { name: "a ball below the bound", build: |at| ball(at, 19.5), dig: through_the_neck },
+        Scene { name: "a ball above the bound", build: |at| ball(at, 20.0), dig: through_the_neck },
+        Scene { name: "a sheet below the bound", build: |at| sheet(at, 30.4), dig: through_the_neck },
+        Scene { name: "a sheet above the bound", build: |at| sheet(at, 32.4), dig: through_the_neck },
     ];
     stages::header("a dig of 100 voxels");
-    for (scene, build, brush) in scenes {
-        for (look, settings) in looks {
-            one_thread(|| {
-                let mut terrain = landscape(32);
-                build(&mut terrain);
-                terrain.set_loose(settings);
-                let played = stages::play(&mut terrain, Places::new(200).iter().map(brush));
-                stages::row(&format!("{scene}: {look}"), &played);
-            });
-        }
+    for Scene { name, build, dig } in scenes {
+        one_thread(|| {
+            let mut terrain = landscape(32);
+            terrain.apply(Places::new(200).iter().flat_map(build));
+            let digs: Vec<Brush> = Places::new(200).iter().map(dig).collect();
+            compare(name, &mut terrain, &digs);
+        });
+    }
+    let bound = f64::from(LooseSettings::default().largest);
+    for Scene { name, build, dig } in bodies {
+        one_thread(|| {
+            let (mut terrain, places) = (landscape(32), open_places(15));
+            terrain.apply(places.iter().copied().flat_map(build));
+            let digs: Vec<Brush> = (0..14).flat_map(|_| places.iter().copied().map(dig)).collect();
+            let Loose { cut_off, found } = compare(name, &mut terrain, &digs);
+            let [least, most] = [0.0, 1.0].map(|share| cut_off.percentile(share));
+            assert!(most < 1.1 * bound && least > 0.9 * bound, "{name}: {least} to {most} voxels");
+            if most <= bound {
+                assert_eq!([0.0, 1.0].map(|share| found.percentile(share)), [least, most], "{name}");
+            } else {
+                assert!(least > bound && found.percentile(1.0) == 0.0, "{name}: {least} to {most} voxels");
+            }
+        });
     }
     one_thread(|| {
         let mut terrain = landscape(32);

@@ -18,18 +18,23 @@ pub struct Played {
 pub fn play(terrain: &mut Terrain, brushes: impl IntoIterator<Item = Brush>) -> Played {
     let mut played = Played::default();
     for brush in brushes {
-        terrain.submit(&brush);
-        let commit = terrain.begin().expect("a brush waits").run();
-        played.stages.push(commit.stages);
-        let start = Instant::now();
-        let receipts = terrain.commit(commit).expect("nothing else commits");
-        played.commits.push(start.elapsed().as_secs_f64());
-        assert!(receipts.iter().all(|receipt| receipt.outcome.is_ok()));
+        played.play(terrain, &brush);
     }
     played
 }
 
 impl Played {
+    /// Plays one more brush; returns what it changed.
+    pub fn play(&mut self, terrain: &mut Terrain, brush: &Brush) -> Applied {
+        terrain.submit(brush);
+        let commit = terrain.begin().expect("a brush waits").run();
+        self.stages.push(commit.stages);
+        let start = Instant::now();
+        let mut receipts = terrain.commit(commit).expect("nothing else commits");
+        self.commits.push(start.elapsed().as_secs_f64());
+        receipts.pop().expect("each brush has a receipt").outcome.expect("a valid brush in the world")
+    }
+
     /// One stage of every transaction, in seconds.
     pub fn stage(&self, stage: fn(&Stages) -> Duration) -> Sample {
         self.stages.iter().map(|stages| stage(stages).as_secs_f64()).collect()

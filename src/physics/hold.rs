@@ -67,6 +67,8 @@ pub(super) struct Body {
     entity: Entity,
     kind: &'static RigidBody,
     position: &'static Position,
+    transform: &'static Transform,
+    is_child: Has<ChildOf>,
     velocity: &'static mut LinearVelocity,
     spin: &'static mut AngularVelocity,
     locked: Option<&'static LockedAxes>,
@@ -164,8 +166,13 @@ pub(super) fn hold(
                 })
             };
             // Where a game has just put it, physics will have it in its next step.
-            let put = || places.compute_global_transform(body.entity).ok().map(|put| put.translation());
-            lacks_ground(body.position.0) || follows_transform && put().is_some_and(lacks_ground)
+            let put = || match body.is_child {
+                true => places.compute_global_transform(body.entity).ok().map(|put| put.translation()),
+                false => Some(body.transform.translation),
+            };
+            let is_put = |put: &Vec3| *put != body.position.0;
+            lacks_ground(body.position.0)
+                || follows_transform && put().filter(is_put).is_some_and(lacks_ground)
         };
         if lacks_ground {
             held += 1;

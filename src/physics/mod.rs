@@ -150,11 +150,13 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
             .add_systems(
                 FixedPreUpdate,
-                (wake::wake, wake::patrol, wake::rescue).chain().in_set(TerrainPhysicsSystems::Wake),
+                (wake::wake, wake::patrol, wake::rescue_before.run_if(wake::is_first_step))
+                    .chain()
+                    .in_set(TerrainPhysicsSystems::Wake),
             )
             .add_systems(
                 FixedPostUpdate,
-                wake::rescue.after(PhysicsSystems::Last).in_set(TerrainPhysicsSystems::Wake),
+                wake::rescue_after.after(PhysicsSystems::Last).in_set(TerrainPhysicsSystems::Wake),
             );
     }
 

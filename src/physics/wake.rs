@@ -3,8 +3,9 @@
 
 use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
+use bevy::diagnostic::FrameCount;
 use bevy::ecs::system::SystemParam;
-use bevy::math::Affine3A;
+use bevy::math::{Affine3A, DVec3};
 use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -21,9 +22,9 @@ const NEAR: f32 = 0.2;
 /// How high above the ground a lifted body starts, in metres.
 const GAP: f32 = 0.02;
 
-/// How often bodies near a change are looked at afterwards, twice in a step: for a second as a rule. One that is built over
-/// in part is still in the air, but between what pushes it up and what pushes it down it may leave through either.
-const WATCHED: u8 = 128;
+/// After how many steps bodies near a change are looked at: for a second as a rule. One that is built over in part is still
+/// in the air, but between what pushes it up and what pushes it down it may leave through either.
+const WATCHED: u8 = 64;
 
 /// In so many steps every body is looked at once, wherever it is.
 const TURNS: usize = 8;
@@ -196,50 +197,89 @@ pub(super) fn patrol(
     figures.main_thread += start.elapsed();
 }
 
-/// Lifts bodies that are watched out of the ground: before each step, and after it, so that nobody sees them there.
-pub(super) fn rescue(
-    mut watched: ResMut<Watched>,
-    mut bodies: Query<(
-        &RigidBody,
-        &RigidBodyColliders,
-        &mut Position,
-        &Rotation,
-        Option<&ComputedCenterOfMass>,
-        &mut LinearVelocity,
-        &mut Transform,
-        Option<&mut CharacterMotion>,
-        Has<ChildOf>,
-    )>,
-    solids: Solids,
-    terrains: Query<(&Terrain, &GlobalTransform)>,
-    time: Option<Res<Time<Physics>>>,
-    mut figures: ResMut<PhysicsFigures>,
-) {
-    let start = Instant::now();
-    // While time stands still nobody is squeezed.
-    let passes = time.is_none_or(|time| !time.is_paused());
-    watched.0.retain(|&(entity, terrain), looks| {
-        *looks -= u8::from(passes);
-        let (Ok(body), Ok((terrain, place))) = (bodies.get_mut(entity), terrains.get(terrain)) else {
-            return false;
-        };
-        let (body, own, mut position, rotation, center, mut velocity, mut transform, motion, is_child) = body;
-        let Some(bounds) = solids.bounds(entity, body, own) else { return false };
-        let middle = middle(&position, rotation, center);
-        if let Some(lift) = lift(terrain, place, middle, &bounds) {
-            position.0.y += lift;
-            if !is_child {
-                transform.translation.y += lift;
-            }
-            velocity.0.y = velocity.0.y.max(0.0);
-            if let Some(mut motion) = motion {
-                motion.velocity.y = motion.velocity.y.max(0.0);
-            }
-            figures.lifted += 1;
+/// What it takes to lift bodies that are watched out of the ground.
+#[derive(SystemParam)]
+pub(super) struct Rescue<'w, 's> {
+    watched: ResMut<'w, Watched>,
+    bodies: Query<
+        'w,
+        's,
+        (
+            &'static RigidBody,
+            &'static RigidBodyColliders,
+            &'static mut Position,
+            &'static Rotation,
+            Option<&'static ComputedCenterOfMass>,
+            &'static mut LinearVelocity,
+            &'static mut Transform,
+            Option<&'static mut CharacterMotion>,
+            Has<ChildOf>,
+        ),
+    >,
+    solids: Solids<'w, 's>,
+    terrains: Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform)>,
+    time: Option<Res<'w, Time<Physics>>>,
+    figures: ResMut<'w, PhysicsFigures>,
+}
+
+impl Rescue<'_, '_> {
+    /// Lifts whoever is in the ground; `passes` counts the look.
+    fn run(&mut self, passes: bool) {
+        let Self { watched, bodies, solids, terrains, figures, .. } = self;
+        if watched.0.is_empty() {
+            return;
         }
-        *looks > 0
-    });
-    figures.main_thread += start.elapsed();
+        let start = Instant::now();
+        let terrains: Vec<_> = terrains
+            .iter()
+            .map(|(entity, terrain, place)| (entity, terrain.world(), place, place.affine().inverse()))
+            .collect();
+        watched.0.retain(|&(entity, terrain), looks| {
+            *looks -= u8::from(passes);
+            let terrain = terrains.iter().find(|known| known.0 == terrain);
+            let (Ok(body), Some((_, world, place, inverse))) = (bodies.get_mut(entity), terrain) else {
+                return false;
+            };
+            let (body, own, mut position, rotation, center, mut velocity, mut transform, motion, is_child) =
+                body;
+            let middle = middle(&position, rotation, center);
+            let local = inverse.transform_point3(middle).as_dvec3();
+            if !local.is_finite() || !world.is_solid(local) {
+                return *looks > 0;
+            }
+            let Some(bounds) = solids.bounds(entity, body, own) else { return false };
+            if let Some(lift) = lift(world, place, local, middle, &bounds) {
+                position.0.y += lift;
+                if !is_child {
+                    transform.translation.y += lift;
+                }
+                velocity.0.y = velocity.0.y.max(0.0);
+                if let Some(mut motion) = motion {
+                    motion.velocity.y = motion.velocity.y.max(0.0);
+                }
+                figures.lifted += 1;
+            }
+            *looks > 0
+        });
+        figures.main_thread += start.elapsed();
+    }
+}
+
+/// Lifts bodies that the ground was built over since the last frame.
+pub(super) fn rescue_before(mut rescue: Rescue) {
+    rescue.run(false);
+}
+
+/// Lifts bodies that a step has squeezed into the ground, so that nobody sees them there.
+pub(super) fn rescue_after(mut rescue: Rescue) {
+    // While time stands still nobody is squeezed.
+    let passes = rescue.time.as_ref().is_none_or(|time| !time.is_paused());
+    rescue.run(passes);
+}
+
+/// Run condition: the first step of a frame. Between two steps of one frame no ground changes.
+pub(super) fn is_first_step(frame: Option<Res<FrameCount>>, mut last: Local<Option<u32>>) -> bool {
+    frame.is_none_or(|frame| last.replace(frame.0) != Some(frame.0))
 }
 
 /// The middle of a body, which need not be where its shapes count from: it is in the ground if that is.
@@ -247,14 +287,14 @@ fn middle(position: &Position, rotation: &Rotation, center: Option<&ComputedCent
     position.0 + center.map_or(Vec3::ZERO, |center| rotation * center.0)
 }
 
-/// How far up a body must go to be in the air: none if its middle is.
-fn lift(terrain: &Terrain, place: &GlobalTransform, middle: Vec3, bounds: &ColliderAabb) -> Option<f32> {
-    let affine = place.affine();
-    let local = affine.inverse().transform_point3(middle).as_dvec3();
-    let world = terrain.world();
-    if !local.is_finite() || !world.is_solid(local) {
-        return None;
-    }
+/// How far up a body must go whose middle, which is at `local` in the terrain, is in the ground.
+fn lift(
+    world: &TerrainWorld,
+    place: &GlobalTransform,
+    local: DVec3,
+    middle: Vec3,
+    bounds: &ColliderAabb,
+) -> Option<f32> {
     let size = f64::from(place.scale().y);
     let tall = f64::from(bounds.max.y - bounds.min.y) / size;
     // The box is as old as the last step, and somebody may have been lifted since.

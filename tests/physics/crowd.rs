@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
+use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::{Character, CharacterSteering, PhysicsFigures};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World as Model;
@@ -73,6 +74,33 @@ fn edit(rng: &mut Rng, model: &Model, builds: bool) -> Brush {
         0 if builds => Brush::add(Shape::sphere(center, radius), MaterialId(2)),
         1 => Brush::dig(Shape::cuboid(center, Vec3::new(radius, 2.0 * radius, radius))),
         _ => Brush::dig(Shape::sphere(center, radius)),
+    }
+}
+
+/// Is an edit to be sent in this frame? Ten are in a second.
+fn is_due(frame: u32) -> bool {
+    frame * 10 / 64 != (frame + 1) * 10 / 64
+}
+
+/// How many edits changed the ground before, and when that was in the time of bodies.
+struct Edits {
+    changed: usize,
+    seconds: f32,
+}
+
+impl Edits {
+    fn begin(stage: &Stage) -> Self {
+        Self { changed: stage.changed(), seconds: stage.seconds() }
+    }
+
+    /// Fails unless edits changed the ground ten times a second since; a tenth of them may have found nothing to change.
+    fn check(&self, stage: &mut Stage, sent: usize) {
+        let seconds = stage.seconds() - self.seconds;
+        stage.catch_up();
+        let changed = stage.changed() - self.changed;
+        println!("{sent} edits were sent in {seconds} s of physics, and {changed} changed the ground");
+        assert!(seconds > 1.0 && changed <= sent, "{changed} changes of {sent} edits in {seconds} s");
+        assert!(changed as f32 >= 9.0 * seconds, "{changed} changes of {sent} edits in {seconds} s");
     }
 }
 
@@ -158,10 +186,10 @@ fn play(builds: bool) -> PhysicsFigures {
     }
     let mut buried = Buried::default();
     let (mut sent, mut steps) = (0, 0);
+    let edits = Edits::begin(&stage);
     let start = std::time::Instant::now();
     for frame in 0..(seconds / STEP) as u32 {
-        // Ten a second, on average.
-        if frame * 10 / 64 != (frame + 1) * 10 / 64 {
+        if is_due(frame) {
             let brush = edit(&mut rng, stage.terrain(terrain).world(), builds);
             stage.send(brush);
             sent += 1;
@@ -184,6 +212,7 @@ fn play(builds: bool) -> PhysicsFigures {
         }
     }
     let took = start.elapsed();
+    edits.check(&mut stage, sent);
     stage.settle();
     let model = stage.terrain(terrain).world();
     let below =
@@ -208,10 +237,49 @@ fn play(builds: bool) -> PhysicsFigures {
     stage.figures().clone()
 }
 
+/// A tunnel with a level floor, deep below all hills, from one side of the world to the other.
+struct Tunnel {
+    floor: f32,
+    ceiling: f32,
+}
+
+impl Tunnel {
+    fn below(model: &Model) -> Self {
+        let lowest = (model.ground().height_range().0 as f32 / 256.0).floor();
+        Self { floor: lowest - 29.5, ceiling: lowest - 23.5 }
+    }
+
+    fn brush(&self) -> Brush {
+        let (middle, tall) = (SIDE as f32 / 2.0, self.ceiling - self.floor);
+        let half = Vec3::new(middle + 4.0, tall / 2.0, 5.0);
+        Brush::dig(Shape::cuboid(Vec3::new(middle, self.floor + tall / 2.0, middle), half))
+    }
+
+    /// The place on its floor that lies below another one, off its walls.
+    fn at(&self, place: Vec2) -> Vec3 {
+        Vec3::new(place.x, self.floor, SIDE as f32 / 2.0 + 6.0 * (place.y / SIDE as f32 - 0.5))
+    }
+
+    /// A hole near a body where nobody is: below the surface of the hills, or in the tunnel's ceiling. The ground that
+    /// bodies move on keeps its shape, but what draws it is made anew.
+    fn hole(&self, rng: &mut Rng, model: &Model, body: Vec3) -> Brush {
+        let radius = 1.5 + rng.f32();
+        let aside = 4.0 * Vec2::new(rng.f32() - 0.5, rng.f32() - 0.5);
+        let place = (body.xz() + aside).clamp(Vec2::splat(4.0), Vec2::splat(SIDE as f32 - 4.0));
+        let is_inside = body.y < self.ceiling;
+        // Off the surface by more than the two voxels around a brush where samples change.
+        let y = if is_inside { self.ceiling } else { height(model, place) - 4.0 - radius };
+        Brush::dig(Shape::sphere(Vec3::new(place.x, y, place.y), radius))
+    }
+}
+
 /// The tile or chunk that draws the ground under a place.
 fn drawn_below(model: &Model, place: Vec3) -> (bool, IVec3) {
     let cell = place.floor().as_ivec3();
-    let is_dug = model.mask().contains(bevy_burrow::lattice::Column::new(cell.x, cell.z));
+    let column = Column::new(cell.x, cell.z);
+    // So far below the pristine surface no tile draws anything.
+    let is_deep = 256 * (cell.y + 8) < model.ground().height(column);
+    let is_dug = is_deep || model.mask().contains(column);
     let chunk = cell.div_euclid(IVec3::splat(16));
     (is_dug, if is_dug { chunk } else { chunk.with_y(0) })
 }
@@ -232,8 +300,9 @@ impl Jumps {
     }
 }
 
-/// On gentle hills nothing but a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere. Ten
-/// times a second the ground below somebody is painted: new seams, new meshes and colliders, and the same surface.
+/// On gentle hills nothing but a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere. A fifth
+/// of the bodies are on the level floor of a tunnel below the hills. Ten times a second the ground below somebody is
+/// painted, or a hole is dug near it, out of its way: new seams, new meshes and colliders, and the same surface.
 #[test]
 fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     let (balls, walkers) = (crowd(), crowd() / 10);
@@ -253,37 +322,56 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
             Brush::paint(Shape::sphere(center, 2.0 + 4.0 * rng.f32()), MaterialId(2))
         })
         .collect();
-    stage.dig(patches);
+    let tunnel = Tunnel::below(model);
+    stage.dig(patches.into_iter().chain([tunnel.brush()]));
+    // Where a body starts, and which way it goes.
+    let start = |stage: &Stage, rng: &mut Rng, number: usize| {
+        let (place, way) = (somewhere(rng), Vec2::from_angle(rng.f32() * 6.3));
+        if number.is_multiple_of(5) {
+            (tunnel.at(place), if rng.bool() { Vec2::X } else { Vec2::NEG_X })
+        } else {
+            let y = height(stage.terrain(terrain).world(), place);
+            (Vec3::new(place.x, y, place.y), way)
+        }
+    };
     // Bodies do not meet each other here: only ground counts.
     let layers = CollisionLayers::new(LayerMask(2), LayerMask(1));
     let mut bodies = Vec::new();
-    for _ in 0..balls {
-        let (place, radius) = (somewhere(&mut rng), 0.3 + 0.4 * rng.f32());
-        let middle =
-            Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + radius + 0.05, place.y);
-        let push = Vec2::from_angle(rng.f32() * 6.3) * (2.0 + 6.0 * rng.f32());
-        let ball = stage.ball(middle, radius, Vec3::new(push.x, 0.0, push.y));
+    for number in 0..balls {
+        let ((place, way), radius) = (start(&stage, &mut rng, number), 0.3 + 0.4 * rng.f32());
+        let push = way * (2.0 + 6.0 * rng.f32());
+        let ball = stage.ball(place + Vec3::Y * (radius + 0.05), radius, Vec3::new(push.x, 0.0, push.y));
         stage.app.world_mut().entity_mut(ball).insert(layers);
         bodies.push((ball, radius));
     }
-    for _ in 0..walkers {
-        let place = somewhere(&mut rng);
-        let feet = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + 0.05, place.y);
-        let person = stage.character(feet, Vec2::from_angle(rng.f32() * 6.3));
+    for number in 0..walkers {
+        let (place, way) = start(&stage, &mut rng, number);
+        let person = stage.character(place + Vec3::Y * 0.05, way);
         stage.app.world_mut().entity_mut(person).insert(layers);
         bodies.push((person, Character::default().height / 2.0));
     }
     stage.frames(32);
-    let (mut before, mut sent, swaps) = (HashMap::<Entity, Vec<Vec3>>::new(), 0, stage.figures().swaps);
+    let (edits, swaps) = (Edits::begin(&stage), stage.figures().swaps);
+    let (mut sent, mut holes, mut waits, mut in_tunnel) = (0, 0, 0, 0);
+    let mut before = HashMap::<Entity, Vec<Vec3>>::new();
     let (mut at_seams, mut elsewhere) =
         ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
     for frame in 0..(seconds / STEP) as u32 {
-        // Ten a second, while the machine keeps up with that.
-        let is_busy = stage.terrain(terrain).queued() > 0 || stage.terrain(terrain).is_busy();
-        if frame * 10 / 64 != (frame + 1) * 10 / 64 && !is_busy {
-            let below = bodies.get(rng.usize(0..bodies.len())).map(|&(body, _)| stage.place(body));
-            let shape = Shape::sphere(below.expect("there is somebody"), 3.0 + 3.0 * rng.f32());
-            stage.send(Brush::paint(shape, MaterialId(3 + (frame % 7) as u8)));
+        if is_due(frame) {
+            // Each edit by itself: on a machine that does not keep up with them, bodies wait.
+            if !stage.is_idle() {
+                stage.catch_up();
+                waits += 1;
+            }
+            let body = stage.place(bodies[rng.usize(0..bodies.len())].0);
+            let brush = if sent % 3 == 0 {
+                holes += 1;
+                tunnel.hole(&mut rng, stage.terrain(terrain).world(), body)
+            } else {
+                let shape = Shape::sphere(body, 3.0 + 3.0 * rng.f32());
+                Brush::paint(shape, MaterialId(3 + (frame % 7) as u8))
+            };
+            stage.send(brush);
             sent += 1;
         }
         stage.frame();
@@ -298,6 +386,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
             if !inside || c.y - reach > height(model, c.xz()) + 1.0 {
                 continue;
             }
+            in_tunnel += usize::from(c.y < tunnel.ceiling);
             let jump = (c.y - 2.0 * b.y + a.y).abs();
             // The body touches the border with all of its width.
             let around = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::NEG_X, Vec2::NEG_Y];
@@ -311,10 +400,15 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
             jumps[kind].all.push(jump);
         }
     }
+    edits.check(&mut stage, sent);
     stage.settle();
     let swapped = stage.figures().swaps - swaps;
-    println!("{sent} edits swapped {swapped} colliders");
-    assert!(swapped > sent, "{swapped} colliders were swapped by {sent} edits");
+    println!(
+        "{holes} of them were holes; {swapped} colliders were swapped, bodies waited {waits} times; \
+         {in_tunnel} samples are of the tunnel"
+    );
+    assert!(swapped > sent as u64, "{swapped} colliders were swapped by {sent} edits");
+    assert!(in_tunnel > 1000, "{in_tunnel} samples of the tunnel");
     for (kind, name) in ["balls", "walkers"].iter().enumerate() {
         let (seams, plain) = (at_seams[kind].figures(), elsewhere[kind].figures());
         println!("{name}: (samples, p99, highest) at seams and borders {seams:?}, elsewhere {plain:?}");

@@ -22,7 +22,11 @@ const NAP: Duration = Duration::from_micros(500);
 
 /// The receipts so far.
 #[derive(Resource, Default)]
-struct Receipts(usize);
+struct Receipts {
+    all: usize,
+    /// Those of edits that changed some sample.
+    changed: usize,
+}
 
 /// An app with the plugin, as a dedicated server has it: no meshes, no assets.
 pub struct Stage {
@@ -44,7 +48,11 @@ impl Stage {
         .init_resource::<Receipts>()
         .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(STEP)))
         .add_systems(Last, |mut new: MessageReader<BrushApplied>, mut kept: ResMut<Receipts>| {
-            kept.0 += new.read().count();
+            for BrushApplied { receipt, .. } in new.read() {
+                kept.all += 1;
+                let is_change = receipt.outcome.as_ref().is_ok_and(|applied| applied.bounds.is_some());
+                kept.changed += usize::from(is_change);
+            }
         });
         app.finish();
         app.cleanup();
@@ -85,13 +93,30 @@ impl Stage {
     pub fn settle(&mut self) {
         self.app.world_mut().resource_mut::<Time<Physics>>().pause();
         self.frames_until("the ground settles", |stage| {
-            let world = stage.app.world_mut();
-            let mut terrains = world.query::<&Terrain>();
-            let is_idle = terrains.iter(world).all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
-            is_idle && stage.figures().colliders > 0 && stage.figures().missing == 0
+            stage.is_idle() && stage.figures().colliders > 0 && stage.figures().missing == 0
         });
         self.frames(2);
         self.app.world_mut().resource_mut::<Time<Physics>>().unpause();
+    }
+
+    /// Is no edit on its way?
+    pub fn is_idle(&mut self) -> bool {
+        let world = self.app.world_mut();
+        let mut terrains = world.query::<&Terrain>();
+        terrains.iter(world).all(|terrain| terrain.queued() == 0 && !terrain.is_busy())
+    }
+
+    /// Frames until no edit is on its way. All time stands still meanwhile: physics takes no step, not even the last one
+    /// that it takes after it was paused itself.
+    pub fn catch_up(&mut self) {
+        self.app.world_mut().resource_mut::<Time<Virtual>>().pause();
+        self.frames_until("edits are applied", Self::is_idle);
+        self.app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+    }
+
+    /// Seconds of physics so far.
+    pub fn seconds(&self) -> f32 {
+        self.app.world().resource::<Time<Physics>>().elapsed_secs()
     }
 
     pub fn figures(&self) -> &PhysicsFigures {
@@ -99,7 +124,12 @@ impl Stage {
     }
 
     pub fn receipts(&self) -> usize {
-        self.app.world().resource::<Receipts>().0
+        self.app.world().resource::<Receipts>().all
+    }
+
+    /// Edits so far that changed some sample.
+    pub fn changed(&self) -> usize {
+        self.app.world().resource::<Receipts>().changed
     }
 
     pub fn send(&mut self, brush: Brush) {
