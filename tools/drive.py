@@ -119,9 +119,10 @@ def digger(stage):
         return [int(found.group(1)) for line in stage.lines()[since:] if (found := re.search(blows, line))]
 
     radius = lambda: float(stage.last(r"^tool pickaxe radius=([\d.]+)").group(1))
-    stage.focus("Digger")
     stage.wait(r"^ready")
     stage.wait(r"^painted")
+    stage.say(f"the land is there and painted {stage.since_start():.1f} s after the start")
+    stage.focus("Digger")
     picture(stage, "1_title", see=(60, 50, 35, 40))
     for downs, name in ((1, "Settings"), (2, "Controls"), (3, "Help")):
         since = stage.mark()

@@ -39,6 +39,7 @@ class Stage:
         shutil.rmtree(config, ignore_errors=True)
         self.env["XDG_CONFIG_HOME"] = str(config)
         self.written = open(self.log, "wb")
+        self.started = time.monotonic()
         self.program = subprocess.Popen(command, env=self.env, stdout=self.written, stderr=subprocess.STDOUT)
 
     def close(self):
@@ -174,6 +175,10 @@ class Stage:
     def middle(self, name):
         left, top, right, bottom = self.place(name)
         return (left + right) / 2, (top + bottom) / 2
+
+    def since_start(self):
+        """Seconds since the program was started."""
+        return time.monotonic() - self.started
 
     def say(self, text):
         print(f"  {text}", flush=True)

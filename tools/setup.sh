@@ -4,14 +4,16 @@
 #   tools/setup.sh build          compiler, linker, Rust
 #   tools/setup.sh run            the same, and what it takes to draw: Vulkan, and X11 libraries where a display is set
 #   tools/setup.sh test           the same as run, and a C++ compiler, with which CUDA kernels are tested without a card
-#   tools/setup.sh drive          the same as run, and Python, which plays the examples
+#   tools/setup.sh drive          the same as run, and what plays the examples: Python, Xvfb, xdotool, ImageMagick
 #   tools/setup.sh lint           the same as build, and rustfmt and clippy
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
 #   tools/setup.sh ptx            Python, whose package index has the compiler of the CUDA kernels
 #   tools/setup.sh instructions   the same as build, and valgrind, which counts instructions
 #
+# With MORE=gamepad in the environment, also what the feature of that name is compiled with.
+#
 # Debian and its kin: uses apt-get, as root or with sudo, and the official Rust installer. Elsewhere it says what to
-# install. Compiling needs no -dev packages.
+# install. Else compiling needs no -dev packages.
 set -eu
 
 wanted_rust=1.95
@@ -98,6 +100,9 @@ if [ "$goal" = test ]; then
 fi
 if [ "$goal" = drive ]; then
     has python3 || want python3
+    has Xvfb || want xvfb
+    has xdotool || want xdotool
+    has import || want imagemagick
     goal=run
 fi
 if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
@@ -114,6 +119,11 @@ if [ "$goal" = run ] && [ "$(uname -s)" = Linux ]; then
         want_library libxkbcommon-x11.so.0 libxkbcommon-x11-0
     fi
 fi
+case ${MORE:-} in *gamepad*)
+    has pkg-config || want pkg-config
+    [ -e /usr/include/libudev.h ] || want libudev-dev
+    ;;
+esac
 if [ "$goal" = peers ]; then
     has python3 || want python3
     python3 -c 'import ensurepip, venv' 2>/dev/null || want python3-venv

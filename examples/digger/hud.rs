@@ -31,6 +31,11 @@ impl Hint {
     pub fn new(words: impl Into<String>) -> Self {
         Self(words.into())
     }
+
+    #[cfg(test)]
+    pub fn words(&self) -> &str {
+        &self.0
+    }
 }
 
 /// Is anything written at all? Not on pictures of the landscape.

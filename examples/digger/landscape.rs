@@ -14,6 +14,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::TerrainError;
 
 use crate::places::Places;
+use crate::toughness;
 
 pub const ROCK: MaterialId = MaterialId(0);
 pub const GRASS: MaterialId = MaterialId(1);
@@ -118,7 +119,9 @@ fn shape(survey: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
 
 /// A terrain that nobody has dug yet.
 fn on(ground: &Arc<Ground>) -> Result<Terrain, TerrainError> {
-    Terrain::new(Arc::clone(ground), &TerrainSettings { chunk_size: 32, voxel_size: 1.0 })
+    let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings { chunk_size: 32, voxel_size: 1.0 })?;
+    terrain.set_rules(toughness::rules());
+    Ok(terrain)
 }
 
 /// Old ground goes, with everything that was on its way to it; it is seen until the new one has loaded.

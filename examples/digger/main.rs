@@ -14,7 +14,7 @@
 //! | left button | uses the tool in hand; held, again and again |
 //! | right button | builds with the chosen material, as far as what was dug allows |
 //! | wheel | size of the brush |
-//! | `1` to `7` | pickaxe, shovel, drill, builder, painter, bomb, lamp |
+//! | `1` to `8` | pickaxe, shovel, drill, builder, painter, bomb, lamp, ball |
 //! | `Q` `E`, `C` | material, form of what is built |
 //! | `F`, `Z` `Y` | headlamp; undo, redo |
 //! | `F1` `F3` | panel, frame times |
@@ -34,7 +34,7 @@
 //! | `input.rs`, `bindings.rs`, `settings.rs` | actions and their keys; what the player may set |
 //! | `player.rs`, `body.rs`, `rim.rs` | the player's eyes and body, and where the world ends |
 //! | `tools.rs`, `form.rs`, `preview.rs`, `held.rs` | the tools, what they would do, and how they look in hand |
-//! | `work.rs`, `amount.rs`, `inventory.rs` | what they do to the ground, and what is left of it |
+//! | `work.rs`, `toughness.rs`, `amount.rs`, `inventory.rs` | what they do to the ground, what resists them, and what is left of it |
 //! | `bombs.rs`, `balls.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what bounces, what shines, what falls and crumbles |
 //! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
@@ -83,6 +83,7 @@ mod sky;
 mod studio;
 mod tell;
 mod tools;
+mod toughness;
 mod tour;
 mod ui;
 mod veins;
@@ -193,11 +194,13 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             preview::PreviewPlugin,
             held::HeldPlugin,
             work::WorkPlugin,
+            toughness::ToughnessPlugin,
             inventory::InventoryPlugin,
             particles::ParticlesPlugin,
             bombs::BombsPlugin,
             balls::BallsPlugin,
             lamps::LampsPlugin,
+            debris::RubblePlugin,
         ))
         .add_plugins((
             art::ArtPlugin,
@@ -216,7 +219,7 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
-    app.add_plugins((veins::VeinsPlugin, debris::RubblePlugin));
+    app.add_plugins(veins::VeinsPlugin);
     if options.tell {
         app.add_plugins(tell::TellPlugin);
     }

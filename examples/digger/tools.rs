@@ -39,6 +39,8 @@ struct Manner {
     reach: f32,
     /// Its brush: least radius, greatest, and the one it begins with.
     radius: (f32, f32, f32),
+    /// How hard the ground may be that it breaks at once.
+    power: u8,
 }
 
 const MANNERS: [Manner; 8] = [
@@ -49,6 +51,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.20,
         reach: 6.5,
         radius: (1.0, 3.5, 1.8),
+        power: 150,
     },
     Manner {
         label: "shovel",
@@ -57,6 +60,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.20,
         reach: 9.0,
         radius: (1.5, 6.0, 3.0),
+        power: 75,
     },
     Manner {
         label: "drill",
@@ -65,6 +69,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.12,
         reach: 6.0,
         radius: (1.0, 3.5, 2.1),
+        power: 190,
     },
     Manner {
         label: "builder",
@@ -73,6 +78,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.10,
         reach: 40.0,
         radius: (1.0, 12.0, 2.0),
+        power: u8::MAX,
     },
     Manner {
         label: "painter",
@@ -81,6 +87,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.12,
         reach: 40.0,
         radius: (1.0, 12.0, 2.5),
+        power: u8::MAX,
     },
     Manner {
         label: "bomb",
@@ -89,6 +96,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.28,
         reach: 40.0,
         radius: (5.5, 5.5, 5.5),
+        power: u8::MAX,
     },
     Manner {
         label: "lamp",
@@ -98,6 +106,7 @@ const MANNERS: [Manner; 8] = [
         // Across a room.
         reach: 14.0,
         radius: (0.3, 0.3, 0.3),
+        power: u8::MAX,
     },
     Manner {
         label: "ball",
@@ -106,6 +115,7 @@ const MANNERS: [Manner; 8] = [
         hit: 0.20,
         reach: 40.0,
         radius: (0.3, 0.3, 0.3),
+        power: u8::MAX,
     },
 ];
 
@@ -148,6 +158,11 @@ impl Tool {
     /// The least and the greatest radius of its brush.
     pub const fn radii(self) -> (f32, f32) {
         (self.manner().radius.0, self.manner().radius.1)
+    }
+
+    /// How hard the ground may be that it breaks at once, see [`DiggingRules`].
+    pub const fn power(self) -> u8 {
+        self.manner().power
     }
 
     /// The action that takes it.

@@ -1,4 +1,4 @@
-//! A minute of play, as a film: a flight, a pickaxe, a tunnel, bombs, a bridge, a sunset, and lamps in a cave.
+//! A minute of play, as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a cave.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use crate::film::{Film, clear, join};
 use crate::held::ShowHand;
 use crate::hud::ShowHud;
 use crate::input::Action;
-use crate::landscape::CONCRETE;
+use crate::landscape::{CONCRETE, ROCK};
 use crate::particles::{Burst, Matter};
 use crate::places::{Hillside, Places, flat};
 use crate::studio::Studio;
@@ -25,14 +25,15 @@ use crate::ui;
 use crate::works;
 
 /// Seconds of each scene.
-const FLIGHT: f32 = 10.0;
-const PICKAXE: f32 = 10.0;
-const TUNNEL: f32 = 11.0;
-const BOMBS: f32 = 8.0;
-const BRIDGE: f32 = 9.0;
-const SUNSET: f32 = 5.0;
-const LAMPS: f32 = 7.0;
-const ALL: f32 = FLIGHT + PICKAXE + TUNNEL + BOMBS + BRIDGE + SUNSET + LAMPS;
+const FLIGHT: f32 = 8.0;
+const PICKAXE: f32 = 9.0;
+const TUNNEL: f32 = 9.5;
+const BOMBS: f32 = 7.5;
+const BOULDER: f32 = 7.0;
+const BRIDGE: f32 = 8.5;
+const SUNSET: f32 = 4.0;
+const LAMPS: f32 = 6.5;
+const ALL: f32 = FLIGHT + PICKAXE + TUNNEL + BOMBS + BOULDER + BRIDGE + SUNSET + LAMPS;
 /// Seconds in which one scene fades into the next.
 const FADE: f32 = 0.4;
 
@@ -85,6 +86,7 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
     tour.pickaxe(&places.hillside)?;
     tour.tunnel(&places.hillside)?;
     tour.bombs(&places)?;
+    tour.boulder(&places)?;
     tour.bridge(&places)?;
     tour.lamps(&places.hillside)?;
     tour.film.develop(0)?;
@@ -282,6 +284,42 @@ impl Tour {
             let holds = throws.iter().any(|&throw| (throw..throw + 0.1).contains(&seconds));
             studio.hold(if holds { &[Action::Use] } else { &[] });
             studio.walk(if seconds > 5.4 { way * 0.7 } else { Vec2::ZERO });
+            Ok(())
+        })?;
+        self.rest();
+        Ok(())
+    }
+
+    /// A boulder on a pillar, and a drill through the pillar: what holds on to nothing falls.
+    fn boulder(&mut self, places: &Places) -> Result {
+        let way = Vec2::new(0.51, 0.86);
+        let place = places.corner.xz() + way * 24.0;
+        let height = self.studio().terrain()?.world().height(place.x.into(), place.y.into());
+        let foot = Vec3::new(place.x, height.ok_or("the tour left the world")? as f32, place.y);
+        let boulder = foot + Vec3::Y * 8.0 + flat(way) * 1.2;
+        let rough =
+            |brush: Brush, bumps: f32, seed: u32| brush.with_roughness(Roughness::new(bumps, 2.6, seed));
+        self.prepare([
+            rough(Brush::add(Shape::capsule(foot - Vec3::Y * 3.0, boulder, 1.1), ROCK), 0.25, 3),
+            rough(Brush::add(Shape::sphere(boulder, 2.9), ROCK), 0.5, 4),
+        ])?;
+        self.studio().carry_to(place - way * 9.0)?;
+        self.take(Tool::Drill);
+        self.scene("the boulder", BOULDER, |studio, t| {
+            let seconds = t * BOULDER;
+            let target = match seconds {
+                ..1.4 => boulder - Vec3::Y * 2.0,
+                ..3.3 => foot + Vec3::Y * 1.8,
+                _ => foot + Vec3::Y * 2.5 + flat(way) * 3.0,
+            };
+            studio.gaze(target, 0.09)?;
+            let reaches = (studio.feet()? - foot).xz().length() < 4.5;
+            studio.walk(match seconds {
+                ..2.4 if !reaches => way * 0.6,
+                3.4..5.0 => way * -0.6,
+                _ => Vec2::ZERO,
+            });
+            studio.hold(if (2.4..3.3).contains(&seconds) { &[Action::Use] } else { &[] });
             Ok(())
         })?;
         self.rest();

@@ -30,6 +30,24 @@ pub fn panel(node: Node) -> impl Bundle {
     (node, BackgroundColor(SHADE), BorderColor::all(EDGE))
 }
 
+/// A bar that fills from the left. What is filled of it is a node that has `mark`, and a width in percent: 0 at first.
+pub fn bar(width: f32, mark: impl Component) -> impl Bundle {
+    let track = Node {
+        width: px(width),
+        height: px(10),
+        border: UiRect::all(px(1)),
+        border_radius: BorderRadius::all(px(5)),
+        ..default()
+    };
+    let filled = Node {
+        width: percent(0),
+        height: percent(100),
+        border_radius: BorderRadius::all(px(4)),
+        ..default()
+    };
+    (track, BackgroundColor(SHADE), BorderColor::all(EDGE), children![(mark, filled, BackgroundColor(GOLD))])
+}
+
 /// All of the window.
 pub fn full() -> Node {
     Node { width: percent(100), height: percent(100), position_type: PositionType::Absolute, ..default() }

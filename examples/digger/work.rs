@@ -81,7 +81,7 @@ fn dig(
         _ => return,
     };
     let tag = inventory.tag();
-    brushes.write(brush.with_tag(tag));
+    brushes.write(brush.with_power(strike.tool.power()).with_tag(tag));
     blows.await_receipt(tag, place, (normal - 0.4 * along).normalize_or(Vec3::Y), chips);
     tremor.nudge(if strike.tool == Tool::Drill { 0.12 } else { 0.3 });
 }

@@ -42,9 +42,17 @@ struct Start {
     is_wanted: bool,
 }
 
-/// Says that the landscape is on its way; gone when it is there.
+/// Tells how far the landscape is; hidden when it is there.
 #[derive(Component)]
 struct Progress;
+
+/// What it says.
+#[derive(Component)]
+struct Words;
+
+/// What is filled of its bar.
+#[derive(Component)]
+struct Filled;
 
 fn open_menu(mut page: ResMut<NextState<Page>>) {
     page.set(Page::Menu);
@@ -83,9 +91,21 @@ fn open(mut commands: Commands, art: Option<Res<Art>>, game: Res<Start>) {
         left.spawn(button("Controls")).observe(go_to(Page::Controls));
         left.spawn(button("Help")).observe(go_to(Page::Help));
         left.spawn(button("Quit")).observe(quit);
-        let word = Node { margin: UiRect::top(px(26)), ..default() };
-        left.spawn((Progress, ui::text("", 15.0, ui::GOLD), word));
+        left.spawn(progress());
     });
+}
+
+/// The words over the bar. Hidden, it keeps its place, so that nothing moves below the mouse when the land is there.
+fn progress() -> impl Bundle {
+    let column = Node {
+        margin: UiRect::top(px(26)),
+        flex_direction: FlexDirection::Column,
+        row_gap: px(8),
+        ..default()
+    };
+    let line = Node { height: px(20), ..default() };
+    let words = (Words, ui::text("", 15.0, ui::GOLD), line);
+    (Progress, column, Visibility::Hidden, children![words, ui::bar(260.0, Filled)])
 }
 
 fn start(_: On<Chosen>, mut game: ResMut<Start>) {
@@ -121,17 +141,33 @@ fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
 fn tell_progress(
     players: Query<(), With<Player>>,
     painting: Res<GroundLoading>,
-    mut words: Query<&mut Text, With<Progress>>,
+    mut shown: Query<&mut Visibility, With<Progress>>,
+    mut words: Query<&mut Text, With<Words>>,
+    mut bars: Query<&mut Node, With<Filled>>,
 ) {
-    let word = if !painting.is_ready() {
-        format!("the ground is being painted: {:.0} %", 100.0 * painting.progress())
-    } else if players.is_empty() {
-        "the land is being surveyed ...".into()
-    } else {
-        String::new()
-    };
-    for mut text in &mut words {
-        text.set_if_neq(Text::new(&word));
+    let done = 100.0 * painting.progress();
+    let word = word(painting.is_ready(), done, !players.is_empty());
+    for mut shown in &mut shown {
+        shown.set_if_neq(if word.is_some() { Visibility::Inherited } else { Visibility::Hidden });
+    }
+    if let Some(word) = &word {
+        for mut text in &mut words {
+            text.set_if_neq(Text::new(word));
+        }
+    }
+    for mut bar in &mut bars {
+        if bar.width != percent(done) {
+            bar.width = percent(done);
+        }
+    }
+}
+
+/// What keeps the player waiting, if anything does.
+fn word(is_painted: bool, done: f32, has_player: bool) -> Option<String> {
+    match (is_painted, has_player) {
+        (false, _) => Some(format!("the ground is being painted: {done:.0} %")),
+        (true, false) => Some("the land is being surveyed ...".into()),
+        (true, true) => None,
     }
 }
 
@@ -164,5 +200,38 @@ fn fly(
 fn land(mut commands: Commands, eyes: Query<Entity, With<Eyes>>) {
     for eyes in &eyes {
         commands.entity(eyes).remove::<Drone>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_waits_is_told_for_what() {
+        for (is_painted, done, has_player, expected) in [
+            (false, 0.0, false, Some("the ground is being painted: 0 %")),
+            (false, 41.7, true, Some("the ground is being painted: 42 %")),
+            (true, 100.0, false, Some("the land is being surveyed ...")),
+            (true, 100.0, true, None),
+        ] {
+            assert_eq!(word(is_painted, done, has_player).as_deref(), expected);
+        }
+    }
+
+    #[test]
+    fn the_bar_shows_while_the_ground_is_painted() {
+        let mut app = App::new();
+        app.init_resource::<GroundLoading>().add_systems(Update, tell_progress);
+        let column = app.world_mut().spawn(progress()).id();
+        let mut bars = app.world_mut().query_filtered::<&mut Node, With<Filled>>();
+        bars.single_mut(app.world_mut()).expect("one bar").width = percent(73);
+        assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Hidden));
+        app.update();
+        // Nothing is painted yet.
+        assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Inherited));
+        assert_eq!(bars.single(app.world()).expect("one bar").width, percent(0));
+        let mut words = app.world_mut().query_filtered::<&Text, With<Words>>();
+        assert_eq!(words.single(app.world()).expect("words").0, "the ground is being painted: 0 %");
     }
 }
