@@ -55,14 +55,14 @@ pub(super) fn bake(side: u32, anisotropy: u16, meter: &Meter) -> Baked {
     let noise = solid_noise();
     meter.step();
     Baked {
-        albedo: array(albedo, side, TextureFormat::Rgba8UnormSrgb, anisotropy),
-        relief: array(relief, side, TextureFormat::Rgba8Unorm, anisotropy),
+        albedo: array(&albedo, side, TextureFormat::Rgba8UnormSrgb, anisotropy),
+        relief: array(&relief, side, TextureFormat::Rgba8Unorm, anisotropy),
         noise,
     }
 }
 
 /// An image array of layers that hold all their mip levels.
-fn array(layers: Vec<Vec<u8>>, side: u32, format: TextureFormat, anisotropy: u16) -> Image {
+pub(super) fn array(layers: &[Vec<u8>], side: u32, format: TextureFormat, anisotropy: u16) -> Image {
     let size = Extent3d { width: side, height: side, depth_or_array_layers: layers.len() as u32 };
     let mut image = Image::new_uninit(size, TextureDimension::D2, format, RenderAssetUsages::RENDER_WORLD);
     image.data = Some(layers.concat());

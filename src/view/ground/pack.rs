@@ -1,19 +1,19 @@
 //! A game's own pictures, packed into the arrays that the ground is drawn with.
 
-use bevy::asset::RenderAssetUsages;
-use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor, IntoDynamicImageError};
+use bevy::image::IntoDynamicImageError;
 use bevy::prelude::*;
-use bevy::render::render_resource::{
-    Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
-};
+use bevy::render::render_resource::{Extent3d, TextureFormat};
 use rayon::prelude::*;
 
 use super::GroundTextures;
+use super::bake::array;
 
 /// Most texels along a side.
 const MAX_SIDE: u32 = 4096;
 /// Most layers: what any graphics card takes, and as many as a `u8` can name.
 const MAX_ARRAY_LAYERS: usize = 256;
+/// How much sharper than usual slanting ground is filtered.
+const ANISOTROPY: u16 = 4;
 
 /// The pictures of one layer, as texture libraries have them. All are square, as large as those of the other layers, and
 /// have 8 bits per channel. Their bytes are taken as they are in the file, whether it was loaded as sRGB or not.
@@ -137,8 +137,8 @@ impl GroundArrays {
         let packed: Vec<_> = packed.into_iter().collect::<Result<_, _>>()?;
         let (albedo, relief): (Vec<_>, Vec<_>) = packed.into_iter().unzip();
         Ok(Self {
-            albedo: array(&albedo, side, TextureFormat::Rgba8UnormSrgb),
-            relief: array(&relief, side, TextureFormat::Rgba8Unorm),
+            albedo: array(&albedo, side, TextureFormat::Rgba8UnormSrgb, ANISOTROPY),
+            relief: array(&relief, side, TextureFormat::Rgba8Unorm, ANISOTROPY),
         })
     }
 
@@ -238,22 +238,11 @@ fn mean_relief(four: [[u8; 4]; 4]) -> [u8; 4] {
     [lean.x, lean.y, mean(2), mean(3)].map(|value| value.round() as u8)
 }
 
-/// An image array of layers that hold all their mip levels.
-fn array(layers: &[Vec<u8>], side: u32, format: TextureFormat) -> Image {
-    let size = Extent3d { width: side, height: side, depth_or_array_layers: layers.len() as u32 };
-    let mut image = Image::new_uninit(size, TextureDimension::D2, format, RenderAssetUsages::RENDER_WORLD);
-    image.data = Some(layers.concat());
-    image.texture_descriptor.mip_level_count = side.ilog2() + 1;
-    image.texture_view_descriptor =
-        Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() });
-    let mut sampler = ImageSamplerDescriptor::linear();
-    sampler.set_address_mode(ImageAddressMode::Repeat).set_anisotropic_filter(4);
-    image.sampler = ImageSampler::Descriptor(sampler);
-    image
-}
-
 #[cfg(test)]
 mod tests {
+    use bevy::asset::RenderAssetUsages;
+    use bevy::render::render_resource::TextureDimension;
+
     use super::*;
 
     fn plain(side: u32, texel: [u8; 4]) -> Image {
