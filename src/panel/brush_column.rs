@@ -4,7 +4,7 @@ use bevy_egui::egui::{self, Color32, CornerRadius, Pos2, Rect, Shape, Stroke, St
 
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, FAINT};
-use super::widgets::{choice, figure, metres, section, slider, swatches, switch, tiles};
+use super::widgets::{choice, figure, metres, percent, section, slider, swatches, switch, tiles};
 use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolOperation, ToolShape};
 
 /// Draws the column.
@@ -58,12 +58,6 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool) {
             Need::Step => slider(ui, "Step", &mut tool.step, 1.0..=32.0, metres),
         };
     }
-}
-
-fn percent(slider: egui::Slider<'_>) -> egui::Slider<'_> {
-    slider
-        .custom_formatter(|value, _| format!("{:.0} %", value * 100.0))
-        .custom_parser(|text| text.trim().trim_end_matches('%').trim().parse::<f64>().ok().map(|v| v / 100.0))
 }
 
 fn shape(ui: &mut Ui, tool: &mut BrushTool) {

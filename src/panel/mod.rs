@@ -22,6 +22,8 @@
 //! window. With no terrain the panel says so; with several it shows one of them at a time.
 
 mod brush_column;
+mod customs;
+mod look_section;
 mod operations;
 mod picture;
 mod plot;
@@ -44,7 +46,8 @@ use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPa
 
 use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, LooseGround, MaterialColors, Redo, Undo};
 use crate::terrain::Terrain;
-use rules_section::Customs;
+use crate::view::GroundLook;
+use customs::Customs;
 use survey::Survey;
 use world_column::{Content, TerrainLine};
 
@@ -135,7 +138,7 @@ fn draw(
     figures: Res<BurrowFigures>,
     survey: Res<Survey>,
     terrains: Query<(Entity, &Terrain)>,
-    parts: Query<(Option<&Name>, &MaterialColors, Option<&LooseGround>)>,
+    parts: Query<(Option<&Name>, &MaterialColors, Option<&LooseGround>, Option<&GroundLook>)>,
     mut places: ResMut<PanelPlaces>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
@@ -147,10 +150,10 @@ fn draw(
     }
     let chosen = survey::chosen(&panel, &terrains);
     let part = chosen.and_then(|entity| parts.get(entity).ok());
-    let materials = materials(&panel, &part.map(|(_, colors, _)| colors.clone()).unwrap_or_default());
+    let materials = materials(&panel, &part.map(|(_, colors, ..)| colors.clone()).unwrap_or_default());
     let customs =
         chosen.and_then(|entity| terrains.get(entity).ok()).map_or_else(Customs::default, |(_, terrain)| {
-            Customs::of(terrain, part.and_then(|(.., loose)| loose))
+            Customs::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))
         });
     let mut lines: Vec<TerrainLine> = terrains
         .iter()
@@ -410,7 +413,7 @@ mod tests {
         for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Found after digs", "are found"] {
             click(&mut screen, name);
         }
-        let Customs { rules, loose } = screen.customs.clone();
+        let Customs { rules, loose, .. } = screen.customs.clone();
         let clay = crate::ground::MaterialId(4);
         assert_eq!((rules.bedrock, rules.unbreakable.first()), (Some(0), Some(&clay)));
         assert!((100..160).contains(&rules.hardness[&clay]), "{rules:?}");
@@ -423,6 +426,22 @@ mod tests {
         }
         assert_eq!((screen.customs.rules.bedrock, screen.customs.loose), (None, None));
         assert!(screen.customs.rules.unbreakable.is_empty());
+    }
+
+    #[test]
+    fn looks_are_set_where_there_is_one() {
+        let mut screen = Screen::new(1280.0, 1600.0, 1);
+        assert!(!screen.places.0.contains_key("Look"));
+        screen.customs.look = Some(GroundLook::default());
+        screen.frame(Vec::new());
+        for name in ["Look", "Plain", "Variety", "Beds"] {
+            let at = screen.middle(name);
+            screen.click(at);
+            screen.frame(Vec::new());
+        }
+        let GroundLook { quality, variety, strata, .. } = screen.customs.look.expect("it is there");
+        assert_eq!(quality, crate::view::GroundQuality::Low);
+        assert!((0.4..0.6).contains(&variety) && (4.0..8.0).contains(&strata.height), "{variety} {strata:?}");
     }
 
     #[test]

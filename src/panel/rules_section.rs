@@ -1,42 +1,13 @@
 //! What brushes may do to the chosen terrain: digging rules, loose pieces.
 
-use bevy::ecs::system::Commands;
-use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui};
 
+use super::customs::Customs;
 use super::theme::FAINT;
 use super::widgets::{count, figure, metres, section, slider, swatches, switch};
 use crate::ground::MaterialId;
 use crate::plugin::LooseGround;
-use crate::terrain::Terrain;
 use crate::volume::DiggingRules;
-
-/// A terrain's rules, to be changed where they are shown.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Customs {
-    pub rules: DiggingRules,
-    pub loose: Option<LooseGround>,
-}
-
-impl Customs {
-    pub fn of(terrain: &Terrain, loose: Option<&LooseGround>) -> Self {
-        Self { rules: terrain.world().rules().cloned().unwrap_or_default(), loose: loose.copied() }
-    }
-
-    /// Hands what differs on to the terrain.
-    pub fn enact(self, before: &Self, entity: Entity, commands: &mut Commands) {
-        let mut terrain = commands.entity(entity);
-        if self.loose != before.loose {
-            match self.loose {
-                Some(loose) => terrain.insert(loose),
-                None => terrain.remove::<LooseGround>(),
-            };
-        }
-        if self.rules != before.rules {
-            terrain.entry::<Terrain>().and_modify(|mut terrain| terrain.set_rules(self.rules));
-        }
-    }
-}
 
 /// Draws both sections; `material` is the one whose hardness is shown.
 pub fn show(
@@ -112,45 +83,5 @@ fn loose(ui: &mut Ui, loose: &mut Option<LooseGround>) {
     ];
     for (name, size, help) in sizes {
         slider(ui, name, size, 0..=1 << 16, |slider| slider.logarithmic(true)).on_hover_text(help);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use bevy::prelude::{DetectChanges, World};
-
-    use super::*;
-    use crate::ground::Ground;
-    use crate::terrain::TerrainSettings;
-
-    #[test]
-    fn what_differs_and_nothing_else_is_handed_on() {
-        let mut world = World::new();
-        let ground = Ground::flat(64, 64, 8.0).expect("valid");
-        let terrain = world.spawn(Terrain::new(ground, &TerrainSettings::default()).expect("valid")).id();
-        let read = |world: &World| {
-            let entity = world.entity(terrain);
-            Customs::of(entity.get().expect("it is there"), entity.get())
-        };
-        let rules = DiggingRules::default().with_bedrock(i32::MIN).with_hardness(MaterialId(3), 9);
-        let loose = Some(LooseGround { crumbs: 5, ..LooseGround::default() });
-        let steps = [
-            Customs { rules: rules.clone(), loose: None },
-            Customs { rules: rules.clone(), loose },
-            Customs { rules: DiggingRules::default(), loose },
-            Customs::default(),
-        ];
-        for step in steps {
-            let before = read(&world);
-            assert_ne!(before, step);
-            step.clone().enact(&before, terrain, &mut world.commands());
-            world.flush();
-            assert_eq!(read(&world), step);
-            world.clear_trackers();
-            step.clone().enact(&step, terrain, &mut world.commands());
-            world.flush();
-            let terrain = world.entity(terrain).get_ref::<Terrain>().expect("it is there");
-            assert!(!terrain.is_changed() && !terrain.is_added());
-        }
     }
 }

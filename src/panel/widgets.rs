@@ -180,6 +180,13 @@ pub fn metres(slider: Slider<'_>) -> Slider<'_> {
     slider.fixed_decimals(1).suffix(" m")
 }
 
+/// The format of a slider in hundredths.
+pub fn percent(slider: Slider<'_>) -> Slider<'_> {
+    slider
+        .custom_formatter(|value, _| format!("{:.0} %", value * 100.0))
+        .custom_parser(|text| text.trim().trim_end_matches('%').trim().parse::<f64>().ok().map(|v| v / 100.0))
+}
+
 /// A name at the left and a figure at the right.
 pub fn figure(ui: &mut Ui, name: &str, value: impl Into<String>) {
     figure_in(ui, name, value, BRIGHT);

@@ -3,12 +3,12 @@
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
 
-use super::plot;
-use super::rules_section::{self, Customs};
+use super::customs::Customs;
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::survey::{Counts, Survey};
 use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
 use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
+use super::{look_section, plot, rules_section};
 use crate::backend::{Choice, EngineState, Stage};
 use crate::plugin::{BurrowFigures, BurrowSettings};
 use crate::terrain::{History, Terrain};
@@ -47,6 +47,9 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     if let Some(line) = chosen {
         let voxel = line.terrain.voxel_size();
         rules_section::show(ui, content.customs, &mut panel.material, content.materials, voxel);
+        if let Some(look) = &mut content.customs.look {
+            look_section::show(ui, look);
+        }
     }
     section(ui, "Settings", false, |ui| settings(ui, panel, content.settings));
 }
