@@ -16,7 +16,7 @@ use crate::film::{Film, clear, join};
 use crate::held::ShowHand;
 use crate::hud::ShowHud;
 use crate::input::Action;
-use crate::landscape::{CONCRETE, ROCK};
+use crate::landscape::CONCRETE;
 use crate::particles::{Burst, Matter};
 use crate::places::{Hillside, Places, flat};
 use crate::studio::Studio;
@@ -297,12 +297,7 @@ impl Tour {
         let height = self.studio().terrain()?.world().height(place.x.into(), place.y.into());
         let foot = Vec3::new(place.x, height.ok_or("the tour left the world")? as f32, place.y);
         let boulder = foot + Vec3::Y * 8.0 + flat(way) * 1.2;
-        let rough =
-            |brush: Brush, bumps: f32, seed: u32| brush.with_roughness(Roughness::new(bumps, 2.6, seed));
-        self.prepare([
-            rough(Brush::add(Shape::capsule(foot - Vec3::Y * 3.0, boulder, 1.1), ROCK), 0.25, 3),
-            rough(Brush::add(Shape::sphere(boulder, 2.9), ROCK), 0.5, 4),
-        ])?;
+        self.prepare(works::boulder(foot, boulder))?;
         self.studio().carry_to(place - way * 9.0)?;
         self.take(Tool::Drill);
         self.scene("the boulder", BOULDER, |studio, t| {

@@ -186,3 +186,12 @@ pub fn pit(corner: Vec3) -> Vec<Brush> {
     let heaps = [heap(2.6, 5.0, CLAY), heap(3.3, 4.0, ROCK), heap(1.9, 3.5, ROCK)];
     trials.into_iter().chain(terraces).chain(ramp).chain(heaps).collect()
 }
+
+/// A boulder on a pillar.
+pub fn boulder(foot: Vec3, middle: Vec3) -> [Brush; 2] {
+    let rough = |brush: Brush, bumps: f32, seed: u32| brush.with_roughness(Roughness::new(bumps, 2.6, seed));
+    [
+        rough(Brush::add(Shape::capsule(foot - Vec3::Y * 3.0, middle, 1.1), ROCK), 0.25, 3),
+        rough(Brush::add(Shape::sphere(middle, 2.9), ROCK), 0.5, 4),
+    ]
+}

@@ -24,13 +24,17 @@ impl<M: Material> Default for TerrainMaterialPlugin<M> {
 
 impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
-        app.add_systems(
-            Update,
-            (undress::<M>, dress_new::<M>, dress_all::<M>, dress_pieces::<M>)
-                .chain()
-                .in_set(BurrowSystems::Dress),
-        );
+        hand_on::<M>(app);
+        app.add_systems(Update, dress_pieces::<M>.in_set(BurrowSystems::Dress));
     }
+}
+
+/// Has tiles and chunks dressed, and no pieces: for a material that pieces do not share with their terrain.
+pub(super) fn hand_on<M: Material>(app: &mut App) {
+    app.add_systems(
+        Update,
+        (undress::<M>, dress_new::<M>, dress_all::<M>).chain().in_set(BurrowSystems::Dress),
+    );
 }
 
 /// A tile or chunk that just came.

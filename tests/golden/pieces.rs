@@ -53,6 +53,9 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.until("a piece that is dressed", |app| {
         app.world().entity(piece).contains::<MeshMaterial3d<GroundMaterial>>()
     });
+    let material =
+        |of: Entity| studio.app.world().entity(of).get::<MeshMaterial3d<GroundMaterial>>().cloned();
+    album.check(material(piece) != material(terrain), || "a piece shares its terrain's material".into());
     let cut = studio.picture();
     album.compare("piece", &cut);
     // At the bottom of the picture one sees the cut itself.

@@ -32,7 +32,7 @@ use bevy::asset::embedded_asset;
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
-use super::TerrainMaterialPlugin;
+use super::material::hand_on;
 use crate::plugin::{BurrowSystems, GroundPiece};
 use crate::terrain::Terrain;
 use material::GroundUniform;
@@ -48,17 +48,16 @@ impl Plugin for GroundPlugin {
             return;
         }
         embedded_asset!(app, "ground.wgsl");
-        app.add_plugins((
-            MaterialPlugin::<GroundMaterial>::default(),
-            TerrainMaterialPlugin::<GroundMaterial>::default(),
-        ))
-        .add_systems(
-            Update,
-            (textures::load_textures, dress, undress, follow, dress_pieces)
-                .chain()
-                .before(BurrowSystems::Dress)
-                .after(BurrowSystems::Begin),
-        );
+        hand_on::<GroundMaterial>(app);
+        app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
+            .add_systems(
+                Update,
+                (textures::load_textures, dress, undress, follow)
+                    .chain()
+                    .before(BurrowSystems::Dress)
+                    .after(BurrowSystems::Begin),
+            )
+            .add_systems(Update, dress_pieces.in_set(BurrowSystems::Dress));
     }
 }
 
