@@ -26,7 +26,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
-.PHONY: help setup run example test test-model test-plugin test-examples drive soak crowd paper pictures bench bench-backends peers instructions ptx
+.PHONY: help setup run example test test-model test-plugin test-examples drive soak crowd paper pictures bench bench-backends peers instructions ptx sanitize
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -89,7 +89,7 @@ crowd: ## 1,000 balls and 100 walkers for a minute, on ground that is dug ten ti
 
 paper: ## Do the paper's experiment again and write docs/RESULTS.md (REPEATS=10)
 	@tools/setup.sh build
-	cargo run --release $(WITHOUT_BEVY) --example paper -- --out out/paper --results docs/RESULTS.md --repeats $(REPEATS)
+	RUSTC_VERSION="$$(rustc --version)" cargo run --release $(WITHOUT_BEVY) --example paper -- --out out/paper --results docs/RESULTS.md --repeats $(REPEATS)
 
 bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short look)
 	@tools/setup.sh build
@@ -98,6 +98,10 @@ bench: ## Time the dense mesher beside public crates (ARGS="--quick" for a short
 bench-backends: ## Time the processor beside a CUDA card (ARGS="craters sweep" for some sections only)
 	@tools/setup.sh build
 	cargo bench $(WITHOUT_BEVY) --bench backends -- $(ARGS)
+
+sanitize: ## Run the kernels' tests under compute-sanitizer on a card, or in an emulator that watches its own memory (BURROW_WORLDS=20)
+	@tools/setup.sh build
+	@tools/sanitize.sh
 
 ptx: ## Compile the CUDA kernels to PTX again; needs no card (ARGS=--check to compare only)
 	@tools/setup.sh ptx

@@ -69,7 +69,140 @@
 //! | to see what the model holds | `BurrowDebugPlugin` and the switches of `BurrowDebug` (feature `debug`) |
 //! | proof | [`World::check_seams`](terrain::World::check_seams), [`World::hash`](terrain::World::hash) |
 //!
-//! Rooms, from the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
+//! # The parts, a few lines each
+//!
+//! **Sculpting**: edits like digs, with the same closed seams, undone like them.
+//!
+//! ```
+//! # #[cfg(feature = "plugin")] {
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::prelude::*;
+//! fn sculpt(hit: &TerrainHit, hill: GreyImage, brushes: &mut MessageWriter<Brush>) {
+//!     let at = Shape::sphere(hit.position, 8.0);
+//!     brushes.write(Brush::smooth(at, 0.5));
+//!     brushes.write(Brush::flatten(at, hit.position, hit.normal).with_falloff(2.0));
+//!     brushes.write(Brush::raise(at, 1.0).with_material(MaterialId(3)));
+//!     brushes.write(Brush::stamp(at, Stamp::new(hill, hit.position, Vec2::splat(12.0), 4.0).onto(hit.normal)));
+//! }
+//! # }
+//! ```
+//!
+//! **Undo and redo**, by transaction and to the bit.
+//!
+//! ```
+//! # #[cfg(feature = "plugin")] {
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::prelude::*;
+//! fn keys(keys: Res<ButtonInput<KeyCode>>, mut undo: MessageWriter<Undo>, mut redo: MessageWriter<Redo>) {
+//!     if keys.just_pressed(KeyCode::KeyZ) {
+//!         undo.write(Undo::default());
+//!     }
+//!     if keys.just_pressed(KeyCode::KeyY) {
+//!         redo.write(Redo::default());
+//!     }
+//! }
+//! # }
+//! ```
+//!
+//! **Digging rules**, and receipts that tell what they refused.
+//!
+//! ```
+//! # #[cfg(feature = "plugin")] {
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::prelude::*;
+//! fn toughen(mut terrains: Query<&mut Terrain, Added<Terrain>>) {
+//!     let (granite, adamant) = (MaterialId(2), MaterialId(9));
+//!     for mut terrain in &mut terrains {
+//!         let rules = DiggingRules::default().with_hardness(granite, 100).with_unbreakable(adamant);
+//!         terrain.set_rules(rules.with_bedrock(-20));
+//!     }
+//! }
+//!
+//! fn drill(at: Vec3, mut brushes: MessageWriter<Brush>) {
+//!     brushes.write(Brush::dig(Shape::sphere(at, 2.0)).with_power(75)); // half speed in granite
+//! }
+//!
+//! fn complain(mut answers: MessageReader<BrushApplied>) {
+//!     for answer in answers.read() {
+//!         if let Ok(applied) = &answer.receipt.outcome
+//!             && applied.refused.total() > 0
+//!         {
+//!             info!("{} voxels would not give way", applied.refused.total());
+//!         }
+//!     }
+//! }
+//! # }
+//! ```
+//!
+//! **Loose pieces**: what a dig cuts off falls, lies about and crumbles (feature `avian`); without that it is a message.
+//!
+//! ```
+//! # #[cfg(feature = "avian")] {
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::physics::DebrisPlugin;
+//! # use bevy_burrow::prelude::*;
+//! fn loosen(app: &mut App, terrain: Terrain) {
+//!     app.add_plugins(DebrisPlugin);
+//!     app.world_mut().spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
+//! }
+//! # }
+//! ```
+//!
+//! **Physics** (feature `avian`): colliders near `ColliderSource`s, and a body that walks on them.
+//!
+//! ```
+//! # #[cfg(feature = "avian")] {
+//! # use avian3d::prelude::*;
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::physics::{Character, CharacterPlugin, ColliderSource, TerrainPhysicsPlugin};
+//! fn embody(app: &mut App) {
+//!     app.add_plugins((PhysicsPlugins::default(), TerrainPhysicsPlugin, CharacterPlugin::default()));
+//!     let person = Character::default();
+//!     let place = person.standing_at(Vec3::new(20.0, 8.0, 20.0));
+//!     app.world_mut().spawn((person, place, TransformInterpolation, ColliderSource { radius: 60.0 }));
+//! }
+//! # }
+//! ```
+//!
+//! **A panel** (feature `egui`) with live figures, the terrain's rules and look, and the brush in hand to read; **views** of
+//! what the model holds (feature `debug`).
+//!
+//! ```
+//! # #[cfg(all(feature = "egui", feature = "debug"))] {
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::debug::{BurrowDebug, BurrowDebugPlugin};
+//! # use bevy_burrow::panel::{BrushTool, BurrowPanelPlugin, pointer_is_free};
+//! # use bevy_burrow::prelude::*;
+//! fn edit(app: &mut App) {
+//!     app.add_plugins((BurrowPanelPlugin, BurrowDebugPlugin))
+//!         .insert_resource(BurrowDebug { mask: true, ..default() })
+//!         .add_systems(Update, stroke.before(BurrowSystems::Collect).run_if(pointer_is_free));
+//! }
+//!
+//! fn stroke(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes: MessageWriter<Brush>) {
+//!     if let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 200.0) {
+//!         brushes.write(tool.brush_at(&hit));
+//!     }
+//! }
+//! # }
+//! ```
+//!
+//! **A look of its own**: any `Material` on the terrain, with its plugin where it is not Bevy's own.
+//!
+//! ```
+//! # #[cfg(feature = "render")] {
+//! # use bevy::prelude::*;
+//! # use bevy_burrow::prelude::*;
+//! fn paint(app: &mut App, terrain: Terrain) {
+//!     let clay = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(Color::srgb(0.7, 0.4, 0.3));
+//!     app.world_mut().spawn((terrain, MeshMaterial3d(clay)));
+//! }
+//! # }
+//! ```
+//!
+//! # Rooms
+//!
+//! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
 //! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
 //! `panel`, `debug`.
 //!

@@ -10,6 +10,8 @@ use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_burrow::ground::OVERLAY_DEPTH;
+use bevy_burrow::lattice::ONE;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::TerrainError;
 
@@ -28,7 +30,7 @@ pub const GOLD: MaterialId = MaterialId(7);
 /// The materials in the order of their ids, which is also that of the default `MaterialColors`.
 pub const MATERIALS: [(MaterialId, &str); 8] = [
     (ROCK, "rock"),
-    (GRASS, "grass"),
+    (GRASS, "turf"),
     (SAND, "sand"),
     (SNOW, "snow"),
     (CLAY, "clay"),
@@ -92,9 +94,24 @@ struct Survey(Handle<HeightmapImage>);
 #[derive(Resource)]
 struct Shaping(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
 
+/// What is drawn is what tools find: under turf, sand and snow as much of it as the ground has, then rock in its beds. Ore
+/// is where the ground has it, see `veins.rs`, and nowhere else.
+fn look() -> GroundLook {
+    let mut look = GroundLook::default();
+    for skin in [SAND, SNOW] {
+        if let Some(layer) = look.layers.get_mut(usize::from(skin.0)) {
+            layer.kind = GroundLayerKind::Body;
+        }
+    }
+    let GroundStrata { soil, subsoil, seam, vein, .. } = &mut look.strata;
+    soil.1 = OVERLAY_DEPTH as f32 / ONE as f32;
+    (subsoil.1, seam.1, vein.1) = (0.0, 0.0, 0.0);
+    look
+}
+
 /// The terrain's entity is there before its terrain: its look makes the textures be painted meanwhile.
 fn open_survey(mut commands: Commands, assets: Res<AssetServer>) {
-    commands.spawn((Name::new("Jacksboro fault"), GroundLook::default()));
+    commands.spawn((Name::new("Jacksboro fault"), look()));
     commands.insert_resource(Survey(assets.load(SURVEY_ASSET)));
 }
 

@@ -182,6 +182,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
             input::InputPlugin,
             phase::PhasePlugin,
             landscape::LandscapePlugin,
+            veins::VeinsPlugin,
             sky::SkyPlugin,
             day::DayPlugin,
             light::LightPlugin,
@@ -219,7 +220,6 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
-    app.add_plugins(veins::VeinsPlugin);
     if options.tell {
         app.add_plugins(tell::TellPlugin);
     }

@@ -10,6 +10,8 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SeamReport;
 use bevy_burrow::terrain::Memory;
 
+use crate::veins;
+
 /// What became of all brushes so far.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Logbook {
@@ -42,7 +44,8 @@ impl Plugin for LogbookPlugin {
 }
 
 fn file_receipts(mut receipts: MessageReader<BrushApplied>, mut logbook: ResMut<Logbook>) {
-    for BrushApplied { receipt, .. } in receipts.read() {
+    // What was in the land from the first is nobody's work.
+    for BrushApplied { receipt, .. } in receipts.read().filter(|answer| answer.receipt.tag != veins::TAG) {
         logbook.scenarios.count(receipt);
         match &receipt.outcome {
             Ok(applied) => {

@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
+use bevy::window::ExitSystems;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -183,7 +184,7 @@ impl SettingsFile {
     }
 }
 
-/// Reads the settings before anything else, and writes them when the player leaves their page.
+/// Reads the settings before anything else, and writes them when the player leaves their page, or from there the game.
 pub struct SettingsPlugin(pub SettingsFile);
 
 impl Plugin for SettingsPlugin {
@@ -199,7 +200,12 @@ impl Plugin for SettingsPlugin {
             .insert_resource(self.0.clone())
             .insert_resource(Broken(!unread.is_empty()))
             .add_systems(OnExit(Page::Settings), save)
-            .add_systems(OnExit(Page::Controls), save);
+            .add_systems(OnExit(Page::Controls), save)
+            .add_systems(
+                Last,
+                // The last window may close in this very frame.
+                save.after(ExitSystems).run_if(on_message::<AppExit>).run_if(are_open),
+            );
     }
 }
 
@@ -207,6 +213,11 @@ impl Plugin for SettingsPlugin {
 /// version of the game may know what it means.
 #[derive(Resource)]
 struct Broken(bool);
+
+/// Is a page open on which settings change?
+fn are_open(page: Option<Res<State<Page>>>) -> bool {
+    page.is_some_and(|page| matches!(page.get(), Page::Settings | Page::Controls))
+}
 
 fn save(settings: Res<Settings>, file: Res<SettingsFile>, mut broken: ResMut<Broken>) {
     let Some(path) = &file.0 else { return };

@@ -58,6 +58,32 @@ fn visit(app: &mut App) {
     }
 }
 
+#[test]
+fn who_leaves_the_game_from_a_page_of_settings_loses_none() {
+    for page in [Page::Settings, Page::Controls] {
+        let path = file(&format!("{page:?}"));
+        let mut app = start(&path);
+        app.world_mut().resource_mut::<NextState<Page>>().set(page);
+        app.update();
+        app.world_mut().resource_mut::<Settings>().sensitivity = 2.0;
+        app.update();
+        assert!(!path.exists(), "nobody has left yet");
+        app.world_mut().write_message(AppExit::Success);
+        app.update();
+        let sensitivity = || Settings::read(&path).expect("what was written").settings.sensitivity;
+        assert_eq!(sensitivity(), 2.0);
+        // Once.
+        app.world_mut().resource_mut::<Settings>().sensitivity = 3.0;
+        app.update();
+        assert_eq!(sensitivity(), 2.0);
+    }
+    let path = file("menu");
+    let mut app = start(&path);
+    app.world_mut().write_message(AppExit::Success);
+    app.update();
+    assert!(!path.exists(), "nothing was changed in the menu");
+}
+
 fn text(path: &Path) -> String {
     std::fs::read_to_string(path).expect("a file")
 }

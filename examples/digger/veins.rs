@@ -1,4 +1,5 @@
-//! Veins of coal, gold and clay within the hill before the player: painted into the ground where nobody sees them yet.
+//! Veins of coal, gold and clay within the hill before the player: painted into the ground where nobody sees them yet, and
+//! dug up as what they are.
 
 use std::f32::consts::TAU;
 
@@ -7,17 +8,21 @@ use bevy_burrow::prelude::*;
 
 use crate::inventory::FIRST;
 use crate::landscape::{CLAY, COAL, GOLD};
-use crate::places::Places;
+use crate::places::{Hillside, Places, flat};
 
-/// How many, and how far from the middle of the hill.
-const VEINS: u32 = 42;
+/// How many there are all over the hill, how far from its middle, and metres below the surface.
+const SPARSE: u32 = 42;
 const AROUND: f32 = 85.0;
+const DEPTHS: (f32, f32) = (3.5, 24.0);
+/// How many there are behind the slope, where one would dig: how far in, to the sides, and above its foot, in metres.
+const DENSE: u32 = 60;
+const IN: (f32, f32) = (6.0, 70.0);
+const ASIDE: (f32, f32) = (-22.0, 22.0);
+const ABOVE: (f32, f32) = (-4.0, 9.0);
 /// Of their brushes; neither the hand nor a script has it.
-const TAG: u64 = FIRST - 1;
+pub const TAG: u64 = FIRST - 1;
 /// Bytes that the ground's history may take once veins are hidden.
 const HISTORY: usize = 64 << 20;
-/// Metres below the surface.
-const DEPTHS: (f32, f32) = (3.5, 24.0);
 
 /// Hides veins when the landscape is there.
 pub struct VeinsPlugin;
@@ -35,9 +40,8 @@ fn hide(
     mut brushes: MessageWriter<Brush>,
 ) {
     let Ok(terrain) = terrains.get(ready.entity) else { return };
-    let middle = places.hillside.mouth.xz() + places.hillside.inward * 45.0;
     let height = |place: Vec2| terrain.world().height(place.x.into(), place.y.into());
-    brushes.write_batch(veins(middle, height));
+    brushes.write_batch(veins(&places.hillside, height));
 }
 
 /// Veins are part of the land: nobody takes them back, and nobody who undoes his first blow.
@@ -53,45 +57,58 @@ fn seal(mut receipts: MessageReader<BrushApplied>, mut terrains: Query<&mut Terr
 }
 
 /// The same ones in every game.
-fn veins(middle: Vec2, height: impl Fn(Vec2) -> Option<f64>) -> Vec<Brush> {
+fn veins(hill: &Hillside, height: impl Fn(Vec2) -> Option<f64>) -> Vec<Brush> {
     let mut chance = fastrand::Rng::with_seed(11);
-    let mut between = |low: f32, high: f32| low + (high - low) * chance.f32();
+    let mut between = |(low, high): (f32, f32)| low + (high - low) * chance.f32();
     let vein = |number: u32| {
-        let out = Vec2::from_angle(between(0.0, TAU)) * AROUND * between(0.0, 1.0).sqrt();
-        let depth = between(DEPTHS.0, DEPTHS.1);
-        let way = Vec2::from_angle(between(0.0, TAU)) * between(5.0, 13.0);
-        let (tilt, radius, seed) = (between(-2.5, 2.5), between(0.9, 1.7), number);
-        let place = middle + out;
-        let from = Vec3::new(place.x, height(place)? as f32 - depth, place.y);
-        let to = from + Vec3::new(way.x, tilt, way.y);
+        let place = if number < SPARSE {
+            let out = Vec2::from_angle(between((0.0, TAU))) * AROUND * between((0.0, 1.0)).sqrt();
+            let place = hill.mouth.xz() + hill.inward * 45.0 + out;
+            flat(place).with_y(height(place)? as f32 - between(DEPTHS))
+        } else {
+            let (forth, aside) = (hill.inward * between(IN), hill.inward.perp() * between(ASIDE));
+            hill.mouth + flat(forth + aside).with_y(between(ABOVE))
+        };
+        let way = Vec2::from_angle(between((0.0, TAU))) * between((5.0, 13.0));
+        let half = flat(way / 2.0).with_y(between((-1.2, 1.2)));
+        let (ends, radius, seed) = ([place - half, place + half], between((0.9, 1.7)), number);
+        let is_deep = |end: &Vec3| height(end.xz()).is_some_and(|top| end.y + DEPTHS.0 <= top as f32);
+        if !ends.iter().all(is_deep) {
+            return None;
+        }
         let material = match number % 5 {
             0 | 3 => COAL,
             1 | 4 => CLAY,
             _ => GOLD,
         };
-        let brush = Brush::paint(Shape::capsule(from, to, radius), material);
+        let brush = Brush::paint(Shape::capsule(ends[0], ends[1], radius), material);
         Some(brush.with_roughness(Roughness::new(0.8, 2.4, seed)).with_tag(TAG))
     };
-    (0..VEINS).filter_map(vein).collect()
+    (0..SPARSE + DENSE).filter_map(vein).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// At the foot of a slope that rises to the right.
+    const HILL: Hillside = Hillside { mouth: Vec3::new(60.0, 60.0, 128.0), inward: Vec2::X, onward: Vec2::Y };
+
     #[test]
     fn veins_lie_in_the_ground_and_can_be_found() {
-        let ground = Ground::from_fn(256, 256, |x, z| 60.0 + f64::from(x + z) * 0.05).expect("a world");
+        let rise = |x: i32| f64::from((x - 60).clamp(0, 40));
+        let ground = Ground::from_fn(256, 256, |x, _| 60.0 + rise(x)).expect("a world");
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
-        let all = veins(Vec2::splat(128.0), |place| terrain.world().height(place.x.into(), place.y.into()));
-        assert_eq!(all.len(), VEINS as usize);
+        let all = veins(&HILL, |place| terrain.world().height(place.x.into(), place.y.into()));
+        assert!(all.len() > (SPARSE + DENSE) as usize / 2, "{}", all.len());
         let painted: u64 = terrain
             .apply(&all)
             .iter()
             .map(|receipt| receipt.outcome.as_ref().expect("valid brushes").painted.of(GOLD))
             .sum();
         assert!(painted > 100, "{painted}");
-        assert!(terrain.world().check_seams().is_flawless());
+        // Nobody sees any of them yet.
+        assert!(terrain.world().mask().is_empty());
     }
 
     #[test]
@@ -104,7 +121,7 @@ mod tests {
         app.finish();
         app.cleanup();
         let terrain = app.world_mut().spawn(terrain).id();
-        let all = veins(Vec2::splat(128.0), |_| Some(60.0));
+        let all = veins(&HILL, |_| Some(60.0));
         app.world_mut().resource_mut::<Messages<Brush>>().write_batch(all);
         let start = std::time::Instant::now();
         let of = |app: &App| {

@@ -89,29 +89,33 @@ fn stroke(
     strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
 }
 
-fn resize(wheel: Res<AccumulatedMouseScroll>, mut tool: ResMut<BrushTool>) {
+fn resize(
+    wheel: Res<AccumulatedMouseScroll>,
+    mut tool: ResMut<BrushTool>,
+    terrain: Option<Single<&Terrain>>,
+) {
     let lines = match wheel.unit {
         MouseScrollUnit::Line => wheel.delta.y,
         MouseScrollUnit::Pixel => wheel.delta.y / MouseScrollUnit::SCROLL_UNIT_CONVERSION_FACTOR,
     };
-    if lines != 0.0 {
-        tool.grow(1.1f32.powf(lines));
+    if let (true, Some(terrain)) = (lines != 0.0, terrain) {
+        tool.grow(1.1f32.powf(lines), terrain.voxel_size());
     }
 }
 
 fn keys(
     keys: Res<ButtonInput<KeyCode>>,
     aim: Res<Aim>,
+    terrain: Option<Single<&Terrain>>,
     mut tool: ResMut<BrushTool>,
     mut panel: ResMut<BurrowPanel>,
     mut actions: MessageWriter<PanelAction>,
     mut exit: MessageWriter<AppExit>,
 ) {
-    if keys.just_pressed(KeyCode::BracketRight) {
-        tool.grow(1.25);
-    }
-    if keys.just_pressed(KeyCode::BracketLeft) {
-        tool.grow(0.8);
+    for (key, factor) in [(KeyCode::BracketRight, 1.25), (KeyCode::BracketLeft, 0.8)] {
+        if let (true, Some(terrain)) = (keys.just_pressed(key), &terrain) {
+            tool.grow(factor, terrain.voxel_size());
+        }
     }
     if keys.just_pressed(KeyCode::Tab) {
         let all: Vec<ToolOperation> = ToolOperation::all().collect();

@@ -84,8 +84,7 @@ fn note_dirty(
     for (entity, bounds) in edited.chain(restored) {
         let (Some(entity), Some(bounds)) = (entity, bounds) else { continue };
         let Ok(terrain) = terrains.get(entity) else { continue };
-        let samples = terrain.world().samples();
-        for brick in BrickPos::covering(bounds).filter(|&brick| samples.brick(brick).is_some()) {
+        for brick in terrain.world().bricks_near(bounds) {
             if dirty.0.len() >= most {
                 break;
             }

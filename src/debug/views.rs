@@ -51,12 +51,8 @@ pub fn draw(view: DebugView, world: &World, place: Place, dirty: &[Dirty], pen: 
 
 fn chunks(world: &World, place: Place, bounds: LatticeBox, pen: &mut Pen) {
     let grid = world.grid();
-    let mut chunks: Vec<ChunkPos> =
-        world.drawn_chunks().chain(world.fields().map(|(chunk, _)| chunk)).collect();
-    chunks.sort_unstable();
-    chunks.dedup();
+    let mut chunks = world.chunks_near(bounds);
     let cells = |chunk: ChunkPos| grid.chunk_cells(chunk);
-    chunks.retain(|&chunk| cells(chunk).intersection(bounds).is_some());
     let middle = |chunk: ChunkPos| (cells(chunk).min.as_vec3() + cells(chunk).max.as_vec3()) / 2.0;
     // The nearest first, should there not be room for all.
     chunks.sort_by(|&a, &b| {
@@ -81,11 +77,8 @@ fn chunks(world: &World, place: Place, bounds: LatticeBox, pen: &mut Pen) {
 }
 
 fn fields(world: &World, bounds: LatticeBox, pen: &mut Pen) {
-    let mut near: Vec<_> = world.fields().flat_map(|(_, fields)| fields.iter()).collect();
-    near.retain(|field| field.bounds.intersection(bounds).is_some());
-    near.sort_unstable_by_key(|field| field.id);
     pen.width(2.5);
-    for field in near {
+    for field in world.fields_near(bounds) {
         let color = LinearRgba::from(Oklcha::sequential_dispersed(field.id.0 as u32));
         pen.cuboid(field.bounds.min.as_vec3() - 0.1, field.bounds.max.as_vec3() + 0.1, color);
     }

@@ -2,19 +2,38 @@
 
 use bevy_egui::egui::{self, Color32, CornerRadius, Pos2, Rect, Shape, Stroke, StrokeKind, Ui, Vec2};
 
+use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP};
 use super::operations::{Need, OPERATIONS};
-use super::theme::{ACCENT, FAINT};
-use super::widgets::{choice, figure, metres, percent, section, slider, swatches, switch, tiles};
-use super::{BrushTool, LENGTHS, RADII, ToolAlign, ToolOperation, ToolShape};
+use super::theme::{ACCENT, BAD, FAINT};
+use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
+use super::{BrushTool, ToolAlign, ToolOperation, ToolShape};
 
-/// Draws the column.
-pub fn show(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) {
-    section(ui, "Operation", true, |ui| operations(ui, tool));
-    section(ui, "Shape", true, |ui| shape(ui, tool));
-    if tool.operation.row().needs.contains(&Need::Material) {
-        section(ui, "Material", true, |ui| material(ui, tool, materials));
+/// Draws the column, for a terrain whose voxels are `voxel` metres wide; `rejection` is why it refused the last brush.
+pub fn show(
+    ui: &mut Ui,
+    tool: &mut BrushTool,
+    materials: &[(Color32, String)],
+    voxel: f32,
+    rejection: Option<&str>,
+) {
+    if let Some(why) = rejection {
+        let line = ui.label(egui::RichText::new(format!("Rejected: {why}")).color(BAD).size(12.0));
+        note(ui, "Rejected", line.rect);
     }
-    section(ui, "Surface", true, |ui| surface(ui, tool));
+    section(ui, "Operation", true, |ui| operations(ui, tool, voxel));
+    section(ui, "Shape", true, |ui| shape(ui, tool, voxel));
+    let row = tool.operation.row();
+    if row.needs.contains(&Need::Material) {
+        section(ui, "Material", true, |ui| material(ui, tool, materials));
+    } else if row.sculpts() {
+        section(ui, "New ground", false, |ui| {
+            switch(ui, "Of a material", &mut tool.is_of_material);
+            if tool.is_of_material {
+                material(ui, tool, materials);
+            }
+        });
+    }
+    section(ui, "Surface", true, |ui| surface(ui, tool, voxel));
     section(ui, "Stroke", true, |ui| {
         slider(ui, "Rate", &mut tool.rate, 1.0..=30.0, |slider| slider.max_decimals(0).suffix(" /s"));
         slider(ui, "Power", &mut tool.power, 0..=u8::MAX, |slider| slider).on_hover_text(
@@ -23,7 +42,7 @@ pub fn show(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) 
     });
 }
 
-fn operations(ui: &mut Ui, tool: &mut BrushTool) {
+fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     let names: Vec<&str> = OPERATIONS.iter().map(|row| row.name).collect();
     let chosen = OPERATIONS.iter().position(|row| row.tool == tool.operation).unwrap_or_default();
     let clicked = tiles(ui, 4, &names, chosen, |ui, at, rect, color| {
@@ -52,15 +71,15 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool) {
         match need {
             Need::Material => continue,
             Need::Strength => slider(ui, "Strength", &mut tool.strength, 0.0..=1.0, percent),
-            Need::Falloff => slider(ui, "Falloff", &mut tool.falloff, 0.0..=16.0, metres),
-            Need::Amount => slider(ui, "Amount", &mut tool.amount, 0.0..=16.0, metres),
+            Need::Falloff => slider(ui, "Falloff", &mut tool.falloff, FALLOFF.range(voxel), metres),
+            Need::Amount => slider(ui, "Amount", &mut tool.amount, AMOUNT.range(voxel), metres),
             Need::Level => slider(ui, "Height", &mut tool.level, -128.0..=256.0, metres),
-            Need::Step => slider(ui, "Step", &mut tool.step, 1.0..=32.0, metres),
+            Need::Step => slider(ui, "Step", &mut tool.step, STEP.range(voxel), metres),
         };
     }
 }
 
-fn shape(ui: &mut Ui, tool: &mut BrushTool) {
+fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     let names = ToolShape::ALL.map(ToolShape::name);
     let chosen = ToolShape::ALL.iter().position(|&shape| shape == tool.shape).unwrap_or_default();
     let clicked = tiles(ui, 5, &names, chosen, |ui, at, rect, color| {
@@ -72,7 +91,7 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool) {
     if let Some(&shape) = clicked.and_then(|at| ToolShape::ALL.get(at)) {
         tool.shape = shape;
     }
-    let radii = RADII.0..=RADII.1;
+    let radii = RADIUS.range(voxel);
     if tool.shape == ToolShape::Box {
         slider(ui, "Half width", &mut tool.half.x, radii.clone(), length);
         slider(ui, "Half height", &mut tool.half.y, radii.clone(), length);
@@ -82,7 +101,7 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool) {
         slider(ui, "Radius", &mut tool.radius, radii, length);
     }
     if tool.shape.is_long() {
-        slider(ui, "Length", &mut tool.length, LENGTHS.0..=LENGTHS.1, length);
+        slider(ui, "Length", &mut tool.length, LENGTH.range(voxel), length);
     }
     slider(ui, "Sink", &mut tool.sink, -1.0..=1.0, percent);
     let aligns = [ToolAlign::Upright, ToolAlign::Surface];
@@ -108,11 +127,12 @@ fn material(ui: &mut Ui, tool: &mut BrushTool, materials: &[(Color32, String)]) 
     ui.label(egui::RichText::new(name).size(12.0));
 }
 
-fn surface(ui: &mut Ui, tool: &mut BrushTool) {
+fn surface(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     switch(ui, "Rough", &mut tool.is_rough);
     if tool.is_rough {
-        slider(ui, "Bumps", &mut tool.bump, 0.0..=4.0, |slider| slider.fixed_decimals(2).suffix(" m"));
-        slider(ui, "Width", &mut tool.bump_width, 1.0..=32.0, length);
+        let bumps = BUMP.range(voxel);
+        slider(ui, "Bumps", &mut tool.bump, bumps, |slider| slider.fixed_decimals(2).suffix(" m"));
+        slider(ui, "Width", &mut tool.bump_width, BUMP_WIDTH.range(voxel), length);
         slider(ui, "Pattern", &mut tool.seed, 0..=99, |slider| slider);
     }
 }

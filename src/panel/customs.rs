@@ -2,6 +2,7 @@
 
 use bevy::ecs::system::Commands;
 use bevy::prelude::{Entity, EntityWorldMut};
+use bevy::tasks::AsyncComputeTaskPool;
 
 use crate::plugin::LooseGround;
 use crate::terrain::Terrain;
@@ -12,14 +13,17 @@ use crate::volume::DiggingRules;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Customs {
     pub rules: DiggingRules,
+    /// Bytes that undo may take.
+    pub undo_budget: usize,
     pub loose: Option<LooseGround>,
     pub look: Option<GroundLook>,
 }
 
 impl Customs {
     pub fn of(terrain: &Terrain, loose: Option<&LooseGround>, look: Option<&GroundLook>) -> Self {
-        let rules = terrain.world().rules().cloned().unwrap_or_default();
-        Self { rules, loose: loose.copied(), look: look.cloned() }
+        let rules = terrain.rules().cloned().unwrap_or_default();
+        let undo_budget = terrain.undo_budget();
+        Self { rules, undo_budget, loose: loose.copied(), look: look.cloned() }
     }
 
     /// Hands what differs on to the terrain.
@@ -41,16 +45,28 @@ impl Customs {
                 }
             });
         }
+        if self.undo_budget != before.undo_budget {
+            terrain.queue_silenced(move |mut terrain: EntityWorldMut| {
+                let Some(mut terrain) = terrain.get_mut::<Terrain>() else { return };
+                let waste = terrain.rebudget_undo(self.undo_budget);
+                if !waste.is_empty() {
+                    AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
+                }
+            });
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use bevy::math::Vec3;
     use bevy::prelude::{DetectChanges, World};
+    use bevy::tasks::TaskPool;
 
     use super::*;
+    use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, MaterialId};
-    use crate::terrain::TerrainSettings;
+    use crate::terrain::{History, TerrainSettings};
 
     #[test]
     fn what_differs_and_nothing_else_is_handed_on() {
@@ -66,9 +82,10 @@ mod tests {
         let rules = DiggingRules::default().with_bedrock(i32::MIN).with_hardness(MaterialId(3), 9);
         let loose = Some(LooseGround { crumbs: 5, ..LooseGround::default() });
         let steps = [
-            Customs { rules: rules.clone(), loose: None, look: look.clone() },
-            Customs { rules: rules.clone(), loose, look: look.clone() },
-            Customs { rules: DiggingRules::default(), loose, look: look.clone() },
+            Customs { rules: rules.clone(), undo_budget: 5 << 20, loose: None, look: look.clone() },
+            Customs { rules: rules.clone(), undo_budget: 6 << 20, loose: None, look: look.clone() },
+            Customs { rules: rules.clone(), undo_budget: 6 << 20, loose, look: look.clone() },
+            Customs { rules: DiggingRules::default(), undo_budget: 6 << 20, loose, look: look.clone() },
             Customs {
                 look: Some(GroundLook { variety: 0.25, ..GroundLook::default() }),
                 ..Customs::default()
@@ -86,5 +103,25 @@ mod tests {
             let terrain = world.entity(terrain).get_ref::<Terrain>().expect("it is there");
             assert!(!terrain.is_changed() && !terrain.is_added());
         }
+    }
+
+    #[test]
+    fn each_terrain_has_its_own_budget_of_undo() {
+        AsyncComputeTaskPool::get_or_init(TaskPool::default);
+        let mut world = World::new();
+        let [large, small] = [20.0, 40.0].map(|x| {
+            let ground = Ground::flat(64, 64, 8.0).expect("valid");
+            let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+            terrain.apply([Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0))]);
+            world.spawn(terrain).id()
+        });
+        let read = |world: &World, of| world.get::<Terrain>(of).map(|of| (of.undo_budget(), of.history()));
+        let before = Customs::of(world.get(small).expect("it is there"), None, None);
+        let (at_first, of_large) = (read(&world, small), read(&world, large));
+        assert!(at_first.is_some_and(|(budget, history)| budget == before.undo_budget && history.undos == 1));
+        Customs { undo_budget: 0, ..before.clone() }.enact(&before, small, &mut world.commands());
+        world.flush();
+        assert_eq!(read(&world, small), Some((0, History::default())));
+        assert_eq!(read(&world, large), of_large);
     }
 }

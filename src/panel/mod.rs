@@ -23,6 +23,7 @@
 
 mod brush_column;
 mod customs;
+mod lengths;
 mod look_section;
 mod operations;
 mod picture;
@@ -41,20 +42,21 @@ pub use tool::{BrushTool, StampImage, ToolAlign, ToolShape};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Align2, Color32, Id, Order, RichText, ScrollArea, Ui, Vec2};
+use bevy_egui::egui::{self, Align2, Color32, Id, LayerId, Order, RichText, ScrollArea, Ui, Vec2};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
-use crate::plugin::{BurrowFigures, BurrowSettings, BurrowSystems, LooseGround, MaterialColors, Redo, Undo};
+use crate::plugin::{
+    BrushApplied, BurrowFigures, BurrowSettings, BurrowSystems, LooseGround, MaterialColors, Redo, Undo,
+};
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
 use customs::Customs;
 use survey::Survey;
 use world_column::{Content, TerrainLine};
 
-/// The least and the greatest radius that the panel offers, in metres.
-const RADII: (f32, f32) = (0.5, 32.0);
-/// The least and the greatest length.
-const LENGTHS: (f32, f32) = (1.0, 64.0);
+/// What egui knows the columns by.
+const BRUSH: &str = "burrow brush";
+const WORLD: &str = "burrow world";
 
 /// Adds the panel to a game that has `BurrowPlugins`, and egui if it is not there. A game that adds egui by itself does so
 /// before.
@@ -81,7 +83,7 @@ impl Plugin for BurrowPanelPlugin {
                     survey::finish_seam_check,
                     picture::finish,
                     act,
-                    set_undo_budget,
+                    note_rejection,
                 )
                     .chain()
                     .after(BurrowSystems::Begin),
@@ -117,15 +119,12 @@ fn act(
     }
 }
 
-/// Hands a new budget of undo on to the terrains.
-fn set_undo_budget(
-    panel: Res<BurrowPanel>,
-    mut terrains: Query<&mut Terrain>,
-    mut last: Local<Option<usize>>,
-) {
-    let budget = panel.undo_mebibytes;
-    if last.replace(budget).is_some_and(|last| last != budget) {
-        terrains.iter_mut().for_each(|mut terrain| terrain.set_undo_budget(budget << 20));
+/// Takes down why the last brush was rejected, until one is not.
+fn note_rejection(mut receipts: MessageReader<BrushApplied>, mut panel: ResMut<BurrowPanel>) {
+    let Some(last) = receipts.read().last() else { return };
+    let rejection = last.receipt.outcome.as_ref().err().map(ToString::to_string);
+    if panel.rejection != rejection {
+        panel.rejection = rejection;
     }
 }
 
@@ -144,10 +143,12 @@ fn draw(
     mut actions: MessageWriter<PanelAction>,
     mut commands: Commands,
 ) {
-    let Ok(context) = contexts.ctx_mut() else { return };
-    if !panel.is_open {
+    let (true, Ok(context)) = (panel.is_open, contexts.ctx_mut()) else {
+        // Nothing of it is on the screen.
+        places.set_if_neq(PanelPlaces::default());
         return;
-    }
+    };
+    let was_typing = context.text_edit_focused();
     let chosen = survey::chosen(&panel, &terrains);
     let part = chosen.and_then(|entity| parts.get(entity).ok());
     let materials = materials(&panel, &part.map(|(_, colors, ..)| colors.clone()).unwrap_or_default());
@@ -164,17 +165,18 @@ fn draw(
         })
         .collect();
     lines.sort_unstable_by_key(|line| line.entity);
+    let voxel = voxel_size(&lines, chosen);
 
     let (mut new_tool, mut new_panel, mut new_settings) = (tool.clone(), panel.clone(), settings.clone());
     let mut new_customs = customs.clone();
     let mut pressed = Vec::new();
     if panel.shows_brush {
-        column(context, "burrow brush", Align2::LEFT_TOP, "Brush", |ui| {
-            brush_column::show(ui, &mut new_tool, &materials);
+        column(context, BRUSH, Align2::LEFT_TOP, "Brush", |ui| {
+            brush_column::show(ui, &mut new_tool, &materials, voxel, panel.rejection.as_deref());
         });
     }
     if panel.shows_world {
-        column(context, "burrow world", Align2::RIGHT_TOP, "World", |ui| {
+        column(context, WORLD, Align2::RIGHT_TOP, "World", |ui| {
             let mut content = Content {
                 terrains: &lines,
                 chosen,
@@ -194,6 +196,7 @@ fn draw(
             }
         });
     }
+    free_keyboard(context, was_typing);
     // Whoever watches them for changes is told of real ones only.
     tool.set_if_neq(new_tool);
     panel.set_if_neq(new_panel);
@@ -203,6 +206,24 @@ fn draw(
         new_customs.enact(&customs, entity, &mut commands);
     }
     actions.write_batch(pressed);
+}
+
+/// Metres along the chosen terrain's voxels.
+fn voxel_size(lines: &[TerrainLine], chosen: Option<Entity>) -> f32 {
+    lines.iter().find(|line| Some(line.entity) == chosen).map_or(1.0, |line| line.terrain.voxel_size())
+}
+
+/// Takes the keyboard from a widget of the panel in which nothing is typed: egui gives it to one when `Tab` is pressed, and
+/// keys are the game's. That one which `Tab` came to would be typed into is no reason to keep it.
+fn free_keyboard(context: &egui::Context, was_typing: bool) {
+    let Some(focused) = context.memory(|memory| memory.focused()) else { return };
+    let columns = [BRUSH, WORLD].map(|id| LayerId::new(Order::Middle, Id::new(id)));
+    let is_own = context.read_response(focused).is_some_and(|widget| columns.contains(&widget.layer_id));
+    let is_typing = context.text_edit_focused()
+        && (was_typing || !context.input(|input| input.key_pressed(egui::Key::Tab)));
+    if is_own && !is_typing {
+        context.memory_mut(|memory| memory.surrender_focus(focused));
+    }
 }
 
 /// Colours and names by id, as many as there are of both.

@@ -21,14 +21,14 @@ pub struct BurrowPanel {
     /// What materials are called, by id. The panel offers these; their colours are those of the terrain's
     /// [`MaterialColors`](crate::plugin::MaterialColors).
     pub materials: Vec<String>,
-    /// What undo may take of memory, in MiB, of each terrain. Terrains keep their own budget until this changes.
-    pub undo_mebibytes: usize,
     /// Where pictures are saved, as `burrow_0001.png` and so on.
     pub pictures: PathBuf,
     /// The material whose hardness is shown.
     pub(super) material: usize,
     /// What the panel has to say: the last seam check, the last picture.
     pub(super) note: Option<Note>,
+    /// Why the last brush was rejected, if it was.
+    pub(super) rejection: Option<String>,
 }
 
 impl Default for BurrowPanel {
@@ -54,10 +54,10 @@ impl Default for BurrowPanel {
             shows_world: true,
             terrain: None,
             materials: names.map(String::from).to_vec(),
-            undo_mebibytes: 64,
             pictures: PathBuf::from("pictures"),
             material: 0,
             note: None,
+            rejection: None,
         }
     }
 }
@@ -94,7 +94,7 @@ pub struct PanelInput {
 }
 
 /// Where the panel's widgets were drawn in the last frame, by name, in logical pixels from the window's upper left corner.
-/// Of a slider it is the rail, of a section its heading, of a figure its line.
+/// Of a slider it is the rail, of a section its heading, of a figure its line. Empty while the panel is closed.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct PanelPlaces(pub HashMap<String, Rect>);
@@ -118,7 +118,8 @@ pub(super) fn read_input(
     for mut context in &mut contexts {
         let context = context.get_mut();
         now.has_pointer |= context.is_pointer_over_egui() || context.egui_is_using_pointer();
-        now.has_keyboard |= context.egui_wants_keyboard_input();
+        // A widget that has the focus is not typed into for that.
+        now.has_keyboard |= context.text_edit_focused();
     }
     input.set_if_neq(now);
 }

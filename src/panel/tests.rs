@@ -2,9 +2,13 @@
 
 use bevy_egui::egui::{Event, Modifiers, PointerButton, Pos2, RawInput, Rect};
 
+use bevy_egui::EguiUserTextures;
+
 use super::*;
-use crate::ground::Ground;
-use crate::terrain::TerrainSettings;
+use crate::brush::{BrushError, Edit};
+use crate::ground::{Ground, MaterialId};
+use crate::plugin::TerrainHit;
+use crate::terrain::{Applied, Receipt, Rejection, TerrainSettings};
 
 /// The panel on a screen of its own, without an app.
 struct Screen {
@@ -59,16 +63,19 @@ impl Screen {
             .collect();
         let materials = materials(&self.panel, &MaterialColors::default());
         let (figures, survey) = (BurrowFigures::default(), Survey::default());
+        let chosen = self.panel.terrain.or(lines.first().map(|line| line.entity));
+        let voxel = voxel_size(&lines, chosen);
         let mut actions = Vec::new();
         let _ = self.context.run_ui(input, |ui| {
             let context = ui.ctx().clone();
-            column(&context, "burrow brush", Align2::LEFT_TOP, "Brush", |ui| {
-                brush_column::show(ui, &mut self.tool, &materials);
+            let was_typing = context.text_edit_focused();
+            column(&context, BRUSH, Align2::LEFT_TOP, "Brush", |ui| {
+                brush_column::show(ui, &mut self.tool, &materials, voxel, self.panel.rejection.as_deref());
             });
-            column(&context, "burrow world", Align2::RIGHT_TOP, "World", |ui| {
+            column(&context, WORLD, Align2::RIGHT_TOP, "World", |ui| {
                 let mut content = Content {
                     terrains: &lines,
-                    chosen: self.panel.terrain.or(lines.first().map(|line| line.entity)),
+                    chosen,
                     figures: &figures,
                     survey: &survey,
                     settings: &mut self.settings,
@@ -78,6 +85,7 @@ impl Screen {
                 };
                 world_column::show(ui, &mut self.panel, &mut content);
             });
+            free_keyboard(&context, was_typing);
         });
         self.actions.append(&mut actions);
         self.places = widgets::places(&self.context);
@@ -101,6 +109,20 @@ impl Screen {
         self.frame(vec![Event::PointerMoved(at)]);
         self.frame(vec![Self::button(at, true)]);
         self.frame(vec![Self::button(at, false)]);
+    }
+
+    /// Drags a slider beyond its lower or its upper end.
+    fn drag(&mut self, name: &str, is_up: bool) {
+        let (from, rail) = (self.middle(name), self.places.0[name]);
+        let to = Pos2::new(if is_up { rail.max.x + 30.0 } else { rail.min.x - 30.0 }, from.y);
+        self.frame(vec![Event::PointerMoved(from)]);
+        self.frame(vec![Self::button(from, true)]);
+        self.frame(vec![Event::PointerMoved(to)]);
+        self.frame(vec![Self::button(to, false)]);
+    }
+
+    fn press(&mut self, key: egui::Key, modifiers: Modifiers) {
+        self.frame(vec![Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers }]);
     }
 }
 
@@ -148,6 +170,19 @@ fn tiles_and_sliders_set_the_brush() {
     screen.frame(vec![Event::PointerMoved(to)]);
     screen.frame(vec![Screen::button(to, false)]);
     assert!(screen.tool.radius > 2.0 * small, "{} {small}", screen.tool.radius);
+}
+
+#[test]
+fn sculpting_makes_ground_of_a_material_where_told_so() {
+    let mut screen = Screen::new(1280.0, 1600.0, 1);
+    assert!(!screen.places.0.contains_key("New ground"));
+    for name in ["Raise", "New ground", "Of a material", "Clay"] {
+        let at = screen.middle(name);
+        screen.click(at);
+        screen.frame(Vec::new());
+    }
+    assert!(screen.tool.is_of_material);
+    assert_eq!(screen.tool.material, 4);
 }
 
 #[test]
@@ -231,5 +266,171 @@ fn egui_has_the_pointer_over_a_column_only() {
         screen.frame(vec![Event::PointerMoved(at)]);
         screen.frame(Vec::new());
         assert_eq!(screen.context.is_pointer_over_egui(), is_over, "{at:?}");
+    }
+}
+
+#[test]
+fn tab_is_left_to_the_game() {
+    let mut screen = Screen::new(1280.0, 1600.0, 1);
+    // The last widgets are sliders with numbers that could be typed.
+    let at = screen.middle("Settings");
+    screen.click(at);
+    screen.frame(Vec::new());
+    for modifiers in [Modifiers::NONE, Modifiers::NONE, Modifiers::SHIFT, Modifiers::SHIFT] {
+        screen.press(egui::Key::Tab, modifiers);
+        assert_eq!(screen.context.memory(|memory| memory.focused()), None, "{modifiers:?}");
+        assert!(!screen.context.text_edit_focused());
+    }
+}
+
+#[test]
+fn numbers_are_typed_where_one_clicks_on_them() {
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    let rail = screen.places.0["Radius"];
+    screen.click(Pos2::new(rail.max.x + 25.0, rail.center().y));
+    assert!(screen.context.text_edit_focused());
+    screen.frame(Vec::new());
+    screen.frame(vec![Event::Text("7".into())]);
+    assert!(screen.context.text_edit_focused());
+    screen.press(egui::Key::Enter, Modifiers::NONE);
+    screen.frame(Vec::new());
+    assert_eq!(screen.tool.radius, 7.0);
+    assert_eq!(screen.context.memory(|memory| memory.focused()), None);
+}
+
+#[test]
+fn what_sliders_offer_the_terrain_takes() {
+    let hit = TerrainHit {
+        terrain: Entity::PLACEHOLDER,
+        distance: 9.0,
+        position: Vec3::new(10.0, 20.0, 30.0),
+        normal: Vec3::Y,
+        material: MaterialId(1),
+        from_inside: false,
+    };
+    let sliders = [
+        "Radius",
+        "Half width",
+        "Half height",
+        "Half depth",
+        "Length",
+        "Falloff",
+        "Amount",
+        "Height",
+        "Step",
+        "Bumps",
+        "Width",
+    ];
+    for voxel_size in [0.125, 8.0] {
+        let mut screen = Screen::new(1280.0, 1600.0, 0);
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        let settings = TerrainSettings { voxel_size, ..TerrainSettings::default() };
+        screen.terrains.push(Terrain::new(ground, &settings).expect("valid"));
+        let at = screen.middle("Rough");
+        screen.click(at);
+        let mut dragged = 0;
+        let combinations = ToolOperation::all().map(|operation| (operation, ToolShape::Sphere));
+        let shapes = ToolShape::ALL.map(|shape| (ToolOperation::Stamp, shape));
+        for (operation, shape) in combinations.chain(shapes) {
+            (screen.tool.operation, screen.tool.shape) = (operation, shape);
+            for is_up in [false, true] {
+                (0..2).for_each(|_| screen.frame(Vec::new()));
+                let is_seen = |name: &&str| screen.places.0.contains_key(*name);
+                let seen: Vec<&str> = sliders.into_iter().filter(is_seen).collect();
+                seen.iter().for_each(|name| screen.drag(name, is_up));
+                dragged += seen.len();
+                let brush = screen.tool.brush_at(&hit);
+                let brush = brush.transformed(Quat::IDENTITY, Vec3::ZERO, voxel_size.recip());
+                let edit = Edit::quantize(&brush);
+                assert!(edit.is_ok(), "{edit:?} at {voxel_size}: {:?}", screen.tool);
+            }
+        }
+        assert!(dragged > 100, "{dragged}");
+    }
+}
+
+#[test]
+fn other_voxels_change_no_setting_by_themselves() {
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    (screen.tool.radius, screen.tool.operation) = (90.0, ToolOperation::Terrace);
+    let before = screen.tool.clone();
+    let ground = Ground::flat(64, 64, 8.0).expect("valid");
+    let settings = TerrainSettings { voxel_size: 8.0, ..TerrainSettings::default() };
+    screen.terrains = vec![Terrain::new(ground, &settings).expect("valid")];
+    (0..3).for_each(|_| screen.frame(Vec::new()));
+    assert_eq!(screen.tool, before);
+    screen.drag("Step", false);
+    assert_eq!(screen.tool, BrushTool { step: 8.0, ..before });
+}
+
+#[test]
+fn a_rejection_is_seen_until_a_brush_is_accepted() {
+    let mut app = App::new();
+    app.init_resource::<BurrowPanel>().add_message::<BrushApplied>().add_systems(Update, note_rejection);
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    let small = BrushError::TooSmall { what: "radius", value: 0.1, least: 0.25 };
+    for (outcome, is_seen) in [
+        (Err(Rejection::Brush(small)), true),
+        (Err(Rejection::OutsideWorld), true),
+        (Ok(Applied::default()), false),
+    ] {
+        app.world_mut().write_message(BrushApplied { terrain: None, receipt: Receipt { tag: 0, outcome } });
+        // Until something else is heard.
+        for _ in 0..3 {
+            app.update();
+            screen.panel = app.world().resource::<BurrowPanel>().clone();
+            screen.frame(Vec::new());
+            assert_eq!(screen.places.0.contains_key("Rejected"), is_seen);
+        }
+    }
+}
+
+#[test]
+fn history_is_that_of_the_chosen_terrain() {
+    let mut screen = Screen::new(1280.0, 1600.0, 0);
+    screen.frame(Vec::new());
+    let at = screen.middle("Settings");
+    screen.click(at);
+    screen.frame(Vec::new());
+    assert!(!screen.places.0.contains_key("History"), "there is no terrain");
+    let mut screen = Screen::new(1280.0, 1600.0, 1);
+    // No whole number of MiB.
+    let odd = (5 << 20) + 123;
+    screen.customs.undo_budget = odd;
+    let at = screen.middle("Settings");
+    screen.click(at);
+    screen.frame(Vec::new());
+    assert_eq!(screen.customs.undo_budget, odd);
+    screen.drag("History", true);
+    assert_eq!(screen.customs.undo_budget, 1 << 30);
+    screen.drag("History", false);
+    assert_eq!(screen.customs.undo_budget, 0);
+}
+
+#[test]
+fn a_closed_panel_is_nowhere() {
+    let mut app = App::new();
+    app.init_resource::<BrushTool>()
+        .init_resource::<BurrowPanel>()
+        .init_resource::<BurrowSettings>()
+        .init_resource::<BurrowFigures>()
+        .init_resource::<Survey>()
+        .init_resource::<PanelPlaces>()
+        .init_resource::<EguiUserTextures>()
+        .add_message::<PanelAction>()
+        .add_systems(Update, draw);
+    let camera = app.world_mut().spawn(PrimaryEguiContext).id();
+    let mut camera = app.world_mut().entity_mut(camera);
+    let context = camera.get_mut::<bevy_egui::EguiContext>().expect("required").get_mut().clone();
+    for (is_open, is_somewhere) in [(true, true), (false, false), (true, true)] {
+        app.world_mut().resource_mut::<BurrowPanel>().is_open = is_open;
+        for _ in 0..3 {
+            let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 720.0));
+            let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
+            let _ = context.run_ui(input, |_| app.update());
+        }
+        let places = app.world().resource::<PanelPlaces>();
+        assert_eq!(places.0.contains_key("Radius"), is_somewhere);
+        assert!(is_somewhere || places.0.is_empty());
     }
 }

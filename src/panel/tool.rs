@@ -4,6 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use bevy::prelude::*;
 
+use super::lengths::RADIUS;
 use super::operations::ToolOperation;
 use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
 use crate::ground::{GreyImage, MaterialId};
@@ -43,6 +44,8 @@ pub struct BrushTool {
     pub sink: f32,
     /// What it builds or paints with: a [`MaterialId`].
     pub material: u8,
+    /// Do operations that sculpt make new ground of that too? Else it is what lies below it.
+    pub is_of_material: bool,
     /// How much of its work one stroke does, 0 to 1, for operations that sculpt.
     pub strength: f32,
     /// Over how many metres from its rim inwards it fades in, for operations that sculpt.
@@ -82,6 +85,7 @@ impl Default for BrushTool {
             turn: 0.0,
             sink: 0.0,
             material: 0,
+            is_of_material: false,
             strength: 0.6,
             falloff: 3.0,
             amount: 2.0,
@@ -198,7 +202,11 @@ impl BrushTool {
         brush.operation = row.operation(self, hit);
         brush.roughness = self.roughness();
         brush.power = self.power;
-        if row.sculpts() { brush.with_strength(self.strength).with_falloff(self.falloff) } else { brush }
+        if !row.sculpts() {
+            return brush;
+        }
+        let brush = brush.with_strength(self.strength).with_falloff(self.falloff);
+        if self.is_of_material { brush.with_material(self.material_id()) } else { brush }
     }
 
     /// The shape of that brush alone: for a preview.
@@ -251,10 +259,11 @@ impl BrushTool {
         }
     }
 
-    /// Makes it larger or smaller by a factor, whatever its shape, within what the panel's sliders allow: for a mouse wheel.
-    pub fn grow(&mut self, factor: f32) {
-        let (least, most) = super::RADII;
-        let grow = |size: f32| (size * factor).clamp(least, most);
+    /// Makes it larger or smaller by a factor, whatever its shape, within what the panel's sliders offer on a terrain with
+    /// voxels of so many metres: for a mouse wheel.
+    pub fn grow(&mut self, factor: f32, voxel_size: f32) {
+        let range = RADIUS.range(voxel_size);
+        let grow = |size: f32| (size * factor).clamp(*range.start(), *range.end());
         match self.shape {
             ToolShape::Box => self.half = self.half.map(grow),
             _ => self.radius = grow(self.radius),
@@ -306,6 +315,14 @@ mod tests {
     }
 
     #[test]
+    fn sculpting_leaves_materials_alone_unless_told_otherwise() {
+        let tool = BrushTool { operation: ToolOperation::Raise, material: 7, ..BrushTool::default() };
+        assert_eq!(tool.brush_at(&hit()).blend.material, None);
+        let tool = BrushTool { is_of_material: true, ..tool };
+        assert_eq!(tool.brush_at(&hit()).blend.material, Some(MaterialId(7)));
+    }
+
+    #[test]
     fn each_shape_is_pushed_in_by_its_own_depth() {
         for shape in ToolShape::ALL {
             for (sink, highest) in [(1.0, 20.0), (0.0, 23.0), (-1.0, 26.0)] {
@@ -350,13 +367,13 @@ mod tests {
 
     #[test]
     fn growing_has_ends() {
-        for shape in ToolShape::ALL {
+        for (shape, voxel) in ToolShape::ALL.into_iter().flat_map(|shape| [(shape, 0.125), (shape, 8.0)]) {
             let mut tool = BrushTool { shape, ..BrushTool::default() };
-            (0..100).for_each(|_| tool.grow(1.5));
+            (0..100).for_each(|_| tool.grow(1.5, voxel));
             let most = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
-            (0..200).for_each(|_| tool.grow(0.5));
+            (0..200).for_each(|_| tool.grow(0.5, voxel));
             let least = if shape == ToolShape::Box { tool.half.x } else { tool.radius };
-            assert_eq!((least, most), super::super::RADII);
+            assert_eq!(least..=most, RADIUS.range(voxel));
         }
     }
 }

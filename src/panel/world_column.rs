@@ -51,7 +51,8 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
             look_section::show(ui, look);
         }
     }
-    section(ui, "Settings", false, |ui| settings(ui, panel, content.settings));
+    let undo_budget = chosen.is_some().then_some(&mut content.customs.undo_budget);
+    section(ui, "Settings", false, |ui| settings(ui, undo_budget, content.settings));
 }
 
 fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, history: Option<History>) {
@@ -183,9 +184,15 @@ fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<
     }
 }
 
-fn settings(ui: &mut Ui, panel: &mut BurrowPanel, settings: &mut BurrowSettings) {
-    slider(ui, "History", &mut panel.undo_mebibytes, 0..=1024, |slider| slider.suffix(" MiB"))
-        .on_hover_text("What undo may take of memory, of each terrain");
+fn settings(ui: &mut Ui, undo_budget: Option<&mut usize>, settings: &mut BurrowSettings) {
+    if let Some(bytes) = undo_budget {
+        let mut mebibytes = *bytes >> 20;
+        let history = slider(ui, "History", &mut mebibytes, 0..=1024, |slider| slider.suffix(" MiB"));
+        // Only then: not every budget is a whole number of them.
+        if history.on_hover_text("What undo may take of memory, on this terrain").changed() {
+            *bytes = mebibytes << 20;
+        }
+    }
     slider(ui, "Swaps", &mut settings.swaps_per_frame, 1..=4096, |slider| slider.logarithmic(true))
         .on_hover_text("Meshes swapped per frame, at most");
     slider(ui, "Loads", &mut settings.loads_per_frame, 1..=4096, |slider| slider.logarithmic(true))

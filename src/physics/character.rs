@@ -163,6 +163,7 @@ pub struct CharacterSystems;
 impl Plugin for CharacterPlugin {
     fn build(&self, app: &mut App) {
         app.add_observer(give_collider)
+            .add_observer(forget_size)
             .add_systems(self.schedule, (resize, move_characters).chain().in_set(CharacterSystems));
     }
 }
@@ -177,11 +178,20 @@ impl Size {
     }
 }
 
-/// A new character gets its capsule.
-fn give_collider(new: On<Insert, Character>, characters: Query<&Character>, mut commands: Commands) {
+/// A new character gets its capsule; what becomes of one that takes another's place is [`resize`]'s.
+fn give_collider(
+    new: On<Insert, Character>,
+    characters: Query<&Character, Without<Size>>,
+    mut commands: Commands,
+) {
     if let Ok(character) = characters.get(new.entity) {
         commands.entity(new.entity).try_insert((character.collider(), Size::of(character)));
     }
+}
+
+/// Who is no character any more may become one as if it had never been.
+fn forget_size(gone: On<Remove, Character>, mut commands: Commands) {
+    commands.entity(gone.entity).try_remove::<Size>();
 }
 
 /// A character whose size changed gets another capsule; its feet stay.

@@ -39,7 +39,7 @@ pub struct GroundBody {
 
 /// What ground is to bodies. Changes count for colliders that come later.
 #[derive(Resource, Clone, Debug, Default)]
-pub struct GroundMaterial {
+pub struct GroundContact {
     /// How slippery it is; avian's `DefaultFriction` if nothing is said.
     pub friction: Option<Friction>,
     /// How bouncy it is; avian's `DefaultRestitution` if nothing is said.
@@ -161,20 +161,20 @@ impl Prepared {
                     Some(old.id())
                 }
                 (Some(shape), None) => {
-                    let material = world.resource::<GroundMaterial>().clone();
+                    let contact = world.resource::<GroundContact>().clone();
                     let mut body = world.spawn((
                         GroundBody { terrain: self.part.terrain, part: owner, drawn: self.part.drawn },
                         RigidBody::Static,
                         // Shapes are in metres already.
                         Transform::from_scale(Vec3::splat(self.part.voxel_size.recip())),
                         ChildOf(owner),
-                        material.layers,
+                        contact.layers,
                         Collider::from(SharedShape(shape)),
                     ));
-                    if let Some(friction) = material.friction {
+                    if let Some(friction) = contact.friction {
                         body.insert(friction);
                     }
-                    if let Some(restitution) = material.restitution {
+                    if let Some(restitution) = contact.restitution {
                         body.insert(restitution);
                     }
                     Some(body.id())

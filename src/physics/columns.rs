@@ -70,12 +70,18 @@ pub(super) struct Columns {
     waiting: BTreeMap<Entity, BTreeSet<TilePos>>,
     colliders: usize,
     missing: usize,
+    losses: u64,
 }
 
 impl Columns {
     /// Has everything that has triangles in this column a collider?
     pub fn is_ready(&self, column: ColumnKey) -> bool {
         self.states.get(&column).is_some_and(|state| state.is_ready)
+    }
+
+    /// How often a column was ready, and then was not.
+    pub fn losses(&self) -> u64 {
+        self.losses
     }
 
     /// How many tiles and chunks have a collider, and how many wait for one.
@@ -111,7 +117,7 @@ impl Columns {
     /// Looks at each part of a column; tells how many there are.
     pub fn look(&mut self, column: ColumnKey, mut look: impl FnMut(Entity) -> Option<Look>) -> usize {
         let Some(state) = self.states.get_mut(&column) else { return 0 };
-        let (colliders, missing) = (state.colliders, state.missing.len());
+        let (colliders, missing, was_ready) = (state.colliders, state.missing.len(), state.is_ready);
         (state.colliders, state.is_ready) = (0, true);
         state.missing.clear();
         for &(part, drawn) in &state.parts {
@@ -122,6 +128,8 @@ impl Columns {
         }
         self.colliders = self.colliders + state.colliders - colliders;
         self.missing = self.missing + state.missing.len() - missing;
+        // One in which nothing stands any more is not ready either.
+        self.losses += u64::from(was_ready && (!state.is_ready || state.parts.is_empty()));
         let (terrain, tile) = column;
         if !state.missing.is_empty() {
             self.waiting.entry(terrain).or_default().insert(tile);

@@ -7,14 +7,13 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, SNAP};
-use crate::plugin::{
-    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, Wardrobe, tell,
-};
+use crate::plugin::{BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, tell};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, Restored, Terrain};
 
 /// Ground that broke off falls as a body. Put a [`LooseGround`](crate::plugin::LooseGround) with some `debris` on the
-/// terrain, and pieces up to so many voxels fall; the collider is made in a task, and with `Assets<Mesh>` a mesh too.
+/// terrain, and pieces up to so many voxels fall. With `Assets<Mesh>` a piece is drawn from the frame on in which the ground
+/// loses it; it falls, and is in the way, when its collider is done, which a task makes.
 ///
 /// ```no_run
 /// # use bevy::prelude::*;
@@ -74,15 +73,12 @@ pub struct DebrisCrumbled {
     pub entity: Entity,
 }
 
-/// A piece whose collider and mesh are being made.
+/// A piece that is drawn already, and whose collider is being made: no body yet, it stays where it was in the ground.
 #[derive(Component)]
+#[require(Transform, Visibility)]
 struct Shaping {
     debris: Debris,
-    place: Transform,
-    /// Where its mesh counts from, in voxels, and metres of a voxel.
-    origin: IVec3,
-    scale: f32,
-    task: Task<(Option<Collider>, Option<Mesh>)>,
+    task: Task<Option<Collider>>,
 }
 
 impl Plugin for DebrisPlugin {
@@ -97,6 +93,7 @@ impl Plugin for DebrisPlugin {
     }
 }
 
+/// Nobody sees a hole: in the frame in which the ground loses a piece, the piece is there.
 fn break_off(
     mut commands: Commands,
     settings: Res<DebrisSettings>,
@@ -104,7 +101,7 @@ fn break_off(
     terrains: Query<(&Terrain, &MaterialColors)>,
     places: TransformHelper,
     pieces: Query<(), Or<(With<Debris>, With<Shaping>)>>,
-    meshes: Option<Res<Assets<Mesh>>>,
+    mut meshes: Option<ResMut<Assets<Mesh>>>,
 ) {
     let mut room = settings.most.saturating_sub(pieces.count());
     for found in found.read().filter(|found| found.piece.fate == PieceFate::BrokeOff) {
@@ -114,26 +111,34 @@ fn break_off(
         room -= 1;
         let (scale, bounds) = (ground.scale().x, found.piece.bounds);
         let size = bounds.max - bounds.min;
-        let most = found.piece.materials.iter().max_by_key(|(_, voxels)| *voxels);
-        let debris = Debris {
-            terrain: found.terrain,
-            tag: found.tag,
-            material: most.map_or_else(MaterialId::default, |(material, _)| material),
-            voxels: found.piece.voxels,
-            half: size.as_vec3() * (scale / 2.0),
-            left: settings.stay,
-        };
-        let place =
-            Transform::from_translation(ground.transform_point(found.origin() + size.as_vec3() / 2.0))
-                .with_rotation(ground.rotation());
-        let wardrobe = meshes.is_some().then(|| Wardrobe::new(terrain.world(), colors));
+        let debris = describe(found, size.as_vec3() * (scale / 2.0), settings.stay);
+        let middle = ground.transform_point(found.origin() + size.as_vec3() / 2.0);
+        let place = Transform::from_translation(middle).with_rotation(ground.rotation());
+        let corner = Transform::from_translation(-debris.half).with_scale(Vec3::splat(scale));
         let task = AsyncComputeTaskPool::get().spawn(async move {
-            let mesh = wardrobe.and_then(|wardrobe| wardrobe.build_at(bounds.min, &surface));
             let mut surface = SurfaceMesh::clone(&surface);
             surface.vertices.iter_mut().for_each(|vertex| vertex.position -= size * (SNAP / 2));
-            (debris_collider(&surface, scale), mesh.map(|(mesh, _)| mesh))
+            debris_collider(&surface, scale)
         });
-        commands.spawn(Shaping { debris, place, origin: bounds.min, scale, task });
+        let mut piece = commands.spawn((Name::new("debris"), Shaping { debris, task }, place));
+        if let Some(meshes) = &mut meshes
+            && let Some(mesh) = found.mesh(terrain, colors)
+        {
+            let part = GroundPiece { terrain: found.terrain, origin: bounds.min };
+            piece.with_child((part, Mesh3d(meshes.add(mesh)), corner));
+        }
+    }
+}
+
+fn describe(found: &LoosePieceFound, half: Vec3, stay: f32) -> Debris {
+    let most = found.piece.materials.iter().max_by_key(|(_, voxels)| *voxels);
+    Debris {
+        terrain: found.terrain,
+        tag: found.tag,
+        material: most.map_or_else(MaterialId::default, |(material, _)| material),
+        voxels: found.piece.voxels,
+        half,
+        left: stay,
     }
 }
 
@@ -143,7 +148,7 @@ fn make_room(
     mut steps: MessageReader<HistoryMoved>,
     places: TransformHelper,
     pieces: Query<(Entity, &Debris, &Transform)>,
-    shaping: Query<(Entity, &Shaping)>,
+    shaping: Query<(Entity, &Shaping, &Transform)>,
 ) {
     for HistoryMoved { terrain, receipt } in steps.read() {
         let Some(entity) = *terrain else { continue };
@@ -153,10 +158,8 @@ fn make_room(
             continue;
         }
         let local = ground.affine().inverse();
-        let all = pieces
-            .iter()
-            .chain(shaping.iter().map(|(entity, Shaping { debris, place, .. })| (entity, debris, place)));
-        for (entity, debris, place) in all {
+        let shaping = shaping.iter().map(|(entity, piece, place)| (entity, &piece.debris, place));
+        for (entity, debris, place) in pieces.iter().chain(shaping) {
             let middle = local.transform_point3(place.translation);
             if meets(*bounds, middle, debris.half.length() / ground.scale().x) {
                 commands.entity(entity).try_despawn();
@@ -170,36 +173,21 @@ fn meets(bounds: LatticeBox, middle: Vec3, reach: f32) -> bool {
     middle.distance(middle.clamp(bounds.min.as_vec3(), bounds.max.as_vec3())) < reach
 }
 
+/// Pieces whose colliders are done become bodies.
 fn take_shape(
     mut commands: Commands,
     settings: Res<DebrisSettings>,
     mut shaping: Query<(Entity, &mut Shaping)>,
-    mut meshes: Option<ResMut<Assets<Mesh>>>,
 ) {
     for (entity, mut piece) in &mut shaping {
-        let Some((collider, mesh)) = check_ready(&mut piece.task) else { continue };
+        let Some(collider) = check_ready(&mut piece.task) else { continue };
         let mut entity = commands.entity(entity);
         let Some(collider) = collider else {
             entity.try_despawn();
             continue;
         };
         let DebrisSettings { friction, restitution, .. } = *settings;
-        entity.try_remove::<Shaping>().try_insert((
-            Name::new("debris"),
-            piece.debris.clone(),
-            piece.place,
-            collider,
-            friction,
-            restitution,
-        ));
-        if let (Some(mesh), Some(meshes)) = (mesh, &mut meshes) {
-            let place = Transform::from_translation(-piece.debris.half).with_scale(Vec3::splat(piece.scale));
-            let part = GroundPiece { terrain: piece.debris.terrain, origin: piece.origin };
-            let shown = (part, Mesh3d(meshes.add(mesh)), place);
-            entity.queue_silenced(move |mut body: EntityWorldMut| {
-                body.with_child(shown);
-            });
-        }
+        entity.try_remove::<Shaping>().try_insert((piece.debris.clone(), collider, friction, restitution));
     }
 }
 

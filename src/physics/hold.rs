@@ -8,9 +8,9 @@ use bevy::math::{Affine3A, Vec3A};
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::character::Character;
 use super::columns::Columns;
-use super::near::{ahead, half};
+use super::near::ahead;
+use super::solids::{Extent, Solids};
 use super::{ColliderSource, PhysicsFigures};
 use crate::lattice::{Column, TilePos};
 use crate::terrain::Terrain;
@@ -24,8 +24,9 @@ const CLEARANCE: f32 = 4.0;
 /// This body stands still until the ground under it has colliders: it is over a terrain that loads, or farther from all
 /// [`ColliderSource`]s than their radius.
 ///
-/// The plugin puts it on dynamic bodies, whose axes it locks, and on [`Character`]s, and takes it away again. Bodies high
-/// above the ground are not held.
+/// The plugin puts it on dynamic bodies, whose axes it locks, and on [`Character`](super::Character)s, and takes it away
+/// again. Bodies high above the ground are not held, and neither are those that ground lets through: sensors, and what its
+/// [layers](super::GroundContact::layers) do not meet.
 ///
 /// The body goes on with the velocity that it had, and with its axes locked as they were. What a game changes meanwhile
 /// counts: `LockedAxes`, and a velocity that is not zero, are kept for then. To stop a held body, set the velocity here.
@@ -66,21 +67,28 @@ fn locks_all(locked: Option<&LockedAxes>) -> bool {
 pub(super) struct Body {
     entity: Entity,
     kind: &'static RigidBody,
-    position: &'static Position,
-    transform: &'static Transform,
+    sleeps: Has<Sleeping>,
+    position: Ref<'static, Position>,
+    transform: Ref<'static, Transform>,
     is_child: Has<ChildOf>,
     velocity: &'static mut LinearVelocity,
     spin: &'static mut AngularVelocity,
     locked: Option<&'static LockedAxes>,
-    bounds: Option<&'static ColliderAabb>,
-    is_character: Has<Character>,
+    extent: Extent,
     hold: Option<&'static mut HeldByGround>,
 }
 
 impl BodyItem<'_, '_> {
     /// Does it move by what holding takes away: forces and steering?
     fn can_be_held(&self) -> bool {
-        self.kind.is_dynamic() || self.is_character
+        self.kind.is_dynamic() || self.extent.is_character
+    }
+
+    /// Does it lie where it lay, and is it free to?
+    fn rests(&self) -> bool {
+        let is_moved =
+            self.position.is_changed() || self.transform.is_changed() || self.velocity.is_changed();
+        self.sleeps && self.hold.is_none() && !is_moved
     }
 
     /// Holds it, or holds on to it: what the game changed since is kept for later.
@@ -89,14 +97,14 @@ impl BodyItem<'_, '_> {
         let mut entity = commands.entity(self.entity);
         let Some(hold) = &mut self.hold else {
             let mut hold = HeldByGround { velocity, spin, ..default() };
-            if !self.is_character {
+            if !self.extent.is_character {
                 hold.lock(self.locked, &mut entity);
                 (self.velocity.0, self.spin.0) = (Vec3::ZERO, Vec3::ZERO);
             }
             entity.try_insert(hold);
             return;
         };
-        if self.is_character {
+        if self.extent.is_character {
             return;
         }
         if velocity != Vec3::ZERO {
@@ -144,6 +152,8 @@ pub(super) fn hold(
     terrains: Query<(Entity, &Terrain)>,
     sources: Query<(), With<ColliderSource>>,
     ready: Res<Columns>,
+    solids: Solids,
+    mut known: Local<Option<Surroundings>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
@@ -154,15 +164,25 @@ pub(super) fn hold(
             Some((entity, terrain, Affine { inverse: place.affine().inverse(), size: terrain.voxel_size() }))
         })
         .collect();
+    let now = Surroundings {
+        losses: ready.losses(),
+        places: terrains.iter().map(|(entity, _, affine)| (*entity, affine.inverse)).collect(),
+    };
+    let are_same = known.as_ref() == Some(&now);
+    *known = Some(now);
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
     let mut held = 0;
     for mut body in &mut bodies {
-        let lacks_ground = body.can_be_held() && {
-            let half = half(body.bounds);
+        if are_same && body.rests() {
+            continue;
+        }
+        let reach = if body.can_be_held() { solids.reach(&body.extent) } else { None };
+        let lacks_ground = reach.is_some_and(|reach| {
+            let (middle, half) = (reach.middle(), reach.half());
             let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
             let lacks_ground = |place: Vec3| {
                 terrains.iter().any(|(terrain, model, affine)| {
-                    affine.lacks_ground(*terrain, model, &ready, place, towards, half)
+                    affine.lacks_ground(*terrain, model, &ready, place + middle, towards, half)
                 })
             };
             // Where a game has just put it, physics will have it in its next step.
@@ -173,7 +193,7 @@ pub(super) fn hold(
             let is_put = |put: &Vec3| *put != body.position.0;
             lacks_ground(body.position.0)
                 || follows_transform && put().filter(is_put).is_some_and(lacks_ground)
-        };
+        });
         if lacks_ground {
             held += 1;
             body.hold(&mut commands);
@@ -190,6 +210,13 @@ pub(super) fn hold(
     figures.main_thread += start.elapsed();
 }
 
+/// What bodies that rest depend on: where terrains are, and how often a column's ground was lost.
+#[derive(PartialEq)]
+pub(super) struct Surroundings {
+    losses: u64,
+    places: Vec<(Entity, Affine3A)>,
+}
+
 /// From the world to a terrain.
 struct Affine {
     inverse: Affine3A,
@@ -197,7 +224,7 @@ struct Affine {
 }
 
 impl Affine {
-    /// May a body reach ground without a collider soon?
+    /// May a body whose box has its middle here reach ground without a collider soon?
     fn lacks_ground(
         &self,
         terrain: Entity,
@@ -225,15 +252,18 @@ impl Affine {
             return false;
         }
         let (first, last) = (grid.tile_of_cell(first), grid.tile_of_cell(last));
-        let mut tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| TilePos { x, z }));
+        let tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| TilePos { x, z }));
+        let mut missing = tiles.filter(|&tile| !ready.is_ready((terrain, tile))).peekable();
+        if missing.peek().is_none() {
+            return false;
+        }
         let body = Aabb2d::new(Vec2::ZERO, half.xz());
         let way = AabbCast2d::new(body, from.xz(), Dir2::new(way.xz()).unwrap_or(Dir2::X), way.xz().length());
-        let is_missing = |tile: TilePos| {
+        let meets = |tile: TilePos| {
             let corner = Vec2::new(tile.x as f32, tile.z as f32) * grid.size() as f32;
-            let bounds = Aabb2d { min: corner, max: corner + grid.size() as f32 };
-            !ready.is_ready((terrain, tile)) && way.aabb_collision_at(bounds).is_some()
+            way.aabb_collision_at(Aabb2d { min: corner, max: corner + grid.size() as f32 }).is_some()
         };
-        tiles.any(is_missing) && self.is_low(model, place, low.y)
+        missing.any(meets) && self.is_low(model, place, low.y)
     }
 
     /// Is its lowest point near the ground, or under some of it?

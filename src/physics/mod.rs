@@ -45,7 +45,7 @@
 //! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.
 //!
 //! Bodies are ordinary bodies of avian, and ground is `RigidBody::Static`. Put `Friction`, `CollisionLayers` and the like
-//! into [`GroundMaterial`].
+//! into [`GroundContact`].
 
 mod character;
 mod colliders;
@@ -56,12 +56,13 @@ mod hold;
 mod hull;
 mod near;
 mod shape;
+mod solids;
 mod upkeep;
 mod wake;
 mod walking;
 
 pub use character::{Character, CharacterMotion, CharacterPlugin, CharacterSteering, CharacterSystems};
-pub use colliders::{GroundBody, GroundCollider, GroundMaterial};
+pub use colliders::{GroundBody, GroundCollider, GroundContact};
 pub use debris::{Debris, DebrisCrumbled, DebrisPlugin, DebrisSettings};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
@@ -127,7 +128,7 @@ impl Plugin for TerrainPhysicsPlugin {
         let grounds = colliders::Grounds::default();
         app.init_resource::<Companions>()
             .init_resource::<PhysicsFigures>()
-            .init_resource::<GroundMaterial>()
+            .init_resource::<GroundContact>()
             .init_resource::<wake::GroundChanges>()
             .init_resource::<wake::Watched>()
             .init_resource::<upkeep::Work>()

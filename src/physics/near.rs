@@ -11,6 +11,7 @@ use rustc_hash::FxHashMap;
 
 use super::colliders::Grounds;
 use super::columns::ColumnKey;
+use super::solids::{Extent, Solids};
 use super::{HeldByGround, PhysicsFigures};
 use crate::lattice::{ChunkGrid, TilePos};
 use crate::terrain::Terrain;
@@ -24,12 +25,6 @@ const STOPS: u32 = 64;
 /// What counts of a way ahead, in voxels: as much of it as colliders are made for.
 pub(super) fn ahead(way: Vec3, grid: ChunkGrid) -> Vec3 {
     way.clamp_length_max(STOPS as f32 * grid.size() as f32)
-}
-
-/// Half a body's size in the world, in metres.
-pub(super) fn half(bounds: Option<&ColliderAabb>) -> Vec3 {
-    let half = bounds.map_or(Vec3::splat(0.5), |bounds| (bounds.max - bounds.min) / 2.0);
-    half.clamp(Vec3::ZERO, Vec3::splat(8.0))
 }
 
 /// Ground around this entity has colliders, in all columns of chunks within its radius; elsewhere it has none.
@@ -130,13 +125,8 @@ pub(super) fn find_near(
     grounds: Res<Grounds>,
     places: TransformHelper,
     terrains: Query<(Entity, &Terrain)>,
-    sources: Query<(
-        Entity,
-        &ColliderSource,
-        Option<&LinearVelocity>,
-        Option<&HeldByGround>,
-        Option<&ColliderAabb>,
-    )>,
+    sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
+    solids: Solids,
     mut known: Local<Neighbourhood>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
@@ -148,7 +138,7 @@ pub(super) fn find_near(
         let grid = model.world().grid();
         let stride = grid.size() as f32;
         let mut stops = Vec::new();
-        for (source, &ColliderSource { radius }, velocity, hold, bounds) in &sources {
+        for (source, &ColliderSource { radius }, velocity, hold, extent) in &sources {
             let Ok(place) = places.compute_global_transform(source) else { continue };
             // One that is held goes on as it came, once there is ground where it was going.
             let velocity = hold.and_then(HeldByGround::stopped).or(velocity.map(|velocity| velocity.0));
@@ -161,7 +151,8 @@ pub(super) fn find_near(
             let count = (way.length() / stride).ceil();
             let apart = way / count.max(1.0);
             // Nor is a body held for want of ground that it reaches itself, or that is between two stops.
-            let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(half(bounds))).xz().length();
+            let reach = solids.reach(&extent).map_or(Vec3::ZERO, |reach| reach.farthest());
+            let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
             let radius = (radius / size).max(own) + (apart.length() / 2.0).ceil();
             // Not every hair's breadth of a move is news.
             let stop = |at: u32| (from + apart * at as f32).round();

@@ -10,8 +10,8 @@ use bevy::platform::collections::HashMap;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::character::{Character, CharacterMotion};
-use super::colliders::GroundMaterial;
+use super::character::CharacterMotion;
+use super::solids::Solids;
 use super::{GroundBody, PhysicsFigures};
 use crate::plugin::TerrainEntities;
 use crate::terrain::{Drawn, Terrain, World as TerrainWorld};
@@ -86,34 +86,6 @@ impl GroundChanges {
 /// Bodies near which a terrain changed a moment ago, or that were found in it; and how often they will be looked at.
 #[derive(Resource, Default)]
 pub(super) struct Watched(HashMap<(Entity, Entity), u8>);
-
-/// What may be in the way of ground: the box around those colliders of a body that are. Sensors are nowhere in the way, and
-/// neither is what the ground lets through.
-#[derive(SystemParam)]
-pub(super) struct Solids<'w, 's> {
-    colliders: Query<
-        'w,
-        's,
-        (&'static ColliderAabb, Option<&'static CollisionLayers>),
-        (Without<Sensor>, Without<ColliderDisabled>),
-    >,
-    characters: Query<'w, 's, (), With<Character>>,
-    ground: Res<'w, GroundMaterial>,
-}
-
-impl Solids<'_, '_> {
-    /// `None` of a body that nothing moves.
-    fn bounds(&self, entity: Entity, body: &RigidBody, own: &RigidBodyColliders) -> Option<ColliderAabb> {
-        if !body.is_dynamic() && !self.characters.contains(entity) {
-            return None;
-        }
-        let meets = |layers: Option<&CollisionLayers>| {
-            self.ground.layers.interacts_with(layers.copied().unwrap_or_default())
-        };
-        let solid = self.colliders.iter_many(own).filter(|(_, layers)| meets(*layers));
-        solid.map(|(bounds, _)| *bounds).reduce(|a, b| a.merged(b))
-    }
-}
 
 /// Wakes bodies near changes, and has them watched.
 pub(super) fn wake(

@@ -32,6 +32,7 @@ pub(super) struct InFlight {
 struct Prepared {
     commit: Commit,
     parts: Vec<Fresh>,
+    pieces: Vec<LoosePieceFound>,
     took: Duration,
 }
 
@@ -86,7 +87,11 @@ pub(super) fn begin_transactions(
                 workshop.make(&part, chunk.is_empty(), || Cow::Borrowed(chunk.mesh()))
             });
             let parts = tiles.chain(chunks).collect();
-            Prepared { commit, parts, took: start.elapsed() }
+            let mut pieces: Vec<LoosePieceFound> = pieces(entity, commit.receipts()).collect();
+            if let Some(wardrobe) = &workshop.wardrobe {
+                pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
+            }
+            Prepared { commit, parts, pieces, took: start.elapsed() }
         });
         *number += 1;
         commands.entity(entity).try_insert(InFlight { number: *number, task, done: None });
@@ -128,7 +133,7 @@ pub(super) fn commit_transactions(
         if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
             continue;
         }
-        let Some(Prepared { commit, parts, took }) = transaction.done.take() else { continue };
+        let Some(Prepared { commit, parts, pieces, took }) = transaction.done.take() else { continue };
         commands.entity(entity).try_remove::<InFlight>();
         let start = Instant::now();
         let news = commit.field_news().to_vec();
@@ -175,7 +180,7 @@ pub(super) fn commit_transactions(
         figures.brushes += committed.len() as u64;
         figures.last_transaction = took;
         figures.transactions.push(took);
-        found.write_batch(pieces(entity, &committed));
+        found.write_batch(pieces);
         let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
         receipts.write_batch(committed.into_iter().map(applied));
         let took = start.elapsed();

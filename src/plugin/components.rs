@@ -63,7 +63,8 @@ pub struct Field {
 }
 
 /// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
-/// gets the terrain's material, and what is drawn on it stays where it was in the ground, wherever it goes.
+/// gets the terrain's material, and what is drawn on it stays where it was in the ground, wherever it goes. With a
+/// `GroundLook` it follows the terrain's look as long as that terrain is there.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -93,7 +93,12 @@ pub(super) fn collect_steps(
 pub(super) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Item = LoosePieceFound> {
     receipts.iter().flat_map(move |receipt| {
         let pieces = receipt.outcome.iter().flat_map(|applied| &applied.loose);
-        pieces.map(move |piece| LoosePieceFound { terrain, tag: receipt.tag, piece: piece.clone() })
+        pieces.map(move |piece| LoosePieceFound {
+            terrain,
+            tag: receipt.tag,
+            piece: piece.clone(),
+            ready: None,
+        })
     })
 }
 

@@ -1,5 +1,7 @@
 //! Messages and entity events: brushes in, news out.
 
+use std::sync::Arc;
+
 use bevy::prelude::*;
 
 use super::MaterialColors;
@@ -79,6 +81,8 @@ pub struct LoosePieceFound {
     pub tag: u64,
     /// Its bounds, voxels, materials and, where it broke off, its surface.
     pub piece: LoosePiece,
+    /// Its mesh, where there are meshes: made in the transaction's task.
+    pub(super) ready: Option<Arc<Mesh>>,
 }
 
 impl LoosePieceFound {
@@ -89,11 +93,22 @@ impl LoosePieceFound {
 
     /// The piece as a mesh like those of chunks, for any material that they can have; `None` unless it broke off. It wants
     /// the terrain, which knows how deep in the ground the piece was. With a [`GroundPiece`](super::GroundPiece) it is drawn
-    /// as the terrain is.
+    /// as the terrain is; its colours are those of when the brush began to work.
     pub fn mesh(&self, terrain: &Terrain, colors: &MaterialColors) -> Option<Mesh> {
+        if let Some(ready) = &self.ready {
+            return Some(Mesh::clone(ready));
+        }
+        self.build(&Wardrobe::new(terrain.world(), colors))
+    }
+
+    fn build(&self, wardrobe: &Wardrobe) -> Option<Mesh> {
         let surface = self.piece.mesh.as_ref()?;
-        let ready = Wardrobe::new(terrain.world(), colors).build_at(self.piece.bounds.min, surface);
-        ready.map(|(mesh, _)| mesh)
+        wardrobe.build_at(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
+    }
+
+    /// Makes its mesh, in the task.
+    pub(super) fn dress(&mut self, wardrobe: &Wardrobe) {
+        self.ready = self.build(wardrobe).map(Arc::new);
     }
 }
 

@@ -35,8 +35,6 @@ pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
 pub use load::TerrainReady;
-#[cfg(feature = "avian")]
-pub(crate) use meshes::Wardrobe;
 pub use meshes::{
     ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };
@@ -55,6 +53,9 @@ use crate::brush::Brush;
 use crate::terrain::Terrain;
 
 /// Everything a game needs. Parts can be disabled, as in any plugin group.
+///
+/// They come after Bevy's own, `add_plugins((DefaultPlugins, BurrowPlugins))`: the other way round no terrain with a
+/// `GroundLook` is drawn, and an error says so.
 ///
 /// | plugin | what it does |
 /// | --- | --- |

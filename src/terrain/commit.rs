@@ -83,6 +83,12 @@ impl Commit {
         &self.news
     }
 
+    /// What became of its edits, once this is committed.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn receipts(&self) -> &[Receipt] {
+        &self.receipts
+    }
+
     /// Makes this the world.
     pub(super) fn install(mut self, world: &mut World) -> Installed {
         self.change.swap(world);

@@ -8,13 +8,15 @@ use super::world::World;
 use crate::backend::Compute;
 use crate::brush::{Edit, Operation};
 use crate::volume::{
-    Bricks, ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, Ledger, SampleView, TakenOut,
-    UniformBricks,
+    Bricks, ChunkEffect, DiggingRules, Draft, DraftedBrick, EditEffect, EditWork, Ledger, SampleView,
+    TakenOut, UniformBricks,
 };
 
 /// Who drafts, over what.
 pub(super) struct Drafting<'a> {
     pub world: &'a World,
+    /// What edits may do; `None`: everything.
+    pub rules: Option<&'a DiggingRules>,
     pub backend: &'a dyn Compute,
 }
 
@@ -41,7 +43,7 @@ impl Drafting<'_> {
     /// What edits make of samples of this hash; bricks of a `known` kind are shared.
     fn draft(&self, base: SampleView, edits: &[&Edit], hash: u64, known: &UniformBricks) -> Draft {
         let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| self.backend.edit(work, each);
-        Draft::make(base, self.world.grid, edits, hash, known, self.world.rules(), apply)
+        Draft::make(base, self.world.grid, edits, hash, known, self.rules, apply)
     }
 
     /// The same world, but each edit that can remove ground comes by itself, and what it cuts off falls before the next.
@@ -63,7 +65,7 @@ impl Drafting<'_> {
             let seeds = is_looked_after.then(|| loose::seeds(world, &over, &drafted));
             lay(&mut over, &mut lowest, &drafted);
             if let Some(seeds) = seeds {
-                let fallen = loose::fall(world, &over, &lowest, &seeds, settings);
+                let fallen = loose::fall(world, self.rules, &over, &lowest, &seeds, settings);
                 for TakenOut { drafted: mut taken, hash, chunks } in fallen.taken {
                     all.hash = all.hash.wrapping_add(hash);
                     if let Some(effect) = effects.last_mut() {

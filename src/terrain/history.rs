@@ -114,7 +114,7 @@ pub(crate) struct Waste {
 
 impl Waste {
     /// Is there nothing to free?
-    #[cfg(feature = "plugin")]
+    #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty() && self.copy.is_none()
     }
@@ -165,6 +165,11 @@ impl Timeline {
     pub fn reaches(&self, samples: LatticeBox) -> bool {
         let meets = |step: &Arc<Step>| step.bounds.is_some_and(|own| own.intersection(samples).is_some());
         self.undo.iter().chain(&self.redo).any(meets)
+    }
+
+    /// Bytes that it may take.
+    pub fn budget(&self) -> usize {
+        self.budget
     }
 
     /// A new budget; what it has no room for goes.

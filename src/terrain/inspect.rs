@@ -1,10 +1,12 @@
 //! What a debug view asks of a world: parts of it near a place, without a copy of the rest.
 
 use glam::{IVec3, Vec3};
+use rustc_hash::FxHashMap;
 
 use super::world::{Drawn, World};
-use crate::lattice::{ChunkPos, Column, LatticeBox, ONE, SNAP, TilePos};
+use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP, TilePos};
 use crate::surface::{MaskView, SurfaceMesh};
+use crate::volume::Field;
 
 impl World {
     /// The cells of the mask from `low` to `high`, both included, in no order.
@@ -53,18 +55,79 @@ impl World {
         let (low, high) = (self.grid.chunk_of(inside.min), self.grid.chunk_of(inside.max));
         let tiles =
             (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Drawn::Tile(TilePos { x, z })));
-        let is_near = |chunk: &ChunkPos| {
-            chunk.as_ivec3().cmpge(low.as_ivec3()).all() && chunk.as_ivec3().cmple(high.as_ivec3()).all()
-        };
-        let mut chunks: Vec<ChunkPos> = self.surfaces.keys().copied().filter(is_near).collect();
-        chunks.sort_unstable();
+        let chunks = found_in(&self.surfaces, LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
         tiles.chain(chunks.into_iter().map(Drawn::Chunk)).collect()
+    }
+
+    /// The chunks with cells in a box that draw something or hold fields, in order.
+    pub fn chunks_near(&self, cells: LatticeBox) -> Vec<ChunkPos> {
+        let first = IVec3::new(0, i32::MIN, 0);
+        let last = IVec3::new(self.grid.width() - 1, i32::MAX, self.grid.depth() - 1);
+        let Some(inside) = LatticeBox::new(cells.min.max(first), cells.max.min(last)) else {
+            return Vec::new();
+        };
+        let size = IVec3::splat(self.grid.size());
+        let places = LatticeBox { min: inside.min.div_euclid(size), max: inside.max.div_euclid(size) };
+        let mut chunks = found_in(&self.surfaces, places);
+        chunks.append(&mut found_in(&self.fields, places));
+        chunks.sort_unstable();
+        chunks.dedup();
+        chunks
+    }
+
+    /// The fields that reach into a box of samples, by age.
+    pub fn fields_near(&self, samples: LatticeBox) -> Vec<&Field> {
+        let Some(inside) = samples.intersection(self.grid.edit_bounds()) else { return Vec::new() };
+        let (low, high) = (self.grid.chunk_of(inside.min), self.grid.chunk_of(inside.max));
+        let chunks = found_in(&self.fields, LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
+        let fields = chunks.into_iter().filter_map(|chunk| self.fields.get(&chunk));
+        let near = |field: &&Field| field.bounds.intersection(inside).is_some();
+        let mut fields: Vec<&Field> = fields.flat_map(|fields| fields.iter()).filter(near).collect();
+        fields.sort_unstable_by_key(|field| field.id);
+        fields
+    }
+
+    /// The stored bricks that reach into a box of samples, in no order.
+    pub fn bricks_near(&self, samples: LatticeBox) -> impl Iterator<Item = BrickPos> + '_ {
+        let inside = samples.intersection(self.grid.edit_bounds());
+        inside.into_iter().flat_map(move |inside| {
+            let (low, high): (IVec3, IVec3) = (inside.min >> 3, inside.max >> 3);
+            let stack = move |(x, z): (i32, i32)| {
+                let stack = self.stacks.get(&(x, z)).map(Vec::as_slice).unwrap_or_default();
+                let from = stack.partition_point(|&y| y < low.y);
+                let inside = stack.iter().skip(from).take_while(move |&&y| y <= high.y);
+                inside.map(move |&y| BrickPos(IVec3::new(x, y, z)))
+            };
+            self.stacks_in(LatticeBox { min: low.with_y(0), max: high.with_y(0) }).flat_map(stack)
+        })
+    }
+
+    /// The columns of bricks in a box that is one high, as far as they are looked at: all of them, or where the world has
+    /// fewer, those with bricks in them.
+    fn stacks_in(&self, columns: LatticeBox) -> Box<dyn Iterator<Item = (i32, i32)> + '_> {
+        if columns.volume() <= self.stacks.len() as u64 {
+            return Box::new(columns.points().map(|column| (column.x, column.z)));
+        }
+        let is_in = move |&(x, z): &(i32, i32)| columns.contains(IVec3::new(x, 0, z));
+        Box::new(self.stacks.keys().copied().filter(is_in))
     }
 
     /// The mesh of a chunk as it is kept; `None` where it draws nothing.
     pub fn chunk_surface(&self, chunk: ChunkPos) -> Option<&SurfaceMesh> {
         self.surfaces.get(&chunk).map(|surface| surface.mesh())
     }
+}
+
+/// The chunks of a table whose positions lie in a box, in order. Each position of the box is asked for, or where the table
+/// has fewer of them, each of the table: the rest of a large world costs nothing.
+fn found_in<T>(table: &FxHashMap<ChunkPos, T>, places: LatticeBox) -> Vec<ChunkPos> {
+    let mut found: Vec<ChunkPos> = if places.volume() <= table.len() as u64 {
+        places.points().map(ChunkPos::from_ivec3).filter(|chunk| table.contains_key(chunk)).collect()
+    } else {
+        table.keys().copied().filter(|chunk| places.contains(chunk.as_ivec3())).collect()
+    };
+    found.sort_unstable();
+    found
 }
 
 #[cfg(test)]
@@ -142,5 +205,76 @@ mod tests {
             }
         }
         assert!(world.drawn_near(LatticeBox::point(IVec3::new(-5, 0, 0))).is_empty());
+    }
+
+    #[test]
+    fn what_is_near_is_the_same_whether_the_box_or_the_world_is_searched() {
+        let mut terrain = dug();
+        // Enough of them for small boxes to be searched by position.
+        let brushes = (0..40).map(|step| {
+            let (x, z) = ((step % 8 * 9) as f32, (step / 8 * 13) as f32);
+            Brush::dig(Shape::sphere(Vec3::new(x, (step % 5 * 17) as f32 - 30.0, z), 4.0))
+        });
+        terrain.apply(brushes);
+        let world = terrain.world();
+        let (grid, mut rng) = (world.grid(), fastrand::Rng::with_seed(3));
+        let mut found = [0; 3];
+        for turn in 0..300 {
+            let size = [3, 20, 90, 400][turn % 4];
+            let mut number = || rng.i32(-60..100);
+            let min = IVec3::new(number(), number(), number());
+            let near = LatticeBox { min, max: min + size };
+            let meets = |own: LatticeBox| own.intersection(near).is_some();
+
+            let mut chunks: Vec<ChunkPos> =
+                world.drawn_chunks().chain(world.fields().map(|(chunk, _)| chunk)).collect();
+            chunks.sort_unstable();
+            chunks.dedup();
+            chunks.retain(|&chunk| meets(grid.chunk_cells(chunk)));
+            assert_eq!(world.chunks_near(near), chunks, "{near:?}");
+
+            let mut fields: Vec<&Field> = world.fields().flat_map(|(_, fields)| fields.iter()).collect();
+            fields.retain(|field| meets(field.bounds));
+            fields.sort_unstable_by_key(|field| field.id);
+            assert_eq!(world.fields_near(near), fields, "{near:?}");
+
+            let bricks: Vec<BrickPos> = world.bricks_near(near).collect();
+            let in_world = near.intersection(grid.edit_bounds());
+            let expected: HashSet<BrickPos> = in_world
+                .into_iter()
+                .flat_map(BrickPos::covering)
+                .filter(|&brick| world.samples().brick(brick).is_some())
+                .collect();
+            assert_eq!(bricks.len(), expected.len(), "{near:?}");
+            assert_eq!(bricks.into_iter().collect::<HashSet<_>>(), expected, "{near:?}");
+            found[0] += chunks.len();
+            found[1] += fields.len();
+            found[2] += expected.len();
+        }
+        assert!(found.iter().all(|&found| found > 300), "{found:?}");
+        let all = LatticeBox { min: IVec3::MIN, max: IVec3::MAX };
+        assert_eq!(world.bricks_near(all).count(), world.bricks().count());
+        assert_eq!(
+            world.fields_near(all).len(),
+            world.fields().map(|(_, fields)| fields.len()).sum::<usize>()
+        );
+        assert!(world.chunks_near(all).len() >= world.drawn_chunks().count());
+    }
+
+    #[test]
+    fn no_box_of_any_numbers_is_too_much() {
+        let terrain = dug();
+        let numbers = [i32::MIN, -1, 0, 69, 70, i32::MAX];
+        let points: Vec<IVec3> = numbers
+            .into_iter()
+            .flat_map(|x| numbers.into_iter().flat_map(move |y| numbers.map(|z| IVec3::new(x, y, z))))
+            .collect();
+        for (at, &min) in points.iter().enumerate() {
+            for &max in points.iter().skip(at % 7).step_by(7) {
+                let (near, world) = (LatticeBox { min, max }, terrain.world());
+                let _ = (world.chunks_near(near), world.fields_near(near), world.drawn_near(near));
+                assert!(world.bricks_near(near).count() <= world.bricks().count());
+            }
+        }
     }
 }

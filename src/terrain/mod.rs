@@ -129,6 +129,7 @@ pub struct Terrain {
     queue: VecDeque<Request>,
     in_flight: Option<InFlight>,
     answered: Vec<Receipt>,
+    rules: Option<Arc<DiggingRules>>,
     loose: Option<LooseSettings>,
     timeline: Timeline,
     moves: Vec<HistoryReceipt>,
@@ -163,6 +164,7 @@ impl Terrain {
             queue: VecDeque::new(),
             in_flight: None,
             answered: Vec::new(),
+            rules: None,
             loose: None,
             timeline: Timeline::new(steps::UNDO_BUDGET),
             moves: Vec::new(),
@@ -178,7 +180,12 @@ impl Terrain {
     /// From now on, edits obey these rules; what is there stays as it is. A transaction under way keeps those it began
     /// with. A journal is replayed exactly only if rules change at the same edits.
     pub fn set_rules(&mut self, rules: DiggingRules) {
-        Arc::make_mut(&mut self.world).rules = (!rules.is_empty()).then(|| Arc::new(rules));
+        self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
+    }
+
+    /// What edits may do; `None`: everything.
+    pub fn rules(&self) -> Option<&DiggingRules> {
+        self.rules.as_deref()
     }
 
     /// The engine of its own, if it has one.
@@ -281,6 +288,7 @@ impl Terrain {
             ticket,
             world: self.snapshot(),
             work,
+            rules: self.rules.clone(),
             loose: self.loose,
             engine: self.engine.clone(),
         })
@@ -310,10 +318,8 @@ impl Terrain {
         let done = self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket).ok_or(StaleCommit)?;
         let mut copy = commit.copy.take();
         if Arc::get_mut(&mut self.world).is_none()
-            && let Some(mut copy) = copy.take_if(|copy| copy.version() == self.world.version())
+            && let Some(copy) = copy.take_if(|copy| copy.version() == self.world.version())
         {
-            // Rules may have changed meanwhile.
-            Arc::make_mut(&mut copy).rules.clone_from(&self.world.rules);
             self.world = copy;
         }
         let installed = commit.install(Arc::make_mut(&mut self.world));

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "plugin")]
 use super::Work;
-use super::{History, HistoryReceipt, HistoryStep, Memory, Request, Terrain};
+use super::{History, HistoryReceipt, HistoryStep, Memory, Request, Terrain, Waste};
 
 /// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
 pub(super) const UNDO_BUDGET: usize = 64 << 20;
@@ -34,9 +34,19 @@ impl Terrain {
 
     /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
     /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
-    /// some thousand digs of radius 8.
+    /// some thousand digs of radius 8. What goes is freed before this returns.
     pub fn set_undo_budget(&mut self, bytes: usize) {
-        self.timeline.set_budget(bytes);
+        drop(self.rebudget_undo(bytes));
+    }
+
+    /// The same; what history lets go of is left to the caller, who may free it elsewhere.
+    pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> Waste {
+        self.timeline.set_budget(bytes)
+    }
+
+    /// The most bytes that history may take.
+    pub fn undo_budget(&self) -> usize {
+        self.timeline.budget()
     }
 
     /// Bytes that the terrain takes: its world, and its history.
@@ -85,5 +95,31 @@ impl Terrain {
             Request::Edit(_) => None,
         });
         in_flight.chain(queued)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::Ground;
+    use crate::terrain::TerrainSettings;
+
+    #[test]
+    fn what_a_smaller_budget_has_no_room_for_is_left_to_whoever_sets_it() {
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        assert_eq!(terrain.undo_budget(), UNDO_BUDGET);
+        let dig = |x| Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0));
+        for x in [20.0, 40.0] {
+            terrain.apply([dig(x)]);
+        }
+        assert_eq!(terrain.history().undos, 2);
+        assert!(terrain.rebudget_undo(1 << 30).is_empty());
+        assert_eq!((terrain.undo_budget(), terrain.history().undos), (1 << 30, 2));
+        assert!(!terrain.rebudget_undo(0).is_empty());
+        assert_eq!((terrain.undo_budget(), terrain.history()), (0, History::default()));
     }
 }

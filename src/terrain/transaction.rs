@@ -28,7 +28,7 @@ use crate::brush::Edit;
 use crate::lattice::{ChunkPos, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, Draft, Fields, Replaced, UniformBricks, pristine_brick};
+use crate::volume::{Bricks, DiggingRules, Draft, Fields, Replaced, UniformBricks, pristine_brick};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.
@@ -37,6 +37,8 @@ pub struct Transaction {
     pub(super) ticket: u64,
     pub(super) world: Arc<World>,
     pub(super) work: Work,
+    /// `None`: edits may do everything.
+    pub(super) rules: Option<Arc<DiggingRules>>,
     /// Without them, nobody looks for loose pieces.
     pub(super) loose: Option<LooseSettings>,
     /// Without one, the processor.
@@ -90,7 +92,7 @@ impl Transaction {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let edits: Vec<&Edit> = submissions.iter().filter_map(|s| s.edit.as_ref().ok()).collect();
         let Drafted { draft, pieces } = Stages::time(&mut stages.edit, || {
-            let drafting = Drafting { world, backend };
+            let drafting = Drafting { world, rules: self.rules.as_deref(), backend };
             match &self.loose {
                 Some(settings) => drafting.one_by_one(&edits, settings),
                 None => drafting.together(&edits),

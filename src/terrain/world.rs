@@ -12,7 +12,7 @@ use crate::surface::block;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
-use crate::volume::{Brick, Bricks, DiggingRules, Fields, SampleView, UniformBricks};
+use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
 /// Something that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,8 +70,6 @@ pub struct World {
     pub(super) uniform: UniformBricks,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,
-    /// `None` without any rule.
-    pub(super) rules: Option<Arc<DiggingRules>>,
     /// Tells worlds of one process apart.
     lineage: u64,
     pub(super) revision: u64,
@@ -100,7 +98,6 @@ impl World {
             uniform: UniformBricks::default(),
             sample_hash: 0,
             next_field: 0,
-            rules: None,
             lineage: super::unique(),
             revision: 0,
         }
@@ -125,11 +122,6 @@ impl World {
     /// The cells that marching cubes draws.
     pub fn mask(&self) -> &Mask {
         &self.mask
-    }
-
-    /// What brushes may do to this world; `None`: everything.
-    pub fn rules(&self) -> Option<&DiggingRules> {
-        self.rules.as_deref()
     }
 
     /// Counts the commits.

@@ -10,8 +10,8 @@ use crate::terrain::Terrain;
 /// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles and chunks, and again whenever it changes; and to
 /// each [`GroundPiece`] once.
 ///
-/// `BurrowPlugins` has it for `StandardMaterial`; add it for each material type of your own. Vertex colours carry the
-/// terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
+/// `BurrowPlugins` has it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
+/// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
 /// [`ATTRIBUTE_MATERIAL_IDS`](crate::plugin::ATTRIBUTE_MATERIAL_IDS) and
 /// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders.
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<fn() -> M>);

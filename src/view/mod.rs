@@ -10,11 +10,16 @@
 //! commands.spawn((terrain, GroundLook { quality: GroundQuality::Low, cliffs: (0.8, 1.4), ..default() }));
 //! # }
 //! fn loading(loading: Res<GroundLoading>) {
-//!     if !loading.is_ready() {
+//!     if let Some(failure) = loading.failure() {
+//!         error_once!("the game's own textures are missing: {failure}");
+//!     } else if !loading.is_ready() {
 //!         info_once!("textures are being painted");
 //!     }
 //! }
 //! ```
+//!
+//! Bevy's renderer must be there first: `add_plugins((DefaultPlugins, BurrowPlugins))`. The other way round no
+//! [`GroundLook`] is drawn, and an error says so; other materials are handed on in any order.
 //!
 //! A game that has a material of its own puts that on the terrain instead, and adds a [`TerrainMaterialPlugin`] for it:
 //!
@@ -36,5 +41,6 @@ mod material;
 pub use ground::{
     GroundArrays, GroundArraysError, GroundLayer, GroundLayerImages, GroundLayerKind, GroundLoading,
     GroundLook, GroundMaterial, GroundPlugin, GroundQuality, GroundStrata, GroundTextures,
+    GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;

@@ -87,7 +87,54 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let (dug, _) = flip(&before[1], &studio.picture());
     println!("a spot of another material: FLIP {painted:.5}; a small hole in it: {dug:.5}");
     album.check(painted > 2.0 * NOISE, || format!("a painted spot went unnoticed: FLIP {painted:.5}"));
+    elsewhere(studio, album);
     studio.sun(Vec3::new(1.0, 0.9, 0.4));
+}
+
+/// The seam around a corner of four chunks, and around the steepest place: no line is seen there either.
+fn elsewhere(studio: &mut Studio, album: &mut Album) {
+    let world = studio.one::<Terrain>().snapshot();
+    let rise = |(x, z): (i32, i32)| {
+        let height = |x, z| f64::from(world.ground().height(Column::new(x, z))) / 256.0;
+        (height(x + 1, z) - height(x - 1, z)).hypot(height(x, z + 1) - height(x, z - 1)) / 2.0
+    };
+    let places = || (20..140).flat_map(|z| (20..140).map(move |x| (x, z)));
+    let is_far = |&(x, z): &(i32, i32)| (x - 100).abs().max((z - 120).abs()) > 30;
+    let steepest = places().filter(is_far).max_by(|a, b| rise(*a).total_cmp(&rise(*b))).unwrap_or((40, 40));
+    for (name, (x, z)) in [("corner", (64, 64)), ("steep", steepest)] {
+        let middle = Vec3::new(x as f32, studio.height(x as f32, z as f32), z as f32);
+        // From the lower side, so that all of it is seen.
+        let down = Vec3::new(
+            studio.height(x as f32 - 1.0, z as f32) - studio.height(x as f32 + 1.0, z as f32),
+            0.0,
+            studio.height(x as f32, z as f32 - 1.0) - studio.height(x as f32, z as f32 + 1.0),
+        );
+        studio.look(middle + down.normalize_or(Vec3::X) * 13.0 + Vec3::Y * 10.0, middle);
+        let photograph = |studio: &mut Studio| -> Vec<_> {
+            suns()
+                .step_by(5)
+                .map(|sun| {
+                    studio.sun(sun);
+                    studio.picture()
+                })
+                .collect()
+        };
+        let before = photograph(studio);
+        studio.apply([Brush::paint(Shape::sphere(middle, 6.0), MaterialId::GROUND)]);
+        let after = photograph(studio);
+        let band = grown(&seam(studio), 2);
+        println!("{name}: {x}, {z}, rise {:.2}, {} pixels along the seam", rise((x, z)), band.len());
+        for (number, (before, after)) in before.iter().zip(&after).enumerate() {
+            let (mean, along) = (flip(before, after).0, flip_at(before, after, &band));
+            println!("{name}, sun {}: FLIP {mean:.5}, {along:.5} along the seam", 5 * number);
+            if mean.max(along) > NOISE {
+                keep(&format!("seam_{name}_{number}"), "without", before);
+                keep(&format!("seam_{name}_{number}"), "with", after);
+            }
+            album.check(mean <= NOISE, || format!("{name}: FLIP {mean:.5} with and without the field"));
+            album.check(along <= NOISE, || format!("{name}: FLIP {along:.5} along the seam"));
+        }
+    }
 }
 
 /// The pixels that the seam crosses: where a cell that marching cubes draws borders on one of the heightmap's.

@@ -1,5 +1,6 @@
 //! Ground that breaks off falls, and makes room for ground that comes back.
 
+use avian3d::prelude::*;
 use bevy::prelude::*;
 use bevy_burrow::physics::{Debris, DebrisCrumbled, DebrisSettings};
 use bevy_burrow::prelude::*;
@@ -16,13 +17,17 @@ struct Crumbled(usize);
 
 /// A stage with such a table on a terrain that stands somewhere, and its entity. Pieces stay for so many seconds.
 fn stage(voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
+    furnish(Stage::new(), voxel_size, place, stay)
+}
+
+fn furnish(stage: Stage, voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
     let mut terrain = level(64, voxel_size);
     // The model counts in voxels.
     terrain.apply([
         Brush::add(Shape::cuboid(PILLAR, Vec3::new(1.2, 8.0, 1.2)), MaterialId(2)),
         Brush::add(Shape::cuboid(SLAB, Vec3::new(6.2, 2.2, 6.2)), MaterialId(3)),
     ]);
-    let (mut stage, entity) = Stage::with_ground(terrain);
+    let (mut stage, entity) = stage.on(terrain);
     stage
         .app
         .init_resource::<Crumbled>()
@@ -66,6 +71,67 @@ fn a_slab_that_is_sawn_off_falls_and_lies_on_the_ground() {
         let height = (at.translation.y - place.y) / voxel_size;
         assert!((9.5..19.0).contains(&height), "{height}");
         assert_eq!(stage.figures().lifted, 0);
+    }
+}
+
+/// Where the meshes of pieces are in the world, and the bodies that they are children of.
+fn drawn(stage: &mut Stage) -> Vec<(Vec3, Entity)> {
+    let world = stage.app.world_mut();
+    let mut drawn = world.query_filtered::<(&Transform, &ChildOf), (With<GroundPiece>, With<Mesh3d>)>();
+    let places = drawn.iter(world).map(|(own, parent)| {
+        let body = world.get::<Transform>(parent.parent()).expect("bodies have a place");
+        ((*body * *own).translation, parent.parent())
+    });
+    places.collect()
+}
+
+/// How often a piece was found, and was drawn in the very same frame, where it was in the ground.
+#[derive(Resource, Default)]
+struct Seen(Vec<bool>);
+
+fn look(
+    mut found: MessageReader<LoosePieceFound>,
+    pieces: Query<(&GroundPiece, &Mesh3d)>,
+    meshes: Res<Assets<Mesh>>,
+    mut seen: ResMut<Seen>,
+) {
+    for LoosePieceFound { terrain, piece, .. } in found.read() {
+        let here = GroundPiece { terrain: *terrain, origin: piece.bounds.min };
+        seen.0.push(pieces.iter().any(|(drawn, mesh)| *drawn == here && meshes.contains(&mesh.0)));
+    }
+}
+
+#[test]
+fn a_piece_is_drawn_in_the_frame_in_which_the_ground_loses_it() {
+    for (voxel_size, place) in [(1.0, Vec3::ZERO), (0.5, Vec3::new(100.0, -20.0, 7.0))] {
+        let (mut stage, _) = furnish(Stage::with_meshes(), voxel_size, place, 1e9);
+        stage.app.init_resource::<Seen>().add_systems(Last, look);
+        stage.send(saw(voxel_size, place));
+        let mut homes = Vec::new();
+        stage.frames_until("the slab takes shape", |stage| {
+            let (seen, drawn) = (stage.app.world().resource::<Seen>().0.clone(), drawn(stage));
+            assert_eq!(drawn.len(), seen.len(), "as many are drawn as were found");
+            let is_body = !pieces(stage).is_empty();
+            for (home, body) in drawn {
+                // It neither falls nor is in the way before its collider is done.
+                let body = stage.app.world().entity(body);
+                assert_eq!(body.contains::<RigidBody>(), is_body);
+                assert_eq!(body.contains::<Collider>(), is_body);
+                homes.push(home);
+            }
+            is_body
+        });
+        assert_eq!(stage.app.world().resource::<Seen>().0, [true]);
+        assert!(homes.iter().all(|home| home.distance(homes[0]) < 1e-4), "{homes:?}");
+        let height = |stage: &mut Stage| {
+            let [(_, body)] = drawn(stage)[..] else { panic!("one piece") };
+            assert!(stage.app.world().entity(body).contains::<Debris>());
+            stage.place(body).y
+        };
+        let before = height(&mut stage);
+        stage.frames((1.0 / STEP) as usize);
+        let after = height(&mut stage);
+        assert!(after < before - voxel_size, "it was at {before}, and is at {after}");
     }
 }
 

@@ -104,6 +104,70 @@ fn a_held_body_goes_on_with_the_velocity_that_the_game_gave_it() {
 }
 
 #[test]
+fn what_ground_lets_through_is_not_held() {
+    let (mut stage, solid) = held_ball();
+    let ghosts = [20.0, 24.0, 28.0, 32.0].map(|x| stage.ball(Vec3::new(x, 8.6, 20.0), 0.5, Vec3::X * 2.0));
+    let world = stage.app.world_mut();
+    world.entity_mut(ghosts[0]).insert(Sensor);
+    world.entity_mut(ghosts[1]).insert(CollisionLayers::NONE);
+    world.entity_mut(ghosts[2]).insert(CollisionLayers::new(LayerMask(2), LayerMask(2)));
+    world.entity_mut(ghosts[3]).insert(ColliderDisabled);
+    let starts = ghosts.map(|ghost| stage.place(ghost));
+    for _ in 0..60 {
+        stage.frame();
+        assert!(stage.is_held(solid) && !ghosts.iter().any(|&ghost| stage.is_held(ghost)));
+    }
+    for (ghost, start) in ghosts.into_iter().zip(starts) {
+        assert!(stage.place(ghost).x > start.x + 1.0, "{} from {start}", stage.place(ghost));
+    }
+    // One that ground lets through from now on is let go.
+    stage.app.world_mut().entity_mut(solid).insert(CollisionLayers::NONE);
+    stage.frames(2);
+    assert!(!stage.is_held(solid) && get::<LockedAxes>(&stage, solid).is_none());
+}
+
+/// A box a metre wide on an arm along x, upright; the body itself has no collider.
+fn on_an_arm(stage: &mut Stage, x: f32, arm: f32) -> Entity {
+    let place = Transform::from_xyz(x, 8.6, 40.0);
+    let hand = (Collider::cuboid(1.0, 1.0, 1.0), Transform::from_xyz(arm, 0.0, 0.0));
+    let body = (RigidBody::Dynamic, LockedAxes::ROTATION_LOCKED, place);
+    stage.app.world_mut().spawn((body, children![hand])).id()
+}
+
+#[test]
+fn a_body_is_held_for_want_of_ground_below_its_colliders_wherever_it_is_itself() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    // Colliders up to x = 64.
+    source(&mut stage, 40.0, 40.0);
+    let cases = [(57.0, 7.0, true), (70.0, -7.0, false), (57.0, -7.0, false), (70.0, 7.0, true)];
+    for (x, arm, is_held) in cases {
+        let body = on_an_arm(&mut stage, x, arm);
+        stage.frames(60);
+        assert_eq!(stage.is_held(body), is_held, "at {x}, with a collider at {}", x + arm);
+        let place = stage.place(body);
+        let height = if is_held { 8.6 } else { 8.5 };
+        assert!((place.y - height).abs() < 0.05, "at {place}");
+        stage.app.world_mut().despawn(body);
+    }
+}
+
+#[test]
+fn a_held_source_gets_ground_below_all_of_its_colliders() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    source(&mut stage, 200.0, 200.0);
+    // Off its radius, in the next column of chunks.
+    let body = on_an_arm(&mut stage, 75.0, 7.0);
+    stage.app.world_mut().entity_mut(body).insert(ColliderSource { radius: 1.0 });
+    stage.frame();
+    assert!(stage.is_held(body), "there is no collider yet");
+    stage.frames_until("it is let go", |stage| !stage.is_held(body));
+    stage.frames(60);
+    assert!((stage.place(body).y - 8.5).abs() < 0.05, "{}", stage.place(body));
+}
+
+#[test]
 fn a_held_body_that_moves_no_longer_by_itself_is_let_go() {
     for kind in [RigidBody::Kinematic, RigidBody::Static] {
         let (mut stage, ball) = held_ball();

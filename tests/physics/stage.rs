@@ -59,13 +59,24 @@ impl Stage {
         Self { app }
     }
 
+    /// With meshes, which nobody draws.
+    pub fn with_meshes() -> Self {
+        let mut stage = Self::new();
+        stage.app.init_resource::<Assets<Mesh>>();
+        stage
+    }
+
     /// Spawns a terrain, and a source that reaches all of it.
     pub fn with_ground(terrain: Terrain) -> (Self, Entity) {
-        let mut stage = Self::new();
-        let entity = stage.app.world_mut().spawn(terrain).id();
-        stage.app.world_mut().spawn((Transform::default(), ColliderSource { radius: 1e4 }));
-        stage.settle();
-        (stage, entity)
+        Self::new().on(terrain)
+    }
+
+    /// The same in an app that is there already.
+    pub fn on(mut self, terrain: Terrain) -> (Self, Entity) {
+        let entity = self.app.world_mut().spawn(terrain).id();
+        self.app.world_mut().spawn((Transform::default(), ColliderSource { radius: 1e4 }));
+        self.settle();
+        (self, entity)
     }
 
     pub fn frame(&mut self) {

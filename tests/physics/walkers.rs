@@ -157,6 +157,36 @@ fn a_walker_that_crouches_is_lower_and_keeps_its_feet_on_the_ground() {
 }
 
 #[test]
+fn a_walker_that_is_given_another_character_keeps_its_feet_on_the_ground() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let walker = stage.character(Vec3::new(20.0, 8.0, 30.0), Vec2::ZERO);
+    stage.frames(seconds(1.0));
+    for height in [1.0, 2.4, 1.8] {
+        let character = Character { height, ..default() };
+        stage.app.world_mut().entity_mut(walker).insert(character.clone());
+        for _ in 0..seconds(0.5) {
+            stage.frame();
+            let feet = character.feet(stage.place(walker));
+            assert!((feet.y - 8.0).abs() < 0.03, "{height} m tall, at {feet}");
+        }
+        assert!((tall(&stage, walker) - height).abs() < 0.01, "{} for {height}", tall(&stage, walker));
+        assert!(stage.motion(walker).grounded);
+    }
+}
+
+#[test]
+fn who_becomes_a_walker_again_gets_its_capsule_again() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let walker = stage.character(Vec3::new(20.0, 8.0, 30.0), Vec2::ZERO);
+    stage.frames(2);
+    stage.app.world_mut().entity_mut(walker).remove::<(Character, Collider)>();
+    stage.frames(2);
+    stage.app.world_mut().entity_mut(walker).insert(Character { height: 1.2, ..default() });
+    stage.frames(2);
+    assert!((tall(&stage, walker) - 1.2).abs() < 0.01, "{}", tall(&stage, walker));
+}
+
+#[test]
 fn a_walker_keeps_the_collider_of_the_game_while_its_size_stays() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let walker = stage.character(Vec3::new(20.0, 8.0, 30.0), Vec2::ZERO);

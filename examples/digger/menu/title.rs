@@ -125,7 +125,9 @@ fn play(
     painting: Res<GroundLoading>,
     mut phase: ResMut<NextState<Phase>>,
 ) {
-    if game.is_wanted && !players.is_empty() && painting.is_ready() {
+    // Ground whose textures can't be used is dug all the same.
+    let is_painted = painting.is_ready() || painting.failure().is_some();
+    if game.is_wanted && !players.is_empty() && is_painted {
         phase.set(Phase::Playing);
     }
 }

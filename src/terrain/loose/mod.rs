@@ -141,10 +141,11 @@ pub(super) fn seeds(world: &World, over: &Bricks, drafted: &[DraftedBrick]) -> S
     search::seeds(&before, drafted)
 }
 
-/// Looks for loose pieces at seeds, in a world with newer bricks over it, and takes them out if the settings say so.
-/// `lowest` are the lowest of the newer ones.
+/// Looks for loose pieces at seeds, in a world with newer bricks over it, and takes them out if the settings and the rules
+/// say so. `lowest` are the lowest of the newer ones.
 pub(super) fn fall(
     world: &World,
+    rules: Option<&DiggingRules>,
     over: &Bricks,
     lowest: &Lowest,
     seeds: &Samples,
@@ -160,7 +161,7 @@ pub(super) fn fall(
     let mut gone = Samples::default();
     for component in &found {
         let mut piece = describe(samples, component, settings);
-        if world.rules().is_some_and(|rules| keep(rules, component, &piece)) {
+        if rules.is_some_and(|rules| keep(rules, component, &piece)) {
             piece.fate = PieceFate::Left;
         }
         if piece.fate != PieceFate::Left {
@@ -171,7 +172,7 @@ pub(super) fn fall(
         }
         fallen.pieces.push(piece);
     }
-    let protected = protected_beside(world, &fallen.pieces);
+    let protected = protected_beside(rules, &fallen.pieces);
     let air = air_around(&solid, &gone);
     for (&pos, layers) in &air {
         let mut air = bits::and(layers, &bits::within(pos, world.grid.edit_bounds()));
@@ -200,9 +201,9 @@ fn keep(rules: &DiggingRules, component: &Component, piece: &LoosePiece) -> bool
 }
 
 /// The protected boxes that pieces which are taken out may touch.
-fn protected_beside(world: &World, pieces: &[LoosePiece]) -> Vec<LatticeBox> {
+fn protected_beside(rules: Option<&DiggingRules>, pieces: &[LoosePiece]) -> Vec<LatticeBox> {
     let taken = pieces.iter().filter(|piece| piece.fate != PieceFate::Left).map(|piece| piece.bounds);
-    let (Some(rules), Some(all)) = (world.rules(), taken.reduce(LatticeBox::union)) else {
+    let (Some(rules), Some(all)) = (rules, taken.reduce(LatticeBox::union)) else {
         return Vec::new();
     };
     let all = all.grown(1);

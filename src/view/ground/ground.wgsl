@@ -387,7 +387,7 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
         let soil = in_soil * (under_skin + body * below);
         let subsoil_depth = soil_depth + ground.soil.w * covered * (1.0 + 0.5 * broad.w);
         let in_subsoil = (1.0 - in_soil) * (1.0 - smoothstep(0.85 * subsoil_depth, subsoil_depth + 0.05, depth));
-        let subsoil = in_subsoil * all * below;
+        let subsoil = step(0.001, ground.soil.w) * in_subsoil * all * below;
         mass = put(mass, u32(ground.soil.x), soil);
         mass = put(mass, u32(ground.soil.y), subsoil);
         var rock = max(all - soil - subsoil, 0.0);
@@ -398,7 +398,7 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
             let up = site.place.y + ground.rock.y * (roll + 0.7 * broad.z + 0.16 * fine.z);
             let within = fract(up / ground.rock.x);
             let seam_off = abs(within - 0.61) * ground.rock.x + 0.15 * fine.x + 0.12 * grit.y;
-            let seam = rock * smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
+            let seam = rock * step(0.001, ground.rock.w) * smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
                 * (1.0 - smoothstep(0.30, 0.52, seam_off / max(ground.rock.w, 0.001)));
             mass = put(mass, u32(ground.rock.z), seam);
             rock -= seam;
@@ -406,7 +406,7 @@ fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice 
             // textures draw their outline.
             let thread = length(fine.yw + 0.25 * broad.yw + 0.05 * grit.zw);
             let width = 0.22 * ground.vein.z * smoothstep(-0.1, 0.25, broad.x);
-            let vein = rock * smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01))
+            let vein = rock * step(0.001, ground.vein.z) * smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01))
                 * (1.0 - smoothstep(0.25, 1.0, thread / max(width, 0.001)));
             mass = put(mass, u32(ground.vein.y), vein);
             rock -= vein;

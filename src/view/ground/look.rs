@@ -9,7 +9,7 @@ pub const MAX_LAYERS: usize = 16;
 /// [`GroundPlugin`](super::GroundPlugin) makes and keeps its [`GroundMaterial`](super::GroundMaterial).
 ///
 /// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures: [`GroundTextures`](super::GroundTextures).
-/// Changes show in the next frame.
+/// Changes show in the next frame, on the terrain's pieces too.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -96,7 +96,8 @@ pub struct GroundStrata {
     pub height: f32,
     /// How far beds are bent, in metres.
     pub bend: f32,
-    /// A thin seam that lies in the beds: its layer, how thick it is, and the depth in metres from which on it is there.
+    /// A thin seam that lies in the beds: its layer, how thick it is (0: there is none), and the depth in metres from which
+    /// on it is there.
     pub seam: (u8, f32, f32),
     /// Veins that run through the rock: their layer, how thick they are (0 none, 1 much), and from which depth on.
     pub vein: (u8, f32, f32),

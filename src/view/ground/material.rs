@@ -24,7 +24,7 @@ use crate::plugin::{
 pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
 
 /// The part of a [`GroundMaterial`] that is not Bevy's.
-#[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
+#[derive(Asset, AsBindGroup, TypePath, Clone, Debug, PartialEq)]
 pub struct GroundExtension {
     #[uniform(100)]
     pub(super) uniform: GroundUniform,
@@ -43,7 +43,7 @@ pub struct GroundExtension {
 }
 
 /// What the shader reads of a [`GroundLook`]; as `ground.wgsl` has it.
-#[derive(ShaderType, Clone, Debug)]
+#[derive(ShaderType, Clone, Debug, PartialEq)]
 pub(super) struct GroundUniform {
     /// From world space to metres of the terrain; of a piece, from its mesh to these metres.
     pub place: Mat4,

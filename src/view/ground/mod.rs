@@ -5,7 +5,7 @@
 //! | --- | --- |
 //! | [`GroundLook`] | a terrain's settings; put it on the terrain instead of a material |
 //! | [`GroundTextures`] | which textures: baked by the project, or a game's own |
-//! | [`GroundLoading`] | how far they are |
+//! | [`GroundLoading`] | how far they are, and why a game's own are not used |
 //! | [`GroundMaterial`] | what comes of it |
 //!
 //! # How layers meet
@@ -16,13 +16,16 @@
 //! that is left out, so that none comes or goes with a jump. Which of two is on top is decided by their heights.
 
 mod bake;
+mod fit;
 mod look;
 mod material;
 mod noise;
 mod pack;
 mod palette;
+mod pieces;
 mod textures;
 
+pub use fit::GroundTexturesError;
 pub use look::{GroundLayer, GroundLayerKind, GroundLook, GroundQuality, GroundStrata, MAX_LAYERS};
 pub use material::{GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
@@ -33,11 +36,12 @@ use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
 use super::material::hand_on;
-use crate::plugin::{BurrowSystems, GroundPiece};
+use crate::plugin::BurrowSystems;
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
-/// Dresses terrains that have a [`GroundLook`]. Does nothing where there is no renderer: add it after Bevy's plugins.
+/// Dresses terrains that have a [`GroundLook`]. Does nothing where there is no renderer. Add it after Bevy's plugins, else
+/// an error tells that no ground will be drawn.
 #[derive(Default)]
 pub struct GroundPlugin;
 
@@ -52,12 +56,21 @@ impl Plugin for GroundPlugin {
         app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
             .add_systems(
                 Update,
-                (textures::load_textures, dress, undress, follow)
+                (textures::load_textures, dress, undress, follow, pieces::follow)
                     .chain()
                     .before(BurrowSystems::Dress)
                     .after(BurrowSystems::Begin),
             )
-            .add_systems(Update, dress_pieces.in_set(BurrowSystems::Dress));
+            .add_systems(Update, pieces::dress.in_set(BurrowSystems::Dress));
+    }
+
+    fn finish(&self, app: &mut App) {
+        if comes_too_early(app) {
+            error!(
+                "no terrain with a GroundLook will be drawn: BurrowPlugins were added before Bevy's PbrPlugin. \
+                 Add DefaultPlugins first"
+            );
+        }
     }
 }
 
@@ -117,17 +130,36 @@ fn follow(
     }
 }
 
-/// Gives each piece of a terrain a material of its own, which knows where in the ground it was.
-fn dress_pieces(
-    mut commands: Commands,
-    bare: Query<(Entity, &GroundPiece), Without<MeshMaterial3d<GroundMaterial>>>,
-    terrains: Query<&MeshMaterial3d<GroundMaterial>, With<Terrain>>,
-    mut materials: ResMut<Assets<GroundMaterial>>,
-) {
-    for (entity, piece) in &bare {
-        let terrain = terrains.get(piece.terrain).ok();
-        let Some(mut own) = terrain.and_then(|terrain| materials.get(&terrain.0)).cloned() else { continue };
-        own.extension.uniform = own.extension.uniform.of_piece(piece.origin);
-        commands.entity(entity).try_insert(MeshMaterial3d(materials.add(own)));
+/// Was Bevy's renderer for materials added only after the ground?
+fn comes_too_early(app: &App) -> bool {
+    app.is_plugin_added::<PbrPlugin>() && !app.is_plugin_added::<MaterialPlugin<GroundMaterial>>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bevy knows plugins by their names.
+    struct Renderer;
+
+    impl Plugin for Renderer {
+        fn build(&self, _: &mut App) {}
+
+        fn name(&self) -> &str {
+            std::any::type_name::<PbrPlugin>()
+        }
+    }
+
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default()));
+        app
+    }
+
+    #[test]
+    fn the_ground_comes_after_the_renderer_or_without_one() {
+        assert!(!comes_too_early(app().add_plugins(GroundPlugin)));
+        assert!(!comes_too_early(app().add_plugins((Renderer, GroundPlugin))));
+        assert!(comes_too_early(app().add_plugins((GroundPlugin, Renderer))));
     }
 }

@@ -1,10 +1,14 @@
 //! Textures: baked by the project, or a game's own.
 
+use bevy::asset::LoadState;
 use bevy::prelude::*;
+use bevy::render::render_resource::WgpuFeatures;
+use bevy::render::renderer::RenderDevice;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::bake::{Baked, Meter, bake};
-use super::look::{GroundLook, MAX_LAYERS};
+use super::fit::{GroundTexturesError, Misfit, layers};
+use super::look::GroundLook;
 
 /// Which textures the ground is drawn with. Insert it before the first [`GroundLook`](super::GroundLook), or change it
 /// at any time.
@@ -25,6 +29,8 @@ pub enum GroundTextures {
     /// A game's own: two arrays with one layer for each material id, alike in number and size, with mip levels and
     /// samplers that repeat. [`GroundArrays`](super::GroundArrays) makes them of ordinary pictures;
     /// a warning tells of arrays that differ, or have fewer layers than a look names.
+    ///
+    /// Images that can't be loaded, or are no arrays that can be filtered, are not used: see [`GroundLoading::failure`].
     Images {
         /// sRGB colours, heights in alpha.
         albedo: Handle<Image>,
@@ -50,7 +56,11 @@ pub struct GroundLoading {
     pub(super) ready: Option<Textures>,
     /// Are those the ones that were wanted last?
     is_current: bool,
-    /// What was wrong with them when somebody last looked.
+    /// Were images there that can be drawn with when somebody last looked?
+    was_sound: bool,
+    /// Why there were none.
+    failure: Option<GroundTexturesError>,
+    /// What was odd about them.
     misfit: Option<Misfit>,
 }
 
@@ -62,37 +72,9 @@ pub(super) struct Textures {
     pub noise: Handle<Image>,
 }
 
-/// Why arrays don't fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-enum Misfit {
-    #[error("albedo has {albedo} layers, relief {relief}")]
-    Unequal { albedo: u32, relief: u32 },
-    #[error("they have {layers} layers, the GroundLook of {terrain} names {named}")]
-    TooFew { layers: u32, terrain: Entity, named: u32 },
-}
-
-impl Misfit {
-    fn find<'a>(
-        [albedo, relief]: [u32; 2],
-        looks: impl Iterator<Item = (Entity, &'a GroundLook)>,
-    ) -> Option<Self> {
-        if albedo != relief {
-            return Some(Self::Unequal { albedo, relief });
-        }
-        let named = |look: &GroundLook| {
-            let layers = look.layers.iter().zip(1..).take(MAX_LAYERS);
-            layers.map(|(layer, count)| layer.top.map_or(0, |top| u32::from(top) + 1).max(count)).max()
-        };
-        let (terrain, named) = looks
-            .map(|(terrain, look)| (terrain, named(look).unwrap_or(1)))
-            .max_by_key(|&(terrain, named)| (named, terrain))?;
-        (named > albedo).then_some(Self::TooFew { layers: albedo, terrain, named })
-    }
-}
-
 impl GroundLoading {
     /// From 0 (nothing asked for, or just begun) to 1 (terrains are dressed). While other textures are made, terrains keep
-    /// those they have, and this begins anew.
+    /// those they have, and this begins anew. After a [`failure`](Self::failure) it never gets to 1.
     pub fn progress(&self) -> f32 {
         if self.is_current { 1.0 } else { self.meter.progress().min(0.99) }
     }
@@ -100,6 +82,32 @@ impl GroundLoading {
     /// Are the textures there, and terrains dressed with them?
     pub fn is_ready(&self) -> bool {
         self.is_current
+    }
+
+    /// Why a game's own images are not used: a loading screen that waits for them waits in vain. Terrains keep the
+    /// textures they have; those that have none get the project's own, as coarse as can be. It is told until
+    /// [`GroundTextures`] are changed, or the images are; a warning tells it too.
+    ///
+    /// ```
+    /// # use bevy::prelude::*;
+    /// # use bevy_burrow::prelude::*;
+    /// fn fall_back(loading: Res<GroundLoading>, mut textures: ResMut<GroundTextures>) {
+    ///     if loading.failure().is_some() {
+    ///         *textures = GroundTextures::default();
+    ///     }
+    /// }
+    /// ```
+    pub fn failure(&self) -> Option<&GroundTexturesError> {
+        self.failure.as_ref()
+    }
+
+    /// Remembers why images are not used, and tells it once.
+    fn fail(&mut self, failure: GroundTexturesError) {
+        (self.is_current, self.was_sound) = (false, false);
+        if self.failure.as_ref().is_none_or(|told| told.to_string() != failure.to_string()) {
+            warn!("the images of GroundTextures are not used: {failure}");
+            self.failure = Some(failure);
+        }
     }
 }
 
@@ -110,6 +118,7 @@ pub(super) fn load_textures(
     looks: Query<(Entity, &GroundLook)>,
     mut images: ResMut<Assets<Image>>,
     server: Option<Res<AssetServer>>,
+    device: Option<Res<RenderDevice>>,
 ) {
     let loading = loading.bypass_change_detection();
     if looks.is_empty() && loading.wanted.is_none() {
@@ -125,7 +134,8 @@ pub(super) fn load_textures(
             GroundTextures::Images { .. } => (16, 1),
         };
         loading.meter = Meter::default();
-        (loading.baked, loading.is_current, loading.misfit) = (None, false, None);
+        (loading.baked, loading.is_current, loading.was_sound) = (None, false, false);
+        (loading.failure, loading.misfit) = (None, None);
         let meter = loading.meter.clone();
         loading.task = Some(AsyncComputeTaskPool::get().spawn(async move { bake(side, anisotropy, &meter) }));
     }
@@ -134,46 +144,157 @@ pub(super) fn load_textures(
         loading.baked = Some([baked.albedo, baked.relief, baked.noise].map(|image| images.add(image)));
     }
     let Some([albedo, relief, noise]) = loading.baked.clone() else { return };
+    let baked = Textures { albedo, relief, noise };
     let textures = match &*settings {
-        GroundTextures::Baked { .. } => Textures { albedo, relief, noise },
+        GroundTextures::Baked { .. } => baked.clone(),
         GroundTextures::Images { albedo, relief } => {
-            Textures { albedo: albedo.clone(), relief: relief.clone(), noise }
+            Textures { albedo: albedo.clone(), relief: relief.clone(), noise: baked.noise.clone() }
         }
     };
-    if let (Some(albedo), Some(relief)) = (images.get(&textures.albedo), images.get(&textures.relief)) {
-        loading.is_current = true;
-        let counts = [albedo, relief].map(|image| image.texture_descriptor.array_layer_count());
-        let misfit = Misfit::find(counts, looks.iter());
-        // In every frame, but told once per change.
-        if let Some(misfit) = misfit
-            && loading.misfit != Some(misfit)
-        {
-            warn!("the arrays of GroundTextures don't fit: {misfit}");
+    // In every frame, since images may change: what is drawn with unfit ones would end the app.
+    let features = device.map_or(WgpuFeatures::empty(), |device| device.features());
+    let find = |name, handle: &Handle<Image>| match (images.get(handle), server.as_deref()) {
+        (Some(image), _) => layers(name, image, features).map(Some),
+        (None, Some(server)) => match server.load_state(handle) {
+            LoadState::Failed(source) => Err(GroundTexturesError::Load { image: name, source }),
+            _ => Ok(None),
+        },
+        (None, None) => Ok(None),
+    };
+    let find_both = |Textures { albedo, relief, .. }: &Textures| {
+        find("albedo", albedo).and_then(|layers| Ok(layers.zip(find("relief", relief)?)))
+    };
+    match find_both(&textures) {
+        Ok(Some((albedo, relief))) => {
+            loading.failure = None;
+            // The renderer takes up images and materials in any order: one that was mended just now may still be there as
+            // it was before.
+            if !std::mem::replace(&mut loading.was_sound, true) {
+                return;
+            }
+            loading.is_current = true;
+            let misfit = Misfit::find([albedo, relief], looks.iter());
+            if let Some(misfit) = misfit
+                && loading.misfit != Some(misfit)
+            {
+                warn!("the arrays of GroundTextures don't fit: {misfit}");
+            }
+            loading.misfit = misfit;
+            if loading.ready.as_ref() != Some(&textures) {
+                loading.ready = Some(textures);
+            }
         }
-        loading.misfit = misfit;
-        if loading.ready.as_ref() != Some(&textures) {
-            loading.ready = Some(textures);
+        Ok(None) => loading.failure = None,
+        Err(failure) => {
+            if loading.ready.as_ref().is_none_or(|worn| find_both(worn).is_err()) {
+                loading.ready = Some(baked);
+            }
+            loading.fail(failure);
         }
-    } else if let Some(server) = server
-        && [&textures.albedo, &textures.relief].iter().any(|image| server.load_state(*image).is_failed())
-    {
-        warn_once!("the ground has no look: an image of GroundTextures can't be loaded");
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
+    use bevy::render::render_resource::{TextureViewDescriptor, TextureViewDimension};
+
+    use super::GroundTexturesError::{Load, NoArray};
     use super::*;
 
+    /// Painted fast.
+    const SMALL: GroundTextures = GroundTextures::Baked { side: 16, anisotropy: 1 };
+
+    /// An app that draws nothing, with somebody who looks.
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default()))
+            .init_asset::<Image>()
+            .insert_resource(SMALL)
+            .init_resource::<GroundLoading>()
+            .add_systems(Update, load_textures);
+        app.world_mut().spawn(GroundLook::default());
+        app
+    }
+
+    fn loading(app: &App) -> &GroundLoading {
+        app.world().resource()
+    }
+
+    fn update_until(app: &mut App, what: &str, is_so: impl Fn(&GroundLoading) -> bool) {
+        for _ in 0..10_000 {
+            app.update();
+            if is_so(loading(app)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        panic!("{what}");
+    }
+
+    fn add(app: &mut App, image: Image) -> Handle<Image> {
+        app.world_mut().resource_mut::<Assets<Image>>().add(image)
+    }
+
+    /// From now on it is seen as this.
+    fn see(app: &mut App, image: &Handle<Image>, dimension: TextureViewDimension) {
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        let mut image = images.get_mut(image).expect("an image");
+        image.texture_view_descriptor =
+            Some(TextureViewDescriptor { dimension: Some(dimension), ..default() });
+    }
+
+    fn wears(app: &App, albedo: &Handle<Image>) -> bool {
+        loading(app).ready.as_ref().is_some_and(|ready| ready.albedo == *albedo)
+    }
+
     #[test]
-    fn arrays_must_be_alike_and_hold_what_looks_name() {
-        let terrain = Entity::PLACEHOLDER;
-        let look = GroundLook::default();
-        let find = |counts| Misfit::find(counts, [(terrain, &look)].into_iter());
-        assert_eq!(find([14, 12]), Some(Misfit::Unequal { albedo: 14, relief: 12 }));
-        // Twelve layers, and two that are seen from above.
-        assert_eq!(find([13, 13]), Some(Misfit::TooFew { layers: 13, terrain, named: 14 }));
-        assert_eq!(find([14, 14]), None);
-        assert_eq!(find([20, 20]), None);
+    fn ordinary_pictures_are_not_drawn_with_until_they_are_arrays() {
+        let mut app = app();
+        let [albedo, relief] = [(); 2].map(|()| add(&mut app, Image::default()));
+        app.insert_resource(GroundTextures::Images { albedo: albedo.clone(), relief: relief.clone() });
+        update_until(&mut app, "a failure", |loading| loading.failure().is_some());
+        assert!(matches!(loading(&app).failure(), Some(NoArray { image: "albedo", .. })));
+        assert!(!loading(&app).is_ready() && loading(&app).progress() < 1.0);
+        assert!(loading(&app).ready.is_some() && !wears(&app, &albedo), "coarse ground is better than none");
+
+        see(&mut app, &albedo, TextureViewDimension::D2Array);
+        app.update();
+        assert!(matches!(loading(&app).failure(), Some(NoArray { image: "relief", .. })));
+        see(&mut app, &relief, TextureViewDimension::D2Array);
+        app.update();
+        assert!(
+            loading(&app).failure().is_none() && !wears(&app, &albedo),
+            "the renderer has them a frame later"
+        );
+        app.update();
+        assert!(loading(&app).is_ready() && wears(&app, &albedo));
+
+        // Loaded anew, say.
+        see(&mut app, &relief, TextureViewDimension::D2);
+        app.update();
+        assert!(loading(&app).failure().is_some() && !loading(&app).is_ready() && !wears(&app, &albedo));
+    }
+
+    #[test]
+    fn an_image_that_cannot_be_loaded_is_told_until_there_are_others() {
+        let mut app = app();
+        update_until(&mut app, "textures", GroundLoading::is_ready);
+        let own = loading(&app).ready.clone();
+        let mut array = Image::default();
+        array.texture_descriptor.size.depth_or_array_layers = 2;
+        let albedo = add(&mut app, array);
+        let relief = app.world().resource::<AssetServer>().load("nowhere.png");
+        app.insert_resource(GroundTextures::Images { albedo, relief });
+        update_until(&mut app, "a failure", |loading| loading.failure().is_some());
+        assert!(matches!(loading(&app).failure(), Some(Load { image: "relief", .. })));
+        assert!(!loading(&app).is_ready());
+        assert_eq!(loading(&app).ready, own, "terrains keep what they have");
+
+        app.insert_resource(SMALL);
+        app.update();
+        assert!(loading(&app).failure().is_none());
+        update_until(&mut app, "textures", GroundLoading::is_ready);
     }
 }
