@@ -1,8 +1,8 @@
 // Draws the cells of one brick, as surface/block.rs does.
 //
-// Each of the 9x9 corners of a brick's cells, seen from above, has a thread that holds its column as bits, bit y for
-// layer y: a few operations on them tell the cubes to draw, and the lattice edges with a vertex. Most bricks are done
-// then. For the others:
+// What is above each of the 9x9 corners of a brick's cells, seen from above, is held as bits, bit y for layer y. Most bricks
+// are all solid or all air, and done then. In the others each corner has a thread: a few operations on the bits tell the
+// cubes to draw, and the lattice edges with a vertex. Then:
 //
 //   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges;
 //      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
@@ -17,62 +17,68 @@
 
 #include "vertex.cuh"
 
-// Looks up the bricks around, copies heights, and the bits of the bricks that hold corners.
-__device__ inline void gather_bits(const Site& site, MeshBench& bench) {
+// Looks up the bricks around, copies heights, and clears what threads add to.
+__device__ inline void look_around(const Site& site, MeshBench& bench) {
     i32 t = threadIdx.x;
     u32 strides = site.job.strides;
-    const u32* window = site.params.windows + site.job.window;
     if (t < 27) {
         i32 along_x = (t % 3 - 1) * (i32)(strides & 0xffff), along_z = (t / 3 % 3 - 1) * (i32)(strides >> 16);
-        bench.refs[t] = window[along_x + along_z + t / 9 - 1];
+        bench.refs[t] = site.params.windows[site.job.window + along_x + along_z + t / 9 - 1];
     }
-    // Eight bricks of eight layers of two halves: four rows for each thread.
-    i32 brick = t / 16, half = t % 16;
-    u32 ref = window[(brick & 1) * (strides & 0xffff) + (brick >> 1 & 1) * (strides >> 16) + (brick >> 2)];
-    u32 solid = 0, edited = 0;
-    if (ref != NONE) {
-        const Brick& found = site.params.bricks[ref >> 1];
-        solid = found.solid[half];
-        edited = found.edited[half];
-    }
-    // A byte of the one, a byte of the other.
-    ((uint2*)bench.rows[brick])[half] = {__byte_perm(solid, edited, 0x5140), __byte_perm(solid, edited, 0x7362)};
-
     if (t < AREA) bench.heights[t] = site.stack.heights[t];
-    if (t < CORNERS + 20) bench.solid[t] = bench.drawn[t] = 0;
+    if (t < CORNERS + 20) bench.drawn[t] = 0;
     if (t == 0) bench.layers = 0;
 }
 
-// A column of corners as bits.
-struct CornerColumn {
-    u32 solid, edited;
-};
-
-__device__ inline CornerColumn corner_column(const Site& site, const MeshBench& bench, i32 x, i32 z) {
-    i32 brick = x / SIDE + z / SIDE * 2, row = z % SIDE, bit = x % SIDE;
-    u32 layers = 0;
-    for (i32 y = 0; y < SIDE; y++) layers |= (bench.rows[brick][y * SIDE + row] >> bit & 0x101u) << y;
-    u32 above = bench.rows[brick + 4][row] >> bit & 0x101u;
-    CornerColumn column = {(layers & 0xff) | (above & 1) << 8, layers >> 8 | (above & 0x100)};
-    // Where there is no brick, the ground tells: below its height all is solid.
-    i32 height = bench.heights[(z + 1) * WINDOW + x + 1];
-    i32 filled = smallest(largest(((height + ONE - 1) >> 8) - site.low[1], 0), 9);
-    u32 pristine = (1u << filled) - 1;
-    if (bench.refs[around(x / SIDE, 0, z / SIDE)] == NONE) column.solid |= pristine & 0xff;
-    if (bench.refs[around(x / SIDE, 1, z / SIDE)] == NONE) column.solid |= pristine & 0x100;
-    return column;
+// Fills the columns of corners, and the signs. A warp has the corners of one of four bricks side by side, and of the one
+// above it. A lane brings a layer's half of a brick's bits; turned around, these are what is above two of its corners.
+__device__ inline void gather_columns(const Site& site, MeshBench& bench) {
+    const Brick* bricks = site.params.bricks;
+    u32 strides = site.job.strides, dx = warp() & 1, dz = warp() >> 1;
+    const u32* window = site.params.windows + site.job.window + dx * (strides & 0xffff) + dz * (strides >> 16);
+    u32 own = window[0], above = window[1], word = 0;
+    // Four bytes of each corner's lane: solid samples, those of the corner four rows on, edited samples, and those.
+    if (own != NONE) {
+        const u32* words = lane() < 16 ? bricks[own >> 1].solid : bricks[own >> 1].edited;
+        word = words[lane() % SIDE * 2 + lane() / SIDE % 2];
+    }
+    word = transpose(word);
+    bool has_solid = false, has_air = false;
+#pragma unroll
+    for (i32 half = 0; half < 2; half++) {
+        u32 x = lane() % SIDE + dx * SIDE, z = lane() / SIDE + half * 4 + dz * SIDE;
+        if (x > SIDE || z > SIDE) continue;
+        u32 bits = word >> half * SIDE & 0xff00ff;
+        if (above != NONE) {
+            const Brick& found = bricks[above >> 1];
+            bits |= (found.solid[half] >> lane() & 1) << 8 | (found.edited[half] >> lane() & 1) << 24;
+        }
+        // Where there is no brick, the ground tells: below its height all is solid.
+        i32 height = site.stack.heights[(z + 1) * WINDOW + x + 1];
+        i32 filled = smallest(largest(((height + ONE - 1) >> 8) - site.low[1], 0), 9);
+        u32 pristine = (1u << filled) - 1;
+        if (own == NONE) bits |= pristine & 0xff;
+        if (above == NONE) bits |= pristine & 0x100;
+        bench.columns[MARGIN + z * 9 + x] = bits;
+        has_solid |= (bits & 0x1ff) != 0;
+        has_air |= (bits & 0x1ff) != 0x1ff;
+    }
+    has_solid = __any_sync(WARP, has_solid);
+    has_air = __any_sync(WARP, has_air);
+    if (lane() == 0) bench.signs[warp()] = has_solid | has_air << 1;
 }
 
 // The cubes to draw over the cell of a corner, a bit for each layer: those that both signs meet in, and that have an
 // edited corner or belong to the mask.
-__device__ inline u32 drawn_cubes(const Site& site, const u16* solid, const u16* edited, i32 x, i32 z) {
+__device__ inline u32 drawn_cubes(const Site& site, const u32* columns, i32 x, i32 z) {
     u32 cells = site.job.cells;
     i32 low_x = cells & 7, low_y = cells >> 3 & 7, low_z = cells >> 6 & 7;
     i32 high_x = cells >> 9 & 7, high_y = cells >> 12 & 7, high_z = cells >> 15 & 7;
     if (x < low_x || x > high_x || z < low_z || z > high_z) return 0;
-    u32 some = solid[0] | solid[1] | solid[9] | solid[10], all = solid[0] & solid[1] & solid[9] & solid[10];
+    u32 some = columns[0] | columns[1] | columns[9] | columns[10];
+    u32 all = columns[0] & columns[1] & columns[9] & columns[10];
     u32 mixed = (some | some >> 1) & ~(all & all >> 1);
-    u32 near = edited[0] | edited[1] | edited[9] | edited[10];
+    u32 near = some >> 16;
     u32 wanted = site.column.mask >> (z * SIDE + x) & 1 ? 0xff : near | near >> 1;
     u32 layers = (2u << high_y) - (1u << low_y);
     return mixed & wanted & layers & 0xff;
@@ -83,11 +89,11 @@ __device__ inline u32 both_faces(u32 cubes) { return cubes | cubes << 1; }
 
 // The edges from the corners of one column that have a vertex, a bit for each level: their two ends differ, and a cube
 // beside them is drawn.
-__device__ inline u32 column_edges(const u16* solid, const u16* drawn) {
-    u32 own = solid[0];
-    u32 along_x = (own ^ solid[1]) & both_faces(drawn[0] | drawn[-9]);
+__device__ inline u32 column_edges(const u32* columns, const u16* drawn) {
+    u32 own = columns[0];
+    u32 along_x = (own ^ columns[1]) & both_faces(drawn[0] | drawn[-9]);
     u32 along_y = (own ^ own >> 1) & (u32)(drawn[0] | drawn[-1] | drawn[-9] | drawn[-10]);
-    u32 along_z = (own ^ solid[9]) & both_faces(drawn[0] | drawn[-1]);
+    u32 along_z = (own ^ columns[9]) & both_faces(drawn[0] | drawn[-1]);
     return along_x | along_y << 9 | along_z << 18;
 }
 
@@ -95,10 +101,10 @@ __device__ inline u32 column_edges(const u16* solid, const u16* drawn) {
 __device__ inline u32 spread_pair(u32 bits) { return (bits & 1) | (bits & 2) << 1; }
 
 // The case of a cube, which says what corners are solid.
-__device__ inline u32 cube_case(const u16* solid, u32 y) {
+__device__ inline u32 cube_case(const u32* columns, u32 y) {
     // Two bits of each column: the lower corner's, and the upper one's two places further.
-    u32 near = spread_pair(solid[0] >> y) | spread_pair(solid[1] >> y) << 1;
-    u32 far = spread_pair(solid[9] >> y) | spread_pair(solid[10] >> y) << 1;
+    u32 near = spread_pair(columns[0] >> y) | spread_pair(columns[1] >> y) << 1;
+    u32 far = spread_pair(columns[9] >> y) | spread_pair(columns[10] >> y) << 1;
     return near | far << 4;
 }
 
@@ -135,7 +141,7 @@ __device__ inline void copy_row(const Site& site, MeshBench& bench, i32 layer, i
 __device__ inline u32 count_edges(const MeshBench& bench) {
     u32 edges = 0;
     for (u32 corner = lane(); corner < CORNERS; corner += 32) {
-        edges += __popc(column_edges(bench.solid + MARGIN + corner, bench.drawn + MARGIN + corner));
+        edges += __popc(column_edges(bench.columns + MARGIN + corner, bench.drawn + MARGIN + corner));
     }
     return __shfl_sync(WARP, running_sum(edges), 31);
 }
@@ -187,7 +193,7 @@ __device__ inline u32 list_triangles(const MeshParams& params, MeshBench& bench,
     for (u32 base = 0; base < cubes; base += 32) {
         u32 cube = base + lane(), count = 0;
         if (cube < cubes) {
-            u32 place = bench.cubes[cube], kind = cube_case(bench.solid + MARGIN + place % CORNERS, place / CORNERS);
+            u32 place = bench.cubes[cube], kind = cube_case(bench.columns + MARGIN + place % CORNERS, place / CORNERS);
             bench.cubes[cube] = place | kind << PLACE_BITS;
             count = triangles_of(params, kind);
         }
@@ -270,36 +276,38 @@ __device__ inline void write_triangles(const MeshParams& params, MeshBench& benc
     __syncwarp();
 }
 
+// Says that a block has no surface.
+__device__ inline void draw_nothing(const MeshParams& params) {
+    if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, 0, 0};
+}
+
 extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params) {
     __shared__ MeshBench bench;
     const MeshJob& job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
     const Stack& stack = params.stacks[column.stack];
     Site site = {params, job, column, stack, {column.x * SIDE, job.y * SIDE, column.z * SIDE}};
-    gather_bits(site, bench);
+    look_around(site, bench);
+    gather_columns(site, bench);
     __syncthreads();
-
-    // Each thread with a corner holds its column.
-    i32 t = threadIdx.x, x = t % 9, z = t / 9;
-    u16* solid = bench.solid + MARGIN + t;
-    u16* drawn = bench.drawn + MARGIN + t;
-    // Only until the list of edges is made.
-    u16* edited = bench.edges + t;
-    if (t < CORNERS) {
-        CornerColumn own = corner_column(site, bench, x, z);
-        *solid = (u16)own.solid;
-        *edited = (u16)own.edited;
+    // Where all corners are solid, or none, there is no surface.
+    if ((bench.signs[0] | bench.signs[1] | bench.signs[2] | bench.signs[3]) != 3) {
+        draw_nothing(params);
+        return;
     }
-    __syncthreads();
+
+    i32 t = threadIdx.x, x = t % 9, z = t / 9;
+    const u32* columns = bench.columns + MARGIN + t;
+    u16* drawn = bench.drawn + MARGIN + t;
     if (x < SIDE && z < SIDE) {
-        u32 cubes = drawn_cubes(site, solid, edited, x, z);
+        u32 cubes = drawn_cubes(site, columns, x, z);
         *drawn = (u16)cubes;
         if (cubes != 0) atomicOr(&bench.layers, cubes);
     }
     __syncthreads();
     u32 layers = bench.layers;
     if (layers == 0) {
-        if (t == 0) params.results[blockIdx.x] = {0, 0, 0, 0};
+        draw_nothing(params);
         return;
     }
 
@@ -308,7 +316,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
     u32 edges = 0, vertices = 0, triangles = 0;
     u64 reserved = 0;
     if (warp() < CORNER_WARPS) {
-        edges = t < CORNERS ? column_edges(solid, drawn) : 0;
+        edges = t < CORNERS ? column_edges(columns, drawn) : 0;
         u32 level = transpose(edges);
         if (lane() < LEVELS) bench.runs[lane()][warp()].crossed = level;
         i32 bottom = __ffs(layers) - 1, top = 31 - __clz(layers), rows = (top - bottom + 4) * WINDOW;

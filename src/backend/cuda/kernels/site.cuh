@@ -22,16 +22,13 @@ struct MeshBench {
     // Bricks around, by (y * 3 + z) * 3 + x.
     u32 refs[27];
     i32 heights[AREA];
-    union alignas(8) {
-        // Rows of the eight bricks that hold corners: solid samples in the low byte, edited ones in the high one.
-        u16 rows[8][SIDE * SIDE];
-        // They are not needed any more when this is filled.
-        Marked apron[WINDOW * AREA];
-    };
-    // By corner, with one column of nothing before and after, so that every corner has neighbours.
-    u16 solid[CORNERS + 20], drawn[CORNERS + 20];
+    Marked apron[WINDOW * AREA];
+    // By corner, with some before and after, so that every corner has neighbours: what is above it as bits, solid samples in
+    // the lower half, edited ones in the upper half; the cubes to draw, none where there is no cell.
+    u32 columns[CORNERS + 20];
+    u16 drawn[CORNERS + 20];
     Run runs[LEVELS][CORNER_WARPS];
-    // Places of the edges, in order of their vertices. Before, the edited samples over each corner.
+    // Places of the edges, in order of their vertices.
     u16 edges[MOST_VERTICES];
     // Drawn cubes in order: the place of their lowest corner in its layer | case << PLACE_BITS.
     u32 cubes[LEN];
@@ -42,6 +39,8 @@ struct MeshBench {
         float normals[96];
         u16 indices[96];
     } staged[THREADS / 32];
+    // What signs each warp's corners have: 1 solid, 2 air.
+    u32 signs[THREADS / 32];
     // Layers that have a cube to draw.
     u32 layers;
     u32 vertex, vertices, index, triangles_in_all;
@@ -49,7 +48,7 @@ struct MeshBench {
 
 constexpr u32 PLACE_BITS = 10, CUBE_BITS = 9;
 
-// From where the corner (0, 0) is in `solid` and `drawn`.
+// From where the corner (0, 0) is in `columns` and `drawn`.
 constexpr i32 MARGIN = 10;
 
 // A brick and what its stack has.
