@@ -30,7 +30,9 @@ __device__ inline u32 transpose(u32 bits) {
 #pragma unroll
     for (i32 step = 16; step > 0; step /= 2) {
         u32 other = __shfl_xor_sync(WARP, bits, step);
-        bits = lane() & step ? (bits & ~low) | (other >> step & low) : (bits & low) | (other << step & ~low);
+        bool is_upper = lane() & step;
+        u32 taken = is_upper ? low : ~low, moved = is_upper ? other >> step : other << step;
+        bits ^= (bits ^ moved) & taken;
         low ^= low << (step / 2);
     }
     return bits;
