@@ -6,7 +6,7 @@
 //
 //   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges;
 //      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
-//   2. Samples are copied out of 27 bricks, only the layers that those edges look at.
+//   2. Samples are copied out of 27 bricks, a thread for each column.
 //      Meanwhile one warp lists the cubes and their triangles, and reserves room for the output.
 //   3. Edges are listed.
 //   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or 32 triangles, which look up
@@ -17,25 +17,12 @@
 
 #include "vertex.cuh"
 
-// Looks up the bricks around, copies heights, and clears what threads add to.
-__device__ inline void look_around(const Site& site, MeshBench& bench) {
-    i32 t = threadIdx.x;
-    u32 strides = site.job.strides;
-    if (t < 27) {
-        i32 along_x = (t % 3 - 1) * (i32)(strides & 0xffff), along_z = (t / 3 % 3 - 1) * (i32)(strides >> 16);
-        bench.refs[t] = site.params.windows[site.job.window + along_x + along_z + t / 9 - 1];
-    }
-    if (t < AREA) bench.heights[t] = site.stack.heights[t];
-    if (t < CORNERS + 20) bench.drawn[t] = 0;
-    if (t == 0) bench.layers = 0;
-}
-
 // Fills the columns of corners, and the signs. A warp has the corners of one of four bricks side by side, and of the one
 // above it. A lane brings a layer's half of a brick's bits; turned around, these are what is above two of its corners.
 __device__ inline void gather_columns(const Site& site, MeshBench& bench) {
     const Brick* bricks = site.params.bricks;
-    u32 strides = site.job.strides, dx = warp() & 1, dz = warp() >> 1;
-    const u32* window = site.params.windows + site.job.window + dx * (strides & 0xffff) + dz * (strides >> 16);
+    u32 dx = warp() & 1, dz = warp() >> 1;
+    const u32* window = window_at(site, dx, dz);
     u32 own = window[0], above = window[1], word = 0;
     // Four bytes of each corner's lane: solid samples, those of the corner four rows on, edited samples, and those.
     if (own != NONE) {
@@ -110,30 +97,33 @@ __device__ inline u32 cube_case(const u32* columns, u32 y) {
 
 __device__ inline u32 triangles_of(const MeshParams& params, u32 kind) { return params.table[kind][15] / 3; }
 
-__device__ inline Marked mark(i32 stored, i32 pristine) {
-    return stored == PRISTINE ? (i32)(2u * (u32)pristine) : stored * 2 + 1;
+// Reads samples above one another, from a layer of a brick on; without a brick nobody edited them.
+template <i32 FIRST, i32 COUNT>
+__device__ inline void read_samples(const Site& site, u32 ref, u32 at, i32* samples) {
+    const i16* found = site.params.bricks[ref >> 1].samples + FIRST * 64 + at;
+#pragma unroll
+    for (i32 i = 0; i < COUNT; i++) samples[i] = ref != NONE ? found[i * 64] : PRISTINE;
 }
 
-// Copies one row of samples into the apron: one of the brick before, eight, and two of the brick after.
-__device__ inline void copy_row(const Site& site, MeshBench& bench, i32 layer, i32 z) {
-    // Layer and row 0 are the last of the brick before.
-    i32 level = (layer + 7) / SIDE - 1, at = (layer + 7) % SIDE * 64 + (z + 7) % SIDE * SIDE;
-    i32 height = (site.low[1] + layer - 1) * ONE;
-    const i32* heights = bench.heights + z * WINDOW;
-    const u32* refs = bench.refs + around(0, level, (z + 7) / SIDE - 1);
-    // Two samples to a word.
-    const u32 NOTHING = (u16)PRISTINE * 0x10001u;
-    u32 before = NOTHING, after = NOTHING;
-    uint4 own = {NOTHING, NOTHING, NOTHING, NOTHING};
-    if (refs[-1] != NONE) before = *(const u32*)&site.params.bricks[refs[-1] >> 1].samples[at + 6];
-    if (refs[0] != NONE) own = *(const uint4*)&site.params.bricks[refs[0] >> 1].samples[at];
-    if (refs[1] != NONE) after = *(const u32*)&site.params.bricks[refs[1] >> 1].samples[at];
-    u32 pairs[6] = {before, own.x, own.y, own.z, own.w, after};
-    Marked* row = bench.apron + layer * AREA + z * WINDOW;
+// Copies the samples of a thread's column to the apron, and its height. Layers of cubes tell whether samples of the bricks
+// below and above are looked at.
+__device__ inline void copy_column(const Site& site, MeshBench& bench, u32 layers) {
+    u32 t = threadIdx.x, x = t % WINDOW + SIDE - 1, z = t / WINDOW + SIDE - 1;
+    if (t >= AREA) return;
+    // Layer, row and column 0 are the last of the brick before.
+    const u32* window = window_at(site, x / SIDE - 1, z / SIDE - 1);
+    u32 at = z % SIDE * SIDE + x % SIDE;
+    i32 samples[WINDOW], height = site.stack.heights[t];
+    read_samples<0, 8>(site, window[0], at, samples + 1);
+    read_samples<7, 1>(site, layers & 1 ? window[-1] : NONE, at, samples);
+    read_samples<0, 2>(site, layers & 0xc0 ? window[1] : NONE, at, samples + 9);
+    bench.heights[t] = height;
+    // Twice the density where the ground tells.
+    u32 pristine = ((u32)(site.low[1] - 1) * ONE - (u32)height) * 2;
 #pragma unroll
-    for (i32 x = 0; x < WINDOW; x++) {
-        i32 stored = (i16)(pairs[(x + 1) / 2] >> ((x + 1) % 2 * 16));
-        row[x] = mark(stored, (i32)((u32)height - (u32)heights[x]));
+    for (i32 layer = 0; layer < WINDOW; layer++) {
+        i32 sample = samples[layer];
+        bench.apron[layer * AREA + t] = sample == PRISTINE ? (i32)(pristine + layer * ONE * 2) : sample * 2 + 1;
     }
 }
 
@@ -283,11 +273,13 @@ __device__ inline void draw_nothing(const MeshParams& params) {
 
 extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params) {
     __shared__ MeshBench bench;
-    const MeshJob& job = params.jobs[blockIdx.x];
+    const MeshJob job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
     const Stack& stack = params.stacks[column.stack];
     Site site = {params, job, column, stack, {column.x * SIDE, job.y * SIDE, column.z * SIDE}};
-    look_around(site, bench);
+    i32 t = threadIdx.x, x = t % 9, z = t / 9;
+    if (t < CORNERS + 20) bench.drawn[t] = 0;
+    if (t == 0) bench.layers = 0;
     gather_columns(site, bench);
     __syncthreads();
     // Where all corners are solid, or none, there is no surface.
@@ -296,7 +288,6 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
         return;
     }
 
-    i32 t = threadIdx.x, x = t % 9, z = t / 9;
     const u32* columns = bench.columns + MARGIN + t;
     u16* drawn = bench.drawn + MARGIN + t;
     if (x < SIDE && z < SIDE) {
@@ -311,18 +302,15 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
         return;
     }
 
-    // Three warps turn edges to words, and copy samples to the apron. The fourth lists triangles, and reserves room; while
-    // it waits for that, edges are listed.
+    copy_column(site, bench, layers);
+    // Three warps turn edges to words. The fourth lists triangles, and reserves room; while it waits for that, edges are
+    // listed.
     u32 edges = 0, vertices = 0, triangles = 0;
     u64 reserved = 0;
     if (warp() < CORNER_WARPS) {
         edges = t < CORNERS ? column_edges(columns, drawn) : 0;
         u32 level = transpose(edges);
         if (lane() < LEVELS) bench.runs[lane()][warp()].crossed = level;
-        i32 bottom = __ffs(layers) - 1, top = 31 - __clz(layers), rows = (top - bottom + 4) * WINDOW;
-        for (i32 row = t; row < rows; row += CORNER_WARPS * 32) {
-            copy_row(site, bench, bottom + row / WINDOW, row % WINDOW);
-        }
     } else {
         vertices = count_edges(bench);
         triangles = list_triangles(params, bench, list_cubes(bench));

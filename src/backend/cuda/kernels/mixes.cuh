@@ -101,11 +101,11 @@ __device__ inline Mix own_mix(const Site& site, const i32* heights, const Edge& 
 }
 
 // The material stored at an edge's solid end.
-__device__ inline u32 stored_material(const Site& site, const u32* refs, const Edge& edge, bool is_lower) {
+__device__ inline u32 stored_material(const Site& site, const Edge& edge, bool is_lower) {
     i32 x = edge.x + (edge.axis == 0 && !is_lower);
     i32 y = edge.y + (edge.axis == 1 && !is_lower);
     i32 z = edge.z + (edge.axis == 2 && !is_lower);
-    u32 ref = refs[around(x / SIDE, y / SIDE, z / SIDE)];
+    u32 ref = window_at(site, x / SIDE, z / SIDE)[y / SIDE];
     if (ref == NONE || !(ref & 1)) return GROUND;
     return site.params.bricks[ref >> 1].materials[y % SIDE * 64 + z % SIDE * SIDE + x % SIDE];
 }
@@ -113,7 +113,7 @@ __device__ inline u32 stored_material(const Site& site, const u32* refs, const E
 __device__ inline Mix mix_at(
     const Site& site, const MeshBench& bench, const Edge& edge, const Crossing& crossing
 ) {
-    u32 stored = stored_material(site, bench.refs, edge, crossing.is_lower_solid);
+    u32 stored = stored_material(site, edge, crossing.is_lower_solid);
     if (stored != GROUND) return pure(stored);
     if (site.params.is_single) return {site.params.single_ids, site.params.single_weights};
     return own_mix(site, bench.heights, edge, crossing.step);

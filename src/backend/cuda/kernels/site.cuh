@@ -19,8 +19,6 @@ struct Run {
 };
 
 struct MeshBench {
-    // Bricks around, by (y * 3 + z) * 3 + x.
-    u32 refs[27];
     i32 heights[AREA];
     Marked apron[WINDOW * AREA];
     // By corner, with some before and after, so that every corner has neighbours: what is above it as bits, solid samples in
@@ -61,5 +59,8 @@ struct Site {
     i32 low[3];
 };
 
-// The brick so far away, each -1, 0 or 1, as an index of `refs`.
-__device__ inline i32 around(i32 dx, i32 dy, i32 dz) { return (dy * 3 + dz) * 3 + dx + 13; }
+// Where the brick so far away is in `windows`, each -1, 0 or 1; those below and above lie beside it.
+__device__ inline const u32* window_at(const Site& site, i32 dx, i32 dz) {
+    i32 strides = site.job.strides;
+    return site.params.windows + (i32)(site.job.window + dx * (strides & 0xffff) + dz * (strides >> 16));
+}
