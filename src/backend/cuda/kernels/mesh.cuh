@@ -5,12 +5,12 @@
 // cubes to draw, and the lattice edges with a vertex. Then:
 //
 //   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges;
-//      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
+//      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges. Cubes
+//      are numbered likewise, by layer, then corner.
 //   2. Samples are copied out of 27 bricks, a thread for each column.
-//      Meanwhile one warp lists the cubes and their triangles, and reserves room for the output.
-//   3. Edges are listed.
-//   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or 32 triangles, which look up
-//      the numbers of their vertices by lattice edge.
+//   3. Edges and cubes are listed, while one thread reserves room for the output.
+//   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or the triangles of 32 cubes, which
+//      look up the numbers of their vertices by lattice edge.
 //
 // Edges are called by their place, as in surface/block.rs: 81 level + corner, where level = 9 axis + y and corner = 9 z + x.
 #pragma once
@@ -46,7 +46,7 @@ __device__ inline void gather_columns(const Site& site, MeshBench& bench) {
         u32 pristine = (1u << filled) - 1;
         if (own == NONE) bits |= pristine & 0xff;
         if (above == NONE) bits |= pristine & 0x100;
-        bench.columns[MARGIN + z * 9 + x] = bits;
+        bench.bits.columns[MARGIN + z * 9 + x] = bits;
         has_solid |= (bits & 0x1ff) != 0;
         has_air |= (bits & 0x1ff) != 0x1ff;
     }
@@ -84,18 +84,35 @@ __device__ inline u32 column_edges(const u32* columns, const u16* drawn) {
     return along_x | along_y << 9 | along_z << 18;
 }
 
-// Two bits, the second one two places from the first.
-__device__ inline u32 spread_pair(u32 bits) { return (bits & 1) | (bits & 2) << 1; }
+// What is drawn over the cell of a corner: a bit for each cube, a byte for its case, which says what corners are solid, and
+// four bits for how many indices it has.
+struct CellColumn {
+    u32 cubes;
+    u64 kinds;
+    u32 counts;
+};
 
-// The case of a cube, which says what corners are solid.
-__device__ inline u32 cube_case(const u32* columns, u32 y) {
-    // Two bits of each column: the lower corner's, and the upper one's two places further.
-    u32 near = spread_pair(columns[0] >> y) | spread_pair(columns[1] >> y) << 1;
-    u32 far = spread_pair(columns[9] >> y) | spread_pair(columns[10] >> y) << 1;
-    return near | far << 4;
+// Moves the second of two bits one place up, in both halves of a word.
+__device__ inline u32 spread_pairs(u32 bits) { return (bits & 0x10001) | (bits & 0x20002) << 1; }
+
+__device__ inline CellColumn cell_column(const MeshParams& params, const u32* columns, u32 cubes) {
+    CellColumn cell = {cubes, 0, 0};
+    // Columns at z, and in the upper half at z + 1.
+    u32 low = (columns[0] & 0x1ff) | columns[9] << 16, high = (columns[1] & 0x1ff) | columns[10] << 16;
+    for (u32 rest = cubes; rest != 0; rest &= rest - 1) {
+        i32 y = __ffs(rest) - 1;
+        u32 corners = spread_pairs(low >> y) | spread_pairs(high >> y) << 1;
+        u32 kind = (corners | corners >> 12) & 0xff;
+        cell.kinds |= (u64)kind << (y * 8);
+        cell.counts |= (u32)params.table[kind][MOST_CUBE_INDICES] << (y * 4);
+    }
+    return cell;
 }
 
-__device__ inline u32 triangles_of(const MeshParams& params, u32 kind) { return params.table[kind][15] / 3; }
+__device__ inline u32 indices_of(const CellColumn& cell) {
+    // Sums of two numbers to a byte, of which the upper one is the sum of all.
+    return ((cell.counts & 0x0f0f0f0f) + (cell.counts >> 4 & 0x0f0f0f0f)) * 0x01010101u >> 24;
+}
 
 // Reads samples above one another, from a layer of a brick on; without a brick nobody edited them.
 template <i32 FIRST, i32 COUNT>
@@ -127,98 +144,59 @@ __device__ inline void copy_column(const Site& site, MeshBench& bench, u32 layer
     }
 }
 
-// Counts the edges of all levels. For one warp.
-__device__ inline u32 count_edges(const MeshBench& bench) {
-    u32 edges = 0;
-    for (u32 corner = lane(); corner < CORNERS; corner += 32) {
-        edges += __popc(column_edges(bench.columns + MARGIN + corner, bench.drawn + MARGIN + corner));
-    }
-    return __shfl_sync(WARP, running_sum(edges), 31);
-}
-
-// Numbers the edges of each level from a warp's corners. For one warp.
-__device__ inline void number_edges(MeshBench& bench) {
+// Numbers the edges of each level and the cubes of each layer from a warp's corners. For one warp.
+__device__ inline void number_runs(MeshBench& bench) {
+    Run* edges = bench.bits.edges[lane()];
+    Run* cubes = bench.bits.cubes[lane()];
+    // Edges, and cubes in the upper half.
     u32 own = 0, before = 0;
-    for (i32 i = 0; i < CORNER_WARPS && lane() < LEVELS; i++) {
-        u32 count = __popc(bench.runs[lane()][i].crossed);
+    for (u32 i = 0; i < CORNER_WARPS; i++) {
+        u32 count = lane() < LEVELS ? __popc(edges[i].crossed) : 0;
+        if (lane() < SIDE) count |= __popc(cubes[i].crossed) << 16;
         if (i < warp()) before += count;
         own += count;
     }
-    u32 end = running_sum(own);
-    if (lane() < LEVELS) bench.runs[lane()][warp()].first = end - own + before;
+    u32 end = running_sum(own), first = end - own + before;
+    if (lane() < LEVELS) edges[warp()].first = first & 0xffff;
+    if (lane() < SIDE) cubes[warp()].first = first >> 16;
+    if (threadIdx.x == 31) {
+        bench.vertices = end & 0xffff;
+        bench.cubes_in_all = end >> 16;
+    }
     __syncwarp();
 }
+
+// The number of the edge or cube from the corner of a thread.
+__device__ inline u32 number_in(Run run) { return run.first + __popc(run.crossed & lanes_before()); }
 
 // Lists the edges from the corner of a thread, a bit for each level.
 __device__ inline void list_edges(MeshBench& bench, u32 edges) {
     for (u32 rest = edges; rest != 0; rest &= rest - 1) {
         i32 level = __ffs(rest) - 1;
-        Run run = bench.runs[level][warp()];
-        bench.edges[run.first + __popc(run.crossed & lanes_before())] = (u16)(level * CORNERS + threadIdx.x);
+        u32 number = number_in(bench.bits.edges[level][warp()]), place = level * CORNERS + threadIdx.x;
+        bench.edges[number] = (u16)place;
+        bench.numbers[place] = (u16)number;
     }
 }
 
-// Lists the places of the cubes to draw; returns how many there are. For one warp.
-__device__ inline u32 list_cubes(MeshBench& bench) {
-    // The lower half of a layer's cells, and the upper half.
-    u32 corners[2] = {lane() / SIDE * 9 + lane() % SIDE, (lane() / SIDE + 4) * 9 + lane() % SIDE};
-    u32 drawn[2] = {bench.drawn[MARGIN + corners[0]], bench.drawn[MARGIN + corners[1]]};
-    u32 cubes = 0;
-    for (u32 y = 0; y < SIDE; y++) {
-#pragma unroll
-        for (i32 half = 0; half < 2; half++) {
-            bool is_drawn = drawn[half] >> y & 1;
-            u32 word = __ballot_sync(WARP, is_drawn);
-            if (is_drawn) bench.cubes[cubes + __popc(word & lanes_before())] = y * CORNERS + corners[half];
-            cubes += __popc(word);
-        }
+// Lists the cubes over the corner of a thread.
+__device__ inline void list_cubes(MeshBench& bench, const CellColumn& cell) {
+    for (u32 rest = cell.cubes; rest != 0; rest &= rest - 1) {
+        i32 y = __ffs(rest) - 1;
+        u32 place = y * CORNERS + threadIdx.x, kind = (u32)(cell.kinds >> (y * 8)) & 0xff, count = cell.counts >> (y * 4) & 15;
+        bench.cubes[number_in(bench.bits.cubes[y][warp()])] = place | kind << PLACE_BITS | count << CUBE_BITS;
     }
-    __syncwarp();
-    return cubes;
 }
 
-// Adds the cases of the cubes to their places, and lists their triangles; returns how many there are. For one warp.
-__device__ inline u32 list_triangles(const MeshParams& params, MeshBench& bench, u32 cubes) {
-    u32 triangles = 0;
-    for (u32 base = 0; base < cubes; base += 32) {
-        u32 cube = base + lane(), count = 0;
-        if (cube < cubes) {
-            u32 place = bench.cubes[cube], kind = cube_case(bench.columns + MARGIN + place % CORNERS, place / CORNERS);
-            bench.cubes[cube] = place | kind << PLACE_BITS;
-            count = triangles_of(params, kind);
-        }
-        u32 end = running_sum(count), first = triangles + end - count;
-        for (u32 number = 0; number < count; number++) {
-            bench.triangles[first + number] = (u16)(cube | number << CUBE_BITS);
-        }
-        triangles += __shfl_sync(WARP, end, 31);
-    }
-    return triangles;
-}
-
-// The number of the vertex on the lattice edge at a place.
-__device__ inline u32 vertex_number(const MeshBench& bench, u32 place) {
-    u32 level = place / CORNERS, corner = place % CORNERS;
-    Run run = bench.runs[level][corner / 32];
-    return run.first + __popc(run.crossed & ((1u << corner % 32) - 1));
-}
-
-// Reserves room for the block: the first vertex, and the first index in the upper half. For one thread.
-__device__ inline u64 reserve(const MeshParams& params, u32 vertices, u32 triangles) {
-    return atomicAdd((u64*)params.counters, vertices | (u64)triangles * 3 << 32);
-}
-
-// Enters what was reserved. For one thread.
-__device__ inline void enter(
-    const MeshParams& params, MeshBench& bench, u64 reserved, u32 vertices, u32 triangles
-) {
-    u32 vertex = (u32)reserved, index = (u32)(reserved >> 32), indices = triangles * 3;
+// Reserves room for the block, and enters what was reserved. For one thread.
+__device__ inline void reserve(const MeshParams& params, MeshBench& bench) {
+    u32 totals = bench.totals[0] + bench.totals[1] + bench.totals[2], vertices = totals & 0xffff, indices = totals >> 16;
+    u64 reserved = atomicAdd((u64*)params.counters, vertices | (u64)indices << 32);
+    u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
     bool is_room = fits(vertex, vertices, params.vertex_capacity);
     is_room &= fits(index, indices, params.index_capacity);
     bench.vertex = is_room ? vertex : NONE;
-    bench.vertices = vertices;
     bench.index = index;
-    bench.triangles_in_all = triangles;
     params.results[blockIdx.x] = {bench.vertex, vertices, is_room ? index : 0, indices};
 }
 
@@ -226,7 +204,7 @@ __device__ inline void enter(
 // lanes write lies side by side.
 __device__ inline void make_vertices(const Site& site, MeshBench& bench, u32 base) {
     const MeshParams& params = site.params;
-    float* normals = bench.staged[warp()].normals;
+    float* normals = bench.output[warp()].normals;
     u32 count = smallest(bench.vertices - base, 32);
     u64 to = (u64)bench.vertex + base;
     if (lane() < count) {
@@ -247,22 +225,33 @@ __device__ inline void make_vertices(const Site& site, MeshBench& bench, u32 bas
     __syncwarp();
 }
 
-// The three vertex numbers of a listed triangle.
-__device__ inline void look_up(const MeshParams& params, const MeshBench& bench, u32 triangle, u16* numbers) {
-    u32 cube = bench.cubes[triangle & ((1 << CUBE_BITS) - 1)], first = (triangle >> CUBE_BITS) * 3;
-    const u16* slots = params.table[cube >> PLACE_BITS] + first;
-    u32 place = cube & ((1 << PLACE_BITS) - 1);
-    for (u32 i = 0; i < 3; i++) numbers[i] = (u16)vertex_number(bench, place + slots[i]);
-}
-
-// Writes up to 32 triangles, the first of number `base`. For one warp.
-__device__ inline void write_triangles(const MeshParams& params, MeshBench& bench, u32 base) {
-    u16* numbers = bench.staged[warp()].indices;
-    u32 count = smallest(bench.triangles_in_all - base, 32);
-    if (lane() < count) look_up(params, bench, bench.triangles[base + lane()], numbers + lane() * 3);
+// Writes the triangles of up to 32 cubes, the first of number `base`. For one warp; they go through shared memory, so that
+// what its lanes write lies side by side.
+__device__ inline void write_cubes(const MeshParams& params, MeshBench& bench, u32 base) {
+    u16* indices = bench.output[warp()].indices;
+    // Indices of the cube, and in the upper half those of cubes before these.
+    u32 cube = base + lane() < bench.cubes_in_all ? bench.cubes[base + lane()] : 0, count = cube >> CUBE_BITS, counts = count;
+#pragma unroll 1
+    for (u32 i = lane(); i < base; i += 32) counts += bench.cubes[i] >> CUBE_BITS << 16;
+    u32 ends = running_sum(counts), all = __shfl_sync(WARP, ends, 31), first = (ends & 0xffff) - count;
+    if (count != 0) {
+        const u16* numbers = bench.numbers + (cube & ((1 << PLACE_BITS) - 1));
+        const uint4* slots = (const uint4*)params.table[cube >> PLACE_BITS & 0xff];
+        uint4 low = slots[0], high = slots[1];
+        const u32 pairs[8] = {low.x, low.y, low.z, low.w, high.x, high.y, high.z, high.w};
+#pragma unroll
+        for (i32 i = 0; i < MOST_CUBE_INDICES; i += 3) {
+            if (i >= count) break;
+            u16 triangle[3];
+#pragma unroll
+            for (i32 j = 0; j < 3; j++) triangle[j] = numbers[pairs[(i + j) / 2] >> (i + j) % 2 * 16 & 0xffff];
+#pragma unroll
+            for (i32 j = 0; j < 3; j++) indices[first + i + j] = triangle[j];
+        }
+    }
     __syncwarp();
-    u64 to = (u64)bench.index + base * 3;
-    for (u32 i = lane(); i < count * 3; i += 32) params.indices[to + i] = numbers[i];
+    u64 to = (u64)bench.index + (all >> 16);
+    for (u32 i = lane(); i < (all & 0xffff); i += 32) params.indices[to + i] = indices[i];
     __syncwarp();
 }
 
@@ -278,7 +267,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
     const Stack& stack = params.stacks[column.stack];
     Site site = {params, job, column, stack, {column.x * SIDE, job.y * SIDE, column.z * SIDE}};
     i32 t = threadIdx.x, x = t % 9, z = t / 9;
-    if (t < CORNERS + 20) bench.drawn[t] = 0;
+    if (t < CORNERS + 20) bench.bits.drawn[t] = 0;
     if (t == 0) bench.layers = 0;
     gather_columns(site, bench);
     __syncthreads();
@@ -288,10 +277,11 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
         return;
     }
 
-    const u32* columns = bench.columns + MARGIN + t;
-    u16* drawn = bench.drawn + MARGIN + t;
+    const u32* columns = bench.bits.columns + MARGIN + t;
+    u16* drawn = bench.bits.drawn + MARGIN + t;
+    u32 cubes = 0;
     if (x < SIDE && z < SIDE) {
-        u32 cubes = drawn_cubes(site, columns, x, z);
+        cubes = drawn_cubes(site, columns, x, z);
         *drawn = (u16)cubes;
         if (cubes != 0) atomicOr(&bench.layers, cubes);
     }
@@ -303,35 +293,37 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
     }
 
     copy_column(site, bench, layers);
-    // Three warps turn edges to words. The fourth lists triangles, and reserves room; while it waits for that, edges are
-    // listed.
-    u32 edges = 0, vertices = 0, triangles = 0;
-    u64 reserved = 0;
+    // Three warps turn edges and cubes to words, and list them while the fourth reserves room.
+    u32 edges = 0;
+    CellColumn cell = {0, 0, 0};
     if (warp() < CORNER_WARPS) {
-        edges = t < CORNERS ? column_edges(columns, drawn) : 0;
-        u32 level = transpose(edges);
-        if (lane() < LEVELS) bench.runs[lane()][warp()].crossed = level;
-    } else {
-        vertices = count_edges(bench);
-        triangles = list_triangles(params, bench, list_cubes(bench));
-        if (lane() == 0) reserved = reserve(params, vertices, triangles);
+        if (t < CORNERS) {
+            edges = column_edges(columns, drawn);
+            cell = cell_column(params, columns, cubes);
+        }
+        u32 level = transpose(edges), layer = transpose(cubes);
+        if (lane() < LEVELS) bench.bits.edges[lane()][warp()].crossed = level;
+        if (lane() < SIDE) bench.bits.cubes[lane()][warp()].crossed = layer;
+        u32 totals = sum_of_warp(__popc(edges) | indices_of(cell) << 16);
+        if (lane() == 0) bench.totals[warp()] = totals;
     }
     __syncthreads();
     if (warp() < CORNER_WARPS) {
-        number_edges(bench);
+        number_runs(bench);
         list_edges(bench, edges);
+        list_cubes(bench, cell);
     } else if (lane() == 0) {
-        enter(params, bench, reserved, vertices, triangles);
+        reserve(params, bench);
     }
     __syncthreads();
     if (bench.vertex == NONE) return;
 
-    u32 batches = (bench.vertices + 31) / 32, all_batches = batches + (bench.triangles_in_all + 31) / 32;
+    u32 batches = (bench.vertices + 31) / 32, all_batches = batches + (bench.cubes_in_all + 31) / 32;
     for (u32 batch = warp(); batch < all_batches; batch += THREADS / 32) {
         if (batch < batches) {
             make_vertices(site, bench, batch * 32);
         } else {
-            write_triangles(params, bench, (batch - batches) * 32);
+            write_cubes(params, bench, (batch - batches) * 32);
         }
     }
 }

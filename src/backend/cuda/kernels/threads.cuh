@@ -23,6 +23,12 @@ __device__ inline u32 running_sum(u32 value) {
     return value;
 }
 
+// Sum over the warp.
+__device__ inline u32 sum_of_warp(u32 value) {
+    for (i32 step = 16; step > 0; step /= 2) value += __shfl_xor_sync(WARP, value, step);
+    return value;
+}
+
 // Turns 32 words of 32 bits around: bit i of lane k becomes bit k of lane i. Swaps halves of the words, then quarters, and
 // so on to single bits.
 __device__ inline u32 transpose(u32 bits) {
