@@ -42,18 +42,19 @@ struct Crossing {
     Vector gradient;
 };
 
-// The central difference at a sample, the last one of the world's being number `last`: beyond the rim densities go on as
-// they come.
-__device__ inline i32 rise(Marked before, Marked own, Marked after, i32 at, i32 last) {
-    i32 low = at == 0 ? own : before, high = at == last ? own : after;
-    i32 rise = (high >> 1) - (low >> 1);
-    return at == 0 || at == last ? 2 * rise : rise;
+// The central difference between the samples before and after.
+__device__ inline i32 rise(Marked before, Marked after) { return (after >> 1) - (before >> 1); }
+
+// The same at a sample that may be on the world's rim, the last one being number `last`: beyond it densities go on as they
+// come.
+__device__ inline i32 rise_at(Marked before, Marked own, Marked after, i32 at, i32 last) {
+    i32 inner = rise(at == 0 ? own : before, at == last ? own : after);
+    return at == 0 || at == last ? 2 * inner : inner;
 }
 
 __device__ inline Crossing crossing_on(const Site& site, const Marked* apron, const Edge& edge) {
     const i32 STRIDES[3] = {1, AREA, WINDOW};
-    // No rim above, and none below.
-    const i32 AT[3] = {site.low[0] + edge.x, 1, site.low[2] + edge.z}, LAST[3] = {site.params.width, 0, site.params.depth};
+    const i32 AT[3] = {site.low[0] + edge.x, 0, site.low[2] + edge.z}, LAST[3] = {site.params.width, 0, site.params.depth};
     const Marked* p = apron + (edge.y + 1) * AREA + edge.window;
     const Marked* q = p + (edge.axis == 0 ? 1 : edge.axis == 1 ? AREA : WINDOW);
     Crossing crossing;
@@ -69,7 +70,11 @@ __device__ inline Crossing crossing_on(const Site& site, const Marked* apron, co
     for (i32 i = 0; i < 3; i++) {
         Marked p0 = p[-STRIDES[i]], p1 = p[STRIDES[i]], q0 = q[-STRIDES[i]], q1 = q[STRIDES[i]];
         stencil |= p0 | p1 | q0 | q1;
-        i32 low = rise(p0, *p, p1, AT[i], LAST[i]), high = rise(q0, *q, q1, AT[i] + (edge.axis == i), LAST[i]);
+        i32 low = rise(p0, p1), high = rise(q0, q1);
+        if (site.is_at_rim && i != 1) {
+            low = rise_at(p0, *p, p1, AT[i], LAST[i]);
+            high = rise_at(q0, *q, q1, AT[i] + (edge.axis == i), LAST[i]);
+        }
         components[i] = lerp((float)low, (float)high, t);
     }
     crossing.is_stencil_pristine = !(stencil & 1);

@@ -265,7 +265,9 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
     const MeshJob job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
     const Stack& stack = params.stacks[column.stack];
-    Site site = {params, job, column, stack, {column.x * SIDE, job.y * SIDE, column.z * SIDE}};
+    const i32 low[3] = {column.x * SIDE, job.y * SIDE, column.z * SIDE};
+    bool is_at_rim = low[0] <= 0 || low[2] <= 0 || low[0] + SIDE >= params.width || low[2] + SIDE >= params.depth;
+    Site site = {params, job, column, stack, {low[0], low[1], low[2]}, is_at_rim};
     i32 t = threadIdx.x, x = t % 9, z = t / 9;
     if (t < CORNERS + 20) bench.bits.drawn[t] = 0;
     if (t == 0) bench.layers = 0;

@@ -64,6 +64,8 @@ struct Site {
     const Stack& stack;
     // Lowest sample.
     i32 low[3];
+    // Do any of its corners lie on the world's rim? There is none above, and none below.
+    bool is_at_rim;
 };
 
 // Where the brick so far away is in `windows`, each -1, 0 or 1; those below and above lie beside it.
