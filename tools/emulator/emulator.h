@@ -121,3 +121,5 @@ inline int __ffs(int value) { return __builtin_ffs(value); }
 inline int __ffsll(long long value) { return __builtin_ffsll(value); }
 inline int __float_as_int(float value) { return emulator::of_word<int>(emulator::to_word(value)); }
 inline int __double2loint(double value) { return (int)(uint32_t)emulator::to_word(value); }
+// On the device it is up to two units of the last place off.
+inline float __fdividef(float a, float b) { return a / b; }

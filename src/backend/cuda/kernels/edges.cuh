@@ -22,12 +22,20 @@ __device__ inline Edge edge_at(u32 place) {
 // Where the surface crosses an edge between two densities, one of them negative: linear, to the nearest step of 1/4096,
 // halves up, and not at the ends.
 __device__ inline i32 linear_steps(i32 p, i32 q) {
-    // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, so the bias
-    // decides halves and nothing else.
-    const double SHIFT = 6755399441055744.0, BIAS = 1.0 / (1 << 28);
-    i32 from = p < 0 ? -p : p, sum = from + (q < 0 ? -q : q);
-    double share = (double)SNAP * (double)from / (double)sum;
-    i32 steps = __double2loint(share + BIAS + SHIFT);
+    i32 from = p < 0 ? -p : p, sum = from + (q < 0 ? -q : q), steps;
+    if (sum < 1 << 17) {
+        // In integers: a quotient that is one off at most, and what it leaves.
+        i32 whole = from * (2 * SNAP) + sum, part = 2 * sum;
+        steps = (i32)__fdividef((float)whole, (float)part);
+        i32 rest = whole - steps * part;
+        steps += (rest >= part) - (rest < 0);
+    } else {
+        // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, so the
+        // bias decides halves and nothing else.
+        const double SHIFT = 6755399441055744.0, BIAS = 1.0 / (1 << 28);
+        double share = (double)SNAP * (double)from / (double)sum;
+        steps = __double2loint(share + BIAS + SHIFT);
+    }
     return smallest(largest(steps, 1), SNAP - 1);
 }
 
