@@ -29,26 +29,20 @@ __device__ inline bool is_border(const ColumnJob& column, const Edge& edge) {
     return column.borders[edge.axis][bit / 32] >> bit % 32 & 1;
 }
 
-// How far the height is looked up on both sides of a column: not beyond the world's rim.
-__device__ inline i32 run_around(i32 at, i32 cells) { return smallest(at + 1, cells) - largest(at - 1, 0); }
+// By what a difference of heights around a column is a slope. Their distance is two columns, and one on the world's rim; both
+// are powers of two in 1/256 voxel, so that nothing is rounded.
+__device__ inline float slope_scale(i32 at, i32 cells) {
+    return at == 0 || at == cells ? 1.0f / ONE : 1.0f / (2 * ONE);
+}
 
 // The tile's normal over a column, `Ground::normal`. Beyond the rim, heights repeat, so there the differences are right.
 __device__ inline Vector ground_normal(const Site& site, const i32* heights, i32 window) {
-    i32 along_x = run_around(site.low[0] + window % WINDOW - 1, site.params.width);
-    i32 along_z = run_around(site.low[2] + window / WINDOW - 1, site.params.depth);
-    float x = (float)(heights[window + 1] - heights[window - 1]) / (float)(along_x * ONE);
-    float z = (float)(heights[window + WINDOW] - heights[window - WINDOW]) / (float)(along_z * ONE);
+    float x = (float)(heights[window + 1] - heights[window - 1]);
+    float z = (float)(heights[window + WINDOW] - heights[window - WINDOW]);
+    x *= slope_scale(site.low[0] + window % WINDOW - 1, site.params.width);
+    z *= slope_scale(site.low[2] + window / WINDOW - 1, site.params.depth);
     float length = sqrtf(x * x + z * z + 1.0f), reciprocal = 1.0f / length;
     return {quotient(-x, length, reciprocal), reciprocal, quotient(-z, length, reciprocal)};
-}
-
-// The tile's normal on an edge.
-__device__ inline Vector sheet_normal(const Site& site, const i32* heights, const Edge& edge, i32 step) {
-    Vector a = ground_normal(site, heights, edge.window);
-    if (edge.axis == 1) return a;
-    Vector b = ground_normal(site, heights, edge.window + edge.next_window);
-    float t = (float)step / (float)SNAP;
-    return unit({lerp(a.x, b.x, t), lerp(a.y, b.y, t), lerp(a.z, b.z, t)});
 }
 
 __device__ inline ushort4 position_of(const Edge& edge, i32 step) {
@@ -58,9 +52,17 @@ __device__ inline ushort4 position_of(const Edge& edge, i32 step) {
     return {(u16)x, (u16)y, (u16)z, 0};
 }
 
+// The tile's normal on an edge that nobody edited, the one of the gradient on others.
 __device__ inline Vector normal_of(
     const Site& site, const MeshBench& bench, const Edge& edge, const Crossing& crossing
 ) {
-    bool is_sheet = crossing.is_pristine && (crossing.is_stencil_pristine || is_border(site.column, edge));
-    return is_sheet ? sheet_normal(site, bench.heights, edge, crossing.step) : unit(crossing.gradient);
+    Vector normal = crossing.gradient;
+    if (crossing.is_pristine && (crossing.is_stencil_pristine || is_border(site.column, edge))) {
+        normal = ground_normal(site, bench.heights, edge.window);
+        if (edge.axis == 1) return normal;
+        Vector other = ground_normal(site, bench.heights, edge.window + edge.next_window);
+        float t = (float)crossing.step / (float)SNAP;
+        normal = {lerp(normal.x, other.x, t), lerp(normal.y, other.y, t), lerp(normal.z, other.z, t)};
+    }
+    return unit(normal);
 }
