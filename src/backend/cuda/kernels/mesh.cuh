@@ -221,7 +221,11 @@ __device__ inline void make_vertices(const Site& site, MeshBench& bench, u32 bas
         }
     }
     __syncwarp();
-    for (u32 i = lane(); i < count * 3; i += 32) params.normals[to * 3 + i] = normals[i];
+    float* place = params.normals + to * 3 + lane();
+#pragma unroll
+    for (u32 i = 0; i < 96; i += 32) {
+        if (i + lane() < count * 3) place[i] = normals[i + lane()];
+    }
     __syncwarp();
 }
 
