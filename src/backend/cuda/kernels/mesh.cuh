@@ -17,38 +17,55 @@
 
 #include "vertex.cuh"
 
-// Fills the columns of corners, and the signs. A warp has the corners of one of four bricks side by side, and of the one
-// above it. A lane brings a layer's half of a brick's bits; turned around, these are what is above two of its corners.
+// A row of eight samples of a brick, a bit for each.
+__device__ inline u32 row_of(const u32* bits, u32 row) { return ((const u8*)bits)[row]; }
+
+// What a brick has above place x of a row of its lowest layer, as in `columns`.
+__device__ inline u32 column_above(const Brick& brick, u32 row, u32 x) {
+    u32 column = 0;
+#pragma unroll
+    for (u32 y = 0; y < SIDE; y++) {
+        u32 rows = row_of(brick.solid, y * SIDE + row) | row_of(brick.edited, y * SIDE + row) << 16;
+        column |= (rows >> x & 0x10001) << y;
+    }
+    return column;
+}
+
+// Fills the columns of corners, and the signs. Two warps have the corners in the brick, a third those in the bricks beside
+// it. In the brick a lane brings a layer's half of the bits; turned around, these are what is above two of the corners.
 __device__ inline void gather_columns(const Site& site, MeshBench& bench) {
     const Brick* bricks = site.params.bricks;
-    u32 dx = warp() & 1, dz = warp() >> 1;
-    const u32* window = window_at(site, dx, dz);
-    u32 own = window[0], above = window[1], word = 0;
-    // Four bytes of each corner's lane: solid samples, those of the corner four rows on, edited samples, and those.
-    if (own != NONE) {
-        const u32* words = lane() < 16 ? bricks[own >> 1].solid : bricks[own >> 1].edited;
-        word = words[lane() % SIDE * 2 + lane() / SIDE % 2];
-    }
-    word = transpose(word);
-    bool has_solid = false, has_air = false;
-#pragma unroll
-    for (i32 half = 0; half < 2; half++) {
-        u32 x = lane() % SIDE + dx * SIDE, z = lane() / SIDE + half * 4 + dz * SIDE;
-        if (x > SIDE || z > SIDE) continue;
-        u32 bits = word >> half * SIDE & 0xff00ff;
+    bool is_inner = warp() < 2, is_side = lane() < SIDE || lane() == 2 * SIDE, has_solid = false, has_air = false;
+    u32 x = is_inner ? lane() % SIDE : is_side ? SIDE : lane() - SIDE;
+    u32 z = is_inner ? lane() / SIDE + warp() * 4 : lane() < SIDE ? lane() : SIDE;
+    if (is_inner || (warp() == 2 && lane() <= 2 * SIDE)) {
+        const u32* window = window_at(site, x / SIDE, z / SIDE);
+        u32 own = window[0], above = window[1], bits = 0, top = 0;
+        i32 height = site.stack.heights[(z + 1) * WINDOW + x + 1];
         if (above != NONE) {
             const Brick& found = bricks[above >> 1];
-            bits |= (found.solid[half] >> lane() & 1) << 8 | (found.edited[half] >> lane() & 1) << 24;
+            top = row_of(found.solid, z % SIDE) | row_of(found.edited, z % SIDE) << 16;
         }
+        if (is_inner) {
+            // Four bytes for each corner of the lower half: its solid samples, those of the corner four rows on, its edited
+            // samples, and those.
+            if (own != NONE) {
+                const u32* words = lane() < 16 ? bricks[own >> 1].solid : bricks[own >> 1].edited;
+                bits = words[lane() % SIDE * 2 + lane() / SIDE % 2];
+            }
+            bits = transpose(bits) >> warp() * SIDE & 0xff00ff;
+        } else if (own != NONE) {
+            bits = column_above(bricks[own >> 1], z % SIDE, x % SIDE);
+        }
+        bits |= (top >> x % SIDE & 0x10001) << SIDE;
         // Where there is no brick, the ground tells: below its height all is solid.
-        i32 height = site.stack.heights[(z + 1) * WINDOW + x + 1];
         i32 filled = smallest(largest(((height + ONE - 1) >> 8) - site.low[1], 0), 9);
         u32 pristine = (1u << filled) - 1;
         if (own == NONE) bits |= pristine & 0xff;
         if (above == NONE) bits |= pristine & 0x100;
         bench.bits.columns[MARGIN + z * 9 + x] = bits;
-        has_solid |= (bits & 0x1ff) != 0;
-        has_air |= (bits & 0x1ff) != 0x1ff;
+        has_solid = (bits & 0x1ff) != 0;
+        has_air = (bits & 0x1ff) != 0x1ff;
     }
     has_solid = __any_sync(WARP, has_solid);
     has_air = __any_sync(WARP, has_air);
