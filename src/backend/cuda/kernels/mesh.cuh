@@ -5,10 +5,10 @@
 // cubes to draw, and the lattice edges with a vertex. Then:
 //
 //   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges;
-//      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges. Cubes
-//      are numbered likewise, by layer, then corner.
+//      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
+//      Meanwhile one warp lists cubes.
 //   2. Samples are copied out of 27 bricks, a thread for each column.
-//   3. Edges and cubes are listed, while one thread reserves room for the output.
+//   3. Edges are listed, while one thread reserves room for the output.
 //   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or the triangles of 32 cubes, which
 //      look up the numbers of their vertices by lattice edge.
 //
@@ -101,34 +101,17 @@ __device__ inline u32 column_edges(const u32* columns, const u16* drawn) {
     return along_x | along_y << 9 | along_z << 18;
 }
 
-// What is drawn over the cell of a corner: a bit for each cube, a byte for its case, which says what corners are solid, and
-// four bits for how many indices it has.
-struct CellColumn {
-    u32 cubes;
-    u64 kinds;
-    u32 counts;
-};
-
-// Moves the second of two bits one place up, in both halves of a word.
+// Two bits, the second one two places from the first, in both halves of a word.
 __device__ inline u32 spread_pairs(u32 bits) { return (bits & 0x10001) | (bits & 0x20002) << 1; }
 
-__device__ inline CellColumn cell_column(const MeshParams& params, const u32* columns, u32 cubes) {
-    CellColumn cell = {cubes, 0, 0};
-    // Columns at z, and in the upper half at z + 1.
-    u32 low = (columns[0] & 0x1ff) | columns[9] << 16, high = (columns[1] & 0x1ff) | columns[10] << 16;
-    for (u32 rest = cubes; rest != 0; rest &= rest - 1) {
-        i32 y = __ffs(rest) - 1;
-        u32 corners = spread_pairs(low >> y) | spread_pairs(high >> y) << 1;
-        u32 kind = (corners | corners >> 12) & 0xff;
-        cell.kinds |= (u64)kind << (y * 8);
-        cell.counts |= (u32)params.table[kind][MOST_CUBE_INDICES] << (y * 4);
-    }
-    return cell;
-}
-
-__device__ inline u32 indices_of(const CellColumn& cell) {
-    // Sums of two numbers to a byte, of which the upper one is the sum of all.
-    return ((cell.counts & 0x0f0f0f0f) + (cell.counts >> 4 & 0x0f0f0f0f)) * 0x01010101u >> 24;
+// The case of a cube, which says what corners are solid.
+__device__ inline u32 cube_case(const u32* columns, u32 y) {
+    // Two bits of each column: the lower corner's, and the upper one's two places further. Columns at z + 1 are in the upper
+    // half.
+    u32 low = spread_pairs((columns[0] & 0x1ff | columns[9] << 16) >> y);
+    u32 high = spread_pairs((columns[1] & 0x1ff | columns[10] << 16) >> y);
+    u32 corners = low | high << 1;
+    return (corners | corners >> 12) & 0xff;
 }
 
 // Reads samples above one another, from a layer of a brick on; without a brick nobody edited them.
@@ -161,58 +144,85 @@ __device__ inline void copy_column(const Site& site, MeshBench& bench, u32 layer
     }
 }
 
-// Numbers the edges of each level and the cubes of each layer from a warp's corners. For one warp.
-__device__ inline void number_runs(MeshBench& bench) {
-    Run* edges = bench.bits.edges[lane()];
-    Run* cubes = bench.bits.cubes[lane()];
-    // Edges, and cubes in the upper half.
+// Numbers the edges of each level from a warp's corners. For one warp.
+__device__ inline void number_edges(MeshBench& bench) {
+    Run* runs = bench.bits.runs[lane()];
     u32 own = 0, before = 0;
-    for (u32 i = 0; i < CORNER_WARPS; i++) {
-        u32 count = lane() < LEVELS ? __popc(edges[i].crossed) : 0;
-        if (lane() < SIDE) count |= __popc(cubes[i].crossed) << 16;
-        if (i < warp()) before += count;
-        own += count;
+    if (lane() < LEVELS) {
+#pragma unroll
+        for (u32 i = 0; i < CORNER_WARPS; i++) {
+            u32 count = __popc(runs[i].crossed);
+            if (i < warp()) before += count;
+            own += count;
+        }
     }
-    u32 end = running_sum(own), first = end - own + before;
-    if (lane() < LEVELS) edges[warp()].first = first & 0xffff;
-    if (lane() < SIDE) cubes[warp()].first = first >> 16;
-    if (threadIdx.x == 31) {
-        bench.vertices = end & 0xffff;
-        bench.cubes_in_all = end >> 16;
-    }
+    u32 end = running_sum(own);
+    if (lane() < LEVELS) runs[warp()].first = end - own + before;
     __syncwarp();
 }
-
-// The number of the edge or cube from the corner of a thread.
-__device__ inline u32 number_in(Run run) { return run.first + __popc(run.crossed & lanes_before()); }
 
 // Lists the edges from the corner of a thread, a bit for each level.
 __device__ inline void list_edges(MeshBench& bench, u32 edges) {
     for (u32 rest = edges; rest != 0; rest &= rest - 1) {
         i32 level = __ffs(rest) - 1;
-        u32 number = number_in(bench.bits.edges[level][warp()]), place = level * CORNERS + threadIdx.x;
+        Run run = bench.bits.runs[level][warp()];
+        u32 number = run.first + __popc(run.crossed & lanes_before()), place = level * CORNERS + threadIdx.x;
         bench.edges[number] = (u16)place;
         bench.numbers[place] = (u16)number;
     }
 }
 
-// Lists the cubes over the corner of a thread.
-__device__ inline void list_cubes(MeshBench& bench, const CellColumn& cell) {
-    for (u32 rest = cell.cubes; rest != 0; rest &= rest - 1) {
-        i32 y = __ffs(rest) - 1;
-        u32 place = y * CORNERS + threadIdx.x, kind = (u32)(cell.kinds >> (y * 8)) & 0xff, count = cell.counts >> (y * 4) & 15;
-        bench.cubes[number_in(bench.bits.cubes[y][warp()])] = place | kind << PLACE_BITS | count << CUBE_BITS;
+// Counts the edges of all levels. For one warp.
+__device__ inline u32 count_edges(const MeshBench& bench) {
+    u32 edges = 0;
+    if (lane() < LEVELS) {
+#pragma unroll
+        for (u32 i = 0; i < CORNER_WARPS; i++) edges += __popc(bench.bits.runs[lane()][i].crossed);
+    }
+    return sum_of_warp(edges);
+}
+
+// Lists the cubes to draw, layer by layer. For one warp.
+__device__ inline void list_cubes(const MeshParams& params, MeshBench& bench) {
+    // The lower half of a layer's cells, and the upper half.
+    u32 corner = lane() / SIDE * 9 + lane() % SIDE, cubes = 0, indices = 0;
+    u32 drawn = bench.bits.drawn[MARGIN + corner] | bench.bits.drawn[MARGIN + corner + 4 * 9] << SIDE;
+    for (u32 rest = bench.layers; rest != 0; rest &= rest - 1) {
+        u32 y = __ffs(rest) - 1;
+#pragma unroll
+        for (u32 half = 0; half < 2; half++) {
+            bool is_drawn = drawn >> (y + half * SIDE) & 1;
+            u32 word = __ballot_sync(WARP, is_drawn);
+            if (is_drawn) bench.cubes[cubes + __popc(word & lanes_before())] = y * CORNERS + corner + half * 4 * 9;
+            cubes += __popc(word);
+        }
+    }
+    __syncwarp();
+    // Their cases, and how many indices they have.
+#pragma unroll 1
+    for (u32 cube = lane(); cube < cubes; cube += 32) {
+        u32 place = bench.cubes[cube], kind = cube_case(bench.bits.columns + MARGIN + place % CORNERS, place / CORNERS);
+        u32 count = params.table[kind][MOST_CUBE_INDICES];
+        bench.cubes[cube] = place | kind << PLACE_BITS | count << CUBE_BITS;
+        indices += count;
+    }
+    __syncwarp();
+    indices = sum_of_warp(indices);
+    if (lane() == 0) {
+        bench.cubes_in_all = cubes;
+        bench.indices = indices;
     }
 }
 
 // Reserves room for the block, and enters what was reserved. For one thread.
-__device__ inline void reserve(const MeshParams& params, MeshBench& bench) {
-    u32 totals = bench.totals[0] + bench.totals[1] + bench.totals[2], vertices = totals & 0xffff, indices = totals >> 16;
+__device__ inline void reserve(const MeshParams& params, MeshBench& bench, u32 vertices) {
+    u32 indices = bench.indices;
     u64 reserved = atomicAdd((u64*)params.counters, vertices | (u64)indices << 32);
     u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
     bool is_room = fits(vertex, vertices, params.vertex_capacity);
     is_room &= fits(index, indices, params.index_capacity);
     bench.vertex = is_room ? vertex : NONE;
+    bench.vertices = vertices;
     bench.index = index;
     params.results[blockIdx.x] = {bench.vertex, vertices, is_room ? index : 0, indices};
 }
@@ -302,9 +312,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
 
     const u32* columns = bench.bits.columns + MARGIN + t;
     u16* drawn = bench.bits.drawn + MARGIN + t;
-    u32 cubes = 0;
     if (x < SIDE && z < SIDE) {
-        cubes = drawn_cubes(site, columns, x, z);
+        u32 cubes = drawn_cubes(site, columns, x, z);
         *drawn = (u16)cubes;
         if (cubes != 0) atomicOr(&bench.layers, cubes);
     }
@@ -316,27 +325,22 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
     }
 
     copy_column(site, bench, layers);
-    // Three warps turn edges and cubes to words, and list them while the fourth reserves room.
+    // Three warps turn edges to words, and list them. The fourth lists cubes, and reserves room.
     u32 edges = 0;
-    CellColumn cell = {0, 0, 0};
     if (warp() < CORNER_WARPS) {
-        if (t < CORNERS) {
-            edges = column_edges(columns, drawn);
-            cell = cell_column(params, columns, cubes);
-        }
-        u32 level = transpose(edges), layer = transpose(cubes);
-        if (lane() < LEVELS) bench.bits.edges[lane()][warp()].crossed = level;
-        if (lane() < SIDE) bench.bits.cubes[lane()][warp()].crossed = layer;
-        u32 totals = sum_of_warp(__popc(edges) | indices_of(cell) << 16);
-        if (lane() == 0) bench.totals[warp()] = totals;
+        if (t < CORNERS) edges = column_edges(columns, drawn);
+        u32 level = transpose(edges);
+        if (lane() < LEVELS) bench.bits.runs[lane()][warp()].crossed = level;
+    } else {
+        list_cubes(params, bench);
     }
     __syncthreads();
     if (warp() < CORNER_WARPS) {
-        number_runs(bench);
+        number_edges(bench);
         list_edges(bench, edges);
-        list_cubes(bench, cell);
-    } else if (lane() == 0) {
-        reserve(params, bench);
+    } else {
+        u32 vertices = count_edges(bench);
+        if (lane() == 0) reserve(params, bench, vertices);
     }
     __syncthreads();
     if (bench.vertex == NONE) return;

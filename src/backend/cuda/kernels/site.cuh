@@ -13,7 +13,7 @@ constexpr i32 MOST_CUBE_INDICES = 15;
 // Samples with their editedness in one number: twice the density, and one more if it is edited.
 typedef i32 Marked;
 
-// Edges of one level, or cubes of one layer, from 32 corners, a bit for each; and how many come before them.
+// Edges of one level from 32 corners, a bit for each; and how many edges come before them.
 struct Run {
     u32 crossed, first;
 };
@@ -24,7 +24,7 @@ struct Bits {
     // lower half, edited ones in the upper half; the cubes to draw, none where there is no cell.
     u32 columns[CORNERS + 20];
     u16 drawn[CORNERS + 20];
-    Run edges[LEVELS][CORNER_WARPS], cubes[SIDE][CORNER_WARPS];
+    Run runs[LEVELS][CORNER_WARPS];
 };
 
 // Where a warp puts its output in order.
@@ -44,11 +44,11 @@ struct MeshBench {
     u16 edges[MOST_VERTICES], numbers[LEVELS * CORNERS];
     // Drawn cubes in order: the place of their lowest corner in its layer | case << PLACE_BITS | indices << CUBE_BITS.
     u32 cubes[LEN];
-    // What signs each warp's corners have: 1 solid, 2 air. How many vertices each warp's corners have, and indices << 16.
-    u32 signs[THREADS / 32], totals[CORNER_WARPS];
+    // What signs each warp's corners have: 1 solid, 2 air.
+    u32 signs[THREADS / 32];
     // Layers that have a cube to draw.
     u32 layers;
-    u32 vertex, vertices, index, cubes_in_all;
+    u32 vertex, vertices, index, indices, cubes_in_all;
 };
 
 constexpr u32 PLACE_BITS = 10, CUBE_BITS = 18;
