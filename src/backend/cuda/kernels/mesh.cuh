@@ -8,7 +8,7 @@
 //      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
 //      Meanwhile one warp lists cubes.
 //   2. Samples are copied out of 27 bricks, a thread for each column.
-//   3. Edges are listed, while one thread reserves room for the output.
+//   3. Edges are listed, while one thread reserves room for the output; the first vertices are made until it has it.
 //   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or the triangles of 32 cubes, which
 //      look up the numbers of their vertices by lattice edge.
 //
@@ -214,40 +214,54 @@ __device__ inline void list_cubes(const MeshParams& params, MeshBench& bench) {
     }
 }
 
-// Reserves room for the block, and enters what was reserved. For one thread.
-__device__ inline void reserve(const MeshParams& params, MeshBench& bench, u32 vertices) {
-    u32 indices = bench.indices;
-    u64 reserved = atomicAdd((u64*)params.counters, vertices | (u64)indices << 32);
-    u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
-    bool is_room = fits(vertex, vertices, params.vertex_capacity);
-    is_room &= fits(index, indices, params.index_capacity);
-    bench.vertex = is_room ? vertex : NONE;
-    bench.vertices = vertices;
-    bench.index = index;
-    params.results[blockIdx.x] = {bench.vertex, vertices, is_room ? index : 0, indices};
+// Reserves room for the block: the first vertex, and the first index in the upper half. For one thread.
+__device__ inline u64 reserve(const MeshParams& params, const MeshBench& bench) {
+    return atomicAdd((u64*)params.counters, bench.vertices | (u64)bench.indices << 32);
 }
 
-// Makes up to 32 vertices, the first of number `base`. For one warp; normals go through shared memory, so that what its
-// lanes write lies side by side.
-__device__ inline void make_vertices(const Site& site, MeshBench& bench, u32 base) {
-    const MeshParams& params = site.params;
-    float* normals = bench.output[warp()].normals;
-    u32 count = smallest(bench.vertices - base, 32);
-    u64 to = (u64)bench.vertex + base;
-    if (lane() < count) {
+// Enters what was reserved. For one thread.
+__device__ inline void enter(const MeshParams& params, MeshBench& bench, u64 reserved) {
+    u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
+    bool is_room = fits(vertex, bench.vertices, params.vertex_capacity);
+    is_room &= fits(index, bench.indices, params.index_capacity);
+    bench.vertex = is_room ? vertex : NONE;
+    bench.index = index;
+    params.results[blockIdx.x] = {bench.vertex, bench.vertices, is_room ? index : 0, bench.indices};
+}
+
+// A lane's vertex, but for its normal.
+struct Made {
+    uint2 position;
+    Mix mix;
+};
+
+// Makes up to 32 vertices, the first of number `base`; normals go to shared memory. For one warp.
+__device__ inline Made make_vertices(const Site& site, MeshBench& bench, u32 base) {
+    Made made = {{0, 0}, {0, 0}};
+    if (base + lane() < bench.vertices) {
         Edge edge = edge_at(bench.edges[base + lane()]);
         Crossing crossing = crossing_on(site, bench.apron, edge);
         Vector normal = normal_of(site, bench, edge, crossing);
-        normals[lane() * 3] = normal.x;
-        normals[lane() * 3 + 1] = normal.y;
-        normals[lane() * 3 + 2] = normal.z;
-        params.positions[to + lane()] = position_of(edge, crossing.step);
-        if (params.mixes) {
-            Mix mix = mix_at(site, bench, edge, crossing);
-            params.mixes[to + lane()] = {mix.ids, mix.weights};
-        }
+        float* normals = bench.output[warp()].normals + lane() * 3;
+        normals[0] = normal.x;
+        normals[1] = normal.y;
+        normals[2] = normal.z;
+        made.position = position_of(edge, crossing.step);
+        if (site.params.mixes) made.mix = mix_at(site, bench, edge, crossing);
     }
     __syncwarp();
+    return made;
+}
+
+// Writes these vertices. Normals come from shared memory, so that what lanes write lies side by side. For one warp.
+__device__ inline void write_vertices(const MeshParams& params, const MeshBench& bench, u32 base, const Made& made) {
+    const float* normals = bench.output[warp()].normals;
+    u32 count = smallest(bench.vertices - base, 32);
+    u64 to = (u64)bench.vertex + base;
+    if (lane() < count) {
+        ((uint2*)params.positions)[to + lane()] = made.position;
+        if (params.mixes) params.mixes[to + lane()] = {made.mix.ids, made.mix.weights};
+    }
     float* place = params.normals + to * 3 + lane();
 #pragma unroll
     for (u32 i = 0; i < 96; i += 32) {
@@ -335,21 +349,34 @@ extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params
         list_cubes(params, bench);
     }
     __syncthreads();
+    u64 reserved = 0;
     if (warp() < CORNER_WARPS) {
         number_edges(bench);
         list_edges(bench, edges);
     } else {
         u32 vertices = count_edges(bench);
-        if (lane() == 0) reserve(params, bench, vertices);
+        if (lane() == 0) {
+            bench.vertices = vertices;
+            reserved = reserve(params, bench);
+        }
     }
     __syncthreads();
-    if (bench.vertex == NONE) return;
 
+    // Warps make their first vertices before they wait for what was reserved.
     u32 batches = (bench.vertices + 31) / 32, all_batches = batches + (bench.cubes_in_all + 31) / 32;
-    for (u32 batch = warp(); batch < all_batches; batch += THREADS / 32) {
+    bool is_entered = false;
+    for (u32 batch = warp(); batch < all_batches || !is_entered; batch += THREADS / 32) {
+        Made made;
+        if (batch < batches) made = make_vertices(site, bench, batch * 32);
+        if (!is_entered) {
+            if (t == CORNER_WARPS * 32) enter(params, bench, reserved);
+            __syncthreads();
+            if (bench.vertex == NONE) return;
+            is_entered = true;
+        }
         if (batch < batches) {
-            make_vertices(site, bench, batch * 32);
-        } else {
+            write_vertices(params, bench, batch * 32, made);
+        } else if (batch < all_batches) {
             write_cubes(params, bench, (batch - batches) * 32);
         }
     }

@@ -45,11 +45,12 @@ __device__ inline Vector ground_normal(const Site& site, const i32* heights, i32
     return {quotient(-x, length, reciprocal), reciprocal, quotient(-z, length, reciprocal)};
 }
 
-__device__ inline ushort4 position_of(const Edge& edge, i32 step) {
+// As in `positions`, two to a word.
+__device__ inline uint2 position_of(const Edge& edge, i32 step) {
     i32 x = edge.x * SNAP + (edge.axis == 0 ? step : 0);
     i32 y = edge.y * SNAP + (edge.axis == 1 ? step : 0);
     i32 z = edge.z * SNAP + (edge.axis == 2 ? step : 0);
-    return {(u16)x, (u16)y, (u16)z, 0};
+    return {(u16)x | (u32)(u16)y << 16, (u16)z};
 }
 
 // The tile's normal on an edge that nobody edited, the one of the gradient on others.
