@@ -279,25 +279,31 @@ __device__ inline void write_cubes(const MeshParams& params, MeshBench& bench, u
 #pragma unroll 1
     for (u32 i = lane(); i < base; i += 32) counts += bench.cubes[i] >> CUBE_BITS << 16;
     u32 ends = running_sum(counts), all = __shfl_sync(WARP, ends, 31), first = (ends & 0xffff) - count;
-    if (count != 0) {
-        const u16* numbers = bench.numbers + (cube & ((1 << PLACE_BITS) - 1));
-        const uint4* slots = (const uint4*)params.table[cube >> PLACE_BITS & 0xff];
-        uint4 low = slots[0], high = slots[1];
-        const u32 pairs[8] = {low.x, low.y, low.z, low.w, high.x, high.y, high.z, high.w};
-#pragma unroll
-        for (i32 i = 0; i < MOST_CUBE_INDICES; i += 3) {
-            if (i >= count) break;
-            u16 triangle[3];
-#pragma unroll
-            for (i32 j = 0; j < 3; j++) triangle[j] = numbers[pairs[(i + j) / 2] >> (i + j) % 2 * 16 & 0xffff];
-#pragma unroll
-            for (i32 j = 0; j < 3; j++) indices[first + i + j] = triangle[j];
-        }
-    }
-    __syncwarp();
+    const u16* numbers = bench.numbers + (cube & ((1 << PLACE_BITS) - 1));
+    const uint4* slots = (const uint4*)params.table[cube >> PLACE_BITS & 0xff];
     u64 to = (u64)bench.index + (all >> 16);
-    for (u32 i = lane(); i < (all & 0xffff); i += 32) params.indices[to + i] = indices[i];
-    __syncwarp();
+#pragma unroll 1
+    for (u32 from = 0; from < (all & 0xffff); from += STAGED_INDICES) {
+        if (count != 0) {
+            uint4 low = slots[0], high = slots[1];
+            const u32 pairs[8] = {low.x, low.y, low.z, low.w, high.x, high.y, high.z, high.w};
+#pragma unroll
+            for (u32 i = 0; i < MOST_CUBE_INDICES; i += 3) {
+                if (i >= count) break;
+                u16 triangle[3];
+#pragma unroll
+                for (u32 j = 0; j < 3; j++) triangle[j] = numbers[pairs[(i + j) / 2] >> (i + j) % 2 * 16 & 0xffff];
+                u32 at = first + i - from;
+                if (at >= STAGED_INDICES) continue;
+#pragma unroll
+                for (u32 j = 0; j < 3; j++) indices[at + j] = triangle[j];
+            }
+        }
+        __syncwarp();
+        u32 staged = smallest((all & 0xffff) - from, STAGED_INDICES);
+        for (u32 i = lane(); i < staged; i += 32) params.indices[to + from + i] = indices[i];
+        __syncwarp();
+    }
 }
 
 // Says that a block has no surface.
@@ -305,7 +311,7 @@ __device__ inline void draw_nothing(const MeshParams& params) {
     if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, 0, 0};
 }
 
-extern "C" __global__ void __launch_bounds__(THREADS, 11) mesh(MeshParams params) {
+extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params) {
     __shared__ MeshBench bench;
     const MeshJob job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
