@@ -146,18 +146,17 @@ __device__ inline void copy_column(const Site& site, MeshBench& bench, u32 layer
 
 // Numbers the edges of each level from a warp's corners. For one warp.
 __device__ inline void number_edges(MeshBench& bench) {
-    Run* runs = bench.bits.runs[lane()];
     u32 own = 0, before = 0;
     if (lane() < LEVELS) {
 #pragma unroll
         for (u32 i = 0; i < CORNER_WARPS; i++) {
-            u32 count = __popc(runs[i].crossed);
+            u32 count = __popc(bench.bits.runs[lane()][i].crossed);
             if (i < warp()) before += count;
             own += count;
         }
     }
     u32 end = running_sum(own);
-    if (lane() < LEVELS) runs[warp()].first = end - own + before;
+    if (lane() < LEVELS) bench.bits.runs[lane()][warp()].first = end - own + before;
     __syncwarp();
 }
 
