@@ -173,7 +173,7 @@ struct CarefulParams {
     u32 pad;
 };
 
-struct ColumnJob {
+struct alignas(16) ColumnJob {
     u32 stack;
     i32 x, z;
     u32 pad;
@@ -181,7 +181,7 @@ struct ColumnJob {
     u32 borders[3][4];
 };
 
-struct MeshJob {
+struct alignas(8) MeshJob {
     u32 window, strides, column;
     i32 y;
     u32 cells, pad;

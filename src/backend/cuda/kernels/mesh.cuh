@@ -31,41 +31,52 @@ __device__ inline u32 column_above(const Brick& brick, u32 row, u32 x) {
     return column;
 }
 
-// Fills the columns of corners, and the signs. Two warps have the corners in the brick, a third those in the bricks beside
-// it. In the brick a lane brings a layer's half of the bits; turned around, these are what is above two of the corners.
+// Fills the columns of corners, and the signs. One warp has the 64 corners in the brick, two for each lane: a lane brings a
+// layer's half of the bits; turned around, these are what is above its corners. Another has the 17 corners in the bricks
+// beside it. For the first two warps.
 __device__ inline void gather_columns(const Site& site, MeshBench& bench) {
     const Brick* bricks = site.params.bricks;
-    bool is_inner = warp() < 2, is_side = lane() < SIDE || lane() == 2 * SIDE, has_solid = false, has_air = false;
+    bool is_inner = warp() == 0, is_side = lane() < SIDE || lane() == 2 * SIDE, has_solid = false, has_air = false;
     u32 x = is_inner ? lane() % SIDE : is_side ? SIDE : lane() - SIDE;
-    u32 z = is_inner ? lane() / SIDE + warp() * 4 : lane() < SIDE ? lane() : SIDE;
-    if (is_inner || (warp() == 2 && lane() <= 2 * SIDE)) {
+    u32 z = is_inner ? lane() / SIDE : lane() < SIDE ? lane() : SIDE;
+    u32 bits = 0;
+    if (is_inner || lane() <= 2 * SIDE) {
         const u32* window = window_at(site, x / SIDE, z / SIDE);
-        u32 own = window[0], above = window[1], bits = 0, top = 0;
-        i32 height = site.stack.heights[(z + 1) * WINDOW + x + 1];
-        if (above != NONE) {
+        u32 own = window[0], above = window[1], tops[2] = {0, 0};
+        i32 heights[2];
+        // The second corner is four rows on; where there is none, it is the first again.
+        const u32 rows[2] = {z, is_inner ? z + 4 : z};
+#pragma unroll
+        for (i32 i = 0; i < 2; i++) {
+            heights[i] = site.stack.heights[(rows[i] + 1) * WINDOW + x + 1];
+            if (above == NONE) continue;
             const Brick& found = bricks[above >> 1];
-            top = row_of(found.solid, z % SIDE) | row_of(found.edited, z % SIDE) << 16;
+            tops[i] = row_of(found.solid, rows[i] % SIDE) | row_of(found.edited, rows[i] % SIDE) << 16;
         }
         if (is_inner) {
-            // Four bytes for each corner of the lower half: its solid samples, those of the corner four rows on, its edited
-            // samples, and those.
+            // Four bytes: the first corner's solid samples, the second one's, the first one's edited samples, and the second
+            // one's.
             if (own != NONE) {
                 const u32* words = lane() < 16 ? bricks[own >> 1].solid : bricks[own >> 1].edited;
                 bits = words[lane() % SIDE * 2 + lane() / SIDE % 2];
             }
-            bits = transpose(bits) >> warp() * SIDE & 0xff00ff;
+            bits = transpose(bits);
         } else if (own != NONE) {
             bits = column_above(bricks[own >> 1], z % SIDE, x % SIDE);
         }
-        bits |= (top >> x % SIDE & 0x10001) << SIDE;
-        // Where there is no brick, the ground tells: below its height all is solid.
-        i32 filled = smallest(largest(((height + ONE - 1) >> 8) - site.low[1], 0), 9);
-        u32 pristine = (1u << filled) - 1;
-        if (own == NONE) bits |= pristine & 0xff;
-        if (above == NONE) bits |= pristine & 0x100;
-        bench.bits.columns[MARGIN + z * 9 + x] = bits;
-        has_solid = (bits & 0x1ff) != 0;
-        has_air = (bits & 0x1ff) != 0x1ff;
+#pragma unroll
+        for (i32 i = 0; i < 2; i++) {
+            if (i == 1 && !is_inner) break;
+            u32 column = (bits >> i * SIDE & 0xff00ff) | (tops[i] >> x % SIDE & 0x10001) << SIDE;
+            // Where there is no brick, the ground tells: below its height all is solid.
+            i32 filled = smallest(largest(((heights[i] + ONE - 1) >> 8) - site.low[1], 0), 9);
+            u32 pristine = (1u << filled) - 1;
+            if (own == NONE) column |= pristine & 0xff;
+            if (above == NONE) column |= pristine & 0x100;
+            bench.bits.columns[MARGIN + rows[i] * 9 + x] = column;
+            has_solid |= (column & 0x1ff) != 0;
+            has_air |= (column & 0x1ff) != 0x1ff;
+        }
     }
     has_solid = __any_sync(WARP, has_solid);
     has_air = __any_sync(WARP, has_air);
@@ -321,10 +332,10 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     i32 t = threadIdx.x, x = t % 9, z = t / 9;
     if (t < CORNERS + 20) bench.bits.drawn[t] = 0;
     if (t == 0) bench.layers = 0;
-    gather_columns(site, bench);
+    if (warp() < 2) gather_columns(site, bench);
     __syncthreads();
     // Where all corners are solid, or none, there is no surface.
-    if ((bench.signs[0] | bench.signs[1] | bench.signs[2] | bench.signs[3]) != 3) {
+    if ((bench.signs[0] | bench.signs[1]) != 3) {
         draw_nothing(params);
         return;
     }

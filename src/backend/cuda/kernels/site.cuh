@@ -47,8 +47,8 @@ struct MeshBench {
     u16 edges[MOST_VERTICES], numbers[LEVELS * CORNERS];
     // Drawn cubes in order: the place of their lowest corner in its layer | case << PLACE_BITS | indices << CUBE_BITS.
     u32 cubes[LEN];
-    // What signs each warp's corners have: 1 solid, 2 air.
-    u32 signs[THREADS / 32];
+    // What signs the corners in the brick have, and those beside it: 1 solid, 2 air.
+    u32 signs[2];
     // Layers that have a cube to draw.
     u32 layers;
     u32 vertex, vertices, index, indices, cubes_in_all;
