@@ -329,7 +329,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     const i32 low[3] = {column.x * SIDE, job.y * SIDE, column.z * SIDE};
     bool is_at_rim = low[0] <= 0 || low[2] <= 0 || low[0] + SIDE >= params.width || low[2] + SIDE >= params.depth;
     Site site = {params, job, column, stack, {low[0], low[1], low[2]}, is_at_rim};
-    i32 t = threadIdx.x, x = t % 9, z = t / 9;
+    i32 t = threadIdx.x;
     if (t < CORNERS + 20) bench.bits.drawn[t] = 0;
     if (t == 0) bench.layers = 0;
     if (warp() < 2) gather_columns(site, bench);
@@ -340,11 +340,11 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
         return;
     }
 
-    const u32* columns = bench.bits.columns + MARGIN + t;
-    u16* drawn = bench.bits.drawn + MARGIN + t;
-    if (x < SIDE && z < SIDE) {
-        u32 cubes = drawn_cubes(site, columns, x, z);
-        *drawn = (u16)cubes;
+    // Threads of cells.
+    if (t < SIDE * SIDE) {
+        i32 x = t % SIDE, z = t / SIDE, corner = MARGIN + z * 9 + x;
+        u32 cubes = drawn_cubes(site, bench.bits.columns + corner, x, z);
+        bench.bits.drawn[corner] = (u16)cubes;
         if (cubes != 0) atomicOr(&bench.layers, cubes);
     }
     __syncthreads();
@@ -358,7 +358,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     // Three warps turn edges to words, and list them. The fourth lists cubes, and reserves room.
     u32 edges = 0;
     if (warp() < CORNER_WARPS) {
-        if (t < CORNERS) edges = column_edges(columns, drawn);
+        if (t < CORNERS) edges = column_edges(bench.bits.columns + MARGIN + t, bench.bits.drawn + MARGIN + t);
         u32 level = transpose(edges);
         if (lane() < LEVELS) bench.bits.runs[lane()][warp()].crossed = level;
     } else {
