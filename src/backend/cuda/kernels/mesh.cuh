@@ -133,24 +133,35 @@ __device__ inline void read_samples(const Site& site, u32 ref, u32 at, i32* samp
     for (i32 i = 0; i < COUNT; i++) samples[i] = ref != NONE ? found[i * 64] : PRISTINE;
 }
 
-// Copies the samples of a thread's column to the apron, and its height. Layers of cubes tell whether samples of the bricks
-// below and above are looked at.
-__device__ inline void copy_column(const Site& site, MeshBench& bench, u32 layers) {
-    u32 t = threadIdx.x, x = t % WINDOW + SIDE - 1, z = t / WINDOW + SIDE - 1;
-    if (t >= AREA) return;
+// A column of the apron, and its height.
+struct ApronColumn {
+    i32 samples[WINDOW], height;
+};
+
+// Reads the column of a thread. Layers of cubes tell whether samples of the bricks below and above are looked at.
+__device__ inline ApronColumn read_column(const Site& site, u32 layers) {
+    ApronColumn column;
+    u32 t = smallest(threadIdx.x, AREA - 1), x = t % WINDOW + SIDE - 1, z = t / WINDOW + SIDE - 1;
     // Layer, row and column 0 are the last of the brick before.
     const u32* window = window_at(site, x / SIDE - 1, z / SIDE - 1);
     u32 at = z % SIDE * SIDE + x % SIDE;
-    i32 samples[WINDOW], height = site.stack.heights[t];
-    read_samples<0, 8>(site, window[0], at, samples + 1);
-    read_samples<7, 1>(site, layers & 1 ? window[-1] : NONE, at, samples);
-    read_samples<0, 2>(site, layers & 0xc0 ? window[1] : NONE, at, samples + 9);
-    bench.heights[t] = height;
+    column.height = site.stack.heights[t];
+    read_samples<0, 8>(site, window[0], at, column.samples + 1);
+    read_samples<7, 1>(site, layers & 1 ? window[-1] : NONE, at, column.samples);
+    read_samples<0, 2>(site, layers & 0xc0 ? window[1] : NONE, at, column.samples + 9);
+    return column;
+}
+
+// Puts it in its place.
+__device__ inline void put_column(const Site& site, MeshBench& bench, const ApronColumn& column) {
+    u32 t = threadIdx.x;
+    if (t >= AREA) return;
+    bench.heights[t] = column.height;
     // Twice the density where the ground tells.
-    u32 pristine = ((u32)(site.low[1] - 1) * ONE - (u32)height) * 2;
+    u32 pristine = ((u32)(site.low[1] - 1) * ONE - (u32)column.height) * 2;
 #pragma unroll
     for (i32 layer = 0; layer < WINDOW; layer++) {
-        i32 sample = samples[layer];
+        i32 sample = column.samples[layer];
         bench.apron[layer * AREA + t] = sample == PRISTINE ? (i32)(pristine + layer * ONE * 2) : sample * 2 + 1;
     }
 }
@@ -354,7 +365,8 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
         return;
     }
 
-    copy_column(site, bench, layers);
+    // Samples are on their way while edges and cubes are told.
+    ApronColumn samples = read_column(site, layers);
     // Three warps turn edges to words, and list them. The fourth lists cubes, and reserves room.
     u32 edges = 0;
     if (warp() < CORNER_WARPS) {
@@ -364,6 +376,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     } else {
         list_cubes(params, bench);
     }
+    put_column(site, bench, samples);
     __syncthreads();
     u64 reserved = 0;
     if (warp() < CORNER_WARPS) {
