@@ -133,22 +133,31 @@ __device__ inline void read_samples(const Site& site, u32 ref, u32 at, i32* samp
     for (i32 i = 0; i < COUNT; i++) samples[i] = ref != NONE ? found[i * 64] : PRISTINE;
 }
 
+// Where a thread's column of the apron lies: the bricks below, own and above; the place in their layers.
+struct ApronPlace {
+    u32 refs[3], at;
+};
+
+__device__ inline ApronPlace apron_place(const Site& site) {
+    // Row and column 0 are the last of the brick before.
+    u32 t = smallest(threadIdx.x, AREA - 1), x = t % WINDOW + SIDE - 1, z = t / WINDOW + SIDE - 1;
+    const u32* window = window_at(site, x / SIDE - 1, z / SIDE - 1);
+    return {{window[-1], window[0], window[1]}, z % SIDE * SIDE + x % SIDE};
+}
+
 // A column of the apron, and its height.
 struct ApronColumn {
     i32 samples[WINDOW], height;
 };
 
-// Reads the column of a thread. Layers of cubes tell whether samples of the bricks below and above are looked at.
-__device__ inline ApronColumn read_column(const Site& site, u32 layers) {
+// Reads the column of a thread; its layer 0 is the last of the brick below. Layers of cubes tell whether samples of the bricks
+// below and above are looked at.
+__device__ inline ApronColumn read_column(const Site& site, const ApronPlace& place, u32 layers) {
     ApronColumn column;
-    u32 t = smallest(threadIdx.x, AREA - 1), x = t % WINDOW + SIDE - 1, z = t / WINDOW + SIDE - 1;
-    // Layer, row and column 0 are the last of the brick before.
-    const u32* window = window_at(site, x / SIDE - 1, z / SIDE - 1);
-    u32 at = z % SIDE * SIDE + x % SIDE;
-    column.height = site.stack.heights[t];
-    read_samples<0, 8>(site, window[0], at, column.samples + 1);
-    read_samples<7, 1>(site, layers & 1 ? window[-1] : NONE, at, column.samples);
-    read_samples<0, 2>(site, layers & 0xc0 ? window[1] : NONE, at, column.samples + 9);
+    column.height = site.stack.heights[smallest(threadIdx.x, AREA - 1)];
+    read_samples<0, 8>(site, place.refs[1], place.at, column.samples + 1);
+    read_samples<7, 1>(site, layers & 1 ? place.refs[0] : NONE, place.at, column.samples);
+    read_samples<0, 2>(site, layers & 0xc0 ? place.refs[2] : NONE, place.at, column.samples + 9);
     return column;
 }
 
@@ -351,6 +360,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
         return;
     }
 
+    ApronPlace place = apron_place(site);
     // Threads of cells.
     if (t < SIDE * SIDE) {
         i32 x = t % SIDE, z = t / SIDE, corner = MARGIN + z * 9 + x;
@@ -366,7 +376,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     }
 
     // Samples are on their way while edges and cubes are told.
-    ApronColumn samples = read_column(site, layers);
+    ApronColumn samples = read_column(site, place, layers);
     // Three warps turn edges to words, and list them. The fourth lists cubes, and reserves room.
     u32 edges = 0;
     if (warp() < CORNER_WARPS) {
