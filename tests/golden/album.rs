@@ -83,9 +83,16 @@ fn flip_map(a: &RgbImage, b: &RgbImage) -> nv_flip::FlipImageFloat {
 
 /// The mean FLIP of some pixels of two pictures of one size.
 pub fn flip_at(a: &RgbImage, b: &RgbImage, pixels: &[UVec2]) -> f32 {
-    let map = flip_map(a, b).to_vec();
-    let sum: f32 = pixels.iter().map(|pixel| map[(pixel.y * a.width() + pixel.x) as usize]).sum();
-    sum / pixels.len().max(1) as f32
+    flip_anywhere(a, b)(pixels)
+}
+
+/// The same for any pixels, once the pictures have been compared.
+pub fn flip_anywhere(a: &RgbImage, b: &RgbImage) -> impl Fn(&[UVec2]) -> f32 + use<> {
+    let (map, width) = (flip_map(a, b).to_vec(), a.width());
+    move |pixels| {
+        let sum: f32 = pixels.iter().map(|pixel| map[(pixel.y * width + pixel.x) as usize]).sum();
+        sum / pixels.len().max(1) as f32
+    }
 }
 
 /// Leaves a picture where one can look at it.

@@ -1,11 +1,13 @@
-//! The panel, with every section of figures; what differs from run to run, which is times, is covered.
+//! The panel, with every section of figures and of settings; what differs from run to run, which is times, is covered.
 
 use bevy::prelude::*;
 use bevy_burrow::panel::{BrushTool, PanelPlaces, ToolOperation, ToolShape};
 use bevy_burrow::prelude::*;
+use bevy_egui::EguiContext;
+use bevy_egui::egui::Id;
 use image::{Rgb, RgbImage};
 
-use crate::album::Album;
+use crate::album::{Album, flip_anywhere};
 use crate::studio::Studio;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
@@ -26,16 +28,44 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         frames += 1;
         frames > 100
     });
-    let mut picture = studio.picture();
-    let places = studio.app.world().resource::<PanelPlaces>().clone();
-    for name in WIDGETS.into_iter().chain(TIMES) {
-        album.check(places.0.contains_key(name), || format!("{name} is not seen"));
+    photograph(studio, album, "panel", &FIGURES);
+    let world = studio.app.world_mut();
+    for mut context in world.query::<&mut EguiContext>().iter_mut(world) {
+        let mut open = |name: &str, is_open: bool| {
+            let id = Id::new(("burrow section", name));
+            context.get_mut().data_mut(|data| data.insert_temp(id, is_open));
+        };
+        ["Terrain", "Live", "Memory", "Engine"].into_iter().for_each(|name| open(name, false));
+        ["New ground", "Digging rules", "Loose pieces", "Look", "Settings"]
+            .into_iter()
+            .for_each(|name| open(name, true));
     }
-    TIMES.iter().filter_map(|name| places.0.get(*name)).for_each(|place| cover(&mut picture, *place));
-    album.compare("panel", &picture);
+    photograph(studio, album, "panel_settings", &SETTINGS);
 }
 
-const WIDGETS: [&str; 12] = [
+/// Takes a picture; each widget of it has to look as it did, however small it is.
+fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&str]) {
+    let mut picture = studio.picture();
+    let places = studio.app.world().resource::<PanelPlaces>().clone();
+    for widget in widgets {
+        album.check(places.0.contains_key(*widget), || format!("{name}: {widget} is not seen"));
+    }
+    TIMES.iter().filter_map(|name| places.0.get(*name)).for_each(|place| cover(&mut picture, *place));
+    album.compare(name, &picture);
+    let golden = album.golden(name).filter(|golden| golden.dimensions() == picture.dimensions());
+    let Some(apart) = golden.map(|golden| flip_anywhere(&golden, &picture)) else { return };
+    for (widget, place) in &places.0 {
+        let apart = apart(&pixels(&picture, *place).collect::<Vec<_>>());
+        album.check(apart < WIDGET, || format!("{name}: {widget} differs: FLIP {apart:.4}"));
+    }
+}
+
+/// Mean FLIP above which a widget counts as another one.
+const WIDGET: f32 = 0.03;
+
+const SETTINGS: [&str; 6] = ["Of a material", "Bedrock", "Found after digs", "Variety", "Beds", "History"];
+
+const FIGURES: [&str; 12] = [
     "Undo",
     "Redo",
     "Check seams",
@@ -60,9 +90,11 @@ const TIMES: [&str; 6] = [
     "Last",
 ];
 
-fn cover(picture: &mut RgbImage, place: Rect) {
+fn pixels(picture: &RgbImage, place: Rect) -> impl Iterator<Item = UVec2> + use<> {
     let (from, to) = (place.min.as_uvec2(), place.max.ceil().as_uvec2().min(picture.dimensions().into()));
-    for (x, y) in (from.y..to.y).flat_map(|y| (from.x..to.x).map(move |x| (x, y))) {
-        picture.put_pixel(x, y, Rgb([0; 3]));
-    }
+    (from.y..to.y).flat_map(move |y| (from.x..to.x).map(move |x| UVec2::new(x, y)))
+}
+
+fn cover(picture: &mut RgbImage, place: Rect) {
+    pixels(picture, place).for_each(|pixel| picture.put_pixel(pixel.x, pixel.y, Rgb([0; 3])));
 }
