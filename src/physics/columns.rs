@@ -70,7 +70,8 @@ pub(super) struct Columns {
     waiting: BTreeMap<Entity, BTreeSet<TilePos>>,
     colliders: usize,
     missing: usize,
-    losses: u64,
+    /// Those that have got ready since, or are not any more.
+    turned: Vec<ColumnKey>,
 }
 
 impl Columns {
@@ -79,9 +80,9 @@ impl Columns {
         self.states.get(&column).is_some_and(|state| state.is_ready)
     }
 
-    /// How often a column was ready, and then was not.
-    pub fn losses(&self) -> u64 {
-        self.losses
+    /// The columns that have got ready since this was asked last, or are not any more.
+    pub fn take_turned(&mut self) -> Vec<ColumnKey> {
+        std::mem::take(&mut self.turned)
     }
 
     /// How many tiles and chunks have a collider, and how many wait for one.
@@ -129,7 +130,9 @@ impl Columns {
         self.colliders = self.colliders + state.colliders - colliders;
         self.missing = self.missing + state.missing.len() - missing;
         // One in which nothing stands any more is not ready either.
-        self.losses += u64::from(was_ready && (!state.is_ready || state.parts.is_empty()));
+        if was_ready != (state.is_ready && !state.parts.is_empty()) {
+            self.turned.push(column);
+        }
         let (terrain, tile) = column;
         if !state.missing.is_empty() {
             self.waiting.entry(terrain).or_default().insert(tile);

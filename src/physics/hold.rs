@@ -10,9 +10,9 @@ use bevy::prelude::*;
 
 use super::columns::Columns;
 use super::near::ahead;
-use super::solids::{Extent, Solids};
+use super::solids::{Extent, FARTHEST, Solids};
 use super::{ColliderSource, PhysicsFigures};
-use crate::lattice::{Column, TilePos};
+use crate::lattice::{ChunkGrid, Column, TilePos};
 use crate::terrain::Terrain;
 
 /// How far ahead of a body ground must have colliders, in seconds: longer than any frame.
@@ -84,11 +84,12 @@ impl BodyItem<'_, '_> {
         self.kind.is_dynamic() || self.extent.is_character
     }
 
-    /// Does it lie where it lay, and is it free to?
+    /// Does it lie where it lay, held or not?
     fn rests(&self) -> bool {
         let is_moved =
             self.position.is_changed() || self.transform.is_changed() || self.velocity.is_changed();
-        self.sleeps && self.hold.is_none() && !is_moved
+        let is_firm = |hold: &Mut<HeldByGround>| hold.is_locked && locks_all(self.locked);
+        self.sleeps && !is_moved && self.hold.as_ref().is_none_or(is_firm)
     }
 
     /// Holds it, or holds on to it: what the game changed since is kept for later.
@@ -151,12 +152,13 @@ pub(super) fn hold(
     config: Option<Res<PhysicsTransformConfig>>,
     terrains: Query<(Entity, &Terrain)>,
     sources: Query<(), With<ColliderSource>>,
-    ready: Res<Columns>,
+    mut columns: ResMut<Columns>,
     solids: Solids,
-    mut known: Local<Option<Surroundings>>,
+    mut known: Local<Vec<(Entity, Affine3A)>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
+    let (turned, ready) = (columns.take_turned(), &*columns);
     let terrains: Vec<(Entity, &Terrain, Affine)> = terrains
         .iter()
         .filter_map(|(entity, terrain)| {
@@ -164,16 +166,22 @@ pub(super) fn hold(
             Some((entity, terrain, Affine { inverse: place.affine().inverse(), size: terrain.voxel_size() }))
         })
         .collect();
-    let now = Surroundings {
-        losses: ready.losses(),
-        places: terrains.iter().map(|(entity, _, affine)| (*entity, affine.inverse)).collect(),
+    let now: Vec<(Entity, Affine3A)> =
+        terrains.iter().map(|(entity, _, affine)| (*entity, affine.inverse)).collect();
+    let are_same = *known == now;
+    *known = now;
+    // Where colliders came or went near a body, it is looked at even if it rests.
+    let is_turned = |place: Vec3| {
+        terrains.iter().any(|(terrain, model, affine)| {
+            let (grid, mut own) = (model.world().grid(), turned.iter().filter(|(of, _)| of == terrain));
+            own.any(|&(_, tile)| affine.is_near(grid, tile, place))
+        })
     };
-    let are_same = known.as_ref() == Some(&now);
-    *known = Some(now);
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
     let mut held = 0;
     for mut body in &mut bodies {
-        if are_same && body.rests() {
+        if are_same && body.rests() && !is_turned(body.position.0) {
+            held += usize::from(body.hold.is_some());
             continue;
         }
         let reach = if body.can_be_held() { solids.reach(&body.extent) } else { None };
@@ -182,7 +190,7 @@ pub(super) fn hold(
             let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
             let lacks_ground = |place: Vec3| {
                 terrains.iter().any(|(terrain, model, affine)| {
-                    affine.lacks_ground(*terrain, model, &ready, place + middle, towards, half)
+                    affine.lacks_ground(*terrain, model, ready, place + middle, towards, half)
                 })
             };
             // Where a game has just put it, physics will have it in its next step.
@@ -210,13 +218,6 @@ pub(super) fn hold(
     figures.main_thread += start.elapsed();
 }
 
-/// What bodies that rest depend on: where terrains are, and how often a column's ground was lost.
-#[derive(PartialEq)]
-pub(super) struct Surroundings {
-    losses: u64,
-    places: Vec<(Entity, Affine3A)>,
-}
-
 /// From the world to a terrain.
 struct Affine {
     inverse: Affine3A,
@@ -224,6 +225,15 @@ struct Affine {
 }
 
 impl Affine {
+    /// May a body that rests here reach a column?
+    fn is_near(&self, grid: ChunkGrid, tile: TilePos, place: Vec3) -> bool {
+        let (place, size) = (self.inverse.transform_point3(place).xz(), grid.size() as f32);
+        let corner = Vec2::new(tile.x as f32, tile.z as f32) * size;
+        let apart = place - place.clamp(corner, corner + size);
+        // Some voxels more than it reaches, for its residual speed.
+        apart.abs().max_element() <= FARTHEST.x / self.size + 4.0
+    }
+
     /// May a body whose box has its middle here reach ground without a collider soon?
     fn lacks_ground(
         &self,

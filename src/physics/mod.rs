@@ -90,9 +90,9 @@ pub enum TerrainPhysicsSystems {
     Upkeep,
     /// In `PostUpdate`: bodies over ground without colliders are held, others let go.
     Hold,
-    /// In `FixedPreUpdate`: bodies where ground changed are woken, and lifted out of it, and so are others that are in it.
-    /// In `FixedPostUpdate`, after each step, those that it pushed into the
-    /// ground are lifted too.
+    /// In `FixedPreUpdate`, before a frame's first step: bodies where ground changed are woken, and lifted out of it, and so
+    /// are others that are in it. In `FixedPostUpdate`, after its last step, those that were pushed into the ground are
+    /// lifted too.
     Wake,
 }
 
@@ -151,13 +151,17 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
             .add_systems(
                 FixedPreUpdate,
-                (wake::wake, wake::patrol, wake::rescue_before.run_if(wake::is_first_step))
+                (wake::wake, wake::patrol, wake::rescue_before)
                     .chain()
+                    .run_if(wake::is_first_step)
                     .in_set(TerrainPhysicsSystems::Wake),
             )
             .add_systems(
                 FixedPostUpdate,
-                wake::rescue_after.after(PhysicsSystems::Last).in_set(TerrainPhysicsSystems::Wake),
+                wake::rescue_after
+                    .run_if(wake::is_last_step)
+                    .after(PhysicsSystems::Last)
+                    .in_set(TerrainPhysicsSystems::Wake),
             );
     }
 

@@ -10,7 +10,7 @@ use super::character::Character;
 use super::colliders::GroundContact;
 
 /// How far from its position a body reaches at most, in metres: boxes of what is fast are long.
-const FARTHEST: Vec3 = Vec3::splat(8.0);
+pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
 
 /// A collider as ground sees it.
 #[derive(QueryData)]

@@ -22,11 +22,11 @@ const NEAR: f32 = 0.2;
 /// How high above the ground a lifted body starts, in metres.
 const GAP: f32 = 0.02;
 
-/// After how many steps bodies near a change are looked at: for a second as a rule. One that is built over in part is still
+/// After how many steps bodies near a change are looked at, the last ones of frames: for a second as a rule. One that is built over in part is still
 /// in the air, but between what pushes it up and what pushes it down it may leave through either.
 const WATCHED: u8 = 64;
 
-/// In so many steps every body is looked at once, wherever it is.
+/// In so many frames with steps every body is looked at once, wherever it is.
 const TURNS: usize = 8;
 
 /// Where a collider changed, in world space.
@@ -93,7 +93,7 @@ pub(super) fn wake(
     mut changes: ResMut<GroundChanges>,
     mut watched: ResMut<Watched>,
     bodies: Query<
-        (Entity, &RigidBody, &RigidBodyColliders, Has<Sleeping>),
+        (Entity, &RigidBody, &RigidBodyColliders, Option<&ColliderAabb>, Has<Sleeping>),
         (Without<GroundBody>, Without<RigidBodyDisabled>),
     >,
     solids: Solids,
@@ -105,7 +105,12 @@ pub(super) fn wake(
     let start = Instant::now();
     let changes = changes.take();
     figures.changes = 0;
-    for (entity, body, own, sleeps) in &bodies {
+    for (entity, body, own, bounds, sleeps) in &bodies {
+        // Most bodies are far off, and have one collider, their own.
+        let is_far = |bounds: &ColliderAabb| !changes.iter().any(|change| change.meets(bounds));
+        if own[..] == [entity] && bounds.is_some_and(is_far) {
+            continue;
+        }
         let Some(bounds) = solids.bounds(entity, body, own) else { continue };
         let mut near = changes.iter().filter(|change| change.meets(&bounds)).peekable();
         if near.peek().is_some() && sleeps {
@@ -117,7 +122,7 @@ pub(super) fn wake(
     figures.main_thread += start.elapsed();
 }
 
-/// Has bodies watched that are in the ground, some in each step: ground has one side only, and whoever got in where nothing
+/// Has bodies watched that are in the ground, some in each frame: ground has one side only, and whoever got in where nothing
 /// changed, pressed by others or put there, would fall for ever. What is to be buried sleeps, or cannot move up and down.
 pub(super) fn patrol(
     mut watched: ResMut<Watched>,
@@ -247,6 +252,11 @@ pub(super) fn rescue_after(mut rescue: Rescue) {
     // While time stands still nobody is squeezed.
     let passes = rescue.time.as_ref().is_none_or(|time| !time.is_paused());
     rescue.run(passes);
+}
+
+/// Run condition: the last step of a frame. What happens between two steps of one frame nobody sees.
+pub(super) fn is_last_step(time: Option<Res<Time<Fixed>>>) -> bool {
+    time.is_none_or(|time| time.overstep() < time.timestep())
 }
 
 /// Run condition: the first step of a frame. Between two steps of one frame no ground changes.

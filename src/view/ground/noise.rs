@@ -31,26 +31,39 @@ fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
 }
 
+/// The largest whole number that is not above; not for numbers beyond those of 32 bits. Where processors have no
+/// instruction for it, [`f32::floor`] is a call.
+fn floor(at: f32) -> i32 {
+    let whole = at as i32;
+    whole - i32::from(at < whole as f32)
+}
+
+/// What is left of lattice steps when periods are taken away. Most lie within the first one, and divisions are slow.
+fn wrap(at: i32, period: i32) -> i32 {
+    if (0..period).contains(&at) { at } else { at.rem_euclid(period) }
+}
+
+/// Eight directions, those along the axes as long as the others.
+const DIRECTIONS: [[f32; 2]; 8] = [
+    [1.0, 1.0],
+    [1.0, -1.0],
+    [-1.0, 1.0],
+    [-1.0, -1.0],
+    [1.414, 0.0],
+    [-1.414, 0.0],
+    [0.0, 1.414],
+    [0.0, -1.414],
+];
+
 /// Gradient noise, about -1 to 1, that repeats after `period` lattice steps; `u` and `v` go from 0 to 1 over the period.
 pub(super) fn gradient(u: f32, v: f32, period: i32, seed: u32) -> f32 {
     let (x, y) = (u * period as f32, v * period as f32);
-    let (i, j) = (x.floor(), y.floor());
-    let (fx, fy) = (x - i, y - j);
-    let (i, j) = (i as i32, j as i32);
-    let corner = |dx: i32, dy: i32| {
-        let hash = hash((i + dx).rem_euclid(period), (j + dy).rem_euclid(period), 0, seed);
-        let (x, y) = (fx - dx as f32, fy - dy as f32);
-        // Eight directions, those along the axes as long as the others.
-        match hash & 7 {
-            0 => x + y,
-            1 => x - y,
-            2 => y - x,
-            3 => -x - y,
-            4 => 1.414 * x,
-            5 => -1.414 * x,
-            6 => 1.414 * y,
-            _ => -1.414 * y,
-        }
+    let (i, j) = (floor(x), floor(y));
+    let (fx, fy) = (x - i as f32, y - j as f32);
+    let (columns, rows) = ([0, 1].map(|step| wrap(i + step, period)), [0, 1].map(|step| wrap(j + step, period)));
+    let corner = |dx: usize, dy: usize| {
+        let [across, along] = DIRECTIONS[(hash(columns[dx], rows[dy], 0, seed) & 7) as usize];
+        across * (fx - dx as f32) + along * (fy - dy as f32)
     };
     let (sx, sy) = (fade(fx), fade(fy));
     lerp(lerp(corner(0, 0), corner(1, 0), sx), lerp(corner(0, 1), corner(1, 1), sx), sy)
@@ -95,10 +108,12 @@ pub(super) struct Cell {
 /// Scattered points, one for each of `period` x `period` cells, repeating.
 pub(super) fn cells(u: f32, v: f32, period: i32, seed: u32) -> Cell {
     let (x, y) = (u * period as f32, v * period as f32);
-    let (i, j) = (x.floor() as i32, y.floor() as i32);
+    let (i, j) = (floor(x), floor(y));
+    let (columns, rows) =
+        ([-1, 0, 1].map(|step| wrap(i + step, period)), [-1, 0, 1].map(|step| wrap(j + step, period)));
     let mut cell = Cell { nearest: f32::MAX, second: f32::MAX, name: 0.0, offset: [0.0; 2] };
     for (dx, dy) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))) {
-        let (cx, cy) = ((i + dx).rem_euclid(period), (j + dy).rem_euclid(period));
+        let (cx, cy) = (columns[(dx + 1) as usize], rows[(dy + 1) as usize]);
         let offset = [
             x - (i + dx) as f32 - chance(cx, cy, seed),
             y - (j + dy) as f32 - chance(cx, cy, seed ^ 0x5bd1_e995),
@@ -116,10 +131,10 @@ pub(super) fn cells(u: f32, v: f32, period: i32, seed: u32) -> Cell {
 
 /// Gradient noise in space, about -1 to 1, that repeats after `period` steps along each axis.
 pub(super) fn solid(place: [f32; 3], period: i32, seed: u32) -> f32 {
-    let cell = place.map(|at| (at * period as f32).floor());
-    let fraction: [f32; 3] = std::array::from_fn(|axis| place[axis] * period as f32 - cell[axis]);
+    let cell = place.map(|at| floor(at * period as f32));
+    let fraction: [f32; 3] = std::array::from_fn(|axis| place[axis] * period as f32 - cell[axis] as f32);
     let corner = |dx: i32, dy: i32, dz: i32| {
-        let at = |axis: usize, step: i32| (cell[axis] as i32 + step).rem_euclid(period);
+        let at = |axis: usize, step: i32| wrap(cell[axis] + step, period);
         let hash = hash(at(0, dx), at(1, dy), at(2, dz), seed);
         let (x, y, z) = (fraction[0] - dx as f32, fraction[1] - dy as f32, fraction[2] - dz as f32);
         // The twelve edges of a cube.
@@ -151,6 +166,15 @@ mod tests {
                 near(cells(0.0, along, 7, seed).nearest, cells(1.0, along, 7, seed).nearest);
                 near(solid([0.0, along, 0.3], 4, seed), solid([1.0, along, 0.3], 4, seed));
             }
+        }
+    }
+
+    #[test]
+    fn shortcuts_give_what_they_stand_for() {
+        for i in -2000..2000 {
+            let at = i as f32 * 0.037;
+            assert_eq!((floor(at), floor(i as f32)), (at.floor() as i32, i));
+            assert_eq!([1, 5, 40].map(|period| wrap(i, period)), [1, 5, 40].map(|period| i.rem_euclid(period)));
         }
     }
 
