@@ -180,12 +180,16 @@ pub(super) fn hold(
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
     let mut held = 0;
     for mut body in &mut bodies {
-        if are_same && body.rests() && !is_turned(body.position.0) {
-            held += usize::from(body.hold.is_some());
+        let rests = are_same && body.rests() && !is_turned(body.position.0);
+        if rests && body.hold.is_none() {
             continue;
         }
         let reach = if body.can_be_held() { solids.reach(&body.extent) } else { None };
         let lacks_ground = reach.is_some_and(|reach| {
+            if rests {
+                // As it did before.
+                return true;
+            }
             let (middle, half) = (reach.middle(), reach.half());
             let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
             let lacks_ground = |place: Vec3| {

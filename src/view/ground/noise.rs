@@ -60,7 +60,8 @@ pub(super) fn gradient(u: f32, v: f32, period: i32, seed: u32) -> f32 {
     let (x, y) = (u * period as f32, v * period as f32);
     let (i, j) = (floor(x), floor(y));
     let (fx, fy) = (x - i as f32, y - j as f32);
-    let (columns, rows) = ([0, 1].map(|step| wrap(i + step, period)), [0, 1].map(|step| wrap(j + step, period)));
+    let (columns, rows) =
+        ([0, 1].map(|step| wrap(i + step, period)), [0, 1].map(|step| wrap(j + step, period)));
     let corner = |dx: usize, dy: usize| {
         let [across, along] = DIRECTIONS[(hash(columns[dx], rows[dy], 0, seed) & 7) as usize];
         across * (fx - dx as f32) + along * (fy - dy as f32)
@@ -174,7 +175,10 @@ mod tests {
         for i in -2000..2000 {
             let at = i as f32 * 0.037;
             assert_eq!((floor(at), floor(i as f32)), (at.floor() as i32, i));
-            assert_eq!([1, 5, 40].map(|period| wrap(i, period)), [1, 5, 40].map(|period| i.rem_euclid(period)));
+            assert_eq!(
+                [1, 5, 40].map(|period| wrap(i, period)),
+                [1, 5, 40].map(|period| i.rem_euclid(period))
+            );
         }
     }
 
