@@ -61,7 +61,7 @@ fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&st
 }
 
 /// Mean FLIP above which a widget counts as another one.
-const WIDGET: f32 = 0.03;
+const WIDGET: f32 = 0.05;
 
 const SETTINGS: [&str; 6] = ["Of a material", "Bedrock", "Found after digs", "Variety", "Beds", "History"];
 
