@@ -73,7 +73,7 @@ fn veins(hill: &Hillside, height: impl Fn(Vec2) -> Option<f64>) -> Vec<Brush> {
         let half = flat(way / 2.0).with_y(between((-1.2, 1.2)));
         let (ends, radius, seed) = ([place - half, place + half], between((0.9, 1.7)), number);
         let is_deep = |end: &Vec3| height(end.xz()).is_some_and(|top| end.y + DEPTHS.0 <= top as f32);
-        if !ends.iter().all(is_deep) {
+        if ![ends[0], place, ends[1]].iter().all(is_deep) {
             return None;
         }
         let material = match number % 5 {

@@ -119,9 +119,12 @@ fn act(
     }
 }
 
-/// Takes down why the last brush was rejected, until one is not.
+/// Takes down why the chosen terrain rejected the last brush, until it takes one.
 fn note_rejection(mut receipts: MessageReader<BrushApplied>, mut panel: ResMut<BurrowPanel>) {
-    let Some(last) = receipts.read().last() else { return };
+    let chosen = panel.terrain;
+    let is_own = |terrain: Entity| chosen.is_none_or(|chosen| chosen == terrain);
+    let own = receipts.read().filter(|answer| answer.terrain.is_none_or(is_own));
+    let Some(last) = own.last() else { return };
     let rejection = last.receipt.outcome.as_ref().err().map(ToString::to_string);
     if panel.rejection != rejection {
         panel.rejection = rejection;

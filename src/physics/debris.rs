@@ -13,7 +13,8 @@ use crate::terrain::{PieceFate, Restored, Terrain};
 
 /// Ground that broke off falls as a body. Put a [`LooseGround`](crate::plugin::LooseGround) with some `debris` on the
 /// terrain, and pieces up to so many voxels fall. With `Assets<Mesh>` a piece is drawn from the frame on in which the ground
-/// loses it; it falls, and is in the way, when its collider is done, which a task makes.
+/// loses it; it falls, and is in the way, when its collider is done, which a task makes. Its mesh comes with the transaction;
+/// only where a game commits by itself is it made on the main thread.
 ///
 /// ```no_run
 /// # use bevy::prelude::*;

@@ -88,8 +88,14 @@ impl BodyItem<'_, '_> {
     fn rests(&self) -> bool {
         let is_moved =
             self.position.is_changed() || self.transform.is_changed() || self.velocity.is_changed();
-        let is_firm = |hold: &Mut<HeldByGround>| hold.is_locked && locks_all(self.locked);
+        let is_firm =
+            |hold: &Mut<HeldByGround>| !hold.is_changed() && hold.is_locked && locks_all(self.locked);
         self.sleeps && !is_moved && self.hold.as_ref().is_none_or(is_firm)
+    }
+
+    /// How far it would go before ground has to have colliders, in metres; nowhere, unless it is held.
+    fn longing(&self) -> f32 {
+        self.hold.as_ref().map_or(0.0, |hold| hold.velocity.length() * AHEAD)
     }
 
     /// Holds it, or holds on to it: what the game changed since is kept for later.
@@ -154,7 +160,7 @@ pub(super) fn hold(
     sources: Query<(), With<ColliderSource>>,
     mut columns: ResMut<Columns>,
     solids: Solids,
-    mut known: Local<Vec<(Entity, Affine3A)>>,
+    mut known: Local<Vec<(Entity, Affine3A, ChunkGrid, u64)>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
@@ -166,21 +172,27 @@ pub(super) fn hold(
             Some((entity, terrain, Affine { inverse: place.affine().inverse(), size: terrain.voxel_size() }))
         })
         .collect();
-    let now: Vec<(Entity, Affine3A)> =
-        terrains.iter().map(|(entity, _, affine)| (*entity, affine.inverse)).collect();
+    let now = terrains.iter().map(|(entity, model, affine)| {
+        (*entity, affine.inverse, model.world().grid(), model.world().ground().hash())
+    });
+    let now: Vec<_> = now.collect();
     let are_same = *known == now;
     *known = now;
-    // Where colliders came or went near a body, it is looked at even if it rests.
-    let is_turned = |place: Vec3| {
-        terrains.iter().any(|(terrain, model, affine)| {
-            let (grid, mut own) = (model.world().grid(), turned.iter().filter(|(of, _)| of == terrain));
-            own.any(|&(_, tile)| affine.is_near(grid, tile, place))
-        })
+    // Where colliders came or went near a body, or near where it was going, it is looked at even if it rests.
+    let is_turned = |body: &BodyItem| {
+        let near = |(terrain, model, affine): &(Entity, &Terrain, Affine)| {
+            let (grid, place) = (model.world().grid(), affine.inverse.transform_point3(body.position.0).xz());
+            // Some voxels more than it reaches, for its residual speed.
+            let reach = (FARTHEST.x + body.longing()) / affine.size + 4.0;
+            let is_near = |tile| distance(grid, tile, place) <= reach;
+            turned.iter().any(|&(of, tile)| of == *terrain && is_near(tile))
+        };
+        !turned.is_empty() && terrains.iter().any(near)
     };
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
     let mut held = 0;
     for mut body in &mut bodies {
-        let rests = are_same && body.rests() && !is_turned(body.position.0);
+        let rests = are_same && body.rests() && !is_turned(&body);
         if rests && body.hold.is_none() {
             continue;
         }
@@ -222,6 +234,13 @@ pub(super) fn hold(
     figures.main_thread += start.elapsed();
 }
 
+/// From a place to a column along x or z, whichever is farther, in voxels.
+fn distance(grid: ChunkGrid, tile: TilePos, place: Vec2) -> f32 {
+    let size = grid.size() as f32;
+    let corner = Vec2::new(tile.x as f32, tile.z as f32) * size;
+    (place - place.clamp(corner, corner + size)).abs().max_element()
+}
+
 /// From the world to a terrain.
 struct Affine {
     inverse: Affine3A,
@@ -229,15 +248,6 @@ struct Affine {
 }
 
 impl Affine {
-    /// May a body that rests here reach a column?
-    fn is_near(&self, grid: ChunkGrid, tile: TilePos, place: Vec3) -> bool {
-        let (place, size) = (self.inverse.transform_point3(place).xz(), grid.size() as f32);
-        let corner = Vec2::new(tile.x as f32, tile.z as f32) * size;
-        let apart = place - place.clamp(corner, corner + size);
-        // Some voxels more than it reaches, for its residual speed.
-        apart.abs().max_element() <= FARTHEST.x / self.size + 4.0
-    }
-
     /// May a body whose box has its middle here reach ground without a collider soon?
     fn lacks_ground(
         &self,

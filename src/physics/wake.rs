@@ -22,8 +22,8 @@ const NEAR: f32 = 0.2;
 /// How high above the ground a lifted body starts, in metres.
 const GAP: f32 = 0.02;
 
-/// After how many steps bodies near a change are looked at, the last ones of frames: for a second as a rule. One that is built over in part is still
-/// in the air, but between what pushes it up and what pushes it down it may leave through either.
+/// In how many frames with steps bodies near a change are looked at: for a second as a rule. One that is built over in part
+/// is still in the air, but between what pushes it up and what pushes it down it may leave through either.
 const WATCHED: u8 = 64;
 
 /// In so many frames with steps every body is looked at once, wherever it is.

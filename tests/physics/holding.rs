@@ -103,6 +103,34 @@ fn a_held_body_goes_on_with_the_velocity_that_the_game_gave_it() {
     assert!(!stage.is_held(ball) && stage.place(ball).x > place.x + 1.0, "{}", stage.place(ball));
 }
 
+/// A fast ball that is held over ground with colliders, for want of some where it was going, and has fallen asleep.
+fn asleep_on_the_way() -> (Stage, Entity) {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    source(&mut stage, 40.0, 120.0);
+    let ball = stage.ball(Vec3::new(48.0, 8.6, 120.0), 0.5, Vec3::X * 150.0);
+    stage.frames(120);
+    let sleeps = stage.app.world().get::<Sleeping>(ball).is_some();
+    assert!(stage.is_held(ball) && sleeps && stage.place(ball).x < 56.0, "{sleeps} {}", stage.place(ball));
+    (stage, ball)
+}
+
+#[test]
+fn who_fell_asleep_while_it_was_held_goes_on_when_there_is_ground_where_it_was_going() {
+    let (mut stage, ball) = asleep_on_the_way();
+    source(&mut stage, 100.0, 120.0);
+    stage.frames_until("it goes on", |stage| !stage.is_held(ball));
+}
+
+#[test]
+fn a_body_that_is_held_can_be_stopped_though_it_sleeps() {
+    let (mut stage, ball) = asleep_on_the_way();
+    let mut held = stage.app.world_mut().get_mut::<HeldByGround>(ball).expect("it is held");
+    held.velocity = Vec3::ZERO;
+    stage.frames(2);
+    assert!(!stage.is_held(ball) && stage.place(ball).x < 56.0, "{}", stage.place(ball));
+}
+
 #[test]
 fn what_ground_lets_through_is_not_held() {
     let (mut stage, solid) = held_ball();
