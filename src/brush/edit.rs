@@ -212,7 +212,7 @@ mod tests {
             Shape::sphere(-rim, 200.0),
             Shape::capsule(Vec3::ZERO, Vec3::ZERO, 1.0),
             Shape::capsule(Vec3::ZERO, Vec3::splat(1000.0), 0.25),
-            Shape::cuboid(Vec3::ZERO, Vec3::new(511.9, 10.0, 10.0)),
+            Shape::cuboid(Vec3::ZERO, Vec3::new(512.0, 10.0, 10.0)),
             Shape::turned_cuboid(Vec3::ZERO, Vec3::ONE, Quat::from_xyzw(0.0, 1.009, 0.0, 0.0)),
         ] {
             Edit::quantize(&Brush::dig(shape)).unwrap().check().unwrap();

@@ -182,7 +182,7 @@ proptest! {
 
     #[test]
     fn out_of_reach_is_never_a_lie(
-        shape in shape(20.0, 8.0), roughness in roughness(), size in prop::array::uniform3(1..10),
+        shape in shape(20.0, 8.0), roughness in roughness(), size in prop::array::uniform3(1..70),
     ) {
         let (edit, size) = (edit(shape, roughness), IVec3::from_array(size));
         let (around, evaluator) = (edit.reach().grown(12), edit.evaluator());

@@ -109,7 +109,7 @@ impl Solid {
                 let (rows, squared) = matrix(rotation);
                 let reach = IVec3::from_array(rows.map(|row| {
                     let reach: i64 = (0..3).map(|i| row[i].abs() * i64::from(half[i])).sum();
-                    (reach / squared + 1) as i32
+                    ((reach + squared - 1) / squared) as i32
                 }));
                 (origin - reach, origin + reach)
             }

@@ -41,10 +41,10 @@ pub struct ImageLimits {
 }
 
 impl Default for ImageLimits {
-    /// Files to 512 MiB, 16385 x 16385 samples, 1 GiB of memory: all that the largest world can use.
+    /// Files to 576 MiB, 16385 x 16385 samples, 1 GiB of memory: all that the largest world can use.
     fn default() -> Self {
         Self {
-            max_file_bytes: 512 << 20,
+            max_file_bytes: 576 << 20,
             max_width: MAX_SIDE,
             max_height: MAX_SIDE,
             max_alloc_bytes: 1 << 30,
@@ -234,6 +234,13 @@ mod tests {
         assert_eq!(decode(ImageLimits { max_width: 1, ..limits }), Err(dimensions));
         let memory = ImageError::Memory { bytes: 8, limit: 7 };
         assert_eq!(decode(ImageLimits { max_alloc_bytes: 7, ..limits }), Err(memory));
+    }
+
+    #[test]
+    fn limits_let_in_what_the_largest_world_can_use() {
+        let (limits, samples) = (ImageLimits::default(), u64::from(MAX_SIDE).pow(2));
+        assert!(samples * 2 <= limits.max_file_bytes);
+        assert_eq!(limits.check_image(MAX_SIDE, MAX_SIDE, 2), Ok(()));
     }
 
     #[test]

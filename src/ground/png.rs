@@ -6,7 +6,7 @@
 use std::io::{Cursor, ErrorKind};
 
 use image::codecs::png::PngDecoder;
-use image::{DynamicImage, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, Limits};
 
 use super::error::ImageError;
 use super::grey_image::{BitDepth, GreyImage, ImageLimits};
@@ -86,18 +86,20 @@ impl GreyImage {
         decoder_limits.max_image_width = Some(header.width);
         decoder_limits.max_image_height = Some(header.height);
         decoder_limits.max_alloc = Some(limits.max_alloc_bytes);
-        let decoded = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits)
-            .and_then(DynamicImage::from_decoder)
-            .map_err(|error| decode_error(error, bytes.len() as u64))?;
-        let samples = match decoded {
+        let failed = |error| decode_error(error, bytes.len() as u64);
+        let decoder = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits).map_err(failed)?;
+        let transparent =
+            || ImageError::ColorType { found: "grey with a transparent shade", bits: header.bits };
+        // A transparent shade makes samples twice as large; so it is refused before memory is taken for them.
+        if !matches!(decoder.color_type(), ColorType::L8 | ColorType::L16) {
+            return Err(transparent());
+        }
+        let samples = match DynamicImage::from_decoder(decoder).map_err(failed)? {
             DynamicImage::ImageLuma8(grey) => {
                 grey.into_raw().into_iter().map(|v| u16::from(v) * 257).collect()
             }
             DynamicImage::ImageLuma16(grey) => grey.into_raw(),
-            _ => {
-                let found = "grey with a transparent shade";
-                return Err(ImageError::ColorType { found, bits: header.bits });
-            }
+            _ => return Err(transparent()),
         };
         Self::checked(header.width, header.height, depth, samples)
     }

@@ -14,8 +14,12 @@ use super::vertex::{WorldView, height_vertex, sheet_vertex};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, Column, ONE, TilePos};
 
-/// The whole mesh of a tile, relative to its lowest column at y = 0. May be empty, when the mask covers all of it.
+/// The whole mesh of a tile, relative to its lowest column at y = 0. Empty where the mask covers all of it, and where the
+/// world has no such tile.
 pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
+    if !world.grid.has_tile(tile) {
+        return SurfaceMesh::default();
+    }
     let borders = borders(world, tile);
     let rings = Rings::new(world, tile, &borders);
     let vertices = vertices(world.samples.ground(), world.grid, tile, &rings);
@@ -33,8 +37,10 @@ pub fn vertices(ground: &Ground, grid: ChunkGrid, tile: TilePos, rings: &Rings) 
     vertices
 }
 
+/// None for a tile that the world does not have: its cells end before they begin.
 fn column_count(low: Column, high: Column) -> u32 {
-    ((high.x - low.x + 1) * (high.z - low.z + 1)) as u32
+    let along = |low: i32, high: i32| if low < high { (high - low + 1) as u32 } else { 0 };
+    along(low.x, high.x) * along(low.z, high.z)
 }
 
 /// Which of a tile's cells are in the mask, or border on it.
@@ -46,12 +52,12 @@ pub fn borders(world: &WorldView, tile: TilePos) -> Borders {
 /// The triangles outside the mask: two for each whole cell, row by row, then the rings.
 pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings) -> Vec<u32> {
     let (low, high) = grid.tile_cells(tile);
-    let cells = (high.x - low.x) as u32;
+    let cells = (high.x - low.x).max(0) as u32;
     let width = cells + 1;
     let corners = |a: u32| [a, a + width, a + width + 1, a + width + 1, a + 1, a];
     let mut first = Vec::with_capacity(cells as usize * 6);
     (0..cells).for_each(|a| first.extend_from_slice(&corners(a)));
-    let mut indices = Vec::with_capacity(first.len() * (high.z - low.z) as usize + rings.fans.len());
+    let mut indices = Vec::with_capacity(first.len() * (high.z - low.z).max(0) as usize + rings.fans.len());
     for z in low.z..high.z {
         let (row, base) = (borders.row(z), (z - low.z) as u32 * width);
         let mut rest = row;

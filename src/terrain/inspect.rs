@@ -55,7 +55,8 @@ impl World {
         let (low, high) = (self.grid.chunk_of(inside.min), self.grid.chunk_of(inside.max));
         let tiles =
             (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Drawn::Tile(TilePos { x, z })));
-        let chunks = found_in(&self.surfaces, LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
+        let mut chunks = found_in(&self.surfaces, LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() });
+        chunks.sort_unstable();
         tiles.chain(chunks.into_iter().map(Drawn::Chunk)).collect()
     }
 
@@ -118,16 +119,14 @@ impl World {
     }
 }
 
-/// The chunks of a table whose positions lie in a box, in order. Each position of the box is asked for, or where the table
+/// The chunks of a table whose positions lie in a box, in no order. Each position of the box is asked for, or where the table
 /// has fewer of them, each of the table: the rest of a large world costs nothing.
 fn found_in<T>(table: &FxHashMap<ChunkPos, T>, places: LatticeBox) -> Vec<ChunkPos> {
-    let mut found: Vec<ChunkPos> = if places.volume() <= table.len() as u64 {
+    if places.volume() <= table.len() as u64 {
         places.points().map(ChunkPos::from_ivec3).filter(|chunk| table.contains_key(chunk)).collect()
     } else {
         table.keys().copied().filter(|chunk| places.contains(chunk.as_ivec3())).collect()
-    };
-    found.sort_unstable();
-    found
+    }
 }
 
 #[cfg(test)]

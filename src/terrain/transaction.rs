@@ -102,7 +102,8 @@ impl Transaction {
         let lay =
             || timed(|| drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect());
         let boxes = || drafted.iter().map(|drafted| (drafted.pos, drafted.changed));
-        let look = || (timed(|| dirty_cells(world.grid, boxes())), timed(|| sheets_in_reach(world, drafted)));
+        let dirty = || timed(|| dirty_cells(world.grid, boxes()));
+        let look = || side_by_side(drafted.len(), dirty, || timed(|| sheets_in_reach(world, drafted)));
         let ((bricks, edit), ((dirty, meshing), (near, ring))): ((Bricks, _), _) =
             side_by_side(drafted.len(), lay, look);
         stages.edit += edit;

@@ -178,7 +178,7 @@ impl World {
 
     /// The mesh of a tile, relative to its lowest column at y = 0; empty where the world has no tile.
     pub fn tile_mesh(&self, tile: TilePos) -> SurfaceMesh {
-        if self.grid.has_tile(tile) { tile::mesh(&self.view(), tile) } else { SurfaceMesh::default() }
+        tile::mesh(&self.view(), tile)
     }
 
     /// The mesh of a chunk, relative to its lowest lattice point; empty where it draws nothing.

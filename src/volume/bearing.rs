@@ -92,19 +92,23 @@ impl<'a> BrickRules<'a> {
         if proposed <= before {
             return (proposed, None);
         }
+        // What lies beyond the world's rim goes on as it is at the rim: nothing there holds anything.
+        let (width, depth) = (view.ground().width(), view.ground().depth());
+        let is_inside = |at: IVec3| (0..=width).contains(&at.x) && (0..=depth).contains(&at.z);
+        let solid_faces = || around.solid_faces().filter(|&way| is_inside(at + way));
         let pace = |at: IVec3| self.rules.pace(view.material(at), at.y, power);
         let holds = |way: IVec3| if self.is_protected(at + way) { (0, None) } else { pace(at + way) };
         let (part, fate) = if before < 0 {
             pace(at)
         } else {
             // Air beside what is solid holds its surface.
-            around.solid_faces().map(holds).min_by_key(|(part, _)| *part).unwrap_or((ONE, None))
+            solid_faces().map(holds).min_by_key(|(part, _)| *part).unwrap_or((ONE, None))
         };
         let change = (i64::from(proposed) - i64::from(before)) * i64::from(part);
         let mut allowed = before + ((change + i64::from(ONE) - 1) >> 8) as i32;
         if before < 0 && allowed >= 0 {
             // What turns to air beside ground that stays uncovers it, and takes nothing of it.
-            for way in around.solid_faces().filter(|&way| holds(way).0 == 0) {
+            for way in solid_faces().filter(|&way| holds(way).0 == 0) {
                 allowed = allowed.min((ONE + around.density(way)).max(0));
             }
         }

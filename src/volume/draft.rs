@@ -102,6 +102,9 @@ pub struct Draft {
 /// From how many bricks on they are spread over threads.
 const PARALLEL_BRICKS: usize = 64;
 
+/// From how many boxes of 8x8x8 bricks on threads look which of the bricks an edit comes near.
+const PARALLEL_BOXES: usize = 64;
+
 /// How many bricks are worked on before what edits did to them is added up: that takes more memory than the bricks when
 /// there are many edits, and most bricks of a large cave are given up for a shared one.
 const BATCH: usize = 8192;
@@ -141,6 +144,12 @@ impl Tool {
     /// Does the edit look at other samples than those that it changes?
     pub fn looks_around(&self) -> bool {
         self.sculptor.is_some() || self.is_bound
+    }
+
+    /// May the edit change some of these samples? Where not, it is certain.
+    fn reaches(&self, samples: LatticeBox) -> bool {
+        let reached = self.reach.and_then(|reach| reach.intersection(samples));
+        reached.is_some_and(|samples| !self.evaluator.is_out_of_reach(samples))
     }
 }
 
@@ -207,24 +216,6 @@ impl<'a> EditWork<'a> {
         self.jobs.chunk_by(|a, b| a.brick == b.brick).collect()
     }
 
-    /// The same without bricks that no edit comes near.
-    #[cfg(feature = "cuda")]
-    pub(crate) fn bricks_in_reach(&self) -> Vec<&[Job]> {
-        let (bricks, is_reached) = (self.bricks(), |jobs: &&[Job]| jobs.iter().any(|job| self.reaches(job)));
-        if bricks.len() < PARALLEL_BRICKS {
-            bricks.into_iter().filter(is_reached).collect()
-        } else {
-            bricks.into_par_iter().filter(is_reached).collect()
-        }
-    }
-
-    /// May the edit of a job change its brick? Where not, it is certain.
-    fn reaches(&self, job: &Job) -> bool {
-        let tool = &self.tools[job.edit as usize];
-        let reached = tool.reach.and_then(|reach| reach.intersection(job.pos().samples()));
-        reached.is_some_and(|samples| !tool.evaluator.is_out_of_reach(samples))
-    }
-
     /// Every brick that some edit may reach, once for each edit.
     pub(crate) fn jobs(&self) -> &[Job] {
         &self.jobs
@@ -277,8 +268,7 @@ impl Changes {
 }
 
 impl Draft {
-    /// What edits make of samples of this hash. Whoever applies them gets them run by run. Where `base` has newer bricks
-    /// already, there must be one run only: a single edit, say.
+    /// What edits make of samples of this hash. Whoever applies them gets them run by run.
     pub(crate) fn make(
         base: SampleView,
         grid: ChunkGrid,
@@ -297,11 +287,15 @@ impl Draft {
             let base = if run.start == 0 { base } else { base.over(&earlier.newer) };
             let work = EditWork::new(base, grid, &edits[run.clone()]).bound(rules, &bound[run.clone()]);
             apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
+            if run.start == 0 && rest.peek().is_some() {
+                // Later runs see both what this one and what others before all of them changed.
+                earlier.newer = base.newer().cloned().unwrap_or_default();
+            }
             if run.start > 0 || rest.peek().is_some() {
                 earlier.take(std::mem::take(&mut draft.bricks));
             }
         }
-        if !earlier.newer.is_empty() {
+        if !earlier.drafted.is_empty() {
             draft.bricks = earlier.bricks();
             // Kinds that came and went.
             let kinds: FxHashSet<_> = draft.bricks.iter().filter_map(|drafted| drafted.kind).collect();
@@ -341,20 +335,29 @@ impl Draft {
     }
 }
 
-/// Which edit may reach which brick.
+/// Which edit may reach which brick. Long thin brushes come near few bricks of the box around them, so boxes are looked at
+/// before bricks.
 fn jobs(tools: &[Tool]) -> Vec<Job> {
-    let reaches = || (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, tool.reach?)));
-    let bricks = |reach: LatticeBox| (reach.min >> 3, reach.max >> 3);
-    let count = |(low, high): (IVec3, IVec3)| (high - low + 1).as_usizevec3().element_product();
-    let mut jobs = Vec::with_capacity(reaches().map(|(_, reach)| count(bricks(reach))).sum());
-    for (edit, reach) in reaches() {
-        let (low, high) = bricks(reach);
-        for x in low.x..=high.x {
-            for z in low.z..=high.z {
-                jobs.extend((low.y..=high.y).map(|y| Job { brick: [x, z, y], edit }));
-            }
-        }
-    }
+    let reaches = (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, tool.reach?)));
+    let boxes = reaches.flat_map(|(edit, reach)| {
+        let bricks = LatticeBox { min: reach.min >> 3, max: reach.max >> 3 };
+        let boxes = LatticeBox { min: bricks.min >> 3, max: bricks.max >> 3 };
+        let own = move |at: IVec3| bricks.intersection(LatticeBox { min: at << 3, max: (at << 3) + 7 });
+        boxes.points().filter_map(move |at| Some((edit, own(at)?)))
+    });
+    let boxes: Vec<(u32, LatticeBox)> = boxes.collect();
+    let near = |&(edit, bricks): &(u32, LatticeBox)| {
+        let tool = &tools[edit as usize];
+        let samples = LatticeBox { min: bricks.min << 3, max: (bricks.max << 3) + 7 };
+        let bricks = tool.reaches(samples).then(|| bricks.points()).into_iter().flatten();
+        let jobs = bricks.map(move |at| Job { brick: [at.x, at.z, at.y], edit });
+        jobs.filter(move |job| tool.reaches(job.pos().samples()))
+    };
+    let mut jobs: Vec<Job> = if boxes.len() < PARALLEL_BOXES {
+        boxes.iter().flat_map(near).collect()
+    } else {
+        boxes.par_iter().flat_map_iter(near).collect()
+    };
     // They stand in order of the edits, and stay so for each brick.
     sort_by_place(&mut jobs, |job| job.brick);
     jobs
@@ -363,8 +366,31 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
 /// Applies all edits of one brick and enters what they changed.
 fn finish(work: &EditWork, jobs: &[Job], ledger: &mut Ledger) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
-    let mut jobs = jobs.iter().filter(|job| work.reaches(job)).peekable();
-    if jobs.peek().is_some() {
-        Workpiece::new(work.base, work.grid, pos).take(&work.tools, work.rules.as_ref(), jobs, ledger);
+    Workpiece::new(work.base, work.grid, pos).take(&work.tools, work.rules.as_ref(), jobs, ledger);
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+
+    #[test]
+    fn a_long_thin_brush_comes_near_few_bricks() {
+        let brush = Brush::dig(Shape::capsule(Vec3::ZERO, Vec3::splat(1000.0), 0.25));
+        let edit = Edit::quantize(&brush).unwrap();
+        let tool = |edit: &Edit| Tool {
+            reach: reach(ChunkGrid::new(32, 1024, 1024), edit),
+            operation: edit.kind(),
+            evaluator: edit.evaluator(),
+            sculptor: None,
+            power: edit.power(),
+            is_bound: false,
+        };
+        let jobs = jobs(&[tool(&edit)]);
+        let has = |at: i32| jobs.iter().any(|job| job.brick == [at >> 3; 3]);
+        assert!((0..=1000).all(has));
+        assert!(jobs.len() < 5000, "{}", jobs.len());
     }
 }

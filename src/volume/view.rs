@@ -36,6 +36,11 @@ impl<'a> SampleView<'a> {
         self.ground
     }
 
+    /// The newer bricks that are laid over the others.
+    pub(super) fn newer(&self) -> Option<&'a Bricks> {
+        self.newer
+    }
+
     /// Where bricks are looked up, the older ones first.
     pub(crate) fn tables(&self) -> impl Iterator<Item = &'a Bricks> {
         std::iter::once(self.bricks).chain(self.newer)

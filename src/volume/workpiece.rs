@@ -49,13 +49,7 @@ impl<'a> Workpiece<'a> {
     }
 
     /// Applies all jobs.
-    pub fn take<'j>(
-        &mut self,
-        tools: &[Tool],
-        rules: Option<&RunRules>,
-        jobs: impl Iterator<Item = &'j Job>,
-        ledger: &mut Ledger,
-    ) {
+    pub fn take(&mut self, tools: &[Tool], rules: Option<&RunRules>, jobs: &[Job], ledger: &mut Ledger) {
         let mut distances = [i16x8::ZERO; 64];
         let low = self.pos.origin();
         let rules = rules.map(|rules| rules.of_brick(self.pos));

@@ -1,7 +1,8 @@
 //! At the world's rim everything is as it is inland: beyond it is nobody's ground.
 
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 
 use crate::measured::assert_closed;
 
@@ -39,6 +40,30 @@ fn level_ground_is_smooth_at_the_rim_too() {
                 assert!((found - height).abs() < 0.01, "{found} instead of {height} at {at}");
             }
         }
+    }
+}
+
+#[test]
+fn rules_hold_nothing_beyond_the_rim() {
+    // Hard ground under a soft heap; and a box that protects what nobody can edit.
+    let beyond = LatticeBox { min: IVec3::new(65, 0, 0), max: IVec3::new(90, 60, 64) };
+    let rules = DiggingRules::default().with_hardness(MaterialId(0), 200).with_protected(beyond);
+    let spans = |x: f32| {
+        let ground = Ground::flat(SIDE as u32, SIDE as u32, 20.0).expect("valid");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        terrain.set_rules(rules.clone());
+        let middle = Vec3::new(x, 26.0, 32.0);
+        let heap = Brush::add(Shape::cuboid(middle, Vec3::splat(8.0)), MaterialId(5));
+        terrain.apply([heap, Brush::dig(Shape::sphere(middle, 2.5)).with_power(10)]);
+        assert_closed(&terrain);
+        let spans = terrain.world().spans(x.into(), 32.0);
+        // In hundredths of a voxel.
+        spans.into_iter().map(|span| (span.floor * 100.0).round() as i32).collect::<Vec<_>>()
+    };
+    let inland = spans(32.0);
+    assert_eq!(inland.len(), 2, "the dig left a hole in the heap");
+    for x in PLACES {
+        assert_eq!(spans(x), inland, "at {x}");
     }
 }
 

@@ -42,7 +42,7 @@ struct Site {
 impl Session {
     /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
     pub fn edit(&mut self, work: &EditWork) -> Result<Vec<Ledger>, Fault> {
-        let bricks = work.bricks_in_reach();
+        let bricks = work.bricks();
         if !work.looks_around() {
             return self.try_edits(work, &bricks, None).map(Option::unwrap_or_default);
         }

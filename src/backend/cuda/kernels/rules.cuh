@@ -55,6 +55,15 @@ struct Judge : Surroundings {
         return part;
     }
 
+    // Does a sample's neighbour across a face lie in the world? Beyond the rim all goes on as it is there, and nothing
+    // holds anything.
+    __device__ bool is_inside(i32 face, const i32* at) const {
+        i32 way[3];
+        way_to(face, way);
+        i32 x = at[0] + way[0], z = at[2] + way[2];
+        return 0 <= x && x <= params.last[0] && 0 <= z && z <= params.last[1];
+    }
+
     // The density across a face of a sample.
     __device__ i32 density_beside(i32 face, const OwnColumn& column, i32 y) const {
         i32 way[3];
@@ -90,7 +99,7 @@ struct Judge : Surroundings {
         } else {
             // Air beside what is solid holds its surface. It is air in any case, so nobody asks why.
             for (i32 i = 0; i < 6; i++) {
-                if (density_beside(i, column, y) < 0) least = smallest(least, pace_beside(i, column, at, y, power));
+                if (is_inside(i, at) && density_beside(i, column, y) < 0) least = smallest(least, pace_beside(i, column, at, y, power));
             }
         }
         i32 allowed = before + (i32)((((i64)proposed - before) * least + ONE - 1) >> 8);
@@ -98,7 +107,7 @@ struct Judge : Surroundings {
         // What turns to air beside ground that stays uncovers it, and takes nothing of it.
         for (i32 i = 0; i < 6; i++) {
             i32 beside = density_beside(i, column, y);
-            if (beside >= 0 || pace_beside(i, column, at, y, power) != 0) continue;
+            if (beside >= 0 || !is_inside(i, at) || pace_beside(i, column, at, y, power) != 0) continue;
             allowed = smallest(allowed, largest(ONE + beside, 0));
         }
         return allowed;
