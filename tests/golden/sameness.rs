@@ -25,20 +25,21 @@ fn suns() -> impl Iterator<Item = Vec3> {
     })
 }
 
+/// A picture under each sun.
+fn photograph(studio: &mut Studio, suns: impl Iterator<Item = Vec3>) -> Vec<RgbImage> {
+    let under = |sun| {
+        studio.sun(sun);
+        studio.picture()
+    };
+    suns.map(under).collect()
+}
+
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.terrain(hills(160), GroundLook::default());
     let middle = Vec3::new(100.0, studio.height(100.0, 120.0), 120.0);
     let from = Vec3::new(9.0, 8.0, 11.0);
     studio.look(middle + from, middle);
-    let photograph = |studio: &mut Studio| -> Vec<_> {
-        suns()
-            .map(|sun| {
-                studio.sun(sun);
-                studio.picture()
-            })
-            .collect()
-    };
-    let before = photograph(studio);
+    let before = photograph(studio, suns());
     album.compare("seam", &before[1]);
     // What a quarter of a pixel does; a pixel is 37 mm wide at this distance.
     studio.sun(suns().nth(1).unwrap_or(Vec3::Y));
@@ -52,7 +53,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.apply([Brush::paint(Shape::sphere(middle, 6.0), MaterialId::GROUND)]);
     let cells = studio.one::<Terrain>().world().mask().len();
     album.check(cells > 80, || format!("only {cells} cells were handed over"));
-    let after = photograph(studio);
+    let after = photograph(studio, suns());
     album.compare("seam_field", &after[1]);
     let seam = seam(studio);
     let band = grown(&seam, 2);
@@ -114,18 +115,9 @@ fn elsewhere(studio: &mut Studio, album: &mut Album) {
             studio.height(x as f32, z as f32 - 1.0) - studio.height(x as f32, z as f32 + 1.0),
         );
         studio.look(middle + down.normalize_or(Vec3::X) * 13.0 + Vec3::Y * 10.0, middle);
-        let photograph = |studio: &mut Studio| -> Vec<_> {
-            suns()
-                .step_by(5)
-                .map(|sun| {
-                    studio.sun(sun);
-                    studio.picture()
-                })
-                .collect()
-        };
-        let before = photograph(studio);
+        let before = photograph(studio, suns().step_by(5));
         studio.apply([Brush::paint(Shape::sphere(middle, 6.0), MaterialId::GROUND)]);
-        let after = photograph(studio);
+        let after = photograph(studio, suns().step_by(5));
         let band = grown(&seam(studio), 2);
         println!("{name}: {x}, {z}, rise {:.2}, {} pixels along the seam", rise((x, z)), band.len());
         for (number, (before, after)) in before.iter().zip(&after).enumerate() {
