@@ -125,79 +125,108 @@ impl<'a> MaskView<'a> {
 
     /// Looks at every cell from `low` up to and without `high`, and at those beside them.
     pub fn borders(&self, low: Column, high: Column) -> Borders {
-        let (width, depth) = ((high.x - low.x).max(0) as usize, (high.z - low.z).max(0) as usize);
-        let mut borders = Borders { low, width, cells: vec![0; width * depth] };
         let (first, last) = ((low.x >> 3, low.z >> 3), ((high.x - 1) >> 3, (high.z - 1) >> 3));
         // With those around them, each looked up once.
         let row = |z: i32| (first.0 - 1..=last.0 + 1).map(move |x| self.word((x, z)));
         let words: Vec<u64> = (first.1 - 1..=last.1 + 1).flat_map(row).collect();
         let rows: Vec<&[u64]> = words.chunks((last.0 - first.0 + 3).max(1) as usize).collect();
-        for (z, rows) in (first.1..).zip(rows.windows(3)) {
-            for (at, x) in (first.0..=last.0).enumerate() {
-                borders.mark((x, z), &[0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx])));
-            }
-        }
-        borders
+        let across = (last.0 - first.0 + 1).max(0) as usize;
+        let patches = rows.windows(3).flat_map(|rows| {
+            (0..across).map(|at| Patch::new(&[0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx]))))
+        });
+        Borders { low, high, first, across, patches: patches.collect() }
     }
 }
 
 /// For each cell of a rectangle: is it in the mask, and which of its sides border on a cell that is?
 pub struct Borders {
     low: Column,
-    width: usize,
-    cells: Vec<u8>,
+    high: Column,
+    /// The first of the patches along x and along z, and how many there are along x.
+    first: (i32, i32),
+    across: usize,
+    patches: Vec<Patch>,
 }
 
-impl Borders {
-    /// Set for a cell that is in the mask itself.
-    pub const VOLUMETRIC: u8 = 16;
+/// 8x8 cells: bit `z * 8 + x`.
+#[derive(Clone, Copy, Default)]
+struct Patch {
+    /// Those in the mask.
+    own: u64,
+    /// Those with a neighbour in the mask, in the order of [`Borders::SIDES`].
+    sides: [u64; 4],
+    /// All of these.
+    touched: u64,
+}
 
-    /// Steps to the neighbour at each side, in the order of the lower four bits: counter-clockwise seen from above, as
-    /// [`Column::corners`] runs.
-    pub const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
-
-    /// Enters the flags of 8x8 cells, by the words of the mask around them: `[dz + 1][dx + 1]`.
-    fn mark(&mut self, (x, z): (i32, i32), words: &[[u64; 3]; 3]) {
+impl Patch {
+    /// By the words of the mask around them: `[dz + 1][dx + 1]`.
+    fn new(words: &[[u64; 3]; 3]) -> Self {
         const FIRST: u64 = 0x0101_0101_0101_0101;
         let own = words[1][1];
-        // In the order of SIDES: each cell's neighbour moved to where the cell is.
+        // Each cell's neighbour moved to where the cell is.
         let sides = [
             (own & !(FIRST << 7)) << 1 | words[1][0] >> 7 & FIRST,
             own >> 8 | words[2][1] << 56,
             (own & !FIRST) >> 1 | (words[1][2] & FIRST) << 7,
             own << 8 | words[0][1] >> 56,
         ];
-        let any = sides.iter().fold(own, |any, side| any | side);
-        if any == 0 {
-            return;
-        }
-        let (from, end) = ((x * 8).max(self.low.x), (x * 8 + 8).min(self.low.x + self.width as i32));
-        for row in 0..8 {
-            let Ok(along) = usize::try_from(z * 8 + row - self.low.z) else { continue };
-            let start = along * self.width + (from - self.low.x) as usize;
-            let Some(cells) = self.cells.get_mut(start..start + (end - from) as usize) else { return };
-            let of_row = |word: u64| (word >> (row * 8)) as u8;
-            if of_row(any) == 0 {
-                continue;
-            }
-            let lanes = |word: u64| spread(of_row(word));
-            let flags =
-                (0..).zip(sides).fold(lanes(own) << 4, |flags, (side, word)| flags | lanes(word) << side);
-            cells.copy_from_slice(&flags.to_le_bytes()[(from - x * 8) as usize..][..cells.len()]);
-        }
-    }
-
-    /// The flags of the cells with this z, along x.
-    pub fn row(&self, z: i32) -> &[u8] {
-        let start = (z - self.low.z) as usize * self.width;
-        &self.cells[start..start + self.width]
+        Self { own, sides, touched: sides.iter().fold(own, |any, side| any | side) }
     }
 }
 
-/// Eight bits as the lowest bits of eight bytes.
-fn spread(bits: u8) -> u64 {
-    let each = (u64::from(bits) * 0x0101_0101_0101_0101) & 0x8040_2010_0804_0201;
-    (each + 0x7f7f_7f7f_7f7f_7f7f) >> 7 & 0x0101_0101_0101_0101
+impl Borders {
+    /// Steps to the neighbour at each side, in the order of flags: counter-clockwise seen from above, as
+    /// [`Column::corners`] runs.
+    pub const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
+
+    fn patch(&self, (x, z): (i32, i32)) -> Option<&Patch> {
+        let x = usize::try_from(x - self.first.0).ok().filter(|&x| x < self.across)?;
+        let z = usize::try_from(z - self.first.1).ok()?;
+        self.patches.get(z * self.across + x)
+    }
+
+    /// The cells of 8x8 that lie in the rectangle, are not in the mask and border on it: row by row, each with a bit for
+    /// every side where it does. `(z, x)` in units of 8 cells.
+    pub fn bordering(&self, (z, x): (i32, i32)) -> impl Iterator<Item = (Column, u8)> {
+        let (low, high) = (self.low, self.high);
+        let patch = self.patch((x, z)).copied().unwrap_or_default();
+        let mut cells = patch.touched & !patch.own;
+        let next = move || {
+            let bit = cells.trailing_zeros();
+            cells &= cells.wrapping_sub(1);
+            let flags = (0..).zip(patch.sides).map(|(side, cells)| ((cells >> bit & 1) as u8) << side);
+            (bit < 64)
+                .then(|| (Column::new(x * 8 + (bit & 7) as i32, z * 8 + (bit >> 3) as i32), flags.sum()))
+        };
+        let is_inside =
+            move |cell: Column| (low.x..high.x).contains(&cell.x) && (low.z..high.z).contains(&cell.z);
+        std::iter::from_fn(next).filter(move |&(cell, _)| is_inside(cell))
+    }
+
+    /// The runs of cells with this z, in order, that neither are in the mask nor border on it: of the rectangle's rows,
+    /// by x.
+    pub fn whole(&self, z: i32) -> impl Iterator<Item = Range<i32>> {
+        // Where the next cell is that is whole, or is not.
+        let next = move |mut x: i32, is_whole: bool| {
+            while x < self.high.x {
+                let patch = self.patch((x >> 3, z >> 3));
+                let touched = patch.map_or(0, |patch| (patch.touched >> ((z & 7) * 8)) as u8);
+                let wanted = if is_whole { !touched } else { touched } >> (x & 7);
+                if wanted != 0 {
+                    return (x + wanted.trailing_zeros() as i32).min(self.high.x);
+                }
+                x = (x | 7) + 1;
+            }
+            self.high.x
+        };
+        let mut at = self.low.x;
+        std::iter::from_fn(move || {
+            let start = next(at, true);
+            at = next(start, false);
+            (start < at).then_some(start..at)
+        })
+    }
 }
 
 #[cfg(test)]
@@ -231,14 +260,30 @@ mod tests {
         for (low, high) in [((0, 0), (8, 8)), ((-3, -2), (11, 13)), ((3, 5), (5, 7)), ((7, 7), (30, 9))] {
             let (low, high) = (Column::new(low.0, low.1), Column::new(high.0, high.1));
             let borders = view.borders(low, high);
-            for (x, z) in (low.z..high.z).flat_map(|z| (low.x..high.x).map(move |x| (x, z))) {
-                let cell = Column::new(x, z);
-                let mut expected = if mask.contains(cell) { Borders::VOLUMETRIC } else { 0 };
-                for (side, (dx, dz)) in Borders::SIDES.into_iter().enumerate() {
-                    expected |= u8::from(mask.contains(cell.offset(dx, dz))) << side;
-                }
-                assert_eq!(borders.row(z)[(x - low.x) as usize], expected, "{cell:?}");
+            let mut flags = std::collections::BTreeMap::new();
+            for patch in (-1..2).flat_map(|z| (-1..5).map(move |x| (z, x))) {
+                let before = flags.len();
+                flags.extend(borders.bordering(patch).map(|(cell, flags)| ((cell.z, cell.x), flags)));
+                let cells: Vec<_> = borders.bordering(patch).map(|(cell, _)| (cell.z, cell.x)).collect();
+                assert!(cells.is_sorted() && cells.len() == flags.len() - before, "{patch:?}");
             }
+            for z in low.z..high.z {
+                let whole: Vec<_> = borders.whole(z).collect();
+                assert!(whole.windows(2).all(|pair| pair[0].end < pair[1].start), "{whole:?}");
+                for x in low.x..high.x {
+                    let cell = Column::new(x, z);
+                    let sides = (0..).zip(Borders::SIDES);
+                    let expected = sides
+                        .map(|(side, (dx, dz))| u8::from(mask.contains(cell.offset(dx, dz))) << side)
+                        .sum::<u8>();
+                    let is_own = mask.contains(cell);
+                    let found = flags.remove(&(z, x)).unwrap_or_default();
+                    assert_eq!(found, if is_own { 0 } else { expected }, "{cell:?}");
+                    let is_whole = whole.iter().any(|run| run.contains(&x));
+                    assert_eq!(is_whole, !is_own && expected == 0, "{cell:?}");
+                }
+            }
+            assert!(flags.is_empty(), "cells outside: {flags:?}");
         }
     }
 

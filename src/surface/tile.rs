@@ -59,26 +59,15 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     (0..cells).for_each(|a| first.extend_from_slice(&corners(a)));
     let mut indices = Vec::with_capacity(first.len() * (high.z - low.z).max(0) as usize + rings.fans.len());
     for z in low.z..high.z {
-        let (row, base) = (borders.row(z), (z - low.z) as u32 * width);
-        let mut rest = row;
-        while !rest.is_empty() {
-            // Runs of whole cells are the first row's, moved.
-            let whole = whole_cells(rest);
-            let from = row.len() - rest.len();
-            indices.extend(first[from * 6..(from + whole) * 6].iter().map(|&index| index + base));
-            let cut = rest[whole..].iter().position(|&flags| flags == 0).unwrap_or(rest.len() - whole);
-            rest = &rest[whole + cut..];
+        let base = (z - low.z) as u32 * width;
+        // Runs of whole cells are the first row's, moved.
+        for run in borders.whole(z) {
+            let corners = (run.start - low.x) as usize * 6..(run.end - low.x) as usize * 6;
+            indices.extend(first[corners].iter().map(|&index| index + base));
         }
     }
     indices.extend_from_slice(&rings.fans);
     indices
-}
-
-/// How many cells at the beginning of a row have no flag.
-fn whole_cells(row: &[u8]) -> usize {
-    // Eight at a time as long as it goes.
-    let eights = row.as_chunks::<8>().0.iter().take_while(|flags| **flags == [0; 8]).count() * 8;
-    eights + row[eights..].iter().position(|&flags| flags != 0).unwrap_or(row.len() - eights)
 }
 
 /// The rings of one tile: triangles of cells that border on the mask, and the vertices they have there.
@@ -216,16 +205,7 @@ impl<'a> Drawing<'a> {
 
     /// Draws the rings of 8x8 cells.
     fn patch(&mut self, at: (i32, i32)) {
-        let (rows, cells) = (at.0 * 8..at.0 * 8 + 8, at.1 * 8..at.1 * 8 + 8);
-        let from = cells.start.max(self.low.x);
-        for z in rows.start.max(self.low.z)..rows.end.min(self.high.z) {
-            let row = &self.borders.row(z)[(from - self.low.x) as usize..];
-            for (x, &flags) in (from..cells.end.min(self.high.x)).zip(row) {
-                if flags != 0 && flags & Borders::VOLUMETRIC == 0 {
-                    self.cell(Column::new(x, z), flags);
-                }
-            }
-        }
+        self.borders.bordering(at).for_each(|(cell, flags)| self.cell(cell, flags));
         self.close(at);
     }
 

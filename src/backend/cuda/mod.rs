@@ -104,6 +104,7 @@ impl Cuda {
                 let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
                 let mut session = Session::new(device, budget)?;
                 let costs = trial::run(&mut session, sizes)?;
+                session.forget();
                 Ok((session, costs))
             };
             // A driver may do anything, and nobody else would hear of it.

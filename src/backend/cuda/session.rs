@@ -152,6 +152,13 @@ impl Session {
         })
     }
 
+    /// Forgets all bricks and stacks: what comes now has their room.
+    pub fn forget(&mut self) {
+        self.bricks.clear();
+        self.stacks.slots.clear();
+        self.stacks.pages.clear();
+    }
+
     /// How long the device took for what was done last: uploads and kernels, and the kernel alone.
     pub fn times(&self) -> [Duration; 2] {
         self.times

@@ -23,8 +23,8 @@ pub(super) struct Slots {
     hand: usize,
 }
 
-/// Slots at the start.
-const FIRST: usize = 4096;
+/// Slots at the start: growing takes half a millisecond of the transaction that needs more, so first digs should not.
+const FIRST: usize = 1 << 14;
 
 /// The first of so many numbers that no other record of this process has.
 fn stamps(count: usize) -> u64 {
@@ -110,6 +110,13 @@ impl Slots {
         Ok(())
     }
 
+    /// Gives all slots back.
+    pub fn clear(&mut self) {
+        self.stamps.fill(0);
+        self.free.clear();
+        self.free.extend((0..self.stamps.len() as u32).rev());
+    }
+
     /// Gives a slot back.
     pub fn give_back(&mut self, slot: u32) {
         self.stamps[slot as usize] = 0;
@@ -156,4 +163,27 @@ impl Slots {
 /// How kernels refer to a brick in a slot.
 pub(super) fn reference(slot: u32, brick: &Brick) -> u32 {
     slot << 1 | u32::from(brick.material_bytes() > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::backend::cuda::tests::device;
+
+    #[test]
+    fn what_is_given_back_is_not_found_and_makes_room() {
+        let Some(mut device) = device() else { return };
+        let mut slots = Slots::new(16, 100 * 16);
+        let mut taken = Vec::new();
+        slots.begin();
+        slots.take_many(&mut *device, 100, &mut taken).expect("room for all");
+        assert!(taken.iter().all(|&(slot, tag)| slots.find(tag) == Some(slot)));
+        assert!(slots.take(&mut *device).is_err(), "all are in use in this round");
+        slots.give_back(taken[7].0);
+        assert_eq!((slots.find(taken[7].1), slots.find(taken[8].1)), (None, Some(taken[8].0)));
+        slots.clear();
+        assert!(taken.iter().all(|&(_, tag)| slots.find(tag).is_none()));
+        taken.clear();
+        slots.take_many(&mut *device, 100, &mut taken).expect("room for all again");
+    }
 }
