@@ -1,6 +1,7 @@
 //! What a terrain runs its transactions on.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -26,6 +27,12 @@ struct Shared {
     #[cfg(feature = "cuda")]
     cuda: Option<Cuda>,
     figures: Mutex<EngineFigures>,
+}
+
+impl fmt::Debug for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Engine").field("state", &self.state()).finish_non_exhaustive()
+    }
 }
 
 /// Choices that are remembered.

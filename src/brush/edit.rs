@@ -8,7 +8,7 @@ use super::deed::{Deed, WrittenDeed};
 use super::roughness::Grain;
 use super::sculptor::Sculptor;
 use super::solid::Solid;
-use super::{BAND, Blend, Brush, BrushError, Evaluator, Kind, Operation};
+use super::{BAND, Blend, Brush, BrushError, Evaluator, Kind, Operation, Roughness, Shape};
 use crate::lattice::{LatticeBox, ONE};
 
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
@@ -82,6 +82,16 @@ impl Edit {
         self.roughness.map_or(Ok(()), |grain| grain.check())
     }
 
+    /// Where, in the brush's own numbers.
+    pub fn shape(&self) -> Shape {
+        self.shape.shape()
+    }
+
+    /// Bumps on the shape's surface, in the brush's own numbers.
+    pub fn roughness(&self) -> Option<Roughness> {
+        self.roughness.map(|grain| grain.roughness())
+    }
+
     /// What the edit does, in the brush's own numbers.
     pub fn operation(&self) -> Operation {
         self.deed.operation()
@@ -131,6 +141,21 @@ impl Edit {
     /// The edit's signed distance function, ready to evaluate.
     pub fn evaluator(&self) -> Evaluator {
         Evaluator::new(&self.shape, self.roughness)
+    }
+}
+
+/// A brush that asks for the edit: quantised, it is the same again. Only how a box is turned and which way a slope faces may
+/// be rounded once more.
+impl From<&Edit> for Brush {
+    fn from(edit: &Edit) -> Self {
+        Self {
+            shape: edit.shape(),
+            operation: edit.operation(),
+            roughness: edit.roughness(),
+            tag: edit.tag(),
+            blend: edit.blend().unwrap_or_default(),
+            power: edit.power(),
+        }
     }
 }
 

@@ -165,6 +165,24 @@ proptest! {
     }
 
     #[test]
+    fn the_brush_of_an_edit_asks_for_that_edit(
+        shape in shape(30_000.0, 60.0), roughness in roughness(), operation in wild_operation(), tag: u64, power: u8,
+    ) {
+        let brush = Brush { operation, roughness, ..Brush::dig(shape) }.with_tag(tag).with_power(power);
+        let Ok(edit) = Edit::quantize(&brush) else { return Ok(()) };
+        let again = Edit::quantize(&Brush::from(&edit)).unwrap();
+        let is_turned = matches!(edit.shape(), Shape::Cuboid { .. });
+        if !is_turned && !matches!(edit.operation(), Operation::Flatten { .. } | Operation::Stamp(_)) {
+            prop_assert_eq!(&again, &edit);
+        }
+        // A turned box may be rounded once more, and no further.
+        let grown = |reach: LatticeBox, other: LatticeBox| {
+            (reach.min - other.min).abs().max_element().max((reach.max - other.max).abs().max_element())
+        };
+        prop_assert!(grown(again.reach(), edit.reach()) <= 1);
+    }
+
+    #[test]
     fn reach_is_tight_without_roughness(shape in shape(30.0, 20.0)) {
         let edit = edit(shape, None);
         let (reach, evaluator) = (edit.reach(), edit.evaluator());

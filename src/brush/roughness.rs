@@ -51,6 +51,12 @@ impl Grain {
         })
     }
 
+    /// As a brush has it.
+    pub(super) fn roughness(&self) -> Roughness {
+        let voxels = |units: i32| units as f32 / ONE as f32;
+        Roughness::new(voxels(self.amplitude), voxels(self.scale), self.seed)
+    }
+
     /// Amplitude, scale, seed.
     #[cfg(feature = "cuda")]
     pub(super) fn constants(&self) -> (i32, i32, u32) {

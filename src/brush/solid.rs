@@ -56,6 +56,23 @@ impl Solid {
         Ok(solid)
     }
 
+    /// The shape as a brush has it.
+    pub(super) fn shape(&self) -> Shape {
+        let vector = |v: [i32; 3]| Vec3::from_array(v.map(voxels));
+        match *self {
+            Self::Sphere { center, radius } => Shape::sphere(vector(center), voxels(radius)),
+            Self::Cuboid { center, half, rotation } => {
+                let rotation = Quat::from_array(rotation.map(f32::from)).normalize();
+                Shape::turned_cuboid(vector(center), vector(half), rotation)
+            }
+            Self::Cylinder { base, axis, radius } => {
+                Shape::cylinder(vector(base), vector(axis), voxels(radius))
+            }
+            Self::Capsule { from, to, radius } => Shape::capsule(vector(from), vector(to), voxels(radius)),
+            Self::Cone { base, axis, radius } => Shape::cone(vector(base), vector(axis), voxels(radius)),
+        }
+    }
+
     /// Is the shape within every limit? Any integers may be asked about; all else here relies on it.
     pub(super) fn check(&self) -> Result<(), BrushError> {
         match *self {

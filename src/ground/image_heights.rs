@@ -11,7 +11,8 @@ use super::world::Ground;
 pub const MAX_VOXELS_PER_SAMPLE: u32 = 64;
 
 /// How an image becomes heights. Its columns run along +x, its rows along +z; its first sample lies at column (0, 0).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ImageScale {
     /// Voxels from one sample to the next, along x and z: 1 to [`MAX_VOXELS_PER_SAMPLE`].
     ///
@@ -36,7 +37,8 @@ impl Default for ImageScale {
 /// Fractal noise on top of an image's heights.
 ///
 /// It moves the samples too: noise that is pinned to zero wherever a sample lies would show their grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Detail {
     /// How far heights rise and fall at most, in voxels; may be negative.
     pub amplitude: f64,

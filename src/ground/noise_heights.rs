@@ -14,7 +14,8 @@ pub const MAX_SCALE: f64 = 1_048_576.0;
 
 /// Which landscape the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
 /// from machine to machine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum NoiseKind {
     /// Rolling hills: fractal Brownian motion.
@@ -25,7 +26,8 @@ pub enum NoiseKind {
 }
 
 /// Heights from noise: `base + amplitude * noise(x / scale, z / scale)`, the noise within -1 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct NoiseHeights {
     /// Which of the many worlds.
     pub seed: u32,

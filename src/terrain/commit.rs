@@ -1,5 +1,6 @@
 //! The result of a transaction, and how it becomes the world.
 
+use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -35,6 +36,17 @@ pub struct Commit {
     pub meshes: MeshUpdates,
     /// Where the time went.
     pub stages: Stages,
+}
+
+impl fmt::Debug for Commit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Commit")
+            .field("ticket", &self.ticket)
+            .field("chunks", &self.surfaces.len())
+            .field("tiles", &self.rings.len())
+            .field("stages", &self.stages)
+            .finish_non_exhaustive()
+    }
 }
 
 /// How long the stages of a transaction took. In large ones tiles and chunks are made side by side, so stages may take

@@ -46,6 +46,7 @@ pub use transaction::Transaction;
 pub use world::{Drawn, Memory, Version, World};
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -133,6 +134,17 @@ pub struct Terrain {
     loose: Option<LooseSettings>,
     timeline: Timeline,
     moves: Vec<HistoryReceipt>,
+}
+
+impl fmt::Debug for Terrain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Terrain")
+            .field("world", &self.world)
+            .field("voxel_size", &self.voxel_size)
+            .field("waiting", &self.queue.len())
+            .field("is_busy", &self.in_flight.is_some())
+            .finish_non_exhaustive()
+    }
 }
 
 /// The transaction under way, as far as its terrain keeps it.

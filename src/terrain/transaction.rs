@@ -8,6 +8,7 @@
 //! ```
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 
 use web_time::Instant;
@@ -43,6 +44,15 @@ pub struct Transaction {
     pub(super) loose: Option<LooseSettings>,
     /// Without one, the processor.
     pub(super) engine: Option<Engine>,
+}
+
+impl fmt::Debug for Transaction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Transaction")
+            .field("ticket", &self.ticket)
+            .field("edits", &self.len())
+            .finish_non_exhaustive()
+    }
 }
 
 /// What edits come to, meshes aside.

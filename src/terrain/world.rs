@@ -1,5 +1,6 @@
 //! The committed world: ground, bricks, fields, mask and the surface parts that were meshed from them.
 
+use std::fmt;
 use std::sync::Arc;
 
 use glam::IVec3;
@@ -80,6 +81,17 @@ pub struct World {
 pub struct Version {
     lineage: u64,
     revision: u64,
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("World")
+            .field("ground", &self.ground)
+            .field("chunk_size", &self.grid.size())
+            .field("revision", &self.revision)
+            .field("hash", &format_args!("{:#018x}", self.hash()))
+            .finish_non_exhaustive()
+    }
 }
 
 impl World {

@@ -27,7 +27,8 @@ use crate::lattice::{LatticeBox, ONE};
 /// assert!(refused[2].is_empty());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct DiggingRules {
     /// How hard materials are; the others are soft. A brush whose power is at least that digs as ever; with half of it or
     /// less it takes nothing away; between them, it goes a part of the way that grows from nothing to all of it. Painting
@@ -119,6 +120,21 @@ impl Refused {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rules_come_back_from_json() {
+        let samples = LatticeBox { min: glam::IVec3::new(-3, 0, 7), max: glam::IVec3::splat(9) };
+        let rules = DiggingRules::default()
+            .with_hardness(MaterialId(1), 100)
+            .with_unbreakable(MaterialId(2))
+            .with_bedrock(-5)
+            .with_protected(samples);
+        let json = r#"{"hardness":{"1":100},"unbreakable":[2],"bedrock":-5,"protected":[{"min":[-3,0,7],"max":[9,9,9]}]}"#;
+        assert_eq!(serde_json::to_string(&rules).unwrap(), json);
+        assert_eq!(serde_json::from_str::<DiggingRules>(json).unwrap(), rules);
+        assert_eq!(serde_json::from_str::<DiggingRules>("{}").unwrap(), DiggingRules::default());
+        assert!(serde_json::from_str::<DiggingRules>(r#"{"hard":1}"#).is_err());
+    }
 
     #[test]
     fn power_goes_all_the_way_or_a_part_of_it_or_nowhere() {

@@ -34,7 +34,8 @@ pub(super) use search::Lowest;
 ///
 /// With these, each edit that can remove ground looks for what it cut off before the next edit applies: the world is the
 /// same however edits were batched, as long as the settings are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
     /// The largest piece to look for, in voxels. Whatever is larger counts as tied; this bounds the time that a search
     /// takes.
