@@ -26,6 +26,7 @@ REPEATS ?= 10
 # Where `make test` leaves pictures and meshes.
 PROOF := $(CARGO_TARGET_DIR)/proof
 
+.NOTPARALLEL:
 .PHONY: help setup run example test test-model test-plugin test-examples drive soak crowd paper pictures bench bench-backends peers instructions ptx sanitize
 
 help: ## List the targets
@@ -51,7 +52,7 @@ test-model:
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::
-	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example sculpt --example server
+	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server
 	cargo test $(WITH_BEVY) --doc
 
 # The examples as a user starts them; whatever an earlier run left is not taken for theirs.

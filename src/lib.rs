@@ -169,14 +169,16 @@
 //!
 //! ```
 //! # #[cfg(all(feature = "egui", feature = "debug"))] {
+//! # use bevy::input::common_conditions::input_just_pressed;
 //! # use bevy::prelude::*;
 //! # use bevy_burrow::debug::{BurrowDebug, BurrowDebugPlugin};
 //! # use bevy_burrow::panel::{BrushTool, BurrowPanelPlugin, pointer_is_free};
 //! # use bevy_burrow::prelude::*;
 //! fn edit(app: &mut App) {
+//!     let click = pointer_is_free.and_then(input_just_pressed(MouseButton::Left));
 //!     app.add_plugins((BurrowPanelPlugin, BurrowDebugPlugin))
 //!         .insert_resource(BurrowDebug { mask: true, ..default() })
-//!         .add_systems(Update, stroke.before(BurrowSystems::Collect).run_if(pointer_is_free));
+//!         .add_systems(Update, stroke.before(BurrowSystems::Collect).run_if(click));
 //! }
 //!
 //! fn stroke(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes: MessageWriter<Brush>) {

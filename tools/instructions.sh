@@ -5,7 +5,8 @@
 #   tools/instructions.sh --update   writes the counts as the new baseline
 #
 # Counts depend on the compiler and the C library: the baseline names those it was made with, and under others they are
-# shown but nothing fails. What the library would choose by the processor at hand it does not choose here. Nor does it where valgrind can't be had: then nothing is counted.
+# shown but nothing fails. What the library would choose by the processor at hand it does not choose here. Where valgrind
+# can't be had, nothing is counted and nothing fails.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -29,6 +29,8 @@ mod map;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
+#[path = "../shared/pixels.rs"]
+mod pixels;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -3,6 +3,8 @@
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
+use crate::tools::Tool;
+
 /// Brushes are rounded to 1/256 voxel; so much larger than it was meant to be a shape may get by that.
 const SLACK: f32 = 0.01;
 
@@ -19,6 +21,12 @@ pub fn voxels(shape: &Shape) -> i64 {
         }
     }
     count
+}
+
+/// The radius up to a wish for which a stock of so many voxels is enough, and how many it takes; `None` where that would be
+/// next to nothing.
+pub fn affordable(tool: Tool, wish: f32, stock: i64, shape: impl Fn(f32) -> Shape) -> Option<(f32, i64)> {
+    largest(wish, 0.8 * tool.radii().0, stock, shape)
 }
 
 /// The largest radius up to a wish at which a shape holds no more than so many voxels, and how many it holds then;

@@ -4,6 +4,7 @@ use avian3d::prelude::*;
 use bevy::prelude::*;
 
 use crate::landscape::NewGame;
+use crate::player::thrown;
 use crate::tools::{Strike, Tool};
 
 /// Metres per second, along the look.
@@ -77,6 +78,7 @@ fn throw(
     commands.spawn((
         Name::new("ball"),
         Ball { number: supply.thrown },
+        thrown(),
         LinearVelocity(velocity),
         AngularVelocity(velocity.cross(Vec3::Y) * -0.3),
         Mesh3d(supply.mesh.clone()),
@@ -110,11 +112,13 @@ mod tests {
             app.world_mut().flush();
         }
         app.world_mut().trigger(strike(Tool::Bomb));
-        let mut balls = app.world_mut().query::<(&Ball, &LinearVelocity)>();
-        let mut left: Vec<usize> = balls.iter(app.world()).map(|(ball, _)| ball.number).collect();
+        let mut balls = app.world_mut().query::<(&Ball, &LinearVelocity, &Visibility)>();
+        let mut left: Vec<usize> = balls.iter(app.world()).map(|(ball, ..)| ball.number).collect();
         left.sort_unstable();
         assert_eq!(left, Vec::from_iter(3..BALLS + 3));
-        assert!(balls.iter(app.world()).all(|(_, velocity)| velocity.x > 10.0));
+        assert!(balls.iter(app.world()).all(|(_, velocity, _)| velocity.x > 10.0));
+        // They come from between the eyes.
+        assert!(balls.iter(app.world()).all(|(.., visibility)| *visibility == Visibility::Hidden));
         app.world_mut().trigger(NewGame);
         app.world_mut().flush();
         assert_eq!(balls.iter(app.world()).count(), 0);

@@ -9,7 +9,7 @@ use bevy_burrow::prelude::*;
 use crate::inventory::Inventory;
 use crate::landscape::NewGame;
 use crate::particles::{Burst, Matter};
-use crate::player::Tremor;
+use crate::player::{Tremor, thrown};
 use crate::tools::{Strike, Tool};
 use crate::work::Blows;
 
@@ -17,9 +17,8 @@ use crate::work::Blows;
 const FUSE: f32 = 2.4;
 /// Metres per second, along the look.
 const THROW: f32 = 14.0;
-/// Radius of the bomb, and of what it digs.
+/// Of the bomb itself.
 const RADIUS: f32 = 0.16;
-const BLAST: f32 = 5.5;
 /// In the air at once.
 const BOMBS: usize = 12;
 
@@ -110,6 +109,7 @@ fn bomb(foundry: &Foundry, place: Vec3, velocity: Vec3) -> impl Bundle {
     (
         Name::new("bomb"),
         Bomb { fuse: FUSE },
+        thrown(),
         LinearVelocity(velocity),
         AngularVelocity(velocity.cross(Vec3::Y) * -0.4),
         Mesh3d(foundry.shell.0.clone()),
@@ -145,10 +145,10 @@ fn explode(
     mut bursts: MessageWriter<Burst>,
     mut bombs: Query<(&mut Bomb, &mut LinearVelocity, &Transform)>,
 ) {
-    let place = blast.place;
+    let (place, (_, radius)) = (blast.place, Tool::Bomb.radii());
     let tag = inventory.tag();
-    let hole = Brush::dig(Shape::sphere(place, BLAST)).with_roughness(Roughness::new(1.5, 3.6, 77));
-    brushes.write(hole.with_tag(tag));
+    let hole = Brush::dig(Shape::sphere(place, radius)).with_roughness(Roughness::new(1.5, 3.6, 77));
+    brushes.write(hole.with_power(Tool::Bomb.power()).with_tag(tag));
     blows.await_receipt(tag, place, Vec3::Y, 0.3);
     let fire = Burst { place, out: Vec3::ZERO, count: 22, speed: 9.0, matter: Matter::Fire };
     bursts.write(fire);
@@ -160,7 +160,7 @@ fn explode(
     ));
     for (mut bomb, mut velocity, other) in &mut bombs {
         let away = other.translation - place;
-        if away.length() < 1.5 * BLAST {
+        if away.length() < 1.5 * radius {
             bomb.fuse = bomb.fuse.min(0.15 + 0.03 * away.length());
             velocity.0 += away.normalize_or(Vec3::Y) * 6.0;
         }
@@ -173,11 +173,12 @@ fn shake(
     mut tremor: ResMut<Tremor>,
     mut bodies: Query<(&Transform, &mut CharacterMotion), With<Character>>,
 ) {
+    let (_, radius) = Tool::Bomb.radii();
     for (place, mut motion) in &mut bodies {
         let away = place.translation - blast.place;
         let near = (1.0 - away.length() / 40.0).max(0.0);
         tremor.nudge(1.6 * near);
-        let push = (1.0 - away.length() / (1.6 * BLAST)).max(0.0);
+        let push = (1.0 - away.length() / (1.6 * radius)).max(0.0);
         if push > 0.0 {
             motion.velocity += away.normalize_or(Vec3::Y) * 11.0 * push;
             motion.grounded = false;

@@ -6,6 +6,8 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::physics::{ColliderSource, HeldByGround, TerrainPhysicsPlugin};
 
 use super::*;
+use crate::settings::Settings;
+use crate::tools::Hand;
 
 /// A flat world, 64 wide and 20 high, with bombs in it and nobody to throw them.
 fn app() -> App {
@@ -39,7 +41,7 @@ fn ground_is_there(app: &mut App) -> bool {
     app.world_mut().run_system_cached(whole).is_ok_and(|ready| ready)
 }
 
-/// A bomb that the ground does not hold back any more.
+/// A bomb on its way; where there are no colliders yet, the ground holds it back.
 fn throw_from(app: &mut App, place: Vec3, velocity: Vec3) -> Entity {
     let bomb = (Bomb { fuse: FUSE }, LinearVelocity(velocity), Transform::from_translation(place));
     app.world_mut().spawn(bomb).id()
@@ -122,4 +124,33 @@ fn bombs_set_each_other_off() {
     assert!(app.world().get_entity(first).is_err());
     assert!(fuse(&mut app, second).is_some_and(|fuse| fuse < 0.5));
     assert!(fuse(&mut app, far).is_some_and(|fuse| fuse > 2.0));
+}
+
+#[test]
+fn a_blast_is_as_large_and_as_strong_as_the_tool_in_hand() {
+    let mut app = App::new();
+    app.init_resource::<Inventory>()
+        .init_resource::<Blows>()
+        .add_message::<Brush>()
+        .add_message::<Burst>()
+        .add_observer(explode);
+    app.world_mut().trigger(Blast { place: Vec3::ZERO });
+    let brushes: Vec<Brush> = app.world_mut().resource_mut::<Messages<Brush>>().drain().collect();
+    let [Brush { shape: Shape::Sphere { radius, .. }, power, .. }] = brushes[..] else {
+        panic!("{brushes:?}");
+    };
+    assert_eq!((radius, power), (Hand::new(&Settings::default()).radius(Tool::Bomb), Tool::Bomb.power()));
+}
+
+#[test]
+fn a_bomb_that_leaves_the_hand_is_not_seen_yet() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, BombsPlugin))
+        .init_resource::<Assets<Mesh>>()
+        .init_resource::<Assets<StandardMaterial>>();
+    app.update();
+    app.world_mut().trigger(Strike { tool: Tool::Bomb, aim: None, eye: Vec3::ZERO, along: Vec3::X });
+    app.world_mut().flush();
+    let mut bombs = app.world_mut().query_filtered::<&Visibility, With<Bomb>>();
+    assert_eq!(*bombs.single(app.world()).expect("one bomb"), Visibility::Hidden);
 }

@@ -111,7 +111,8 @@ impl Film {
 
     /// Draws a frame into a file.
     fn expose(&mut self) -> Result {
-        let image = self.studio.film.clone().ok_or("there is nothing to draw with")?;
+        let photographer = self.studio.photographer.as_ref().ok_or("there is nothing to draw with")?;
+        let image = photographer.film.clone();
         let path = self.path(self.drawn);
         let mut save = save_to_disk(path.clone());
         let develop = move |picture: On<ScreenshotCaptured>,

@@ -43,7 +43,7 @@ impl Form {
 }
 
 /// Where the look meets the ground.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aim {
     pub place: Vec3,
     /// The way of the look.

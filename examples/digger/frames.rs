@@ -7,6 +7,7 @@ use bevy::asset::RenderAssetUsages;
 use bevy::image::ImageSampler;
 use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
+use bevy_burrow::plugin::Times;
 use bevy_burrow::prelude::*;
 
 use crate::input::{Action, Actions};
@@ -37,11 +38,11 @@ impl Plugin for FramesPlugin {
 struct Frames(VecDeque<(Duration, Duration)>);
 
 impl Frames {
-    /// The time that so many percent of the frames did not exceed.
-    fn percentile(&self, percent: usize) -> Duration {
-        let mut sorted: Vec<Duration> = self.0.iter().map(|frame| frame.0).collect();
-        sorted.sort_unstable();
-        sorted.get((sorted.len() * percent).div_ceil(100).saturating_sub(1)).copied().unwrap_or_default()
+    /// How long they took, for percentiles.
+    fn times(&self) -> Times {
+        let mut times = Times::default();
+        self.0.iter().for_each(|frame| times.push(frame.0));
+        times
     }
 }
 
@@ -133,11 +134,11 @@ fn draw(
         texel.copy_from_slice(&color);
     }
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    let times = frames.times();
+    let [p50, p99] = [50, 99].map(|percent| ms(times.percentile(percent).unwrap_or_default()));
     let worst = frames.0.iter().map(|frame| frame.1).max().unwrap_or_default();
     words.0 = format!(
-        "frame  p50 {:.1}  p99 {:.1} ms\nplugin {:.2} ms of it at most\n{} edits, {} chunks, last transaction {:.1} ms",
-        ms(frames.percentile(50)),
-        ms(frames.percentile(99)),
+        "frame  p50 {p50:.1}  p99 {p99:.1} ms\nplugin {:.2} ms of it at most\n{} edits, {} chunks, last transaction {:.1} ms",
         ms(worst),
         figures.brushes,
         chunks.iter().count(),

@@ -110,7 +110,7 @@ pub struct Actions {
 }
 
 impl Actions {
-    /// Is it held down?
+    /// Is it held down? What is shorter than a frame is held for one.
     pub fn pressed(&self, action: Action) -> bool {
         self.held & action.bit() != 0
     }
@@ -217,6 +217,7 @@ fn read_devices(
         held |= if puppet || bindings.iter().any(is_held) { action.bit() } else { 0 };
         fresh |= if bindings.iter().any(is_fresh) { action.bit() } else { 0 };
     }
+    held |= fresh;
     actions.stale &= held & !fresh;
     actions.held = held & !actions.stale;
     actions.just = fresh | (actions.held & !before);

@@ -7,7 +7,7 @@ use bevy::input::gamepad::{
     RawGamepadEvent,
 };
 use bevy::input::keyboard::{Key, KeyboardInput};
-use bevy::input::mouse::MouseWheel;
+use bevy::input::mouse::{MouseButtonInput, MouseWheel};
 use bevy::input::touch::TouchPhase;
 use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
 
@@ -52,6 +52,30 @@ fn a_press_is_fresh_for_one_frame_and_held_until_its_end() {
     assert!(actions(&app).pressed(Action::Jump) && !actions(&app).just_pressed(Action::Jump));
     type_key(&mut app, KeyCode::Space, ButtonState::Released);
     assert!(!actions(&app).pressed(Action::Jump));
+}
+
+#[test]
+fn a_click_shorter_than_a_frame_is_held_for_one() {
+    let mut app = app();
+    let click = |app: &mut App| {
+        for state in [ButtonState::Pressed, ButtonState::Released] {
+            let (button, window) = (MouseButton::Left, Entity::PLACEHOLDER);
+            app.world_mut().write_message(MouseButtonInput { button, state, window });
+        }
+        app.update();
+    };
+    for _ in 0..2 {
+        click(&mut app);
+        assert!(actions(&app).pressed(Action::Use) && actions(&app).just_pressed(Action::Use));
+        app.update();
+        assert!(!actions(&app).pressed(Action::Use) && !actions(&app).just_pressed(Action::Use));
+    }
+    // Nobody waits for the end of a click that is over.
+    click(&mut app);
+    app.world_mut().resource_mut::<Actions>().forget();
+    assert!(!actions(&app).pressed(Action::Use));
+    click(&mut app);
+    assert!(actions(&app).pressed(Action::Use));
 }
 
 #[test]

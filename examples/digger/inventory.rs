@@ -3,7 +3,7 @@
 //! A brush is answered some frames after it was sent. Until then what it may take is pledged, so that a fast hand
 //! can't spend the same ground twice; the receipt says what it really took. What each transaction did to the stock is
 //! kept, so that undo and redo do just the opposite: the ground's own history knows of pieces that fell and of paint,
-//! but not of what they were worth.
+//! but not of what they were worth. They are answered later as well, and until then what they may take is not free.
 
 use std::collections::VecDeque;
 
@@ -38,6 +38,9 @@ pub struct Inventory {
     /// What transactions did, those that can be undone and those that can be done again; the nearest stand last.
     past: VecDeque<Change>,
     future: Vec<Change>,
+    /// Steps through history that are under way: back, and forth.
+    undos: usize,
+    redos: usize,
 }
 
 impl Default for Inventory {
@@ -50,6 +53,8 @@ impl Default for Inventory {
             open: None,
             past: VecDeque::new(),
             future: Vec::new(),
+            undos: 0,
+            redos: 0,
         };
         inventory.gain(CONCRETE, 600);
         inventory
@@ -68,10 +73,19 @@ impl Inventory {
         self.stock.get(usize::from(material.0)).copied().unwrap_or(0)
     }
 
-    /// Voxels of a material that no brush under way may take.
+    /// Voxels of a material that neither brushes nor steps under way may take.
     pub fn free(&self, material: MaterialId) -> i64 {
         let pledged = self.pledges.iter().filter(|pledge| pledge.1 == material).map(|pledge| pledge.2);
-        self.stock(material) - pledged.sum::<i64>()
+        self.stock(material) - pledged.sum::<i64>() - self.at_stake(material)
+    }
+
+    /// The most that steps under way take: what was dug and is undone, and what was built and is done again. What they
+    /// give counts once it is there: a step may be refused, and what an undo takes back may be a brush under way.
+    fn at_stake(&self, material: MaterialId) -> i64 {
+        let by = |change: &Change| change.get(usize::from(material.0)).copied().unwrap_or(0);
+        let undone = self.past.iter().rev().take(self.undos).map(|change| by(change).max(0));
+        let redone = self.future.iter().rev().take(self.redos).map(|change| (-by(change)).max(0));
+        undone.chain(redone).sum()
     }
 
     /// Keeps some of a material for a brush that is under way.
@@ -129,7 +143,25 @@ impl Inventory {
         }
     }
 
-    /// Enters a step through history; says what came and went.
+    /// A step through history was sent.
+    pub fn await_step(&mut self, step: HistoryStep) {
+        *self.under_way(step) += 1;
+    }
+
+    /// A step was answered, whatever the answer. In a new game nobody waits for those of the old one.
+    pub fn end_step(&mut self, step: HistoryStep) {
+        let under_way = self.under_way(step);
+        *under_way = under_way.saturating_sub(1);
+    }
+
+    fn under_way(&mut self, step: HistoryStep) -> &mut usize {
+        match step {
+            HistoryStep::Undo => &mut self.undos,
+            HistoryStep::Redo => &mut self.redos,
+        }
+    }
+
+    /// Enters a step through history that was taken; says what came and went.
     pub fn step(&mut self, step: HistoryStep) -> Vec<(MaterialId, i64)> {
         match step {
             HistoryStep::Undo => {
@@ -169,6 +201,7 @@ fn enter_history(
     mut hints: MessageWriter<Hint>,
 ) {
     for HistoryMoved { receipt, .. } in steps.read() {
+        inventory.end_step(receipt.step);
         match &receipt.outcome {
             Ok(_) => {
                 let entered = inventory.step(receipt.step);
@@ -191,6 +224,16 @@ fn step_through_history(actions: Res<Actions>, mut undo: MessageWriter<Undo>, mu
     }
 }
 
+/// Whoever sent them, the keys or the panel.
+fn await_steps(
+    mut undos: MessageReader<Undo>,
+    mut redos: MessageReader<Redo>,
+    mut inventory: ResMut<Inventory>,
+) {
+    undos.read().for_each(|_| inventory.await_step(HistoryStep::Undo));
+    redos.read().for_each(|_| inventory.await_step(HistoryStep::Redo));
+}
+
 /// Some of a material came or went.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StockChanged {
@@ -206,7 +249,11 @@ impl Plugin for InventoryPlugin {
         app.init_resource::<Inventory>()
             .add_message::<StockChanged>()
             .add_observer(empty)
-            .add_systems(Update, (enter_receipts, enter_history).chain().after(BurrowSystems::Commit))
+            .add_systems(
+                Update,
+                // Steps that were collected in this frame may be answered in it.
+                (await_steps, enter_receipts, enter_history).chain().after(BurrowSystems::Commit),
+            )
             .add_systems(Update, step_through_history.in_set(Playing).run_if(in_state(Phase::Playing)));
     }
 }

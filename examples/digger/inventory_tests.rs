@@ -157,3 +157,109 @@ fn what_is_pledged_is_not_spent_twice() {
     inventory.enter(&nothing);
     assert_eq!(inventory.free(ROCK), 100);
 }
+
+/// What transactions made of a stock of rock, those that can be undone and those that can be done again.
+fn after(past: &[i64], future: &[i64]) -> Inventory {
+    let change = |by: &i64| {
+        let mut change = Change::default();
+        change[usize::from(ROCK.0)] = *by;
+        change
+    };
+    let (past_sum, past) = (past.iter().sum(), past.iter().map(change).collect());
+    let mut inventory = Inventory { past, future: future.iter().map(change).collect(), ..default() };
+    inventory.gain(ROCK, past_sum);
+    inventory
+}
+
+#[test]
+fn what_steps_under_way_take_is_not_free_and_what_they_give_not_yet() {
+    use HistoryStep::{Redo, Undo};
+    let cases: [(&[i64], &[i64], &[HistoryStep], i64, i64); 11] = [
+        // What was dug is taken back, once.
+        (&[100], &[], &[Undo], 0, 0),
+        (&[100], &[], &[Undo, Undo], 0, 0),
+        (&[60, 40], &[], &[Undo], 60, 60),
+        (&[60, 40], &[], &[Undo, Undo], 0, 0),
+        // What was built comes back, and what was dug before it goes then.
+        (&[100, -70], &[], &[Undo], 30, 100),
+        (&[100, -70], &[], &[Undo, Undo], -70, 0),
+        // The other way round.
+        (&[100], &[-70], &[Redo], 30, 30),
+        (&[100], &[50], &[Redo], 100, 150),
+        (&[100], &[-20, 50], &[Redo, Redo], 80, 130),
+        // There and back.
+        (&[100], &[], &[Undo, Redo], 0, 100),
+        (&[100], &[-70], &[Redo, Undo], -70, 100),
+    ];
+    for (past, future, steps, free, left) in cases {
+        let mut inventory = after(past, future);
+        steps.iter().for_each(|step| inventory.await_step(*step));
+        assert_eq!(inventory.free(ROCK), free, "{past:?} {future:?} {steps:?}");
+        for step in steps {
+            inventory.end_step(*step);
+            inventory.step(*step);
+        }
+        assert_eq!(
+            (inventory.free(ROCK), inventory.stock(ROCK)),
+            (left, left),
+            "{past:?} {future:?} {steps:?}"
+        );
+    }
+}
+
+#[test]
+fn a_brush_before_an_undo_is_what_it_takes_back() {
+    let mut inventory = after(&[100], &[]);
+    let tag = inventory.tag();
+    inventory.pledge(tag, ROCK, 70);
+    inventory.await_step(HistoryStep::Undo);
+    // Nobody knows yet whether the brush will change anything.
+    assert_eq!(inventory.free(ROCK), -70);
+    // It does.
+    inventory.pledges.clear();
+    inventory.gain(ROCK, -70);
+    inventory.past.push_back(after(&[-70], &[]).past[0]);
+    assert_eq!(inventory.free(ROCK), 30);
+    inventory.end_step(HistoryStep::Undo);
+    inventory.step(HistoryStep::Undo);
+    assert_eq!(inventory.free(ROCK), 100);
+}
+
+#[test]
+fn a_step_is_awaited_until_it_is_answered() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, InventoryPlugin))
+        .init_resource::<Actions>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_message::<HistoryMoved>()
+        .add_message::<BrushApplied>()
+        .add_message::<Hint>()
+        .insert_resource(after(&[100], &[-70]));
+    let free = |app: &mut App| {
+        app.update();
+        app.world().resource::<Inventory>().free(ROCK)
+    };
+    let answer = |app: &mut App, step, outcome| {
+        let receipt = HistoryReceipt { step, outcome };
+        app.world_mut().write_message(HistoryMoved { terrain: None, receipt });
+    };
+    // One that is refused takes nothing.
+    app.world_mut().write_message(Redo::default());
+    assert_eq!(free(&mut app), 30);
+    assert_eq!(free(&mut app), 30);
+    answer(&mut app, HistoryStep::Redo, Err(HistoryRejection::NothingToRedo));
+    assert_eq!(free(&mut app), 100);
+    app.world_mut().write_message(Undo::default());
+    assert_eq!(free(&mut app), 0);
+    answer(&mut app, HistoryStep::Undo, Ok(Restored::default()));
+    assert_eq!(free(&mut app), 0);
+    assert_eq!(app.world().resource::<Inventory>().stock(ROCK), 0);
+    // Nobody waits for what was sent in another game.
+    app.world_mut().write_message(Undo::default());
+    app.update();
+    app.world_mut().trigger(NewGame);
+    answer(&mut app, HistoryStep::Undo, Err(HistoryRejection::TerrainGone));
+    app.world_mut().resource_mut::<Inventory>().gain(ROCK, 50);
+    assert_eq!(free(&mut app), 50);
+}

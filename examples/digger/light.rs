@@ -1,5 +1,8 @@
 //! Eyes and light: the camera, the sun and its shadows, the dark of caves and the headlamp.
 
+#[path = "../shared/software.rs"]
+mod software;
+
 use bevy::anti_alias::smaa::Smaa;
 use bevy::camera::{Hdr, ShadowLodOrigin};
 use bevy::core_pipeline::{prepass::DepthPrepass, tonemapping::Tonemapping};
@@ -8,6 +11,7 @@ use bevy::post_process::bloom::Bloom;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy_burrow::prelude::*;
+use software::draws_in_software;
 
 use crate::input::{Action, Actions};
 use crate::landscape::NewGame;
@@ -74,11 +78,6 @@ impl Plugin for LightPlugin {
     }
 }
 
-/// Is there no graphics card, so that the processor draws? (Bevy does not re-export the type that tells.)
-fn draws_in_software(adapter: &RenderAdapterInfo) -> bool {
-    format!("{:?}", adapter.device_type) == "Cpu"
-}
-
 /// Without a graphics card there is no filter for textures seen at an angle, and a player begins with low quality.
 fn spare_software(
     adapter: Option<Res<RenderAdapterInfo>>,
@@ -86,7 +85,7 @@ fn spare_software(
     mut settings: ResMut<Settings>,
     mut textures: ResMut<GroundTextures>,
 ) {
-    if !adapter.is_some_and(|adapter| draws_in_software(&adapter)) {
+    if !draws_in_software(adapter.as_deref()) {
         return;
     }
     *textures = GroundTextures::Baked { side: 512, anisotropy: 1 };
@@ -168,7 +167,7 @@ fn apply_settings(
     commands.entity(*sun).insert(shadows);
     let mut eyes = commands.entity(*entity);
     let is_low = settings.quality == Quality::Low;
-    let in_software = adapter.is_some_and(|adapter| draws_in_software(&adapter));
+    let in_software = draws_in_software(adapter.as_deref());
     for mut look in &mut looks {
         // Some fifty texels for each pixel are nothing to a card, and seconds to a processor.
         look.quality = if is_low || in_software { GroundQuality::Low } else { GroundQuality::High };

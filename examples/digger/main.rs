@@ -39,7 +39,7 @@
 //! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
-//! | `script.rs`, `tour.rs` | two stories |
+//! | `script.rs`, `tour.rs` and `tour/` | two stories |
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
 //! | `report.rs`, `tell.rs` | receipts, times and the summary; what goes on |
 

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy::window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused};
 use bevy_burrow::panel::BurrowPanel;
 
-use crate::input::{Action, Actions};
+use crate::input::{Action, Actions, ReadsDevices};
 
 /// What goes on.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -41,7 +41,7 @@ impl Plugin for PhasePlugin {
             .add_systems(OnEnter(Phase::Playing), (close_menus, run_time, take_mouse, listen))
             .add_systems(OnEnter(Phase::Paused), (stop_time, leave_mouse))
             .add_systems(OnEnter(Phase::Title), (run_time, leave_mouse))
-            .add_systems(Update, pause.run_if(in_state(Phase::Playing)));
+            .add_systems(PreUpdate, pause.after(ReadsDevices).run_if(in_state(Phase::Playing)));
     }
 }
 
@@ -75,7 +75,8 @@ pub fn leave_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) 
 }
 
 /// The pause key, Escape whatever it is, the help key, and whatever takes the window away. While the panel is open,
-/// letters are typed into it.
+/// letters are typed into it. It looks before the states change, as menus do: the key that leads back to the game does
+/// not pause it again.
 fn pause(
     actions: Res<Actions>,
     keys: Res<ButtonInput<KeyCode>>,

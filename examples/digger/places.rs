@@ -5,6 +5,7 @@
 use bevy::prelude::*;
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::{Column, ONE};
+use bevy_burrow::terrain::World as Model;
 
 use crate::light::SUN;
 
@@ -93,6 +94,24 @@ impl Hillside {
     pub fn room(&self) -> Vec3 {
         let [_, _, end] = self.floor();
         end + flat(self.onward) * (ROOM_RADIUS - 2.0) + Vec3::Y * (ROOM_RADIUS - 2.0)
+    }
+}
+
+impl Ravine {
+    /// How much of a bridge over it is seen from a place: points of its deck and of its arch with no ground before them.
+    /// The bridge may be there, or not yet.
+    pub fn seen_from(&self, world: &Model, eye: Vec3) -> usize {
+        /// No part of the bridge itself is farther from its middle line.
+        const BRIDGE: f32 = 4.0;
+        let across = (self.to - self.from).cross(Vec3::Y).normalize();
+        let open = 1.0 - (BRIDGE / (eye - self.from).dot(across).abs()).min(1.0);
+        let points = (1..12).map(|i| self.from.lerp(self.to, i as f32 / 12.0));
+        let points = points.flat_map(|bank| [1.0, -4.0].map(|up| bank + Vec3::Y * up));
+        let is_seen = |point: &Vec3| {
+            let way = *point - eye;
+            world.raycast(eye.as_dvec3(), way.as_dvec3(), (open * way.length()).into()).is_none()
+        };
+        points.filter(is_seen).count()
     }
 }
 
@@ -227,4 +246,31 @@ impl Relief<'_> {
 /// A level way in the world.
 pub fn flat(way: Vec2) -> Vec3 {
     Vec3::new(way.x, 0.0, way.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_burrow::prelude::*;
+
+    use super::*;
+    use crate::works;
+
+    #[test]
+    fn a_bridge_is_seen_past_itself_but_not_past_a_hill() {
+        let height = |x: i32, z: i32| match (x, z) {
+            (_, 80..90) => 40.0,
+            (42..71, _) => 10.0,
+            _ => 20.0,
+        };
+        let ground = Ground::from_fn(128, 128, height).expect("a small world");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
+        let bank = |x: f32| Vec3::new(x, 20.0, 64.0);
+        let ravine =
+            Ravine { from: bank(41.0), to: bank(71.0), behind: [bank(29.0), bank(83.0)], bottom: 10.0 };
+        let [before, behind] = [30.0, 98.0].map(|z| Vec3::new(56.0, 30.0, z));
+        let seen = |terrain: &Terrain| [before, behind].map(|eye| ravine.seen_from(terrain.world(), eye));
+        assert_eq!(seen(&terrain), [22, 0]);
+        terrain.apply(works::bridge(&ravine));
+        assert_eq!(seen(&terrain), [22, 0], "it does not hide itself");
+    }
 }

@@ -1,7 +1,7 @@
 //! The player: actions steer a body, and the camera looks through its eyes.
 
 use bevy::prelude::*;
-use bevy_burrow::physics::CharacterSteering;
+use bevy_burrow::physics::{CharacterSteering, CharacterSystems};
 use bevy_burrow::prelude::*;
 
 use crate::body::{self, Body};
@@ -40,6 +40,20 @@ impl Tremor {
     }
 }
 
+/// Metres from the eyes at which something thrown is seen: nearer by, it would fill the view.
+const CLEAR: f32 = 0.7;
+/// Seconds after which it is seen wherever it is: a wall may have thrown it back.
+const LATEST: f32 = 0.1;
+
+/// Just thrown, so many seconds ago, and not seen yet.
+#[derive(Component, Clone, Copy, Debug, Default)]
+struct Thrown(f32);
+
+/// What bombs and balls have when they leave the hand.
+pub fn thrown() -> impl Bundle {
+    (Thrown::default(), Visibility::Hidden)
+}
+
 /// Systems that obey the player; all of them come before [`BurrowSystems::Collect`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Playing;
@@ -57,9 +71,10 @@ impl Plugin for PlayerPlugin {
                 Update,
                 (
                     (look, steer).run_if(in_state(Phase::Playing)).in_set(Playing),
-                    see.after(BurrowSystems::Commit),
+                    (see, show_thrown).chain().after(BurrowSystems::Commit),
                 ),
             )
+            .add_systems(FixedUpdate, feel_jump.after(CharacterSystems))
             .add_systems(OnExit(Phase::Playing), stand_still);
     }
 }
@@ -110,7 +125,14 @@ fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut CharacterSteer
         let way = Quat::from_rotation_y(player.yaw) * Vec3::new(actions.walk.x, 0.0, -actions.walk.y);
         steering.direction = way.xz();
         steering.run = actions.pressed(Action::Run);
-        steering.jump = actions.pressed(Action::Jump);
+        steering.jump |= actions.pressed(Action::Jump);
+    }
+}
+
+/// The wish to jump lasts until the body has felt it: not every frame has a step of the physics.
+fn feel_jump(mut players: Query<&mut CharacterSteering, (With<Player>, Without<Scripted>)>) {
+    for mut steering in &mut players {
+        steering.jump = false;
     }
 }
 
@@ -142,3 +164,24 @@ fn see(
         eyes.rotation = player.rotation() * Quat::from_euler(EulerRot::YXZ, shake.x, shake.y, shake.z);
     }
 }
+
+/// What was thrown is seen as soon as it is clear of the eyes.
+fn show_thrown(
+    mut commands: Commands,
+    time: Res<Time>,
+    eyes: Query<&Transform, With<Eyes>>,
+    mut thrown: Query<(Entity, &mut Thrown, &Transform, &mut Visibility)>,
+) {
+    for (entity, mut thrown, place, mut visibility) in &mut thrown {
+        let is_near = eyes.iter().any(|eyes| eyes.translation.distance(place.translation) < CLEAR);
+        if !is_near || thrown.0 >= LATEST {
+            *visibility = Visibility::Inherited;
+            commands.entity(entity).try_remove::<Thrown>();
+        }
+        thrown.0 += time.delta_secs();
+    }
+}
+
+#[cfg(test)]
+#[path = "player_tests.rs"]
+mod tests;

@@ -11,6 +11,7 @@ use bevy_burrow::terrain::World as Model;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Options;
+use crate::landscape::CONCRETE;
 use crate::places::{Hillside, Places, Ravine, TUNNEL_RADIUS, flat};
 use crate::report::{Logbook, Report};
 use crate::studio::Studio;
@@ -174,7 +175,10 @@ impl Stage {
         let middle = from.midpoint(to);
         let aside = [1.0, -1.0].map(|side| middle + flat(along.perp()) * side * 34.0 - flat(along) * 9.0);
         let [left, right] = [self.above(aside[0], 9.0)?, self.above(aside[1], 9.0)?];
-        let eye = if left.y.max(right.y) > middle.y + 6.0 && left.y > right.y { right } else { left };
+        // The side from which more of it is seen, and of equals the lower one.
+        let world = self.studio.terrain()?.world();
+        let worth = |eye: Vec3| (ravine.seen_from(world, eye), -eye.y);
+        let eye = if worth(right) > worth(left) { right } else { left };
         self.shoot_from("7_bridge", eye, middle - Vec3::Y * 3.5)
     }
 
@@ -214,6 +218,8 @@ impl Stage {
         let mut hand = self.studio.world().resource_mut::<Hand>();
         hand.preview = on;
         hand.tool = if on { Tool::Builder } else { Tool::Pickaxe };
+        // There is some of it before anything was dug.
+        hand.material = CONCRETE;
         hand.set_radius(Tool::Builder, 3.0);
     }
 

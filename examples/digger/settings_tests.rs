@@ -1,14 +1,33 @@
 //! Facts about the file of settings.
 
+use std::ops::Deref;
+
 use super::*;
 use crate::bindings::Binding;
 use crate::input::Action;
 
+/// A file in a folder of its own, which goes with it.
+struct OwnFile(PathBuf);
+
+impl Deref for OwnFile {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for OwnFile {
+    fn drop(&mut self) {
+        let _ = self.0.parent().map(std::fs::remove_dir_all);
+    }
+}
+
 /// A file of its own for each test.
-fn file(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("digger_settings_{}", std::process::id())).join(name);
+fn file(name: &str) -> OwnFile {
+    let folder = std::env::temp_dir().join(format!("digger_settings_{}_{name}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
-    folder.join("digger.json")
+    OwnFile(folder.join("digger.json"))
 }
 
 fn write_text(path: &Path, text: &str) {

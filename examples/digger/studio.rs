@@ -4,20 +4,22 @@
 //! [`CharacterSteering`] and sends the same [`Brush`]
 //! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
 
+#[path = "../shared/photo.rs"]
+mod photo;
+
 use std::f32::consts::PI;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use avian3d::prelude::Position;
-use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy::render::render_resource::{PollType, TextureFormat};
-use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
+use bevy::render::renderer::RenderAdapterInfo;
 use bevy::render::settings::RenderResources;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
 use bevy_burrow::physics::{Character, CharacterMotion, CharacterSteering, HeldByGround};
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
+use photo::Photographer;
+pub use photo::{Developed, PATIENCE};
 
 use crate::Options;
 use crate::day::Clock;
@@ -27,18 +29,10 @@ use crate::hud::ShowHud;
 use crate::input::{Action, Actions};
 use crate::light::{Eyes, LampSwitch};
 use crate::phase::Phase;
-use crate::pixels;
 use crate::player::{Drone, Player, Scripted};
 use crate::report::{EditTime, FrameTimes, Logbook};
 use crate::tools::Hand;
 use crate::ui::scale_for;
-
-/// Longest wait for the landscape.
-pub const PATIENCE: Duration = Duration::from_secs(300);
-
-/// Pictures that lie on the disk, as far as the renderer told.
-#[derive(Resource, Default)]
-pub struct Developed(pub usize);
 
 /// Where the player stands.
 #[derive(Clone, Copy, Debug)]
@@ -52,13 +46,11 @@ pub struct Studio {
     pub app: App,
     eyes: Entity,
     player: Entity,
-    /// Where pictures are drawn; `None` without a renderer.
-    pub film: Option<Handle<Image>>,
+    /// Who takes the pictures; `None` without a renderer.
+    pub photographer: Option<Photographer>,
     /// Where they are written.
     pub folder: PathBuf,
     is_warm: bool,
-    /// Is every frame drawn, and not only the pictures?
-    draws_all: bool,
     /// Frames without a picture.
     pub frames: FrameTimes,
     /// Frames that were drawn.
@@ -84,18 +76,11 @@ impl Studio {
             engine.wait(PATIENCE);
         }
         let mut app = build_app(renderer, engine);
-        app.init_resource::<Developed>();
         // One frame, for the systems that spawn the camera.
         app.update();
         let eyes = app.world_mut().query_filtered::<Entity, With<Eyes>>().single(app.world())?;
-        let image =
-            Image::new_target_texture(options.width, options.height, TextureFormat::Rgba8UnormSrgb, None);
-        let film = app.world_mut().resource_mut::<Assets<Image>>().add(image);
-        app.world_mut().entity_mut(eyes).insert(RenderTarget::from(film.clone()));
         // Nobody looks while the land is made.
-        if let Some(mut camera) = app.world_mut().get_mut::<Camera>(eyes) {
-            camera.is_active = false;
-        }
+        let mut photographer = Photographer::new(&mut app, eyes, (options.width, options.height));
         let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
@@ -107,22 +92,20 @@ impl Studio {
         world.resource_mut::<Hand>().preview = false;
         world.resource_mut::<NextState<Phase>>().set(Phase::Playing);
         app.update();
-        let film = renders.then_some(film);
-        let mut studio = Self {
+        photographer.draws_all = options.draw_all;
+        photographer.film_runs(&mut app, options.draw_all);
+        Ok(Self {
             app,
             eyes,
             player,
-            film,
+            photographer: renders.then_some(photographer),
             folder: options.out.clone(),
             is_warm: false,
-            draws_all: options.draw_all,
             frames: FrameTimes::default(),
             drawn: FrameTimes::default(),
             times: Vec::new(),
             pictures: Vec::new(),
-        };
-        studio.film_runs(studio.draws_all);
-        Ok(studio)
+        })
     }
 
     /// What draws the pictures.
@@ -158,8 +141,8 @@ impl Studio {
         }
         let start = Instant::now();
         self.app.update();
-        if self.draws_all {
-            self.finish_drawing();
+        if self.photographer.as_ref().is_some_and(|photographer| photographer.draws_all) {
+            photo::finish_drawing(&self.app);
         }
         self.frames.count(start.elapsed());
     }
@@ -325,34 +308,13 @@ impl Studio {
     pub fn shoot(&mut self, name: &str) -> Result {
         // Eyes get used to the light.
         self.wait(90);
-        let Some(film) = self.film.clone() else { return Ok(()) };
+        let Some(photographer) = &self.photographer else { return Ok(()) };
         let path = self.folder.join(name).with_extension("png");
-        if path.exists() {
-            std::fs::remove_file(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-        }
-        self.film_runs(true);
-        // Shaders and the sky come in over some frames; later on, lights need a few to find what they shine on.
+        // The sky comes in over some frames; later on, lights need a few to find what they shine on.
         let frames = if self.is_warm { 3 } else { 6 };
         self.is_warm = true;
-        for _ in 0..frames {
-            self.step_and_draw();
-        }
-        let before = self.app.world().resource::<Developed>().0;
-        let mut save = save_to_disk(path.clone());
-        let develop = move |picture: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| {
-            save(picture);
-            developed.0 += 1;
-        };
-        self.app.world_mut().spawn(Screenshot::image(film)).observe(develop);
-        self.step_and_draw();
-        self.film_runs(self.draws_all);
-        let start = Instant::now();
-        while self.app.world().resource::<Developed>().0 == before && start.elapsed() < PATIENCE {
-            self.step_and_draw();
-        }
-        if !pixels::show_something(&path) {
-            return Err(format!("{} was not written, or shows nothing", path.display()).into());
-        }
+        let drawn = &mut self.drawn;
+        photographer.shoot_after(frames, &mut self.app, &path, |app| draw(app, drawn))?;
         self.pictures.push(path);
         Ok(())
     }
@@ -367,25 +329,21 @@ impl Studio {
 
     /// Does the camera draw?
     pub fn film_runs(&mut self, runs: bool) {
-        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.eyes) {
-            camera.is_active = runs;
+        if let Some(photographer) = &self.photographer {
+            photographer.film_runs(&mut self.app, runs);
         }
     }
 
     /// One frame, drawn to its end.
     pub fn step_and_draw(&mut self) {
-        let start = Instant::now();
-        self.app.update();
-        self.finish_drawing();
-        self.drawn.count(start.elapsed());
+        draw(&mut self.app, &mut self.drawn);
     }
+}
 
-    fn finish_drawing(&self) {
-        if let Some(device) = self.app.world().get_resource::<RenderDevice>() {
-            // An error here is the device's end, and shows as a missing picture.
-            let _ = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
-        }
-    }
+fn draw(app: &mut App, drawn: &mut FrameTimes) {
+    let start = Instant::now();
+    photo::draw(app);
+    drawn.count(start.elapsed());
 }
 
 fn wait_for_player(app: &mut App, renders: bool) -> Result<Entity> {

@@ -170,6 +170,13 @@ impl Tool {
         Self::SLOTS[self as usize]
     }
 
+    /// Where the look meets the ground, if the tool reaches it.
+    fn aim(self, terrains: &Terrains, eyes: &Transform) -> Option<Aim> {
+        let along = eyes.forward();
+        let hit = terrains.raycast(Ray3d::new(eyes.translation, along), self.manner().reach)?;
+        Some(Aim { place: hit.position, along: *along, normal: hit.normal })
+    }
+
     /// The tool that lies `by` slots further.
     fn after(self, by: usize) -> Self {
         Self::ALL[(self as usize + by) % Self::ALL.len()]
@@ -183,7 +190,7 @@ pub struct Hand {
     pub form: Form,
     pub material: MaterialId,
     radii: [f32; 8],
-    /// What is aimed at, if the tool reaches it.
+    /// What is aimed at, if the tool in hand reaches it; the one that swings may be another.
     pub aim: Option<Aim>,
     /// Show what a dig would take?
     pub preview: bool,
@@ -259,7 +266,7 @@ pub fn put_down(mut swing: ResMut<Swing>) {
 #[derive(Event, Clone, Copy, Debug)]
 pub struct Strike {
     pub tool: Tool,
-    /// What is in its reach.
+    /// What is in its own reach.
     pub aim: Option<Aim>,
     pub eye: Vec3,
     pub along: Vec3,
@@ -296,10 +303,7 @@ fn follow_settings(settings: Res<Settings>, mut hand: ResMut<Hand>, mut last: Lo
 }
 
 fn aim(terrains: Terrains, eyes: Single<&Transform, With<Eyes>>, mut hand: ResMut<Hand>) {
-    let along = eyes.forward();
-    let reach = hand.tool.manner().reach;
-    let hit = terrains.raycast(Ray3d::new(eyes.translation, along), reach);
-    hand.aim = hit.map(|hit| Aim { place: hit.position, along: *along, normal: hit.normal });
+    hand.aim = hand.tool.aim(&terrains, &eyes);
 }
 
 fn choose(actions: Res<Actions>, mut hand: ResMut<Hand>) {
@@ -338,6 +342,7 @@ fn swing(
     time: Res<Time>,
     actions: Res<Actions>,
     hand: Res<Hand>,
+    terrains: Terrains,
     eyes: Single<&Transform, With<Eyes>>,
     mut swing: ResMut<Swing>,
 ) {
@@ -350,52 +355,11 @@ fn swing(
     };
     let tool = swing.tool;
     if swing.advance(wanted, time.delta_secs()) {
-        commands.trigger(Strike { tool, aim: hand.aim, eye: eyes.translation, along: *eyes.forward() });
+        let aim = tool.aim(&terrains, &eyes);
+        commands.trigger(Strike { tool, aim, eye: eyes.translation, along: *eyes.forward() });
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_held_button_hits_in_rhythm_whatever_the_frame_rate() {
-        for tool in [Tool::Pickaxe, Tool::Builder, Tool::Drill] {
-            for fps in [30, 60, 144] {
-                let mut swing = Swing::default();
-                let hits = (0..10 * fps).filter(|_| swing.advance(Some(tool), 1.0 / fps as f32)).count();
-                let due = 10.0 / tool.manner().period;
-                assert!((hits as f32 - due).abs() <= 2.0, "{tool:?} at {fps}: {hits} of {due}");
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_set_is_in_the_hand_at_once_and_the_wheel_is_left_alone() {
-        let settings = Settings::default();
-        let mut app = App::new();
-        app.insert_resource(Hand::new(&settings))
-            .insert_resource(settings)
-            .add_systems(Update, follow_settings);
-        app.update();
-        app.world_mut().resource_mut::<Hand>().set_radius(Tool::Builder, 5.0);
-        app.world_mut().resource_mut::<Settings>().invert_y = true;
-        app.update();
-        assert_eq!(app.world().resource::<Hand>().radius(Tool::Builder), 5.0);
-        app.world_mut().resource_mut::<Settings>().radius = 2.5;
-        app.world_mut().resource_mut::<Settings>().form = Form::Cube;
-        app.update();
-        let hand = app.world().resource::<Hand>();
-        assert_eq!(
-            (hand.radius(Tool::Builder), hand.radius(Tool::Pickaxe), hand.form),
-            (2.5, 2.5, Form::Cube)
-        );
-    }
-
-    #[test]
-    fn a_click_hits_once_and_comes_to_rest() {
-        let mut swing = Swing::default();
-        let hits = (0..200).filter(|i| swing.advance((*i == 0).then_some(Tool::Pickaxe), 0.01)).count();
-        assert_eq!((hits, swing.phase()), (1, None));
-    }
-}
+#[path = "tools_tests.rs"]
+mod tests;

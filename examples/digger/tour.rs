@@ -1,16 +1,18 @@
 //! A minute of play, as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a cave.
 
+mod curtain;
+mod way;
+
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use bevy::math::cubic_splines::{CubicCardinalSpline, CubicCurve, CubicGenerator};
 use bevy::prelude::*;
 use bevy::render::settings::RenderResources;
 use bevy_burrow::prelude::*;
 use indicatif::{ProgressBar, ProgressStyle};
+use way::Way;
 
 use crate::Options;
-use crate::art::Art;
 use crate::day::{AFTERNOON, Clock};
 use crate::film::{Film, clear, join};
 use crate::held::ShowHand;
@@ -21,7 +23,6 @@ use crate::particles::{Burst, Matter};
 use crate::places::{Hillside, Places, flat};
 use crate::studio::Studio;
 use crate::tools::{Hand, Tool};
-use crate::ui;
 use crate::works;
 
 /// Seconds of each scene.
@@ -34,8 +35,6 @@ const BRIDGE: f32 = 8.5;
 const SUNSET: f32 = 4.0;
 const LAMPS: f32 = 6.5;
 const ALL: f32 = FLIGHT + PICKAXE + TUNNEL + BOMBS + BOULDER + BRIDGE + SUNSET + LAMPS;
-/// Seconds in which one scene fades into the next.
-const FADE: f32 = 0.4;
 
 /// Makes the film, and a video of it where there is ffmpeg.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
@@ -59,14 +58,6 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     }
 }
 
-/// A black sheet before the camera.
-#[derive(Component)]
-struct Curtain;
-
-/// The name of the game, on the first and the last frames.
-#[derive(Component)]
-struct Signature;
-
 fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, Duration)> {
     let start = Instant::now();
     let studio = Studio::open(options, renderer)?;
@@ -75,13 +66,13 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
     let all = (ALL * options.fps as f32).round() as usize;
     let film = Film::new(studio, options.fps, all, options.frames.map_or(all, |frames| frames as usize));
     // Where a fade has hardly a frame, it is no fade but a black picture.
-    let fades = film.rate() * FADE >= 3.0;
+    let fades = film.rate() * curtain::FADE >= 3.0;
     let bar = ProgressBar::new((ALL * 10.0) as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {elapsed} of about {duration} {msg}") {
         bar.set_style(style);
     }
     let mut tour = Tour { film, bar, fades, is_first: true };
-    tour.hang_curtain();
+    curtain::hang(tour.studio().world());
     tour.flight(&places)?;
     tour.pickaxe(&places.hillside)?;
     tour.tunnel(&places.hillside)?;
@@ -108,23 +99,7 @@ impl Tour {
         &mut self.film.studio
     }
 
-    fn hang_curtain(&mut self) {
-        let logo = self.studio().world().resource::<Art>().logo.clone();
-        let world = self.studio().world();
-        let middle =
-            Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..ui::full() };
-        let size = Node { width: percent(46), ..default() };
-        world.spawn((middle, GlobalZIndex(9), children![(Signature, ImageNode::new(logo), size)]));
-        world.spawn((Curtain, ui::full(), GlobalZIndex(10), BackgroundColor(Color::BLACK)));
-        self.sign(0.0);
-    }
-
-    /// How much is seen of the name of the game.
-    fn sign(&mut self, alpha: f32) {
-        sign(self.studio(), alpha);
-    }
-
-    /// A scene: the curtain goes up at its begin, but for the first one, and down at its end.
+    /// A scene, from curtain to curtain.
     fn scene(
         &mut self,
         name: &'static str,
@@ -133,16 +108,11 @@ impl Tour {
     ) -> Result {
         self.bar.set_message(name);
         self.film.settle()?;
-        // Nobody begins with a black picture.
-        let (fades, hangs) = (self.fades, if std::mem::take(&mut self.is_first) { 0.0 } else { 1.0 });
+        let (fades, is_first) = (self.fades, std::mem::take(&mut self.is_first));
         self.film.play(seconds, |studio, t| {
             direct(studio, t)?;
-            let curtain = (hangs - t * seconds / FADE).max(1.0 - (1.0 - t) * seconds / FADE).clamp(0.0, 1.0);
-            let world = studio.world();
-            let mut sheets = world.query_filtered::<&mut BackgroundColor, With<Curtain>>();
-            for mut sheet in sheets.iter_mut(world) {
-                sheet.0 = Color::BLACK.with_alpha(if fades { curtain } else { 0.0 });
-            }
+            let shade = if fades { curtain::shade(t, seconds, is_first) } else { 0.0 };
+            curtain::draw(studio.world(), shade);
             Ok(())
         })?;
         self.bar.inc((seconds * 10.0) as u64);
@@ -180,8 +150,8 @@ impl Tour {
             (mouth - along * 80.0 + aside * 22.0, 20.0),
             (mouth - along * 38.0, 7.0),
         ];
-        let way = self.over_ground(&way)?;
-        let look = spline([
+        let way = Way::over(self.studio().terrain()?.world(), &way)?;
+        let look = Way::through([
             mouth + along * 40.0 - aside * 120.0,
             mouth + along * 60.0 - aside * 40.0,
             mouth + along * 30.0 + Vec3::Y * 6.0,
@@ -190,8 +160,8 @@ impl Tour {
         ])?;
         self.scene("the flight", FLIGHT, |studio, t| {
             let eased = t * t * (3.0 - 2.0 * t);
-            studio.fly_to(at(&way, eased), at(&look, eased));
-            sign(studio, 1.0 - ((t * FLIGHT - 2.6) / 0.7).clamp(0.0, 1.0));
+            studio.fly_to(way.at(eased), look.at(eased));
+            curtain::sign(studio.world(), 1.0 - ((t * FLIGHT - 2.6) / 0.7).clamp(0.0, 1.0));
             Ok(())
         })
     }
@@ -327,21 +297,16 @@ impl Tour {
         let middle = ravine.from.midpoint(ravine.to);
         let brushes = works::bridge(&ravine);
         let along = (ravine.to - ravine.from).with_y(0.0).normalize();
-        // From the east, so that the evening is behind it.
-        let aside = along.cross(Vec3::Y) * (along.cross(Vec3::Y).x + 0.01).signum();
-        let swing = |angle: f32, out: f32| middle + Quat::from_rotation_y(angle) * aside * out;
-        let way = [
-            (swing(0.75, 40.0), 12.0),
-            (swing(0.40, 37.0), 9.0),
-            (swing(0.12, 34.0), 7.0),
-            (swing(-0.1, 33.0), 6.5),
-        ];
-        let way = self.over_ground(&way)?;
+        let east = along.cross(Vec3::Y) * (along.cross(Vec3::Y).x + 0.01).signum();
+        let world = self.studio().terrain()?.world();
+        let (east, west) = (Way::around(world, middle, east)?, Way::around(world, middle, -east)?);
+        // From the east, so that the evening is behind it, unless more of it is seen from the other side.
+        let way = if west.sight(world, &ravine) > east.sight(world, &ravine) { west } else { east };
         let mut sent = 0;
         self.scene("the bridge", BRIDGE + SUNSET, |studio, t| {
             let seconds = t * (BRIDGE + SUNSET);
             studio.fly_to(
-                at(&way, (seconds / (BRIDGE + SUNSET)).powf(0.8)),
+                way.at((seconds / (BRIDGE + SUNSET)).powf(0.8)),
                 middle - Vec3::Y * 3.0 + Vec3::Y * (2.0 * t),
             );
             let due = ((seconds - 0.5) / (BRIDGE - 2.0) * brushes.len() as f32) as usize;
@@ -390,7 +355,7 @@ impl Tour {
                 &[]
             });
             studio.walk(if (0.6..4.6).contains(&seconds) { hillside.onward * 0.32 } else { Vec2::ZERO });
-            sign(studio, ((seconds - (LAMPS - 1.6)) / 0.6).clamp(0.0, 1.0));
+            curtain::sign(studio.world(), ((seconds - (LAMPS - 1.6)) / 0.6).clamp(0.0, 1.0));
             Ok(())
         })?;
         self.rest();
@@ -406,37 +371,6 @@ impl Tour {
         self.studio().hold(&[]);
         self.studio().walk(Vec2::ZERO);
     }
-
-    /// A way through places at heights over the ground.
-    fn over_ground(&mut self, places: &[(Vec3, f32)]) -> Result<CubicCurve<Vec3>> {
-        const RIM: f32 = 20.0;
-        let world = self.film.studio.terrain()?.world();
-        let (width, depth) = (world.grid().width() as f32, world.grid().depth() as f32);
-        let points = places.iter().map(|&(place, metres)| {
-            // Hills may lie near the rim; the way stays within it.
-            let [x, z] = [(place.x, width), (place.z, depth)].map(|(at, end)| at.clamp(RIM, end - RIM));
-            let height = world.height(x.into(), z.into()).ok_or("the tour left the world")?;
-            Ok(Vec3::new(x, height as f32 + metres, z))
-        });
-        spline(points.collect::<Result<Vec<Vec3>>>()?)
-    }
-}
-
-fn sign(studio: &mut Studio, alpha: f32) {
-    let world = studio.world();
-    let mut signatures = world.query_filtered::<&mut ImageNode, With<Signature>>();
-    for mut signature in signatures.iter_mut(world) {
-        signature.color = Color::WHITE.with_alpha(alpha);
-    }
-}
-
-fn spline(points: impl IntoIterator<Item = Vec3>) -> Result<CubicCurve<Vec3>> {
-    Ok(CubicCardinalSpline::new_catmull_rom(points).to_curve()?)
-}
-
-/// The place on a way, 0 to 1.
-fn at(way: &CubicCurve<Vec3>, part: f32) -> Vec3 {
-    way.position(part.clamp(0.0, 1.0) * way.segments().len() as f32)
 }
 
 /// Roughly the middle of a shape.

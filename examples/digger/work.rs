@@ -128,7 +128,7 @@ fn afford(
     if !settings.survival {
         return Some(wish);
     }
-    let (radius, voxels) = amount::largest(wish, 0.8 * tool.radii().0, inventory.free(hand.material), shape)?;
+    let (radius, voxels) = amount::affordable(tool, wish, inventory.free(hand.material), shape)?;
     inventory.pledge(tag, hand.material, voxels);
     Some(radius)
 }

@@ -20,8 +20,8 @@ struct Arguments {
     /// Rounds that are timed; medians are printed.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=1000))]
     rounds: u16,
-    /// Where the picture goes.
-    #[arg(long, default_value = "interop.png")]
+    /// Where the picture goes; its folder is made.
+    #[arg(long, value_name = "FILE", default_value = "out/interop.png")]
     picture: std::path::PathBuf,
     /// Draw the processor's surfaces only; needs no CUDA.
     #[arg(long)]

@@ -213,7 +213,10 @@ fn compare(surfaces: &mut Surfaces, expected: &Reference) -> Result<(), Box<dyn 
     Ok(())
 }
 
-fn save(arguments: &Arguments, pixels: &[u8]) -> Result<(), image::ImageError> {
-    let [width, height] = SIDES;
-    image::save_buffer(&arguments.picture, pixels, width, height, image::ColorType::Rgba8)
+fn save(arguments: &Arguments, pixels: &[u8]) -> Result<(), Box<dyn Error>> {
+    let ([width, height], picture) = (SIDES, &arguments.picture);
+    if let Some(folder) = picture.parent() {
+        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    }
+    Ok(image::save_buffer(picture, pixels, width, height, image::ColorType::Rgba8)?)
 }

@@ -24,6 +24,8 @@ mod headless;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
+#[path = "../shared/pixels.rs"]
+mod pixels;
 mod rain;
 mod scene;
 

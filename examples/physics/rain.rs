@@ -38,8 +38,18 @@ impl Rain {
         Self { digs: true, edits: 0, most, balls: VecDeque::new(), rng: Rng::with_seed(1), looks: Vec::new() }
     }
 
-    /// A ball at rest.
-    pub fn ball(&mut self, place: Vec3) -> impl Bundle + use<> {
+    /// One ball more, fallen or thrown; the oldest one goes when there are too many.
+    pub fn add(&mut self, commands: &mut Commands, place: Vec3, velocity: Vec3) {
+        let ball = commands.spawn((self.ball(place), LinearVelocity(velocity))).id();
+        self.balls.push_back(ball);
+        if self.balls.len() > self.most
+            && let Some(oldest) = self.balls.pop_front()
+        {
+            commands.entity(oldest).try_despawn();
+        }
+    }
+
+    fn ball(&mut self, place: Vec3) -> impl Bundle + use<> {
         let number = self.rng.usize(0..RADII.len());
         let (mesh, material) = self.looks.get(number).cloned().unwrap_or_default();
         (
@@ -75,7 +85,7 @@ pub fn prepare(
     }
 }
 
-/// Drops balls; the oldest ones go when there are too many.
+/// Drops balls.
 pub fn fall(mut commands: Commands, mut rain: ResMut<Rain>, terrains: Terrains) {
     // Not before there is ground to fall on.
     if !terrains.is_ready(MIDDLE, MIDDLE) {
@@ -87,13 +97,7 @@ pub fn fall(mut commands: Commands, mut rain: ResMut<Rain>, terrains: Terrains) 
         let (x, z) = (along(&mut rain.rng), along(&mut rain.rng));
         let floor = terrains.height(x, z).unwrap_or(0.0);
         let place = Vec3::new(x, floor + 10.0 + 10.0 * rain.rng.f32(), z);
-        let entity = commands.spawn(rain.ball(place)).id();
-        rain.balls.push_back(entity);
-        if rain.balls.len() > rain.most
-            && let Some(oldest) = rain.balls.pop_front()
-        {
-            commands.entity(oldest).try_despawn();
-        }
+        rain.add(&mut commands, place, Vec3::ZERO);
     }
 }
 
@@ -120,5 +124,23 @@ pub fn dig(
         let builds = rain.rng.u8(0..5) == 0;
         brushes.write(if builds { Brush::add(shape, MaterialId(2)) } else { Brush::dig(shape) });
         rain.edits += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_are_never_more_balls_than_were_allowed() {
+        let (mut world, mut rain) = (World::new(), Rain::new(3));
+        for number in 0..5 {
+            rain.add(&mut world.commands(), Vec3::ZERO, Vec3::X * number as f32);
+        }
+        world.flush();
+        let mut balls = world.query_filtered::<&LinearVelocity, With<Ball>>();
+        let mut speeds: Vec<f32> = balls.iter(&world).map(|velocity| velocity.x).collect();
+        speeds.sort_by(f32::total_cmp);
+        assert_eq!(speeds, [2.0, 3.0, 4.0]);
     }
 }

@@ -95,6 +95,6 @@ pub fn press_keys(
     }
     if keys.just_pressed(KeyCode::Space) {
         let (place, ahead) = (camera.translation(), *camera.forward());
-        commands.spawn((rain.ball(place + ahead * 2.0), LinearVelocity(ahead * 40.0)));
+        rain.add(&mut commands, place + ahead * 2.0, ahead * 40.0);
     }
 }

@@ -38,6 +38,8 @@ mod journal;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
+#[path = "../shared/pixels.rs"]
+mod pixels;
 mod scene;
 mod script;
 mod stamps;

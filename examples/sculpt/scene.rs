@@ -1,11 +1,15 @@
 //! Landscape, sun and camera.
 
+#[path = "../shared/software.rs"]
+mod software;
+
 use bevy::camera_controller::free_camera::{FreeCamera, FreeCameraPlugin};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy_burrow::prelude::*;
+use software::draws_in_software;
 
 /// Cells along the landscape's sides.
 const SIDE: u32 = 256;
@@ -25,17 +29,12 @@ impl Plugin for ScenePlugin {
     }
 }
 
-/// Does the processor draw? Then all that is dear is left out. (Bevy does not re-export the type that tells.)
-fn draws_in_software(adapter: Option<Res<RenderAdapterInfo>>) -> bool {
-    adapter.is_some_and(|adapter| format!("{:?}", adapter.device_type) == "Cpu")
-}
-
 fn landscape(
     mut commands: Commands,
     mut textures: ResMut<GroundTextures>,
     adapter: Option<Res<RenderAdapterInfo>>,
 ) -> Result {
-    let is_plain = draws_in_software(adapter);
+    let is_plain = draws_in_software(adapter.as_deref());
     if is_plain {
         *textures = GroundTextures::Baked { side: 256, anisotropy: 1 };
     }
@@ -58,7 +57,7 @@ fn landscape(
 }
 
 fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) {
-    let is_plain = draws_in_software(adapter);
+    let is_plain = draws_in_software(adapter.as_deref());
     commands.spawn((
         DirectionalLight { illuminance: 9_000.0, shadow_maps_enabled: !is_plain, ..default() },
         CascadeShadowConfigBuilder { maximum_distance: 260.0, first_cascade_far_bound: 40.0, ..default() }

@@ -1,5 +1,8 @@
 //! Strokes: where the brush is, how it looks there, and what the mouse and keys do with it.
 
+#[path = "../shared/gizmos.rs"]
+mod gizmos;
+
 use std::time::Duration;
 
 use bevy::camera_controller::free_camera::FreeCameraState;
@@ -31,7 +34,9 @@ pub struct StrokePlugin;
 
 impl Plugin for StrokePlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Aim>().add_systems(Startup, show_through_ground).add_systems(Update, preview);
+        app.init_resource::<Aim>()
+            .add_systems(Startup, gizmos::show_through_ground)
+            .add_systems(Update, preview);
     }
 }
 
@@ -157,13 +162,6 @@ fn hold_camera(
             camera.enabled && mouse.pressed(MouseButton::Right) && !mouse.just_pressed(MouseButton::Right);
         camera.enabled = goes_on || !input.has_pointer && !input.has_keyboard;
     }
-}
-
-/// A brush is half inside the ground, and all of it should be seen.
-fn show_through_ground(mut store: ResMut<GizmoConfigStore>) {
-    let (config, _) = store.config_mut::<DefaultGizmoConfigGroup>();
-    config.depth_bias = -1.0;
-    config.line.width = 1.5;
 }
 
 fn preview(aim: Res<Aim>, tool: Res<BrushTool>, mut gizmos: Gizmos) {

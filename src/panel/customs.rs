@@ -2,9 +2,8 @@
 
 use bevy::ecs::system::Commands;
 use bevy::prelude::{Entity, EntityWorldMut};
-use bevy::tasks::AsyncComputeTaskPool;
 
-use crate::plugin::LooseGround;
+use crate::plugin::{LooseGround, free_later};
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
 use crate::volume::DiggingRules;
@@ -50,7 +49,7 @@ impl Customs {
                 let Some(mut terrain) = terrain.get_mut::<Terrain>() else { return };
                 let waste = terrain.rebudget_undo(self.undo_budget);
                 if !waste.is_empty() {
-                    AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
+                    free_later(waste);
                 }
             });
         }
@@ -61,7 +60,7 @@ impl Customs {
 mod tests {
     use bevy::math::Vec3;
     use bevy::prelude::{DetectChanges, World};
-    use bevy::tasks::TaskPool;
+    use bevy::tasks::{AsyncComputeTaskPool, TaskPool};
 
     use super::*;
     use crate::brush::{Brush, Shape};

@@ -19,9 +19,12 @@
 //!
 //! [`PanelAction`] messages are its buttons, for keys of the game. It is drawn by the camera that has egui's primary
 //! context: the first one, unless the game says otherwise; a camera that draws into an image is as good as one with a
-//! window. With no terrain the panel says so; with several it shows one of them at a time.
+//! window. When that camera goes, another one with a window gets the context, as long as bevy_egui may create one by itself
+//! (`EguiGlobalSettings::auto_create_primary_context`). With no terrain the panel says so; with several it shows one of them
+//! at a time.
 
 mod brush_column;
+mod context;
 mod customs;
 mod lengths;
 mod look_section;
@@ -67,6 +70,7 @@ impl Plugin for BurrowPanelPlugin {
         if !app.is_plugin_added::<EguiPlugin>() {
             app.add_plugins(EguiPlugin::default());
         }
+        context::keep(app);
         app.init_resource::<BrushTool>()
             .init_resource::<BurrowPanel>()
             .init_resource::<PanelInput>()
@@ -82,6 +86,7 @@ impl Plugin for BurrowPanelPlugin {
                     survey::count_terrain,
                     survey::finish_seam_check,
                     picture::finish,
+                    picture::give_up,
                     act,
                     note_rejection,
                 )
@@ -119,13 +124,22 @@ fn act(
     }
 }
 
-/// Takes down why the chosen terrain rejected the last brush, until it takes one.
-fn note_rejection(mut receipts: MessageReader<BrushApplied>, mut panel: ResMut<BurrowPanel>) {
-    let chosen = panel.terrain;
+/// Takes down why the terrain that the panel is about rejected the last brush, until it takes one or the panel is about
+/// another.
+fn note_rejection(
+    mut receipts: MessageReader<BrushApplied>,
+    mut panel: ResMut<BurrowPanel>,
+    terrains: Query<(Entity, &Terrain)>,
+    mut last: Local<Option<Entity>>,
+) {
+    let chosen = survey::chosen(&panel, &terrains);
+    let is_another = std::mem::replace(&mut *last, chosen) != chosen;
     let is_own = |terrain: Entity| chosen.is_none_or(|chosen| chosen == terrain);
-    let own = receipts.read().filter(|answer| answer.terrain.is_none_or(is_own));
-    let Some(last) = own.last() else { return };
-    let rejection = last.receipt.outcome.as_ref().err().map(ToString::to_string);
+    let own = receipts.read().filter(|answer| answer.terrain.is_none_or(is_own)).last();
+    if own.is_none() && !is_another {
+        return;
+    }
+    let rejection = own.and_then(|answer| answer.receipt.outcome.as_ref().err()).map(ToString::to_string);
     if panel.rejection != rejection {
         panel.rejection = rejection;
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy::render::view::screenshot::{Capturing, Screenshot, ScreenshotCaptured};
 use bevy::tasks::{IoTaskPool, Task, futures::check_ready};
 use bevy::window::WindowRef;
 use image::ImageFormat;
@@ -15,6 +15,16 @@ use super::state::{BurrowPanel, Note};
 
 /// Pictures of one folder that are numbered; when all are there, there are no more.
 const MOST: u32 = 9999;
+
+/// What the panel says while it waits for a picture.
+const TAKING: &str = "taking a picture ...";
+
+/// How many frames a picture may be waited for; most come after a few.
+const PATIENCE: u32 = 300;
+
+/// A picture that the panel asked for.
+#[derive(Component)]
+pub(super) struct Asked;
 
 /// Pictures on their way to the disk.
 #[derive(Resource, Default)]
@@ -31,13 +41,13 @@ pub(super) fn save(commands: &mut Commands, panel: &mut BurrowPanel, target: Opt
             return;
         }
     };
-    panel.note = Some(Note::Busy("taking a picture ...".into()));
+    panel.note = Some(Note::Busy(TAKING.into()));
     let folder = panel.pictures.clone();
     let develop = move |mut shot: On<ScreenshotCaptured>, mut saving: ResMut<Saving>| {
         let (image, folder) = (std::mem::take(&mut shot.image), folder.clone());
         saving.0.push(IoTaskPool::get().spawn(async move { write(image, &folder) }));
     };
-    commands.spawn(screenshot).observe(develop);
+    commands.spawn((screenshot, Asked)).observe(develop);
 }
 
 /// Says what became of pictures.
@@ -53,6 +63,23 @@ pub(super) fn finish(mut saving: ResMut<Saving>, mut panel: ResMut<BurrowPanel>)
         });
         false
     });
+}
+
+/// Waits no longer for a picture that does not come, as of a window that is gone.
+pub(super) fn give_up(
+    mut commands: Commands,
+    mut panel: ResMut<BurrowPanel>,
+    saving: Res<Saving>,
+    asked: Query<Entity, (With<Asked>, Without<Capturing>)>,
+    mut waited: Local<u32>,
+) {
+    let is_waiting = matches!(&panel.note, Some(Note::Busy(text)) if text == TAKING);
+    *waited = if is_waiting && saving.0.is_empty() { *waited + 1 } else { 0 };
+    if *waited > PATIENCE {
+        panel.note = Some(Note::Bad("no picture came".into()));
+        // Not those that Bevy has begun: it looks for them when they come after all, and they are saved then.
+        asked.iter().for_each(|picture| commands.entity(picture).try_despawn());
+    }
 }
 
 /// Writes a picture into a folder, which is made if it is not there, under the first free name.
@@ -112,6 +139,36 @@ mod tests {
         fs::write(&file, b"").expect("written");
         assert!(write(image(), &file).is_err());
         fs::remove_file(&file).expect("removed");
+    }
+
+    /// What the panel says at last of a picture that it asks for and that does not come.
+    fn last_word(is_begun: bool) -> (Option<Note>, usize) {
+        let mut app = App::new();
+        app.init_resource::<BurrowPanel>().init_resource::<Saving>().add_systems(Update, (finish, give_up));
+        let mut panel = BurrowPanel::default();
+        save(&mut app.world_mut().commands(), &mut panel, None);
+        app.insert_resource(panel);
+        app.world_mut().flush();
+        let mut pictures = app.world_mut().query_filtered::<Entity, With<Screenshot>>();
+        if is_begun {
+            let picture = pictures.single(app.world()).expect("asked for");
+            app.world_mut().entity_mut(picture).insert(Capturing);
+        }
+        for frame in 0..PATIENCE {
+            app.update();
+            let note = &app.world().resource::<BurrowPanel>().note;
+            assert_eq!(*note, Some(Note::Busy(TAKING.into())), "after {frame} frames");
+        }
+        app.update();
+        let note = app.world().resource::<BurrowPanel>().note.clone();
+        (note, pictures.iter(app.world()).count())
+    }
+
+    #[test]
+    fn a_picture_that_does_not_come_is_given_up() {
+        let given_up = Some(Note::Bad("no picture came".into()));
+        assert_eq!(last_word(false), (given_up.clone(), 0));
+        assert_eq!(last_word(true), (given_up, 1), "Bevy may have it in hand");
     }
 
     #[test]

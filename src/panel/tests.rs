@@ -385,6 +385,40 @@ fn a_rejection_is_seen_until_a_brush_is_accepted() {
     }
 }
 
+/// Does the panel know of a rejection after a frame, in which one of these terrains rejects a brush?
+fn is_rejected(app: &mut App, by: Option<Entity>) -> bool {
+    if by.is_some() {
+        let receipt = Receipt { tag: 0, outcome: Err(Rejection::OutsideWorld) };
+        app.world_mut().write_message(BrushApplied { terrain: by, receipt });
+    }
+    app.update();
+    app.world().resource::<BurrowPanel>().rejection.is_some()
+}
+
+#[test]
+fn a_rejection_is_that_of_the_terrain_that_the_panel_is_about() {
+    let mut app = App::new();
+    app.init_resource::<BurrowPanel>().add_message::<BrushApplied>().add_systems(Update, note_rejection);
+    let mut terrains = [(); 3].map(|()| {
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        app.world_mut().spawn(terrain).id()
+    });
+    terrains.sort_unstable();
+    let [first, second, gone] = terrains;
+    app.world_mut().despawn(gone);
+    app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(gone);
+    assert!(!is_rejected(&mut app, Some(second)), "the panel shows the first of those that are there");
+    assert!(is_rejected(&mut app, Some(first)));
+    assert!(is_rejected(&mut app, None), "nothing has changed");
+    app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(second);
+    assert!(!is_rejected(&mut app, None), "another terrain has rejected nothing");
+    assert!(!is_rejected(&mut app, Some(first)));
+    assert!(is_rejected(&mut app, Some(second)));
+    app.world_mut().despawn(second);
+    assert!(!is_rejected(&mut app, None));
+}
+
 #[test]
 fn history_is_that_of_the_chosen_terrain() {
     let mut screen = Screen::new(1280.0, 1600.0, 0);

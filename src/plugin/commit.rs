@@ -15,7 +15,7 @@ use super::load::Loading;
 use super::meshes::{Ready, Wardrobe};
 use super::{
     Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
-    Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface,
+    Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
 };
 use crate::terrain::{Commit, Drawn, Terrain};
 
@@ -140,7 +140,7 @@ pub(super) fn commit_transactions(
         // A transaction that the game gave up is refused; its edits wait in the queue again.
         let Ok((committed, waste)) = terrain.settle(commit) else { continue };
         if !waste.is_empty() {
-            AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
+            free_later(waste);
         }
         let is_step = terrain.has_history_receipts();
         tell_steps(entity, &mut terrain, &mut moved);

@@ -1,5 +1,6 @@
 //! The entities below a terrain: which one shows what.
 
+use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
@@ -26,9 +27,17 @@ impl TerrainEntities {
         self.shown == world.version()
     }
 
-    /// Tiles and chunks; fields lie below these.
-    pub(super) fn drawn(&self) -> impl Iterator<Item = Entity> {
-        self.drawn.values().copied()
+    /// Despawns tiles and chunks; fields lie below these. The last of the terrain's children goes first: Bevy looks for
+    /// each from the end of their list, and moves up what is behind it.
+    pub(super) fn despawn(&self, commands: &mut Commands, children: Option<&Children>) {
+        let mut own: EntityHashSet = self.drawn.values().copied().collect();
+        for child in children.into_iter().flat_map(|children| children.iter().rev()) {
+            if own.remove(&child) {
+                commands.entity(child).try_despawn();
+            }
+        }
+        // What a game took from the terrain.
+        own.into_iter().for_each(|stray| commands.entity(stray).try_despawn());
     }
 
     /// The entity of a tile or chunk, if it has one and the game did not despawn it.
@@ -146,11 +155,11 @@ pub(crate) fn tell<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Comm
 /// Takes a terrain's entities along when only its component goes.
 pub(super) fn remove_with_terrain(
     gone: On<Remove, Terrain>,
-    entities: Query<&TerrainEntities>,
+    terrains: Query<(&TerrainEntities, Option<&Children>)>,
     mut commands: Commands,
 ) {
-    for child in entities.get(gone.entity).into_iter().flat_map(TerrainEntities::drawn) {
-        commands.entity(child).try_despawn();
+    if let Ok((entities, children)) = terrains.get(gone.entity) {
+        entities.despawn(&mut commands, children);
     }
     commands
         .entity(gone.entity)

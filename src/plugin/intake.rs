@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use super::{
     BrushApplied, BurrowFigures, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush, Undo,
 };
-use crate::brush::Brush;
+use crate::brush::{Brush, Operation, Shape};
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain};
 
 /// Moves brushes into their terrains' space and queues them. A brush that no terrain can take is answered at once.
@@ -146,9 +146,49 @@ pub(super) fn answer_with_terrain(
     terrain.forget();
 }
 
+/// How much the scale along one axis may differ from another's, by rounding, where all are the same.
+const EVEN: f32 = 1e-5;
+
 /// A brush in world space as its terrain sees it, in voxels.
 fn to_terrain(brush: &Brush, place: &GlobalTransform) -> Brush {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
-    let (rotation, scale) = (rotation.inverse(), scale.x.recip());
+    if (scale / scale.x).abs_diff_eq(Vec3::ONE, EVEN) {
+        evenly(brush, scale.x, rotation, translation)
+    } else {
+        stretched(brush, place.affine().matrix3, rotation.normalize(), translation)
+    }
+}
+
+/// The same for a terrain whose axes have one scale.
+fn evenly(brush: &Brush, scale: f32, rotation: Quat, translation: Vec3) -> Brush {
+    let (rotation, scale) = (rotation.inverse(), scale.recip());
     brush.transformed(rotation, rotation * -translation * scale, scale)
+}
+
+/// The same for a terrain that a parent stretches: points go where the ground has them, and sizes, which have no
+/// direction, by the scale that a volume has.
+fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Brush {
+    let scale = matrix.determinant().abs().cbrt();
+    let mut brush = evenly(brush, scale, rotation, translation);
+    // What is left to do of the way into the terrain.
+    let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
+    let stretch = |point: &mut Vec3| *point = rest * *point;
+    let lift = |height: &mut f32| *height *= rest.y_axis.y;
+    match &mut brush.shape {
+        Shape::Sphere { center, .. } | Shape::Cuboid { center, .. } => stretch(center),
+        Shape::Cylinder { base: from, axis: to, .. }
+        | Shape::Capsule { from, to, .. }
+        | Shape::Cone { base: from, axis: to, .. } => [from, to].into_iter().for_each(stretch),
+    }
+    match &mut brush.operation {
+        Operation::Flatten { point, normal } => {
+            stretch(point);
+            *normal = rest.inverse().transpose() * *normal;
+        }
+        Operation::Level { height } => lift(height),
+        Operation::Terrace { step, base } => [step, base].into_iter().for_each(lift),
+        Operation::Stamp(stamp) => stretch(&mut stamp.center),
+        _ => {}
+    }
+    brush
 }

@@ -113,10 +113,10 @@ pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
     mut assets: Option<ResMut<Assets<Mesh>>>,
-    mut terrains: Query<(Entity, &Terrain, &mut Loading, Option<&TerrainEntities>)>,
+    mut terrains: Query<(Entity, &Terrain, &mut Loading, Option<&TerrainEntities>, Option<&Children>)>,
 ) {
     let mut budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
-    for (entity, terrain, mut loading, old) in &mut terrains {
+    for (entity, terrain, mut loading, old, children) in &mut terrains {
         if let Some(task) = &mut loading.task {
             let Some(parts) = check_ready(task) else { continue };
             (loading.task, loading.waiting) = (None, parts);
@@ -132,8 +132,8 @@ pub(super) fn finish_loading(
         if !loading.waiting.is_empty() {
             continue;
         }
-        for child in old.into_iter().flat_map(TerrainEntities::drawn) {
-            commands.entity(child).try_despawn();
+        if let Some(old) = old {
+            old.despawn(&mut commands, children);
         }
         let entities = show(&mut commands, entity, &mut loading);
         let is_current = entities.show(terrain.world());

@@ -10,6 +10,10 @@ use crate::brush::Brush;
 use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
 
 /// A brush in world space: every terrain that it reaches obeys it.
+///
+/// On a terrain that a parent stretches, a brush's points, axes and heights are where the world has them. Its sizes (radii,
+/// half sides, amounts, falloff, roughness) are scaled by the cube root of what a volume is scaled by: counted in voxels, a
+/// ball stays a ball.
 impl Message for Brush {}
 
 /// A brush in world space for one terrain alone.

@@ -2,7 +2,7 @@
 //!
 //! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that digging
 //! touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become transactions
-//! that run on [`AsyncComputeTaskPool`](bevy::tasks::AsyncComputeTaskPool); a finished one is committed in a single frame:
+//! that run on [`AsyncComputeTaskPool`]; a finished one is committed in a single frame:
 //! meshes, entities, [`BrushApplied`] receipts and entity events. Without an `Assets<Mesh>`, on a server with
 //! `MinimalPlugins`, all of that happens but the meshes.
 //!
@@ -48,6 +48,7 @@ pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
+use bevy::tasks::AsyncComputeTaskPool;
 
 use crate::brush::Brush;
 use crate::terrain::Terrain;
@@ -137,4 +138,9 @@ impl Plugin for TerrainPlugin {
                 ),
             );
     }
+}
+
+/// Frees in a task what takes its time.
+pub(crate) fn free_later(waste: impl Send + 'static) {
+    AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
 }

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use bevy_burrow::plugin::{ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged};
 use bevy_burrow::prelude::*;
 
-use crate::stage::{Stage, dig, random_brushes, steep};
+use crate::stage::{Stage, dig, level, random_brushes, steep};
 
 /// Fails when something of a terrain is left.
 fn assert_clean(stage: &mut Stage, when: &str) {
@@ -221,4 +221,40 @@ fn a_terrain_goes_with_all_its_children_when_a_system_despawns_it() {
         |mut commands: Commands, terrain: Single<Entity, With<Terrain>>| commands.entity(*terrain).despawn();
     stage.app.world_mut().run_system_once(despawn).expect("one terrain");
     assert_clean(&mut stage, "after a command");
+}
+
+/// For each tile that went, how many children its terrain had behind it.
+#[derive(Resource, Default)]
+struct Behind(Vec<usize>);
+
+fn look_behind(
+    gone: On<Despawn, Tile>,
+    tiles: Query<&ChildOf>,
+    terrains: Query<&Children>,
+    mut behind: ResMut<Behind>,
+) {
+    let terrain = tiles.get(gone.entity).expect("below its terrain").parent();
+    let mut from_the_end = terrains.get(terrain).expect("with children").iter().rev();
+    behind.0.push(from_the_end.position(|child| child == gone.entity).expect("one of them"));
+}
+
+#[test]
+fn tiles_go_from_the_end_of_their_terrains_children() {
+    // Bevy looks for each from there: any other way is slow where there are thousands.
+    let mut stage = Stage::drawing();
+    stage.app.init_resource::<Behind>().add_observer(look_behind);
+    let behind = |stage: &mut Stage| std::mem::take(&mut stage.app.world_mut().resource_mut::<Behind>().0);
+    let terrain = stage.show(steep());
+    stage.send(dig(30.0, 4.0, 30.0, 6.0));
+    stage.settle();
+    let own = stage.app.world_mut().spawn(ChildOf(terrain)).id();
+    stage.app.world_mut().entity_mut(terrain).insert(level(1.0));
+    stage.frames_until("another terrain is shown", |stage| {
+        !stage.app.world().resource::<Behind>().0.is_empty()
+    });
+    assert_eq!(behind(&mut stage), [1; 16], "the game's own child stays behind them");
+    stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
+    assert_eq!(behind(&mut stage), [0; 16]);
+    let left = stage.app.world().get::<Children>(terrain).expect("the game's own child");
+    assert_eq!(&**left, [own]);
 }

@@ -2,6 +2,7 @@
 
 use std::slice::from_ref;
 
+use bevy::math::Affine3A;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
@@ -130,4 +131,36 @@ fn a_terrain_below_another_entity_is_dug_where_that_one_puts_it() {
     model.apply([dig(32.0, 8.0, 16.0, 4.0)]);
     assert_eq!(stage.hash(terrain), model.world().hash());
     stage.assert_whole(terrain, "below another entity");
+}
+
+/// Brushes for level ground in the space that `place` takes voxels to, with a voxel as large as `size`.
+fn tools(place: Affine3A, size: f32) -> [Brush; 6] {
+    let at = |x, y, z| place.transform_point3(Vec3::new(x, y, z));
+    let up = |length: f32| place.transform_vector3(Vec3::Y * length);
+    let ball = |x, z| Shape::sphere(at(x, 8.0, z), 6.0 * size);
+    let normal = place.matrix3.inverse().transpose() * Vec3::new(1.0, 3.0, 0.0);
+    [
+        Brush::dig(Shape::capsule(at(8.0, 6.0, 50.0), at(50.0, 8.0, 58.0), 3.0 * size)),
+        Brush::add(Shape::cone(at(40.0, 6.0, 16.0), up(9.0), 5.0 * size), MaterialId(3)),
+        Brush::dig(Shape::cuboid(at(54.0, 8.0, 30.0), Vec3::splat(2.0 * size))),
+        Brush::level(ball(12.0, 30.0), at(0.0, 10.0, 0.0).y).with_falloff(2.0 * size),
+        Brush::flatten(ball(30.0, 30.0), at(30.0, 9.0, 30.0), normal).with_falloff(2.0 * size),
+        Brush::dig(Shape::cylinder(at(14.0, 2.0, 12.0), up(9.0), 4.0 * size)),
+    ]
+}
+
+#[test]
+fn a_stretched_terrain_is_dug_where_brushes_are_in_the_world() {
+    let mut stage = Stage::drawing();
+    let place = Transform::from_xyz(500.0, -16.0, 0.0).with_scale(Vec3::new(1.0, 2.0, 1.0));
+    let island = stage.app.world_mut().spawn((place, Visibility::default())).id();
+    let terrain = stage.spawn(level(0.5));
+    stage.app.world_mut().entity_mut(terrain).insert(ChildOf(island));
+    let voxels = place.compute_affine() * Affine3A::from_scale(Vec3::splat(0.5));
+    tools(voxels, voxels.matrix3.determinant().cbrt()).into_iter().for_each(|brush| stage.send(brush));
+    stage.settle();
+    assert_eq!(answers(&stage), [(Some(terrain), true); 6]);
+    let mut model = level(0.5);
+    model.apply(tools(Affine3A::IDENTITY, 1.0));
+    assert_eq!(stage.hash(terrain), model.world().hash());
 }

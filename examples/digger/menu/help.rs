@@ -4,11 +4,15 @@ use bevy::prelude::*;
 
 use super::go_to;
 use crate::art::Art;
+use crate::bindings::Bindings;
 use crate::input::Action;
 use crate::phase::Page;
 use crate::settings::Settings;
 use crate::tools::Tool;
 use crate::ui;
+
+/// Pixels for the keys of an action: none of those that it has at first is broken.
+const KEYS: f32 = 200.0;
 
 /// The page of help.
 pub struct HelpPlugin;
@@ -19,63 +23,118 @@ impl Plugin for HelpPlugin {
     }
 }
 
+/// What there is to do, and its keys.
+fn lines(bindings: &Bindings) -> [(String, &'static str); 14] {
+    use Action as A;
+    let key = |action: Action| bindings.first(action);
+    let keys = |actions: [Action; 2]| actions.map(key).join(", ");
+    [
+        ([A::Forward, A::Left, A::Back, A::Right].map(key).join(" "), "walk"),
+        (key(A::Run), "run"),
+        (key(A::Jump), "jump"),
+        (key(A::Use), "use the tool in hand; hold to go on"),
+        (key(A::Build), "build with the chosen material"),
+        (keys([A::Grow, A::Shrink]), "size of the brush"),
+        (keys([A::PreviousMaterial, A::NextMaterial]), "choose a material"),
+        (key(A::Form), "form of what is built"),
+        (key(A::NextTool), "next tool"),
+        (key(A::PreviousTool), "previous tool"),
+        (key(A::Headlamp), "headlamp"),
+        (keys([A::Undo, A::Redo]), "undo, redo"),
+        (keys([A::Figures, A::Panel]), "frame times, panel"),
+        (key(A::Pause), "pause"),
+    ]
+}
+
 fn open(mut commands: Commands, settings: Res<Settings>, art: Option<Res<Art>>) {
     let Some(art) = art else { return };
-    let key = |action: Action| settings.bindings.first(action);
-    let lines = [
-        (
-            format!(
-                "{} {} {} {}",
-                key(Action::Forward),
-                key(Action::Left),
-                key(Action::Back),
-                key(Action::Right)
-            ),
-            "walk",
-        ),
-        (key(Action::Run), "run"),
-        (key(Action::Jump), "jump"),
-        (key(Action::Use), "use the tool in hand; hold to go on"),
-        (key(Action::Build), "build with the chosen material"),
-        (format!("{}, {}", key(Action::Grow), key(Action::Shrink)), "size of the brush"),
-        (format!("{}, {}", key(Action::PreviousMaterial), key(Action::NextMaterial)), "choose a material"),
-        (key(Action::Form), "form of what is built"),
-        (key(Action::Headlamp), "headlamp"),
-        (format!("{}, {}", key(Action::Undo), key(Action::Redo)), "undo, redo"),
-        (format!("{}, {}", key(Action::Figures), key(Action::Panel)), "frame times, panel"),
-        (key(Action::Pause), "pause"),
-    ];
-    super::open(&mut commands, Page::Help, "Help", 1010.0, |column| {
+    let bindings = &settings.bindings;
+    super::open(&mut commands, Page::Help, "Help", 1110.0, |column| {
         let below = Node { margin: UiRect::bottom(px(14)), ..default() };
         let words = "Every hill here can be dug, and what was dug can be built with.";
         column.spawn((ui::text(words, 17.0, ui::WHITE), below));
         let columns = Node { column_gap: px(28), ..default() };
         column.spawn(columns).with_children(|columns| {
             let rows =
-                Node { flex_direction: FlexDirection::Column, row_gap: px(7), width: px(465), ..default() };
+                Node { flex_direction: FlexDirection::Column, row_gap: px(7), width: px(514), ..default() };
             columns.spawn(rows.clone()).with_children(|rows| {
-                for (keys, what) in lines {
+                for (keys, what) in lines(bindings) {
                     rows.spawn(Node { column_gap: px(14), ..default() }).with_children(|row| {
-                        let first = Node { width: px(150), flex_shrink: 0.0, ..default() };
+                        let first = Node { width: px(KEYS), flex_shrink: 0.0, ..default() };
                         row.spawn((first, children![ui::text(keys, 16.0, ui::GOLD)]));
                         row.spawn(ui::text(what, 16.0, ui::WHITE));
                     });
                 }
             });
             columns.spawn(rows).with_children(|rows| {
-                for (slot, tool) in Tool::ALL.into_iter().enumerate() {
-                    let row = Node { column_gap: px(14), align_items: AlignItems::Center, ..default() };
-                    rows.spawn(row).with_children(|row| {
-                        let icon = Node { width: px(32), height: px(32), flex_shrink: 0.0, ..default() };
-                        row.spawn((ImageNode::new(art.tools[slot].clone()), icon));
-                        let first = Node { width: px(90), flex_shrink: 0.0, ..default() };
-                        row.spawn((first, children![ui::text(tool.label(), 16.0, ui::GOLD)]));
-                        row.spawn(ui::text(tool.purpose(), 15.0, ui::WHITE));
-                    });
+                for tool in Tool::ALL {
+                    spawn_tool(rows, tool, bindings.first(tool.slot()), &art);
                 }
             });
         });
+        if cfg!(feature = "gamepad") {
+            let above = Node { margin: UiRect::top(px(14)), ..default() };
+            let words = "A gamepad's left stick walks, and goes through menus; its right one looks around.";
+            column.spawn((ui::text(words, 15.0, ui::WHITE), above));
+        }
         column.spawn(Node { height: px(14), ..default() });
-        column.spawn(ui::button(0, "Back", 950.0)).observe(go_to(Page::Menu));
+        column.spawn(ui::button(0, "Back", 1050.0)).observe(go_to(Page::Menu));
     });
+}
+
+/// The row of a tool: its picture, the key that takes it, its name, and what it is for.
+fn spawn_tool(rows: &mut ChildSpawnerCommands, tool: Tool, key: String, art: &Art) {
+    let row = Node { column_gap: px(14), align_items: AlignItems::Center, ..default() };
+    rows.spawn(row).with_children(|row| {
+        let icon = Node { width: px(32), height: px(32), flex_shrink: 0.0, ..default() };
+        row.spawn((ImageNode::new(art.tools[tool as usize].clone()), icon));
+        // A long name moves the others aside.
+        let first = Node { min_width: px(12), flex_shrink: 0.0, ..default() };
+        row.spawn((first, children![ui::text(key, 16.0, ui::GOLD)]));
+        let second = Node { width: px(74), flex_shrink: 0.0, ..default() };
+        row.spawn((second, children![ui::text(tool.label(), 16.0, ui::WHITE)]));
+        row.spawn(ui::text(tool.purpose(), 15.0, ui::GREY));
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::state::app::StatesPlugin;
+
+    use super::*;
+    use crate::bindings::Binding;
+
+    /// All that is written on the page.
+    fn words(bindings: &Bindings) -> Vec<String> {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, StatesPlugin, HelpPlugin))
+            .init_state::<Page>()
+            .insert_resource(Settings { bindings: bindings.clone(), ..default() })
+            .init_resource::<Assets<Image>>()
+            .init_resource::<Art>();
+        app.world_mut().resource_mut::<NextState<Page>>().set(Page::Help);
+        app.update();
+        let mut texts = app.world_mut().query::<&Text>();
+        texts.iter(app.world()).map(|text| text.0.clone()).collect()
+    }
+
+    #[test]
+    fn every_tool_and_its_key_are_on_the_page() {
+        let mut bindings = Bindings::default();
+        bindings.rebind(Tool::Bomb.slot(), Binding::Key(KeyCode::KeyG));
+        let words = words(&bindings);
+        let is_there = |what: &str| words.iter().any(|word| word == what);
+        for tool in Tool::ALL {
+            assert!(is_there(tool.label()) && is_there(&bindings.first(tool.slot())), "{tool:?}: {words:?}");
+        }
+        assert!(is_there("next tool") && is_there("previous tool"), "{words:?}");
+    }
+
+    #[test]
+    fn no_keys_are_broken_as_they_are_at_first() {
+        // Letters of the default font are all 0.6 times as wide as they are high.
+        for (keys, what) in lines(&Bindings::default()) {
+            assert!(keys.len() as f32 * 0.6 * 16.0 <= KEYS, "{what}: {keys}");
+        }
+    }
 }

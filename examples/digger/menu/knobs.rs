@@ -1,4 +1,4 @@
-//! The page of settings: a row for each, with its value between two arrows.
+//! The page of settings: a row for each, with its value between two arrows. What has names goes round; numbers end.
 
 use bevy::prelude::*;
 
@@ -51,7 +51,7 @@ const KNOBS: [Knob; 9] = [
         value: |settings| format!("{:?}", settings.quality).to_lowercase(),
         turn: |settings, by| {
             let all = [Quality::Low, Quality::Medium, Quality::High];
-            settings.quality = all[(settings.quality as usize).saturating_add_signed(by as isize).min(2)];
+            settings.quality = all[(settings.quality as i32 + by).rem_euclid(3) as usize];
         },
     },
     Knob {
@@ -121,6 +121,10 @@ fn open(mut commands: Commands) {
                 })
                 .observe(move |turned: On<Turned>, mut settings: ResMut<Settings>| {
                     (knob.turn)(&mut settings, turned.by);
+                })
+                // It can be clicked, so a click does something: what the right arrow does.
+                .observe(move |_: On<Chosen>, mut settings: ResMut<Settings>| {
+                    (knob.turn)(&mut settings, 1);
                 });
         }
         let gap = Node { height: px(10), ..default() };
@@ -149,5 +153,79 @@ fn reset(_: On<Chosen>, mut settings: ResMut<Settings>) {
 fn show_values(settings: Res<Settings>, mut values: Query<(&Value, &mut Text)>) {
     for (value, mut text) in &mut values {
         text.set_if_neq(Text::new((KNOBS[value.0].value)(&settings)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::input::keyboard::{Key, KeyboardInput};
+    use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
+    use bevy::state::app::StatesPlugin;
+
+    use super::*;
+    use crate::input::InputPlugin;
+    use crate::ui::{Focus, UiPlugin};
+
+    /// The page of settings.
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin))
+            .init_state::<Page>()
+            .init_resource::<Settings>()
+            .init_resource::<UiScale>()
+            .add_plugins((UiPlugin, KnobsPlugin));
+        app.world_mut().resource_mut::<NextState<Page>>().set(Page::Settings);
+        app.update();
+        app.update();
+        app
+    }
+
+    /// The row of a setting, and where it stands.
+    fn row(app: &mut App, label: &str) -> (Entity, usize) {
+        let at = KNOBS.iter().position(|knob| knob.label == label).expect("a knob");
+        let mut rows = app.world_mut().query::<(Entity, &Item)>();
+        let found = rows.iter(app.world()).find(|(_, item)| item.0 == at);
+        (found.expect("a row").0, at)
+    }
+
+    #[test]
+    fn what_has_names_goes_round_and_numbers_end() {
+        let mut app = app();
+        for (label, expected) in [
+            ("Invert up and down", ["yes", "no", "yes"]),
+            ("Use only what was dug", ["no", "yes", "no"]),
+            ("Quality", ["high", "low", "medium"]),
+            ("Form of what is built", ["cube", "beam", "sphere"]),
+            ("Field of view", ["105 degrees", "110 degrees", "110 degrees"]),
+        ] {
+            app.world_mut().resource_mut::<Settings>().field_of_view = 100.0;
+            let (entity, at) = row(&mut app, label);
+            let values = expected.map(|_| {
+                app.world_mut().trigger(Chosen { entity });
+                (KNOBS[at].value)(app.world().resource::<Settings>())
+            });
+            assert_eq!(values, expected, "{label}");
+        }
+    }
+
+    #[test]
+    fn rows_answer_to_enter_and_to_a_click() {
+        let mut app = app();
+        let is_inverted = |app: &App| app.world().resource::<Settings>().invert_y;
+        let (entity, at) = row(&mut app, "Invert up and down");
+        app.world_mut().resource_mut::<Focus>().0 = at;
+        app.world_mut().write_message(KeyboardInput {
+            key_code: KeyCode::Enter,
+            logical_key: Key::Enter,
+            state: ButtonState::Pressed,
+            text: None,
+            repeat: false,
+            window: Entity::PLACEHOLDER,
+        });
+        app.update();
+        assert!(is_inverted(&app));
+        app.world_mut().entity_mut(entity).insert(Interaction::Pressed);
+        app.update();
+        assert!(!is_inverted(&app));
     }
 }

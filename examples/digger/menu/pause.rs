@@ -65,3 +65,60 @@ fn go_back(
         _ => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy::input::keyboard::{Key, KeyboardInput};
+    use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
+    use bevy::state::app::StatesPlugin;
+    use bevy::window::WindowFocused;
+
+    use super::*;
+    use crate::input::InputPlugin;
+    use crate::phase::PhasePlugin;
+    use crate::settings::Settings;
+
+    /// Someone plays.
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PhasePlugin, PausePlugin))
+            .add_message::<WindowFocused>()
+            .init_resource::<Settings>();
+        app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
+        app.update();
+        app.update();
+        app
+    }
+
+    /// Presses a key for a frame.
+    fn tap(app: &mut App, key_code: KeyCode) {
+        for state in [ButtonState::Pressed, ButtonState::Released] {
+            app.world_mut().write_message(KeyboardInput {
+                key_code,
+                logical_key: Key::Escape,
+                state,
+                text: None,
+                repeat: false,
+                window: Entity::PLACEHOLDER,
+            });
+            app.update();
+        }
+    }
+
+    fn now(app: &App) -> (Phase, Page) {
+        (**app.world().resource::<State<Phase>>(), **app.world().resource::<State<Page>>())
+    }
+
+    #[test]
+    fn the_key_that_pauses_leads_back_to_the_game() {
+        let mut app = app();
+        for (key, page) in [(KeyCode::Escape, Page::Menu), (KeyCode::KeyH, Page::Help)] {
+            for _ in 0..2 {
+                for expected in [(Phase::Paused, page), (Phase::Playing, Page::None)] {
+                    tap(&mut app, key);
+                    assert_eq!(now(&app), expected, "{key:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! The title: the name of the game and its menu, over a landscape that slowly turns.
 
 use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
 
@@ -27,7 +28,7 @@ impl Plugin for TitlePlugin {
             .add_systems(OnExit(Phase::Title), (land, begin))
             .add_systems(
                 Update,
-                (fly.run_if(resource_exists::<Places>), (tell_progress, play).chain())
+                (fly.run_if(resource_exists::<Places>), (tell_progress, play.run_if(is_watched)).chain())
                     .run_if(in_state(Phase::Title)),
             );
     }
@@ -118,6 +119,12 @@ fn start_anew(_: On<Chosen>, mut commands: Commands, mut game: ResMut<Start>) {
     game.is_wanted = true;
 }
 
+/// Does somebody look at the window? Whoever has turned to another one while the land was made is waited for: the game
+/// takes the mouse, and only a window that loses the focus pauses it. Scripts have no window.
+fn is_watched(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
+    windows.iter().all(|window| window.focused)
+}
+
 /// Once there is someone to play.
 fn play(
     game: Res<Start>,
@@ -125,9 +132,7 @@ fn play(
     painting: Res<GroundLoading>,
     mut phase: ResMut<NextState<Phase>>,
 ) {
-    // Ground whose textures can't be used is dug all the same.
-    let is_painted = painting.is_ready() || painting.failure().is_some();
-    if game.is_wanted && !players.is_empty() && is_painted {
+    if game.is_wanted && !players.is_empty() && painting.is_ready() {
         phase.set(Phase::Playing);
     }
 }
@@ -207,6 +212,8 @@ fn land(mut commands: Commands, eyes: Query<Entity, With<Eyes>>) {
 
 #[cfg(test)]
 mod tests {
+    use bevy::ecs::system::RunSystemOnce;
+
     use super::*;
 
     #[test]
@@ -219,6 +226,17 @@ mod tests {
         ] {
             assert_eq!(word(is_painted, done, has_player).as_deref(), expected);
         }
+    }
+
+    #[test]
+    fn the_game_waits_for_who_has_turned_to_another_window() {
+        let mut world = World::new();
+        let is_watched = |world: &mut World| world.run_system_once(is_watched).expect("a system that runs");
+        assert!(is_watched(&mut world), "scripts have no window");
+        let window = world.spawn((PrimaryWindow, Window { focused: false, ..default() })).id();
+        assert!(!is_watched(&mut world));
+        world.get_mut::<Window>(window).expect("it is open").focused = true;
+        assert!(is_watched(&mut world));
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub const MAX_LAYERS: usize = 16;
 /// [`GroundPlugin`](super::GroundPlugin) makes and keeps its [`GroundMaterial`](super::GroundMaterial).
 ///
 /// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures: [`GroundTextures`](super::GroundTextures).
-/// Changes show in the next frame, on the terrain's pieces too.
+/// Changes made before `PostUpdate` show in the same frame, on the terrain's pieces too.
 ///
 /// ```
 /// # use bevy::prelude::*;

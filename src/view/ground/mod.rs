@@ -31,7 +31,7 @@ pub use material::{GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
-use bevy::asset::embedded_asset;
+use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
@@ -53,15 +53,9 @@ impl Plugin for GroundPlugin {
         }
         embedded_asset!(app, "ground.wgsl");
         hand_on::<GroundMaterial>(app);
+        keep_materials(app);
         app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
-            .add_systems(
-                Update,
-                (textures::load_textures, dress, undress, follow, pieces::follow)
-                    .chain()
-                    .before(BurrowSystems::Dress)
-                    .after(BurrowSystems::Begin),
-            )
-            .add_systems(Update, pieces::dress.in_set(BurrowSystems::Dress));
+            .add_systems(Update, textures::load_textures.before(dress).after(BurrowSystems::Begin));
     }
 
     fn finish(&self, app: &mut App) {
@@ -72,6 +66,22 @@ impl Plugin for GroundPlugin {
             );
         }
     }
+}
+
+/// Has materials made, and kept as terrains and their looks are.
+fn keep_materials(app: &mut App) {
+    app.add_systems(
+        Update,
+        (
+            (dress, undress).chain().after(BurrowSystems::Begin).before(BurrowSystems::Dress),
+            pieces::dress.in_set(BurrowSystems::Dress),
+        ),
+    )
+    // Where meshes are drawn is known then; a material that changes later is drawn as it was.
+    .add_systems(
+        PostUpdate,
+        (follow, pieces::follow).chain().after(TransformSystems::Propagate).before(AssetEventSystems),
+    );
 }
 
 /// Gives each terrain with a look its material as soon as the textures are there, and another one when these change.
@@ -115,7 +125,7 @@ fn undress(mut commands: Commands, mut removed: RemovedComponents<GroundLook>) {
     }
 }
 
-/// Textures move with the terrain, and follow its look.
+/// Textures move with the terrain, in the frame that draws it elsewhere, and follow its look.
 fn follow(
     looks: Query<
         (&GroundLook, &GlobalTransform, &MeshMaterial3d<GroundMaterial>),

@@ -59,7 +59,9 @@ pub(super) fn follow(
 
 #[cfg(test)]
 mod tests {
+    use super::super::keep_materials;
     use super::super::look::GroundQuality;
+    use super::super::material::GroundUniform;
     use super::super::textures::{GroundLoading, Textures};
     use super::*;
     use crate::ground::Ground;
@@ -77,11 +79,8 @@ mod tests {
         app.add_plugins((MinimalPlugins, AssetPlugin::default()))
             .init_asset::<Image>()
             .init_asset::<GroundMaterial>()
-            .init_resource::<GroundLoading>()
-            .add_systems(
-                Update,
-                (super::super::dress, super::super::undress, super::super::follow, follow, dress).chain(),
-            );
+            .init_resource::<GroundLoading>();
+        keep_materials(&mut app);
         let ready = textures(&mut app);
         app.world_mut().resource_mut::<GroundLoading>().ready = Some(ready);
         app
@@ -173,6 +172,25 @@ mod tests {
         app.world_mut().entity_mut(terrain).insert(place);
         app.update();
         assert_eq!(count_changes(&mut app), 1, "only the terrain has moved");
+    }
+
+    #[test]
+    fn textures_move_in_the_frame_that_draws_the_ground_elsewhere() {
+        let mut app = app();
+        app.add_plugins(TransformPlugin);
+        let terrain = spawn_terrain(&mut app);
+        let piece = GroundPiece { terrain, origin: IVec3::ONE };
+        let debris = app.world_mut().spawn(piece).id();
+        app.update();
+        app.update();
+        count_changes(&mut app);
+        let place = Transform::from_xyz(5.0, -3.0, 2.0).with_scale(Vec3::splat(2.0));
+        app.world_mut().entity_mut(terrain).insert(place);
+        app.update();
+        let ground = extension(&app, terrain);
+        assert_eq!(ground.uniform, GroundUniform::new(&GroundLook::default(), &place.into()));
+        assert_eq!(extension(&app, debris), of_piece(&ground, &piece));
+        assert_eq!(count_changes(&mut app), 2, "the renderer is told in the same frame");
     }
 
     #[test]
