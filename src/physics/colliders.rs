@@ -6,6 +6,7 @@ use avian3d::collision::collider::EnlargedAabb;
 use avian3d::parry::shape::SharedShape;
 use avian3d::prelude::*;
 use bevy::platform::collections::HashMap;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::PhysicsFigures;
@@ -26,7 +27,7 @@ pub struct GroundCollider {
     pub revision: u64,
 }
 
-/// The body of a tile or chunk: on the entity with the [`Collider`].
+/// The body of a tile or chunk: on the entity with the [`Collider`], which stays at the origin of its parent.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroundBody {
     /// The terrain's entity.
@@ -74,6 +75,11 @@ impl Grounds {
         shapes.get(&(part.terrain, part.drawn)).cloned()
     }
 
+    fn has_shape(&self, terrain: Entity, drawn: Drawn) -> bool {
+        let shapes = self.0.shapes.read().unwrap_or_else(PoisonError::into_inner);
+        shapes.contains_key(&(terrain, drawn))
+    }
+
     fn set_shape(&self, part: &Part, shape: Option<Arc<GroundShape>>) {
         let mut shapes = self.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
         match shape {
@@ -91,11 +97,14 @@ impl Grounds {
 }
 
 impl Companion for Grounds {
-    /// Near sources, and a little farther off where there is a collider that has not gone yet.
+    /// Near sources, and a little farther off where there is a collider that has not gone yet: what is dug out of a tile
+    /// there takes ground from it, so the chunk that draws the hole gets its collider with the tile's new one.
     fn wants(&self, part: &Part) -> bool {
         let near = self.0.near.read().unwrap_or_else(PoisonError::into_inner);
-        let distance = near.distance((part.terrain, column(part.drawn)));
-        distance.is_some_and(|distance| distance <= 0.0 || self.shape(part).is_some())
+        let tile = column(part.drawn);
+        let has_shape = |drawn| self.has_shape(part.terrain, drawn);
+        let stays = || has_shape(part.drawn) || has_shape(Drawn::Tile(tile));
+        near.distance((part.terrain, tile)).is_some_and(|distance| distance <= 0.0 || stays())
     }
 
     fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
@@ -195,15 +204,22 @@ pub(super) fn detach(mut part: EntityWorldMut) {
     });
 }
 
-/// Lets go of a shape whose collider is gone, whoever despawned it; its tile or chunk has no collider then.
+/// Lets go of a shape whose collider is gone, whoever despawned it; its tile or chunk has no collider then, and who sleeps
+/// there is told.
 pub(super) fn forget(
     gone: On<Remove, GroundBody>,
-    bodies: Query<&GroundBody>,
+    bodies: Query<(&GroundBody, Option<&ColliderAabb>)>,
     grounds: Res<Grounds>,
+    mut changes: ResMut<GroundChanges>,
+    mut figures: ResMut<PhysicsFigures>,
     mut commands: Commands,
 ) {
     let gone = gone.entity;
-    let Ok(body) = bodies.get(gone) else { return };
+    let Ok((body, bounds)) = bodies.get(gone) else { return };
+    if let Some(bounds) = bounds {
+        changes.add(body.drawn, Change::around(body.terrain, bounds));
+        figures.changes = changes.len();
+    }
     let mut shapes = grounds.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
     shapes.remove(&(body.terrain, body.drawn));
     let Ok(mut part) = commands.get_entity(body.part) else { return };
@@ -212,4 +228,43 @@ pub(super) fn forget(
             part.remove::<GroundCollider>();
         }
     });
+}
+
+/// Puts colliders where their tiles and chunks are, before a step. Avian itself would take over no turn of less than a tenth
+/// of a degree: ground that turns slowly would leave its colliders behind.
+pub(super) fn follow(
+    parts: Query<(Entity, &GroundCollider), Or<(Changed<GlobalTransform>, Changed<GroundCollider>)>>,
+    places: TransformHelper,
+    mut bodies: Query<(&GroundBody, &Collider, &ColliderAabb, &mut Position, &mut Rotation)>,
+    mut changes: ResMut<GroundChanges>,
+    mut figures: ResMut<PhysicsFigures>,
+) {
+    let start = Instant::now();
+    for (part, ground) in &parts {
+        let Some(body) = ground.body else { continue };
+        let (Ok(body), Ok(place)) = (bodies.get_mut(body), places.compute_global_transform(part)) else {
+            continue;
+        };
+        let (body, collider, bounds, mut position, mut turn) = body;
+        let place = place.compute_transform();
+        if !place.is_finite() {
+            continue;
+        }
+        let is_moved = position.set_if_neq(Position(place.translation));
+        if turn.set_if_neq(Rotation(place.rotation)) || is_moved {
+            let bounds = bounds.merged(collider.aabb(place.translation, place.rotation));
+            changes.add(body.drawn, Change::around(body.terrain, &bounds));
+            figures.changes = changes.len();
+        }
+    }
+    figures.main_thread += start.elapsed();
+}
+
+/// Keeps bodies of ground at the origins of their tiles and chunks, after a step: Avian works out from where they are in the
+/// world where that is below their parents, and what it rounds would add up.
+pub(super) fn stay(mut bodies: Query<&mut Transform, (With<GroundBody>, Changed<Transform>)>) {
+    for mut place in &mut bodies {
+        let home = Transform::from_scale(place.scale);
+        place.set_if_neq(home);
+    }
 }

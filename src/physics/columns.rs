@@ -70,17 +70,23 @@ pub(super) struct Columns {
     waiting: BTreeMap<Entity, BTreeSet<TilePos>>,
     colliders: usize,
     missing: usize,
-    /// Those that have got ready since, or are not any more.
+    /// Those that have got ready since, or are not any more, or are empty.
     turned: Vec<ColumnKey>,
 }
 
 impl Columns {
-    /// Has everything that has triangles in this column a collider?
-    pub fn is_ready(&self, column: ColumnKey) -> bool {
-        self.states.get(&column).is_some_and(|state| state.is_ready)
+    /// Has everything that has triangles in this column a collider? `None` where nothing stands in it: it is to come yet, or
+    /// the game took it away.
+    pub fn is_ready(&self, column: ColumnKey) -> Option<bool> {
+        self.states.get(&column).map(|state| state.is_ready)
     }
 
-    /// The columns that have got ready since this was asked last, or are not any more.
+    /// Was there a collider in this column when it was looked at last?
+    pub fn has_colliders(&self, column: ColumnKey) -> bool {
+        self.states.get(&column).is_some_and(|state| state.colliders > 0)
+    }
+
+    /// The columns that have got ready since this was asked last, or are not any more, or in which nothing stands any more.
     pub fn take_turned(&mut self) -> Vec<ColumnKey> {
         std::mem::take(&mut self.turned)
     }
@@ -129,8 +135,7 @@ impl Columns {
         }
         self.colliders = self.colliders + state.colliders - colliders;
         self.missing = self.missing + state.missing.len() - missing;
-        // One in which nothing stands any more is not ready either.
-        if was_ready != (state.is_ready && !state.parts.is_empty()) {
+        if was_ready != state.is_ready || state.parts.is_empty() {
             self.turned.push(column);
         }
         let (terrain, tile) = column;

@@ -9,10 +9,11 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::columns::Columns;
-use super::near::ahead;
+use super::near::{ahead, voxel_size};
 use super::solids::{Extent, FARTHEST, Solids};
 use super::{ColliderSource, PhysicsFigures};
 use crate::lattice::{ChunkGrid, Column, TilePos};
+use crate::plugin::TerrainEntities;
 use crate::terrain::Terrain;
 
 /// How far ahead of a body ground must have colliders, in seconds: longer than any frame.
@@ -21,6 +22,12 @@ const AHEAD: f32 = 0.25;
 /// Bodies this far above all ground are not held, in metres beyond what they fall in [`AHEAD`].
 const CLEARANCE: f32 = 4.0;
 
+/// How far apart the ground's height is asked on a body's way, in voxels, unless that makes more places than [`STOPS`].
+const STRIDE: f32 = 2.0;
+
+/// Places on a body's way in which the ground's height is asked, at most, beyond the first.
+const STOPS: f32 = 16.0;
+
 /// This body stands still until the ground under it has colliders: it is over a terrain that loads, or farther from all
 /// [`ColliderSource`]s than their radius.
 ///
@@ -28,8 +35,9 @@ const CLEARANCE: f32 = 4.0;
 /// again. Bodies high above the ground are not held, and neither are those that ground lets through: sensors, and what its
 /// [layers](super::GroundContact::layers) do not meet.
 ///
-/// The body goes on with the velocity that it had, and with its axes locked as they were. What a game changes meanwhile
-/// counts: `LockedAxes`, and a velocity that is not zero, are kept for then. To stop a held body, set the velocity here.
+/// The body goes on with the velocity that it had, and with its axes locked as they were, whoever takes this away. What a
+/// game changes meanwhile counts: `LockedAxes`, and a velocity that is not zero, are kept for then. To stop a held body, set
+/// the velocity here.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default)]
 #[reflect(Component, Default)]
 pub struct HeldByGround {
@@ -69,7 +77,7 @@ pub(super) struct Body {
     kind: &'static RigidBody,
     sleeps: Has<Sleeping>,
     position: Ref<'static, Position>,
-    transform: Ref<'static, Transform>,
+    transform: Option<Ref<'static, Transform>>,
     is_child: Has<ChildOf>,
     velocity: &'static mut LinearVelocity,
     spin: &'static mut AngularVelocity,
@@ -86,8 +94,8 @@ impl BodyItem<'_, '_> {
 
     /// Does it lie where it lay, held or not?
     fn rests(&self) -> bool {
-        let is_moved =
-            self.position.is_changed() || self.transform.is_changed() || self.velocity.is_changed();
+        let is_put = self.transform.as_ref().is_some_and(DetectChanges::is_changed);
+        let is_moved = is_put || self.position.is_changed() || self.velocity.is_changed();
         let is_firm =
             |hold: &Mut<HeldByGround>| !hold.is_changed() && hold.is_locked && locks_all(self.locked);
         self.sleeps && !is_moved && self.hold.as_ref().is_none_or(is_firm)
@@ -126,27 +134,43 @@ impl BodyItem<'_, '_> {
     }
 
     /// Lets go of it, if it is held.
-    fn release(&mut self, commands: &mut Commands) {
-        let Some(hold) = self.hold.as_deref().copied() else { return };
-        let mut entity = commands.entity(self.entity);
-        entity.try_remove::<HeldByGround>();
-        if !hold.is_locked {
-            return;
+    fn release(&self, commands: &mut Commands) {
+        if self.hold.is_some() {
+            commands.entity(self.entity).try_remove::<HeldByGround>();
         }
-        // Only what falls is to go on falling.
-        if self.kind.is_dynamic() {
-            // Told so by the change, avian wakes it.
-            let or = |now: Vec3, then: Vec3| if now == Vec3::ZERO { then } else { now };
-            self.velocity.0 = or(self.velocity.0, hold.velocity);
-            self.spin.0 = or(self.spin.0, hold.spin);
-        }
-        // Others are the game's own already.
-        if locks_all(self.locked) {
-            match hold.locked {
-                Some(locked) => entity.try_insert(locked),
-                None => entity.try_remove::<LockedAxes>(),
-            };
-        }
+    }
+}
+
+/// A body that is not held any more goes on as it was, whoever let go of it.
+pub(super) fn go_on(
+    gone: On<Remove, HeldByGround>,
+    mut bodies: Query<(
+        &HeldByGround,
+        &RigidBody,
+        &mut LinearVelocity,
+        &mut AngularVelocity,
+        Option<&LockedAxes>,
+    )>,
+    mut commands: Commands,
+) {
+    let Ok((hold, kind, mut velocity, mut spin, locked)) = bodies.get_mut(gone.entity) else { return };
+    if !hold.is_locked {
+        return;
+    }
+    // Only what falls is to go on falling.
+    if kind.is_dynamic() {
+        // Told so by the change, avian wakes it.
+        let or = |now: Vec3, then: Vec3| if now == Vec3::ZERO { then } else { now };
+        velocity.0 = or(velocity.0, hold.velocity);
+        spin.0 = or(spin.0, hold.spin);
+    }
+    // Others are the game's own already.
+    if locks_all(locked) {
+        let mut entity = commands.entity(gone.entity);
+        match hold.locked {
+            Some(locked) => entity.try_insert(locked),
+            None => entity.try_remove::<LockedAxes>(),
+        };
     }
 }
 
@@ -156,24 +180,26 @@ pub(super) fn hold(
     mut bodies: Query<Body, Without<super::GroundBody>>,
     places: TransformHelper,
     config: Option<Res<PhysicsTransformConfig>>,
-    terrains: Query<(Entity, &Terrain)>,
+    terrains: Query<(Entity, &Terrain, Option<&TerrainEntities>)>,
     sources: Query<(), With<ColliderSource>>,
     mut columns: ResMut<Columns>,
     solids: Solids,
-    mut known: Local<Vec<(Entity, Affine3A, ChunkGrid, u64)>>,
+    mut known: Local<Vec<(Entity, Affine3A, bool, ChunkGrid, u64)>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
     let (turned, ready) = (columns.take_turned(), &*columns);
     let terrains: Vec<(Entity, &Terrain, Affine)> = terrains
         .iter()
-        .filter_map(|(entity, terrain)| {
+        .filter_map(|(entity, terrain, entities)| {
             let place = places.compute_global_transform(entity).ok()?;
-            Some((entity, terrain, Affine { inverse: place.affine().inverse(), size: terrain.voxel_size() }))
+            let is_shown = entities.is_some_and(|entities| entities.show(terrain.world()));
+            let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
+            Some((entity, terrain, Affine { inverse, size, is_shown }))
         })
         .collect();
     let now = terrains.iter().map(|(entity, model, affine)| {
-        (*entity, affine.inverse, model.world().grid(), model.world().ground().hash())
+        (*entity, affine.inverse, affine.is_shown, model.world().grid(), model.world().ground().hash())
     });
     let now: Vec<_> = now.collect();
     let are_same = *known == now;
@@ -212,7 +238,7 @@ pub(super) fn hold(
             // Where a game has just put it, physics will have it in its next step.
             let put = || match body.is_child {
                 true => places.compute_global_transform(body.entity).ok().map(|put| put.translation()),
-                false => Some(body.transform.translation),
+                false => body.transform.as_ref().map(|put| put.translation),
             };
             let is_put = |put: &Vec3| *put != body.position.0;
             lacks_ground(body.position.0)
@@ -244,7 +270,10 @@ fn distance(grid: ChunkGrid, tile: TilePos, place: Vec2) -> f32 {
 /// From the world to a terrain.
 struct Affine {
     inverse: Affine3A,
+    /// Metres along a voxel's side.
     size: f32,
+    /// Do its tiles and chunks show the world that it has now?
+    is_shown: bool,
 }
 
 impl Affine {
@@ -277,26 +306,32 @@ impl Affine {
         }
         let (first, last) = (grid.tile_of_cell(first), grid.tile_of_cell(last));
         let tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| TilePos { x, z }));
-        let mut missing = tiles.filter(|&tile| !ready.is_ready((terrain, tile))).peekable();
+        // Where the game took the tile away, nothing is to come any more.
+        let is_ready = |tile| ready.is_ready((terrain, tile)).unwrap_or(self.is_shown);
+        let mut missing = tiles.filter(|&tile| !is_ready(tile)).peekable();
         if missing.peek().is_none() {
             return false;
         }
-        let body = Aabb2d::new(Vec2::ZERO, half.xz());
-        let way = AabbCast2d::new(body, from.xz(), Dir2::new(way.xz()).unwrap_or(Dir2::X), way.xz().length());
+        let (body, from, way) = (Aabb2d::new(Vec2::ZERO, half.xz()), from.xz(), way.xz());
+        let cast = AabbCast2d::new(body, from, Dir2::new(way).unwrap_or(Dir2::X), way.length());
         let meets = |tile: TilePos| {
             let corner = Vec2::new(tile.x as f32, tile.z as f32) * grid.size() as f32;
-            way.aabb_collision_at(Aabb2d { min: corner, max: corner + grid.size() as f32 }).is_some()
+            cast.aabb_collision_at(Aabb2d { min: corner, max: corner + grid.size() as f32 }).is_some()
         };
-        missing.any(meets) && self.is_low(model, place, low.y)
+        // Its front is farther ahead than its middle.
+        let way = way + way.normalize_or_zero() * half.xz().length();
+        missing.any(meets) && self.is_low(model, from, way, low.y)
     }
 
-    /// Is its lowest point near the ground, or under some of it?
-    fn is_low(&self, model: &Terrain, place: Vec3, low: f32) -> bool {
-        let local = self.inverse.transform_point3(place).as_dvec3();
+    /// Is its lowest point near the ground somewhere on its way, or under some of it?
+    fn is_low(&self, model: &Terrain, from: Vec2, way: Vec2, low: f32) -> bool {
         let grid = model.world().grid();
-        let (x, z) =
-            (local.x.clamp(0.0, f64::from(grid.width())), local.z.clamp(0.0, f64::from(grid.depth())));
-        let height = model.world().height(x, z);
-        height.is_some_and(|height| f64::from(low) < height + f64::from(CLEARANCE / self.size))
+        let end = Vec2::new(grid.width() as f32, grid.depth() as f32);
+        let count = (way.length() / STRIDE).ceil().min(STOPS);
+        (0..=count as u32).any(|stop| {
+            let place = (from + way * (stop as f32 / count.max(1.0))).clamp(Vec2::ZERO, end).as_dvec2();
+            let height = model.world().height(place.x, place.y);
+            height.is_some_and(|height| f64::from(low) < height + f64::from(CLEARANCE / self.size))
+        })
     }
 }

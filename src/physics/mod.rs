@@ -31,15 +31,18 @@
 //! - **One commit.** A collider is made from the same arrays as the mesh, in the same task, and swapped in the same frame.
 //!   It has exactly the triangles that are drawn: none where the tile is dug away, none twice. Servers without meshes have
 //!   the same colliders. Only where a source comes while a transaction is under way does the collider follow a task later.
+//!   A terrain may be moved and turned: before each step its colliders are put where its tiles and chunks are.
 //! - **No bump.** Triangles know their neighbours, those of other tiles and chunks included, see [`GroundShape`]; a body
 //!   that rolls over a border or a seam feels the surface, and not where it is cut.
 //! - **Nothing falls through.** An old collider stays until the new one takes its place; a collider that was made from an
 //!   older world than the one that is shown is thrown away. Colliders are made within the radius of a source, and where it
-//!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has.
-//! - **Dug ground lets go.** Bodies that sleep where a surface changed are woken. Bodies that were built over, or get squeezed
-//!   into the ground soon after it changed near them, are lifted to the nearest air above, for ground has one side only.
-//!   So is whoever gets into the ground in another way, an eighth of a second later. Sensors, bodies whose layers have
-//!   nothing to do with the ground, and those that sleep or cannot move up and down are left alone there.
+//!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has. Where a game
+//!   despawned the tile, there is nothing to wait for.
+//! - **Dug ground lets go.** Bodies that sleep where a surface changed, moved or went are woken. Bodies that were built over,
+//!   or get squeezed into the ground soon after it changed near them, are lifted to the nearest air above, for ground has
+//!   one side only; above is where the terrain's own y leads. So is whoever gets into the ground in another way, some
+//!   frames later. Sensors, bodies whose layers have nothing to do with the ground, and those that sleep or cannot move up
+//!   and down are left alone there.
 //!
 //! Avian optimises its trees in tasks on the pool that also runs transactions, and waits for them: a large transaction
 //! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.
@@ -72,6 +75,7 @@ pub use shape::GroundShape;
 use std::time::Duration;
 
 use avian3d::collider_tree::ColliderTreeOptimization;
+use avian3d::physics_transform::PhysicsTransformSystems;
 use avian3d::prelude::PhysicsSystems;
 use bevy::prelude::*;
 
@@ -94,6 +98,8 @@ pub enum TerrainPhysicsSystems {
     /// are others that are in it. In `FixedPostUpdate`, after its last step, those that were pushed into the ground are
     /// lifted too.
     Wake,
+    /// In `FixedPostUpdate`, before a step: colliders are put where their tiles and chunks are.
+    Follow,
 }
 
 /// What the plugin has, and did lately.
@@ -110,7 +116,7 @@ pub struct PhysicsFigures {
     pub stale: u64,
     /// Tiles and chunks looked at so far, because something happened to them or a source came near or left.
     pub looked_at: u64,
-    /// Tiles and chunks that changed, and that bodies have not been told of yet.
+    /// Tiles and chunks that changed, moved or went, and that bodies have not been told of yet.
     pub changes: usize,
     /// Bodies that are held.
     pub held: usize,
@@ -143,6 +149,7 @@ impl Plugin for TerrainPhysicsPlugin {
                 ),
             )
             .add_observer(colliders::forget)
+            .add_observer(hold::go_on)
             .add_observer(columns::note_new)
             .add_observer(columns::note_gone)
             .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
@@ -158,10 +165,20 @@ impl Plugin for TerrainPhysicsPlugin {
             )
             .add_systems(
                 FixedPostUpdate,
-                wake::rescue_after
-                    .run_if(wake::is_last_step)
-                    .after(PhysicsSystems::Last)
-                    .in_set(TerrainPhysicsSystems::Wake),
+                (
+                    colliders::follow
+                        .in_set(PhysicsSystems::Prepare)
+                        .after(PhysicsTransformSystems::Propagate)
+                        .before(PhysicsTransformSystems::TransformToPosition)
+                        .in_set(TerrainPhysicsSystems::Follow),
+                    colliders::stay
+                        .in_set(PhysicsSystems::Writeback)
+                        .after(PhysicsTransformSystems::PositionToTransform),
+                    wake::rescue_after
+                        .run_if(wake::is_last_step)
+                        .after(PhysicsSystems::Last)
+                        .in_set(TerrainPhysicsSystems::Wake),
+                ),
             );
     }
 

@@ -22,6 +22,12 @@ const AHEAD: f32 = 1.0;
 /// Places that a way ahead is looked at in, at most: one for each chunk's width of it.
 const STOPS: u32 = 64;
 
+/// How long a voxel's side is in the world, in metres: below a scaled parent not what the terrain says. Its shortest side
+/// where the terrain is stretched.
+pub(super) fn voxel_size(place: &GlobalTransform) -> f32 {
+    place.scale().abs().min_element()
+}
+
 /// What counts of a way ahead, in voxels: as much of it as colliders are made for.
 pub(super) fn ahead(way: Vec3, grid: ChunkGrid) -> Vec3 {
     way.clamp_length_max(STOPS as f32 * grid.size() as f32)
@@ -134,7 +140,7 @@ pub(super) fn find_near(
     let mut near = Neighbourhood::default();
     for (terrain, model) in &terrains {
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
-        let (inverse, size) = (place.affine().inverse(), model.voxel_size());
+        let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
         let grid = model.world().grid();
         let stride = grid.size() as f32;
         let mut stops = Vec::new();

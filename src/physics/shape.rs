@@ -19,6 +19,9 @@ use crate::surface::SurfaceMesh;
 /// Triangles are exactly those that are drawn, in metres from the part's origin. Within the mesh a triangle's neighbours
 /// are known; across its border stands what the vertices' normals say of them, which both sides share bit by bit. So no
 /// mesh has to be made again because another one changed, and no border is felt.
+///
+/// All of that is scaled with it. But avian 0.7 itself scales what looks like a mesh as a plain mesh: below a parent with a
+/// scale, ground has bumps, and a second side.
 #[derive(Clone, Debug)]
 pub struct GroundShape {
     mesh: TriMesh,
@@ -223,7 +226,11 @@ impl Shape for GroundShape {
     }
 
     fn scale_dyn(&self, scale: Vector, _: u32) -> Option<Box<dyn Shape>> {
-        Some(Box::new(self.mesh.clone().scaled(scale)))
+        // Normals are stretched across.
+        let across = Vector::new(scale.y * scale.z, scale.z * scale.x, scale.x * scale.y);
+        let beyond = self.beyond.iter().map(|normal| (normal * across).normalize_or_zero()).collect();
+        let (mesh, neighbours) = (self.mesh.clone().scaled(scale), self.neighbours.clone());
+        Some(Box::new(Self { mesh, neighbours, beyond }))
     }
 
     fn mass_properties(&self, _: Real) -> MassProperties {

@@ -12,6 +12,9 @@ use super::colliders::GroundContact;
 /// How far from its position a body reaches at most, in metres: boxes of what is fast are long.
 pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
 
+/// How far into a collider the way through it begins, in metres: less than anything is thick.
+const SKIN: f32 = 1e-3;
+
 /// A collider as ground sees it.
 #[derive(QueryData)]
 pub(super) struct Solid {
@@ -19,11 +22,29 @@ pub(super) struct Solid {
     layers: Option<&'static CollisionLayers>,
     is_sensor: Has<Sensor>,
     is_disabled: Has<ColliderDisabled>,
+    shape: Option<&'static Collider>,
+    place: Option<&'static ColliderTransform>,
 }
 
 impl SolidItem<'_, '_> {
     fn layers(&self) -> CollisionLayers {
         self.layers.copied().unwrap_or_default()
+    }
+
+    /// How far a point is from this collider, for a body that is placed so; and a place inside the collider: the point
+    /// itself or, if it is outside, halfway through what is nearest to it, for right there a body may touch the ground.
+    fn inside(&self, position: &Position, rotation: &Rotation, point: Vec3) -> Option<(f32, Vec3)> {
+        let (shape, own) = (self.shape?, self.place.copied().unwrap_or_default());
+        let (place, turn) = (position.0 + rotation * own.translation, *rotation * own.rotation);
+        if !(place.is_finite() && turn.is_finite() && point.is_finite()) {
+            return None;
+        }
+        let (nearest, is_inside) = shape.project_point(place, turn, point, true);
+        let way = Dir3::new_and_length(nearest - point).ok().filter(|_| !is_inside);
+        let Some((way, distance)) = way else { return Some((0.0, point)) };
+        let enter = nearest + way * SKIN;
+        let through = shape.cast_ray(place, turn, enter, *way, f32::MAX, false);
+        Some((distance, enter + way * through.map_or(0.0, |(through, _)| through / 2.0)))
     }
 }
 
@@ -110,6 +131,20 @@ impl Solids<'_, '_> {
         }
         let solid = self.colliders.iter_many(own).filter(|collider| self.meets(collider));
         solid.map(|collider| *collider.bounds).reduce(|a, b| a.merged(b))
+    }
+
+    /// A place inside those colliders of a body that may be in the way: its middle, if that is in one of them. The middle of
+    /// an arch is not, nor that of a ball which a game made heavy far below.
+    pub fn inside(
+        &self,
+        own: &RigidBodyColliders,
+        position: &Position,
+        rotation: &Rotation,
+        middle: Vec3,
+    ) -> Vec3 {
+        let solid = self.colliders.iter_many(own).filter(|collider| self.meets(collider));
+        let places = solid.filter_map(|collider| collider.inside(position, rotation, middle));
+        places.min_by(|(a, _), (b, _)| a.total_cmp(b)).map_or(middle, |(_, place)| place)
     }
 
     /// How far a body reaches with what may be in the way; `None` if ground lets all of it through.

@@ -73,6 +73,8 @@ pub(super) fn tend(
     }
     for column in touched {
         let distance = known.distance(column);
+        // A little farther off than sources reach, what is dug out of a tile with a collider is to have one too.
+        let has_colliders = columns.has_colliders(column);
         let looked_at = columns.look(column, |part| {
             let (shown, ground, ..) = parts.get(part).ok()?;
             let is_outdated = ground.is_none_or(|ground| ground.revision < shown.revision);
@@ -80,7 +82,8 @@ pub(super) fn tend(
             if goes {
                 commands.entity(part).queue_silenced(detach);
             }
-            let is_wanted = ground.is_some() || distance.is_some_and(|distance| distance <= 0.0);
+            let is_near = distance.is_some_and(|distance| distance <= 0.0 || has_colliders);
+            let is_wanted = ground.is_some() || is_near;
             Some(Look {
                 has_collider: !goes && ground.is_some_and(|ground| ground.body.is_some()),
                 is_missing: !goes && is_outdated && !shown.is_empty && is_wanted,

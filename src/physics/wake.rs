@@ -29,7 +29,7 @@ const WATCHED: u8 = 64;
 /// In so many frames with steps every body is looked at once, wherever it is.
 const TURNS: usize = 8;
 
-/// Where a collider changed, in world space.
+/// Where a collider changed, moved or went, in world space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Change {
     terrain: Entity,
@@ -48,6 +48,11 @@ impl Change {
             .map(corner)
             .fold((corner(0), corner(0)), |(low, high), corner| (low.min(corner), high.max(corner)));
         Self { terrain, low: low - NEAR, high: high + NEAR }
+    }
+
+    /// The box around a collider that went, or around where it was and is.
+    pub fn around(terrain: Entity, bounds: &ColliderAabb) -> Self {
+        Self { terrain, low: bounds.min - NEAR, high: bounds.max + NEAR }
     }
 
     fn meets(&self, bounds: &ColliderAabb) -> bool {
@@ -188,13 +193,13 @@ pub(super) struct Rescue<'w, 's> {
             &'static Rotation,
             Option<&'static ComputedCenterOfMass>,
             &'static mut LinearVelocity,
-            &'static mut Transform,
+            Option<&'static mut Transform>,
             Option<&'static mut CharacterMotion>,
             Has<ChildOf>,
         ),
     >,
     solids: Solids<'w, 's>,
-    terrains: Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform)>,
+    terrains: Query<'w, 's, (Entity, &'static Terrain, &'static GlobalTransform, &'static TerrainEntities)>,
     time: Option<Res<'w, Time<Physics>>>,
     figures: ResMut<'w, PhysicsFigures>,
 }
@@ -207,9 +212,11 @@ impl Rescue<'_, '_> {
             return;
         }
         let start = Instant::now();
+        // A world that is not shown yet comes with colliders that have bodies watched anew.
         let terrains: Vec<_> = terrains
             .iter()
-            .map(|(entity, terrain, place)| (entity, terrain.world(), place, place.affine().inverse()))
+            .filter(|(_, terrain, _, entities)| entities.show(terrain.world()))
+            .map(|(entity, terrain, place, _)| (entity, terrain.world(), place, place.affine().inverse()))
             .collect();
         watched.0.retain(|&(entity, terrain), looks| {
             *looks -= u8::from(passes);
@@ -217,22 +224,26 @@ impl Rescue<'_, '_> {
             let (Ok(body), Some((_, world, place, inverse))) = (bodies.get_mut(entity), terrain) else {
                 return false;
             };
-            let (body, own, mut position, rotation, center, mut velocity, mut transform, motion, is_child) =
-                body;
+            let (body, own, mut position, rotation, center, mut velocity, transform, motion, is_child) = body;
+            let local = |place: Vec3| inverse.transform_point3(place).as_dvec3();
+            let is_in_ground = |place: Vec3| local(place).is_finite() && world.is_solid(local(place));
             let middle = middle(&position, rotation, center);
-            let local = inverse.transform_point3(middle).as_dvec3();
-            if !local.is_finite() || !world.is_solid(local) {
+            if !is_in_ground(middle) {
                 return *looks > 0;
             }
             let Some(bounds) = solids.bounds(entity, body, own) else { return false };
-            if let Some(lift) = lift(world, place, local, middle, &bounds) {
-                position.0.y += lift;
-                if !is_child {
-                    transform.translation.y += lift;
+            let inside = solids.inside(own, &position, rotation, middle);
+            if !is_in_ground(inside) {
+                return *looks > 0;
+            }
+            if let Some((up, lift)) = lift(world, place, local(inside), inside, &bounds) {
+                position.0 += up * lift;
+                if let Some(mut transform) = transform.filter(|_| !is_child) {
+                    transform.translation += up * lift;
                 }
-                velocity.0.y = velocity.0.y.max(0.0);
+                velocity.0 = rising(velocity.0, up);
                 if let Some(mut motion) = motion {
-                    motion.velocity.y = motion.velocity.y.max(0.0);
+                    motion.velocity = rising(motion.velocity, up);
                 }
                 figures.lifted += 1;
             }
@@ -264,26 +275,35 @@ pub(super) fn is_first_step(frame: Option<Res<FrameCount>>, mut last: Local<Opti
     frame.is_none_or(|frame| last.replace(frame.0) != Some(frame.0))
 }
 
-/// The middle of a body, which need not be where its shapes count from: it is in the ground if that is.
+/// The middle of a body, which need not be where its shapes count from: if that is in the air, so is the body.
 fn middle(position: &Position, rotation: &Rotation, center: Option<&ComputedCenterOfMass>) -> Vec3 {
     position.0 + center.map_or(Vec3::ZERO, |center| rotation * center.0)
 }
 
-/// How far up a body must go whose middle, which is at `local` in the terrain, is in the ground.
+/// What is left of a velocity when nothing of it leads down.
+fn rising(velocity: Vec3, up: Dir3) -> Vec3 {
+    velocity - up * velocity.dot(*up).min(0.0)
+}
+
+/// Which way is up in a terrain, and how far up a body must go that is in the ground with a point `inside` it, which is at
+/// `local` in the terrain.
 fn lift(
     world: &TerrainWorld,
     place: &GlobalTransform,
     local: DVec3,
-    middle: Vec3,
+    inside: Vec3,
     bounds: &ColliderAabb,
-) -> Option<f32> {
-    let size = f64::from(place.scale().y);
-    let tall = f64::from(bounds.max.y - bounds.min.y) / size;
+) -> Option<(Dir3, f32)> {
+    let (up, size) = Dir3::new_and_length(place.affine().transform_vector3(Vec3::Y)).ok()?;
+    let (half, size) = (up.abs().dot(bounds.size()) / 2.0, f64::from(size));
+    let tall = f64::from(2.0 * half) / size;
     // The box is as old as the last step, and somebody may have been lifted since.
-    let below = (f64::from(middle.y - bounds.min.y) / size).clamp(0.0, tall.max(0.0));
+    let below = f64::from(up.dot(inside - bounds.center()) + half) / size;
+    let below = below.clamp(0.0, tall.max(0.0));
     let fits = |floor: f64, ceiling: Option<f64>| ceiling.is_none_or(|ceiling| ceiling - floor >= tall);
     let spans = world.spans(local.x, local.z);
     let above = spans.iter().filter(|span| span.floor >= local.y && fits(span.floor, span.ceiling));
     let floor = above.map(|span| span.floor).next()?;
-    Some(((floor + below - local.y) * size) as f32 + GAP)
+    let lift = ((floor + below - local.y) * size) as f32 + GAP;
+    lift.is_finite().then_some((up, lift))
 }

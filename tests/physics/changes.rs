@@ -34,6 +34,38 @@ fn a_sleeping_ball_falls_when_it_is_dug_away_under_it_and_others_sleep_on() {
 }
 
 #[test]
+fn who_sleeps_on_ground_that_goes_or_moves_is_woken() {
+    let ways: [(&str, fn(&mut Stage, Entity)); 4] = [
+        ("the terrain is despawned", |stage, terrain| {
+            stage.app.world_mut().despawn(terrain);
+        }),
+        ("it is no terrain any more", |stage, terrain| {
+            stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
+        }),
+        ("its tiles are despawned", |stage, _| {
+            let world = stage.app.world_mut();
+            let tiles: Vec<Entity> = world.query_filtered::<Entity, With<Tile>>().iter(world).collect();
+            for tile in tiles {
+                world.despawn(tile);
+            }
+        }),
+        ("it is moved", |stage, terrain| {
+            let mut place = stage.app.world_mut().get_mut::<Transform>(terrain).expect("terrains have one");
+            place.translation.y -= 3.0;
+        }),
+    ];
+    for (what, happens) in ways {
+        let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
+        let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+        stage.frames(seconds(4.0));
+        assert!(sleeps(&stage, ball));
+        happens(&mut stage, terrain);
+        stage.frames(4);
+        assert!(!sleeps(&stage, ball), "{what}");
+    }
+}
+
+#[test]
 fn who_is_built_over_comes_out_on_top() {
     let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
     let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
@@ -224,6 +256,46 @@ fn what_is_dug_while_time_stands_still_does_not_pile_up() {
     stage.frames(seconds(2.0));
     assert!(stage.figures().changes == 0 && stage.figures().woken == 1);
     assert!((2.0..4.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
+}
+
+#[test]
+fn nobody_is_lifted_onto_ground_that_is_not_shown_yet() {
+    let (mut stage, entity) = Stage::with_ground(level(64, 1.0));
+    let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+    stage.frames(4);
+    // For a while after a change near it a body is watched.
+    stage.dig([pit(22.0, 8.0, 20.0, 1.5)]);
+    // A change by the game itself is shown when it has loaded.
+    let mut terrain = stage.app.world_mut().get_mut::<Terrain>(entity).expect("it stays");
+    terrain.apply([Brush::add(Shape::sphere(Vec3::new(20.0, 8.0, 20.0), 4.0), MaterialId(2))]);
+    stage.frame();
+    assert_eq!(stage.figures().lifted, 0);
+    stage.frames_until("the ball is lifted", |stage| stage.figures().lifted > 0);
+    assert!(stage.place(ball).y > 10.0, "{}", stage.place(ball));
+}
+
+#[test]
+fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let rock = Shape::cuboid(Vec3::new(30.0, 9.5, 20.0), Vec3::splat(2.0));
+    stage.dig([Brush::add(rock, MaterialId(2))]);
+    // Below the ball, as if it were heavy there, and in the rock that the arch stands astride.
+    let ball = stage.ball(Vec3::new(10.0, 8.5, 20.0), 0.5, Vec3::ZERO);
+    stage.app.world_mut().entity_mut(ball).insert((CenterOfMass(Vec3::NEG_Y * 2.0), NoAutoCenterOfMass));
+    let leg = |x: f32| (Vec3::new(x, 2.0, 0.0), Quat::IDENTITY, Collider::cuboid(2.0, 4.0, 2.0));
+    let top = (Vec3::new(0.0, 4.25, 0.0), Quat::IDENTITY, Collider::cuboid(10.0, 0.5, 2.0));
+    let arch = Collider::compound(vec![leg(-4.0), leg(4.0), top]);
+    let place = Transform::from_xyz(30.0, 8.0, 20.0);
+    let arch = stage.app.world_mut().spawn((RigidBody::Dynamic, arch, place)).id();
+    stage.frames(seconds(2.0));
+    assert_eq!(stage.figures().lifted, 0);
+    for (body, height) in [(ball, 8.5), (arch, 8.0)] {
+        assert!((stage.place(body).y - height).abs() < 0.1, "{} for {height}", stage.place(body));
+    }
+    // In the ground itself it is lifted all the same.
+    stage.app.world_mut().get_mut::<Transform>(ball).expect("a body").translation.y = -30.0;
+    stage.frames(seconds(1.0));
+    assert!(stage.figures().lifted > 0 && stage.place(ball).y > 8.0, "{}", stage.place(ball));
 }
 
 #[test]

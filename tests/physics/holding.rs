@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::physics::{Character, ColliderSource, HeldByGround};
+use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level};
 
@@ -89,6 +91,19 @@ fn axes_that_a_game_locks_or_frees_on_a_held_body_are_so_when_it_is_let_go() {
         let bits = |locked: Option<LockedAxes>| locked.map(|locked| locked.to_bits());
         assert_eq!(bits(get(&stage, ball)), bits(locked));
     }
+}
+
+#[test]
+fn a_game_that_lets_go_of_a_held_body_leaves_no_axis_locked() {
+    let (mut stage, ball) = held_ball();
+    stage.app.world_mut().entity_mut(ball).remove::<HeldByGround>();
+    assert!(get::<LockedAxes>(&stage, ball).is_none());
+    // There still is no ground.
+    stage.frames(4);
+    assert!(stage.is_held(ball));
+    source(&mut stage, 120.0, 120.0);
+    stage.frames(4);
+    assert!(!stage.is_held(ball) && get::<LockedAxes>(&stage, ball).is_none());
 }
 
 #[test]
@@ -209,5 +224,60 @@ fn a_held_body_that_moves_no_longer_by_itself_is_let_go() {
         stage.frames(2);
         assert!(stage.is_held(ball), "{kind:?}");
         assert_eq!(stage.app.world_mut().query::<&HeldByGround>().iter(stage.app.world()).count(), 1);
+    }
+}
+
+#[test]
+fn who_flies_into_a_hill_without_colliders_is_held_before_it() {
+    let mut stage = Stage::new();
+    let mut terrain = level(256, 1.0);
+    // From x = 150 on, and higher than the flight.
+    let hill = Shape::cuboid(Vec3::new(170.0, 24.0, 120.0), Vec3::new(20.0, 17.0, 20.0));
+    terrain.apply([Brush::add(hill, MaterialId(2))]);
+    stage.app.world_mut().spawn(terrain);
+    source(&mut stage, 40.0, 120.0);
+    let ball = stage.ball(Vec3::new(100.0, 30.0, 120.0), 0.5, Vec3::X * 60.0);
+    stage.frames_until("it is held", |stage| stage.is_held(ball));
+    assert!((110.0..149.0).contains(&stage.place(ball).x), "{}", stage.place(ball));
+}
+
+#[test]
+fn nobody_waits_for_ground_where_the_game_took_the_tile_away() {
+    let (mut stage, ball) = held_ball();
+    let tile = |stage: &mut Stage| {
+        let world = stage.app.world_mut();
+        let mut tiles = world.query::<(Entity, &Tile)>();
+        tiles.iter(world).find(|(_, tile)| (tile.x, tile.z) == (7, 7)).map(|(tile, _)| tile)
+    };
+    stage.frames_until("the ground is shown", |stage| tile(stage).is_some());
+    stage.frames(120);
+    assert!(stage.is_held(ball) && get::<Sleeping>(&stage, ball).is_some());
+    // For ground of its own.
+    let floor = (Collider::cuboid(16.0, 1.0, 16.0), Transform::from_xyz(120.0, 7.5, 120.0));
+    stage.app.world_mut().spawn((RigidBody::Static, floor));
+    let tile = tile(&mut stage).expect("it is shown");
+    stage.app.world_mut().despawn(tile);
+    stage.frames(60);
+    assert!(!stage.is_held(ball) && (stage.place(ball).y - 8.5).abs() < 0.05, "{}", stage.place(ball));
+}
+
+#[test]
+fn on_a_server_that_keeps_bodies_out_of_the_hierarchy_they_are_held_and_lifted_too() {
+    let mut app = App::new();
+    let (position_to_transform, transform_to_position) = (false, false);
+    app.insert_resource(PhysicsTransformConfig { position_to_transform, transform_to_position, ..default() });
+    let mut stage = Stage::within(app);
+    stage.app.world_mut().spawn(level(256, 1.0));
+    source(&mut stage, 40.0, 40.0);
+    let [lies, buried, held] = [(36.0, 8.6), (44.0, -30.0), (200.0, 8.6)].map(|(x, y)| {
+        let place = (Position::from_xyz(x, y, 40.0), Rotation::IDENTITY, GlobalTransform::IDENTITY);
+        stage.app.world_mut().spawn((RigidBody::Dynamic, Collider::sphere(0.5), place)).id()
+    });
+    stage.frames(60);
+    assert!(get::<Transform>(&stage, held).is_none());
+    assert!(stage.is_held(held) && !stage.is_held(lies) && !stage.is_held(buried));
+    for (body, height) in [(lies, 8.5), (buried, 8.5), (held, 8.6)] {
+        let place = get::<Position>(&stage, body).expect("a body");
+        assert!((place.y - height).abs() < 0.05, "{place:?} for {height}");
     }
 }

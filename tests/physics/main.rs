@@ -6,6 +6,7 @@ mod changes;
 mod crowd;
 mod debris;
 mod holding;
+mod placement;
 mod sources;
 mod stage;
 mod walkers;

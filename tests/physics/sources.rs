@@ -129,6 +129,25 @@ fn edits_far_from_all_sources_are_there_when_one_comes() {
 }
 
 #[test]
+fn what_is_dug_just_beyond_a_source_is_ground_for_those_who_are_there() {
+    let mut stage = Stage::new();
+    stage.app.world_mut().spawn(level(256, 1.0));
+    let place = Transform::from_xyz(56.0, 8.0, 40.0);
+    let source = stage.app.world_mut().spawn((place, ColliderSource { radius: 20.0 })).id();
+    stage.settle();
+    // The tile from x = 64 on keeps its collider, though it is farther off than the radius now.
+    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x = 40.0;
+    stage.frame();
+    stage.settle();
+    let ball = stage.ball(Vec3::new(72.0, 8.5, 40.0), 0.5, Vec3::ZERO);
+    stage.frames(10);
+    assert!(!stage.is_held(ball));
+    stage.dig([pit(72.0, 8.0, 40.0, 3.0)]);
+    stage.frames((2.0 / STEP) as usize);
+    assert!(!stage.is_held(ball) && (5.0..6.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
+}
+
+#[test]
 fn colliders_go_with_their_terrain() {
     let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
     assert!(!stage.ground().is_empty());

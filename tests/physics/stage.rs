@@ -36,7 +36,11 @@ pub struct Stage {
 
 impl Stage {
     pub fn new() -> Self {
-        let mut app = App::new();
+        Self::within(App::new())
+    }
+
+    /// In an app that has settings for plugins already.
+    pub fn within(mut app: App) -> Self {
         app.add_plugins((
             MinimalPlugins,
             PhysicsPlugins::default(),

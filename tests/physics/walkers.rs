@@ -134,6 +134,18 @@ fn tall(stage: &Stage, walker: Entity) -> f32 {
     aabb.max.y - aabb.min.y
 }
 
+/// For half a second, a walker of that character stands at height 8.
+fn stands(stage: &mut Stage, walker: Entity, character: &Character) {
+    let height = character.height;
+    for _ in 0..seconds(0.5) {
+        stage.frame();
+        let feet = character.feet(stage.place(walker));
+        assert!((feet.y - 8.0).abs() < 0.03, "{height} m tall, at {feet}");
+    }
+    assert!((tall(stage, walker) - height).abs() < 0.01, "{} for {height}", tall(stage, walker));
+    assert!(stage.motion(walker).grounded);
+}
+
 #[test]
 fn a_walker_that_crouches_is_lower_and_keeps_its_feet_on_the_ground() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
@@ -146,13 +158,7 @@ fn a_walker_that_crouches_is_lower_and_keeps_its_feet_on_the_ground() {
             character.clone()
         };
         let character = character(&mut stage);
-        for _ in 0..seconds(0.5) {
-            stage.frame();
-            let feet = character.feet(stage.place(walker));
-            assert!((feet.y - 8.0).abs() < 0.03, "{height} m tall, at {feet}");
-        }
-        assert!((tall(&stage, walker) - height).abs() < 0.01, "{} for {height}", tall(&stage, walker));
-        assert!(stage.motion(walker).grounded);
+        stands(&mut stage, walker, &character);
     }
 }
 
@@ -164,13 +170,7 @@ fn a_walker_that_is_given_another_character_keeps_its_feet_on_the_ground() {
     for height in [1.0, 2.4, 1.8] {
         let character = Character { height, ..default() };
         stage.app.world_mut().entity_mut(walker).insert(character.clone());
-        for _ in 0..seconds(0.5) {
-            stage.frame();
-            let feet = character.feet(stage.place(walker));
-            assert!((feet.y - 8.0).abs() < 0.03, "{height} m tall, at {feet}");
-        }
-        assert!((tall(&stage, walker) - height).abs() < 0.01, "{} for {height}", tall(&stage, walker));
-        assert!(stage.motion(walker).grounded);
+        stands(&mut stage, walker, &character);
     }
 }
 
