@@ -131,10 +131,12 @@ impl<'a> MaskView<'a> {
         let words: Vec<u64> = (first.1 - 1..=last.1 + 1).flat_map(row).collect();
         let rows: Vec<&[u64]> = words.chunks((last.0 - first.0 + 3).max(1) as usize).collect();
         let across = (last.0 - first.0 + 1).max(0) as usize;
-        let patches = rows.windows(3).flat_map(|rows| {
-            (0..across).map(|at| Patch::new(&[0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx]))))
-        });
-        Borders { low, high, first, across, patches: patches.collect() }
+        let mut patches = Vec::with_capacity(across * rows.len());
+        for rows in rows.windows(3) {
+            let around = |at: usize| [0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx]));
+            patches.extend((0..across).map(|at| Patch::new(&around(at))));
+        }
+        Borders { low, high, first, across, patches }
     }
 }
 

@@ -345,7 +345,9 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
         let own = move |at: IVec3| bricks.intersection(LatticeBox { min: at << 3, max: (at << 3) + 7 });
         boxes.points().filter_map(move |at| Some((edit, own(at)?)))
     });
-    let boxes: Vec<(u32, LatticeBox)> = boxes.collect();
+    // Small brushes lie in at most eight.
+    let mut all: Vec<(u32, LatticeBox)> = Vec::with_capacity(tools.len() * 8);
+    all.extend(boxes);
     let near = |&(edit, bricks): &(u32, LatticeBox)| {
         let tool = &tools[edit as usize];
         let samples = LatticeBox { min: bricks.min << 3, max: (bricks.max << 3) + 7 };
@@ -353,10 +355,13 @@ fn jobs(tools: &[Tool]) -> Vec<Job> {
         let jobs = bricks.map(move |at| Job { brick: [at.x, at.z, at.y], edit });
         jobs.filter(move |job| tool.reaches(job.pos().samples()))
     };
-    let mut jobs: Vec<Job> = if boxes.len() < PARALLEL_BOXES {
-        boxes.iter().flat_map(near).collect()
+    let mut jobs: Vec<Job> = if all.len() < PARALLEL_BOXES {
+        let room = all.iter().map(|(_, bricks)| bricks.volume() as usize).sum();
+        let mut jobs = Vec::with_capacity(room);
+        jobs.extend(all.iter().flat_map(near));
+        jobs
     } else {
-        boxes.par_iter().flat_map_iter(near).collect()
+        all.par_iter().flat_map_iter(near).collect()
     };
     // They stand in order of the edits, and stay so for each brick.
     sort_by_place(&mut jobs, |job| job.brick);
