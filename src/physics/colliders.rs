@@ -204,11 +204,12 @@ pub(super) fn detach(mut part: EntityWorldMut) {
     });
 }
 
-/// Lets go of a shape whose collider is gone, whoever despawned it; its tile or chunk has no collider then, and who sleeps
-/// there is told.
+/// Lets go of a shape whose collider is gone, whoever despawned it; its tile or chunk has no collider then. Where nobody
+/// [detached](detach) it, ground has gone, and who sleeps there is told.
 pub(super) fn forget(
     gone: On<Remove, GroundBody>,
     bodies: Query<(&GroundBody, Option<&ColliderAabb>)>,
+    parts: Query<Has<GroundCollider>>,
     grounds: Res<Grounds>,
     mut changes: ResMut<GroundChanges>,
     mut figures: ResMut<PhysicsFigures>,
@@ -216,7 +217,8 @@ pub(super) fn forget(
 ) {
     let gone = gone.entity;
     let Ok((body, bounds)) = bodies.get(gone) else { return };
-    if let Some(bounds) = bounds {
+    let is_detached = parts.get(body.part).is_ok_and(|has_collider| !has_collider);
+    if let Some(bounds) = bounds.filter(|_| !is_detached) {
         changes.add(body.drawn, Change::around(body.terrain, bounds));
         figures.changes = changes.len();
     }
@@ -235,7 +237,7 @@ pub(super) fn forget(
 pub(super) fn follow(
     parts: Query<(Entity, &GroundCollider), Or<(Changed<GlobalTransform>, Changed<GroundCollider>)>>,
     places: TransformHelper,
-    mut bodies: Query<(&GroundBody, &Collider, &ColliderAabb, &mut Position, &mut Rotation)>,
+    mut bodies: Query<(&GroundBody, &Collider, Ref<ColliderAabb>, &mut Position, &mut Rotation)>,
     mut changes: ResMut<GroundChanges>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
@@ -250,8 +252,10 @@ pub(super) fn follow(
         if !place.is_finite() {
             continue;
         }
-        let is_moved = position.set_if_neq(Position(place.translation));
-        if turn.set_if_neq(Rotation(place.rotation)) || is_moved {
+        let is_put = position.set_if_neq(Position(place.translation));
+        let is_turned = turn.set_if_neq(Rotation(place.rotation));
+        // Whoever was there before a collider has been told when it came.
+        if (is_put || is_turned) && !bounds.is_added() {
             let bounds = bounds.merged(collider.aabb(place.translation, place.rotation));
             changes.add(body.drawn, Change::around(body.terrain, &bounds));
             figures.changes = changes.len();
