@@ -57,3 +57,19 @@ fn open(
 fn go_to(page: Page) -> impl FnMut(On<Chosen>, ResMut<NextState<Page>>) {
     move |_, mut next| next.set(page)
 }
+
+/// A page of what the player may set, as devices see it with nothing chosen: for its tests.
+#[cfg(test)]
+fn app_with(plugin: impl Plugin, page: Page) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, bevy::state::app::StatesPlugin, bevy::input::InputPlugin))
+        .add_plugins(crate::input::InputPlugin)
+        .init_state::<Page>()
+        .init_resource::<crate::settings::Settings>()
+        .init_resource::<UiScale>()
+        .add_plugins((ui::UiPlugin, plugin));
+    app.world_mut().resource_mut::<NextState<Page>>().set(page);
+    app.update();
+    app.update();
+    app
+}

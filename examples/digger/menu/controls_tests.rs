@@ -1,29 +1,17 @@
 //! Facts about the page of controls, as a mouse and keys see it.
 
+use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::input::mouse::{MouseButtonInput, MouseScrollUnit, MouseWheel};
 use bevy::input::touch::TouchPhase;
-use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
-use bevy::state::app::StatesPlugin;
 
 use super::*;
-use crate::input::InputPlugin;
-use crate::ui::UiPlugin;
 
 const LEFT: Binding = Binding::Mouse(MouseButton::Left);
 
 /// The page, with nothing chosen.
 fn app() -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin))
-        .init_state::<Page>()
-        .init_resource::<Settings>()
-        .init_resource::<UiScale>()
-        .add_plugins((UiPlugin, ControlsPlugin));
-    app.world_mut().resource_mut::<NextState<Page>>().set(Page::Controls);
-    app.update();
-    app.update();
-    app
+    crate::menu::app_with(ControlsPlugin, Page::Controls)
 }
 
 fn row(app: &mut App, action: Action) -> Entity {

@@ -158,26 +158,15 @@ fn show_values(settings: Res<Settings>, mut values: Query<(&Value, &mut Text)>) 
 
 #[cfg(test)]
 mod tests {
+    use bevy::input::ButtonState;
     use bevy::input::keyboard::{Key, KeyboardInput};
-    use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
-    use bevy::state::app::StatesPlugin;
 
     use super::*;
-    use crate::input::InputPlugin;
-    use crate::ui::{Focus, UiPlugin};
+    use crate::ui::Focus;
 
     /// The page of settings.
     fn app() -> App {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin))
-            .init_state::<Page>()
-            .init_resource::<Settings>()
-            .init_resource::<UiScale>()
-            .add_plugins((UiPlugin, KnobsPlugin));
-        app.world_mut().resource_mut::<NextState<Page>>().set(Page::Settings);
-        app.update();
-        app.update();
-        app
+        crate::menu::app_with(KnobsPlugin, Page::Settings)
     }
 
     /// The row of a setting, and where it stands.
