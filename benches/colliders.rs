@@ -192,7 +192,7 @@ fn row(what: &str, kind: &str, meshes: &[SurfaceMesh], build: impl Fn(&SurfaceMe
 
 fn tri_mesh(mesh: &SurfaceMesh, flags: TriMeshFlags) -> Option<TriMesh> {
     let vertices = mesh.vertices.iter().map(|vertex| Vector::from_array(vertex.position_f32())).collect();
-    let triangles = mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let triangles = mesh.indices.triangles().collect();
     TriMesh::with_flags(vertices, triangles, flags).ok()
 }
 

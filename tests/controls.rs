@@ -11,7 +11,7 @@ use bevy_burrow::lattice::{Column, LatticeBox, ONE, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::mask::{cell_sheet, sheet};
 use bevy_burrow::surface::vertex::{Lattice, WorldView, position};
-use bevy_burrow::surface::{MaterialMix, SeamReport, SeamSoup, SurfaceMesh, Vertex, cases};
+use bevy_burrow::surface::{Indices, MaterialMix, SeamReport, SeamSoup, SurfaceMesh, Vertex, cases};
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
@@ -203,7 +203,7 @@ impl<'a> Plain<'a> {
 fn check(world: &World, triangles: &[[IVec3; 3]]) -> SeamReport {
     let corner = |position: IVec3| Vertex { position, normal: Vec3::Y, materials: MaterialMix::default() };
     let vertices: Vec<Vertex> = triangles.iter().flatten().map(|&position| corner(position)).collect();
-    let indices = (0..vertices.len() as u32).collect();
+    let indices = Indices::new(vertices.len(), (0..vertices.len() as u32).collect());
     let mut soup = SeamSoup::default();
     soup.add(&SurfaceMesh { vertices, indices }, IVec3::ZERO);
     soup.check(world.grid())

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::{BrickPos, Column, SNAP};
 use bevy_burrow::prelude::*;
-use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::surface::{Indices, SurfaceMesh};
 use bevy_burrow::terrain::{Drawn, World};
 use fastrand::Rng;
 use glam::{I64Vec3, Quat, Vec3};
@@ -61,7 +61,7 @@ fn bits(mesh: &SurfaceMesh, origin: glam::IVec3) -> Vec<Bits> {
 }
 
 /// Every mesh as it is drawn: which, vertices, indices.
-fn drawn(world: &World) -> Vec<(Drawn, Vec<Bits>, Vec<u32>)> {
+fn drawn(world: &World) -> Vec<(Drawn, Vec<Bits>, Indices)> {
     world.drawn().map(|(drawn, mesh)| (drawn, bits(&mesh, world.origin(drawn)), mesh.indices)).collect()
 }
 
@@ -70,8 +70,8 @@ fn picture(world: &World) -> Vec<[Bits; 3]> {
     let mut triangles: Vec<[Bits; 3]> = Vec::new();
     for (drawn, mesh) in world.drawn() {
         let vertices = bits(&mesh, world.origin(drawn));
-        for corner in mesh.indices.chunks_exact(3) {
-            let mut triangle = [0, 1, 2].map(|i| vertices[corner[i] as usize]);
+        for corner in mesh.indices.triangles() {
+            let mut triangle = corner.map(|index| vertices[index as usize]);
             let first = (0..3).min_by_key(|&i| triangle[i]).expect("three corners");
             triangle.rotate_left(first);
             triangles.push(triangle);

@@ -65,7 +65,7 @@ fn every_block_has_the_bits_of_the_mesher_by_the_book() {
             let cells = cells.expect("blocks hold cells");
             let expected = plain::mesh(&view, block.brick, cells, world.grid().origin(block.chunk));
             let ours = sorted(vertices, indices.iter().map(|&index| usize::from(index)));
-            let theirs = sorted(&expected.vertices, expected.indices.iter().map(|&index| index as usize));
+            let theirs = sorted(&expected.vertices, expected.indices.iter().map(|index| index as usize));
             if ours != theirs {
                 let extra: Vec<_> = ours.iter().filter(|t| !theirs.contains(t)).take(2).collect();
                 let missing: Vec<_> = theirs.iter().filter(|t| !ours.contains(t)).take(2).collect();

@@ -45,7 +45,7 @@ impl Met {
         for (drawn, mesh) in world.drawn() {
             // Tiles keep vertices that no triangle has.
             let mut is_drawn = vec![false; mesh.vertices.len()];
-            mesh.indices.iter().for_each(|&index| is_drawn[index as usize] = true);
+            mesh.indices.iter().for_each(|index| is_drawn[index as usize] = true);
             let origin = world.origin(drawn) * SNAP;
             for (vertex, _) in mesh.vertices.iter().zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
                 let (place, own) = (origin + vertex.position, vertex.materials);

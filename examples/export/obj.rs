@@ -38,7 +38,7 @@ impl<W: Write> ObjWriter<'_, W> {
         // A tile keeps the vertices of ground that was dug away; only those in use are written.
         let mut numbers = vec![0; mesh.vertices.len()];
         let origin = origin.as_i64vec3() * i64::from(SNAP);
-        for &index in &mesh.indices {
+        for index in mesh.indices.iter() {
             let number = &mut numbers[index as usize];
             if *number == 0 {
                 self.vertices += 1;
@@ -46,8 +46,8 @@ impl<W: Write> ObjWriter<'_, W> {
                 self.vertex(origin + mesh.vertices[index as usize].position.as_i64vec3());
             }
         }
-        for triangle in mesh.indices.chunks_exact(3) {
-            let [a, b, c] = [0, 1, 2].map(|corner| numbers[triangle[corner] as usize]);
+        for triangle in mesh.indices.triangles() {
+            let [a, b, c] = triangle.map(|index| numbers[index as usize]);
             self.text += &format!("f {a} {b} {c}\n");
         }
         self.flush()

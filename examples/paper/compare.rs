@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use bevy_burrow::lattice::{Column, SNAP};
-use bevy_burrow::surface::Vertex;
+use bevy_burrow::surface::{SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Drawn, World};
 use glam::IVec3;
 
@@ -58,9 +58,8 @@ pub struct Surface {
 type Key = [[i32; 3]; 3];
 
 /// Triangles by their positions; each holds its corners in the same order.
-fn keyed(vertices: &[Vertex], indices: &[u32], origin: IVec3) -> impl Iterator<Item = (Key, [Vertex; 3])> {
-    indices.chunks_exact(3).map(move |triangle| {
-        let mut corners = [0, 1, 2].map(|i| vertices[triangle[i] as usize]);
+fn keyed(mesh: &SurfaceMesh, origin: IVec3) -> impl Iterator<Item = (Key, [Vertex; 3])> {
+    mesh.triangles().map(move |mut corners| {
         for corner in &mut corners {
             corner.position += origin * SNAP;
         }
@@ -75,11 +74,10 @@ impl Surface {
     /// Looks at every triangle.
     pub fn compare(full: &FullWorld, world: &World) -> Self {
         let mut surface = Self::default();
-        let mut others: HashMap<Key, [Vertex; 3]> =
-            keyed(full.vertices(), full.indices(), IVec3::ZERO).collect();
+        let mut others: HashMap<Key, [Vertex; 3]> = keyed(&full.mesh(), IVec3::ZERO).collect();
         for chunk in world.drawn_chunks() {
             let (mesh, origin) = (world.chunk_mesh(chunk), world.origin(Drawn::Chunk(chunk)));
-            for (key, here) in keyed(&mesh.vertices, &mesh.indices, origin) {
+            for (key, here) in keyed(&mesh, origin) {
                 surface.triangles += 1;
                 let Some(there) = others.remove(&key) else {
                     surface.missing += 1;

@@ -156,7 +156,7 @@ fn normals(world: &World, place: Place, pen: &mut Pen) {
                 let mesh = world.tile_mesh(tile);
                 // Of columns in the mask no triangle is left.
                 let mut is_used = vec![false; mesh.vertices.len()];
-                for &index in &mesh.indices {
+                for index in mesh.indices.iter() {
                     if let Some(used) = is_used.get_mut(index as usize) {
                         *used = true;
                     }

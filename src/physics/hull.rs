@@ -21,8 +21,7 @@ pub fn debris_collider(piece: &SurfaceMesh, voxel_size: f32) -> Option<Collider>
     let vertices: Vec<Vec3> = piece.vertices.iter().map(|vertex| vertex.position.as_vec3() * scale).collect();
     let triangles: Vec<[u32; 3]> = piece
         .indices
-        .chunks_exact(3)
-        .map(|t| [t[0], t[1], t[2]])
+        .triangles()
         .filter(|t| t.iter().all(|&corner| (corner as usize) < vertices.len()))
         .collect();
     let corners = |t: &[u32; 3]| t.map(|corner| vertices[corner as usize] - vertices[0]);

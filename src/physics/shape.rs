@@ -133,10 +133,8 @@ impl Welded {
             let [a, b, c] = t.map(|corner| places[corner as usize].as_i64vec3());
             (b - a).cross(c - a) != glam::I64Vec3::ZERO
         };
-        let triangles = surface
-            .indices
-            .chunks_exact(3)
-            .filter_map(|t| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]));
+        let triangles =
+            surface.indices.triangles().filter_map(|t| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]));
         let triangles = triangles.filter(has_area).collect();
         Self { places, normals, triangles }
     }

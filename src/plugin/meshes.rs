@@ -13,7 +13,7 @@ use bevy::mesh::{
 use super::MaterialColors;
 use crate::ground::{Ground, OVERLAY_DEPTH};
 use crate::lattice::{ChunkGrid, Column, ONE, SNAP};
-use crate::surface::{MaterialMix, SurfaceMesh, Vertex};
+use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
 use crate::terrain::{Drawn, World};
 
 /// Up to four material ids of a vertex, for materials that look them up.
@@ -80,7 +80,10 @@ impl Wardrobe {
             .with_inserted_attribute(ATTRIBUTE_MATERIAL_WEIGHTS, VertexAttributeValues::Unorm8x4(weights))
             .with_inserted_attribute(ATTRIBUTE_GROUND_DEPTH, depths)
             .with_inserted_attribute(ATTRIBUTE_GROUND_COVER, VertexAttributeValues::Unorm8x4(covers))
-            .with_inserted_indices(Indices::U32(surface.indices.clone()));
+            .with_inserted_indices(match &surface.indices {
+                surface::Indices::U16(list) => Indices::U16(list.clone()),
+                surface::Indices::U32(list) => Indices::U32(list.clone()),
+            });
         if !self.colors.0.is_empty() {
             let blended: Vec<[f32; 4]> =
                 vertices.iter().map(|vertex| blend(vertex.materials, &self.colors)).collect();

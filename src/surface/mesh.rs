@@ -2,6 +2,7 @@
 
 use glam::{IVec3, Vec3};
 
+use super::indices::Indices;
 use crate::ground::{ColumnMaterial, MaterialId};
 use crate::lattice::SNAP;
 
@@ -98,7 +99,7 @@ pub struct SurfaceMesh {
     /// Vertices, shared by the triangles of a block or tile.
     pub vertices: Vec<Vertex>,
     /// Three for each triangle.
-    pub indices: Vec<u32>,
+    pub indices: Indices,
 }
 
 impl SurfaceMesh {
@@ -109,7 +110,7 @@ impl SurfaceMesh {
 
     /// The triangles as vertices.
     pub fn triangles(&self) -> impl Iterator<Item = [Vertex; 3]> {
-        self.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|index| self.vertices[index as usize]))
+        self.indices.triangles().map(|triangle| triangle.map(|index| self.vertices[index as usize]))
     }
 
     /// Lowest and highest corner in voxels, `None` without vertices.
@@ -123,16 +124,9 @@ impl SurfaceMesh {
         Some((voxels(min), voxels(max)))
     }
 
-    /// Adds a part after what is there.
-    pub fn append(&mut self, vertices: &[Vertex], indices: &[u16]) {
-        let base = self.vertices.len() as u32;
-        self.vertices.extend_from_slice(vertices);
-        self.indices.extend(indices.iter().map(|&index| base + u32::from(index)));
-    }
-
-    /// Bytes of the buffers.
+    /// Bytes of the buffers, room that is not used included.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.vertices.as_slice()) + size_of_val(self.indices.as_slice())
+        self.vertices.capacity() * size_of::<Vertex>() + self.indices.bytes()
     }
 }
 

@@ -6,7 +6,7 @@
 //! - [`vertex`]: the one vertex function of cubes and ring (rule 4), with normals and materials.
 //! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk; [`plain`] is the same by the book.
 //! - [`tile`]: the heightmap's triangles outside the mask, rings included (rule 3).
-//! - [`mesh`]: vertex and index buffers, local to a chunk or tile.
+//! - [`mesh`]: vertex and index buffers, local to a chunk or tile; [`indices`] has 16 or 32 bits each.
 //! - [`seams`]: the validator: is everything drawn together closed?
 
 mod apron;
@@ -15,6 +15,7 @@ pub mod cases;
 mod corners;
 mod crossings;
 pub mod dense;
+pub mod indices;
 pub mod mask;
 pub mod mesh;
 pub mod plain;
@@ -27,6 +28,7 @@ pub(crate) mod window;
 #[cfg(feature = "cuda")]
 pub(crate) use stack::borders;
 
+pub use indices::Indices;
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};
 pub use seams::{SeamFault, SeamReport, SeamSoup};

@@ -6,8 +6,9 @@
 use glam::IVec3;
 
 use super::cases::{self, Edge};
+use super::indices::Indices;
 use super::mask::cell_sheet;
-use super::mesh::SurfaceMesh;
+use super::mesh::{SurfaceMesh, Vertex};
 use super::vertex::{Lattice, WorldView, over_the_rim, vertex};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BRICK, BrickPos, Column, LatticeBox};
@@ -93,7 +94,8 @@ impl Lattice for Apron<'_> {
 
 /// Vertices already made in a block, by lattice edge.
 struct VertexCache {
-    mesh: SurfaceMesh,
+    vertices: Vec<Vertex>,
+    indices: Vec<u32>,
     numbers: Vec<u32>,
     low: IVec3,
     origin: IVec3,
@@ -109,8 +111,8 @@ impl VertexCache {
         let at = p - self.low;
         let slot = &mut self.numbers[(((at.y * Self::SIDE + at.z) * Self::SIDE + at.x) * 3) as usize + axis];
         if *slot == Self::NONE {
-            *slot = self.mesh.vertices.len() as u32;
-            self.mesh.vertices.push(vertex(apron, p, axis, self.origin));
+            *slot = self.vertices.len() as u32;
+            self.vertices.push(vertex(apron, p, axis, self.origin));
         }
         *slot
     }
@@ -122,7 +124,8 @@ pub fn mesh(world: &WorldView, brick: BrickPos, cells: LatticeBox, origin: IVec3
     let apron = Apron::gather(world, brick);
     let side = VertexCache::SIDE as usize;
     let mut cache = VertexCache {
-        mesh: SurfaceMesh::default(),
+        vertices: Vec::new(),
+        indices: Vec::new(),
         numbers: vec![VertexCache::NONE; side * side * side * 3],
         low: brick.origin(),
         origin,
@@ -141,10 +144,10 @@ pub fn mesh(world: &WorldView, brick: BrickPos, cells: LatticeBox, origin: IVec3
                 }
                 for triangle in table[case].triangles() {
                     let numbers = triangle.map(|edge| cache.number(&apron, cube, edge));
-                    cache.mesh.indices.extend_from_slice(&numbers);
+                    cache.indices.extend_from_slice(&numbers);
                 }
             }
         }
     }
-    cache.mesh
+    SurfaceMesh { indices: Indices::new(cache.vertices.len(), cache.indices), vertices: cache.vertices }
 }

@@ -111,7 +111,7 @@ impl SeamSoup {
         let origin = origin.as_i64vec3() * i64::from(SNAP);
         // Only what is drawn: tiles keep the vertices of columns that the mask took from them.
         let mut numbers = vec![None; mesh.vertices.len()];
-        for triangle in mesh.indices.chunks_exact(3) {
+        for triangle in mesh.indices.triangles() {
             let [a, b, c] = [0, 1, 2].map(|i| {
                 let index = triangle[i] as usize;
                 *numbers[index].get_or_insert_with(|| {

@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 
 use glam::IVec3;
 
+use super::indices::Indices;
 use super::mask::{Borders, sheet};
 use super::mesh::{SurfaceMesh, Vertex};
 use super::vertex::{WorldView, height_vertex, sheet_vertex};
@@ -50,23 +51,25 @@ pub fn borders(world: &WorldView, tile: TilePos) -> Borders {
 }
 
 /// The triangles outside the mask: two for each whole cell, row by row, then the rings.
-pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings) -> Vec<u32> {
+pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings) -> Indices {
     let (low, high) = grid.tile_cells(tile);
+    let vertices = column_count(low, high) as usize + rings.vertices.len();
     let cells = (high.x - low.x).max(0) as u32;
     let width = cells + 1;
     let corners = |a: u32| [a, a + width, a + width + 1, a + width + 1, a + 1, a];
-    let mut first = Vec::with_capacity(cells as usize * 6);
-    (0..cells).for_each(|a| first.extend_from_slice(&corners(a)));
-    let mut indices = Vec::with_capacity(first.len() * (high.z - low.z).max(0) as usize + rings.fans.len());
+    let mut first = Indices::with_capacity(vertices, cells as usize * 6);
+    (0..cells).for_each(|a| first.extend(&corners(a)));
+    let count = first.len() * (high.z - low.z).max(0) as usize + rings.fans.len();
+    let mut indices = Indices::with_capacity(vertices, count);
     for z in low.z..high.z {
-        let base = (z - low.z) as u32 * width;
+        let base = (z - low.z) as usize * width as usize;
         // Runs of whole cells are the first row's, moved.
         for run in borders.whole(z) {
             let corners = (run.start - low.x) as usize * 6..(run.end - low.x) as usize * 6;
-            indices.extend(first[corners].iter().map(|&index| index + base));
+            indices.extend_moved(&first, corners, 0, base);
         }
     }
-    indices.extend_from_slice(&rings.fans);
+    indices.extend(&rings.fans);
     indices
 }
 

@@ -16,7 +16,7 @@ use crate::lattice::{ChunkGrid, ChunkPos, Column, LatticeBox, TilePos, order_of_
 use crate::surface::block::{Block, Parts};
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
-use crate::surface::{Mask, SurfaceMesh};
+use crate::surface::{Indices, Mask, SurfaceMesh};
 
 /// Meshes that a commit puts in place of old ones. An empty one means that nothing is drawn there any more.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +31,7 @@ pub struct MeshUpdates {
 #[derive(Clone, Debug)]
 pub struct TileUpdate {
     /// The whole list of indices.
-    pub indices: Vec<u32>,
+    pub indices: Indices,
     /// The rings; their vertices follow after those of the columns.
     pub rings: Arc<Rings>,
     tile: TilePos,

@@ -1,9 +1,7 @@
 //! The surface of one chunk: the parts of its blocks, assembled to one mesh.
 
-use std::cmp::Ordering;
-
 use crate::lattice::BrickPos;
-use crate::surface::{SurfaceMesh, Vertex};
+use crate::surface::{Indices, SurfaceMesh, Vertex};
 
 /// What marching cubes draws in one chunk: one mesh, which remembers where each block's part of it is.
 #[derive(Clone, Debug, Default)]
@@ -84,7 +82,7 @@ impl ChunkSurface {
         let mut new = Self::default();
         new.parts.reserve_exact(parts);
         new.mesh.vertices.reserve_exact(vertices);
-        new.mesh.indices.reserve_exact(indices);
+        new.mesh.indices = Indices::with_capacity(vertices, indices);
         let mut kept = 0;
         for change in &changes {
             let upto = kept + self.parts[kept..].partition_point(|part| part.key < change.key);
@@ -103,11 +101,10 @@ impl ChunkSurface {
             return !fresh.indices.is_empty();
         };
         let ((vertex, index), part) = (self.start(at), self.parts[at]);
-        let rebased = fresh.indices.iter().map(|&i| vertex as u32 + u32::from(i));
         let old = &self.mesh.vertices[vertex..part.vertices];
         old.len() != fresh.vertices.len()
             || !old.iter().zip(fresh.vertices).all(|(old, new)| old.is_same(new))
-            || rebased.cmp(self.mesh.indices[index..part.indices].iter().copied()) != Ordering::Equal
+            || !self.mesh.indices.is_part(index..part.indices, fresh.indices, vertex)
     }
 
     /// Appends parts of another surface as they are.
@@ -119,8 +116,7 @@ impl ChunkSurface {
         let vertices = |at: usize, by: usize| at - vertex + by;
         let (v, i) = (self.mesh.vertices.len(), self.mesh.indices.len());
         self.mesh.vertices.extend_from_slice(&from.mesh.vertices[vertex..vertex_end]);
-        let moved = (v as u32).wrapping_sub(vertex as u32);
-        self.mesh.indices.extend(from.mesh.indices[index..index_end].iter().map(|at| at.wrapping_add(moved)));
+        self.mesh.indices.extend_moved(&from.mesh.indices, index..index_end, vertex, v);
         let shift = |part: &Part| Part {
             key: part.key,
             vertices: vertices(part.vertices, v),
@@ -133,16 +129,14 @@ impl ChunkSurface {
         if fresh.indices.is_empty() {
             return;
         }
-        let base = self.mesh.vertices.len() as u32;
+        self.mesh.indices.extend_from_part(fresh.indices, self.mesh.vertices.len());
         self.mesh.vertices.extend_from_slice(fresh.vertices);
-        self.mesh.indices.extend(fresh.indices.iter().map(|&index| base + u32::from(index)));
         let (vertices, indices) = (self.mesh.vertices.len(), self.mesh.indices.len());
         self.parts.push(Part { key: fresh.key, vertices, indices });
     }
 
     /// Bytes of the mesh, and of what is kept to assemble the next one.
     pub(super) fn bytes(&self) -> (usize, usize) {
-        let mesh = self.mesh.vertices.capacity() * size_of::<Vertex>() + self.mesh.indices.capacity() * 4;
-        (mesh, self.parts.capacity() * size_of::<Part>() + size_of::<Self>())
+        (self.mesh.bytes(), self.parts.capacity() * size_of::<Part>() + size_of::<Self>())
     }
 }

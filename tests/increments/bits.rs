@@ -1,11 +1,11 @@
 //! Vertices and meshes as bits, and the mixing that hashes are made of.
 
-use bevy_burrow::surface::{SurfaceMesh, Vertex};
+use bevy_burrow::surface::{Indices, SurfaceMesh, Vertex};
 
 /// A vertex as bits: 0.0 is not -0.0.
 type Bits = ([i32; 3], [u32; 3], [u8; 4], [u8; 4]);
 /// A mesh as bits.
-pub type MeshBits = (Vec<Bits>, Vec<u32>);
+pub type MeshBits = (Vec<Bits>, Indices);
 
 pub fn bits(vertex: &Vertex) -> Bits {
     let normal = vertex.normal.to_array().map(f32::to_bits);

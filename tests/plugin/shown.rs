@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use bevy::mesh::{Indices, VertexAttributeValues};
+use bevy::mesh::VertexAttributeValues;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
@@ -42,11 +42,10 @@ impl Soup {
         else {
             panic!("a mesh has no positions");
         };
-        let Some(Indices::U32(indices)) = mesh.indices() else { panic!("a mesh has no indices") };
-        let mut number =
-            |index: &u32| self.weld(place.transform_point(Vec3::from(positions[*index as usize])));
+        let indices: Vec<usize> = mesh.indices().expect("a mesh has indices").iter().collect();
+        let mut number = |index: usize| self.weld(place.transform_point(Vec3::from(positions[index])));
         let triangles: Vec<[u32; 3]> =
-            indices.chunks_exact(3).map(|t| [number(&t[0]), number(&t[1]), number(&t[2])]).collect();
+            indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(&mut number)).collect();
         self.triangles.extend(triangles);
     }
 

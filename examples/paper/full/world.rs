@@ -5,7 +5,7 @@ use bevy_burrow::ground::MaterialId;
 use bevy_burrow::lattice::{BrickPos, LatticeBox, ONE, SNAP};
 use bevy_burrow::surface::block::{Block, Mesher, Parts};
 use bevy_burrow::surface::vertex::WorldView;
-use bevy_burrow::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh, Vertex};
+use bevy_burrow::surface::{Indices, Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Receipt, Terrain, World};
 use glam::{IVec3, Vec3};
 
@@ -84,6 +84,12 @@ impl FullWorld {
         &self.indices
     }
 
+    /// A copy of both buffers.
+    pub fn mesh(&self) -> SurfaceMesh {
+        let indices = Indices::new(self.vertices().len(), self.indices.clone());
+        SurfaceMesh { vertices: self.vertices().to_vec(), indices }
+    }
+
     /// Bytes of both buffers.
     pub fn mesh_bytes(&self) -> usize {
         size_of_val(self.vertices()) + size_of_val(self.indices())
@@ -92,8 +98,7 @@ impl FullWorld {
     /// Is the mesh one closed surface?
     pub fn check_seams(&self) -> SeamReport {
         let mut soup = SeamSoup::default();
-        let mesh = SurfaceMesh { vertices: self.vertices().to_vec(), indices: self.indices.clone() };
-        soup.add(&mesh, IVec3::ZERO);
+        soup.add(&self.mesh(), IVec3::ZERO);
         soup.check(self.world().grid())
     }
 }

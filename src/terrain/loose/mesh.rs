@@ -7,9 +7,9 @@ use super::bits::Samples;
 use super::search::{self, Component};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, Column, ONE};
-use crate::surface::SurfaceMesh;
 use crate::surface::cases;
 use crate::surface::vertex::{Lattice, vertex};
+use crate::surface::{Indices, SurfaceMesh};
 use crate::volume::SampleView;
 
 /// Density of what lies beyond the world's sides. The piece ends at its last sample there, not halfway to the next.
@@ -61,7 +61,7 @@ impl Lattice for Piece<'_> {
 pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origin: IVec3) -> SurfaceMesh {
     let samples = piece.iter().map(|(&key, &layers)| (search::brick(key), layers)).collect();
     let piece_view = Piece { view, grid, samples };
-    let mut mesh = SurfaceMesh::default();
+    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
     let mut numbers: FxHashMap<(IVec3, usize), u32> = FxHashMap::default();
     for (&key, layers) in piece {
         let low = search::brick(key).origin();
@@ -74,16 +74,16 @@ pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origi
                         let (corner, axis) = cases::edge_corners(edge);
                         let at = cube + IVec3::from_array(cases::corner(corner));
                         *numbers.entry((at, axis)).or_insert_with(|| {
-                            mesh.vertices.push(vertex(&piece_view, at, axis, origin));
-                            mesh.vertices.len() as u32 - 1
+                            vertices.push(vertex(&piece_view, at, axis, origin));
+                            vertices.len() as u32 - 1
                         })
                     });
-                    mesh.indices.extend_from_slice(&triangle);
+                    indices.extend_from_slice(&triangle);
                 }
             });
         }
     }
-    mesh
+    SurfaceMesh { indices: Indices::new(vertices.len(), indices), vertices }
 }
 
 /// The cubes around a sample of the piece that hold surface, with their cases. Of the samples that are corners of a cube,

@@ -17,6 +17,7 @@ use super::mapped::Mapped;
 use super::*;
 use crate::backend::Engine;
 use crate::prelude::*;
+use crate::surface::Indices;
 use crate::terrain::{Drawn, World};
 
 #[path = "../../../../tests/worlds/mod.rs"]
@@ -38,7 +39,7 @@ fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
 }
 
 /// Everything that is drawn, as bits.
-fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Vec<u32>)> {
+fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Indices)> {
     let bits = |vertex: &crate::surface::Vertex| {
         let mut bytes = Vec::with_capacity(32);
         vertex.position.to_array().iter().for_each(|part| bytes.extend(part.to_le_bytes()));
