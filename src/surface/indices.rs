@@ -131,3 +131,47 @@ impl Indices {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// As many vertices as there may be at most for 16 bits, or one more.
+    fn vertices(is_long: bool) -> usize {
+        Indices::MOST_SHORT + usize::from(is_long)
+    }
+
+    proptest! {
+        #[test]
+        fn both_kinds_hold_the_same(list in prop::collection::vec(0u32..1 << 16, 0..40), is_long: bool) {
+            let indices = Indices::new(vertices(is_long), list.clone());
+            prop_assert_eq!(matches!(indices, Indices::U32(_)), is_long);
+            prop_assert_eq!(indices.iter().collect::<Vec<_>>(), list.clone());
+            prop_assert_eq!((indices.len(), indices.is_empty()), (list.len(), list.is_empty()));
+            let triangles: Vec<[u32; 3]> = list.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+            prop_assert_eq!(indices.triangles().collect::<Vec<_>>(), triangles);
+        }
+
+        #[test]
+        fn parts_are_copied_from_either_kind_to_either(
+            part in prop::collection::vec(0u16..500, 1..40),
+            from in 0usize..60_000,
+            to in 0usize..60_000,
+            was_long: bool,
+            is_long: bool,
+        ) {
+            let mut old = Indices::with_capacity(vertices(was_long), 0);
+            old.extend(&[7, 8, 9]);
+            old.extend_from_part(&part, from);
+            let range = 3..3 + part.len();
+            prop_assert!(old.is_part(range.clone(), &part, from));
+            prop_assert!(!old.is_part(range.clone(), &part, from + 1));
+            let mut new = Indices::with_capacity(vertices(is_long), 0);
+            new.extend_moved(&old, range, from, to);
+            let expected: Vec<u32> = part.iter().map(|&index| u32::from(index) + to as u32).collect();
+            prop_assert_eq!(new, Indices::new(vertices(is_long), expected));
+        }
+    }
+}
