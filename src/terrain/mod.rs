@@ -27,9 +27,11 @@ mod receipt;
 #[cfg(any(feature = "plugin", test))]
 mod recipe;
 mod redraw;
+mod settings;
 mod steps;
 mod surface;
 mod transaction;
+mod triangles;
 mod world;
 
 pub use commit::{Commit, Stages};
@@ -41,6 +43,7 @@ pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 #[cfg(feature = "avian")]
 pub(crate) use recipe::SurfaceRecipe;
 pub use redraw::{MeshUpdates, TileUpdate};
+pub use settings::{TerrainError, TerrainSettings};
 pub use surface::ChunkSurface;
 pub use transaction::Transaction;
 pub use world::{Drawn, Memory, Version, World};
@@ -56,34 +59,6 @@ use crate::ground::Ground;
 use crate::lattice::LatticeBox;
 use crate::volume::DiggingRules;
 use history::{Step, Timeline, Waste};
-
-/// How a terrain is cut up and how large it is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TerrainSettings {
-    /// Cells along a chunk's side, 8..=128. Small chunks redraw faster, large ones need fewer draws.
-    pub chunk_size: u32,
-    /// Metres along a voxel's side: a power of two from 1/8 to 8, so that scaling loses no bits. The model itself counts
-    /// in voxels.
-    pub voxel_size: f32,
-}
-
-impl Default for TerrainSettings {
-    fn default() -> Self {
-        Self { chunk_size: 32, voxel_size: 1.0 }
-    }
-}
-
-/// Why a terrain can't be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TerrainError {
-    /// The chunk size is out of range.
-    #[error("chunk size {0} is not in 8..=128")]
-    ChunkSize(u32),
-    /// The voxel size is no power of two from 1/8 to 8.
-    #[error("voxel size {0} is not one of 1/8, 1/4, 1/2, 1, 2, 4, 8")]
-    VoxelSize(f32),
-}
 
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -162,12 +137,7 @@ impl Terrain {
     /// # Errors
     /// When the chunk size or the voxel size is out of range.
     pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
-        if !(8..=128).contains(&settings.chunk_size) {
-            return Err(TerrainError::ChunkSize(settings.chunk_size));
-        }
-        if !(-3..=3).any(|power| settings.voxel_size == 2f32.powi(power)) {
-            return Err(TerrainError::VoxelSize(settings.voxel_size));
-        }
+        settings.check()?;
         let world = World::new(ground.into(), settings.chunk_size as i32);
         Ok(Self {
             world: Arc::new(world),

@@ -59,17 +59,14 @@ pub(super) fn updates(
     newer: &Mask,
     stages: &mut Stages,
 ) -> MeshUpdates {
+    let Stages { meshing, assembly, ring, .. } = stages;
     let chunks = || {
-        let mut stages = Stages::default();
-        let blocks = Stages::time(&mut stages.meshing, || dirty_blocks(world, view, newer, dirty));
-        (mesh_blocks(world, view, backend, &blocks, &mut stages), stages)
+        let blocks = Stages::time(meshing, || dirty_blocks(world, view, newer, dirty));
+        mesh_blocks(world, view, backend, &blocks, meshing, assembly)
     };
-    let tiles = || timed(|| touched_tiles(world, view, newer));
+    let tiles = || Stages::time(ring, || touched_tiles(world, view, newer));
     // Tiles and chunks do not depend on each other. What either does alone is time for the other.
-    let ((chunks, own), (tiles, ring)) = side_by_side(dirty.len(), chunks, tiles);
-    stages.meshing += own.meshing;
-    stages.assembly += own.assembly;
-    stages.ring += ring;
+    let (chunks, tiles) = side_by_side(dirty.len(), chunks, tiles);
     MeshUpdates { tiles, chunks }
 }
 
@@ -82,28 +79,24 @@ pub(super) fn side_by_side<A: Send, B: Send>(
     if bricks < PARALLEL_BLOCKS { (a(), b()) } else { rayon::join(a, b) }
 }
 
-/// What `work` gives, and how long it took.
-pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
-    let mut time = Duration::ZERO;
-    (Stages::time(&mut time, work), time)
-}
-
 /// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
 fn mesh_blocks(
     world: &World,
     view: &WorldView,
     backend: &dyn Compute,
     blocks: &[Block],
-    stages: &mut Stages,
+    meshing: &mut Duration,
+    assembly: &mut Duration,
 ) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
-    let (mut chunks, mut assembly) = (Vec::new(), Duration::ZERO);
-    let (_, all) = timed(|| {
+    let (mut chunks, mut own) = (Vec::new(), Duration::ZERO);
+    Stages::time(meshing, || {
         backend.mesh(view, blocks, &mut |parts| {
-            chunks = Stages::time(&mut assembly, || assemble(world, blocks, parts));
+            chunks = Stages::time(&mut own, || assemble(world, blocks, parts));
         });
     });
-    stages.meshing += all - assembly;
-    stages.assembly += assembly;
+    // The backend hands parts out in the middle of its own time.
+    *meshing = meshing.saturating_sub(own);
+    *assembly += own;
     chunks
 }
 

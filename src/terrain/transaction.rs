@@ -21,7 +21,7 @@ use super::field_log::{FieldLog, FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
 use super::loose::{LoosePiece, LooseSettings};
 use super::receipt::{Applied, Receipt};
-use super::redraw::{self, MeshUpdates, side_by_side, timed};
+use super::redraw::{self, MeshUpdates, side_by_side};
 use super::world::World;
 use super::{Submission, Work};
 use crate::backend::{Compute, Cpu, Engine};
@@ -108,17 +108,15 @@ impl Transaction {
                 None => drafting.together(&edits),
             }
         });
-        let drafted = &draft.bricks;
-        let lay =
-            || timed(|| drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect());
-        let boxes = || drafted.iter().map(|drafted| (drafted.pos, drafted.changed));
-        let dirty = || timed(|| dirty_cells(world.grid, boxes()));
-        let look = || side_by_side(drafted.len(), dirty, || timed(|| sheets_in_reach(world, drafted)));
-        let ((bricks, edit), ((dirty, meshing), (near, ring))): ((Bricks, _), _) =
-            side_by_side(drafted.len(), lay, look);
-        stages.edit += edit;
-        stages.meshing += meshing;
-        stages.ring += ring;
+        // Three things that do not depend on each other: new bricks as a table, cells to mesh, cells that may join the mask.
+        let (drafted, Stages { edit, meshing, ring, .. }) = (&draft.bricks, &mut stages);
+        let table = || drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
+        let table = || -> Bricks { Stages::time(edit, table) };
+        let changed = || drafted.iter().map(|drafted| (drafted.pos, drafted.changed));
+        let dirty = || Stages::time(meshing, || dirty_cells(world.grid, changed()));
+        let near = || Stages::time(ring, || sheets_in_reach(world, drafted));
+        let count = drafted.len();
+        let (bricks, (dirty, near)) = side_by_side(count, table, || side_by_side(count, dirty, near));
 
         let before = WorldView { samples: world.samples().over(&bricks), ..world.view() };
         let mask = Stages::time(&mut stages.ring, || joined_mask(&before, &near));

@@ -1,0 +1,100 @@
+//! The triangles that are drawn over one cell of the world, without a mesh.
+
+use std::ops::Range;
+
+use glam::{DVec3, IVec3};
+
+use super::ray::Triangle;
+use super::world::World;
+use crate::lattice::{BRICK, Column, ONE, SNAP};
+use crate::surface::cases;
+use crate::surface::mask::{Borders, cell_sheet};
+use crate::surface::tile;
+use crate::surface::vertex::{Lattice, WorldView, position};
+
+/// Hands out the drawn triangles of a cell whose cubes may reach into `low..=high`.
+pub(super) fn for_triangles(
+    world: &World,
+    view: &WorldView,
+    cell: Column,
+    low: f64,
+    high: f64,
+    mut found: impl FnMut(Triangle),
+) {
+    let ground = view.ground();
+    let sheet = cell_sheet(ground, cell);
+    let is_volumetric = view.mask.contains(cell);
+    let meets = |rows: &Range<i32>| f64::from(rows.start) <= high && low <= f64::from(rows.end);
+    if !is_volumetric && meets(&sheet) {
+        heightmap_triangles(view, cell, &mut found);
+    }
+    let mut rows = edited_rows(world, cell);
+    if is_volumetric {
+        rows.push(sheet.clone());
+    }
+    rows.sort_unstable_by_key(|rows| rows.start);
+    let mut next = i32::MIN;
+    for rows in rows.into_iter().filter(meets) {
+        let bottom = rows.start.max(next).max((low.floor() - 1.0) as i32);
+        let top = rows.end.min((high.floor() + 2.0) as i32);
+        for y in bottom..top {
+            cube_triangles(view, cell.at(y), is_volumetric && sheet.contains(&y), &mut found);
+        }
+        next = next.max(rows.end);
+    }
+}
+
+/// The triangles that a tile draws for a cell.
+fn heightmap_triangles(view: &WorldView, cell: Column, found: &mut impl FnMut(Triangle)) {
+    let ground = view.ground();
+    let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
+    let columns = cell.corners();
+    let bordered = Borders::SIDES.map(|(dx, dz)| view.mask.contains(cell.offset(dx, dz)));
+    if bordered == [false; 4] {
+        let [a, b, c, d] = columns.map(corner);
+        found([a, b, c]);
+        found([c, d, a]);
+        return;
+    }
+    let leg = |side: usize| -> Vec<DVec3> {
+        let (from, to) = (columns[side], columns[(side + 1) % 4]);
+        let mut line = vec![corner(from)];
+        if bordered[side] {
+            let crossing = |(p, axis)| position(view, p, axis, IVec3::ZERO).as_dvec3() / f64::from(SNAP);
+            line.extend(tile::chain(ground, from, to).map(crossing));
+        }
+        line.push(corner(to));
+        line
+    };
+    tile::fan(&leg(0), &leg(1), &mut *found);
+    tile::fan(&leg(2), &leg(3), &mut *found);
+}
+
+/// Rows of cubes over a cell that may touch an edited sample.
+fn edited_rows(world: &World, cell: Column) -> Vec<Range<i32>> {
+    let mut rows = Vec::new();
+    for bx in cell.x >> 3..=(cell.x + 1) >> 3 {
+        for bz in cell.z >> 3..=(cell.z + 1) >> 3 {
+            for by in world.stacks.get(&(bx, bz)).into_iter().flatten() {
+                rows.push(by * BRICK - 1..by * BRICK + BRICK);
+            }
+        }
+    }
+    rows
+}
+
+/// The triangles of one cube, where it is drawn by marching cubes.
+fn cube_triangles(view: &WorldView, cube: IVec3, in_sheet: bool, found: &mut impl FnMut(Triangle)) {
+    let corners: [IVec3; 8] = std::array::from_fn(|i| cube + IVec3::from_array(cases::corner(i)));
+    if !in_sheet && !corners.iter().any(|&corner| view.is_edited(corner)) {
+        return;
+    }
+    let case = (0..8).fold(0, |case, i| case | usize::from(view.distance(corners[i]) < 0) << i);
+    for triangle in cases::table()[case].triangles() {
+        found(triangle.map(|edge| {
+            let (corner, axis) = cases::edge_corners(edge);
+            let local = position(view, corners[corner], axis, cube);
+            cube.as_dvec3() + local.as_dvec3() / f64::from(SNAP)
+        }));
+    }
+}
