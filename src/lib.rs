@@ -63,6 +63,7 @@
 //! | to ask about the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
+//! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
 //! | more from the same surfaces, in the same commit | `Companion`s |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | an editor's panel | `BurrowPanelPlugin`, and `BrushTool` for the brush in hand (feature `egui`) |

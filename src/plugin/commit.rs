@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use bevy::camera::visibility::NoAutoAabb;
+use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
@@ -17,7 +18,8 @@ use super::{
     Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
     Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
 };
-use crate::terrain::{Commit, Drawn, Terrain};
+use crate::lattice::ChunkPos;
+use crate::terrain::{Commit, Drawn, FieldNews, Receipt, Terrain};
 
 /// The transaction that a terrain waits for.
 #[derive(Component)]
@@ -40,7 +42,7 @@ struct Prepared {
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &TerrainEntities, &MaterialColors, Option<&LooseGround>),
+        (Entity, &mut Terrain, &TerrainEntities, Option<&MaterialColors>, Option<&LooseGround>),
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -99,20 +101,61 @@ pub(super) fn begin_transactions(
     figures.main_thread += start.elapsed();
 }
 
+/// What shows commits: entities and their meshes.
+#[derive(SystemParam)]
+pub(super) struct Screen<'w, 's> {
+    commands: Commands<'w, 's>,
+    assets: Option<ResMut<'w, Assets<Mesh>>>,
+    meshes: Query<'w, 's, &'static Mesh3d>,
+    figures: ResMut<'w, BurrowFigures>,
+}
+
+/// What commits say in messages.
+#[derive(SystemParam)]
+pub(super) struct News<'w> {
+    receipts: MessageWriter<'w, BrushApplied>,
+    moved: MessageWriter<'w, HistoryMoved>,
+    found: MessageWriter<'w, LoosePieceFound>,
+}
+
 /// Commits what is done: each commit whole, as many of them as the frame's budget of swaps allows, and at least one.
 pub(super) fn commit_transactions(
-    mut commands: Commands,
     settings: Res<BurrowSettings>,
-    mut figures: ResMut<BurrowFigures>,
-    mut assets: Option<ResMut<Assets<Mesh>>>,
     mut terrains: Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
-    shown: Query<&Mesh3d>,
-    mut receipts: MessageWriter<BrushApplied>,
-    mut moved: MessageWriter<HistoryMoved>,
-    mut found: MessageWriter<LoosePieceFound>,
+    mut screen: Screen,
+    mut news: News,
 ) {
+    let done = done_in_order(&mut terrains);
+    if done.is_empty() {
+        return;
+    }
+    screen.commands.queue(|world: &mut World| world.insert_resource(Applying(Instant::now())));
+    let mut swapped = 0;
+    for entity in done {
+        let Ok((_, terrain, entities, mut transaction)) = terrains.get_mut(entity) else { continue };
+        let swaps = transaction.done.as_ref().map_or(0, |prepared| prepared.parts.len());
+        if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
+            continue;
+        }
+        let Some(prepared) = transaction.done.take() else { continue };
+        screen.commands.entity(entity).try_remove::<InFlight>();
+        if commit(entity, terrain, entities, prepared, &mut screen, &mut news) {
+            swapped += swaps;
+        }
+    }
+    screen.commands.queue(|world: &mut World| {
+        if let Some(Applying(start)) = world.remove_resource() {
+            world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
+        }
+    });
+}
+
+/// The terrains whose transactions are done, the oldest first: whoever had to wait for the budget is next.
+fn done_in_order(
+    terrains: &mut Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
+) -> Vec<Entity> {
     let mut done = Vec::new();
-    for (entity, _, _, mut transaction) in &mut terrains {
+    for (entity, _, _, mut transaction) in terrains.iter_mut() {
         if transaction.done.is_none() {
             transaction.done = check_ready(&mut transaction.task);
         }
@@ -120,79 +163,114 @@ pub(super) fn commit_transactions(
             done.push((transaction.number, entity));
         }
     }
-    if done.is_empty() {
-        return;
-    }
-    // The oldest first: whoever had to wait for the budget is next.
     done.sort_unstable();
-    commands.queue(|world: &mut World| world.insert_resource(Applying(Instant::now())));
-    let mut swapped = 0;
-    for (_, entity) in done {
-        let Ok((_, mut terrain, mut entities, mut transaction)) = terrains.get_mut(entity) else { continue };
-        let swaps = transaction.done.as_ref().map_or(0, |prepared| prepared.parts.len());
-        if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
-            continue;
-        }
-        let Some(Prepared { commit, parts, pieces, took }) = transaction.done.take() else { continue };
-        commands.entity(entity).try_remove::<InFlight>();
-        let start = Instant::now();
-        let news = commit.field_news().to_vec();
-        // A transaction that the game gave up is refused; its edits wait in the queue again.
-        let Ok((committed, waste)) = terrain.settle(commit) else { continue };
-        if !waste.is_empty() {
-            free_later(waste);
-        }
-        let is_step = terrain.has_history_receipts();
-        tell_steps(entity, &mut terrain, &mut moved);
-        swapped += swaps;
+    done.into_iter().map(|(_, entity)| entity).collect()
+}
+
+/// Commits one transaction, and says whether it did: one that the game gave up is refused, and its edits wait in the
+/// queue again.
+fn commit(
+    entity: Entity,
+    mut terrain: Mut<Terrain>,
+    mut entities: Mut<TerrainEntities>,
+    prepared: Prepared,
+    screen: &mut Screen,
+    news: &mut News,
+) -> bool {
+    let start = Instant::now();
+    let Prepared { commit, parts, pieces, took } = prepared;
+    let fields = commit.field_news().to_vec();
+    let Ok((receipts, waste)) = terrain.settle(commit) else { return false };
+    if !waste.is_empty() {
+        free_later(waste);
+    }
+    let is_step = terrain.has_history_receipts();
+    tell_steps(entity, &mut terrain, &mut news.moved);
+    screen.show(entity, &terrain, &mut entities, parts, &fields, is_step);
+    let brushes = receipts.len() as u64;
+    news.tell(entity, receipts, pieces);
+    screen.figures.count(brushes, took, start.elapsed());
+    true
+}
+
+impl Screen<'_, '_> {
+    /// Shows all that a commit changed of a terrain.
+    fn show(
+        &mut self,
+        entity: Entity,
+        terrain: &Terrain,
+        entities: &mut TerrainEntities,
+        parts: Vec<Fresh>,
+        fields: &[(ChunkPos, FieldNews)],
+        is_step: bool,
+    ) {
         let world = terrain.world();
         entities.shown = world.version();
-        let with_fields = news.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
+        let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
         let with_surfaces = parts.into_iter().map(|fresh| (fresh.drawn, Some(fresh)));
         let mut touched = Vec::new();
         for (drawn, fresh) in with_surfaces.chain(with_fields) {
             if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
-            let child = entities.get(&mut commands, drawn);
-            let is_new = child.is_none();
-            if is_new && fresh.as_ref().is_some_and(|fresh| fresh.shown.is_empty) {
-                continue;
-            }
-            let child = child.unwrap_or_else(|| entities.spawn(&mut commands, entity, world, drawn));
-            if let Some(fresh) = fresh {
-                if let Some(assets) = &mut assets {
-                    swap(&mut commands, assets, child, shown.get(child).ok(), fresh.mesh);
-                    figures.swaps += 1;
-                    if let (Drawn::Chunk(_), false) = (drawn, is_new) {
-                        tell(&mut commands, ChunkChanged { entity: child });
-                    }
-                }
-                attach(&mut commands, child, fresh.shown, fresh.attachments);
-            }
-            if let (Drawn::Chunk(_), true) = (drawn, is_new) {
-                tell(&mut commands, ChunkCreated { entity: child });
-            }
+            self.show_part((entity, terrain), entities, drawn, fresh);
         }
-        entities.tell_fields(&mut commands, world, &news);
-        entities.drop_empty(&mut commands, world, touched);
-        figures.commits += 1;
-        figures.brushes += committed.len() as u64;
-        figures.last_transaction = took;
-        figures.transactions.push(took);
-        found.write_batch(pieces);
-        let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
-        receipts.write_batch(committed.into_iter().map(applied));
-        let took = start.elapsed();
-        figures.last_commit = took;
-        figures.commit_times.push(took);
-        figures.main_thread += took;
+        entities.tell_fields(&mut self.commands, world, fields);
+        entities.drop_empty(&mut self.commands, world, touched);
     }
-    commands.queue(|world: &mut World| {
-        if let Some(Applying(start)) = world.remove_resource() {
-            world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
+
+    /// Shows a tile or chunk with its new surface, if it has a new one; spawns it where it has no entity yet.
+    fn show_part(
+        &mut self,
+        (entity, terrain): (Entity, &Terrain),
+        entities: &mut TerrainEntities,
+        drawn: Drawn,
+        fresh: Option<Fresh>,
+    ) {
+        let commands = &mut self.commands;
+        let child = entities.get(commands, drawn);
+        let is_new = child.is_none();
+        if is_new && fresh.as_ref().is_some_and(|fresh| fresh.shown.is_empty) {
+            return;
         }
-    });
+        let child = child.unwrap_or_else(|| entities.spawn(commands, entity, terrain.world(), drawn));
+        let is_chunk = matches!(drawn, Drawn::Chunk(_));
+        if let Some(fresh) = fresh {
+            if let Some(assets) = &mut self.assets {
+                swap(commands, assets, child, self.meshes.get(child).ok(), fresh.mesh);
+                self.figures.swaps += 1;
+                if is_chunk && !is_new {
+                    tell(commands, ChunkChanged { entity: child });
+                }
+            }
+            attach(commands, child, fresh.shown, fresh.attachments);
+        }
+        if is_chunk && is_new {
+            tell(commands, ChunkCreated { entity: child });
+        }
+    }
+}
+
+impl News<'_> {
+    /// Tells what became of a transaction's brushes, and what they cut off.
+    fn tell(&mut self, terrain: Entity, receipts: Vec<Receipt>, pieces: Vec<LoosePieceFound>) {
+        self.found.write_batch(pieces);
+        let applied = |receipt| BrushApplied { terrain: Some(terrain), receipt };
+        self.receipts.write_batch(receipts.into_iter().map(applied));
+    }
+}
+
+impl BurrowFigures {
+    /// Counts one more commit: its brushes, and how long it took in its task and here.
+    fn count(&mut self, brushes: u64, transaction: Duration, commit: Duration) {
+        self.commits += 1;
+        self.brushes += brushes;
+        self.last_transaction = transaction;
+        self.transactions.push(transaction);
+        self.last_commit = commit;
+        self.commit_times.push(commit);
+        self.main_thread += commit;
+    }
 }
 
 /// When the entities that a frame's commits change began to be changed.

@@ -14,6 +14,10 @@ impl Component for Terrain {
 }
 
 /// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.
+///
+/// It wears the terrain's material, and has its `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver`: put them on the
+/// terrain. Leave tiles out of saved scenes: a scene of the whole world brings them back without their terrain, which is
+/// not reflected.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -25,7 +29,7 @@ pub struct Tile {
 }
 
 /// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` where it draws something, even where it holds
-/// no field itself.
+/// no field itself. Dressed, and left out of saved scenes, like a [`Tile`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -63,8 +67,8 @@ pub struct Field {
 }
 
 /// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
-/// gets the terrain's material, and what is drawn on it stays where it was in the ground, wherever it goes. With a
-/// `GroundLook` it follows the terrain's look as long as that terrain is there.
+/// gets the terrain's material, layers and shadows as a [`Tile`] does, and what is drawn on it stays where it was in the
+/// ground, wherever it goes. With a `GroundLook` it follows the terrain's look as long as that terrain is there.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -89,6 +93,7 @@ pub struct Field {
 #[require(Transform, Visibility)]
 pub struct GroundPiece {
     /// The terrain that it was part of.
+    #[entities]
     pub terrain: Entity,
     /// Where its mesh counts from, in voxels of the terrain.
     pub origin: IVec3,
@@ -116,7 +121,7 @@ impl From<&volume::Field> for Field {
 /// its end have the last colour. Materials that sample textures by id ignore it, `GroundMaterial` among them; without any
 /// colour in it, meshes have none, which saves 16 bytes a vertex.
 ///
-/// Meshes made after a change have the new colours.
+/// Meshes made after a change have the new colours, and those made after it was taken off have none.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component)]
 pub struct MaterialColors(pub Vec<LinearRgba>);

@@ -13,13 +13,15 @@ use crate::volume::{self, FieldId};
 #[derive(Component)]
 pub struct TerrainEntities {
     pub(super) shown: Version,
+    /// Metres along the side of the voxels that they were made for.
+    pub(super) voxel_size: f32,
     drawn: HashMap<Drawn, Entity>,
     fields: HashMap<FieldId, Entity>,
 }
 
 impl TerrainEntities {
-    pub(super) fn new(shown: Version) -> Self {
-        Self { shown, drawn: HashMap::default(), fields: HashMap::default() }
+    pub(super) fn new(shown: Version, voxel_size: f32) -> Self {
+        Self { shown, voxel_size, drawn: HashMap::default(), fields: HashMap::default() }
     }
 
     /// Are they those of this world, as it is now? Not while one that the game changed by itself loads.

@@ -93,12 +93,21 @@ async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, st
 pub struct HeightmapPlugin;
 
 impl Plugin for HeightmapPlugin {
-    fn build(&self, _: &mut App) {}
+    // At once where that is possible: games may load a heightmap while they are built, in a `FromWorld` say.
+    fn build(&self, app: &mut App) {
+        register(app);
+    }
 
-    // Once all plugins are there, in whatever order they were added.
+    // Else once all plugins are there, in whatever order they were added.
     fn finish(&self, app: &mut App) {
-        if app.world().contains_resource::<AssetServer>() {
-            app.init_asset::<HeightmapImage>().init_asset_loader::<HeightmapLoader>();
-        }
+        register(app);
+    }
+}
+
+/// Does nothing without an asset server, or the second time.
+fn register(app: &mut App) {
+    let world = app.world();
+    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<HeightmapImage>>() {
+        app.init_asset::<HeightmapImage>().init_asset_loader::<HeightmapLoader>();
     }
 }

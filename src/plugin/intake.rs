@@ -3,13 +3,16 @@
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
+use super::reach::reaches;
 use super::{
     BrushApplied, BurrowFigures, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush, Undo,
+    free_later,
 };
-use crate::brush::{Brush, Operation, Shape};
+use crate::brush::{Brush, Edit, Operation, Shape};
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain};
 
-/// Moves brushes into their terrains' space and queues them. A brush that no terrain can take is answered at once.
+/// Moves brushes into their terrains' space and queues them. A terrain that a brush reaches and that can't take it
+/// answers at once, and so does a brush that reaches none.
 pub(super) fn collect_brushes(
     mut brushes: MessageReader<Brush>,
     mut targeted: MessageReader<TargetedBrush>,
@@ -32,18 +35,30 @@ pub(super) fn collect_brushes(
         answers.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
     };
     for brush in brushes.read() {
-        let mut taken = false;
-        let mut rejection = Rejection::OutsideWorld;
+        let (mut is_answered, mut why) = (false, Rejection::OutsideWorld);
+        // A terrain is borrowed to be changed only once it takes a brush: for `Changed<Terrain>`, others stay as they are.
         for (entity, mut terrain) in &mut terrains {
             let Ok(place) = places.compute_global_transform(entity) else { continue };
             let local = to_terrain(brush, &place);
-            match terrain.offer(&local) {
-                Ok(took) => taken |= took,
-                Err(error) => rejection = error.into(),
+            let grid = terrain.world().grid();
+            match Edit::quantize(&local) {
+                Ok(edit) if edit.reach().intersection(grid.edit_bounds()).is_some() => {
+                    terrain.submit_edit(&edit);
+                    is_answered = true;
+                }
+                Ok(_) => {}
+                Err(error) => match reaches(&local.shape, grid) {
+                    Some(true) => {
+                        reject(brush, Some(entity), error.into());
+                        is_answered = true;
+                    }
+                    Some(false) => {}
+                    None => why = error.into(),
+                },
             }
         }
-        if !taken {
-            reject(brush, None, rejection);
+        if !is_answered {
+            reject(brush, None, why);
         }
     }
     for TargetedBrush { terrain, brush } in targeted.read() {
@@ -127,8 +142,11 @@ fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
 
 /// Brushes and steps that a terrain had not come to when it goes, or another one takes its place. If it comes back, it
 /// does not do what was answered.
+///
+/// Its world may be large: it is held until the component is gone, to be freed elsewhere.
 pub(super) fn answer_with_terrain(
     gone: On<Discard, Terrain>,
+    mut commands: Commands,
     mut terrains: Query<&mut Terrain>,
     mut answers: MessageWriter<BrushApplied>,
     mut moved: MessageWriter<HistoryMoved>,
@@ -144,6 +162,15 @@ pub(super) fn answer_with_terrain(
     answers.write_batch(terrain.unanswered().map(answer));
     moved.write_batch(terrain.unanswered_steps().map(|step| self::gone(Some(gone.entity), step)));
     terrain.forget();
+    let world = terrain.snapshot();
+    commands.queue(move |_: &mut World| free_later(world));
+}
+
+/// The history of a terrain that nobody can take up again is freed in a task, too.
+pub(super) fn free_history(gone: On<Despawn, Terrain>, mut terrains: Query<&mut Terrain>) {
+    if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
+        free_later(terrain.rebudget_undo(0));
+    }
 }
 
 /// How much the scale along one axis may differ from another's, by rounding, where all are the same.

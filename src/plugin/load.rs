@@ -19,6 +19,10 @@ use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
 
 /// A terrain's tiles are all shown, and it takes transactions.
+///
+/// Shown is not painted: while textures are made or loaded, a terrain with a `GroundLook` has no material, and nothing of
+/// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
+/// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainReady {
     /// The terrain's entity.
@@ -29,9 +33,21 @@ pub struct TerrainReady {
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
+    voxel_size: f32,
     task: Option<Task<Vec<Fresh>>>,
     waiting: Vec<Fresh>,
     ready: HashMap<Drawn, Loaded>,
+}
+
+impl Loading {
+    /// Are these meshes of this terrain, whatever the game did to it since? As far as that can be told: of two terrains on
+    /// the same ground the one that was dug less may pass for the other.
+    fn is_of(&self, terrain: &Terrain) -> bool {
+        let (world, now) = (&*self.world, terrain.world());
+        std::ptr::eq(world.ground(), now.ground())
+            && (self.voxel_size, world.grid()) == (terrain.voxel_size(), now.grid())
+            && world.revision() <= now.revision()
+    }
 }
 
 /// A part whose mesh, if it has one, is with the renderer.
@@ -47,18 +63,76 @@ type Idle = (Without<Loading>, Without<InFlight>);
 pub(super) fn scale_terrains(
     mut terrains: Query<(&Terrain, &mut Transform), Or<(Changed<Transform>, Changed<Terrain>)>>,
 ) {
-    for (terrain, mut transform) in &mut terrains {
-        let scale = Vec3::splat(terrain.voxel_size());
-        if transform.scale != scale {
-            transform.scale = scale;
+    for (terrain, transform) in &mut terrains {
+        scale(transform, terrain);
+    }
+}
+
+fn scale(mut transform: Mut<Transform>, terrain: &Terrain) {
+    let scale = Vec3::splat(terrain.voxel_size());
+    if transform.scale != scale {
+        transform.scale = scale;
+    }
+}
+
+/// A terrain that comes is scaled and placed at once: who asks about it in the frame that spawned it, in `Startup` say,
+/// finds it where it is. What was made for another terrain on its entity goes, unless it may be shown until the new one
+/// has loaded.
+pub(super) fn take_in(
+    new: On<Insert, Terrain>,
+    mut commands: Commands,
+    terrains: Query<(&Terrain, Option<&TerrainEntities>, Option<&Children>)>,
+    mut places: ParamSet<(Query<&mut Transform>, TransformHelper, Query<&mut GlobalTransform>)>,
+) {
+    let entity = new.entity;
+    let Ok((terrain, entities, children)) = terrains.get(entity) else { return };
+    commands.entity(entity).try_remove::<(Loading, InFlight)>();
+    drop_misfits(&mut commands, entity, terrain, entities, children);
+    if let Ok(transform) = places.p0().get_mut(entity) {
+        scale(transform, terrain);
+    }
+    let Ok(now) = places.p1().compute_global_transform(entity) else { return };
+    if let Ok(place) = places.p2().get_mut(entity) {
+        put(place, now, terrain);
+    }
+}
+
+/// The same for a terrain that the game put in place of another one without inserting it, by `mem::swap` say.
+pub(super) fn drop_former(
+    mut commands: Commands,
+    terrains: Query<
+        (Entity, &Terrain, Option<&Loading>, Option<&TerrainEntities>, Option<&Children>),
+        Changed<Terrain>,
+    >,
+) {
+    for (entity, terrain, loading, entities, children) in &terrains {
+        if loading.is_some_and(|loading| !loading.is_of(terrain)) {
+            commands.entity(entity).try_remove::<Loading>();
         }
+        drop_misfits(&mut commands, entity, terrain, entities, children);
+    }
+}
+
+/// Takes tiles and chunks away that were made for voxels of another size: the new scale would draw them too large or too
+/// small.
+fn drop_misfits(
+    commands: &mut Commands,
+    entity: Entity,
+    terrain: &Terrain,
+    entities: Option<&TerrainEntities>,
+    children: Option<&Children>,
+) {
+    if let Some(entities) = entities.filter(|entities| entities.voxel_size != terrain.voxel_size()) {
+        entities.despawn(commands, children);
+        // A transaction under way was the other terrain's, and nothing is left that it could change.
+        commands.entity(entity).try_remove::<(TerrainEntities, InFlight)>();
     }
 }
 
 /// Starts the task of each terrain that is new, or whose world the game changed by itself.
 pub(super) fn start_loading(
     mut commands: Commands,
-    terrains: Query<(Entity, &Terrain, &MaterialColors, Option<&TerrainEntities>), Idle>,
+    terrains: Query<(Entity, &Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
     assets: Option<Res<Assets<Mesh>>>,
     companions: Res<Companions>,
 ) {
@@ -66,17 +140,17 @@ pub(super) fn start_loading(
         if entities.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
-        let world = terrain.snapshot();
+        let (world, voxel_size) = (terrain.snapshot(), terrain.voxel_size());
         let workshop = Workshop {
             wardrobe: assets.is_some().then(|| Wardrobe::new(&world, colors)),
             companions: companions.clone(),
         };
         let task = (!workshop.is_idle()).then(|| {
-            let (world, voxel_size) = (Arc::clone(&world), terrain.voxel_size());
+            let world = Arc::clone(&world);
             AsyncComputeTaskPool::get()
                 .spawn(async move { make_all(&world, &workshop, (entity, voxel_size)) })
         });
-        let loading = Loading { world, task, waiting: Vec::new(), ready: HashMap::default() };
+        let loading = Loading { world, voxel_size, task, waiting: Vec::new(), ready: HashMap::default() };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -86,12 +160,16 @@ pub(super) fn place_terrains(
     places: TransformHelper,
     mut terrains: Query<(Entity, &Terrain, &mut GlobalTransform)>,
 ) {
-    for (entity, terrain, mut place) in &mut terrains {
+    for (entity, terrain, place) in &mut terrains {
         let Ok(now) = places.compute_global_transform(entity) else { continue };
-        if *place != now {
-            *place = now;
-            warn_about_placement(&now, terrain.voxel_size());
-        }
+        put(place, now, terrain);
+    }
+}
+
+fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform, terrain: &Terrain) {
+    if *place != now {
+        *place = now;
+        warn_about_placement(&now, terrain.voxel_size());
     }
 }
 
@@ -148,7 +226,7 @@ pub(super) fn finish_loading(
 /// Spawns tiles, chunks and fields of a world that has loaded.
 fn show(commands: &mut Commands, terrain: Entity, loading: &mut Loading) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
-    let mut entities = TerrainEntities::new(world.version());
+    let mut entities = TerrainEntities::new(world.version(), loading.voxel_size);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     for drawn in world.grid().tiles().map(Drawn::Tile).chain(chunks.into_iter().map(Drawn::Chunk)) {

@@ -45,8 +45,10 @@ pub(crate) struct Wardrobe {
 }
 
 impl Wardrobe {
-    pub(crate) fn new(world: &World, colors: &MaterialColors) -> Self {
-        Self { colors: colors.clone(), ground: world.shared_ground(), grid: world.grid() }
+    /// Without colours, meshes have none.
+    pub(crate) fn new(world: &World, colors: Option<&MaterialColors>) -> Self {
+        let colors = colors.cloned().unwrap_or(MaterialColors(Vec::new()));
+        Self { colors, ground: world.shared_ground(), grid: world.grid() }
     }
 
     /// Builds the Bevy mesh of a tile or chunk, in the task.
@@ -153,7 +155,7 @@ fn blend(mix: MaterialMix, colors: &MaterialColors) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::ground::{ColumnMaterial, MaterialControl, MaterialId, NoiseHeights};
+    use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights};
     use crate::terrain::{Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
@@ -220,6 +222,30 @@ mod tests {
             assert_eq!(bits(own), bits(other));
             assert!(own.depth.abs() < 1.0 / 64.0, "{own:?} is on the surface");
         }
+    }
+
+    #[test]
+    fn colours_are_blended_by_weight() {
+        let colors = MaterialColors(vec![LinearRgba::RED, LinearRgba::GREEN]);
+        let mix = MaterialMix { ids: [0, 9, 0, 0], weights: [51, 204, 0, 0] };
+        for (found, expected) in blend(mix, &colors).into_iter().zip([0.2, 0.8, 0.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-6, "{found} is not {expected}");
+        }
+    }
+
+    #[test]
+    fn covers_are_blended_along_an_edge() {
+        let mask = GreyImage::from_samples(65, 65, (0..65 * 65).map(|index| index % 2 * u16::MAX).collect());
+        let checkers =
+            MaterialControl::Blend { mask: mask.unwrap(), base: MaterialId(0), overlay: MaterialId(1) };
+        let ground = Ground::flat(64, 64, 8.0).unwrap().with_materials(&checkers).unwrap();
+        let cover = |x: i32, z: i32| {
+            let place = IVec3::new(10 * SNAP + x, 8 * SNAP, 10 * SNAP + z);
+            let materials = MaterialMix::pure(MaterialId(0));
+            Origin::of(&ground, IVec3::ZERO, &Vertex { position: place, normal: Vec3::Y, materials }).cover
+        };
+        assert_eq!([cover(0, 0), cover(SNAP, 0), cover(0, SNAP)], [0, 255, 255]);
+        assert_eq!([cover(SNAP / 4, 0), cover(0, SNAP / 4), cover(SNAP + SNAP / 4, 0)], [63, 63, 191]);
     }
 
     #[test]

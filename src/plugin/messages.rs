@@ -25,10 +25,11 @@ pub struct TargetedBrush {
     pub brush: Brush,
 }
 
-/// What became of a brush; each brush gets at least one. Bounds count in voxels of the terrain.
+/// What became of a brush: one from each terrain that it reaches, whether that took it or refused it. Bounds count in
+/// voxels of the terrain.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct BrushApplied {
-    /// The terrain that was changed; `None` for a brush that no terrain took.
+    /// The terrain; `None` for a brush that reaches none, or whose place is no number.
     pub terrain: Option<Entity>,
     /// Scenario, volumes, bounds, or why it was rejected.
     pub receipt: Receipt,
@@ -102,7 +103,7 @@ impl LoosePieceFound {
         if let Some(ready) = &self.ready {
             return Some(Mesh::clone(ready));
         }
-        self.build(&Wardrobe::new(terrain.world(), colors))
+        self.build(&Wardrobe::new(terrain.world(), Some(colors)))
     }
 
     fn build(&self, wardrobe: &Wardrobe) -> Option<Mesh> {

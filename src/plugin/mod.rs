@@ -9,6 +9,12 @@
 //! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
 //! On [`LooseGround`], [`LoosePieceFound`] tells what a brush cut off.
 //!
+//! What a game puts on the terrain's entity goes for all that is drawn below it: a `MeshMaterial3d`, [`RenderLayers`], and,
+//! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. Bevy asks each mesh for its own, so new tiles,
+//! chunks and [`GroundPiece`]s get the terrain's, and follow as it is put on, changed and taken off.
+//!
+//! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
+//!
 //! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
 //! commit: see [`Companion`].
 //!
@@ -18,12 +24,14 @@ mod commit;
 mod companion;
 mod components;
 mod entities;
+mod hand_on;
 mod heightmap;
 mod intake;
 mod load;
 mod meshes;
 mod messages;
 mod query;
+mod reach;
 mod settings;
 mod times;
 
@@ -89,7 +97,7 @@ pub enum BurrowSystems {
     Commit,
     /// Queued brushes start as transactions.
     Begin,
-    /// New tiles, chunks and pieces get their terrain's material.
+    /// New tiles, chunks and pieces get their terrain's material, layers and shadows.
     Dress,
 }
 
@@ -112,6 +120,8 @@ impl Plugin for TerrainPlugin {
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
+            .add_observer(load::take_in)
+            .add_observer(intake::free_history)
             .add_observer(intake::answer_with_terrain)
             .add_observer(intake::stop_looking)
             .add_observer(entities::remove_with_terrain)
@@ -129,7 +139,13 @@ impl Plugin for TerrainPlugin {
             .add_systems(
                 Update,
                 (
-                    (load::scale_terrains, load::start_loading, load::place_terrains, load::finish_loading)
+                    (
+                        load::scale_terrains,
+                        load::drop_former,
+                        load::start_loading,
+                        load::place_terrains,
+                        load::finish_loading,
+                    )
                         .chain()
                         .in_set(BurrowSystems::Load),
                     (intake::collect_brushes, intake::collect_steps).chain().in_set(BurrowSystems::Collect),
@@ -137,10 +153,13 @@ impl Plugin for TerrainPlugin {
                     commit::begin_transactions.in_set(BurrowSystems::Begin),
                 ),
             );
+        hand_on::add(app);
     }
 }
 
-/// Frees in a task what takes its time.
+/// Frees in a task what takes its time; here, where there are no tasks.
 pub(crate) fn free_later(waste: impl Send + 'static) {
-    AsyncComputeTaskPool::get().spawn(async move { drop(waste) }).detach();
+    if let Some(tasks) = AsyncComputeTaskPool::try_get() {
+        tasks.spawn(async move { drop(waste) }).detach();
+    }
 }

@@ -1,6 +1,7 @@
 //! Questions about the ground in world space, over all terrains.
 
 use bevy::ecs::system::SystemParam;
+use bevy::math::Affine3A;
 use bevy::prelude::*;
 
 use super::entities::TerrainEntities;
@@ -10,8 +11,9 @@ use crate::terrain::{Span, Terrain};
 
 /// A system parameter that asks all terrains about the ground, in world space.
 ///
-/// Terrains may be moved and evenly scaled; for [`height`](Self::height) and [`spans`](Self::spans) they must not be
-/// rotated.
+/// Terrains may be moved, rotated and evenly scaled; for [`height`](Self::height) and [`spans`](Self::spans) they must
+/// not be rotated. A terrain is asked where it was when it was inserted, or at the start of this frame's
+/// [`BurrowSystems::Load`](super::BurrowSystems::Load), whichever came last.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -48,7 +50,8 @@ pub struct TerrainHit {
 }
 
 impl Terrains<'_, '_> {
-    /// The first ground that a ray meets within `max_distance` metres.
+    /// The first ground that a ray meets within `max_distance` metres. Bevy's mesh picking passes through ground, whose
+    /// meshes live in the render world only: pick it with this.
     pub fn raycast(&self, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
         let hits = self.terrains.iter().filter_map(|(entity, terrain, place, _)| {
             let affine = place.affine();
@@ -68,44 +71,58 @@ impl Terrains<'_, '_> {
                 from_inside: hit.from_inside,
             })
         });
-        hits.min_by(|a, b| a.distance.total_cmp(&b.distance))
+        hits.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.terrain.cmp(&b.terrain)))
     }
 
-    /// The topmost ground over (x, z); `None` where no terrain is.
+    /// The topmost ground over (x, z), of all terrains there; `None` where none is.
     pub fn height(&self, x: f32, z: f32) -> Option<f32> {
         self.spans(x, z).last().map(|span| span.floor as f32)
     }
 
-    /// The stretches of air over (x, z), lowest first, in metres. Where terrains overlap, those of the first one.
+    /// The stretches of air over (x, z), lowest first, in metres. Where terrains overlap, those of the one whose ground is
+    /// topmost there, and of two at one height always those of the same one.
     pub fn spans(&self, x: f32, z: f32) -> Vec<Span> {
-        let over = self.terrains.iter().map(|(_, terrain, place, _)| {
+        let over = self.terrains.iter().filter_map(|(entity, terrain, place, _)| {
             let (origin, scale) = (place.translation().as_dvec3(), f64::from(place.scale().x));
             let local = |at: f32, from: f64| (f64::from(at) - from) / scale;
             let spans = terrain.world().spans(local(x, origin.x), local(z, origin.z));
             let world = |y: f64| y * scale + origin.y;
-            spans
+            let spans = spans
                 .into_iter()
                 .map(|span| Span { floor: world(span.floor), ceiling: span.ceiling.map(world) })
-                .collect::<Vec<_>>()
+                .collect::<Vec<_>>();
+            Some((spans.last()?.floor, entity, spans))
         });
-        over.into_iter().find(|spans| !spans.is_empty()).unwrap_or_default()
+        let highest = over.max_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        highest.map(|(_, _, spans)| spans).unwrap_or_default()
     }
 
-    /// The unit normal of the surface that is nearest to `place` along y; `None` where no terrain is.
+    /// The unit normal of the surface that is nearest to `place` along the y of its terrain; `None` where no terrain is.
     pub fn normal(&self, place: Vec3) -> Option<Vec3> {
-        self.terrains.iter().find_map(|(_, terrain, at, _)| {
-            let affine = at.affine();
-            let normal = terrain.world().normal(affine.inverse().transform_point3(place).as_dvec3())?;
-            Some(affine.transform_vector3(normal).normalize_or_zero())
-        })
+        let (terrain, affine) = self.nearest(place)?;
+        let normal = terrain.world().normal(affine.inverse().transform_point3(place).as_dvec3())?;
+        Some(affine.transform_vector3(normal).normalize_or_zero())
     }
 
-    /// What the ground is made of at a place on or in it; `None` where no terrain is.
+    /// What the ground is made of at a place on or in it; `None` where no terrain is. Where terrains overlap, the one
+    /// answers whose surface is nearest along its y.
     pub fn material(&self, place: Vec3) -> Option<MaterialId> {
-        self.terrains.iter().find_map(|(_, terrain, at, _)| {
-            let local = at.affine().inverse().transform_point3(place).as_dvec3();
-            terrain.world().height(local.x, local.z).map(|_| terrain.world().material_under(local))
-        })
+        let (terrain, affine) = self.nearest(place)?;
+        Some(terrain.world().material_under(affine.inverse().transform_point3(place).as_dvec3()))
+    }
+
+    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one.
+    fn nearest(&self, place: Vec3) -> Option<(&Terrain, Affine3A)> {
+        let over = self.terrains.iter().filter_map(|(entity, terrain, at, _)| {
+            let affine = at.affine();
+            let local = affine.inverse().transform_point3(place).as_dvec3();
+            let spans = terrain.world().spans(local.x, local.z);
+            let surfaces = spans.into_iter().flat_map(|span| [Some(span.floor), span.ceiling]).flatten();
+            let apart = surfaces.map(|y| (y - local.y).abs()).min_by(f64::total_cmp)?;
+            Some((apart * f64::from(at.scale().y), entity, terrain, affine))
+        });
+        let nearest = over.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        nearest.map(|(_, _, terrain, affine)| (terrain, affine))
     }
 
     /// Is the place inside the ground?
@@ -115,14 +132,29 @@ impl Terrains<'_, '_> {
         })
     }
 
-    /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there?
+    /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there? Not while
+    /// there is no terrain at all, nor with a corner that is no number. Infinite corners stand for everywhere.
+    ///
+    /// Shown is not painted: see [`TerrainReady`](super::TerrainReady).
     pub fn is_ready(&self, min: Vec3, max: Vec3) -> bool {
+        if self.terrains.is_empty() || min.is_nan() || max.is_nan() {
+            return false;
+        }
+        // Farther than any terrain reaches; infinite numbers can't be turned.
+        let far = Vec3::splat(1.0e9);
+        let (min, max) = (min.clamp(-far, far), max.clamp(-far, far));
         self.terrains.iter().all(|(_, terrain, place, entities)| {
             let loaded = entities.is_some_and(|entities| entities.show(terrain.world()));
             let inverse = place.affine().inverse();
-            let (a, b) = (inverse.transform_point3(min), inverse.transform_point3(max));
-            let bounds = LatticeBox::new(a.min(b).floor().as_ivec3(), a.max(b).ceil().as_ivec3());
-            loaded && bounds.is_none_or(|bounds| terrain.is_ready(bounds))
+            let corners = (0..8).map(|corner| {
+                let is_high = BVec3::new(corner & 1 > 0, corner & 2 > 0, corner & 4 > 0);
+                inverse.transform_point3(Vec3::select(is_high, max, min))
+            });
+            let (low, high) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| {
+                (low.min(corner), high.max(corner))
+            });
+            let bounds = LatticeBox::new(low.floor().as_ivec3(), high.ceil().as_ivec3());
+            loaded && bounds.is_some_and(|bounds| terrain.is_ready(bounds))
         })
     }
 }

@@ -258,3 +258,41 @@ fn tiles_go_from_the_end_of_their_terrains_children() {
     let left = stage.app.world().get::<Children>(terrain).expect("the game's own child");
     assert_eq!(&**left, [own]);
 }
+
+/// Keeps all threads of Bevy's tasks busy until what it returns is dropped.
+#[cfg(feature = "examples")]
+fn hold_tasks() -> std::sync::mpsc::Sender<()> {
+    use std::sync::{Arc, Mutex, mpsc};
+
+    let tasks = bevy::tasks::AsyncComputeTaskPool::get();
+    let (hold, held) = mpsc::channel::<()>();
+    let (start, started) = mpsc::channel();
+    let held = Arc::new(Mutex::new(held));
+    for _ in 0..tasks.thread_num() {
+        let (held, start) = (Arc::clone(&held), start.clone());
+        let wait = async move {
+            start.send(()).expect("somebody waits for it");
+            // An error: what was held on to is gone.
+            let _ = held.lock().expect("nobody panics with it").recv();
+        };
+        tasks.spawn(wait).detach();
+    }
+    (0..tasks.thread_num()).for_each(|_| started.recv().expect("it starts"));
+    hold
+}
+
+// With the examples come Bevy's threads; without these a task runs where it is waited for.
+#[cfg(feature = "examples")]
+#[test]
+fn the_world_of_a_terrain_that_goes_is_freed_in_a_task() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.show(steep());
+    stage.frames(4);
+    let world = std::sync::Arc::downgrade(&stage.terrain(terrain).snapshot());
+    assert_eq!(world.strong_count(), 1);
+    let tasks = hold_tasks();
+    stage.app.world_mut().despawn(terrain);
+    assert_eq!(world.strong_count(), 1, "freed on the main thread");
+    drop(tasks);
+    stage.frames_until("it is freed", |_| world.strong_count() == 0);
+}

@@ -293,3 +293,12 @@ fn a_chunk_that_draws_nothing_any_more_keeps_its_entity_without_a_mesh() {
     assert!(stage.app.world().entity(rock[0]).contains::<Mesh3d>());
     stage.assert_whole(terrain, "the rock is back");
 }
+
+#[test]
+fn the_terrain_of_a_piece_is_mapped_with_other_entities() {
+    let mut world = World::new();
+    let (here, there) = (world.spawn_empty().id(), world.spawn_empty().id());
+    let mut piece = GroundPiece { terrain: here, origin: IVec3::ZERO };
+    <GroundPiece as Component>::map_entities(&mut piece, &mut (here, there));
+    assert_eq!(piece.terrain, there);
+}

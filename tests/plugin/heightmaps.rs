@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::prelude::*;
 use bevy_burrow::ground::ImageLimits;
-use bevy_burrow::plugin::HeightmapSettings;
+use bevy_burrow::plugin::{HeightmapPlugin, HeightmapSettings};
 use bevy_burrow::prelude::*;
 
 use crate::stage::Stage;
@@ -195,4 +195,31 @@ fn pictures_of_a_game_stay_pictures() {
     });
     let pictures = stage.app.world().resource::<Assets<Image>>();
     assert_eq!(pictures.iter().count(), 1, "no other loader took it");
+}
+
+/// A game's own resource, which wants a heightmap at once.
+#[derive(Resource)]
+struct Map(Handle<HeightmapImage>);
+
+impl FromWorld for Map {
+    fn from_world(world: &mut World) -> Self {
+        Self(world.resource::<AssetServer>().load("jacksboro_fault.png"))
+    }
+}
+
+#[test]
+fn a_heightmap_may_be_loaded_while_the_app_is_built() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default())).add_plugins(BurrowPlugins);
+    app.init_resource::<Map>();
+    assert!(app.world().resource::<Map>().0.is_strong());
+}
+
+#[test]
+fn heightmaps_may_come_before_bevys_assets() {
+    let mut app = App::new();
+    app.add_plugins((HeightmapPlugin, MinimalPlugins, AssetPlugin::default()));
+    assert!(!app.world().contains_resource::<Assets<HeightmapImage>>());
+    app.finish();
+    assert!(app.world().contains_resource::<Assets<HeightmapImage>>());
 }

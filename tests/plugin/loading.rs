@@ -92,3 +92,36 @@ fn a_brush_in_the_first_frame_of_a_moved_and_scaled_terrain_goes_where_it_was_se
         assert_eq!(stage.hash(terrain), model.world().hash(), "after {earlier} frames");
     }
 }
+
+#[test]
+fn a_terrain_without_colours_loads_and_is_dug() {
+    let mut stage = Stage::drawing();
+    let terrain = stage.spawn(level(1.0));
+    stage.app.world_mut().entity_mut(terrain).remove::<MaterialColors>();
+    stage.settle();
+    stage.send(dig(30.0, 8.0, 30.0, 4.0));
+    stage.settle();
+    stage.assert_whole(terrain, "without colours");
+    let meshes = stage.app.world().resource::<Assets<Mesh>>();
+    assert!(meshes.iter().all(|(_, mesh)| mesh.attribute(Mesh::ATTRIBUTE_COLOR).is_none()));
+}
+
+/// How high terrains were found to be.
+#[derive(Resource, Default)]
+struct Floors(Vec<Option<f32>>);
+
+#[test]
+fn a_terrain_is_found_where_it_is_before_the_first_update() {
+    let spawn = |mut commands: Commands| {
+        commands.spawn((level(0.5), Transform::from_xyz(-256.0, 0.0, -256.0)));
+        let island = (Transform::from_xyz(500.0, 20.0, 0.0), Visibility::default());
+        commands.spawn(island).with_child(level(0.5));
+    };
+    let ask = |terrains: Terrains, mut floors: ResMut<Floors>| {
+        floors.0 = vec![terrains.height(-250.0, -250.0), terrains.height(510.0, 10.0)];
+    };
+    let mut stage = Stage::drawing();
+    stage.app.init_resource::<Floors>().add_systems(Startup, (spawn, ask).chain());
+    stage.frame();
+    assert_eq!(stage.app.world().resource::<Floors>().0, [Some(4.0), Some(24.0)]);
+}

@@ -6,6 +6,7 @@ mod companions;
 mod debug_views;
 mod despawning;
 mod entities;
+mod handed_on;
 mod heightmaps;
 mod history;
 mod holes;

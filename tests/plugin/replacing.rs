@@ -188,3 +188,49 @@ fn a_terrain_that_is_put_elsewhere_keeps_the_size_of_its_voxels() {
     model.apply([dig(16.0, 8.0, 32.0, 4.0)]);
     assert_eq!(stage.hash(terrain), model.world().hash());
 }
+
+/// The ways to put a terrain in place of another one.
+const WAYS: [fn(&mut Stage, Entity, Terrain); 2] = [insert, assign];
+
+fn insert(stage: &mut Stage, entity: Entity, other: Terrain) {
+    stage.app.world_mut().entity_mut(entity).insert(other);
+}
+
+fn assign(stage: &mut Stage, entity: Entity, other: Terrain) {
+    *stage.app.world_mut().get_mut::<Terrain>(entity).expect("a terrain") = other;
+}
+
+#[test]
+fn a_terrain_that_is_replaced_while_it_loads_is_never_shown() {
+    for replace in WAYS {
+        let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 1, ..default() });
+        let mut former = steep();
+        former.apply(random_brushes(14, 10));
+        let terrain = stage.spawn(former);
+        stage.frames(6);
+        assert_eq!(stage.count::<Tile>(), 0, "the former still loads");
+        replace(&mut stage, terrain, level(1.0));
+        stage.frames_until("the other terrain is shown", |stage| {
+            let triangles = stage.shown(terrain).triangles;
+            assert!([0, 2 * 64 * 64].contains(&triangles), "{triangles} triangles are the former's");
+            triangles > 0
+        });
+    }
+}
+
+#[test]
+fn tiles_of_another_terrain_are_not_shown_in_the_scale_of_a_new_one() {
+    for replace in WAYS {
+        let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 1, ..default() });
+        let terrain = stage.show(level(1.0));
+        stage.send(dig(30.0, 8.0, 30.0, 4.0));
+        stage.frame();
+        assert!(stage.terrain(terrain).is_busy());
+        replace(&mut stage, terrain, level(0.5));
+        stage.frame();
+        assert_eq!((stage.count::<Tile>(), stage.count::<Mesh3d>()), (0, 0));
+        stage.frames_until("the other terrain is shown", is_ready);
+        assert_eq!(stage.count::<Tile>(), 16);
+        stage.assert_whole(terrain, "replaced");
+    }
+}

@@ -164,3 +164,48 @@ fn a_stretched_terrain_is_dug_where_brushes_are_in_the_world() {
     model.apply(tools(Affine3A::IDENTITY, 1.0));
     assert_eq!(stage.hash(terrain), model.world().hash());
 }
+
+#[test]
+fn a_terrain_that_refuses_a_brush_says_so_though_another_one_takes_it() {
+    let mut stage = Stage::drawing();
+    let (coarse, fine) = (stage.spawn(level(1.0)), stage.spawn(level(0.5)));
+    stage.settle();
+    // Too small for voxels of a metre, and just large enough for those of half a metre.
+    stage.send(dig(10.0, 6.0, 10.0, 0.15));
+    stage.settle();
+    let (mut answers, mut both) = (answers(&stage), [(Some(coarse), false), (Some(fine), true)]);
+    answers.sort();
+    both.sort();
+    assert_eq!(answers, both);
+}
+
+#[test]
+fn a_brush_that_reaches_no_terrain_lies_outside_whatever_they_think_of_it() {
+    let (mut stage, ..) = pair();
+    stage.send(dig(-500.0, 8.0, 30.0, 0.1));
+    stage.frame();
+    let [applied] = stage.receipts() else { panic!("one receipt") };
+    assert_eq!((applied.terrain, &applied.receipt.outcome), (None, &Err(Rejection::OutsideWorld)));
+}
+
+/// The terrains that were changed.
+#[derive(Resource, Default)]
+struct Changes(Vec<Entity>);
+
+#[test]
+fn a_brush_does_not_count_as_a_change_of_terrains_that_it_does_not_reach() {
+    let (mut stage, first, second) = pair();
+    stage.app.init_resource::<Changes>().add_systems(
+        Last,
+        |changed: Query<Entity, Changed<Terrain>>, mut changes: ResMut<Changes>| {
+            changes.0.extend(changed.iter());
+        },
+    );
+    // To the new system, all are changed at first.
+    stage.frame();
+    stage.app.world_mut().resource_mut::<Changes>().0.clear();
+    stage.send(dig(30.0, 8.0, 30.0, 4.0));
+    stage.settle();
+    let changes = &stage.app.world().resource::<Changes>().0;
+    assert!(changes.contains(&first) && !changes.contains(&second), "{changes:?}");
+}
