@@ -103,6 +103,14 @@ struct Key {
     fading: u64,
 }
 
+/// A view as it was drawn last.
+struct Drawing {
+    key: Key,
+    since: Duration,
+    /// How many entities it has; games may despawn a terrain's children.
+    layers: usize,
+}
+
 /// Draws what is on and not as it should be, and takes away what is off.
 fn draw(
     mut commands: Commands,
@@ -113,7 +121,7 @@ fn draw(
     cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
     shown: Query<(Entity, &DebugLines, &ChildOf)>,
     mut assets: ResMut<Assets<GizmoAsset>>,
-    mut drawn: Local<HashMap<(Entity, DebugView), (Key, Duration)>>,
+    mut drawn: Local<HashMap<(Entity, DebugView), Drawing>>,
     mut frames: Local<u64>,
     mut faded: Local<bool>,
 ) {
@@ -146,9 +154,13 @@ fn draw(
                 settings: debug.clone(),
                 fading,
             };
-            if let Some((old, since)) = drawn.get(&(entity, view)) {
+            let own =
+                shown.iter().filter(|(_, lines, parent)| lines.view == view && parent.parent() == entity);
+            let own: Vec<Entity> = own.map(|(lines, ..)| lines).collect();
+            if let Some(Drawing { key: old, since, layers }) = drawn.get(&(entity, view)) {
                 let is_urgent = old.settings != key.settings || old.fading != key.fading;
-                if *old == key || !is_urgent && now.saturating_sub(*since) < PERIOD {
+                let is_as_it_was = *old == key || !is_urgent && now.saturating_sub(*since) < PERIOD;
+                if is_as_it_was && own.len() == *layers {
                     continue;
                 }
             }
@@ -161,14 +173,13 @@ fn draw(
                 if view == DebugView::Dirty { &fresh } else { &[] },
                 &mut pen,
             );
-            let own =
-                shown.iter().filter(|(_, lines, parent)| lines.view == view && parent.parent() == entity);
-            own.for_each(|(old, ..)| commands.entity(old).try_despawn());
-            for layer in pen.finish() {
+            own.into_iter().for_each(|old| commands.entity(old).try_despawn());
+            let layers = pen.finish();
+            drawn.insert((entity, view), Drawing { key, since: now, layers: layers.len() });
+            for layer in layers {
                 // They are drawn in this very frame, and nobody places them any more.
                 commands.spawn((DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity), *own_place));
             }
-            drawn.insert((entity, view), (key, now));
         }
     }
 }
@@ -222,8 +233,8 @@ mod tests {
     use crate::plugin::BurrowPlugins;
     use crate::terrain::TerrainSettings;
 
-    #[test]
-    fn lines_are_where_their_terrain_is_in_the_frame_they_come_in_and_go_when_it_is_hidden() {
+    /// An app that shows the chunks of a terrain, which stands there.
+    fn app(place: Transform) -> (App, Entity) {
         let mut app = App::new();
         app.add_plugins((
             MinimalPlugins,
@@ -238,9 +249,15 @@ mod tests {
         app.cleanup();
         let ground = Ground::flat(64, 64, 8.0).expect("valid");
         let terrain = Terrain::new(ground, &TerrainSettings { voxel_size: 0.5, ..default() }).expect("valid");
-        let place = Transform::from_xyz(100.0, 116.0, 104.0);
         let entity = app.world_mut().spawn((terrain, place, InheritedVisibility::VISIBLE)).id();
         app.update();
+        (app, entity)
+    }
+
+    #[test]
+    fn lines_are_where_their_terrain_is_in_the_frame_they_come_in_and_go_when_it_is_hidden() {
+        let place = Transform::from_xyz(100.0, 116.0, 104.0);
+        let (mut app, entity) = app(place);
         let mut lines = app.world_mut().query_filtered::<&GlobalTransform, With<DebugLines>>();
         let places: Vec<&GlobalTransform> = lines.iter(app.world()).collect();
         let expected = GlobalTransform::from(place.with_scale(Vec3::splat(0.5)));
@@ -248,5 +265,19 @@ mod tests {
         app.world_mut().entity_mut(entity).insert(InheritedVisibility::HIDDEN);
         app.update();
         assert_eq!(lines.iter(app.world()).count(), 0);
+    }
+
+    #[test]
+    fn lines_that_a_game_despawns_are_drawn_again_and_others_are_left_alone() {
+        let (mut app, entity) = app(Transform::from_xyz(100.0, 116.0, 104.0));
+        let mut lines = app.world_mut().query_filtered::<Entity, With<DebugLines>>();
+        let before: Vec<Entity> = lines.iter(app.world()).collect();
+        app.update();
+        assert!(!before.is_empty());
+        assert_eq!(lines.iter(app.world()).collect::<Vec<_>>(), before);
+        app.world_mut().entity_mut(entity).despawn_children();
+        assert_eq!(lines.iter(app.world()).count(), 0);
+        app.update();
+        assert_eq!(lines.iter(app.world()).count(), before.len());
     }
 }

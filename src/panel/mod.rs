@@ -115,8 +115,8 @@ fn act(
             PanelAction::Redo => drop(chosen.map(|terrain| redos.write(Redo { terrain: Some(terrain) }))),
             PanelAction::CheckSeams => {
                 let terrain = chosen.and_then(|entity| terrains.get(entity).ok());
-                if let (Some((_, terrain)), None) = (terrain, &check) {
-                    survey::start_seam_check(&mut commands, &mut panel, terrain);
+                if let (Some((entity, terrain)), None) = (terrain, &check) {
+                    survey::start_seam_check(&mut commands, &mut panel, entity, terrain);
                 }
             }
             PanelAction::SavePicture => picture::save(&mut commands, &mut panel, cameras.iter().next()),
@@ -154,7 +154,7 @@ fn draw(
     figures: Res<BurrowFigures>,
     survey: Res<Survey>,
     terrains: Query<(Entity, &Terrain)>,
-    parts: Query<(Option<&Name>, &MaterialColors, Option<&LooseGround>, Option<&GroundLook>)>,
+    parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseGround>, Option<&GroundLook>)>,
     mut places: ResMut<PanelPlaces>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
@@ -168,7 +168,7 @@ fn draw(
     let was_typing = context.text_edit_focused();
     let chosen = survey::chosen(&panel, &terrains);
     let part = chosen.and_then(|entity| parts.get(entity).ok());
-    let materials = materials(&panel, &part.map(|(_, colors, ..)| colors.clone()).unwrap_or_default());
+    let materials = materials(&panel, &part.and_then(|(_, colors, ..)| colors.cloned()).unwrap_or_default());
     let customs =
         chosen.and_then(|entity| terrains.get(entity).ok()).map_or_else(Customs::default, |(_, terrain)| {
             Customs::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
-use bevy_egui::{EguiContext, PrimaryEguiContext};
+use bevy_egui::EguiContext;
+
+use crate::terrain::World;
 
 /// The panel itself; [`BrushTool`](super::BrushTool) holds what it sets.
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
@@ -68,6 +70,30 @@ pub(super) enum Note {
     Good(String),
     Bad(String),
     Busy(String),
+    /// What a seam check found.
+    Seams(Verdict),
+}
+
+/// What a seam check found: of a terrain as it was then.
+#[derive(Reflect, Clone, Debug, PartialEq, Eq)]
+pub(super) struct Verdict {
+    pub terrain: Entity,
+    pub revision: u64,
+    /// Of the world that was checked.
+    pub hash: u64,
+    pub is_flawless: bool,
+    pub text: String,
+}
+
+impl Verdict {
+    /// What it says of a terrain: nothing of another one, and of one that has changed since, when that was.
+    pub fn about(&self, terrain: Entity, world: &World) -> Option<String> {
+        if terrain != self.terrain {
+            return None;
+        }
+        let then = || format!("revision {}: {}", self.revision, self.text);
+        Some(if world.hash() == self.hash { self.text.clone() } else { then() })
+    }
 }
 
 /// A button of the panel. Games may send these too, from keys say.
@@ -83,7 +109,8 @@ pub enum PanelAction {
     SavePicture,
 }
 
-/// Does the panel, or anything else of egui, have the pointer or the keyboard in this frame? Known from `PreUpdate` on.
+/// Does the panel, or anything else of egui, have the pointer or the keyboard in this frame? Contexts of all cameras count.
+/// Known from `PreUpdate` on.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct PanelInput {
@@ -109,11 +136,8 @@ pub fn keyboard_is_free(input: Option<Res<PanelInput>>) -> bool {
     input.is_none_or(|input| !input.has_keyboard)
 }
 
-/// Asks egui, after it has read the frame's input and before anyone acts on it.
-pub(super) fn read_input(
-    mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
-    mut input: ResMut<PanelInput>,
-) {
+/// Asks egui, each of its contexts, after it has read the frame's input and before anyone acts on it.
+pub(super) fn read_input(mut contexts: Query<&mut EguiContext>, mut input: ResMut<PanelInput>) {
     let mut now = PanelInput::default();
     for mut context in &mut contexts {
         let context = context.get_mut();

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::plot::Line;
-use super::state::{BurrowPanel, Note};
+use super::state::{BurrowPanel, Note, Verdict};
 use crate::backend::{Choice, EngineState};
 use crate::plugin::{BurrowEngine, BurrowFigures};
 use crate::surface::SeamReport;
@@ -118,12 +118,17 @@ fn count(world: &World) -> Counts {
 
 /// A seam check under way.
 #[derive(Resource)]
-pub(super) struct SeamCheck(Task<SeamReport>);
+pub(super) struct SeamCheck(Task<Verdict>);
 
 /// Starts a check of a terrain as it is now.
-pub(super) fn start_seam_check(commands: &mut Commands, panel: &mut BurrowPanel, terrain: &Terrain) {
+pub(super) fn start_seam_check(
+    commands: &mut Commands,
+    panel: &mut BurrowPanel,
+    entity: Entity,
+    terrain: &Terrain,
+) {
     let world = terrain.snapshot();
-    let task = AsyncComputeTaskPool::get().spawn(async move { world.check_seams() });
+    let task = AsyncComputeTaskPool::get().spawn(async move { check_seams(entity, &world) });
     panel.note = Some(Note::Busy("checking every seam ...".into()));
     commands.insert_resource(SeamCheck(task));
 }
@@ -134,26 +139,33 @@ pub(super) fn finish_seam_check(
     check: Option<ResMut<SeamCheck>>,
     mut panel: ResMut<BurrowPanel>,
 ) {
-    let Some(report) = check.and_then(|mut check| check_ready(&mut check.0)) else { return };
+    let Some(verdict) = check.and_then(|mut check| check_ready(&mut check.0)) else { return };
     commands.remove_resource::<SeamCheck>();
-    let note = seam_note(&report);
-    match &note {
-        Note::Bad(text) => warn!("seam check: {text}"),
-        Note::Good(text) | Note::Busy(text) => info!("seam check: {text}"),
+    let Verdict { is_flawless, text, .. } = &verdict;
+    if *is_flawless {
+        info!("seam check: {text}");
+    } else {
+        warn!("seam check: {text}");
     }
-    panel.note = Some(note);
+    panel.note = Some(Note::Seams(verdict));
 }
 
-fn seam_note(report: &SeamReport) -> Note {
+fn check_seams(terrain: Entity, world: &World) -> Verdict {
+    let report = world.check_seams();
+    let (is_flawless, text) = (report.is_flawless(), describe(&report));
+    Verdict { terrain, revision: world.revision(), hash: world.hash(), is_flawless, text }
+}
+
+fn describe(report: &SeamReport) -> String {
     let triangles = super::widgets::count(report.triangles);
     if report.is_flawless() {
-        return Note::Good(format!("closed: no open edge in {triangles} triangles"));
+        return format!("closed: no open edge in {triangles} triangles");
     }
     let (open, unbalanced) = (report.open, report.unbalanced);
     let touching = report.nonmanifold_edges + report.nonmanifold_vertices;
     let (flat, jump) = (report.degenerate, report.worst_normal_jump);
-    Note::Bad(format!(
+    format!(
         "{open} open, {unbalanced} unbalanced, {touching} non-manifold, {flat} flat of {triangles} triangles; \
          normals differ by up to {jump:.1}°"
-    ))
+    )
 }

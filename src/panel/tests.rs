@@ -1,9 +1,12 @@
 //! The panel on a screen of its own, without an app.
 
+use std::time::Duration;
+
+use bevy::tasks::{AsyncComputeTaskPool, TaskPool};
 use bevy_egui::egui::{Event, Modifiers, PointerButton, Pos2, RawInput, Rect};
+use bevy_egui::{EguiContext, EguiUserTextures};
 
-use bevy_egui::EguiUserTextures;
-
+use super::state::Note;
 use super::*;
 use crate::brush::{BrushError, Edit};
 use crate::ground::{Ground, MaterialId};
@@ -441,8 +444,8 @@ fn history_is_that_of_the_chosen_terrain() {
     assert_eq!(screen.customs.undo_budget, 0);
 }
 
-#[test]
-fn a_closed_panel_is_nowhere() {
+/// An app with as much of the panel as draws it, and what it is drawn in.
+fn app_and_context() -> (App, egui::Context) {
     let mut app = App::new();
     app.init_resource::<BrushTool>()
         .init_resource::<BurrowPanel>()
@@ -455,16 +458,98 @@ fn a_closed_panel_is_nowhere() {
         .add_systems(Update, draw);
     let camera = app.world_mut().spawn(PrimaryEguiContext).id();
     let mut camera = app.world_mut().entity_mut(camera);
-    let context = camera.get_mut::<bevy_egui::EguiContext>().expect("required").get_mut().clone();
+    let context = camera.get_mut::<EguiContext>().expect("required").get_mut().clone();
+    (app, context)
+}
+
+/// Where widgets are after some frames.
+fn places_in<'a>(app: &'a mut App, context: &egui::Context) -> &'a PanelPlaces {
+    for _ in 0..3 {
+        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 1600.0));
+        let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
+        let _ = context.run_ui(input, |_| app.update());
+    }
+    app.world().resource()
+}
+
+#[test]
+fn a_closed_panel_is_nowhere() {
+    let (mut app, context) = app_and_context();
     for (is_open, is_somewhere) in [(true, true), (false, false), (true, true)] {
         app.world_mut().resource_mut::<BurrowPanel>().is_open = is_open;
-        for _ in 0..3 {
-            let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 720.0));
-            let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
-            let _ = context.run_ui(input, |_| app.update());
-        }
-        let places = app.world().resource::<PanelPlaces>();
+        let places = places_in(&mut app, &context);
         assert_eq!(places.0.contains_key("Radius"), is_somewhere);
         assert!(is_somewhere || places.0.is_empty());
+    }
+}
+
+#[test]
+fn a_terrain_without_colours_is_shown_like_any_other() {
+    let (mut app, context) = app_and_context();
+    let terrain = app.world_mut().spawn((flat(), GroundLook::default())).id();
+    assert!(!app.world().entity(terrain).contains::<MaterialColors>());
+    assert!(places_in(&mut app, &context).0.contains_key("Look"));
+}
+
+fn flat() -> Terrain {
+    let ground = Ground::flat(64, 64, 8.0).expect("valid");
+    Terrain::new(ground, &TerrainSettings::default()).expect("valid")
+}
+
+#[test]
+fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
+    AsyncComputeTaskPool::get_or_init(TaskPool::default);
+    let mut app = App::new();
+    app.init_resource::<BurrowPanel>()
+        .add_message::<PanelAction>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_systems(Update, (act, survey::finish_seam_check).chain());
+    let [checked, other] = [(); 2].map(|()| app.world_mut().spawn(flat()).id());
+    app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(checked);
+    app.world_mut().write_message(PanelAction::CheckSeams);
+    let verdict = (0..10_000).find_map(|_| {
+        app.update();
+        std::thread::sleep(Duration::from_millis(1));
+        match &app.world().resource::<BurrowPanel>().note {
+            Some(Note::Seams(verdict)) => Some(verdict.clone()),
+            _ => None,
+        }
+    });
+    let verdict = verdict.expect("the check comes to its end");
+    let said = |app: &App, of: Entity| {
+        let terrain = app.world().get::<Terrain>(of).expect("it is there");
+        verdict.about(of, terrain.world())
+    };
+    assert!(verdict.is_flawless);
+    assert_eq!(said(&app, checked), Some(verdict.text.clone()));
+    assert_eq!(said(&app, other), None, "that one was not checked");
+    let dig = crate::brush::Brush::dig(crate::brush::Shape::sphere(Vec3::new(32.0, 8.0, 32.0), 4.0));
+    let mut terrain = app.world_mut().get_mut::<Terrain>(checked).expect("it is there");
+    terrain.apply([dig]);
+    let then = format!("revision {}: {}", verdict.revision, verdict.text);
+    assert_eq!(said(&app, checked), Some(then));
+}
+
+#[test]
+fn any_context_of_egui_may_have_the_pointer() {
+    let mut app = App::new();
+    app.init_resource::<PanelInput>().add_systems(Update, state::read_input);
+    // Of another camera than the panel's.
+    let camera = app.world_mut().spawn(EguiContext::default()).id();
+    let mut camera = app.world_mut().entity_mut(camera);
+    let context = camera.get_mut::<EguiContext>().expect("it is there").get_mut().clone();
+    for (at, is_over) in [(Pos2::new(30.0, 30.0), true), (Pos2::new(600.0, 400.0), false)] {
+        for _ in 0..3 {
+            let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 720.0));
+            let events = vec![Event::PointerMoved(at)];
+            let input = RawInput { screen_rect: Some(screen), events, ..RawInput::default() };
+            let _ = context.run_ui(input, |ui| {
+                let map = egui::Area::new(Id::new("map")).fixed_pos(Pos2::ZERO);
+                map.show(ui.ctx(), |ui| ui.allocate_space(Vec2::splat(100.0)));
+            });
+        }
+        app.update();
+        assert_eq!(app.world().resource::<PanelInput>().has_pointer, is_over, "{at:?}");
     }
 }

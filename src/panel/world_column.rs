@@ -10,7 +10,7 @@ use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
 use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
 use super::{look_section, plot, rules_section};
 use crate::backend::{Choice, EngineState, Stage};
-use crate::plugin::{BurrowFigures, BurrowSettings};
+use crate::plugin::{BurrowFigures, BurrowSettings, Times};
 use crate::terrain::{History, Terrain};
 
 /// A terrain on the list.
@@ -35,7 +35,8 @@ pub struct Content<'a> {
 /// Draws the column.
 pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     let chosen = content.terrains.iter().find(|line| Some(line.entity) == content.chosen);
-    buttons(ui, panel, content.actions, chosen.map(|line| line.terrain.history()));
+    buttons(ui, panel, content.actions, chosen);
+    note(ui, panel, chosen);
     section(ui, "Terrain", true, |ui| terrain(ui, panel, content.terrains, chosen));
     section(ui, "Live", true, |ui| live(ui, content.figures, content.survey));
     if let Some(counts) = &content.survey.counts {
@@ -55,10 +56,10 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     section(ui, "Settings", false, |ui| settings(ui, undo_budget, content.settings));
 }
 
-fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, history: Option<History>) {
+fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, chosen: Option<&TerrainLine>) {
     let is_busy = matches!(panel.note, Some(Note::Busy(_)));
     let width = share(ui, 2);
-    let has_terrain = history.is_some();
+    let history = chosen.map(|line| line.terrain.history());
     let History { undos, redos, bytes: held } = history.unwrap_or_default();
     ui.horizontal(|ui| {
         if button(ui, "Undo", width, undos > 0).clicked() {
@@ -70,7 +71,7 @@ fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, his
     });
     figure(ui, "Undo, redo", format!("{undos}, {redos} steps, {}", bytes(held)));
     ui.horizontal(|ui| {
-        let seams = button(ui, "Check seams", width, has_terrain && !is_busy);
+        let seams = button(ui, "Check seams", width, chosen.is_some() && !is_busy);
         if seams.on_hover_text("Looks at every triangle of the terrain").clicked() {
             actions.push(PanelAction::CheckSeams);
         }
@@ -78,11 +79,20 @@ fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, his
             actions.push(PanelAction::SavePicture);
         }
     });
+}
+
+/// What the panel has to say.
+fn note(ui: &mut Ui, panel: &BurrowPanel, chosen: Option<&TerrainLine>) {
     let (color, text) = match &panel.note {
         None => return,
-        Some(Note::Good(text)) => (GOOD, text),
-        Some(Note::Bad(text)) => (BAD, text),
-        Some(Note::Busy(text)) => (FAINT, text),
+        Some(Note::Good(text)) => (GOOD, text.clone()),
+        Some(Note::Bad(text)) => (BAD, text.clone()),
+        Some(Note::Busy(text)) => (FAINT, text.clone()),
+        Some(Note::Seams(verdict)) => {
+            let about = chosen.and_then(|line| verdict.about(line.entity, line.terrain.world()));
+            let Some(text) = about else { return };
+            (if verdict.is_flawless { GOOD } else { BAD }, text)
+        }
     };
     ui.label(RichText::new(text).color(color).size(12.0));
 }
@@ -112,11 +122,10 @@ fn terrain(ui: &mut Ui, panel: &mut BurrowPanel, terrains: &[TerrainLine], chose
 }
 
 fn live(ui: &mut Ui, figures: &BurrowFigures, survey: &Survey) {
-    let of = |percent| time(figures.transactions.percentile(percent));
     let recent = figures.transactions.iter().map(|took| took.as_secs_f32() * 1e3);
     let recent: Vec<f32> = recent.skip(figures.transactions.len().saturating_sub(180)).collect();
     plot::line(ui, recent.into_iter(), 1.0, ACCENT, "transaction", &time(figures.transactions.iter().last()));
-    figure(ui, "p50, p95, p99", format!("{}, {}, {}", of(50), of(95), of(99)));
+    figure(ui, "p50, p95, p99", percentiles(&figures.transactions));
     let now = survey.swaps_now.to_string();
     plot::line(ui, survey.swaps.iter(), 8.0, BLUE, "meshes swapped per frame", &now);
     let last = survey.frame_ms.iter().last().unwrap_or_default();
@@ -129,6 +138,11 @@ fn live(ui: &mut Ui, figures: &BurrowFigures, survey: &Survey) {
         "Brushes, commits",
         format!("{}, {}", count(figures.brushes as usize), count(figures.commits as usize)),
     );
+}
+
+/// The times that half of all, all but 5 % and all but 1 % do not exceed.
+fn percentiles(times: &Times) -> String {
+    [50, 95, 99].map(|percent| time(times.percentile(percent))).join(", ")
 }
 
 fn memory(ui: &mut Ui, counts: &Counts) {
@@ -210,4 +224,19 @@ pub fn debug(ui: &mut Ui, debug: &mut crate::debug::BurrowDebug) {
         slider(ui, "Near", &mut debug.near, 4.0..=64.0, |slider| slider.logarithmic(true).suffix(" m"))
             .on_hover_text("How far normals and wires reach");
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn percentiles_stand_in_the_order_of_their_names() {
+        let mut times = Times::default();
+        assert_eq!(percentiles(&times), "-, -, -");
+        (1..=100).for_each(|number| times.push(Duration::from_micros(10 * number)));
+        assert_eq!(percentiles(&times), "500 µs, 950 µs, 990 µs");
+    }
 }

@@ -13,7 +13,7 @@ use super::PhysicsFigures;
 use super::columns::column;
 use super::near::Neighbourhood;
 use super::shape::GroundShape;
-use super::wake::{Change, GroundChanges};
+use super::wake::{GroundChange, GroundChanges};
 use crate::plugin::{Attachment, Companion, Part, ShownSurface};
 use crate::surface::SurfaceMesh;
 use crate::terrain::Drawn;
@@ -89,10 +89,10 @@ impl Grounds {
     }
 
     /// Makes a collider, in a task.
-    pub fn prepare(&self, part: &Part, surface: &SurfaceMesh) -> Prepared {
+    pub fn prepare(&self, part: &Part, surface: &SurfaceMesh) -> PreparedCollider {
         let shape = GroundShape::new(surface, part.voxel_size).map(Arc::new);
         let changed = GroundShape::difference(self.shape(part).as_deref(), shape.as_deref());
-        Prepared { grounds: self.clone(), part: *part, shape, changed }
+        PreparedCollider { grounds: self.clone(), part: *part, shape, changed }
     }
 }
 
@@ -119,7 +119,7 @@ impl Companion for Grounds {
 const MARGIN: f32 = 0.05;
 
 /// A collider on its way to its tile or chunk.
-pub(super) struct Prepared {
+pub(super) struct PreparedCollider {
     grounds: Grounds,
     part: Part,
     shape: Option<Arc<GroundShape>>,
@@ -127,7 +127,7 @@ pub(super) struct Prepared {
     changed: Option<(Vec3, Vec3)>,
 }
 
-impl Prepared {
+impl PreparedCollider {
     /// Puts the collider in place of the old one, unless the surface has changed since it was made.
     pub fn attach(self, mut part: EntityWorldMut) {
         let owner = part.id();
@@ -145,7 +145,7 @@ impl Prepared {
                 // A new part is not placed itself before the end of the frame.
                 let terrain = world.get::<GlobalTransform>(self.part.terrain).copied().unwrap_or_default();
                 let place = terrain * Transform::from_translation(self.part.origin.as_vec3());
-                let change = Change::new(self.part.terrain, &place, self.part.voxel_size, low, high);
+                let change = GroundChange::new(self.part.terrain, &place, self.part.voxel_size, low, high);
                 let mut changes = world.resource_mut::<GroundChanges>();
                 changes.add(self.part.drawn, change);
                 let count = changes.len();
@@ -219,7 +219,7 @@ pub(super) fn forget(
     let Ok((body, bounds)) = bodies.get(gone) else { return };
     let is_detached = parts.get(body.part).is_ok_and(|has_collider| !has_collider);
     if let Some(bounds) = bounds.filter(|_| !is_detached) {
-        changes.add(body.drawn, Change::around(body.terrain, bounds));
+        changes.add(body.drawn, GroundChange::around(body.terrain, bounds));
         figures.changes = changes.len();
     }
     let mut shapes = grounds.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
@@ -257,7 +257,7 @@ pub(super) fn follow(
         // Whoever was there before a collider has been told when it came.
         if (is_put || is_turned) && !bounds.is_added() {
             let bounds = bounds.merged(collider.aabb(place.translation, place.rotation));
-            changes.add(body.drawn, Change::around(body.terrain, &bounds));
+            changes.add(body.drawn, GroundChange::around(body.terrain, &bounds));
             figures.changes = changes.len();
         }
     }

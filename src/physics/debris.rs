@@ -99,12 +99,14 @@ fn break_off(
     mut commands: Commands,
     settings: Res<DebrisSettings>,
     mut found: MessageReader<LoosePieceFound>,
-    terrains: Query<(&Terrain, &MaterialColors)>,
+    terrains: Query<(&Terrain, Option<&MaterialColors>)>,
     places: TransformHelper,
     pieces: Query<(), Or<(With<Debris>, With<Shaping>)>>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
 ) {
     let mut room = settings.most.saturating_sub(pieces.count());
+    // A game that takes a terrain's colours away wants none on its pieces.
+    let plain = MaterialColors(Vec::new());
     for found in found.read().filter(|found| found.piece.fate == PieceFate::BrokeOff) {
         let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
         let Ok(ground) = places.compute_global_transform(found.terrain) else { continue };
@@ -123,7 +125,7 @@ fn break_off(
         });
         let mut piece = commands.spawn((Name::new("debris"), Shaping { debris, task }, place));
         if let Some(meshes) = &mut meshes
-            && let Some(mesh) = found.mesh(terrain, colors)
+            && let Some(mesh) = found.mesh(terrain, colors.unwrap_or(&plain))
         {
             let part = GroundPiece { terrain: found.terrain, origin: bounds.min };
             piece.with_child((part, Mesh3d(meshes.add(mesh)), corner));

@@ -3,30 +3,17 @@
 use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
-use bevy::math::bounding::{Aabb2d, AabbCast2d};
-use bevy::math::{Affine3A, Vec3A};
+use bevy::math::Affine3A;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::columns::Columns;
-use super::near::{ahead, voxel_size};
-use super::solids::{Extent, FARTHEST, Solids};
+use super::columns::{ColumnKey, Columns};
+use super::frame::{AHEAD, TerrainFrame};
+use super::solids::{Extent, FARTHEST, Reach, Solids};
 use super::{ColliderSource, PhysicsFigures};
-use crate::lattice::{ChunkGrid, Column, TilePos};
+use crate::lattice::ChunkGrid;
 use crate::plugin::TerrainEntities;
 use crate::terrain::Terrain;
-
-/// How far ahead of a body ground must have colliders, in seconds: longer than any frame.
-const AHEAD: f32 = 0.25;
-
-/// Bodies this far above all ground are not held, in metres beyond what they fall in [`AHEAD`].
-const CLEARANCE: f32 = 4.0;
-
-/// How far apart the ground's height is asked on a body's way, in voxels, unless that makes more places than [`STOPS`].
-const STRIDE: f32 = 2.0;
-
-/// Places on a body's way in which the ground's height is asked, at most, beyond the first.
-const STOPS: f32 = 16.0;
 
 /// This body stands still until the ground under it has colliders: it is over a terrain that loads, or farther from all
 /// [`ColliderSource`]s than their radius.
@@ -174,6 +161,80 @@ pub(super) fn go_on(
     }
 }
 
+/// What of a terrain decides on bodies that rest: while all of it stays, they need no look.
+#[derive(PartialEq)]
+pub(super) struct Standing {
+    terrain: Entity,
+    inverse: Affine3A,
+    is_shown: bool,
+    grid: ChunkGrid,
+    ground: u64,
+}
+
+impl Standing {
+    fn of(frame: &TerrainFrame) -> Self {
+        let TerrainFrame { terrain, model, inverse, is_shown, .. } = *frame;
+        let (grid, ground) = (model.world().grid(), model.world().ground().hash());
+        Self { terrain, inverse, is_shown, grid, ground }
+    }
+}
+
+/// What bodies are judged by in a frame.
+struct Judge<'a, 'w, 's> {
+    frames: Vec<TerrainFrame<'a>>,
+    /// Do terrains stand as they stood in the last frame?
+    are_same: bool,
+    columns: &'a Columns,
+    /// Columns in which colliders came or went since the last frame.
+    turned: Vec<ColumnKey>,
+    places: &'a TransformHelper<'w, 's>,
+    /// Does physics take over where transforms put bodies?
+    follows_transform: bool,
+}
+
+impl Judge<'_, '_, '_> {
+    /// Is it not enough to know what a body was found to be in the last frame? Where colliders came or went near it, or near
+    /// where it was going, it is looked at even if it rests.
+    fn needs_a_look(&self, body: &BodyItem) -> bool {
+        !self.are_same || !body.rests() || self.has_turned_near(body)
+    }
+
+    fn has_turned_near(&self, body: &BodyItem) -> bool {
+        let has_turned = |frame: &TerrainFrame| {
+            // Some voxels more than it reaches, for its residual speed.
+            let reach = (FARTHEST.x + body.longing()) / frame.size + 4.0;
+            let place = frame.inverse.transform_point3(body.position.0).xz();
+            let is_near = |tile| frame.distance(tile, place) <= reach;
+            self.turned.iter().any(|&(terrain, tile)| terrain == frame.terrain && is_near(tile))
+        };
+        !self.turned.is_empty() && self.frames.iter().any(has_turned)
+    }
+
+    /// May a body that reaches so far come to ground without a collider soon?
+    fn lacks_ground(&self, body: &BodyItem, reach: Reach) -> bool {
+        let (middle, half) = (reach.middle(), reach.half());
+        let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
+        let lacks_ground_at = |place: Vec3| {
+            let lacks =
+                |frame: &TerrainFrame| frame.lacks_ground(self.columns, place + middle, towards, half);
+            self.frames.iter().any(lacks)
+        };
+        lacks_ground_at(body.position.0) || self.put(body).is_some_and(lacks_ground_at)
+    }
+
+    /// Where a game has just put a body: physics will have it there in its next step.
+    fn put(&self, body: &BodyItem) -> Option<Vec3> {
+        if !self.follows_transform {
+            return None;
+        }
+        let place = match body.is_child {
+            true => self.places.compute_global_transform(body.entity).ok()?.translation(),
+            false => body.transform.as_ref()?.translation,
+        };
+        (place != body.position.0).then_some(place)
+    }
+}
+
 /// Holds bodies and lets them go.
 pub(super) fn hold(
     mut commands: Commands,
@@ -184,67 +245,32 @@ pub(super) fn hold(
     sources: Query<(), With<ColliderSource>>,
     mut columns: ResMut<Columns>,
     solids: Solids,
-    mut known: Local<Vec<(Entity, Affine3A, bool, ChunkGrid, u64)>>,
+    mut known: Local<Vec<Standing>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
-    let (turned, ready) = (columns.take_turned(), &*columns);
-    let terrains: Vec<(Entity, &Terrain, Affine)> = terrains
+    let frames: Vec<TerrainFrame> = terrains
         .iter()
-        .filter_map(|(entity, terrain, entities)| {
+        .filter_map(|(entity, model, entities)| {
             let place = places.compute_global_transform(entity).ok()?;
-            let is_shown = entities.is_some_and(|entities| entities.show(terrain.world()));
-            let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
-            Some((entity, terrain, Affine { inverse, size, is_shown }))
+            Some(TerrainFrame::new(entity, model, entities, &place))
         })
         .collect();
-    let now = terrains.iter().map(|(entity, model, affine)| {
-        (*entity, affine.inverse, affine.is_shown, model.world().grid(), model.world().ground().hash())
-    });
-    let now: Vec<_> = now.collect();
-    let are_same = *known == now;
-    *known = now;
-    // Where colliders came or went near a body, or near where it was going, it is looked at even if it rests.
-    let is_turned = |body: &BodyItem| {
-        let near = |(terrain, model, affine): &(Entity, &Terrain, Affine)| {
-            let (grid, place) = (model.world().grid(), affine.inverse.transform_point3(body.position.0).xz());
-            // Some voxels more than it reaches, for its residual speed.
-            let reach = (FARTHEST.x + body.longing()) / affine.size + 4.0;
-            let is_near = |tile| distance(grid, tile, place) <= reach;
-            turned.iter().any(|&(of, tile)| of == *terrain && is_near(tile))
-        };
-        !turned.is_empty() && terrains.iter().any(near)
-    };
+    let standing: Vec<Standing> = frames.iter().map(Standing::of).collect();
+    let are_same = *known == standing;
+    *known = standing;
+    let turned = columns.take_turned();
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
+    let judge = Judge { frames, are_same, columns: &columns, turned, places: &places, follows_transform };
     let mut held = 0;
     for mut body in &mut bodies {
-        let rests = are_same && body.rests() && !is_turned(&body);
-        if rests && body.hold.is_none() {
+        let needs_a_look = judge.needs_a_look(&body);
+        if !needs_a_look && body.hold.is_none() {
             continue;
         }
         let reach = if body.can_be_held() { solids.reach(&body.extent) } else { None };
-        let lacks_ground = reach.is_some_and(|reach| {
-            if rests {
-                // As it did before.
-                return true;
-            }
-            let (middle, half) = (reach.middle(), reach.half());
-            let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
-            let lacks_ground = |place: Vec3| {
-                terrains.iter().any(|(terrain, model, affine)| {
-                    affine.lacks_ground(*terrain, model, ready, place + middle, towards, half)
-                })
-            };
-            // Where a game has just put it, physics will have it in its next step.
-            let put = || match body.is_child {
-                true => places.compute_global_transform(body.entity).ok().map(|put| put.translation()),
-                false => body.transform.as_ref().map(|put| put.translation),
-            };
-            let is_put = |put: &Vec3| *put != body.position.0;
-            lacks_ground(body.position.0)
-                || follows_transform && put().filter(is_put).is_some_and(lacks_ground)
-        });
-        if lacks_ground {
+        // One that is not looked at is held as before.
+        if reach.is_some_and(|reach| !needs_a_look || judge.lacks_ground(&body, reach)) {
             held += 1;
             body.hold(&mut commands);
         } else {
@@ -258,80 +284,4 @@ pub(super) fn hold(
         );
     }
     figures.main_thread += start.elapsed();
-}
-
-/// From a place to a column along x or z, whichever is farther, in voxels.
-fn distance(grid: ChunkGrid, tile: TilePos, place: Vec2) -> f32 {
-    let size = grid.size() as f32;
-    let corner = Vec2::new(tile.x as f32, tile.z as f32) * size;
-    (place - place.clamp(corner, corner + size)).abs().max_element()
-}
-
-/// From the world to a terrain.
-struct Affine {
-    inverse: Affine3A,
-    /// Metres along a voxel's side.
-    size: f32,
-    /// Do its tiles and chunks show the world that it has now?
-    is_shown: bool,
-}
-
-impl Affine {
-    /// May a body whose box has its middle here reach ground without a collider soon?
-    fn lacks_ground(
-        &self,
-        terrain: Entity,
-        model: &Terrain,
-        ready: &Columns,
-        place: Vec3,
-        velocity: Vec3,
-        half: Vec3,
-    ) -> bool {
-        let grid = model.world().grid();
-        let from = self.inverse.transform_point3(place);
-        let way = self.inverse.transform_vector3(velocity * AHEAD);
-        if !(from.is_finite() && way.is_finite()) {
-            return false;
-        }
-        let (way, half) = (ahead(way, grid), Vec3::from(self.inverse.matrix3.abs() * Vec3A::from(half)));
-        let (low, high) = (from.min(from + way) - half, from.max(from + way) + half);
-        let (first, last) = (low.floor().as_ivec3(), high.floor().as_ivec3());
-        // A body that is off the terrain has nothing to wait for.
-        let (first, last) = (
-            Column::new(first.x.max(0), first.z.max(0)),
-            Column::new(last.x.min(grid.width() - 1), last.z.min(grid.depth() - 1)),
-        );
-        if first.x > last.x || first.z > last.z {
-            return false;
-        }
-        let (first, last) = (grid.tile_of_cell(first), grid.tile_of_cell(last));
-        let tiles = (first.z..=last.z).flat_map(|z| (first.x..=last.x).map(move |x| TilePos { x, z }));
-        // Where the game took the tile away, nothing is to come any more.
-        let is_ready = |tile| ready.is_ready((terrain, tile)).unwrap_or(self.is_shown);
-        let mut missing = tiles.filter(|&tile| !is_ready(tile)).peekable();
-        if missing.peek().is_none() {
-            return false;
-        }
-        let (body, from, way) = (Aabb2d::new(Vec2::ZERO, half.xz()), from.xz(), way.xz());
-        let cast = AabbCast2d::new(body, from, Dir2::new(way).unwrap_or(Dir2::X), way.length());
-        let meets = |tile: TilePos| {
-            let corner = Vec2::new(tile.x as f32, tile.z as f32) * grid.size() as f32;
-            cast.aabb_collision_at(Aabb2d { min: corner, max: corner + grid.size() as f32 }).is_some()
-        };
-        // Its front is farther ahead than its middle.
-        let way = way + way.normalize_or_zero() * half.xz().length();
-        missing.any(meets) && self.is_low(model, from, way, low.y)
-    }
-
-    /// Is its lowest point near the ground somewhere on its way, or under some of it?
-    fn is_low(&self, model: &Terrain, from: Vec2, way: Vec2, low: f32) -> bool {
-        let grid = model.world().grid();
-        let end = Vec2::new(grid.width() as f32, grid.depth() as f32);
-        let count = (way.length() / STRIDE).ceil().min(STOPS);
-        (0..=count as u32).any(|stop| {
-            let place = (from + way * (stop as f32 / count.max(1.0))).clamp(Vec2::ZERO, end).as_dvec2();
-            let height = model.world().height(place.x, place.y);
-            height.is_some_and(|height| f64::from(low) < height + f64::from(CLEARANCE / self.size))
-        })
-    }
 }

@@ -55,6 +55,7 @@ mod colliders;
 mod columns;
 mod cone;
 mod debris;
+mod frame;
 mod hold;
 mod hull;
 mod near;
@@ -82,6 +83,10 @@ use bevy::prelude::*;
 use crate::plugin::{BurrowSystems, Companions};
 
 /// Colliders for terrains. Needs avian's `PhysicsPlugins`, and the crate's own `BurrowPlugins`.
+///
+/// Avian has to run in `FixedPostUpdate`, where `PhysicsPlugins::default()` puts it: what the plugin does before and after a
+/// step is in `FixedPreUpdate` and `FixedPostUpdate`, see [`TerrainPhysicsSystems`]. With `PhysicsPlugins::new` and another
+/// schedule, colliders would follow a terrain that moves, and bodies would be lifted, at other times than steps are taken.
 #[derive(Default)]
 pub struct TerrainPhysicsPlugin;
 

@@ -35,8 +35,15 @@ pub(super) fn ahead(way: Vec3, grid: ChunkGrid) -> Vec3 {
 
 /// Ground around this entity has colliders, in all columns of chunks within its radius; elsewhere it has none.
 ///
-/// Put it on players and on whatever else needs ground. With a `LinearVelocity`, ground where it will be in a second, or on
-/// the next 64 chunks of its way, has colliders too. Bodies need not be sources: those too far from any are [held](super::HeldByGround).
+/// Put it on players and on whatever else needs ground. With a radius of `f32::INFINITY` all ground has colliders, wherever
+/// the entity is.
+///
+/// A source that comes to another voxel costs some time on the main thread for each column of chunks within its radius, and
+/// around each chunk's width of its way; one that reaches all of a terrain, only when it comes to another column. Each
+/// collider costs time in a task, and memory.
+///
+/// With a `LinearVelocity`, ground where it will be in a second, or on the next 64 chunks of its way, has colliders too.
+/// Bodies need not be sources: those too far from any are [held](super::HeldByGround).
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(Transform)]
@@ -54,11 +61,60 @@ impl Default for ColliderSource {
 /// A place in voxels along x and z, and how far around it colliders are wanted.
 type Stop = (Vec2, f32);
 
+/// The largest stops, by which others may be covered: a crowd has thousands that are all alike, and cover none.
+const LARGEST: usize = 16;
+
+/// Does a stop reach all of a grid?
+fn reaches_all(grid: ChunkGrid, (place, radius): Stop) -> bool {
+    let (width, depth) = grid.tile_counts();
+    let end = Vec2::new(width as f32, depth as f32) * grid.size() as f32;
+    place.abs().max((place - end).abs()).length() <= radius
+}
+
+/// Is the first stop's radius nowhere farther off than the second one's? Not where only rounding says so.
+fn covers((large, radius): Stop, (place, small): Stop) -> bool {
+    large == place && radius >= small || large.distance(place) + 1.0 <= radius - small
+}
+
+/// The stops that no other one covers.
+fn uncovered(stops: &[Stop]) -> Vec<Stop> {
+    let mut sorted = stops.to_vec();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut kept: Vec<Stop> = Vec::new();
+    for stop in sorted {
+        if !kept.iter().take(LARGEST).any(|&large| covers(large, stop)) {
+            kept.push(stop);
+        }
+    }
+    kept
+}
+
+/// Where a source that is at `from` and goes this `way` wants ground within a `radius`, in voxels: here, and ahead, in one
+/// place for each chunk's width of the way.
+fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
+    let stride = grid.size() as f32;
+    // Not every hair's breadth of a move is news; where all of the ground is near, not even another voxel is, and what is
+    // ahead is near already.
+    let middle = (from / stride).floor() * stride + stride / 2.0;
+    let home = if radius.is_finite() { middle } else { Vec2::ZERO };
+    let all = (home, radius + 1.0);
+    if reaches_all(grid, all) {
+        return vec![all];
+    }
+    let count = (way.length() / stride).ceil();
+    let apart = way / count.max(1.0);
+    // Nor is a body held for want of ground that is between two stops.
+    let radius = radius + (apart.length() / 2.0).ceil() + 1.0;
+    (0..=count as u32).map(|at| ((from + apart * at as f32).round(), radius)).collect()
+}
+
 /// Where sources are over one terrain.
 #[derive(Debug)]
 struct Area {
     grid: ChunkGrid,
     stops: Vec<Stop>,
+    /// Is all of the ground within a source's radius?
+    is_all: bool,
     /// How far the nearest source's radius ends from a column, in voxels; negative within it. Columns farther off than a
     /// chunk is wide are not in here.
     columns: FxHashMap<TilePos, f32>,
@@ -68,7 +124,8 @@ impl Area {
     fn new(grid: ChunkGrid, stops: Vec<Stop>) -> Self {
         let (size, (width, depth)) = (grid.size() as f32, grid.tile_counts());
         let mut columns = FxHashMap::default();
-        for &(place, radius) in &stops {
+        let is_all = stops.iter().any(|&stop| reaches_all(grid, stop));
+        for (place, radius) in uncovered(&stops) {
             let reach = radius + size;
             let (low, high) = ((place - reach) / size - 1.0, (place + reach) / size);
             let (low, high) = (low.floor().as_ivec2().max(IVec2::ZERO), high.floor().as_ivec2());
@@ -83,7 +140,7 @@ impl Area {
                 }
             }
         }
-        Self { grid, stops, columns }
+        Self { grid, stops, is_all, columns }
     }
 }
 
@@ -112,7 +169,8 @@ impl Neighbourhood {
         for (side, other) in [(self, before), (before, self)] {
             for (&terrain, area) in &side.0 {
                 let other = other.0.get(&terrain);
-                if other.is_some_and(|other| Arc::ptr_eq(other, area)) {
+                let is_all = |other: &Area| area.is_all && other.is_all && area.grid == other.grid;
+                if other.is_some_and(|other| Arc::ptr_eq(other, area) || is_all(other)) {
                     continue;
                 }
                 for (&column, &distance) in &area.columns {
@@ -142,8 +200,7 @@ pub(super) fn find_near(
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
         let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
         let grid = model.world().grid();
-        let stride = grid.size() as f32;
-        let mut stops = Vec::new();
+        let mut all = Vec::new();
         for (source, &ColliderSource { radius }, velocity, hold, extent) in &sources {
             let Ok(place) = places.compute_global_transform(source) else { continue };
             // One that is held goes on as it came, once there is ground where it was going.
@@ -153,19 +210,13 @@ pub(super) fn find_near(
             if !(from.is_finite() && way.is_finite() && radius >= 0.0) {
                 continue;
             }
-            let (from, way) = (from.xz(), ahead(way, grid).xz());
-            let count = (way.length() / stride).ceil();
-            let apart = way / count.max(1.0);
-            // Nor is a body held for want of ground that it reaches itself, or that is between two stops.
+            // No body is held for want of ground that it reaches itself.
             let reach = solids.reach(&extent).map_or(Vec3::ZERO, |reach| reach.farthest());
             let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
-            let radius = (radius / size).max(own) + (apart.length() / 2.0).ceil();
-            // Not every hair's breadth of a move is news.
-            let stop = |at: u32| (from + apart * at as f32).round();
-            stops.extend((0..=count as u32).map(|at| (stop(at), radius + 1.0)));
+            all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), (radius / size).max(own)));
         }
-        let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
-        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));
+        let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == all);
+        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, all)));
         near.0.insert(terrain, area);
     }
     if !near.is(&known) {
@@ -173,4 +224,92 @@ pub(super) fn find_near(
         *known = near;
     }
     figures.main_thread += start.elapsed();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid() -> ChunkGrid {
+        ChunkGrid::new(16, 200, 120)
+    }
+
+    /// What an area has to be, worked out for each column and stop.
+    fn distances(grid: ChunkGrid, stops: &[Stop]) -> FxHashMap<TilePos, f32> {
+        let size = grid.size() as f32;
+        let nearest = |tile: TilePos| {
+            let corner = Vec2::new(tile.x as f32, tile.z as f32) * size;
+            let distance =
+                |&(place, radius): &Stop| place.distance(place.clamp(corner, corner + size)) - radius;
+            stops.iter().map(distance).fold(f32::INFINITY, f32::min)
+        };
+        grid.tiles().map(|tile| (tile, nearest(tile))).filter(|&(_, distance)| distance <= size).collect()
+    }
+
+    #[test]
+    fn an_area_is_that_of_all_stops_though_covered_ones_are_skipped() {
+        let mut rng = fastrand::Rng::with_seed(7);
+        let mut skipped = 0;
+        for _ in 0..300 {
+            let mut stops: Vec<Stop> = Vec::new();
+            for _ in 0..rng.usize(0..40) {
+                let place = Vec2::new(rng.f32() * 300.0 - 50.0, rng.f32() * 220.0 - 50.0).round();
+                let radius = [0.0, 8.0, 8.5, 60.0, 400.0][rng.usize(0..5)] * rng.f32();
+                stops.push((place, radius));
+                // Many stand where others do.
+                if rng.bool() {
+                    stops.push((place, radius * rng.f32()));
+                }
+            }
+            skipped += stops.len() - uncovered(&stops).len();
+            let area = Area::new(grid(), stops);
+            assert_eq!(area.columns, distances(grid(), &area.stops));
+            assert!(!area.is_all || area.columns.values().all(|&distance| distance <= 0.0));
+        }
+        assert!(skipped > 1000, "{skipped}");
+    }
+
+    #[test]
+    fn a_source_that_reaches_all_ground_is_news_only_in_another_column_and_an_endless_one_never() {
+        let grid = grid();
+        let at = |x: f32, radius: f32| stops(grid, Vec2::new(x, 50.0), Vec2::X * 200.0, radius);
+        let endless = at(10.0, f32::INFINITY);
+        assert_eq!(endless, at(-4000.0, f32::INFINITY));
+        assert!(Area::new(grid, endless).columns.values().all(|&distance| distance == f32::NEG_INFINITY));
+
+        let large = at(81.0, 300.0);
+        assert_eq!(large.len(), 1);
+        assert_eq!(large, at(95.0, 300.0));
+        let moved = at(97.0, 300.0);
+        assert_ne!(large, moved);
+        let [before, after] = [large, moved].map(|stops| {
+            let area = Area::new(grid, stops);
+            assert!(area.is_all && area.columns.len() == grid.tiles().count());
+            Neighbourhood([(Entity::PLACEHOLDER, Arc::new(area))].into_iter().collect())
+        });
+        after.changes(&before, |column| panic!("{column:?} has been near all the time"));
+        assert!(!after.is(&before), "the nearest is another one");
+
+        assert_eq!(at(81.0, 20.0).len(), 1 + 13, "for each chunk's width of the way");
+        assert_ne!(at(81.0, 20.0), at(82.0, 20.0));
+    }
+
+    #[test]
+    fn columns_that_a_source_comes_to_or_leaves_are_told() {
+        let grid = grid();
+        let [here, there] = [40.0, 72.0].map(|x| {
+            let area = Area::new(grid, stops(grid, Vec2::new(x, 50.0), Vec2::ZERO, 20.0));
+            Neighbourhood([(Entity::PLACEHOLDER, Arc::new(area))].into_iter().collect())
+        });
+        let mut told = std::collections::BTreeSet::new();
+        there.changes(&here, |(_, column)| {
+            told.insert(column);
+        });
+        let is_near = |area: &Neighbourhood, column: TilePos| {
+            area.distance((Entity::PLACEHOLDER, column)).is_some_and(|distance| distance <= 0.0)
+        };
+        for column in grid.tiles().filter(|&column| is_near(&here, column) != is_near(&there, column)) {
+            assert!(told.contains(&column), "{column:?}");
+        }
+    }
 }

@@ -257,3 +257,50 @@ impl Shape for GroundShape {
         Some(self)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::Ground;
+    use crate::terrain::{Drawn, Terrain, TerrainSettings};
+
+    /// How steep the roof's slopes are: rise over run.
+    const PITCH: f64 = 0.5;
+
+    /// For each triangle beside the ridge of a roof along x = `ridge`: its normal, and what it has for that of its neighbour
+    /// over the ridge. Chunks are 16 cells wide.
+    fn over_ridge(ridge: i32) -> Vec<(Vector, Vector)> {
+        let height = |x: i32, _| 30.0 - PITCH * f64::from((x - ridge).abs());
+        let ground = Ground::from_fn(32, 32, height).expect("valid");
+        let settings = TerrainSettings { chunk_size: 16, voxel_size: 1.0 };
+        let terrain = Terrain::new(ground, &settings).expect("valid");
+        let world = terrain.world();
+        let mut found = Vec::new();
+        for tile in world.grid().tiles() {
+            let shape = GroundShape::new(&world.tile_mesh(tile), 1.0).expect("it has triangles");
+            let ridge = (ridge - world.origin(Drawn::Tile(tile)).x) as f32;
+            for number in 0..shape.triangles() as u32 {
+                let triangle = shape.mesh.triangle(number);
+                let cone = shape.cone(number, &triangle).expect("it has a normal");
+                let Triangle { a, b, c } = triangle;
+                let sides = [(a, b), (b, c), (c, a)].into_iter().zip(cone.sides);
+                let on_ridge = sides.filter(|((from, to), _)| from.x == ridge && to.x == ridge);
+                found.extend(on_ridge.map(|(_, (_, beyond))| (cone.face, beyond)));
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn a_ridge_on_a_border_is_known_as_one_within_a_chunk_is() {
+        let [within, border] = [8, 16].map(over_ridge);
+        // From both sides, cell by cell.
+        assert_eq!((within.len(), border.len()), (64, 64));
+        for (face, beyond) in within.into_iter().chain(border) {
+            let slope = Vector::new(PITCH as f32 * face.x.signum(), 1.0, 0.0).normalize();
+            assert!(face.abs_diff_eq(slope, 1e-5), "{face} is no slope of the roof");
+            let other = Vector::new(-slope.x, slope.y, 0.0);
+            assert!(beyond.abs_diff_eq(other, 1e-5), "{beyond} beside {face}");
+        }
+    }
+}

@@ -17,7 +17,7 @@ const SKIN: f32 = 1e-3;
 
 /// A collider as ground sees it.
 #[derive(QueryData)]
-pub(super) struct Solid {
+pub(super) struct SolidCollider {
     bounds: Ref<'static, ColliderAabb>,
     layers: Option<&'static CollisionLayers>,
     is_sensor: Has<Sensor>,
@@ -26,7 +26,7 @@ pub(super) struct Solid {
     place: Option<&'static ColliderTransform>,
 }
 
-impl SolidItem<'_, '_> {
+impl SolidColliderItem<'_, '_> {
     fn layers(&self) -> CollisionLayers {
         self.layers.copied().unwrap_or_default()
     }
@@ -53,14 +53,14 @@ impl SolidItem<'_, '_> {
 pub(super) struct Extent {
     entity: Entity,
     position: Option<Ref<'static, Position>>,
-    own: Option<Solid>,
+    own: Option<SolidCollider>,
     all: Option<&'static RigidBodyColliders>,
     pub is_character: Has<Character>,
 }
 
 impl ExtentItem<'_, '_> {
     /// How far one of its colliders reaches.
-    fn reach(&self, collider: &SolidItem) -> Reach {
+    fn reach(&self, collider: &SolidColliderItem) -> Reach {
         let Some(position) = &self.position else { return Reach::UNKNOWN };
         let bounds = &collider.bounds;
         let (low, high) = (bounds.min - position.0, bounds.max - position.0);
@@ -109,18 +109,18 @@ impl Reach {
 /// Tells which colliders may be in the way of ground.
 #[derive(SystemParam)]
 pub(super) struct Solids<'w, 's> {
-    colliders: Query<'w, 's, Solid>,
+    colliders: Query<'w, 's, SolidCollider>,
     characters: Query<'w, 's, (), With<Character>>,
     ground: Res<'w, GroundContact>,
 }
 
 impl Solids<'_, '_> {
-    fn meets(&self, collider: &SolidItem) -> bool {
+    fn meets(&self, collider: &SolidColliderItem) -> bool {
         !collider.is_sensor && !collider.is_disabled && self.ground.layers.interacts_with(collider.layers())
     }
 
     /// The same for a walker, which looks for ground by itself: with its own collider, and where its filters say.
-    fn carries(&self, walker: &SolidItem) -> bool {
+    fn carries(&self, walker: &SolidColliderItem) -> bool {
         (walker.layers().filters & self.ground.layers.memberships) != LayerMask::NONE
     }
 

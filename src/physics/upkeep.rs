@@ -9,7 +9,7 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
 use super::PhysicsFigures;
-use super::colliders::{Grounds, Prepared, detach};
+use super::colliders::{Grounds, PreparedCollider, detach};
 use super::columns::{Columns, Look, Parts};
 use super::near::Neighbourhood;
 use crate::plugin::{Part, TerrainEntities};
@@ -24,9 +24,9 @@ const FRAME_TIME: Duration = Duration::from_micros(150);
 /// The colliders under way.
 #[derive(Resource, Default)]
 pub(super) struct Work {
-    task: Option<Task<Vec<(Entity, Prepared)>>>,
+    task: Option<Task<Vec<(Entity, PreparedCollider)>>>,
     /// Done, and waiting for their frame.
-    done: VecDeque<(Entity, Prepared)>,
+    done: VecDeque<(Entity, PreparedCollider)>,
 }
 
 /// Puts colliders that are done in their places.
@@ -106,7 +106,7 @@ fn begin(
     terrains: &Query<(&Terrain, &TerrainEntities)>,
     columns: &Columns,
     near: &Neighbourhood,
-) -> Option<Task<Vec<(Entity, Prepared)>>> {
+) -> Option<Task<Vec<(Entity, PreparedCollider)>>> {
     let is_shown =
         |&terrain: &Entity| terrains.get(terrain).is_ok_and(|(model, entities)| entities.show(model.world()));
     let missing = columns.waiting().filter(is_shown).flat_map(|terrain| {

@@ -31,13 +31,13 @@ const TURNS: usize = 8;
 
 /// Where a collider changed, moved or went, in world space.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Change {
+pub(super) struct GroundChange {
     terrain: Entity,
     low: Vec3,
     high: Vec3,
 }
 
-impl Change {
+impl GroundChange {
     /// A box in metres from the origin of a part that stands at `place`.
     pub fn new(terrain: Entity, place: &GlobalTransform, voxel_size: f32, low: Vec3, high: Vec3) -> Self {
         let corner = |number: usize| {
@@ -63,13 +63,13 @@ impl Change {
 /// Changes that bodies have not been told of: one box for each tile or chunk, for much is dug while time stands still.
 #[derive(Resource, Default)]
 pub(super) struct GroundChanges {
-    boxes: Vec<Change>,
+    boxes: Vec<GroundChange>,
     numbers: HashMap<(Entity, Drawn), usize>,
 }
 
 impl GroundChanges {
     /// Adds a change of one tile or chunk of its terrain.
-    pub fn add(&mut self, drawn: Drawn, change: Change) {
+    pub fn add(&mut self, drawn: Drawn, change: GroundChange) {
         let number = *self.numbers.entry((change.terrain, drawn)).or_insert(self.boxes.len());
         match self.boxes.get_mut(number) {
             Some(known) => (known.low, known.high) = (known.low.min(change.low), known.high.max(change.high)),
@@ -82,7 +82,7 @@ impl GroundChanges {
         self.boxes.len()
     }
 
-    fn take(&mut self) -> Vec<Change> {
+    fn take(&mut self) -> Vec<GroundChange> {
         self.numbers.clear();
         std::mem::take(&mut self.boxes)
     }

@@ -7,7 +7,7 @@
 //! | after a failure | `$CARGO_TARGET_DIR/proof/golden` has the picture, the golden one and where they differ |
 //!
 //! Pictures are compared by FLIP, which says how much of a difference an eye would see: 0 none, 1 all of it. Needs a
-//! Vulkan driver; lavapipe will do. Where there is none, the tests say so and pass.
+//! Vulkan driver; lavapipe will do. Where there is none, the tests say so and pass; with `BURROW_REQUIRE=1` they fail.
 //!
 //! # A new scene
 //!

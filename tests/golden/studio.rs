@@ -36,10 +36,12 @@ pub struct Studio {
 
 impl Studio {
     /// Opens a studio with `BurrowPlugins` and whatever else is added. `None`, and a line that says so, where nothing
-    /// can draw.
+    /// can draw; a failure if `BURROW_REQUIRE` is set.
     pub fn open(add: impl FnOnce(&mut App)) -> Option<Self> {
         let only = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(renderer) = offscreen::find_renderer() else {
+            let is_required = std::env::var_os("BURROW_REQUIRE").is_some_and(|value| !value.is_empty());
+            assert!(!is_required, "BURROW_REQUIRE is set, but there is no Vulkan device to draw with");
             eprintln!(
                 "\n*** SKIPPED: no Vulkan device, so no picture was compared. Install mesa-vulkan-drivers. ***\n"
             );

@@ -124,7 +124,7 @@ fn compare(what: &str, ways: impl Fn(Ground8) -> [Ride; 2]) {
     for ground in [Ground8::Tiles, Ground8::Seams, Ground8::Chunks] {
         for (lane, cut) in LANES.into_iter().zip(ways(ground)) {
             println!("{what}, {ground:?}, z = {lane}: {cut:?}");
-            assert!(cut.jump < 0.05 && cut.off < 0.05, "{ground:?}, {lane}: {cut:?}");
+            assert!(cut.jump < 0.005 && cut.off < 0.05, "{ground:?}, {lane}: {cut:?}");
             assert!(cut.went > 0.98 * plain.went, "{ground:?}, {lane}: {cut:?} of {plain:?}");
         }
     }
@@ -145,7 +145,7 @@ fn a_walker_feels_neither_seams_nor_borders() {
     }
 }
 
-/// The other tests can fail: triangles on their own do bump.
+/// The other tests can fail: triangles on their own do bump, by more than those allow.
 #[test]
 fn a_ball_feels_the_triangles_of_a_plain_mesh() {
     let mut worst = 0.0f32;
@@ -162,7 +162,7 @@ fn a_ball_feels_the_triangles_of_a_plain_mesh() {
         println!("ball at 12 m/s, plain meshes, z = {lane}: {plain:?}");
         worst = worst.max(plain.jump);
     }
-    assert!(worst > 0.005, "a plain mesh jumps by {worst} only");
+    assert!(worst > 0.02, "a plain mesh jumps by {worst} only");
 }
 
 #[test]

@@ -85,6 +85,16 @@ fn drawn(stage: &mut Stage) -> Vec<(Vec3, Entity)> {
     places.collect()
 }
 
+#[test]
+fn a_piece_of_a_terrain_without_colours_is_drawn_all_the_same() {
+    let (mut stage, terrain) = furnish(Stage::with_meshes(), 1.0, Vec3::ZERO, 1e9);
+    stage.send(saw(1.0, Vec3::ZERO));
+    stage.frames_until("the saw cuts", |stage| stage.terrain(terrain).is_busy());
+    stage.app.world_mut().entity_mut(terrain).remove::<MaterialColors>();
+    stage.frames_until("the slab takes shape", |stage| !pieces(stage).is_empty());
+    assert_eq!(drawn(&mut stage).len(), 1);
+}
+
 /// How often a piece was found, and was drawn in the very same frame, where it was in the ground.
 #[derive(Resource, Default)]
 struct Seen(Vec<bool>);

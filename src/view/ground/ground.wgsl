@@ -1,6 +1,7 @@
 // Layers of ground over Bevy's own material. The uniform is `GroundUniform` in material.rs.
 
 #import bevy_pbr::{
+    decal::clustered::apply_decals,
     mesh_functions,
     mesh_view_bindings::view,
     pbr_fragment::pbr_input_from_standard_material,
@@ -24,16 +25,47 @@
 #import bevy_pbr::pbr_functions::visibility_range_dither;
 #endif
 
+struct Layer {
+    per_metre: f32,
+    relief: f32,
+    metallic: f32,
+    // 0 body, 1 skin, 2 strata.
+    kind: f32,
+}
+
+struct Tint {
+    color: vec3<f32>,
+    // The texture that shows from above, less than 0 for the same one.
+    top: f32,
+}
+
 struct Ground {
     place: mat4x4<f32>,
-    layers: array<vec4<f32>, 16>,
-    tints: array<vec4<f32>, 16>,
-    soil: vec4<f32>,
+    layers: array<Layer, 16>,
+    tints: array<Tint, 16>,
+    soil_layer: f32,
+    subsoil_layer: f32,
+    soil_depth: f32,
+    subsoil_depth: f32,
     beds: vec4<f32>,
-    rock: vec4<f32>,
-    vein: vec4<f32>,
-    far: vec4<f32>,
-    detail: vec4<f32>,
+    bed_height: f32,
+    bend: f32,
+    seam_layer: f32,
+    seam_thickness: f32,
+    seam_depth: f32,
+    vein_layer: f32,
+    vein_thickness: f32,
+    vein_depth: f32,
+    // Cosines of the slopes on which no skin is left, and where it begins to give way.
+    bare: f32,
+    skinned: f32,
+    near: f32,
+    far: f32,
+    variety: f32,
+    quality: f32,
+    // Metres of a voxel.
+    voxel: f32,
+    layer_count: f32,
     is_piece: u32,
 }
 
@@ -105,10 +137,10 @@ fn put(mass: Mass, layer: u32, weight: f32) -> Mass {
 
 fn kinds_from(first: u32) -> vec4<f32> {
     return vec4(
-        ground.layers[first].w,
-        ground.layers[first + 1u].w,
-        ground.layers[first + 2u].w,
-        ground.layers[first + 3u].w,
+        ground.layers[first].kind,
+        ground.layers[first + 1u].kind,
+        ground.layers[first + 2u].kind,
+        ground.layers[first + 3u].kind,
     );
 }
 
@@ -138,9 +170,9 @@ fn vertex(in: Vertex) -> Varying {
         mesh_functions::get_visibility_range_dither_level(in.instance_index, world_from_local[3]);
 #endif
 #ifdef GROUND_ATTRIBUTES
-    out.origin = vec3(in.depth * ground.detail.z, in.cover.xy);
+    out.origin = vec3(in.depth * ground.voxel, in.cover.xy);
     // Ids can't be blended between vertices; weights of layers can.
-    let ids = min(in.ids, vec4(u32(ground.detail.w) - 1u));
+    let ids = min(in.ids, vec4(u32(ground.layer_count) - 1u));
     var mass = Mass(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     mass = put(mass, ids.x, in.weights.x);
     mass = put(mass, ids.y, in.weights.y);
@@ -190,7 +222,7 @@ struct Pair {
 }
 
 fn is_fine() -> bool {
-    return ground.detail.y > 0.5;
+    return ground.quality > 0.5;
 }
 
 fn fetch(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair {
@@ -279,11 +311,11 @@ fn lean_of(relief: vec4<f32>) -> vec2<f32> {
 fn layer_at(layer: u32, site: Site) -> Texels {
     let settings = ground.layers[layer];
     // What shows from above and below, if that is another one: then this one is bedded.
-    let top = ground.tints[layer].w;
+    let top = ground.tints[layer].top;
     let is_bedded = top >= 0.0 && top < f32(textureNumLayers(albedo_texture));
-    let place = site.place * settings.x;
-    let dx = site.dx * settings.x;
-    let dy = site.dy * settings.x;
+    let place = site.place * settings.per_metre;
+    let dx = site.dx * settings.per_metre;
+    let dy = site.dy * settings.per_metre;
     var texels = Texels(vec4(0.0), vec2(0.0), vec3(0.0));
     for (var side = 0; side < 3; side++) {
         let is_x = side == 0;
@@ -303,8 +335,8 @@ fn layer_at(layer: u32, site: Site) -> Texels {
             texels.lean += select(up, vec3(0.0, -lean.y, lean.x), is_x) * weight;
         }
     }
-    texels.color = vec4(texels.color.rgb * ground.tints[layer].rgb, texels.color.a);
-    texels.lean *= settings.y;
+    texels.color = vec4(texels.color.rgb * ground.tints[layer].color, texels.color.a);
+    texels.lean *= settings.relief;
     return texels;
 }
 
@@ -347,103 +379,164 @@ fn offer_four(choice: Choice, first: u32, weights: vec4<f32>) -> Choice {
     return offer(best, first + 3u, weights.w);
 }
 
-// Weights of layers: what vertices say, and below the surface what lies there.
-fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice {
-    var mass = Mass(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 #ifdef GROUND_ATTRIBUTES
-    mass = Mass(in.weights_0, in.weights_1, in.weights_2, in.weights_3);
-    let own = in.origin.z;
-    let cover = in.origin.y;
-    let sunk = max(in.origin.x, 0.0);
+// A place on the ground, as far as strata care.
+struct Depth {
+    // Metres below the surface that was there before anyone dug; the same where borders between strata are ragged.
+    sunk: f32,
+    ragged: f32,
+    // Noise there, in space: over the land, over a few steps, and within one, which is 0 on the surface itself.
+    broad: vec4<f32>,
+    fine: vec4<f32>,
+    grit: vec4<f32>,
+}
+
+fn depth_at(site: Site, sunk: f32, broad: vec4<f32>, fine: vec4<f32>) -> Depth {
     // Borders between strata are ragged, but not at the surface itself.
-    var depth = sunk;
+    var ragged = sunk;
     var grit = vec4(0.0);
     if sunk > 0.0 {
         let inside = min(1.4 * sunk, 1.0);
         grit = noise_at(site.place, 5.0) * inside;
-        depth = max(sunk + 0.7 * grit.x + (0.35 * fine.x + 0.5 * broad.x) * inside, 0.0);
+        ragged = max(sunk + 0.7 * grit.x + (0.35 * fine.x + 0.5 * broad.x) * inside, 0.0);
     }
-    let steep = 1.0 - smoothstep(ground.far.x, ground.far.y, site.normal.y + 0.08 * fine.y);
-    let bare = own * max(steep, smoothstep(0.10, 0.40, depth));
-    // What the strata fill: under turf, and where the ground itself shows. A layer's kind is 1 for a skin, 2 for strata.
+    return Depth(sunk, ragged, broad, fine, grit);
+}
+
+// What is left of four layers when the strata have taken what is theirs: of skins, where these are `bare`, and all of the
+// ground's own that stands for strata.
+fn less_strata(weights: vec4<f32>, kinds: vec4<f32>, own: f32, bare: f32) -> vec4<f32> {
+    return weights * (1.0 - select(step(vec4(0.5), kinds) * bare, vec4(own), kinds > vec4(1.5)));
+}
+
+// Soil and subsoil, of all that the strata fill: what lies under a skin, and what is the ground's own body.
+fn soils(depth: Depth, under_skin: f32, body: f32, all: f32, cover: f32) -> vec2<f32> {
+    let covered = max(cover, under_skin / all);
+    let soil_depth = ground.soil_depth * covered * (1.0 + 0.5 * depth.broad.y);
+    let in_soil = 1.0 - smoothstep(0.75 * soil_depth, soil_depth + 0.02, depth.ragged);
+    // Bare rock has no soil on its face.
+    let below = smoothstep(0.02, 0.30, depth.ragged);
+    let soil = in_soil * (under_skin + body * below);
+    let subsoil_depth = soil_depth + ground.subsoil_depth * covered * (1.0 + 0.5 * depth.broad.w);
+    let in_subsoil = (1.0 - in_soil) * (1.0 - smoothstep(0.85 * subsoil_depth, subsoil_depth + 0.05, depth.ragged));
+    let subsoil = step(0.001, ground.subsoil_depth) * in_subsoil * all * below;
+    return vec2(soil, subsoil);
+}
+
+// Where between two repetitions of the beds a place is, from 0 to 1. Beds dip, roll and bend.
+fn within_beds(site: Site, depth: Depth) -> f32 {
+    let flat_place = site.place.xz;
+    let roll = 0.012 * dot(flat_place, vec2(0.8, -0.6))
+        + sin(0.013 * flat_place.x + 1.6 * sin(0.009 * flat_place.y));
+    let up = site.place.y + ground.bend * (roll + 0.7 * depth.broad.z + 0.16 * depth.fine.z);
+    return fract(up / ground.bed_height);
+}
+
+// What of the rock is the seam, which lies in the beds.
+fn seam_in(rock: f32, depth: Depth, within: f32) -> f32 {
+    let off = abs(within - 0.61) * ground.bed_height + 0.15 * depth.fine.x + 0.12 * depth.grit.y;
+    return rock * step(0.001, ground.seam_thickness) * smoothstep(0.8, 1.0, depth.sunk / max(ground.seam_depth, 0.01))
+        * (1.0 - smoothstep(0.30, 0.52, off / max(ground.seam_thickness, 0.001)));
+}
+
+// What of the rock is a vein. Veins are where two kinds of noise cross 0 together: threads in space. They thin out, so that
+// heights of the textures draw their outline.
+fn vein_in(rock: f32, depth: Depth) -> f32 {
+    let thread = length(depth.fine.yw + 0.25 * depth.broad.yw + 0.05 * depth.grit.zw);
+    let width = 0.22 * ground.vein_thickness * smoothstep(-0.1, 0.25, depth.broad.x);
+    return rock * step(0.001, ground.vein_thickness) * smoothstep(0.8, 1.0, depth.sunk / max(ground.vein_depth, 0.01))
+        * (1.0 - smoothstep(0.25, 1.0, thread / max(width, 0.001)));
+}
+
+// Lays rock in four beds, each as thick as noise has it: borders stray from the quarters by up to 0.36 of one.
+fn lay_beds(mass: Mass, rock: f32, depth: Depth, within: f32) -> Mass {
+    let bed = within * 4.0;
+    let quarter = floor(bed);
+    let broad = depth.broad;
+    let borders = clamp(0.8 * vec4(broad.x, broad.w, broad.y, -broad.x), vec4(-0.36), vec4(0.36));
+    let odd = quarter == 1.0 || quarter == 3.0;
+    let below_it = select(select(borders.w, borders.x, odd), select(borders.y, borders.z, odd), quarter >= 2.0);
+    let above_it = select(select(borders.x, borders.y, odd), select(borders.z, borders.w, odd), quarter >= 2.0);
+    let part = bed - quarter;
+    // The nearest border, and the bed below it.
+    let is_low = part < 0.5;
+    let off = select(part - 1.0 - above_it, part - below_it, is_low);
+    let number = u32(quarter + select(4.0, 3.0, is_low)) % 4u;
+    let here = ground.beds[number];
+    let next = ground.beds[(number + 1u) % 4u];
+    let soft = min(0.02 * ground.bed_height, 0.5);
+    let passed = smoothstep(-soft, soft, 0.25 * ground.bed_height * off + 0.7 * soft * depth.grit.x);
+    // Weather leaves a crust, which hides the beds of natural faces in patches.
+    let spread = smoothstep(-0.03, 0.22, 0.8 * broad.y + 0.5 * depth.fine.x);
+    let crust = rock * spread * (1.0 - smoothstep(0.4, 1.6, depth.sunk));
+    let rest = rock - crust;
+    var laid = put(mass, u32(ground.beds.x), crust);
+    laid = put(laid, u32(here), rest * (1.0 - passed));
+    return put(laid, u32(next), rest * passed);
+}
+
+// Puts rock with its seam and veins where it lies.
+fn lay_rock(mass: Mass, rock: f32, site: Site, depth: Depth) -> Mass {
+    let within = within_beds(site, depth);
+    let seam = seam_in(rock, depth, within);
+    let beside_seam = rock - seam;
+    let vein = vein_in(beside_seam, depth);
+    var laid = put(mass, u32(ground.seam_layer), seam);
+    laid = put(laid, u32(ground.vein_layer), vein);
+    return lay_beds(laid, beside_seam - vein, depth, within);
+}
+
+// What vertices say, and below the surface what lies there.
+fn ground_at(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Mass {
+    let given = Mass(in.weights_0, in.weights_1, in.weights_2, in.weights_3);
+    let own = in.origin.z;
+    let cover = in.origin.y;
+    let depth = depth_at(site, max(in.origin.x, 0.0), broad, fine);
+    let steep = 1.0 - smoothstep(ground.bare, ground.skinned, site.normal.y + 0.08 * fine.y);
+    let bare = own * max(steep, smoothstep(0.10, 0.40, depth.ragged));
     let kinds = Mass(kinds_from(0u), kinds_from(4u), kinds_from(8u), kinds_from(12u));
-    let given = mass;
-    mass.a *= 1.0 - select(step(vec4(0.5), kinds.a) * bare, vec4(own), kinds.a > vec4(1.5));
-    mass.b *= 1.0 - select(step(vec4(0.5), kinds.b) * bare, vec4(own), kinds.b > vec4(1.5));
-    mass.c *= 1.0 - select(step(vec4(0.5), kinds.c) * bare, vec4(own), kinds.c > vec4(1.5));
-    mass.d *= 1.0 - select(step(vec4(0.5), kinds.d) * bare, vec4(own), kinds.d > vec4(1.5));
+    var mass = Mass(
+        less_strata(given.a, kinds.a, own, bare),
+        less_strata(given.b, kinds.b, own, bare),
+        less_strata(given.c, kinds.c, own, bare),
+        less_strata(given.d, kinds.d, own, bare),
+    );
+    // What the strata fill: under turf, and where the ground itself shows.
     let taken = given.a + given.b + given.c + given.d - (mass.a + mass.b + mass.c + mass.d);
     let all = dot(taken, vec4(1.0));
     if all > 0.001 {
         let body = own * (
             dot(given.a, step(vec4(1.5), kinds.a)) + dot(given.b, step(vec4(1.5), kinds.b))
             + dot(given.c, step(vec4(1.5), kinds.c)) + dot(given.d, step(vec4(1.5), kinds.d)));
-        let under_skin = max(all - body, 0.0);
-        let covered = max(cover, under_skin / all);
-        let soil_depth = ground.soil.z * covered * (1.0 + 0.5 * broad.y);
-        let in_soil = 1.0 - smoothstep(0.75 * soil_depth, soil_depth + 0.02, depth);
-        // Bare rock has no soil on its face.
-        let below = smoothstep(0.02, 0.30, depth);
-        let soil = in_soil * (under_skin + body * below);
-        let subsoil_depth = soil_depth + ground.soil.w * covered * (1.0 + 0.5 * broad.w);
-        let in_subsoil = (1.0 - in_soil) * (1.0 - smoothstep(0.85 * subsoil_depth, subsoil_depth + 0.05, depth));
-        let subsoil = step(0.001, ground.soil.w) * in_subsoil * all * below;
-        mass = put(mass, u32(ground.soil.x), soil);
-        mass = put(mass, u32(ground.soil.y), subsoil);
-        var rock = max(all - soil - subsoil, 0.0);
+        let soil = soils(depth, max(all - body, 0.0), body, all, cover);
+        mass = put(mass, u32(ground.soil_layer), soil.x);
+        mass = put(mass, u32(ground.subsoil_layer), soil.y);
+        let rock = max(all - soil.x - soil.y, 0.0);
         if rock > 0.0 {
-            // Beds dip, roll and bend.
-            let flat = site.place.xz;
-            let roll = 0.012 * dot(flat, vec2(0.8, -0.6)) + sin(0.013 * flat.x + 1.6 * sin(0.009 * flat.y));
-            let up = site.place.y + ground.rock.y * (roll + 0.7 * broad.z + 0.16 * fine.z);
-            let within = fract(up / ground.rock.x);
-            let seam_off = abs(within - 0.61) * ground.rock.x + 0.15 * fine.x + 0.12 * grit.y;
-            let seam = rock * step(0.001, ground.rock.w) * smoothstep(0.8, 1.0, sunk / max(ground.vein.x, 0.01))
-                * (1.0 - smoothstep(0.30, 0.52, seam_off / max(ground.rock.w, 0.001)));
-            mass = put(mass, u32(ground.rock.z), seam);
-            rock -= seam;
-            // Veins are where two kinds of noise cross 0 together: threads in space. They thin out, so that heights of the
-            // textures draw their outline.
-            let thread = length(fine.yw + 0.25 * broad.yw + 0.05 * grit.zw);
-            let width = 0.22 * ground.vein.z * smoothstep(-0.1, 0.25, broad.x);
-            let vein = rock * step(0.001, ground.vein.z) * smoothstep(0.8, 1.0, sunk / max(ground.vein.w, 0.01))
-                * (1.0 - smoothstep(0.25, 1.0, thread / max(width, 0.001)));
-            mass = put(mass, u32(ground.vein.y), vein);
-            rock -= vein;
-            // Four beds, each as thick as noise has it: borders stray from the quarters by up to 0.36 of one.
-            let bed = within * 4.0;
-            let quarter = floor(bed);
-            let borders = clamp(0.8 * vec4(broad.x, broad.w, broad.y, -broad.x), vec4(-0.36), vec4(0.36));
-            let odd = quarter == 1.0 || quarter == 3.0;
-            let below_it = select(select(borders.w, borders.x, odd), select(borders.y, borders.z, odd), quarter >= 2.0);
-            let above_it = select(select(borders.x, borders.y, odd), select(borders.z, borders.w, odd), quarter >= 2.0);
-            let part = bed - quarter;
-            // The nearest border, and the bed below it.
-            let is_low = part < 0.5;
-            let off = select(part - 1.0 - above_it, part - below_it, is_low);
-            let number = u32(quarter + select(4.0, 3.0, is_low)) % 4u;
-            let here = ground.beds[number];
-            let next = ground.beds[(number + 1u) % 4u];
-            let soft = min(0.02 * ground.rock.x, 0.5);
-            let passed = smoothstep(-soft, soft, 0.25 * ground.rock.x * off + 0.7 * soft * grit.x);
-            // Weather leaves a crust, which hides the beds of natural faces in patches.
-            let spread = smoothstep(-0.03, 0.22, 0.8 * broad.y + 0.5 * fine.x);
-            let crust = rock * spread * (1.0 - smoothstep(0.4, 1.6, sunk));
-            rock -= crust;
-            mass = put(mass, u32(ground.beds.x), crust);
-            mass = put(mass, u32(here), rock * (1.0 - passed));
-            mass = put(mass, u32(next), rock * passed);
+            mass = lay_rock(mass, rock, site, depth);
         }
     }
-#else
-    mass.a.x = 1.0;
+    return mass;
+}
 #endif
-    // Where layers meet, they do so in patches, and not along the lattice.
+
+// Where layers meet, they do so in patches, and not along the lattice.
+fn in_patches(mass: Mass, site: Site) -> Mass {
     let most = max(max(mass.a, mass.b), max(mass.c, mass.d));
     if max(max(most.x, most.y), max(most.z, most.w)) < 0.985 {
         let patches = clamp(1.0 + 1.5 * noise_at(site.place, 4.5), vec4(0.15), vec4(2.0));
-        mass = Mass(mass.a * patches, mass.b * patches, mass.c * patches, mass.d * patches);
+        return Mass(mass.a * patches, mass.b * patches, mass.c * patches, mass.d * patches);
     }
+    return mass;
+}
+
+// The layers that show in a place.
+fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice {
+#ifdef GROUND_ATTRIBUTES
+    let mass = in_patches(ground_at(in, site, broad, fine), site);
+#else
+    let mass = in_patches(Mass(vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0), vec4(0.0), vec4(0.0)), site);
+#endif
     var best = Choice(vec3(0u), vec4(0.0));
     best = offer_four(best, 0u, mass.a);
     best = offer_four(best, 4u, mass.b);
@@ -504,7 +597,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     sides = max(sides / (sides.x + sides.y + sides.z) - 0.06, vec3(0.0));
     site.sides = sides / (sides.x + sides.y + sides.z);
     let distance = length(view.world_position - in.world_position.xyz);
-    site.far = smoothstep(ground.far.z, ground.far.w, distance);
+    site.far = smoothstep(ground.near, ground.far, distance);
 
     let broad = noise_at(site.place, 150.0);
     let fine = noise_at(site.place, 27.0);
@@ -524,7 +617,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
             sum.color += texels.color * score;
             sum.finish += texels.finish * score;
             sum.lean += texels.lean * score;
-            metallic += ground.layers[layer].z * score;
+            metallic += ground.layers[layer].metallic * score;
             total += score;
         }
     }
@@ -533,9 +626,9 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     var lean = sum.lean / total;
     metallic /= total;
     // No two places have quite the same tint.
-    let mood = clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0) * ground.detail.x;
+    let mood = clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0) * ground.variety;
     color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(mood, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-mood, 0.0));
-    color *= 1.0 + (0.16 + 0.3 * site.far) * ground.detail.x * fine.z;
+    color *= 1.0 + (0.16 + 0.3 * site.far) * ground.variety * fine.z;
 
     pbr_input.material.base_color = vec4(pbr_input.material.base_color.rgb * color, 1.0);
     pbr_input.material.perceptual_roughness = clamp(finish.y, 0.089, 1.0);
@@ -544,6 +637,7 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     pbr_input.specular_occlusion *= finish.x;
     lean -= dot(lean, site.normal) * site.normal;
     pbr_input.N = facing(normalize(normalize(site.normal + lean) * turn), normalize(in.world_normal), pbr_input.V);
+    apply_decals(&pbr_input);
 
 #ifdef PREPASS_PIPELINE
     return deferred_output(plain, pbr_input);

@@ -118,13 +118,14 @@ impl Default for GroundStrata {
     }
 }
 
-/// How many texels a pixel of the ground may cost.
+/// How many texels a pixel of the ground may cost. Each layer is laid on from all sides that show: one where the
+/// ground is level, two on most slopes.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default)]
 pub enum GroundQuality {
-    /// The two strongest layers, each from one side, repeating: for weak machines and software renderers.
+    /// The two strongest layers, repeating: for weak machines and software renderers.
     Low,
-    /// The three strongest layers, each from two sides, and without repetition.
+    /// The three strongest layers, without repetition.
     #[default]
     High,
 }

@@ -18,7 +18,7 @@ use crate::plugin::{
 };
 
 /// What terrains with a [`GroundLook`] are drawn with: Bevy's own material, whose colour, roughness and relief come from
-/// layers of texture. Shadows, fog, prepasses and deferred rendering work as ever.
+/// layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do there.
 ///
 /// Meshes without the attributes of a terrain show layer 0.
 pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
@@ -42,27 +42,57 @@ pub struct GroundExtension {
     pub(super) noise: Option<Handle<Image>>,
 }
 
+/// A layer, as `ground.wgsl` has it.
+#[derive(ShaderType, Clone, Copy, Debug, PartialEq)]
+pub(super) struct LayerUniform {
+    per_metre: f32,
+    relief: f32,
+    metallic: f32,
+    /// 0 body, 1 skin, 2 strata.
+    kind: f32,
+}
+
+/// A layer's colours, as `ground.wgsl` has them.
+#[derive(ShaderType, Clone, Copy, Debug, PartialEq)]
+pub(super) struct TintUniform {
+    color: Vec3,
+    /// The texture that shows from above, -1 for the same one.
+    top: f32,
+}
+
 /// What the shader reads of a [`GroundLook`]; as `ground.wgsl` has it.
 #[derive(ShaderType, Clone, Debug, PartialEq)]
 pub(super) struct GroundUniform {
     /// From world space to metres of the terrain; of a piece, from its mesh to these metres.
     pub place: Mat4,
-    /// 1 / metres, relief, metallic, kind.
-    layers: [Vec4; MAX_LAYERS],
-    /// Tint; the texture that shows from above, -1 for the same one.
-    tints: [Vec4; MAX_LAYERS],
+    layers: [LayerUniform; MAX_LAYERS],
+    tints: [TintUniform; MAX_LAYERS],
     /// Layers of soil and subsoil, how deep each reaches.
-    soil: Vec4,
+    soil_layer: f32,
+    subsoil_layer: f32,
+    soil_depth: f32,
+    subsoil_depth: f32,
     /// Layers of the beds.
     beds: Vec4,
-    /// Height, bend; the seam's layer and thickness.
-    rock: Vec4,
-    /// Depth of the seam; the vein's layer, thickness, depth.
-    vein: Vec4,
-    /// Cosines of cliffs, distances.
-    far: Vec4,
-    /// Variety, quality, metres of a voxel, number of layers.
-    detail: Vec4,
+    bed_height: f32,
+    bend: f32,
+    seam_layer: f32,
+    seam_thickness: f32,
+    seam_depth: f32,
+    vein_layer: f32,
+    vein_thickness: f32,
+    vein_depth: f32,
+    /// Cosines of the slopes on which no skin is left, and where it begins to give way.
+    bare: f32,
+    skinned: f32,
+    near: f32,
+    far: f32,
+    variety: f32,
+    /// 1 for the finest.
+    quality: f32,
+    /// Metres of a voxel.
+    voxel: f32,
+    layer_count: f32,
     /// 1 for pieces, which move by themselves.
     is_piece: u32,
 }
@@ -78,41 +108,46 @@ impl GroundUniform {
         Self {
             place: Mat4::from_rotation_translation(rotation, translation).inverse(),
             layers: std::array::from_fn(|at| {
-                let layer = layer(at);
-                let kind = match layer.kind {
+                let GroundLayer { metres, relief, metallic, kind, .. } = layer(at);
+                let kind = match kind {
                     GroundLayerKind::Body => 0.0,
                     GroundLayerKind::Skin => 1.0,
                     GroundLayerKind::Strata => 2.0,
                 };
-                Vec4::new(1.0 / layer.metres.max(0.01), layer.relief, layer.metallic, kind)
+                LayerUniform { per_metre: 1.0 / metres.max(0.01), relief, metallic, kind }
             }),
             tints: std::array::from_fn(|at| {
                 let GroundLayer { tint, top, .. } = layer(at);
-                tint.to_vec3().extend(top.map_or(-1.0, f32::from))
+                TintUniform { color: tint.to_vec3(), top: top.map_or(-1.0, f32::from) }
             }),
-            soil: Vec4::new(number(strata.soil.0), number(strata.subsoil.0), strata.soil.1, strata.subsoil.1),
+            soil_layer: number(strata.soil.0),
+            subsoil_layer: number(strata.subsoil.0),
+            soil_depth: strata.soil.1,
+            subsoil_depth: strata.subsoil.1,
             beds: Vec4::from_array(strata.beds.map(number)),
-            rock: Vec4::new(strata.height.max(0.1), strata.bend, number(strata.seam.0), strata.seam.1),
-            vein: Vec4::new(strata.seam.2, number(strata.vein.0), strata.vein.1, strata.vein.2),
-            far: Vec4::new(
-                cosine(look.cliffs.1),
-                cosine(look.cliffs.0).max(cosine(look.cliffs.1) + 0.001),
-                look.distance.0,
-                look.distance.1.max(look.distance.0 + 0.1),
-            ),
-            detail: Vec4::new(
-                look.variety,
-                if look.quality == GroundQuality::High { 1.0 } else { 0.0 },
-                scale.y,
-                count as f32,
-            ),
+            bed_height: strata.height.max(0.1),
+            bend: strata.bend,
+            seam_layer: number(strata.seam.0),
+            seam_thickness: strata.seam.1,
+            seam_depth: strata.seam.2,
+            vein_layer: number(strata.vein.0),
+            vein_thickness: strata.vein.1,
+            vein_depth: strata.vein.2,
+            bare: cosine(look.cliffs.1),
+            skinned: cosine(look.cliffs.0).max(cosine(look.cliffs.1) + 0.001),
+            near: look.distance.0,
+            far: look.distance.1.max(look.distance.0 + 0.1),
+            variety: look.variety,
+            quality: if look.quality == GroundQuality::High { 1.0 } else { 0.0 },
+            voxel: scale.y,
+            layer_count: count as f32,
             is_piece: 0,
         }
     }
 
     /// The same for a piece whose mesh counts from a voxel.
     pub(super) fn of_piece(self, origin: IVec3) -> Self {
-        let voxel = self.detail.z;
+        let voxel = self.voxel;
         let place = Mat4::from_scale_rotation_translation(
             Vec3::splat(voxel),
             Quat::IDENTITY,

@@ -23,6 +23,8 @@ mod noise;
 mod pack;
 mod palette;
 mod pieces;
+#[cfg(test)]
+mod stage;
 mod textures;
 
 pub use fit::GroundTexturesError;
@@ -84,6 +86,10 @@ fn keep_materials(app: &mut App) {
     );
 }
 
+/// The material that a terrain has from here: what the game puts on it by itself is not taken away.
+#[derive(Component, Clone, Copy)]
+struct OwnMaterial(AssetId<GroundMaterial>);
+
 /// Gives each terrain with a look its material as soon as the textures are there, and another one when these change.
 fn dress(
     mut commands: Commands,
@@ -112,14 +118,22 @@ fn dress(
             noise: Some(textures.noise.clone()),
         };
         let base = current.map_or(base, |current| current.base.clone());
-        commands.entity(entity).try_insert(MeshMaterial3d(materials.add(GroundMaterial { base, extension })));
+        let own = materials.add(GroundMaterial { base, extension });
+        commands.entity(entity).try_insert((OwnMaterial(own.id()), MeshMaterial3d(own)));
     }
 }
 
-/// Takes the material of a terrain that has lost its look.
-fn undress(mut commands: Commands, mut removed: RemovedComponents<GroundLook>) {
+/// Takes the material of a terrain that has lost its look, and has no other one by now.
+fn undress(
+    mut commands: Commands,
+    mut removed: RemovedComponents<GroundLook>,
+    dressed: Query<(&MeshMaterial3d<GroundMaterial>, &OwnMaterial), Without<GroundLook>>,
+) {
     for entity in removed.read() {
-        if let Ok(mut terrain) = commands.get_entity(entity) {
+        let Ok((material, own)) = dressed.get(entity) else { continue };
+        let mut terrain = commands.entity(entity);
+        terrain.try_remove::<OwnMaterial>();
+        if material.0.id() == own.0 {
             terrain.try_remove::<MeshMaterial3d<GroundMaterial>>();
         }
     }
@@ -171,5 +185,43 @@ mod tests {
         assert!(!comes_too_early(app().add_plugins(GroundPlugin)));
         assert!(!comes_too_early(app().add_plugins((Renderer, GroundPlugin))));
         assert!(comes_too_early(app().add_plugins((GroundPlugin, Renderer))));
+    }
+
+    fn worn(app: &App, terrain: Entity) -> Option<MeshMaterial3d<GroundMaterial>> {
+        app.world().get(terrain).cloned()
+    }
+
+    #[test]
+    fn a_look_that_makes_way_for_another_one_leaves_no_frame_without_ground() {
+        let mut app = stage::app();
+        let terrain = stage::spawn_terrain(&mut app);
+        app.update();
+        let before = worn(&app, terrain);
+        assert!(before.is_some());
+        let other = GroundLook { variety: 0.9, ..default() };
+        app.world_mut().entity_mut(terrain).remove::<GroundLook>().insert(other.clone());
+        app.update();
+        assert_eq!(worn(&app, terrain), before);
+        let uniform = GroundUniform::new(&other, &GlobalTransform::IDENTITY);
+        assert_eq!(stage::extension(&app, terrain).uniform, uniform);
+        app.world_mut().entity_mut(terrain).remove::<GroundLook>();
+        app.update();
+        assert_eq!(worn(&app, terrain), None);
+    }
+
+    #[test]
+    fn a_material_that_the_game_put_on_a_terrain_stays_when_the_look_goes() {
+        let mut app = stage::app();
+        let terrain = stage::spawn_terrain(&mut app);
+        app.update();
+        let dressed = worn(&app, terrain).expect("it is dressed");
+        let mut materials = app.world_mut().resource_mut::<Assets<GroundMaterial>>();
+        let copy = materials.get(&dressed.0).expect("it is there").clone();
+        let own = MeshMaterial3d(materials.add(copy));
+        app.world_mut().entity_mut(terrain).insert(own.clone());
+        app.update();
+        app.world_mut().entity_mut(terrain).remove::<GroundLook>();
+        app.update();
+        assert_eq!(worn(&app, terrain), Some(own));
     }
 }

@@ -59,44 +59,11 @@ pub(super) fn follow(
 
 #[cfg(test)]
 mod tests {
-    use super::super::keep_materials;
     use super::super::look::GroundQuality;
     use super::super::material::GroundUniform;
-    use super::super::textures::{GroundLoading, Textures};
+    use super::super::stage::{app, extension, spawn_terrain, textures};
+    use super::super::textures::GroundLoading;
     use super::*;
-    use crate::ground::Ground;
-    use crate::terrain::TerrainSettings;
-
-    fn textures(app: &mut App) -> Textures {
-        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
-        let [albedo, relief, noise] = [(); 3].map(|()| images.add(Image::default()));
-        Textures { albedo, relief, noise }
-    }
-
-    /// An app that draws nothing, and has textures.
-    fn app() -> App {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, AssetPlugin::default()))
-            .init_asset::<Image>()
-            .init_asset::<GroundMaterial>()
-            .init_resource::<GroundLoading>();
-        keep_materials(&mut app);
-        let ready = textures(&mut app);
-        app.world_mut().resource_mut::<GroundLoading>().ready = Some(ready);
-        app
-    }
-
-    fn spawn_terrain(app: &mut App) -> Entity {
-        let ground = Ground::flat(64, 64, 8.0).expect("valid");
-        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
-        app.world_mut().spawn((terrain, GroundLook::default(), GlobalTransform::IDENTITY)).id()
-    }
-
-    fn extension(app: &App, of: Entity) -> GroundExtension {
-        let material = app.world().get::<MeshMaterial3d<GroundMaterial>>(of).expect("it is dressed");
-        let materials = app.world().resource::<Assets<GroundMaterial>>();
-        materials.get(&material.0).expect("it is there").extension.clone()
-    }
 
     /// How many materials the last frame changed.
     fn count_changes(app: &mut App) -> usize {

@@ -19,7 +19,7 @@ pub enum GroundTextures {
     /// The project's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) comes:
     /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel;
     /// 12 and 13 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top).
-    /// The same bytes on every machine.
+    /// The same bytes on every machine. They stay when the last look goes, so that the next one need not wait for them.
     Baked {
         /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
         side: u32,
@@ -45,7 +45,7 @@ impl Default for GroundTextures {
     }
 }
 
-/// How far the textures are; for a progress bar.
+/// How far the textures are; for a progress bar. It counts as changed when one of its answers does.
 #[derive(Resource, Default)]
 pub struct GroundLoading {
     meter: Meter,
@@ -62,6 +62,16 @@ pub struct GroundLoading {
     failure: Option<GroundTexturesError>,
     /// What was odd about them.
     misfit: Option<Misfit>,
+    /// What those who watch for changes know.
+    told: News,
+}
+
+/// What can be asked of [`GroundLoading`].
+#[derive(Clone, Debug, Default, PartialEq)]
+struct News {
+    progress: f32,
+    is_ready: bool,
+    failure: Option<String>,
 }
 
 /// What materials are made with.
@@ -79,7 +89,7 @@ impl GroundLoading {
         if self.is_current { 1.0 } else { self.meter.progress().min(0.99) }
     }
 
-    /// Are the textures there, and terrains dressed with them?
+    /// Are the textures there, and terrains dressed with them? Not any more when a game removes the images of its own.
     pub fn is_ready(&self) -> bool {
         self.is_current
     }
@@ -101,6 +111,11 @@ impl GroundLoading {
         self.failure.as_ref()
     }
 
+    fn news(&self) -> News {
+        let failure = self.failure().map(ToString::to_string);
+        News { progress: self.progress(), is_ready: self.is_ready(), failure }
+    }
+
     /// Remembers why images are not used, and tells it once.
     fn fail(&mut self, failure: GroundTexturesError) {
         (self.is_current, self.was_sound) = (false, false);
@@ -120,77 +135,101 @@ pub(super) fn load_textures(
     server: Option<Res<AssetServer>>,
     device: Option<Res<RenderDevice>>,
 ) {
-    let loading = loading.bypass_change_detection();
-    if looks.is_empty() && loading.wanted.is_none() {
-        return;
+    let features = device.map_or(WgpuFeatures::empty(), |device| device.features());
+    let unseen = loading.bypass_change_detection();
+    unseen.proceed(&settings, &looks, &mut images, server.as_deref(), features);
+    // Whoever watches it for changes is told of what can be asked.
+    let news = loading.news();
+    if loading.told != news {
+        loading.told = news;
     }
-    if loading.wanted.as_ref() != Some(&*settings) {
-        loading.wanted = Some(settings.clone());
+}
+
+impl GroundLoading {
+    fn proceed(
+        &mut self,
+        settings: &GroundTextures,
+        looks: &Query<(Entity, &GroundLook)>,
+        images: &mut ResMut<Assets<Image>>,
+        server: Option<&AssetServer>,
+        features: WgpuFeatures,
+    ) {
+        if looks.is_empty() && self.wanted.is_none() {
+            return;
+        }
+        if self.wanted.as_ref() != Some(settings) {
+            self.begin(settings);
+        }
+        if let Some(baked) = self.task.as_mut().and_then(check_ready) {
+            self.task = None;
+            self.baked = Some([baked.albedo, baked.relief, baked.noise].map(|image| images.add(image)));
+        }
+        let Some([albedo, relief, noise]) = self.baked.clone() else { return };
+        let baked = Textures { albedo, relief, noise };
+        let textures = match settings {
+            GroundTextures::Baked { .. } => baked.clone(),
+            GroundTextures::Images { albedo, relief } => {
+                Textures { albedo: albedo.clone(), relief: relief.clone(), noise: baked.noise.clone() }
+            }
+        };
+        // In every frame, since images may change: what is drawn with unfit ones would end the app.
+        let find = |name, handle: &Handle<Image>| match (images.get(handle), server) {
+            (Some(image), _) => layers(name, image, features).map(Some),
+            (None, Some(server)) => match server.load_state(handle) {
+                LoadState::Failed(source) => Err(GroundTexturesError::Load { image: name, source }),
+                _ => Ok(None),
+            },
+            (None, None) => Ok(None),
+        };
+        let find_both = |Textures { albedo, relief, .. }: &Textures| {
+            find("albedo", albedo).and_then(|layers| Ok(layers.zip(find("relief", relief)?)))
+        };
+        match find_both(&textures) {
+            Ok(Some((albedo, relief))) => {
+                self.failure = None;
+                // The renderer takes up images and materials in any order: one that was mended just now may still be there
+                // as it was before.
+                if !std::mem::replace(&mut self.was_sound, true) {
+                    return;
+                }
+                self.is_current = true;
+                let misfit = Misfit::find([albedo, relief], looks.iter());
+                if let Some(misfit) = misfit
+                    && self.misfit != Some(misfit)
+                {
+                    warn!("the arrays of GroundTextures don't fit: {misfit}");
+                }
+                self.misfit = misfit;
+                if self.ready.as_ref() != Some(&textures) {
+                    self.ready = Some(textures);
+                }
+            }
+            // Still to come, or taken away.
+            Ok(None) => (self.is_current, self.was_sound, self.failure) = (false, false, None),
+            Err(failure) => {
+                if self.ready.as_ref().is_none_or(|worn| find_both(worn).is_err()) {
+                    self.ready = Some(baked);
+                }
+                self.fail(failure);
+            }
+        }
+    }
+
+    /// Begins with other textures.
+    fn begin(&mut self, settings: &GroundTextures) {
+        self.wanted = Some(settings.clone());
         // Noise is needed in any case; with a game's own images the layers are baked as small as can be.
-        let (side, anisotropy) = match &*settings {
+        let (side, anisotropy) = match settings {
             GroundTextures::Baked { side, anisotropy } => {
                 (side.clamp(&16, &2048).next_power_of_two(), *anisotropy)
             }
             GroundTextures::Images { .. } => (16, 1),
         };
-        loading.meter = Meter::default();
-        (loading.baked, loading.is_current, loading.was_sound) = (None, false, false);
-        (loading.failure, loading.misfit) = (None, None);
-        let meter = loading.meter.clone();
-        loading.task = Some(AsyncComputeTaskPool::get().spawn(async move { bake(side, anisotropy, &meter) }));
-    }
-    if let Some(baked) = loading.task.as_mut().and_then(check_ready) {
-        loading.task = None;
-        loading.baked = Some([baked.albedo, baked.relief, baked.noise].map(|image| images.add(image)));
-    }
-    let Some([albedo, relief, noise]) = loading.baked.clone() else { return };
-    let baked = Textures { albedo, relief, noise };
-    let textures = match &*settings {
-        GroundTextures::Baked { .. } => baked.clone(),
-        GroundTextures::Images { albedo, relief } => {
-            Textures { albedo: albedo.clone(), relief: relief.clone(), noise: baked.noise.clone() }
-        }
-    };
-    // In every frame, since images may change: what is drawn with unfit ones would end the app.
-    let features = device.map_or(WgpuFeatures::empty(), |device| device.features());
-    let find = |name, handle: &Handle<Image>| match (images.get(handle), server.as_deref()) {
-        (Some(image), _) => layers(name, image, features).map(Some),
-        (None, Some(server)) => match server.load_state(handle) {
-            LoadState::Failed(source) => Err(GroundTexturesError::Load { image: name, source }),
-            _ => Ok(None),
-        },
-        (None, None) => Ok(None),
-    };
-    let find_both = |Textures { albedo, relief, .. }: &Textures| {
-        find("albedo", albedo).and_then(|layers| Ok(layers.zip(find("relief", relief)?)))
-    };
-    match find_both(&textures) {
-        Ok(Some((albedo, relief))) => {
-            loading.failure = None;
-            // The renderer takes up images and materials in any order: one that was mended just now may still be there as
-            // it was before.
-            if !std::mem::replace(&mut loading.was_sound, true) {
-                return;
-            }
-            loading.is_current = true;
-            let misfit = Misfit::find([albedo, relief], looks.iter());
-            if let Some(misfit) = misfit
-                && loading.misfit != Some(misfit)
-            {
-                warn!("the arrays of GroundTextures don't fit: {misfit}");
-            }
-            loading.misfit = misfit;
-            if loading.ready.as_ref() != Some(&textures) {
-                loading.ready = Some(textures);
-            }
-        }
-        Ok(None) => loading.failure = None,
-        Err(failure) => {
-            if loading.ready.as_ref().is_none_or(|worn| find_both(worn).is_err()) {
-                loading.ready = Some(baked);
-            }
-            loading.fail(failure);
-        }
+        self.meter = Meter::default();
+        (self.baked, self.is_current, self.was_sound) = (None, false, false);
+        (self.failure, self.misfit) = (None, None);
+        let meter = self.meter.clone();
+        self.task = Some(AsyncComputeTaskPool::get().spawn(async move { bake(side, anisotropy, &meter) }));
     }
 }
 
@@ -296,5 +335,67 @@ mod tests {
         app.update();
         assert!(loading(&app).failure().is_none());
         update_until(&mut app, "textures", GroundLoading::is_ready);
+    }
+
+    /// Two images that can be drawn with, worn.
+    fn wear_own(app: &mut App) -> [Handle<Image>; 2] {
+        let own = [(); 2].map(|()| add(app, Image::default()));
+        own.iter().for_each(|image| see(app, image, TextureViewDimension::D2Array));
+        let [albedo, relief] = own.clone();
+        app.insert_resource(GroundTextures::Images { albedo, relief });
+        update_until(app, "textures", GroundLoading::is_ready);
+        own
+    }
+
+    #[test]
+    fn an_image_that_is_taken_away_is_not_ready_until_it_is_back() {
+        let mut app = app();
+        let [albedo, relief] = wear_own(&mut app);
+        assert!(wears(&app, &albedo));
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        let image = images.remove(&relief).expect("it is there");
+        app.update();
+        assert!(!loading(&app).is_ready() && loading(&app).progress() < 1.0);
+        assert!(loading(&app).failure().is_none(), "it may be on its way");
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        images.insert(&relief, image).expect("its handle is there");
+        app.update();
+        assert!(!loading(&app).is_ready(), "the renderer has it a frame later");
+        app.update();
+        assert!(loading(&app).is_ready() && wears(&app, &albedo));
+    }
+
+    /// How often somebody who watches was told of a change.
+    #[derive(Resource, Default)]
+    struct Told(usize);
+
+    #[test]
+    fn whoever_watches_is_told_when_an_answer_changes_and_not_otherwise() {
+        let mut app = app();
+        app.init_resource::<Told>().add_systems(
+            Last,
+            |loading: Res<GroundLoading>, mut told: ResMut<Told>| {
+                told.0 += usize::from(loading.is_changed());
+            },
+        );
+        let told = |app: &App| app.world().resource::<Told>().0;
+        app.update();
+        let before = told(&app);
+        update_until(&mut app, "textures", GroundLoading::is_ready);
+        assert!(told(&app) > before, "they are ready");
+        let before = told(&app);
+        (0..5).for_each(|_| app.update());
+        assert_eq!(told(&app), before);
+        let [albedo, relief] = [(); 2].map(|()| add(&mut app, Image::default()));
+        app.insert_resource(GroundTextures::Images { albedo, relief });
+        app.update();
+        assert_eq!(told(&app), before + 1, "it begins anew");
+        update_until(&mut app, "a failure", |loading| loading.failure().is_some());
+        let before = told(&app);
+        app.update();
+        assert_eq!(told(&app), before);
+        app.insert_resource(SMALL);
+        app.update();
+        assert!(loading(&app).failure().is_none() && told(&app) == before + 1);
     }
 }

@@ -1,0 +1,42 @@
+//! What tests of materials stand on: an app that draws nothing, with terrains that have a look.
+
+use bevy::prelude::*;
+
+use super::keep_materials;
+use super::look::GroundLook;
+use super::material::{GroundExtension, GroundMaterial};
+use super::textures::{GroundLoading, Textures};
+use crate::ground::Ground;
+use crate::terrain::{Terrain, TerrainSettings};
+
+pub(super) fn textures(app: &mut App) -> Textures {
+    let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+    let [albedo, relief, noise] = [(); 3].map(|()| images.add(Image::default()));
+    Textures { albedo, relief, noise }
+}
+
+/// An app that draws nothing, and has textures.
+pub(super) fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default()))
+        .init_asset::<Image>()
+        .init_asset::<GroundMaterial>()
+        .init_resource::<GroundLoading>();
+    keep_materials(&mut app);
+    let ready = textures(&mut app);
+    app.world_mut().resource_mut::<GroundLoading>().ready = Some(ready);
+    app
+}
+
+pub(super) fn spawn_terrain(app: &mut App) -> Entity {
+    let ground = Ground::flat(64, 64, 8.0).expect("valid");
+    let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    app.world_mut().spawn((terrain, GroundLook::default(), GlobalTransform::IDENTITY)).id()
+}
+
+/// What an entity is drawn with.
+pub(super) fn extension(app: &App, of: Entity) -> GroundExtension {
+    let material = app.world().get::<MeshMaterial3d<GroundMaterial>>(of).expect("it is dressed");
+    let materials = app.world().resource::<Assets<GroundMaterial>>();
+    materials.get(&material.0).expect("it is there").extension.clone()
+}
