@@ -4,7 +4,7 @@ use avian3d::prelude::*;
 use bevy::prelude::*;
 
 use crate::landscape::NewGame;
-use crate::player::thrown;
+use crate::thrown::just_thrown;
 use crate::tools::{Strike, Tool};
 
 /// Metres per second, along the look.
@@ -78,7 +78,7 @@ fn throw(
     commands.spawn((
         Name::new("ball"),
         Ball { number: supply.thrown },
-        thrown(),
+        just_thrown(),
         LinearVelocity(velocity),
         AngularVelocity(velocity.cross(Vec3::Y) * -0.3),
         Mesh3d(supply.mesh.clone()),

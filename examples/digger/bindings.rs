@@ -2,16 +2,18 @@
 
 use std::collections::{BTreeMap, HashSet};
 use std::fmt;
+use std::str::FromStr;
 
 use bevy::prelude::*;
 use bevy::reflect::Typed;
 use bevy::reflect::enums::{DynamicEnum, DynamicVariant, VariantType};
 use serde::de::IntoDeserializer;
-use serde::de::value::StringDeserializer;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::de::value::{Error, StringDeserializer};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::input::Action;
+use crate::labels::Labels;
 
 /// A key, a button, or a turn of the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -25,11 +27,22 @@ pub enum Binding {
 }
 
 /// What a binding belongs to.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Device {
     Keyboard,
     Mouse,
     Pad,
+}
+
+impl Device {
+    /// What a text was meant for, though it names nothing there.
+    fn meant_by(text: &str) -> Self {
+        match text.split_once(' ') {
+            Some(("Mouse" | "Wheel", _)) => Self::Mouse,
+            Some(("Pad", _)) => Self::Pad,
+            _ => Self::Keyboard,
+        }
+    }
 }
 
 impl Binding {
@@ -39,6 +52,11 @@ impl Binding {
             Self::Mouse(_) | Self::WheelUp | Self::WheelDown => Device::Mouse,
             Self::Pad(_) => Device::Pad,
         }
+    }
+
+    /// Is it read again as what it was written? Keys that no layout knows have no name, but only a number on one platform.
+    pub fn can_be_kept(self) -> bool {
+        Self::try_from(String::from(self)) == Ok(self)
     }
 }
 
@@ -54,6 +72,11 @@ fn variant_named<E: Typed + FromReflect>(name: &str) -> Option<E> {
         return None;
     }
     E::from_reflect(&DynamicEnum::new(name, DynamicVariant::Unit))
+}
+
+/// The number of a button without a name, as in `Other(9)`.
+fn number<N: FromStr>(name: &str) -> Option<N> {
+    name.strip_prefix("Other(")?.strip_suffix(')')?.parse().ok()
 }
 
 impl From<Binding> for String {
@@ -73,8 +96,12 @@ impl TryFrom<String> for Binding {
 
     fn try_from(text: String) -> Result<Self, UnknownBinding> {
         let found = match text.split_once(' ') {
-            Some(("Mouse", button)) => variant_named(button).map(Self::Mouse),
-            Some(("Pad", button)) => variant_named(button).map(Self::Pad),
+            Some(("Mouse", button)) => {
+                variant_named(button).or_else(|| number(button).map(MouseButton::Other)).map(Self::Mouse)
+            }
+            Some(("Pad", button)) => {
+                variant_named(button).or_else(|| number(button).map(GamepadButton::Other)).map(Self::Pad)
+            }
             Some(("Wheel", "Up")) => Some(Self::WheelUp),
             Some(("Wheel", "Down")) => Some(Self::WheelDown),
             Some(_) => None,
@@ -94,21 +121,41 @@ impl fmt::Display for Binding {
 
 /// Which keys and buttons each action has.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Bindings(#[serde(deserialize_with = "known_bindings")] BTreeMap<Action, Vec<Binding>>);
+#[serde(from = "BTreeMap<String, Value>", into = "BTreeMap<Action, Vec<Binding>>")]
+pub struct Bindings {
+    all: BTreeMap<Action, Vec<Binding>>,
+    /// What a file had for an action, and nobody could read; it is made good by [`complete`](Self::complete).
+    lost: Vec<(Action, Device)>,
+}
 
-/// Actions and keys of another version of the game are left out, and cost nobody the others.
-fn known_bindings<'de, D: Deserializer<'de>>(reader: D) -> Result<BTreeMap<Action, Vec<Binding>>, D::Error> {
-    let texts = BTreeMap::<String, Value>::deserialize(reader)?;
-    let action = |name: String| {
-        let name: StringDeserializer<D::Error> = name.into_deserializer();
-        Action::deserialize(name).ok()
-    };
-    let known = |texts: Value| {
-        let texts = texts.as_array().into_iter().flatten().filter_map(Value::as_str);
-        texts.filter_map(|text| Binding::try_from(text.to_owned()).ok()).collect()
-    };
-    Ok(texts.into_iter().filter_map(|(name, texts)| Some((action(name)?, known(texts)))).collect())
+impl From<BTreeMap<String, Value>> for Bindings {
+    /// Actions and keys of another version of the game are left out, and cost nobody the others.
+    fn from(file: BTreeMap<String, Value>) -> Self {
+        let mut bindings = Self { all: BTreeMap::new(), lost: Vec::new() };
+        for (name, texts) in file {
+            let name: StringDeserializer<Error> = name.into_deserializer();
+            let Ok(action) = Action::deserialize(name) else { continue };
+            let own = bindings.all.entry(action).or_default();
+            let Value::Array(texts) = texts else {
+                bindings.lost.push((action, Device::Keyboard));
+                continue;
+            };
+            for text in &texts {
+                let text = text.as_str().unwrap_or_default();
+                match Binding::try_from(text.to_owned()) {
+                    Ok(binding) => own.push(binding),
+                    Err(_) => bindings.lost.push((action, Device::meant_by(text))),
+                }
+            }
+        }
+        bindings
+    }
+}
+
+impl From<Bindings> for BTreeMap<Action, Vec<Binding>> {
+    fn from(bindings: Bindings) -> Self {
+        bindings.all
+    }
 }
 
 impl Default for Bindings {
@@ -149,54 +196,78 @@ impl Default for Bindings {
             (A::Panel, &[Key(K::F1)]),
             (A::Pause, &[Key(K::Escape), Pad(G::Start)]),
         ];
-        Self(all.into_iter().map(|(action, bindings)| (action, bindings.to_vec())).collect())
+        let all = all.into_iter().map(|(action, bindings)| (action, bindings.to_vec())).collect();
+        Self { all, lost: Vec::new() }
     }
 }
 
 impl Bindings {
     /// The keys and buttons of an action.
     pub fn of(&self, action: Action) -> &[Binding] {
-        self.0.get(&action).map_or(&[], Vec::as_slice)
+        self.all.get(&action).map_or(&[], Vec::as_slice)
     }
 
     /// The first key or button of an action, as it is written on the screen.
-    pub fn first(&self, action: Action) -> String {
-        self.of(action).first().map_or_else(|| "-".into(), Binding::to_string)
+    pub fn first(&self, action: Action, labels: &Labels) -> String {
+        self.of(action).first().map_or_else(|| "-".into(), |binding| labels.of(*binding))
     }
 
     /// Gives an action a key or button in place of those of the same device: a gamepad's button leaves the keys alone, and
     /// so does the mouse. Whoever had it loses it, and is returned.
     pub fn rebind(&mut self, action: Action, binding: Binding) -> Option<Action> {
         let loser = self
-            .0
+            .all
             .iter()
             .find(|(other, bindings)| **other != action && bindings.contains(&binding))
             .map(|(other, _)| *other);
-        if let Some(bindings) = loser.and_then(|loser| self.0.get_mut(&loser)) {
+        if let Some(bindings) = loser.and_then(|loser| self.all.get_mut(&loser)) {
             bindings.retain(|other| *other != binding);
         }
-        let own = self.0.entry(action).or_default();
+        let own = self.all.entry(action).or_default();
         own.retain(|old| old.device() != binding.device());
         own.insert(0, binding);
         loser
     }
 
     /// What a file leaves open: no key has two actions, the first one keeps it; and actions without any key get those
-    /// that they have by default, unless they are taken. Escape is the pause's own.
-    pub fn complete(&mut self) {
+    /// that they have by default, unless they are taken. Escape is the pause's own. Who lost a key or a button that could
+    /// not be read, and has no other of that kind, gets it back in the same way; says who did.
+    pub fn complete(&mut self) -> Vec<Action> {
         let mut taken = HashSet::new();
-        for (action, bindings) in &mut self.0 {
+        for (action, bindings) in &mut self.all {
             bindings.retain(|binding| {
                 (*action == Action::Pause || *binding != Binding::Key(KeyCode::Escape))
                     && taken.insert(*binding)
             });
         }
-        for (action, bindings) in Self::default().0 {
-            let own = self.0.entry(action).or_default();
+        let mut mended = Vec::new();
+        for (action, defaults) in Self::default().all {
+            let own = self.all.entry(action).or_default();
+            let mut fill = |own: &mut Vec<Binding>, belongs: &dyn Fn(&Binding) -> bool| {
+                own.extend(defaults.iter().copied().filter(|one| belongs(one) && taken.insert(*one)));
+            };
+            let before = own.len();
             if own.is_empty() {
-                own.extend(bindings.into_iter().filter(|binding| taken.insert(*binding)));
+                fill(own, &|_| true);
+            }
+            for &(_, device) in self.lost.iter().filter(|lost| lost.0 == action) {
+                // Nobody is left with a gamepad alone that he may not have.
+                let (is_such, is_near) = (
+                    |one: &Binding| one.device() == device,
+                    |one: &Binding| (one.device() == Device::Pad) == (device == Device::Pad),
+                );
+                if !own.iter().any(is_near) {
+                    fill(own, &is_near);
+                } else if !own.iter().any(is_such) {
+                    fill(own, &is_such);
+                }
+            }
+            if own.len() > before && self.lost.iter().any(|lost| lost.0 == action) {
+                mended.push(action);
             }
         }
+        self.lost.clear();
+        mended
     }
 }
 

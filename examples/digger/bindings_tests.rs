@@ -23,7 +23,11 @@ fn bindings_are_written_as_words_and_read_again() {
         ("Pad South", true),
         ("Wheel Up", true),
         ("KeyÄ", false),
+        ("Mouse Other(9)", true),
+        ("Pad Other(3)", true),
         ("Mouse Other", false),
+        ("Mouse Other(x)", false),
+        ("Mouse Other(70000)", false),
         ("Unidentified", false),
         ("Pad", false),
         ("", false),
@@ -85,4 +89,49 @@ fn no_action_of_a_file_is_left_without_a_key_that_is_free() {
         assert!(!bindings.of(action).is_empty(), "{label}");
         assert!(bindings.of(action).iter().all(|binding| seen.insert(*binding)), "{label}");
     }
+}
+
+#[test]
+fn what_has_no_name_is_not_kept_and_what_has_a_number_is() {
+    use bevy::input::keyboard::NativeKeyCode;
+    for (binding, is_kept) in [
+        (Binding::Mouse(MouseButton::Other(9)), true),
+        (Binding::Pad(GamepadButton::Other(3)), true),
+        (Binding::WheelDown, true),
+        (Binding::Key(KeyCode::KeyW), true),
+        (Binding::Key(KeyCode::Unidentified(NativeKeyCode::Xkb(170))), false),
+        (Binding::Key(KeyCode::Unidentified(NativeKeyCode::Unidentified)), false),
+    ] {
+        assert_eq!(binding.can_be_kept(), is_kept, "{binding}");
+    }
+}
+
+#[test]
+fn who_lost_what_could_not_be_read_gets_it_back_and_is_named() {
+    let text = r#"{
+        "use": ["Mouse Thumb", "Pad RightTrigger2"],
+        "grow": ["Unidentified(Xkb(170))", "Wheel Up"],
+        "jump": ["Mouse Thumb", "Pad South"],
+        "undo": ["Unidentified(Xkb(171))"],
+        "build": ["FutureKey", "KeyB"],
+        "headlamp": ["Pad North"],
+        "form": ["Pad Paddle", "KeyC"]
+    }"#;
+    let mut bindings: Bindings = serde_json::from_str(text).expect("unknown keys are left out");
+    let mended = bindings.complete();
+    assert_eq!(mended, [Action::Jump, Action::Use, Action::Grow, Action::Form, Action::Undo]);
+    let has = |action: Action, binding: Binding| bindings.of(action).contains(&binding);
+    assert!(has(Action::Use, Binding::Mouse(MouseButton::Left)));
+    assert!(has(Action::Grow, Binding::Key(KeyCode::Equal)));
+    // There was no button of the mouse to begin with, but a key.
+    assert!(has(Action::Jump, Binding::Key(KeyCode::Space)));
+    assert!(has(Action::Form, Binding::Pad(GamepadButton::West)));
+    assert_eq!(bindings.of(Action::Undo), Bindings::default().of(Action::Undo));
+    // What can be read was meant like that.
+    assert_eq!(bindings.of(Action::Build), [Binding::Key(KeyCode::KeyB)]);
+    assert_eq!(bindings.of(Action::Headlamp), [Binding::Pad(GamepadButton::North)]);
+    // Nothing is left to be mended.
+    let before = bindings.clone();
+    assert!(bindings.complete().is_empty());
+    assert_eq!(bindings, before);
 }

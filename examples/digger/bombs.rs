@@ -9,7 +9,8 @@ use bevy_burrow::prelude::*;
 use crate::inventory::Inventory;
 use crate::landscape::NewGame;
 use crate::particles::{Burst, Matter};
-use crate::player::{Tremor, thrown};
+use crate::player::Tremor;
+use crate::thrown::just_thrown;
 use crate::tools::{Strike, Tool};
 use crate::work::Blows;
 
@@ -19,8 +20,6 @@ const FUSE: f32 = 2.4;
 const THROW: f32 = 14.0;
 /// Of the bomb itself.
 const RADIUS: f32 = 0.16;
-/// In the air at once.
-const BOMBS: usize = 12;
 
 /// A bomb on its way, and the seconds that are left to it: a ball of iron, as far as the physics are concerned.
 #[derive(Component, Clone, Copy, Debug)]
@@ -87,8 +86,8 @@ fn found(
     });
 }
 
-fn throw(strike: On<Strike>, mut commands: Commands, foundry: Res<Foundry>, bombs: Query<(), With<Bomb>>) {
-    if strike.tool != Tool::Bomb || bombs.count() >= BOMBS {
+fn throw(strike: On<Strike>, mut commands: Commands, foundry: Res<Foundry>) {
+    if strike.tool != Tool::Bomb {
         return;
     }
     let aside = strike.along.cross(Vec3::Y).normalize_or_zero();
@@ -109,7 +108,7 @@ fn bomb(foundry: &Foundry, place: Vec3, velocity: Vec3) -> impl Bundle {
     (
         Name::new("bomb"),
         Bomb { fuse: FUSE },
-        thrown(),
+        just_thrown(),
         LinearVelocity(velocity),
         AngularVelocity(velocity.cross(Vec3::Y) * -0.4),
         Mesh3d(foundry.shell.0.clone()),

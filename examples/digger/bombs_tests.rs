@@ -87,7 +87,7 @@ fn a_blast_takes_a_hole_and_what_it_took_is_in_the_inventory() {
         Update,
         (|mut receipts: MessageReader<BrushApplied>, mut inventory: ResMut<Inventory>| {
             for receipt in receipts.read() {
-                inventory.enter(&receipt.receipt);
+                inventory.enter(&receipt.receipt, true);
             }
         })
         .after(BurrowSystems::Commit),

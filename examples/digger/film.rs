@@ -184,16 +184,14 @@ fn is_all_ready(terrains: Terrains) -> bool {
 
 /// Frames to a video, so many of them a second. Where there is no ffmpeg, frames are all there is to be.
 pub fn join(folder: &Path, rate: f32, frames: usize) -> ExitCode {
-    let rate = rate.to_string();
     let video = folder.join("tour.mp4");
-    let arguments = ["-y", "-loglevel", "error", "-framerate", &rate, "-i"];
-    // The colours of a video go by twos, so its sides have to.
-    let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
-    let count = frames.to_string();
-    let encoding = ["-frames:v", &count, "-vf", even, "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"];
-    let pattern = folder.join("frame_%05d.png");
     let mut ffmpeg = Command::new("ffmpeg");
-    match ffmpeg.args(arguments).arg(&pattern).args(encoding).arg(&video).status() {
+    ffmpeg.args(["-y", "-loglevel", "error", "-framerate", &rate.to_string()]);
+    ffmpeg.arg("-i").arg(folder.join("frame_%05d.png")).args(["-frames:v", &frames.to_string()]);
+    // The colours of a video go by twos, so its sides have to.
+    ffmpeg.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]);
+    ffmpeg.args(["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "20"]).arg(&video);
+    match ffmpeg.status() {
         Ok(status) if status.success() => {
             println!("video: {}", video.display());
             ExitCode::SUCCESS
@@ -203,14 +201,37 @@ pub fn join(folder: &Path, rate: f32, frames: usize) -> ExitCode {
             ExitCode::FAILURE
         }
         Err(_) => {
-            println!(
-                "There is no ffmpeg here. Where there is: ffmpeg {} {} {} {}",
-                arguments.join(" "),
-                pattern.display(),
-                encoding.join(" "),
-                video.display()
-            );
+            println!("There is no ffmpeg here. Where there is: {}", for_shell(&ffmpeg));
             ExitCode::SUCCESS
         }
+    }
+}
+
+/// A command as it is typed into a shell.
+fn for_shell(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| quoted(&word.to_string_lossy())).collect::<Vec<_>>().join(" ")
+}
+
+/// A word that a shell takes as it is, in quotes where it has to be.
+fn quoted(word: &str) -> String {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=%+,@".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.into()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_to_be_typed_can_be_typed() {
+        let mut command = Command::new("ffmpeg");
+        command.args(["-i", "my films/%05d.png", "-vf", "pad=ceil(iw/2)*2", "", "it's", "tour.mp4"]);
+        let line = r"ffmpeg -i 'my films/%05d.png' -vf 'pad=ceil(iw/2)*2' '' 'it'\''s' tour.mp4";
+        assert_eq!(for_shell(&command), line);
     }
 }

@@ -10,6 +10,7 @@ use crate::art::Art;
 use crate::day::Clock;
 use crate::input::Action;
 use crate::inventory::{Inventory, StockChanged};
+use crate::labels::Labels;
 use crate::landscape::{self, MATERIALS};
 use crate::light::{Eyes, LampSwitch};
 use crate::phase::Phase;
@@ -18,7 +19,7 @@ use crate::settings::Settings;
 use crate::tools::{Hand, Tool};
 use crate::ui;
 
-/// Seconds that a hint or a find stays.
+/// Seconds that a hint or a find stays, the player's own: a new game begins without those of the old one.
 const STAY: f32 = 2.6;
 /// Finds that are seen at once.
 const FINDS: usize = 4;
@@ -279,7 +280,12 @@ fn count_materials(
     for (count, mut text, mut color) in &mut counts {
         let stock = inventory.stock(count.0);
         text.set_if_neq(Text::new(stock.to_string()));
-        color.set_if_neq(TextColor(if stock > 0 { ui::WHITE } else { ui::GREY }));
+        color.set_if_neq(TextColor(match stock {
+            1.. => ui::WHITE,
+            0 => ui::GREY,
+            // Owed.
+            _ => ui::RED,
+        }));
     }
 }
 
@@ -295,7 +301,7 @@ fn tell_hour(clock: Res<Clock>, lamp: Res<LampSwitch>, mut hour: Single<&mut Tex
 }
 
 fn tell_hints(
-    time: Res<Time>,
+    time: Res<Time<Real>>,
     mut hints: MessageReader<Hint>,
     mut line: Single<(&mut Text, &mut TextColor), With<Hints>>,
     mut left: Local<f32>,
@@ -311,7 +317,7 @@ fn tell_hints(
 
 /// What was dug lately, the same materials added up while they keep coming.
 fn tell_finds(
-    time: Res<Time>,
+    time: Res<Time<Real>>,
     mut changes: MessageReader<StockChanged>,
     mut lines: Query<(&Find, &mut Text, &mut TextColor)>,
     mut finds: Local<VecDeque<(MaterialId, i64, f32)>>,
@@ -339,18 +345,47 @@ fn tell_finds(
 
 fn tell_keys(
     settings: Res<Settings>,
+    labels: Res<Labels>,
     mut line: Single<&mut Text, (With<KeyLine>, Without<SlotKey>)>,
     mut slots: Query<(&SlotKey, &mut Text)>,
 ) {
-    if !settings.is_changed() {
+    if !settings.is_changed() && !labels.is_changed() {
         return;
     }
     let lines = [Action::Help, Action::Headlamp, Action::Undo, Action::Pause]
-        .map(|action| format!("{}  {}", settings.bindings.first(action), action.label()));
+        .map(|action| format!("{}  {}", settings.bindings.first(action, &labels), action.label()));
     line.0 = lines.join("\n");
     for (slot, mut text) in &mut slots {
         // There is no room for more than a short name.
-        let key = settings.bindings.first(slot.0);
+        let key = settings.bindings.first(slot.0, &labels);
         text.0 = if key.len() <= 5 { key } else { String::new() };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use bevy::time::TimeUpdateStrategy;
+
+    use super::*;
+
+    #[test]
+    fn hints_go_even_while_the_game_stands_still() {
+        let mut app = App::new();
+        app.add_plugins(MinimalPlugins)
+            .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(500)))
+            .add_message::<Hint>()
+            .add_systems(Update, tell_hints);
+        let line = app.world_mut().spawn((Hints, Text::default(), TextColor::default())).id();
+        let alpha = |app: &App| app.world().get::<TextColor>(line).expect("a line").0.alpha();
+        app.world_mut().resource_mut::<Time<Virtual>>().pause();
+        app.world_mut().write_message(Hint::new("look there"));
+        app.update();
+        assert_eq!(alpha(&app), 1.0);
+        for _ in 0..6 {
+            app.update();
+        }
+        assert_eq!(alpha(&app), 0.0);
     }
 }

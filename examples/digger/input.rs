@@ -9,6 +9,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::bindings::Binding;
+use crate::labels::{self, Labels};
 
 /// Something that the player can want.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -135,9 +136,9 @@ pub struct InputPlugin;
 
 impl Plugin for InputPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Actions>().init_resource::<Turns>().add_systems(
+        app.init_resource::<Actions>().init_resource::<Turns>().init_resource::<Labels>().add_systems(
             PreUpdate,
-            (turn_wheel, read_devices).chain().in_set(ReadsDevices).after(InputSystems),
+            (labels::learn, turn_wheel, read_devices).chain().in_set(ReadsDevices).after(InputSystems),
         );
     }
 }

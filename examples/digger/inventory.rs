@@ -4,6 +4,10 @@
 //! can't spend the same ground twice; the receipt says what it really took. What each transaction did to the stock is
 //! kept, so that undo and redo do just the opposite: the ground's own history knows of pieces that fell and of paint,
 //! but not of what they were worth. They are answered later as well, and until then what they may take is not free.
+//!
+//! A shovel fills as well as it takes, and nobody knows how much of what before it did. What it fills is paid for like
+//! what is built: where there is too little, the rest is owed, and what is dug next pays that off first. So all ground
+//! and all stock together stay what they were, however often something is dug and smoothed over.
 
 use std::collections::VecDeque;
 
@@ -14,9 +18,10 @@ use bevy_burrow::terrain::{HistoryStep, PieceFate};
 
 use crate::hud::Hint;
 use crate::input::{Action, Actions};
-use crate::landscape::{CONCRETE, MATERIALS, NewGame};
+use crate::landscape::{CONCRETE, MATERIALS, NewGame, name};
 use crate::phase::Phase;
 use crate::player::Playing;
+use crate::settings::Settings;
 
 /// Tags from here on belong to the hand. Brushes of scripts have others, and cost nothing.
 pub const FIRST: u64 = 1 << 32;
@@ -29,7 +34,7 @@ type Change = [i64; MATERIALS.len()];
 /// Voxels of each material.
 #[derive(Resource, Clone, Debug)]
 pub struct Inventory {
-    /// Never below 0.
+    /// Below 0 where some is owed.
     stock: Change,
     pledges: Vec<(u64, MaterialId, i64)>,
     next: u64,
@@ -68,7 +73,7 @@ impl Inventory {
         self.next - 1
     }
 
-    /// All voxels of a material.
+    /// All voxels of a material, or, negative, what is owed of it.
     pub fn stock(&self, material: MaterialId) -> i64 {
         self.stock.get(usize::from(material.0)).copied().unwrap_or(0)
     }
@@ -93,17 +98,16 @@ impl Inventory {
         self.pledges.push((tag, material, voxels));
     }
 
-    /// More of a material, or less, as far as there is any; says by how much it really changed.
-    pub fn gain(&mut self, material: MaterialId, voxels: i64) -> i64 {
-        let Some(stock) = self.stock.get_mut(usize::from(material.0)) else { return 0 };
-        let before = *stock;
-        *stock = before.saturating_add(voxels).max(0);
-        *stock - before
+    /// More of a material, or less.
+    pub fn gain(&mut self, material: MaterialId, voxels: i64) {
+        if let Some(stock) = self.stock.get_mut(usize::from(material.0)) {
+            *stock += voxels;
+        }
     }
 
     /// Enters what became of a brush; if it was the hand's, says what came and went. Whatever fell off is the player's
-    /// as well, and paint is used up as what is built is.
-    pub fn enter(&mut self, receipt: &Receipt) -> Vec<(MaterialId, i64)> {
+    /// as well, and paint is used up as what is built is. What there was too little of is owed, or a present.
+    pub fn enter(&mut self, receipt: &Receipt, owes: bool) -> Vec<(MaterialId, i64)> {
         self.pledges.retain(|pledge| pledge.0 != receipt.tag);
         let Ok(applied) = &receipt.outcome else { return Vec::new() };
         if applied.bounds.is_some() {
@@ -121,6 +125,11 @@ impl Inventory {
         for (material, voxels) in came.chain(went.map(|(material, voxels)| (material, -(voxels as i64)))) {
             if let Some(sum) = sums.get_mut(usize::from(material.0)) {
                 *sum += voxels;
+            }
+        }
+        if !owes {
+            for (sum, stock) in sums.iter_mut().zip(&self.stock) {
+                *sum = (*sum).max(-(*stock).max(0));
             }
         }
         let changes = self.change(&sums);
@@ -183,9 +192,10 @@ impl Inventory {
     }
 
     fn change(&mut self, change: &Change) -> Vec<(MaterialId, i64)> {
-        let each = MATERIALS.iter().map(|&(material, _)| material).zip(change);
-        let changes: Vec<_> = each.map(|(material, &by)| (material, self.gain(material, by))).collect();
-        changes.into_iter().filter(|(_, by)| *by != 0).collect()
+        let each = MATERIALS.iter().map(|&(material, _)| material).zip(change.iter().copied());
+        let changes: Vec<_> = each.filter(|(_, by)| *by != 0).collect();
+        changes.iter().for_each(|&(material, by)| self.gain(material, by));
+        changes
     }
 }
 
@@ -261,11 +271,21 @@ impl Plugin for InventoryPlugin {
 /// Receipts of a transaction come all in one frame.
 fn enter_receipts(
     mut receipts: MessageReader<BrushApplied>,
+    settings: Res<Settings>,
     mut inventory: ResMut<Inventory>,
     mut changes: MessageWriter<StockChanged>,
+    mut hints: MessageWriter<Hint>,
 ) {
     for BrushApplied { receipt, .. } in receipts.read() {
-        let entered = inventory.enter(receipt);
+        let entered = inventory.enter(receipt, settings.survival);
+        for &(material, by) in &entered {
+            let stock = inventory.stock(material);
+            // Once: from then on, the number is red.
+            if stock < 0 && stock - by >= 0 {
+                let words = format!("{} {} owed: what is dug next pays for it", -stock, name(material));
+                hints.write(Hint::new(words));
+            }
+        }
         changes.write_batch(entered.into_iter().map(|(material, by)| StockChanged { material, by }));
     }
     // A frame shows one transaction at most.

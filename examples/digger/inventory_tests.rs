@@ -37,7 +37,7 @@ fn the_stock_is_what_came_less_what_went() {
         };
         for receipt in terrain.apply(&[brush.with_tag(inventory.tag())]) {
             sums(receipt.outcome.as_ref().expect("a valid brush"), &mut change);
-            inventory.enter(&receipt);
+            inventory.enter(&receipt, true);
         }
     }
     for (material, name) in MATERIALS {
@@ -54,7 +54,7 @@ fn paint_is_used_up() {
     let hill = Shape::sphere(Vec3::new(30.0, 24.0, 30.0), 3.0);
     let mut apply = |brush: Brush, inventory: &mut Inventory| {
         let receipts = terrain.apply(&[brush.with_tag(inventory.tag())]);
-        receipts.iter().for_each(|receipt| drop(inventory.enter(receipt)));
+        receipts.iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
     };
     apply(Brush::paint(hill, GOLD), &mut inventory);
     let left = inventory.stock(GOLD);
@@ -80,7 +80,7 @@ fn undo_takes_what_the_dig_gave_and_not_more() {
     ];
     for (number, brush) in brushes.into_iter().enumerate() {
         let receipts = terrain.apply(&[brush.with_tag(inventory.tag())]);
-        receipts.iter().for_each(|receipt| drop(inventory.enter(receipt)));
+        receipts.iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
         inventory.close();
         stocks.push(inventory.stock);
         if number == 1 {
@@ -108,7 +108,7 @@ fn brushes_that_change_nothing_are_no_step_and_a_new_one_ends_redo() {
     let (mut terrain, mut inventory) = (terrain(), Inventory::default());
     let mut dig = |y: f32, inventory: &mut Inventory| {
         let brush = Brush::dig(Shape::sphere(Vec3::new(30.0, y, 30.0), 2.0)).with_tag(inventory.tag());
-        terrain.apply(&[brush]).iter().for_each(|receipt| drop(inventory.enter(receipt)));
+        terrain.apply(&[brush]).iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
         inventory.close();
     };
     dig(24.0, &mut inventory);
@@ -124,10 +124,90 @@ fn brushes_that_change_nothing_are_no_step_and_a_new_one_ends_redo() {
 }
 
 #[test]
-fn no_stock_is_ever_below_nothing() {
-    let mut inventory = Inventory::default();
-    assert_eq!(inventory.gain(ROCK, -5), 0);
-    assert_eq!((inventory.gain(ROCK, 3), inventory.gain(ROCK, -5), inventory.stock(ROCK)), (3, -3, 0));
+fn what_was_dug_and_smoothed_over_again_and_again_makes_no_ground() {
+    let (mut terrain, mut inventory) = (terrain(), Inventory::default());
+    let ball = |y: f32, radius: f32| Shape::sphere(Vec3::new(30.0, y, 30.0), radius);
+    // The walls of a pit are hollow everywhere: smoothed, they only grow.
+    let (pit, floor) = (ball(24.0, 4.0), ball(20.0, 4.0));
+    let mut apply = |brush: Brush, inventory: &mut Inventory| {
+        let receipts = terrain.apply(&[brush.with_tag(inventory.tag())]);
+        receipts.iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
+        inventory.close();
+        receipts[0].outcome.clone().expect("a valid brush")
+    };
+    apply(Brush::dig(pit), &mut inventory);
+    // All of it is built elsewhere.
+    inventory.stock = Change::default();
+    let (mut change, mut owed) = (Change::default(), 0);
+    let mut stocks = vec![inventory.stock];
+    for _ in 0..5 {
+        let smooth = || Brush::smooth(floor, 1.0).with_falloff(0.0);
+        for brush in [smooth(), smooth(), smooth(), smooth(), Brush::dig(pit)] {
+            let steps = inventory.past.len();
+            let applied = apply(brush, &mut inventory);
+            sums(&applied, &mut change);
+            assert_eq!(inventory.stock, change);
+            owed = inventory.stock.iter().copied().fold(owed, i64::min);
+            if inventory.past.len() > steps {
+                stocks.push(inventory.stock);
+            }
+        }
+    }
+    assert!(owed < 0, "nothing was filled");
+    for stock in stocks.iter().rev().skip(1) {
+        inventory.step(terrain.undo().step);
+        assert_eq!(inventory.stock, *stock);
+    }
+}
+
+#[test]
+fn what_is_owed_is_paid_off_first_and_where_building_is_free_nothing_is() {
+    let (mut terrain, mut inventory) = (terrain(), Inventory::default());
+    let mut build = |x: f32, inventory: &mut Inventory, owes: bool| {
+        let brush = Brush::add(Shape::sphere(Vec3::new(x, 45.0, 30.0), 3.0), CLAY).with_tag(inventory.tag());
+        terrain.apply(&[brush]).iter().for_each(|receipt| drop(inventory.enter(receipt, owes)));
+        inventory.close();
+    };
+    inventory.gain(CLAY, 10);
+    build(15.0, &mut inventory, false);
+    assert_eq!(inventory.stock(CLAY), 0);
+    inventory.step(HistoryStep::Undo);
+    assert_eq!(inventory.stock(CLAY), 10);
+    inventory.step(HistoryStep::Redo);
+    build(30.0, &mut inventory, true);
+    let owed = -inventory.stock(CLAY);
+    assert!(owed > 50, "{owed}");
+    // A present does not pay it off.
+    build(45.0, &mut inventory, false);
+    assert_eq!(inventory.stock(CLAY), -owed);
+    inventory.gain(CLAY, owed + 7);
+    assert_eq!((inventory.stock(CLAY), inventory.free(CLAY)), (7, 7));
+}
+
+#[test]
+fn who_begins_to_owe_is_told_once() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, InventoryPlugin))
+        .init_resource::<Actions>()
+        .init_resource::<Settings>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_message::<HistoryMoved>()
+        .add_message::<BrushApplied>()
+        .add_message::<Hint>();
+    let mut terrain = terrain();
+    let told = [15.0, 30.0].map(|x| {
+        let tag = app.world_mut().resource_mut::<Inventory>().tag();
+        let brush = Brush::add(Shape::sphere(Vec3::new(x, 45.0, 30.0), 3.0), CLAY).with_tag(tag);
+        for receipt in terrain.apply(&[brush]) {
+            app.world_mut().write_message(BrushApplied { terrain: None, receipt });
+        }
+        app.update();
+        let mut hints = app.world_mut().resource_mut::<Messages<Hint>>();
+        hints.drain().map(|hint| hint.words().to_owned()).collect::<Vec<String>>()
+    });
+    assert!(matches!(&told[0][..], [one] if one.contains("clay owed")), "{told:?}");
+    assert_eq!(told[1], Vec::<String>::new());
 }
 
 #[test]
@@ -136,7 +216,7 @@ fn brushes_of_scripts_cost_nothing() {
     let brush = Brush::dig(Shape::sphere(Vec3::new(30.0, 24.0, 30.0), 4.0)).with_tag(9);
     for receipt in terrain.apply(&[brush]) {
         assert!(receipt.outcome.as_ref().is_ok_and(|applied| applied.removed.total() > 0));
-        assert_eq!(inventory.enter(&receipt), []);
+        assert_eq!(inventory.enter(&receipt, true), []);
     }
     assert_eq!(inventory.stock(ROCK), 0);
 }
@@ -151,10 +231,10 @@ fn what_is_pledged_is_not_spent_twice() {
     assert_eq!((inventory.stock(ROCK), inventory.free(ROCK)), (100, 10));
     // A brush that was rejected took nothing.
     let rejected = Receipt { tag: first, outcome: Err(Rejection::TerrainGone) };
-    assert_eq!(inventory.enter(&rejected), []);
+    assert_eq!(inventory.enter(&rejected, true), []);
     assert_eq!((inventory.stock(ROCK), inventory.free(ROCK)), (100, 80));
     let nothing = Receipt { tag: second, outcome: Ok(Applied::default()) };
-    inventory.enter(&nothing);
+    inventory.enter(&nothing, true);
     assert_eq!(inventory.free(ROCK), 100);
 }
 
@@ -230,6 +310,7 @@ fn a_step_is_awaited_until_it_is_answered() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, InventoryPlugin))
         .init_resource::<Actions>()
+        .init_resource::<Settings>()
         .add_message::<Undo>()
         .add_message::<Redo>()
         .add_message::<HistoryMoved>()

@@ -17,7 +17,7 @@ use crate::input::{Action, Actions};
 use crate::landscape::NewGame;
 use crate::phase::Phase;
 use crate::player::Playing;
-use crate::settings::{Quality, Settings, SettingsFile};
+use crate::settings::{AsMade, Quality, Settings, SettingsFile};
 
 /// The way to the sun on a late afternoon, of length 1: from the south-west.
 pub const SUN: Vec3 = Vec3::new(-0.58, 0.64, 0.504);
@@ -82,6 +82,7 @@ impl Plugin for LightPlugin {
 fn spare_software(
     adapter: Option<Res<RenderAdapterInfo>>,
     file: Res<SettingsFile>,
+    mut made: ResMut<AsMade>,
     mut settings: ResMut<Settings>,
     mut textures: ResMut<GroundTextures>,
 ) {
@@ -89,8 +90,9 @@ fn spare_software(
         return;
     }
     *textures = GroundTextures::Baked { side: 512, anisotropy: 1 };
+    made.0.quality = Quality::Low;
     if file.0.as_ref().is_some_and(|file| !file.exists()) {
-        settings.quality = Quality::Low;
+        settings.quality = made.0.quality;
     }
 }
 
@@ -237,9 +239,9 @@ fn dim_lamps(
 }
 
 /// The sky's light reaches into a cave as far as the sky is seen from there: looks up from points around the eyes, and
-/// lets the eyes get used to what it finds.
+/// lets the eyes get used to what it finds, even while time stands still: the title may lie under another sky.
 fn darken_caves(
-    time: Res<Time>,
+    time: Res<Time<Real>>,
     terrains: Terrains,
     eyes: Single<&GlobalTransform, With<Eyes>>,
     skylight: Res<Skylight>,

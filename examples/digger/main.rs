@@ -20,6 +20,8 @@
 //! | `F1` `F3` | panel, frame times |
 //! | `H`, `Esc` | help, pause |
 //!
+//! Keys are bound by their place, as an American keyboard has them, and called by the letters that they turn out to have.
+//!
 //! A gamepad does that too, all but the panel and the frame times, with `--features examples,gamepad`: its sticks walk and
 //! look, its shoulders go through the tools, and its left stick or its cross through the menus.
 //! The title leads on with a game that was left, or begins a new one: fresh land, and nothing in the bag.
@@ -31,11 +33,11 @@
 //! | file | subject |
 //! | --- | --- |
 //! | `phase.rs`, `menu.rs` and `menu/`, `ui.rs`, `art.rs` | title, pause, settings, controls, help |
-//! | `input.rs`, `bindings.rs`, `settings.rs` | actions and their keys; what the player may set |
+//! | `input.rs`, `bindings.rs`, `labels.rs`, `settings.rs` | actions, their keys and what stands on those; what the player may set |
 //! | `player.rs`, `body.rs`, `rim.rs` | the player's eyes and body, and where the world ends |
 //! | `tools.rs`, `form.rs`, `preview.rs`, `held.rs` | the tools, what they would do, and how they look in hand |
 //! | `work.rs`, `toughness.rs`, `amount.rs`, `inventory.rs` | what they do to the ground, what resists them, and what is left of it |
-//! | `bombs.rs`, `balls.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what bounces, what shines, what falls and crumbles |
+//! | `bombs.rs`, `balls.rs`, `thrown.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what bounces, what shines, what falls and crumbles |
 //! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
 //! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
 //! | `places.rs`, `works.rs` | where scripts dig, and what |
@@ -61,6 +63,7 @@ mod held;
 mod hud;
 mod input;
 mod inventory;
+mod labels;
 mod lamps;
 mod landscape;
 mod light;
@@ -82,6 +85,7 @@ mod settings;
 mod sky;
 mod studio;
 mod tell;
+mod thrown;
 mod tools;
 mod toughness;
 mod tour;
@@ -110,10 +114,11 @@ pub struct Options {
     #[arg(long)]
     tour: bool,
     /// Frames of the tour that are drawn, evenly spread; all of them without it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
+    #[arg(long, requires = "tour", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
     frames: Option<u32>,
     /// Frames in a second of the tour.
-    #[arg(long, value_name = "F", default_value_t = 30, value_parser = clap::value_parser!(u32).range(10..=120))]
+    #[arg(long, requires = "tour", value_name = "F", default_value_t = 30)]
+    #[arg(value_parser = clap::value_parser!(u32).range(10..=120))]
     fps: u32,
     /// Folder for the script's pictures and summary.
     #[arg(long, value_name = "DIR", default_value = "out/digger")]
@@ -125,7 +130,7 @@ pub struct Options {
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
     /// Draw every frame of the script, not only the pictures: for frame times.
-    #[arg(long)]
+    #[arg(long, requires = "headless")]
     draw_all: bool,
     /// Say on standard output what goes on, for programs that play the game.
     #[arg(long)]
@@ -190,6 +195,7 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
         .add_plugins((
             body::BodyPlugin,
             player::PlayerPlugin,
+            thrown::ThrownPlugin,
             rim::RimPlugin,
             tools::ToolsPlugin,
             preview::PreviewPlugin,
@@ -224,4 +230,26 @@ fn open_window(options: &Options) -> App {
         app.add_plugins(tell::TellPlugin);
     }
     app
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_do_nothing_is_refused() {
+        for (line, is_understood) in [
+            ("digger", true),
+            ("digger --tour", true),
+            ("digger --tour --fps 10 --frames 12", true),
+            ("digger --fps 24", false),
+            ("digger --frames 12", false),
+            ("digger --headless --fps 24", false),
+            ("digger --headless --draw-all --backend cpu", true),
+            ("digger --draw-all", false),
+            ("digger --tour --draw-all", false),
+        ] {
+            assert_eq!(Options::try_parse_from(line.split(' ')).is_ok(), is_understood, "{line}");
+        }
+    }
 }

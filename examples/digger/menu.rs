@@ -66,6 +66,7 @@ fn app_with(plugin: impl Plugin, page: Page) -> App {
         .add_plugins(crate::input::InputPlugin)
         .init_state::<Page>()
         .init_resource::<crate::settings::Settings>()
+        .init_resource::<crate::settings::AsMade>()
         .init_resource::<UiScale>()
         .add_plugins((ui::UiPlugin, plugin));
     app.world_mut().resource_mut::<NextState<Page>>().set(page);

@@ -9,7 +9,7 @@ use crate::input::{Action, Actions, ReadsDevices};
 /// What goes on.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// The landscape turns behind the menu.
+    /// The landscape turns behind the menu; a game that was left stands still.
     #[default]
     Title,
     /// The player digs.
@@ -40,7 +40,8 @@ impl Plugin for PhasePlugin {
             .init_state::<Page>()
             .add_systems(OnEnter(Phase::Playing), (close_menus, run_time, take_mouse, listen))
             .add_systems(OnEnter(Phase::Paused), (stop_time, leave_mouse))
-            .add_systems(OnEnter(Phase::Title), (run_time, leave_mouse))
+            // Behind the title, time goes on as it did: it runs before the first game, and a game that was left waits.
+            .add_systems(OnEnter(Phase::Title), leave_mouse)
             .add_systems(PreUpdate, pause.after(ReadsDevices).run_if(in_state(Phase::Playing)));
     }
 }

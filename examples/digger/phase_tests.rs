@@ -61,6 +61,37 @@ fn a_pause_stops_time_and_its_end_lets_it_run() {
 }
 
 #[test]
+fn a_game_that_was_left_for_the_title_stands_still_until_it_goes_on() {
+    let mut app = app();
+    let hour = |app: &App| app.world().resource::<Clock>().hour;
+    let go = |app: &mut App, phase: Phase| {
+        app.world_mut().resource_mut::<NextState<Phase>>().set(phase);
+        app.update();
+        app.update();
+    };
+    press(&mut app, Action::Pause);
+    let stopped = hour(&app);
+    go(&mut app, Phase::Title);
+    for _ in 0..10 {
+        app.update();
+    }
+    assert_eq!(hour(&app), stopped);
+    go(&mut app, Phase::Playing);
+    assert!(hour(&app) > stopped);
+}
+
+#[test]
+fn time_runs_before_the_first_game() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PhasePlugin))
+        .add_message::<WindowFocused>()
+        .init_resource::<Settings>();
+    app.update();
+    assert_eq!(phase(&app).0, Phase::Title);
+    assert!(!app.world().resource::<Time<Virtual>>().is_paused());
+}
+
+#[test]
 fn help_and_a_lost_window_pause_too() {
     let mut app = app();
     press(&mut app, Action::Help);

@@ -40,20 +40,6 @@ impl Tremor {
     }
 }
 
-/// Metres from the eyes at which something thrown is seen: nearer by, it would fill the view.
-const CLEAR: f32 = 0.7;
-/// Seconds after which it is seen wherever it is: a wall may have thrown it back.
-const LATEST: f32 = 0.1;
-
-/// Just thrown, so many seconds ago, and not seen yet.
-#[derive(Component, Clone, Copy, Debug, Default)]
-struct Thrown(f32);
-
-/// What bombs and balls have when they leave the hand.
-pub fn thrown() -> impl Bundle {
-    (Thrown::default(), Visibility::Hidden)
-}
-
 /// Systems that obey the player; all of them come before [`BurrowSystems::Collect`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Playing;
@@ -71,7 +57,7 @@ impl Plugin for PlayerPlugin {
                 Update,
                 (
                     (look, steer).run_if(in_state(Phase::Playing)).in_set(Playing),
-                    (see, show_thrown).chain().after(BurrowSystems::Commit),
+                    see.after(BurrowSystems::Commit),
                 ),
             )
             .add_systems(FixedUpdate, feel_jump.after(CharacterSystems))
@@ -143,7 +129,8 @@ pub fn stand_still(mut players: Query<&mut CharacterSteering, Without<Scripted>>
     }
 }
 
-fn see(
+/// Looks through the player's eyes, shaken as they are.
+pub fn see(
     time: Res<Time>,
     mut tremor: ResMut<Tremor>,
     mut players: Query<(&mut Player, Body)>,
@@ -162,23 +149,6 @@ fn see(
     for mut eyes in &mut eyes {
         eyes.translation = body.eye() - Vec3::Y * player.lag;
         eyes.rotation = player.rotation() * Quat::from_euler(EulerRot::YXZ, shake.x, shake.y, shake.z);
-    }
-}
-
-/// What was thrown is seen as soon as it is clear of the eyes.
-fn show_thrown(
-    mut commands: Commands,
-    time: Res<Time>,
-    eyes: Query<&Transform, With<Eyes>>,
-    mut thrown: Query<(Entity, &mut Thrown, &Transform, &mut Visibility)>,
-) {
-    for (entity, mut thrown, place, mut visibility) in &mut thrown {
-        let is_near = eyes.iter().any(|eyes| eyes.translation.distance(place.translation) < CLEAR);
-        if !is_near || thrown.0 >= LATEST {
-            *visibility = Visibility::Inherited;
-            commands.entity(entity).try_remove::<Thrown>();
-        }
-        thrown.0 += time.delta_secs();
     }
 }
 

@@ -40,31 +40,3 @@ fn a_tap_between_two_steps_of_the_physics_is_one_jump() {
     }
     assert_eq!(app.world().resource::<Jumps>().0, 1);
 }
-
-#[test]
-fn what_is_thrown_is_seen_once_it_is_clear_of_the_eyes_or_has_had_its_time() {
-    let mut app = App::new();
-    app.add_plugins(MinimalPlugins)
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(20)))
-        .add_systems(Update, show_thrown);
-    app.world_mut().spawn((Eyes, Transform::default()));
-    let mut throw = || app.world_mut().spawn((thrown(), Transform::from_xyz(0.0, 0.0, -0.25))).id();
-    let (flies, stays) = (throw(), throw());
-    let is_seen = |app: &App, thing: Entity| {
-        app.world().get::<Visibility>(thing).is_some_and(|visibility| *visibility != Visibility::Hidden)
-    };
-    for _ in 0..3 {
-        app.update();
-        assert!(!is_seen(&app, flies) && !is_seen(&app, stays));
-    }
-    app.world_mut().get_mut::<Transform>(flies).expect("a place").translation.z = -0.8;
-    app.update();
-    assert!(is_seen(&app, flies) && !is_seen(&app, stays));
-    // What comes back is not hidden again.
-    app.world_mut().get_mut::<Transform>(flies).expect("a place").translation.z = -0.25;
-    for _ in 0..4 {
-        app.update();
-        assert!(is_seen(&app, flies));
-    }
-    assert!(is_seen(&app, stays));
-}

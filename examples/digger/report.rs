@@ -184,7 +184,8 @@ impl fmt::Display for Report {
     }
 }
 
-/// The middle and the nearly worst of some times.
+/// The middle and the nearly worst of some times: of all of them, while the plugin's own
+/// [`Times`](bevy_burrow::plugin::Times) keep the latest few hundred, and a script has thousands of frames.
 struct Percentiles {
     p50: Duration,
     p99: Duration,

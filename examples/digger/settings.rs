@@ -63,6 +63,10 @@ impl Default for Settings {
     }
 }
 
+/// Settings as a player of this machine begins with them, and goes back to.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct AsMade(pub Settings);
+
 /// Why a file of settings was not read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -95,8 +99,11 @@ impl Settings {
         };
         let fields: Map<String, Value> = serde_json::from_str(&text)
             .map_err(|error| SettingsError::Content { path: path.into(), error })?;
-        let Found { settings, unread } = Self::of(fields);
-        Ok(Found { settings: settings.within_reason(), unread })
+        let Found { settings, mut unread } = Self::of(fields);
+        let mut settings = settings.within_reason();
+        let mended = settings.bindings.complete();
+        unread.extend(mended.iter().map(|action| format!("bindings: some of \"{}\"", action.label())));
+        Ok(Found { settings, unread })
     }
 
     fn of(mut fields: Map<String, Value>) -> Found {
@@ -145,7 +152,6 @@ impl Settings {
         for (number, low, high) in all {
             *number = number.clamp(low, high);
         }
-        self.bindings.complete();
         self
     }
 }
@@ -196,7 +202,8 @@ impl Plugin for SettingsPlugin {
         for setting in &unread {
             warn!("settings have their defaults: {setting}");
         }
-        app.insert_resource(settings)
+        app.init_resource::<AsMade>()
+            .insert_resource(settings)
             .insert_resource(self.0.clone())
             .insert_resource(Broken(!unread.is_empty()))
             .add_systems(OnExit(Page::Settings), save)

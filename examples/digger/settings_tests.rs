@@ -151,3 +151,27 @@ fn an_old_file_keeps_what_it_has() {
     assert_eq!(found.settings, Settings { sensitivity: 0.5, field_of_view: 110.0, ..default() });
     assert!(found.unread.is_empty());
 }
+
+#[test]
+fn keys_that_nobody_can_read_are_named_and_set_aside_with_their_file() {
+    let path = file("keys");
+    let words = r#"{ "bindings": { "use": ["Mouse Thumb", "Pad RightTrigger2"], "fly": ["KeyF"] } }"#;
+    write_text(&path, words);
+    let found = Settings::read(&path).expect("all but a button");
+    assert!(found.settings.bindings.of(Action::Use).contains(&Binding::Mouse(MouseButton::Left)));
+    assert!(matches!(&found.unread[..], [one] if one.contains("use the tool")), "{:?}", found.unread);
+    visit(&mut start(&path));
+    assert_eq!(text(&path.with_extension("json.broken")), words);
+}
+
+#[test]
+fn a_button_with_nothing_but_a_number_is_there_at_the_next_start() {
+    let path = file("button");
+    let mut settings = Settings::default();
+    let thumb = Binding::Mouse(MouseButton::Other(9));
+    settings.bindings.rebind(Action::Use, thumb);
+    settings.write(&path).expect("a folder that is made");
+    let found = Settings::read(&path).expect("what was written");
+    assert!(found.settings.bindings.of(Action::Use).contains(&thumb));
+    assert_eq!((found.settings, found.unread), (settings, vec![]));
+}

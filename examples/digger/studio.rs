@@ -71,10 +71,8 @@ impl Studio {
             .map_err(|error| format!("{}: {error}", options.out.display()))?;
         let renders = renderer.is_some();
         let engine = options.backend.engine();
-        if options.headless {
-            // The script is not to be over before a card is found.
-            engine.wait(PATIENCE);
-        }
+        // The script is not to be over before a card is found, whatever it is played for.
+        engine.wait(PATIENCE);
         let mut app = build_app(renderer, engine);
         // One frame, for the systems that spawn the camera.
         app.update();

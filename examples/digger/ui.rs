@@ -53,6 +53,9 @@ pub fn full() -> Node {
     Node { width: percent(100), height: percent(100), position_type: PositionType::Absolute, ..default() }
 }
 
+/// Keys that choose the item in focus; so does a gamepad's South.
+pub const CHOOSE: [KeyCode; 3] = [KeyCode::Enter, KeyCode::NumpadEnter, KeyCode::Space];
+
 /// Something to choose, by its place in the menu.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
 #[require(Button)]
@@ -226,7 +229,7 @@ fn press_keys(
         focus.0 = (focus.0 + count - 1) % count;
     }
     let Some((entity, _)) = items.iter().find(|(_, item)| item.0 == focus.0) else { return };
-    if pressed(&[K::Enter, K::NumpadEnter, K::Space], G::South) {
+    if pressed(&CHOOSE, G::South) {
         commands.trigger(Chosen { entity });
     }
     for (keys, button, by) in

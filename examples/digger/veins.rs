@@ -21,8 +21,6 @@ const ASIDE: (f32, f32) = (-22.0, 22.0);
 const ABOVE: (f32, f32) = (-4.0, 9.0);
 /// Of their brushes; neither the hand nor a script has it.
 pub const TAG: u64 = FIRST - 1;
-/// Bytes that the ground's history may take once veins are hidden.
-const HISTORY: usize = 64 << 20;
 
 /// Hides veins when the landscape is there.
 pub struct VeinsPlugin;
@@ -50,10 +48,15 @@ fn seal(mut receipts: MessageReader<BrushApplied>, mut terrains: Query<&mut Terr
         return;
     }
     for mut terrain in &mut terrains {
-        // Without room for it, history is empty.
-        terrain.set_undo_budget(0);
-        terrain.set_undo_budget(HISTORY);
+        empty_history(&mut terrain);
     }
+}
+
+/// Without room for it, history is empty; it has as much as before then.
+fn empty_history(terrain: &mut Terrain) {
+    let budget = terrain.undo_budget();
+    terrain.set_undo_budget(0);
+    terrain.set_undo_budget(budget);
 }
 
 /// The same ones in every game.
@@ -114,7 +117,9 @@ mod tests {
     #[test]
     fn veins_can_not_be_undone() {
         let ground = Ground::from_fn(256, 256, |_, _| 60.0).expect("a world");
-        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
+        let budget = terrain.undo_budget() / 2;
+        terrain.set_undo_budget(budget);
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, BurrowPlugins))
             .add_systems(Update, seal.after(BurrowSystems::Commit));
@@ -134,5 +139,8 @@ mod tests {
         }
         let (bricks, undos) = of(&app);
         assert!(bricks > 0 && undos == 0, "{bricks} bricks, {undos} undos");
+        // And his own blows find as much room as there ever was.
+        let terrain = app.world().get::<Terrain>(terrain).expect("a terrain");
+        assert_eq!(terrain.undo_budget(), budget);
     }
 }

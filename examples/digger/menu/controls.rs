@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use super::go_to;
 use crate::bindings::Binding;
 use crate::input::{Action, Actions, Turns};
+use crate::labels::Labels;
 use crate::phase::Page;
 use crate::settings::Settings;
 use crate::ui::{self, Chosen, Deaf, Item, Pointing};
@@ -93,6 +94,7 @@ fn bind(
     mut commands: Commands,
     waiting: Option<Res<Waiting>>,
     mut settings: ResMut<Settings>,
+    labels: Res<Labels>,
     keys: Res<ButtonInput<KeyCode>>,
     mouse: Res<ButtonInput<MouseButton>>,
     turns: Res<Turns>,
@@ -121,10 +123,14 @@ fn bind(
     let is_no_key = binding == Binding::Key(KeyCode::Escape) && action != Action::Pause;
     let note = if elsewhere.is_some() || is_no_key {
         format!("{} keeps its keys", action.label())
+    } else if !binding.can_be_kept() {
+        // It would be gone at the next start, and the old key with it.
+        format!("that key has no name to remember it by: {} keeps its keys", action.label())
     } else {
+        let name = labels.of(binding);
         match settings.bindings.rebind(action, binding) {
-            Some(loser) => format!("{binding} was taken from \"{}\"", loser.label()),
-            None => format!("{binding} is \"{}\" now", action.label()),
+            Some(loser) => format!("{name} was taken from \"{}\"", loser.label()),
+            None => format!("{name} is \"{}\" now", action.label()),
         }
     };
     for mut text in &mut notes {
@@ -141,11 +147,13 @@ fn bind(
 fn show_keys(
     waiting: Option<Res<Waiting>>,
     settings: Res<Settings>,
+    labels: Res<Labels>,
     mut rows: Query<(&Keys, &mut Text, &mut TextColor)>,
 ) {
     for (keys, mut text, mut color) in &mut rows {
         let waits = waiting.as_ref().is_some_and(|waiting| waiting.0 == keys.0);
-        let names: Vec<String> = settings.bindings.of(keys.0).iter().map(Binding::to_string).collect();
+        let names: Vec<String> =
+            settings.bindings.of(keys.0).iter().map(|&binding| labels.of(binding)).collect();
         let words = if waits { "press a key ...".into() } else { names.join("  ") };
         text.set_if_neq(Text::new(words));
         color.set_if_neq(TextColor(if waits {

@@ -1,7 +1,7 @@
 //! Facts about the page of controls, as a mouse and keys see it.
 
 use bevy::input::ButtonState;
-use bevy::input::keyboard::{Key, KeyboardInput};
+use bevy::input::keyboard::{Key, KeyboardInput, NativeKeyCode};
 use bevy::input::mouse::{MouseButtonInput, MouseScrollUnit, MouseWheel};
 use bevy::input::touch::TouchPhase;
 
@@ -121,4 +121,22 @@ fn the_wheel_can_be_bound_and_leaves_the_keys_alone() {
     assert!(of(&app, Action::NextTool).contains(&Binding::WheelUp));
     let grow = of(&app, Action::Grow);
     assert!(grow.contains(&Binding::Key(KeyCode::Equal)) && !grow.contains(&Binding::WheelUp), "{grow:?}");
+}
+
+#[test]
+fn a_key_without_a_name_is_refused_and_a_button_with_a_number_is_not() {
+    let mut app = app();
+    let undo = row(&mut app, Action::Undo);
+    click(&mut app, undo);
+    type_key(&mut app, KeyCode::Unidentified(NativeKeyCode::Xkb(170)));
+    assert_eq!(app.world().resource::<Settings>().bindings, default());
+    assert_eq!(waits_for(&app), None);
+    let mut notes = app.world_mut().query_filtered::<&Text, With<Note>>();
+    let note = notes.single(app.world()).expect("one note").0.clone();
+    assert!(note.contains("undo keeps its keys"), "{note}");
+    click(&mut app, undo);
+    let (button, window) = (MouseButton::Other(9), Entity::PLACEHOLDER);
+    app.world_mut().write_message(MouseButtonInput { button, state: ButtonState::Pressed, window });
+    app.update();
+    assert!(of(&app, Action::Undo).contains(&Binding::Mouse(button)));
 }

@@ -6,6 +6,7 @@ use super::go_to;
 use crate::art::Art;
 use crate::bindings::Bindings;
 use crate::input::Action;
+use crate::labels::Labels;
 use crate::phase::Page;
 use crate::settings::Settings;
 use crate::tools::Tool;
@@ -24,9 +25,9 @@ impl Plugin for HelpPlugin {
 }
 
 /// What there is to do, and its keys.
-fn lines(bindings: &Bindings) -> [(String, &'static str); 14] {
+fn lines(bindings: &Bindings, labels: &Labels) -> [(String, &'static str); 14] {
     use Action as A;
-    let key = |action: Action| bindings.first(action);
+    let key = |action: Action| bindings.first(action, labels);
     let keys = |actions: [Action; 2]| actions.map(key).join(", ");
     [
         ([A::Forward, A::Left, A::Back, A::Right].map(key).join(" "), "walk"),
@@ -46,7 +47,7 @@ fn lines(bindings: &Bindings) -> [(String, &'static str); 14] {
     ]
 }
 
-fn open(mut commands: Commands, settings: Res<Settings>, art: Option<Res<Art>>) {
+fn open(mut commands: Commands, settings: Res<Settings>, labels: Res<Labels>, art: Option<Res<Art>>) {
     let Some(art) = art else { return };
     let bindings = &settings.bindings;
     super::open(&mut commands, Page::Help, "Help", 1110.0, |column| {
@@ -58,7 +59,7 @@ fn open(mut commands: Commands, settings: Res<Settings>, art: Option<Res<Art>>) 
             let rows =
                 Node { flex_direction: FlexDirection::Column, row_gap: px(7), width: px(514), ..default() };
             columns.spawn(rows.clone()).with_children(|rows| {
-                for (keys, what) in lines(bindings) {
+                for (keys, what) in lines(bindings, &labels) {
                     rows.spawn(Node { column_gap: px(14), ..default() }).with_children(|row| {
                         let first = Node { width: px(KEYS), flex_shrink: 0.0, ..default() };
                         row.spawn((first, children![ui::text(keys, 16.0, ui::GOLD)]));
@@ -68,7 +69,7 @@ fn open(mut commands: Commands, settings: Res<Settings>, art: Option<Res<Art>>) 
             });
             columns.spawn(rows).with_children(|rows| {
                 for tool in Tool::ALL {
-                    spawn_tool(rows, tool, bindings.first(tool.slot()), &art);
+                    spawn_tool(rows, tool, bindings.first(tool.slot(), &labels), &art);
                 }
             });
         });
@@ -110,6 +111,7 @@ mod tests {
         app.add_plugins((MinimalPlugins, StatesPlugin, HelpPlugin))
             .init_state::<Page>()
             .insert_resource(Settings { bindings: bindings.clone(), ..default() })
+            .init_resource::<Labels>()
             .init_resource::<Assets<Image>>()
             .init_resource::<Art>();
         app.world_mut().resource_mut::<NextState<Page>>().set(Page::Help);
@@ -125,7 +127,10 @@ mod tests {
         let words = words(&bindings);
         let is_there = |what: &str| words.iter().any(|word| word == what);
         for tool in Tool::ALL {
-            assert!(is_there(tool.label()) && is_there(&bindings.first(tool.slot())), "{tool:?}: {words:?}");
+            assert!(
+                is_there(tool.label()) && is_there(&bindings.first(tool.slot(), &Labels::default())),
+                "{tool:?}: {words:?}"
+            );
         }
         assert!(is_there("next tool") && is_there("previous tool"), "{words:?}");
     }
@@ -133,7 +138,7 @@ mod tests {
     #[test]
     fn no_keys_are_broken_as_they_are_at_first() {
         // Letters of the default font are all 0.6 times as wide as they are high.
-        for (keys, what) in lines(&Bindings::default()) {
+        for (keys, what) in lines(&Bindings::default(), &Labels::default()) {
             assert!(keys.len() as f32 * 0.6 * 16.0 <= KEYS, "{what}: {keys}");
         }
     }

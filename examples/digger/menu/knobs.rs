@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::go_to;
 use crate::phase::Page;
-use crate::settings::{Quality, Settings};
+use crate::settings::{AsMade, Quality, Settings};
 use crate::ui::{self, Arrow, Chosen, Item, Turned};
 
 /// The page of settings.
@@ -146,8 +146,8 @@ fn arrow(sign: &str, by: i32) -> impl Bundle {
 }
 
 /// All but the keys, which have a page of their own.
-fn reset(_: On<Chosen>, mut settings: ResMut<Settings>) {
-    *settings = Settings { bindings: settings.bindings.clone(), ..default() };
+fn reset(_: On<Chosen>, made: Res<AsMade>, mut settings: ResMut<Settings>) {
+    *settings = Settings { bindings: settings.bindings.clone(), ..made.0.clone() };
 }
 
 fn show_values(settings: Res<Settings>, mut values: Query<(&Value, &mut Text)>) {
@@ -194,6 +194,22 @@ mod tests {
                 (KNOBS[at].value)(app.world().resource::<Settings>())
             });
             assert_eq!(values, expected, "{label}");
+        }
+    }
+
+    #[test]
+    fn as_it_was_made_is_as_this_machine_was_given_it() {
+        let mut app = app();
+        let mut items = app.world_mut().query::<(Entity, &Item)>();
+        let found = items.iter(app.world()).find(|(_, item)| item.0 == KNOBS.len());
+        let entity = found.expect("a button below the knobs").0;
+        for given in [Quality::Low, Quality::Medium] {
+            app.world_mut().resource_mut::<AsMade>().0.quality = given;
+            let mut settings = app.world_mut().resource_mut::<Settings>();
+            (settings.quality, settings.sensitivity) = (Quality::High, 3.0);
+            app.world_mut().trigger(Chosen { entity });
+            let settings = app.world().resource::<Settings>();
+            assert_eq!((settings.quality, settings.sensitivity), (given, 1.0));
         }
     }
 

@@ -54,9 +54,12 @@ fn go_back(
     mut phase: ResMut<NextState<Phase>>,
     mut page: ResMut<NextState<Page>>,
 ) {
+    let presses = |button: GamepadButton| pads.iter().any(|pad| pad.just_pressed(button));
+    // What chooses an item does nothing but that here, though it may be bound to the pause.
+    let chooses = keys.any_just_pressed(ui::CHOOSE) || presses(GamepadButton::South);
     let back = keys.just_pressed(KeyCode::Escape)
-        || actions.just_pressed(Action::Pause)
-        || pads.iter().any(|pad| pad.just_pressed(GamepadButton::East));
+        || actions.just_pressed(Action::Pause) && !chooses
+        || presses(GamepadButton::East);
     let help = actions.just_pressed(Action::Help) && *now.1 == Page::Help;
     match (**now.0, **now.1) {
         (Phase::Paused, Page::Menu) if back => phase.set(Phase::Playing),
@@ -74,6 +77,7 @@ mod tests {
     use bevy::window::WindowFocused;
 
     use super::*;
+    use crate::bindings::Binding;
     use crate::input::InputPlugin;
     use crate::phase::PhasePlugin;
     use crate::settings::Settings;
@@ -120,5 +124,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn who_pauses_with_the_key_that_chooses_can_choose_with_it() {
+        let mut app = app();
+        let space = Binding::Key(KeyCode::Space);
+        app.world_mut().resource_mut::<Settings>().bindings.rebind(Action::Pause, space);
+        for _ in 0..2 {
+            tap(&mut app, KeyCode::Space);
+            assert_eq!(now(&app), (Phase::Paused, Page::Menu));
+        }
+        tap(&mut app, KeyCode::Escape);
+        assert_eq!(now(&app), (Phase::Playing, Page::None));
     }
 }

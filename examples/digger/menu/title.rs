@@ -28,7 +28,10 @@ impl Plugin for TitlePlugin {
             .add_systems(OnExit(Phase::Title), (land, begin))
             .add_systems(
                 Update,
-                (fly.run_if(resource_exists::<Places>), (tell_progress, play.run_if(is_watched)).chain())
+                (
+                    fly.run_if(resource_exists::<Places>),
+                    (tell_progress, play.run_if(is_there).run_if(is_watched)).chain(),
+                )
                     .run_if(in_state(Phase::Title)),
             );
     }
@@ -125,14 +128,14 @@ fn is_watched(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
     windows.iter().all(|window| window.focused)
 }
 
-/// Once there is someone to play.
-fn play(
-    game: Res<Start>,
-    players: Query<(), With<Player>>,
-    painting: Res<GroundLoading>,
-    mut phase: ResMut<NextState<Phase>>,
-) {
-    if game.is_wanted && !players.is_empty() && painting.is_ready() {
+/// Is there land, and someone to play on it?
+fn is_there(players: Query<(), With<Player>>, painting: Res<GroundLoading>) -> bool {
+    !players.is_empty() && painting.is_ready()
+}
+
+/// Nobody is taken from a page that he has opened meanwhile: the game begins once he is back in the menu.
+fn play(game: Res<Start>, page: Res<State<Page>>, mut phase: ResMut<NextState<Phase>>) {
+    if game.is_wanted && *page.get() == Page::Menu {
         phase.set(Phase::Playing);
     }
 }
@@ -178,10 +181,10 @@ fn word(is_painted: bool, done: f32, has_player: bool) -> Option<String> {
     }
 }
 
-/// Around the tunnel's hill, over the ridges.
+/// Around the tunnel's hill, over the ridges, while the game's own time may stand still.
 fn fly(
     mut commands: Commands,
-    time: Res<Time>,
+    time: Res<Time<Real>>,
     places: Res<Places>,
     terrains: Terrains,
     mut eyes: Query<(Entity, &mut Transform), With<Eyes>>,
@@ -237,6 +240,24 @@ mod tests {
         assert!(!is_watched(&mut world));
         world.get_mut::<Window>(window).expect("it is open").focused = true;
         assert!(is_watched(&mut world));
+    }
+
+    #[test]
+    fn nobody_is_taken_from_a_page_into_the_game() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, bevy::state::app::StatesPlugin))
+            .init_state::<Phase>()
+            .init_state::<Page>()
+            .insert_resource(Start { has_begun: false, is_wanted: true })
+            .add_systems(Update, play);
+        for page in [Page::Settings, Page::Controls, Page::Help, Page::Menu] {
+            app.world_mut().resource_mut::<NextState<Page>>().set(page);
+            // One more for what was wanted on it.
+            app.update();
+            app.update();
+            let expected = if page == Page::Menu { Phase::Playing } else { Phase::Title };
+            assert_eq!(**app.world().resource::<State<Phase>>(), expected, "{page:?}");
+        }
     }
 
     #[test]
