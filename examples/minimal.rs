@@ -8,7 +8,8 @@
 //! | --- | --- |
 //! | left mouse button | digs where the cursor points |
 //! | right mouse button, held | looks around |
-//! | W A S D, Q, E | moves, down, up; with Shift faster |
+//! | W A S D, Q, E | moves, down, up; with the left Shift key faster |
+//! | M | looks around without a button, until it is pressed again |
 
 use bevy::camera_controller::free_camera::{FreeCamera, FreeCameraPlugin};
 use bevy::prelude::*;

@@ -321,7 +321,11 @@ def main():
     # Whoever is told to stop takes the program and the display along.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     start = time.monotonic()
-    stage = Stage(command + args.arguments, args.out, size, args.patience)
+    try:
+        stage = Stage(command + args.arguments, args.out, size, args.patience)
+    except (Failed, OSError) as error:
+        print(f"FAILED: {error}", file=sys.stderr)
+        return 1
     try:
         act(stage)
     except (Failed, subprocess.SubprocessError) as error:

@@ -18,8 +18,18 @@ class Stage:
     def __init__(self, command, out, size, patience):
         self.out, self.size, self.patience = out, size, patience
         self.shots = []
-        out.mkdir(parents=True, exist_ok=True)
         self.log = out / "log.txt"
+        self.server = self.program = self.written = None
+        try:
+            self.start(command)
+        except BaseException:
+            self.close()
+            raise
+
+    def start(self, command):
+        """Starts the display, and the program on it."""
+        out, size = self.out, self.size
+        out.mkdir(parents=True, exist_ok=True)
         read, write = os.pipe()
         # Xvfb itself picks a display that is free, and tells when it is ready.
         self.server = subprocess.Popen(
@@ -43,16 +53,17 @@ class Stage:
         self.program = subprocess.Popen(command, env=self.env, stdout=self.written, stderr=subprocess.STDOUT)
 
     def close(self):
-        """Ends the program and the display."""
+        """Ends the program and the display, as far as they were started."""
         for process in (self.program, self.server):
-            if process.poll() is None:
+            if process and process.poll() is None:
                 process.send_signal(signal.SIGTERM)
                 try:
                     process.wait(10)
                 except subprocess.TimeoutExpired:
                     process.kill()
                     process.wait()
-        self.written.close()
+        if self.written:
+            self.written.close()
 
     # What the program says
 

@@ -9,6 +9,7 @@
 #   tools/setup.sh peers          the same as build, and Python for the meshers that ours is compared with
 #   tools/setup.sh ptx            Python, whose package index has the compiler of the CUDA kernels
 #   tools/setup.sh instructions   the same as build, and valgrind, which counts instructions
+#   tools/setup.sh skipped        nothing: says which tests find nothing to run on here, and pass for that
 #
 # With MORE=gamepad in the environment, also what the feature of that name is compiled with.
 #
@@ -32,6 +33,15 @@ want_library() { ldconfig -p 2>/dev/null | grep -q "$1" || want "$2"; }
 has_vulkan_driver() {
     for driver in /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json; do
         [ -e "$driver" ] && return 0
+    done
+    return 1
+}
+
+# Where programs find whom to trust on the network; elsewhere than on Linux the system knows.
+has_certificates() {
+    [ "$(uname -s)" = Linux ] || return 0
+    for bundle in /etc/ssl/certs/ca-certificates.crt /etc/pki/tls/certs/ca-bundle.crt /etc/ssl/cert.pem; do
+        [ -e "$bundle" ] && return 0
     done
     return 1
 }
@@ -80,9 +90,30 @@ install_rust() {
     rust_is_new_enough || die "rustc is '$(rust_version)' after installing, but $wanted_rust is the least"
 }
 
+# add_component NAME: what cargo calls so, from rustup; a distribution's Rust has it as a package.
+add_component() {
+    cargo "$1" --version >/dev/null 2>&1 && return 0
+    has rustup || die "'cargo $1' is missing, and there is no rustup to add it"
+    case $1 in fmt) rustup component add rustfmt ;; *) rustup component add "$1" ;; esac
+}
+
+# What is told at the end of many tests, of which some had nothing to run on.
+tell_skipped() {
+    if ! has nvidia-smi && { [ "$(uname -s)" != Linux ] || ! { has "${CXX:-c++}" || has g++ || has clang++; }; }; then
+        say '*** SKIPPED: CUDA kernels were not tested: neither a card nor, on Linux, a C++ compiler (g++) for the emulator ***'
+    fi
+    if [ "$(uname -s)" = Linux ] && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && ! has_vulkan_driver; then
+        say '*** SKIPPED: no picture was compared: no Vulkan driver (mesa-vulkan-drivers) ***'
+    fi
+}
+
 case $goal in
     build | run | test | drive | lint | peers | ptx | instructions) ;;
-    *) die "unknown goal '$goal': build, run, test, drive, lint, peers, ptx or instructions" ;;
+    skipped)
+        tell_skipped
+        exit 0
+        ;;
+    *) die "unknown goal '$goal': build, run, test, drive, lint, peers, ptx, instructions or skipped" ;;
 esac
 
 has make || want make
@@ -92,7 +123,11 @@ if ! has cc; then
 fi
 if ! rust_is_new_enough && ! has rustup; then
     has curl || want curl
-    [ -e /etc/ssl/certs/ca-certificates.crt ] || want ca-certificates
+    has_certificates || want ca-certificates
+fi
+if [ "$goal" = lint ] && rust_is_new_enough && ! has rustup; then
+    cargo fmt --version >/dev/null 2>&1 || want rustfmt
+    cargo clippy --version >/dev/null 2>&1 || want rust-clippy
 fi
 if [ "$goal" = test ]; then
     has c++ || want g++
@@ -140,6 +175,6 @@ install_packages
 has cc || die "a C compiler and linker is missing"
 install_rust
 if [ "$goal" = lint ]; then
-    cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
-    cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+    add_component fmt
+    add_component clippy
 fi

@@ -13,7 +13,7 @@ const SIZE: (u32, u32) = (960, 540);
 
 /// Two pictures: before and after digging.
 pub fn run(folder: &Path) -> Result {
-    std::fs::create_dir_all(folder)?;
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let renderer = offscreen::find_renderer().ok_or("there is no graphics adapter, and so no picture")?;
     let mut app = offscreen::build(Some(renderer), |app| {
         app.add_plugins(super::table);

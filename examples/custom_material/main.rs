@@ -10,7 +10,7 @@
 //! | left mouse button | digs where the cursor points |
 //! | middle mouse button | builds there |
 //! | right mouse button, held | looks around |
-//! | `W` `A` `S` `D`, `Q`, `E` | moves, down, up; with `Shift` faster |
+//! | `W` `A` `S` `D`, `Q`, `E` | moves, down, up; with the left `Shift` faster |
 //!
 //! Any `Material` will do: put it on the terrain's entity and add `TerrainMaterialPlugin` for its type. This one is all
 //! its own, with a shader in `map.wgsl` that reads the colours of the terrain's `MaterialColors` and the depth of each
@@ -23,6 +23,8 @@
 
 #[path = "../shared/display.rs"]
 mod display;
+#[path = "../shared/flight.rs"]
+mod flight;
 mod headless;
 mod map;
 #[path = "../shared/offscreen.rs"]
@@ -33,9 +35,9 @@ mod photo;
 mod pixels;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{ExitCode, Termination};
 
-use bevy::camera_controller::free_camera::{FreeCamera, FreeCameraPlugin};
+use bevy::camera_controller::free_camera::FreeCameraPlugin;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 use clap::Parser;
@@ -63,13 +65,13 @@ fn main() -> ExitCode {
             }
         };
     }
-    let exit = App::new()
+    App::new()
         .add_plugins((DefaultPlugins, FreeCameraPlugin))
         .add_plugins(table)
         .add_systems(Startup, open_eyes)
         .add_systems(Update, dig.before(BurrowSystems::Collect))
-        .run();
-    if exit.is_success() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        .run()
+        .report()
 }
 
 /// Everything but the window: the map on its table.
@@ -101,7 +103,7 @@ const VIEW: (Vec3, Vec3) = (Vec3::new(128.0, 120.0, 300.0), Vec3::new(128.0, -20
 fn open_eyes(mut commands: Commands) {
     commands.spawn((
         Camera3d::default(),
-        FreeCamera { walk_speed: 20.0, run_speed: 60.0, ..default() },
+        flight::free_camera(20.0, 60.0),
         Transform::from_translation(VIEW.0).looking_at(VIEW.1, Vec3::Y),
     ));
 }

@@ -34,7 +34,7 @@ pub struct MapMaterial {
     deep: LinearRgba,
     /// Metres between contour lines; every fifth is thick.
     #[uniform(0)]
-    step: Vec4,
+    step: f32,
 }
 
 impl Default for MapMaterial {
@@ -42,7 +42,7 @@ impl Default for MapMaterial {
         Self {
             shallow: Color::srgb(0.96, 0.72, 0.34).into(),
             deep: Color::srgb(0.55, 0.10, 0.16).into(),
-            step: Vec4::splat(2.0),
+            step: 2.0,
         }
     }
 }

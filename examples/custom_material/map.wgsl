@@ -3,7 +3,7 @@
 struct Map {
     shallow: vec4<f32>,
     deep: vec4<f32>,
-    step: vec4<f32>,
+    step: f32,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(0) var<uniform> map: Map;
@@ -55,6 +55,6 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let built = smoothstep(0.3, 1.0, -in.depth);
     var color = mix(mix(in.color, warm, dug), vec3(0.35, 0.55, 0.75), 0.7 * built);
     color *= 0.35 + 0.75 * max(light, 0.0);
-    let ink = max(0.35 * line(in.place.y, map.step.x, 0.6), 0.75 * line(in.place.y, 5.0 * map.step.x, 1.1));
+    let ink = max(0.35 * line(in.place.y, map.step, 0.6), 0.75 * line(in.place.y, 5.0 * map.step, 1.1));
     return vec4(mix(color, vec3(0.16, 0.10, 0.06), ink), 1.0);
 }

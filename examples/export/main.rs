@@ -27,7 +27,11 @@
 //!
 //! Unless the exit code is 0, nothing is left behind.
 
+#[path = "../shared/brush_lines.rs"]
+mod brush_lines;
 mod obj;
+#[path = "../shared/output.rs"]
+mod output;
 mod play;
 mod report;
 mod script;
@@ -102,7 +106,7 @@ impl ExportError {
 fn main() -> ExitCode {
     match export(&Args::parse()) {
         Ok(report) => {
-            println!("{report}");
+            output::say(format_args!("{report}"));
             ExitCode::SUCCESS
         }
         Err(error) => {

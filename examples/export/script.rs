@@ -2,12 +2,13 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use bevy_burrow::brush::{Brush, BrushRecord, Edit};
+use bevy_burrow::brush::Edit;
 
 use crate::ExportError;
+use crate::brush_lines::{Fault, Line, Lines};
 
 /// An edit and the line it stands on, from 1.
 #[derive(Debug)]
@@ -45,35 +46,25 @@ impl fmt::Display for BadLines {
 /// Reads a script whole, or says what is wrong with each bad line.
 pub fn read(path: &Path) -> Result<Vec<ScriptedEdit>, ExportError> {
     let failed = |reason| ExportError::Read { path: path.into(), reason };
-    let mut reader = BufReader::new(File::open(path).map_err(failed)?);
+    let script = BufReader::new(File::open(path).map_err(failed)?);
     let (mut edits, mut bad) = (Vec::new(), Vec::new());
-    let mut bytes = Vec::new();
-    for line in 1.. {
-        bytes.clear();
-        if reader.read_until(b'\n', &mut bytes).map_err(failed)? == 0 {
-            break;
-        }
-        match parse(&bytes) {
-            Ok(Some(edit)) => edits.push(ScriptedEdit { line, edit }),
-            Ok(None) => {}
-            Err(reason) => bad.push((line, reason)),
+    for line in Lines::new(script) {
+        match line {
+            Ok((line, said)) => match edit(&said) {
+                Ok(edit) => edits.push(ScriptedEdit { line, edit }),
+                Err(reason) => bad.push((line, reason)),
+            },
+            Err(Fault::Line { number, reason }) => bad.push((number, reason)),
+            Err(Fault::End(reason)) => return Err(failed(reason)),
         }
     }
     if bad.is_empty() { Ok(edits) } else { Err(BadLines { path: path.into(), lines: bad }.into()) }
 }
 
-/// The edit on a line; none on a blank line or a comment.
-fn parse(line: &[u8]) -> Result<Option<Edit>, String> {
-    let text = std::str::from_utf8(line).map_err(|_| "the line is not UTF-8".to_string())?.trim();
-    if text.is_empty() || text.starts_with('#') {
-        return Ok(None);
+/// The edit that a line asks for.
+fn edit(line: &Line) -> Result<Edit, String> {
+    match line {
+        Line::Brush(brush) => Edit::quantize(brush).map_err(|error| error.to_string()),
+        Line::Undo | Line::Redo => Err("there are no steps through history here, only edits".into()),
     }
-    let record: BrushRecord = serde_json::from_str(text).map_err(|error| {
-        let reason = error.to_string();
-        // The record is all on one line, whose number the caller knows better.
-        let reason = reason.rsplit_once(" at line ").map_or(reason.as_str(), |(reason, _)| reason);
-        format!("column {}: {reason}", error.column())
-    })?;
-    let brush = Brush::try_from(record).map_err(|error| error.to_string())?;
-    Edit::quantize(&brush).map(Some).map_err(|error| error.to_string())
 }

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Files under temporary names in one folder. Dropped before [`publish`](Self::publish), it leaves nothing behind.
+/// Files under temporary names in one folder. Unless [`publish`](Self::publish) succeeds, it leaves nothing behind.
 pub struct Staging {
     folder: PathBuf,
     /// Folders that were made for it, innermost first.
@@ -28,9 +28,7 @@ impl Staging {
         name: &'static str,
         content: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>,
     ) -> io::Result<T> {
-        if self.folder.join(name).is_dir() {
-            return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
-        }
+        self.check_is_no_folder(name)?;
         self.names.push(name);
         let mut writer = BufWriter::with_capacity(1 << 20, File::create(self.staged(name))?);
         let result = content(&mut writer)?;
@@ -38,17 +36,53 @@ impl Staging {
         Ok(result)
     }
 
-    /// Gives all files their names, over what had them before.
+    /// Gives all files their names, over what had them before; where one can't have its name, none gets it.
     pub fn publish(mut self) -> io::Result<()> {
-        self.made.clear();
-        for name in &self.names {
-            fs::rename(self.staged(name), self.folder.join(name))?;
+        for (number, name) in self.names.iter().enumerate() {
+            if let Err(error) = self.put_in_place(name) {
+                self.names[..number].iter().for_each(|name| self.take_back(name));
+                return Err(error);
+            }
         }
+        for name in &self.names {
+            let _ = fs::remove_file(self.earlier(name));
+        }
+        self.made.clear();
         Ok(())
+    }
+
+    /// Gives a file its name; what had it is kept aside.
+    fn put_in_place(&self, name: &str) -> io::Result<()> {
+        self.check_is_no_folder(name)?;
+        let (place, earlier) = (self.folder.join(name), self.earlier(name));
+        match fs::rename(&place, &earlier) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        fs::rename(self.staged(name), &place).inspect_err(|_| drop(fs::rename(&earlier, &place)))
+    }
+
+    /// What had the name before has it again. What can't be done here can't be helped either.
+    fn take_back(&self, name: &str) {
+        let place = self.folder.join(name);
+        let _ = fs::rename(&place, self.staged(name));
+        let _ = fs::rename(self.earlier(name), place);
+    }
+
+    fn check_is_no_folder(&self, name: &str) -> io::Result<()> {
+        match self.folder.join(name).is_dir() {
+            true => Err(io::Error::new(io::ErrorKind::IsADirectory, format!("{name} is a folder"))),
+            false => Ok(()),
+        }
     }
 
     fn staged(&self, name: &str) -> PathBuf {
         self.folder.join(format!(".{name}.{}.part", std::process::id()))
+    }
+
+    /// Where a file waits that has the name so far.
+    fn earlier(&self, name: &str) -> PathBuf {
+        self.folder.join(format!(".{name}.{}.earlier", std::process::id()))
     }
 }
 

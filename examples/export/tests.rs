@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -10,6 +11,7 @@ use clap::Parser;
 use serde_json::Value;
 
 use crate::obj::push_voxels;
+use crate::staging::Staging;
 use crate::{Args, export};
 
 const DIG: &str = r#"{"shape":"sphere","center":[9,30,9],"radius":4,"op":"dig"}"#;
@@ -215,8 +217,9 @@ fn bad_lines_are_named_and_nothing_is_written() {
     desk.put_hills();
     for (line, reason) in [
         ("{", "EOF while parsing"),
-        ("[]", "invalid length 0"),
-        ("dig here", "expected value"),
+        ("[]", "expected a JSON object"),
+        ("dig here", "expected a JSON object"),
+        (r#"{"undo":true}"#, "no steps through history"),
         (r#"{"shape":"ball","op":"dig"}"#, "unknown variant `ball`"),
         (r#"{"shape":"sphere","center":[0,0,0],"op":"dig"}"#, "missing field `radius`"),
         (r#"{"shape":"sphere","center":[0,0,0],"radius":-1,"op":"dig"}"#, "`radius` is -1 voxels"),
@@ -236,6 +239,9 @@ fn bad_lines_are_named_and_nothing_is_written() {
         assert!(message.contains("edits.jsonl: line 2: ") && message.contains(reason), "{line}: {message}");
         assert!(!desk.path("out").exists(), "{line}: something was written");
     }
+    desk.run(&desk.put("edits.jsonl", format!("\u{feff}{DIG}\n")), &[])
+        .expect("a mark of the encoding is no fault");
+    fs::remove_dir_all(desk.path("out")).expect("the folder");
     let (code, message) = desk.run(&desk.put("edits.jsonl", b"\xff\xfe\n{\n"), &[]).unwrap_err();
     assert!(code == 2 && message.contains("line 1: the line is not UTF-8") && message.contains("line 2: "));
     let (_, message) = desk.run(&desk.put("edits.jsonl", "{\n".repeat(30)), &[]).unwrap_err();
@@ -290,6 +296,30 @@ fn a_folder_that_cannot_be_written_is_another_matter_than_bad_input() {
     fs::create_dir_all(desk.path("out/report.json")).expect("a folder");
     assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
     assert_eq!(fs::read_dir(desk.path("out")).expect("the folder").count(), 1, "something was left behind");
+}
+
+#[test]
+fn files_get_their_names_together_or_not_at_all() {
+    let desk = Desk::new();
+    let read = || fs::read_to_string(desk.path("a")).ok();
+    let stage = |content: &str| {
+        let mut staging = Staging::new(&desk.0).expect("a folder");
+        for name in ["a", "b"] {
+            staging.write(name, |out| out.write_all(content.as_bytes())).expect("a file");
+        }
+        staging
+    };
+    // Somebody takes the second name while the files are written.
+    for before in [None, Some("first".to_string())] {
+        let staging = stage("second");
+        fs::create_dir(desk.path("b")).expect("a folder");
+        assert!(staging.publish().is_err() && read() == before, "the first file was not taken back");
+        fs::remove_dir(desk.path("b")).expect("the folder");
+        stage("first").publish().expect("both names are free");
+        assert_eq!(read().as_deref(), Some("first"));
+        assert_eq!(fs::read_dir(&desk.0).expect("the folder").count(), 2, "something was left behind");
+        fs::remove_file(desk.path("b")).expect("the file");
+    }
 }
 
 #[test]

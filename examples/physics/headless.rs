@@ -36,7 +36,8 @@ pub fn run(options: &Options) -> ExitCode {
 }
 
 fn play(options: &Options) -> Result<usize> {
-    std::fs::create_dir_all(&options.out)?;
+    let at = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
+    std::fs::create_dir_all(&options.out).map_err(|error| at(&options.out, error))?;
     let (mut app, renders) = build(options);
     let photographer = renders.then(|| hire(&mut app, options)).transpose()?;
     // Ground first: its colliders and the tunnels.
@@ -86,7 +87,8 @@ fn play(options: &Options) -> Result<usize> {
     });
     let text = serde_json::to_string_pretty(&report)?;
     println!("{text}");
-    std::fs::write(options.out.join("report.json"), text)?;
+    let path = options.out.join("report.json");
+    std::fs::write(&path, text).map_err(|error| at(&path, error))?;
     Ok(below.max(below_ever))
 }
 

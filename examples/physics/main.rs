@@ -10,7 +10,7 @@
 //! | left mouse button, held | digs where the cursor points |
 //! | middle mouse button, held | builds there |
 //! | right mouse button, held | looks around |
-//! | `W` `A` `S` `D`, `Q`, `E` | moves, down, up; with `Shift` faster |
+//! | `W` `A` `S` `D`, `Q`, `E` | moves, down, up; with the left `Shift` faster |
 //! | `Space` | throws a ball |
 //! | `P` | stops the digging machine, or lets it go on |
 //!
@@ -30,7 +30,7 @@ mod rain;
 mod scene;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{ExitCode, Termination};
 
 use avian3d::prelude::*;
 use bevy::camera_controller::free_camera::FreeCameraPlugin;
@@ -77,10 +77,7 @@ fn main() -> ExitCode {
     app.add_plugins((DefaultPlugins, FreeCameraPlugin));
     game(&mut app, &options);
     app.add_systems(Update, (scene::use_mouse, scene::press_keys).before(BurrowSystems::Collect));
-    match app.run() {
-        AppExit::Success => ExitCode::SUCCESS,
-        AppExit::Error(code) => ExitCode::from(code.get()),
-    }
+    app.run().report()
 }
 
 /// Everything that needs no window: ten lines of physics, and a scene.

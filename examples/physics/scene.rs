@@ -1,7 +1,9 @@
 //! Hills with tunnels, a sun and a camera; mouse and keys.
 
+#[path = "../shared/flight.rs"]
+mod flight;
+
 use avian3d::prelude::*;
-use bevy::camera_controller::free_camera::FreeCamera;
 use bevy::prelude::*;
 use bevy_burrow::physics::ColliderSource;
 use bevy_burrow::prelude::*;
@@ -36,7 +38,7 @@ pub fn set_up(
     commands.insert_resource(ClearColor(Color::srgb(0.62, 0.76, 0.95)));
     commands.spawn((
         Camera3d::default(),
-        FreeCamera { walk_speed: 20.0, run_speed: 60.0, ..default() },
+        flight::free_camera(20.0, 60.0),
         Transform::from_translation(EYE).looking_at(MIDDLE, Vec3::Y),
     ));
     // All of this small world is near.

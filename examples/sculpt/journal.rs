@@ -1,5 +1,7 @@
 //! A line on standard output for whatever happened: what was done can be followed, and checked by a script.
 
+#[path = "../shared/steps.rs"]
+mod steps;
 #[path = "../shared/tell.rs"]
 mod told;
 
@@ -7,7 +9,6 @@ use bevy::prelude::*;
 use bevy_burrow::panel::{BrushTool, PanelPlaces};
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::HistoryStep;
 
 pub struct JournalPlugin;
 
@@ -64,10 +65,7 @@ fn tell_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Ter
 
 fn tell_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
     for HistoryMoved { terrain, receipt } in moves.read() {
-        let name = match receipt.step {
-            HistoryStep::Undo => "undo",
-            HistoryStep::Redo => "redo",
-        };
+        let name = steps::name(receipt.step);
         let terrain = terrain.and_then(|terrain| terrains.get(terrain).ok());
         let hash = terrain.map_or(0, |terrain| terrain.world().hash());
         match &receipt.outcome {

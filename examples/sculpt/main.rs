@@ -10,7 +10,7 @@
 //! | --- | --- |
 //! | left button, held | a stroke with the panel's brush under the mouse |
 //! | right button, held | looks around |
-//! | `W` `A` `S` `D`, `Q`, `E`, `Shift` | flies, down, up, faster |
+//! | `W` `A` `S` `D`, `Q`, `E`, left `Shift` | flies, down, up, faster |
 //! | wheel, `[`, `]` | size of the brush |
 //! | `Tab` | next operation |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
@@ -46,7 +46,7 @@ mod stamps;
 mod stroke;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{ExitCode, Termination};
 
 use bevy::prelude::*;
 use bevy_burrow::debug::BurrowDebugPlugin;
@@ -100,10 +100,7 @@ fn main() -> ExitCode {
     if let Some(file) = &options.stamp {
         stamps::take(file, &mut app.world_mut().resource_mut::<BrushTool>());
     }
-    match app.run() {
-        AppExit::Success => ExitCode::SUCCESS,
-        AppExit::Error(code) => ExitCode::from(code.get()),
-    }
+    app.run().report()
 }
 
 /// Everything that needs no window.

@@ -1,5 +1,7 @@
 //! Landscape, sun and camera.
 
+#[path = "../shared/flight.rs"]
+mod flight;
 #[path = "../shared/software.rs"]
 mod software;
 
@@ -69,7 +71,8 @@ fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>
         Tonemapping::AcesFitted,
         Msaa::Off,
         DistanceFog { color: SKY, falloff: FogFalloff::Linear { start: 180.0, end: 420.0 }, ..default() },
-        FreeCamera { walk_speed: 24.0, run_speed: 80.0, scroll_factor: 0.0, ..default() },
+        // The wheel is for the brush.
+        FreeCamera { scroll_factor: 0.0, ..flight::free_camera(24.0, 80.0) },
         Transform::from_translation(MIDDLE + Vec3::new(-26.0, 62.0, 58.0))
             .looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y),
     ));

@@ -27,7 +27,7 @@ struct Stage {
 /// Plays the script.
 pub fn play(options: &Options) -> Result {
     let stamp = stamps::read_or_crater(options.stamp.as_deref())?;
-    std::fs::create_dir_all(&options.out)?;
+    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
     let mut stage = Stage::open(options)?;
     stage.wait_until(|world| {
         let mut dressed = world.query_filtered::<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
@@ -91,7 +91,7 @@ pub fn play(options: &Options) -> Result {
     stage.frames(40);
     stage.shoot("2_sculpted")?;
 
-    // Back to before the sculpting, and half of the way forth again.
+    // Back to before the sculpting, and forth again.
     for _ in 0..sculpted {
         stage.step(PanelAction::Undo)?;
     }

@@ -6,6 +6,7 @@ mod gizmos;
 use std::time::Duration;
 
 use bevy::camera_controller::free_camera::FreeCameraState;
+use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::input::mouse::{AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
@@ -56,6 +57,7 @@ impl Plugin for MousePlugin {
                         .before(preview),
                     resize.run_if(pointer_is_free),
                     keys.run_if(keyboard_is_free),
+                    step,
                 ),
             );
     }
@@ -127,15 +129,6 @@ fn keys(
         let next = all.iter().position(|&operation| operation == tool.operation).map_or(0, |at| at + 1);
         tool.operation = all.get(next).copied().unwrap_or_default();
     }
-    let (is_ctrl, is_shift) = (
-        keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]),
-        keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]),
-    );
-    match (is_ctrl, keys.just_pressed(KeyCode::KeyZ), keys.just_pressed(KeyCode::KeyY)) {
-        (true, true, _) if !is_shift => drop(actions.write(PanelAction::Undo)),
-        (true, true, _) | (true, _, true) => drop(actions.write(PanelAction::Redo)),
-        _ => {}
-    }
     if let (true, Some(hit)) = (keys.just_pressed(KeyCode::KeyH), &aim.0) {
         tool.level = hit.position.y;
     }
@@ -147,6 +140,37 @@ fn keys(
     }
     if keys.just_pressed(KeyCode::Escape) {
         exit.write(AppExit::Success);
+    }
+}
+
+/// Steps through history. By messages: to `ButtonInput<Key>`, a `Z` that comes up as `z`, after Shift, is held for ever.
+fn step(
+    mut presses: MessageReader<KeyboardInput>,
+    keys: Res<ButtonInput<KeyCode>>,
+    panel: Option<Res<PanelInput>>,
+    mut actions: MessageWriter<PanelAction>,
+) {
+    let is_shift = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
+    let is_due = keyboard_is_free(panel) && keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+    for press in presses.read().filter(|press| is_due && press.state.is_pressed() && !press.repeat) {
+        match letter(press) {
+            Some('z') if !is_shift => drop(actions.write(PanelAction::Undo)),
+            Some('z' | 'y') => drop(actions.write(PanelAction::Redo)),
+            _ => {}
+        }
+    }
+}
+
+/// The letter on a key: by the layout, as QWERTZ and AZERTY have Z elsewhere than QWERTY. Where the layout has other
+/// letters than Latin ones, by its place on QWERTY.
+fn letter(press: &KeyboardInput) -> Option<char> {
+    match (&press.logical_key, press.key_code) {
+        (Key::Character(text), _) if text.bytes().all(|byte| byte.is_ascii_graphic()) => {
+            text.chars().next().map(|letter| letter.to_ascii_lowercase())
+        }
+        (_, KeyCode::KeyZ) => Some('z'),
+        (_, KeyCode::KeyY) => Some('y'),
+        _ => None,
     }
 }
 
@@ -169,4 +193,45 @@ fn preview(aim: Res<Aim>, tool: Res<BrushTool>, mut gizmos: Gizmos) {
     draw_shape(&mut gizmos, &tool.shape_at(hit), Color::srgb(1.0, 0.80, 0.30));
     let normal = hit.normal * f32::max(0.5 * tool.radius, 1.0);
     gizmos.line(hit.position, hit.position + normal, Color::srgb(1.0, 1.0, 1.0));
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::input::ButtonState;
+
+    use super::*;
+
+    #[test]
+    fn undo_and_redo_are_where_the_layout_has_their_letters() {
+        let on = |key_code, text: &str| {
+            let (logical_key, state, window) =
+                (Key::Character(text.into()), ButtonState::Pressed, Entity::PLACEHOLDER);
+            letter(&KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window })
+        };
+        assert_eq!((on(KeyCode::KeyZ, "z"), on(KeyCode::KeyZ, "Z")), (Some('z'), Some('z')));
+        // QWERTZ and AZERTY.
+        assert_eq!((on(KeyCode::KeyY, "z"), on(KeyCode::KeyZ, "y")), (Some('z'), Some('y')));
+        assert_eq!((on(KeyCode::KeyW, "z"), on(KeyCode::KeyZ, "w")), (Some('z'), Some('w')));
+        // Cyrillic letters.
+        assert_eq!((on(KeyCode::KeyZ, "я"), on(KeyCode::KeyY, "н")), (Some('z'), Some('y')));
+    }
+
+    #[test]
+    fn a_second_ctrl_shift_z_counts_though_shift_was_let_go_of_first() {
+        let mut app = App::new();
+        app.add_message::<KeyboardInput>().add_message::<PanelAction>().add_systems(Update, step);
+        let mut keys = ButtonInput::<KeyCode>::default();
+        keys.press(KeyCode::ControlLeft);
+        keys.press(KeyCode::ShiftLeft);
+        app.insert_resource(keys);
+        for (text, state) in [("Z", ButtonState::Pressed), ("z", ButtonState::Released)].repeat(2) {
+            let (key_code, logical_key) = (KeyCode::KeyZ, Key::Character(text.into()));
+            let window = Entity::PLACEHOLDER;
+            let press = KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window };
+            app.world_mut().write_message(press);
+        }
+        app.update();
+        let actions = app.world().resource::<Messages<PanelAction>>();
+        assert_eq!(actions.len(), 2);
+    }
 }

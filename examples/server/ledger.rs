@@ -1,11 +1,16 @@
 //! What is printed: a line for each receipt, and a summary at the end.
 
+#[path = "../shared/steps.rs"]
+mod steps;
+
 use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_burrow::plugin::HistoryMoved;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{HistoryStep, Memory};
+use bevy_burrow::terrain::Memory;
+
+use crate::output::say;
 
 /// What happened so far.
 #[derive(Resource)]
@@ -52,15 +57,15 @@ fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut ledger: ResMut<
                 ledger.moved = (ledger.moved.0 + removed, ledger.moved.1 + added);
                 if !ledger.quiet {
                     let chunks = applied.chunks.len();
-                    println!(
+                    say(format_args!(
                         "brush {tag}: {removed} removed, {added} added, {painted} painted in {chunks} chunks"
-                    );
+                    ));
                 }
             }
             Err(rejection) => {
                 ledger.rejected += 1;
                 if !ledger.quiet {
-                    println!("brush {tag}: rejected, {rejection}");
+                    say(format_args!("brush {tag}: rejected, {rejection}"));
                 }
             }
         }
@@ -70,15 +75,16 @@ fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut ledger: ResMut<
 fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut ledger: ResMut<Ledger>) {
     for HistoryMoved { receipt, .. } in moves.read() {
         ledger.answered += 1;
-        let name = match receipt.step {
-            HistoryStep::Undo => "undo",
-            HistoryStep::Redo => "redo",
-        };
+        let name = steps::name(receipt.step);
         match &receipt.outcome {
             Ok(restored) if !ledger.quiet => {
-                println!("{name}: {} removed, {} added", restored.removed.total(), restored.added.total());
+                say(format_args!(
+                    "{name}: {} removed, {} added",
+                    restored.removed.total(),
+                    restored.added.total()
+                ));
             }
-            Err(why) if !ledger.quiet => println!("{name}: {why}"),
+            Err(why) if !ledger.quiet => say(format_args!("{name}: {why}")),
             _ => {}
         }
     }
@@ -86,25 +92,28 @@ fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut ledger: ResMut<Ledger
 
 fn sum_up(ledger: Res<Ledger>, figures: Res<BurrowFigures>, terrains: Query<&Terrain>) {
     let Ledger { answered, rejected, scenarios, moved, start, .. } = &*ledger;
-    println!("{answered} answered, {rejected} rejected, in {:.2} s", start.elapsed().as_secs_f64());
-    println!(
+    say(format_args!("{answered} answered, {rejected} rejected, in {:.2} s", start.elapsed().as_secs_f64()));
+    say(format_args!(
         "scenarios: {} created, {} changed, {} extended, {} merged, {} split over chunks",
         scenarios.created, scenarios.changed, scenarios.extended, scenarios.merged, scenarios.split
-    );
-    println!("voxels: {} removed, {} added", moved.0, moved.1);
+    ));
+    say(format_args!("voxels: {} removed, {} added", moved.0, moved.1));
     let ms = |time: Option<Duration>| time.unwrap_or_default().as_secs_f64() * 1e3;
     let [p50, p95, p99] = [50, 95, 99].map(|percent| ms(figures.transactions.percentile(percent)));
-    println!("transactions: {} commits, p50 {p50:.2}, p95 {p95:.2}, p99 {p99:.2} ms", figures.commits);
+    say(format_args!(
+        "transactions: {} commits, p50 {p50:.2}, p95 {p95:.2}, p99 {p99:.2} ms",
+        figures.commits
+    ));
     for terrain in &terrains {
         let (world, memory) = (terrain.world(), terrain.memory());
         let fields: usize = world.fields().map(|(_, fields)| fields.len()).sum();
-        println!(
+        say(format_args!(
             "world: {fields} fields, {} bricks, {} drawn chunks",
             world.bricks().count(),
             world.drawn_chunks().count()
-        );
-        println!("memory: {}", in_words(&memory));
-        println!("hash: {:016x}", world.hash());
+        ));
+        say(format_args!("memory: {}", in_words(&memory)));
+        say(format_args!("hash: {:016x}", world.hash()));
     }
 }
 

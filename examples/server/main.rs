@@ -20,11 +20,15 @@
 //! | `script.rs` | where brushes come from |
 //! | `ledger.rs` | what is printed |
 
+#[path = "../shared/brush_lines.rs"]
+mod brush_lines;
 mod ledger;
+#[path = "../shared/output.rs"]
+mod output;
 mod script;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{ExitCode, Termination};
 use std::time::Duration;
 
 use bevy::app::ScheduleRunnerPlugin;
@@ -66,15 +70,10 @@ fn ticks(text: &str) -> Result<f64, String> {
 
 fn main() -> ExitCode {
     let options = Options::parse();
-    let terrain = match terrain(&options) {
-        Ok(terrain) => terrain,
-        Err(error) => {
-            eprintln!("server: {error}");
-            return ExitCode::FAILURE;
-        }
-    };
-    let source = match script::open(&options) {
-        Ok(source) => source,
+    // The script first: what is wrong with it should not have to wait for the ground.
+    let opened = script::open(&options).and_then(|source| Ok((source, terrain(&options)?)));
+    let (source, terrain) = match opened {
+        Ok(both) => both,
         Err(error) => {
             eprintln!("server: {error}");
             return ExitCode::FAILURE;
@@ -88,10 +87,7 @@ fn main() -> ExitCode {
     ledger::add(&mut app, options.quiet);
     script::add(&mut app, source);
     app.world_mut().spawn(terrain);
-    match app.run() {
-        AppExit::Success => ExitCode::SUCCESS,
-        AppExit::Error(code) => ExitCode::from(code.get()),
-    }
+    app.run().report()
 }
 
 /// Hills in chunks, not touched yet.

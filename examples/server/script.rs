@@ -1,97 +1,82 @@
 //! Where brushes come from: a file, standard input, or nowhere.
 
-use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy_burrow::brush::BrushRecord;
 use bevy_burrow::plugin::{Redo, Undo};
 use bevy_burrow::prelude::*;
-use serde::Deserialize;
 
 use crate::Options;
+use crate::brush_lines::{Line, Lines};
 use crate::ledger::Ledger;
 
-/// Brushes that wait for the ground at most before others are sent.
+/// Brushes that wait for the ground at most before others are sent, and lines that wait to be sent.
 const MOST_WAITING: usize = 1024;
 
-/// A line of a script.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Line {
-    Brush(Brush),
-    Undo,
-    Redo,
+/// How long nothing is done where there is nothing to do.
+const REST: Duration = Duration::from_millis(1);
+
+/// A line, or what is wrong with it or with the whole script.
+type Entry = Result<Line, String>;
+
+/// Lines still to come.
+enum Feed {
+    /// Made up, or read from a file, only when their turn comes.
+    Ready(Box<dyn Iterator<Item = Entry> + Send + Sync>),
+    /// Read by a thread of its own, so that a silent player holds nobody up.
+    Coming(Mutex<Receiver<Entry>>),
+    /// There are none.
+    Over,
 }
 
-/// A step through history as it is written.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Step {
-    undo: Option<bool>,
-    redo: Option<bool>,
-}
-
-/// Lines that were read, and those still to come.
+/// What is sent, line by line.
 #[derive(Resource)]
 pub struct Source {
-    ready: VecDeque<Result<Line, String>>,
-    /// Read by a thread of its own, so that a silent player holds nobody up.
-    coming: Option<Mutex<Receiver<Result<Line, String>>>>,
-    /// Made up only when their turn comes.
-    made_up: Option<Box<dyn Iterator<Item = Line> + Send + Sync>>,
+    feed: Feed,
+    /// The line whose turn it is.
+    next: Option<Entry>,
     per_tick: u64,
     sent: u64,
 }
 
 /// Opens what the options name.
 pub fn open(options: &Options) -> Result<Source> {
-    let mut source =
-        Source { ready: VecDeque::new(), coming: None, made_up: None, per_tick: options.per_tick, sent: 0 };
-    match options.script.as_deref() {
-        None => source.made_up = Some(Box::new(made_up(options))),
-        Some(path) if path == Path::new("-") => {
-            let (sender, receiver) = sync_channel(1024);
-            std::thread::spawn(move || {
-                let lines = std::io::stdin().lock().lines().zip(1..);
-                let parsed = lines.filter_map(|(line, number)| parse(line, number));
-                parsed.map_while(|line| sender.send(line).ok()).for_each(drop);
-            });
-            source.coming = Some(Mutex::new(receiver));
-        }
+    let feed = match options.script.as_deref() {
+        None => Feed::Ready(Box::new(made_up(options).map(Entry::Ok))),
+        Some(path) if path == Path::new("-") => listen(io::stdin(), "standard input".into()),
         Some(path) => {
-            let file = File::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-            let lines = BufReader::new(file).lines().zip(1..);
-            source.ready = lines.filter_map(|(line, number)| parse(line, number)).collect();
+            let name = path.display().to_string();
+            let at = |error: io::Error| format!("{name}: {error}");
+            let file = File::open(path).map_err(at)?;
+            let kind = file.metadata().map_err(at)?;
+            if kind.is_dir() {
+                return Err(format!("{name}: is a folder").into());
+            }
+            // Pipes are files too, and may be silent.
+            if kind.is_file() { Feed::Ready(Box::new(entries(file, name))) } else { listen(file, name) }
         }
-    }
-    Ok(source)
+    };
+    Ok(Source { feed, next: None, per_tick: options.per_tick, sent: 0 })
 }
 
-/// What a line says; nothing on a blank one or a comment.
-fn parse(line: std::io::Result<String>, number: usize) -> Option<Result<Line, String>> {
-    let at = |error: String| format!("line {number}: {error}");
-    let line = match line {
-        Ok(line) => line,
-        Err(error) => return Some(Err(at(error.to_string()))),
-    };
-    let text = line.trim();
-    if text.is_empty() || text.starts_with('#') {
-        return None;
-    }
-    if let Ok(step) = serde_json::from_str::<Step>(text) {
-        return Some(match (step.undo, step.redo) {
-            (Some(true), None) => Ok(Line::Undo),
-            (None, Some(true)) => Ok(Line::Redo),
-            _ => Err(at("either undo or redo is to be true".into())),
-        });
-    }
-    let record = serde_json::from_str::<BrushRecord>(text).map_err(|error| error.to_string());
-    let brush = record.and_then(|record| Brush::try_from(record).map_err(|error| error.to_string()));
-    Some(brush.map(Line::Brush).map_err(at))
+/// What a script says, as it is asked for.
+fn entries(script: impl Read, name: String) -> impl Iterator<Item = Entry> {
+    let lines = Lines::new(BufReader::new(script));
+    lines.map(move |line| line.map(|(_, line)| line).map_err(|fault| format!("{name}: {fault}")))
+}
+
+/// What somebody says who may be silent for a while. Who says more than is sent has to wait.
+fn listen(script: impl Read + Send + 'static, name: String) -> Feed {
+    let (sender, receiver) = sync_channel(MOST_WAITING);
+    std::thread::spawn(move || {
+        entries(script, name).map_while(|entry| sender.send(entry).ok()).for_each(drop);
+    });
+    Feed::Coming(Mutex::new(receiver))
 }
 
 /// Digs, hills and paint all over the world, the same each time.
@@ -126,24 +111,19 @@ fn send(
     mut exit: MessageWriter<AppExit>,
 ) {
     let source = &mut *source;
-    let is_open = source.receive();
     // Who sends faster than the ground is dug waits, or memory would fill with what waits.
     let is_full = terrains.iter().any(|terrain| terrain.queued() >= MOST_WAITING);
     let due = if is_full { 0 } else { source.per_tick };
     let is_idle = terrains.iter().all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
     for _ in 0..due {
+        source.look();
         // A step is no part of a batch: what it undoes should not depend on how fast the server is.
-        let is_step = matches!(source.ready.front(), Some(Ok(Line::Undo | Line::Redo)));
+        let is_step = matches!(source.next, Some(Ok(Line::Undo | Line::Redo)));
         if is_step && !(is_idle && ledger.answered >= source.sent) {
             break;
         }
-        let made_up = || source.made_up.as_mut().and_then(Iterator::next).map(Ok);
-        let Some(line) = source.ready.pop_front().or_else(made_up) else {
-            source.made_up = None;
-            break;
-        };
-        match line {
-            Ok(line) => {
+        match source.next.take() {
+            Some(Ok(line)) => {
                 source.sent += 1;
                 match line {
                     Line::Brush(brush) => {
@@ -154,58 +134,105 @@ fn send(
                     Line::Redo => drop(redos.write(Redo::default())),
                 }
             }
-            Err(error) => {
+            Some(Err(error)) => {
                 eprintln!("{error}");
                 ledger.faults += 1;
             }
+            None => break,
         }
         if is_step {
             break;
         }
     }
-    let is_over = !is_open && source.ready.is_empty() && source.made_up.is_none();
-    if is_over && ledger.answered >= source.sent && is_idle && !ledger.is_done {
-        ledger.is_done = true;
-        exit.write(if ledger.faults == 0 { AppExit::Success } else { AppExit::error() });
+    if source.next.is_some() || !is_idle || ledger.answered < source.sent {
+        return;
+    }
+    match source.feed {
+        Feed::Ready(_) => {}
+        // Without a number of ticks to keep to, waiting would take all of a core.
+        Feed::Coming(_) => std::thread::sleep(REST),
+        Feed::Over if ledger.is_done => {}
+        Feed::Over => {
+            ledger.is_done = true;
+            exit.write(if ledger.faults == 0 { AppExit::Success } else { AppExit::error() });
+        }
     }
 }
 
 impl Source {
-    /// Takes in what has come; says whether more may.
-    fn receive(&mut self) -> bool {
-        let Some(coming) = &mut self.coming else { return false };
-        let Ok(coming) = coming.get_mut() else { return false };
-        loop {
-            match coming.try_recv() {
-                Ok(line) => self.ready.push_back(line),
-                Err(TryRecvError::Empty) => return true,
-                Err(TryRecvError::Disconnected) => break,
-            }
+    /// Takes the next line, if none is taken and there is one by now.
+    fn look(&mut self) {
+        if self.next.is_some() {
+            return;
         }
-        self.coming = None;
-        false
+        let (next, is_over) = match &mut self.feed {
+            Feed::Ready(lines) => {
+                let next = lines.next();
+                let is_over = next.is_none();
+                (next, is_over)
+            }
+            Feed::Coming(lines) => {
+                let lines = lines.get_mut().unwrap_or_else(PoisonError::into_inner);
+                match lines.try_recv() {
+                    Ok(line) => (Some(line), false),
+                    Err(error) => (None, error == TryRecvError::Disconnected),
+                }
+            }
+            Feed::Over => (None, true),
+        };
+        self.next = next;
+        if is_over {
+            self.feed = Feed::Over;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::TrySendError;
+
+    use clap::Parser;
+
     use super::*;
 
-    fn read(line: &str) -> Option<Result<Line, String>> {
-        parse(Ok(line.into()), 3)
+    #[test]
+    fn a_folder_is_refused_by_its_name() {
+        let folder = std::env::temp_dir();
+        let arguments = ["server".as_ref(), "--script".as_ref(), folder.as_os_str()];
+        let Err(error) = open(&Options::parse_from(arguments)) else { panic!("a folder is a script") };
+        let error = error.to_string();
+        assert!(error.contains(&*folder.to_string_lossy()) && error.contains("folder"), "{error}");
     }
 
     #[test]
-    fn lines_are_brushes_steps_or_nothing() {
-        let brush = Brush::dig(Shape::sphere(Vec3::new(8.0, 0.0, 8.0), 4.0));
-        let line = r#"{"shape":"sphere","center":[8,0,8],"radius":4,"op":"dig"}"#;
-        assert_eq!(read(line), Some(Ok(Line::Brush(brush))));
-        assert_eq!(read(r#"{"undo":true}"#), Some(Ok(Line::Undo)));
-        assert_eq!(read(r#" {"redo":true} "#), Some(Ok(Line::Redo)));
-        assert_eq!((read("# words"), read("  ")), (None, None));
-        for bad in [r#"{"undo":false}"#, r#"{"undo":true,"redo":true}"#, "{}", "dig", r#"{"shape":"ball"}"#] {
-            let error = read(bad).expect("a line").expect_err(bad);
-            assert!(error.starts_with("line 3: "), "{error}");
+    fn who_says_more_than_is_sent_has_to_wait() {
+        let (sender, receiver) = sync_channel(3);
+        let feed = Feed::Coming(Mutex::new(receiver));
+        let mut source = Source { feed, next: None, per_tick: 1, sent: 0 };
+        for _ in 0..3 {
+            sender.try_send(Ok(Line::Undo)).expect("room for three");
         }
+        // One is taken, however often it looks.
+        (0..3).for_each(|_| source.look());
+        assert_eq!(source.next, Some(Ok(Line::Undo)));
+        assert_eq!(sender.try_send(Ok(Line::Undo)), Ok(()));
+        assert_eq!(sender.try_send(Ok(Line::Redo)), Err(TrySendError::Full(Ok(Line::Redo))));
+        drop(sender);
+        for _ in 0..3 {
+            source.next = None;
+            source.look();
+            assert!(source.next.is_some());
+        }
+        source.next = None;
+        source.look();
+        assert!(source.next.is_none() && matches!(source.feed, Feed::Over));
+    }
+
+    #[test]
+    fn a_fault_names_its_file_and_line_and_the_rest_goes_on() {
+        let script = "{\"undo\":true}\ndig\n{\"redo\":true}\n";
+        let found: Vec<Entry> = entries(script.as_bytes(), "a.jsonl".into()).collect();
+        let fault = "a.jsonl: line 2: expected a JSON object in braces";
+        assert_eq!(found, [Ok(Line::Undo), Err(fault.into()), Ok(Line::Redo)]);
     }
 }

@@ -1,5 +1,6 @@
 //! An app without a window. Examples, benchmarks and tests have it in common; each takes it in by its path.
 
+use std::any::Any;
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,7 +14,7 @@ use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 
-/// A renderer without a window, if there is an adapter for one, be it in software.
+/// A renderer without a window, if there is an adapter for one, be it in software. Where there is none, it says why.
 pub fn find_renderer() -> Option<RenderResources> {
     let settings = WgpuSettings::default();
     let backends = settings.backends?;
@@ -22,7 +23,13 @@ pub fn find_renderer() -> Option<RenderResources> {
     panic::set_hook(Box::new(|_| {}));
     let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
     panic::set_hook(hook);
-    found.ok()
+    found.inspect_err(|panic| eprintln!("no renderer: {}", reason(&**panic))).ok()
+}
+
+/// What a panic said.
+fn reason(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no reason was given")
 }
 
 /// Bevy's plugins and what `add` adds, ready for the first frame. Without a renderer all goes on, and nothing is drawn.

@@ -1,0 +1,17 @@
+//! Lines on standard output for whoever reads them. Examples write them in common; each takes this in by its path.
+
+use std::fmt::Arguments;
+use std::io::{self, ErrorKind, Write};
+use std::process;
+
+/// Writes a line. Where nobody reads any more, as behind `| head`, the program ends without a word.
+pub fn say(line: Arguments<'_>) {
+    match writeln!(io::stdout(), "{line}") {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => process::exit(0),
+        Err(error) => {
+            eprintln!("standard output: {error}");
+            process::exit(1);
+        }
+    }
+}
