@@ -10,8 +10,8 @@ use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::{Column, LatticeBox, ONE, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::mask::{cell_sheet, sheet};
-use bevy_burrow::surface::vertex::{Lattice, WorldView, position};
-use bevy_burrow::surface::{Indices, MaterialMix, SeamReport, SeamSoup, SurfaceMesh, Vertex, cases};
+use bevy_burrow::surface::vertex::{self, Lattice, WorldView};
+use bevy_burrow::surface::{Indices, SeamReport, SeamSoup, SurfaceMesh, Vertex, cases};
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
@@ -37,6 +37,8 @@ enum Fault {
     ShortRange,
     /// Case table: cases with more than four solid corners reuse their complement's triangles, reversed.
     ComplementTable,
+    /// Normals: cubes at the mask's border take the density gradient, as all other cubes do.
+    GradientNormals,
 }
 
 /// Samples as marching cubes sees them when rule 1 is broken.
@@ -60,17 +62,38 @@ impl Lattice for Clamped<'_> {
     }
 }
 
+/// A world whose mask has no border for marching cubes.
+struct Borderless<'a>(WorldView<'a>);
+
+impl Lattice for Borderless<'_> {
+    fn distance(&self, point: IVec3) -> i32 {
+        self.0.distance(point)
+    }
+    fn is_edited(&self, point: IVec3) -> bool {
+        self.0.is_edited(point)
+    }
+    fn stored_material(&self, point: IVec3) -> MaterialId {
+        self.0.stored_material(point)
+    }
+    fn ground(&self) -> &Ground {
+        self.0.ground()
+    }
+    fn is_volumetric(&self, cell: Column) -> Option<bool> {
+        self.0.is_volumetric(cell).map(|_| true)
+    }
+}
+
 /// Draws a world cell by cell, as plainly as the rules are written.
 struct Plain<'a> {
     view: WorldView<'a>,
     fault: Fault,
     /// Lowest and highest edited y of each column that has any.
     edited: HashMap<Column, (i32, i32)>,
-    triangles: Vec<[IVec3; 3]>,
+    triangles: Vec<[Vertex; 3]>,
 }
 
 impl<'a> Plain<'a> {
-    fn draw(world: &'a World, fault: Fault) -> Vec<[IVec3; 3]> {
+    fn draw(world: &'a World, fault: Fault) -> Vec<[Vertex; 3]> {
         let mut edited: HashMap<Column, (i32, i32)> = HashMap::new();
         for (pos, brick) in world.bricks() {
             for (point, ..) in brick.edited_samples(pos) {
@@ -135,9 +158,16 @@ impl<'a> Plain<'a> {
                 self.triangles.push(triangle.map(|edge| {
                     let (corner, axis) = cases::edge_corners(edge);
                     let p = cube + IVec3::from_array(cases::corner(corner));
+                    let own = vertex::vertex(&self.view, p, axis, IVec3::ZERO);
                     match self.fault {
-                        Fault::ClampedPristine => position(&Clamped(self.view), p, axis, IVec3::ZERO),
-                        _ => position(&self.view, p, axis, IVec3::ZERO),
+                        Fault::ClampedPristine => {
+                            let position = vertex::position(&Clamped(self.view), p, axis, IVec3::ZERO);
+                            Vertex { position, ..own }
+                        }
+                        Fault::GradientNormals => {
+                            vertex::vertex(&Borderless(self.view), p, axis, IVec3::ZERO)
+                        }
+                        _ => own,
                     }
                 }));
             }
@@ -163,23 +193,23 @@ impl<'a> Plain<'a> {
         self.ring_triangle(&cd, &da);
     }
 
-    fn height_vertex(&self, column: Column) -> IVec3 {
-        column.at(0) * SNAP + IVec3::Y * (self.view.ground().height(column) * (SNAP / ONE))
+    fn height_vertex(&self, column: Column) -> Vertex {
+        vertex::height_vertex(self.view.ground(), column, IVec3::ZERO)
     }
 
-    fn chain(&self, from: Column, to: Column) -> Vec<IVec3> {
+    fn chain(&self, from: Column, to: Column) -> Vec<Vertex> {
         let (h0, h1) = (self.view.ground().height(from), self.view.ground().height(to));
         let axis = if from.x != to.x { 0 } else { 2 };
         let low = Column::new(from.x.min(to.x), from.z.min(to.z));
         let rungs = sheet([h0, h1]).filter(|y| (y * ONE < h0) != (y * ONE < h1));
-        let mut chain: Vec<IVec3> = rungs
+        let mut chain: Vec<Vertex> = rungs
             .map(|y| {
-                let mut place = position(&self.view, low.at(y), axis, IVec3::ZERO);
+                let mut place = vertex::vertex(&self.view, low.at(y), axis, IVec3::ZERO);
                 if self.fault == Fault::OwnRingVertices {
                     let share = f64::from(y * ONE - h0) / f64::from(h1 - h0);
                     let along =
                         |a: i32, b: i32| ((f64::from(a) + f64::from(b - a) * share) * f64::from(SNAP)) as i32;
-                    place = IVec3::new(along(from.x, to.x), y * SNAP, along(from.z, to.z));
+                    place.position = IVec3::new(along(from.x, to.x), y * SNAP, along(from.z, to.z));
                 }
                 place
             })
@@ -190,7 +220,7 @@ impl<'a> Plain<'a> {
         chain
     }
 
-    fn ring_triangle(&mut self, first: &[IVec3], second: &[IVec3]) {
+    fn ring_triangle(&mut self, first: &[Vertex], second: &[Vertex]) {
         for pair in first.windows(2) {
             self.triangles.push([pair[0], pair[1], second[1]]);
         }
@@ -200,9 +230,8 @@ impl<'a> Plain<'a> {
     }
 }
 
-fn check(world: &World, triangles: &[[IVec3; 3]]) -> SeamReport {
-    let corner = |position: IVec3| Vertex { position, normal: Vec3::Y, materials: MaterialMix::default() };
-    let vertices: Vec<Vertex> = triangles.iter().flatten().map(|&position| corner(position)).collect();
+fn check(world: &World, triangles: &[[Vertex; 3]]) -> SeamReport {
+    let vertices = triangles.as_flattened().to_vec();
     let indices = Indices::new(vertices.len(), (0..vertices.len() as u32).collect());
     let mut soup = SeamSoup::default();
     soup.add(&SurfaceMesh { vertices, indices }, IVec3::ZERO);
@@ -270,6 +299,17 @@ fn a_complement_symmetric_case_table_leaves_holes() {
 }
 
 #[test]
+fn with_gradients_at_the_masks_border_shading_jumps_there() {
+    let terrain = control_world();
+    let report = check(terrain.world(), &Plain::draw(terrain.world(), Fault::GradientNormals));
+    // Nothing but shading is wrong.
+    assert!(report.is_closed() && report.first.is_empty(), "{report}");
+    assert!(report.worst_normal_jump > 1.0, "gradients went unnoticed: {report}");
+    let at = report.worst_normal_at.expect("a jump is somewhere");
+    assert!(terrain.world().mask().iter().any(|cell| cell.at(0).as_dvec3().with_y(at.y).distance(at) < 3.0));
+}
+
+#[test]
 fn rule_6_a_dig_leaves_the_deep_rock_alone() {
     let ground = Ground::flat(64, 64, 0.0).expect("valid ground");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
@@ -297,7 +337,9 @@ fn the_crate_draws_what_the_plain_rules_draw() {
             triangle.rotate_left(first);
             triangle.map(|place| place.to_array())
         };
-        let mut plain: Vec<_> = Plain::draw(world, Fault::None).into_iter().map(canonical).collect();
+        let places = |triangle: [Vertex; 3]| triangle.map(|vertex| vertex.position);
+        let plain = Plain::draw(world, Fault::None).into_iter();
+        let mut plain: Vec<_> = plain.map(|triangle| canonical(places(triangle))).collect();
         let mut drawn = Vec::new();
         for (what, mesh) in world.drawn() {
             let origin = world.origin(what) * SNAP;

@@ -6,14 +6,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use bevy_burrow::ground::Ground;
-use bevy_burrow::lattice::{BrickPos, Column, SNAP};
+use bevy_burrow::lattice::{BrickPos, Column, LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::{Indices, SurfaceMesh};
 use bevy_burrow::terrain::{Drawn, World};
 use fastrand::Rng;
 use glam::{I64Vec3, Quat, Vec3};
 use worlds::{
-    random_brush, random_brush_at_a_face, random_ground, random_sculpting_brush, steep_real_ground,
+    random_brush, random_brush_at_a_face, random_ground, random_rules, random_sculpting_brush,
+    steep_real_ground,
 };
 
 /// A vertex without floats, so that it can be compared bit for bit.
@@ -39,6 +40,52 @@ fn random_script(seed: u64) -> (Ground, Vec<Brush>) {
 fn terrain(ground: &Arc<Ground>, chunk_size: u32) -> Terrain {
     let settings = TerrainSettings { chunk_size, ..Default::default() };
     Terrain::new(Arc::clone(ground), &settings).expect("valid settings")
+}
+
+/// A script of which rules refuse a part, and whose end cuts something off.
+struct HardScript {
+    ground: Arc<Ground>,
+    brushes: Vec<Brush>,
+    rules: DiggingRules,
+}
+
+impl HardScript {
+    fn new(seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let (ground, mut brushes) = random_script(seed);
+        brushes.iter_mut().for_each(|brush| brush.power = rng.u8(..) | rng.u8(..));
+        // A ball on the ground, and a cut through its foot.
+        let column = Column::new(rng.i32(4..ground.width() - 4), rng.i32(4..ground.depth() - 4));
+        let height = ground.height(column) as f32 / 256.0;
+        let at = |up: f32| Vec3::new(column.x as f32, height + up, column.z as f32);
+        brushes.push(Brush::add(Shape::sphere(at(5.0), 6.0), MaterialId(9)));
+        brushes.push(Brush::dig(Shape::cuboid(at(2.0), Vec3::new(9.0, 1.2, 9.0))));
+        let rules = random_rules(&mut rng, &ground);
+        Self { ground: ground.into(), brushes, rules }
+    }
+
+    /// In one transaction.
+    fn play(&self, chunk_size: u32) -> (Terrain, Vec<Receipt>) {
+        let mut terrain = terrain(&self.ground, chunk_size);
+        terrain.set_rules(self.rules.clone());
+        terrain.set_loose(Some(LooseSettings { largest: 4000, crumbs: 9, debris: 4000 }));
+        let receipts = terrain.apply(&self.brushes);
+        (terrain, receipts)
+    }
+}
+
+/// What brushes did, but for how that was cut into chunks.
+fn without_chunks(receipts: &[Receipt]) -> Vec<Result<Applied, Rejection>> {
+    let applied =
+        |receipt: &Receipt| receipt.outcome.clone().map(|applied| Applied { chunks: Vec::new(), ..applied });
+    receipts.iter().map(applied).collect()
+}
+
+/// How many of these receipts tell of something refused, and how many pieces came off.
+fn refused_and_loose(receipts: &[Receipt]) -> (usize, usize) {
+    let applied = || receipts.iter().filter_map(|receipt| receipt.outcome.as_ref().ok());
+    let refused = applied().filter(|applied| !applied.refused.is_empty());
+    (refused.count(), applied().map(|applied| applied.loose.len()).sum())
 }
 
 /// Applies brushes in transactions of random lengths.
@@ -132,6 +179,29 @@ fn the_number_of_threads_does_not_show() {
             "script {seed}: meshes or receipts depend on the threads"
         );
     }
+}
+
+#[test]
+fn the_number_of_threads_does_not_show_in_what_is_refused_or_comes_off() {
+    let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
+    let (mut refused, mut loose) = (0, 0);
+    for seed in 700..712 {
+        let script = HardScript::new(seed);
+        let runs = pools.each_ref().map(|pool| {
+            pool.install(|| {
+                let (terrain, receipts) = script.play(25);
+                (terrain.world().hash(), drawn(terrain.world()), receipts)
+            })
+        });
+        assert!(runs.iter().all(|run| run.0 == runs[0].0), "script {seed}: the hash depends on the threads");
+        assert!(
+            runs.iter().all(|run| *run == runs[0]),
+            "script {seed}: meshes, receipts or pieces depend on the threads"
+        );
+        let found = refused_and_loose(&runs[0].2);
+        (refused, loose) = (refused + found.0, loose + found.1);
+    }
+    assert!(refused > 5 && loose > 2, "{refused} refused, {loose} came off");
 }
 
 #[test]
@@ -232,6 +302,27 @@ fn the_chunk_size_changes_neither_samples_nor_picture() {
 }
 
 #[test]
+fn the_chunk_size_does_not_show_in_what_is_refused_or_comes_off() {
+    let (mut refused, mut loose) = (0, 0);
+    for seed in 600..612 {
+        let script = HardScript::new(seed);
+        let (first, receipts) = script.play(8);
+        let expected = picture(first.world());
+        for chunk_size in [25, 64, 128] {
+            let (other, others) = script.play(chunk_size);
+            let what = format!("script {seed}, chunks of 8 and of {chunk_size}");
+            assert_eq!(first_difference(first.world(), other.world()), None, "{what}");
+            assert_eq!(first.world().hash(), other.world().hash(), "{what}");
+            assert!(without_chunks(&receipts) == without_chunks(&others), "{what}: other receipts");
+            assert!(picture(other.world()) == expected, "{what}: same samples, but other triangles");
+        }
+        let found = refused_and_loose(&receipts);
+        (refused, loose) = (refused + found.0, loose + found.1);
+    }
+    assert!(refused > 5 && loose > 2, "{refused} refused, {loose} came off");
+}
+
+#[test]
 fn edits_sent_as_json_make_the_same_world() {
     for seed in 500..530 {
         let (ground, brushes) = random_script(seed);
@@ -295,11 +386,16 @@ fn golden_script(ground: &Ground) -> Vec<Brush> {
     brushes
 }
 
-#[test]
-fn the_hash_of_a_dug_world_is_the_same_on_every_machine() {
+/// Steep ground that every machine makes alike.
+fn golden_ground() -> Ground {
     let height =
         |x: i32, z: i32| f64::from((x * x * 7 + z * z * 5 + x * z * 3) % 97) / 8.0 + f64::from(x) / 4.0;
-    let ground = Ground::from_fn(52, 56, height).expect("finite heights");
+    Ground::from_fn(52, 56, height).expect("finite heights")
+}
+
+#[test]
+fn the_hash_of_a_dug_world_is_the_same_on_every_machine() {
+    let ground = golden_ground();
     let script = golden_script(&ground);
     let mut terrain = terrain(&ground.into(), 25);
     let receipts = terrain.apply(&script);
@@ -314,5 +410,147 @@ fn the_hash_of_a_dug_world_is_the_same_on_every_machine() {
         "the same script made another world than before, or than on other machines. If edits are meant to come out \
          differently from now on, put the new hash here, and say in the change log that saved journals give other \
          worlds. If not, something in `ground`, `brush` or `volume` lost its written order of arithmetic"
+    );
+}
+
+/// A number that stands for some numbers in their order (FNV-1a, by words).
+fn fold(words: impl IntoIterator<Item = u64>) -> u64 {
+    words.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Every bit of a mesh whose positions count from `origin`, and its triangles.
+fn mesh_words(mesh: &SurfaceMesh, origin: glam::IVec3) -> impl Iterator<Item = u64> {
+    let vertices = bits(mesh, origin).into_iter().flat_map(|(place, normal, materials)| {
+        let place = place.map(|part| part as u64).into_iter();
+        place.chain(normal.map(u64::from)).chain(materials.map(|four| u64::from(u32::from_le_bytes(four))))
+    });
+    let indices: Vec<u64> = mesh.indices.iter().map(u64::from).collect();
+    vertices.chain([indices.len() as u64]).chain(indices)
+}
+
+/// Every mesh that a world draws.
+fn drawn_hash(world: &World) -> u64 {
+    let meshes = world.drawn().map(|(drawn, mesh)| fold(mesh_words(&mesh, world.origin(drawn))));
+    fold(meshes.collect::<Vec<_>>())
+}
+
+/// Every operation that sculpts, on shapes of every kind that are softer than they are deep or harder.
+fn sculpting_script(ground: &Ground) -> Vec<Brush> {
+    let image = GreyImage::from_samples(4, 3, (0..12).map(|i| i * 5003).collect()).expect("twelve samples");
+    let turn = Quat::from_xyzw(0.3, -0.1, 0.2, 0.9).normalize();
+    (0..24)
+        .map(|i| {
+            let (x, z) = (7 + i % 5 * 9, 8 + i / 5 * 9);
+            let height = (ground.height(Column::new(x, z)) / 64) as f32 / 4.0;
+            let at = Vec3::new(x as f32 + 0.25, height, z as f32 - 0.5);
+            let shape = match i % 5 {
+                0 => Shape::sphere(at, 5.25),
+                1 => Shape::turned_cuboid(at, Vec3::new(5.0, 3.5, 4.0), turn),
+                2 => Shape::cylinder(at - Vec3::Y * 4.0, Vec3::new(1.0, 8.0, -2.0), 4.5),
+                3 => Shape::capsule(at, at + Vec3::new(4.0, 1.0, 3.0), 3.25),
+                _ => Shape::cone(at - Vec3::Y * 3.0, Vec3::new(-1.0, 9.0, 2.0), 6.0),
+            };
+            let stamp = Stamp::new(image.clone(), at, glam::Vec2::new(9.0, 7.5), 4.0).with_rotation(turn);
+            let brush = match i % 8 {
+                0 => Brush::smooth(shape, 0.75),
+                1 => Brush::sharpen(shape, 1.0),
+                2 => Brush::flatten(shape, at, Vec3::new(0.3, 1.0, -0.2)),
+                3 => Brush::level(shape, height + 1.25),
+                4 => Brush::raise(shape, 2.5),
+                5 => Brush::lower(shape, 1.75),
+                6 => Brush::stamp(shape, stamp),
+                _ => Brush::terrace(shape, 2.0),
+            };
+            match i % 3 {
+                0 => brush,
+                1 => brush.with_falloff(1.5).with_material(MaterialId(2)),
+                _ => brush.with_falloff(32.0).with_roughness(Roughness::new(0.5, 3.0, i as u32)),
+            }
+        })
+        .collect()
+}
+
+/// A table, a ball on a post and a stick, and a cut through all of them that leaves a crumb of the stick.
+fn falling_script() -> Vec<Brush> {
+    // From below the ground.
+    let post = |x: f32, z: f32, half: f32, top: f32, material| {
+        let (middle, half) = (Vec3::new(x, top * 0.5 - 1.0, z), Vec3::new(half, top * 0.5 + 1.0, half));
+        Brush::add(Shape::cuboid(middle, half), MaterialId(material))
+    };
+    let board = |x: f32, z: f32, half: f32| {
+        Brush::add(Shape::cuboid(Vec3::new(x, 48.0, z), Vec3::new(half, 1.75, half)), MaterialId(6))
+    };
+    let saw = Shape::cuboid(Vec3::new(26.0, 40.0, 28.0), Vec3::new(30.0, 1.25, 32.0));
+    vec![
+        post(14.0, 15.0, 2.25, 50.0, 4),
+        board(14.0, 15.0, 6.5),
+        post(36.0, 40.0, 1.25, 48.0, 5),
+        Brush::add(Shape::sphere(Vec3::new(36.5, 50.0, 40.25), 5.0), MaterialId(7)),
+        post(10.0, 42.0, 0.75, 46.0, 5),
+        Brush::dig(saw).with_roughness(Roughness::new(0.5, 4.0, 9)),
+    ]
+}
+
+#[test]
+fn worlds_meshes_and_loose_pieces_have_the_same_bits_on_every_machine() {
+    let ground = Arc::new(golden_ground());
+    let mut found: Vec<(&str, u64)> = Vec::new();
+
+    let mut dug = terrain(&ground, 25);
+    dug.apply(golden_script(&ground));
+    found.push(("meshes of a dug world", drawn_hash(dug.world())));
+
+    let mut sculpted = terrain(&ground, 32);
+    let receipts = sculpted.apply(sculpting_script(&ground));
+    let changes = |receipt: &Receipt| receipt.outcome.as_ref().is_ok_and(|own| own.bounds.is_some());
+    assert!(receipts.iter().filter(|receipt| changes(receipt)).count() > 16, "few brushes change something");
+    found.push(("a sculpted world", sculpted.world().hash()));
+    found.push(("its meshes", drawn_hash(sculpted.world())));
+
+    let protected = LatticeBox::new(glam::IVec3::new(20, 0, 10), glam::IVec3::new(30, 40, 30));
+    let rules = DiggingRules::default()
+        .with_hardness(MaterialId(0), 120)
+        .with_unbreakable(MaterialId(3))
+        .with_bedrock(4)
+        .with_protected(protected.expect("not empty"));
+    let mut ruled = terrain(&ground, 25);
+    ruled.set_rules(rules);
+    let script = golden_script(&ground).into_iter().chain(sculpting_script(&ground)).enumerate();
+    let receipts = ruled.apply(script.map(|(i, brush)| brush.with_power([255, 180, 130, 60][i % 4])));
+    assert!(refused_and_loose(&receipts).0 > 5, "little is refused");
+    found.push(("a world under rules", ruled.world().hash()));
+    found.push(("its meshes", drawn_hash(ruled.world())));
+
+    let mut fallen = terrain(&ground, 32);
+    fallen.set_loose(Some(LooseSettings { largest: 10_000, crumbs: 12, debris: 10_000 }));
+    let receipts = fallen.apply(falling_script());
+    let applied = receipts.iter().filter_map(|receipt| receipt.outcome.as_ref().ok());
+    let pieces: Vec<&LoosePiece> = applied.flat_map(|applied| &applied.loose).collect();
+    assert!(pieces.iter().filter(|piece| piece.mesh.is_some()).count() > 1, "{} pieces", pieces.len());
+    let meshes = pieces.iter().filter_map(|piece| Some((piece.mesh.as_ref()?, piece.bounds.min)));
+    found.push(("a world that pieces fell out of", fallen.world().hash()));
+    found.push(("its meshes", drawn_hash(fallen.world())));
+    found.push(("the pieces", fold(meshes.flat_map(|(mesh, low)| mesh_words(mesh, low)))));
+
+    let expected: [u64; 8] = [
+        0xf9410c865fbdc66d, // meshes of a dug world
+        0xcda586a121b42bab, // a sculpted world
+        0xb49c24c03b112a6b, // its meshes
+        0x0226a5990b796722, // a world under rules
+        0xc07b11474befb3e0, // its meshes
+        0x0c4529be9710fafd, // a world that pieces fell out of
+        0xc3721f5caf4c5f76, // its meshes
+        0x7705ad1639b960a1, // the pieces
+    ];
+    let lines = |hashes: &[u64]| -> String {
+        found.iter().zip(hashes).map(|((name, _), hash)| format!("{hash:#018x}, // {name}\n")).collect()
+    };
+    let hashes: Vec<u64> = found.iter().map(|(_, hash)| *hash).collect();
+    assert!(
+        hashes == expected,
+        "other bits than before, or than on other machines. If these scripts are meant to come out differently from now \
+         on, put what was found in place of the numbers here. Found:\n{}Expected:\n{}",
+        lines(&hashes),
+        lines(&expected)
     );
 }

@@ -194,6 +194,10 @@ fn fifth_scenario_an_edit_on_a_face_an_edge_or_a_corner_is_split() {
             if !crowded {
                 assert_eq!(applied.chunks.len(), chunks, "{what}: {applied:?}");
             }
+            let grid = terrain.world().grid();
+            let edited = terrain.world().bricks().flat_map(|(pos, brick)| brick.edited_samples(pos));
+            let reached: BTreeSet<ChunkPos> = edited.map(|(point, ..)| grid.chunk_of(point)).collect();
+            assert!(applied.chunks.iter().map(|part| part.chunk).eq(reached), "{what}: {applied:?}");
             assert!(applied.is_split(), "{what}");
             assert!(
                 applied.chunks.iter().all(|part| part.scenario == Scenario::Created),
@@ -204,13 +208,18 @@ fn fifth_scenario_an_edit_on_a_face_an_edge_or_a_corner_is_split() {
             // Together the parts are what an edit in the middle of a chunk would be.
             let bounds = cuboid([at[0] - 3, at[1] - 4, at[2] - 3], [at[0] + 3, at[1], at[2] + 3]);
             assert_eq!(applied.bounds, Some(bounds), "{what}");
-            let parts: u64 = applied
+            let parts: Vec<LatticeBox> = applied
                 .chunks
                 .iter()
                 .flat_map(|part| boxes(terrain.world(), part.chunk.as_ivec3().to_array()))
-                .map(LatticeBox::volume)
-                .sum();
-            assert!(parts <= bounds.volume(), "{what}: the parts overlap");
+                .collect();
+            assert_eq!(parts.len(), applied.chunks.len(), "{what}: one field in each chunk");
+            assert_eq!(parts.iter().copied().reduce(LatticeBox::union), Some(bounds), "{what}");
+            for (i, &part) in parts.iter().enumerate() {
+                assert!(grid.chunk_samples(applied.chunks[i].chunk).encloses(part), "{what}: {part:?}");
+                let mut others = parts[i + 1..].iter();
+                assert!(others.all(|&other| part.intersection(other).is_none()), "{what}: the parts overlap");
+            }
             check_laws(terrain.world(), &what);
             let report = terrain.world().check_seams();
             assert!(report.is_flawless(), "{what}: {report}");

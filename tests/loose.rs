@@ -4,14 +4,14 @@ mod worlds;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use bevy_burrow::lattice::LatticeBox;
+use bevy_burrow::lattice::{LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
-use bevy_burrow::surface::cases;
 use bevy_burrow::surface::vertex::crossing;
+use bevy_burrow::surface::{MaterialMix, cases};
 use bevy_burrow::terrain::World;
 use bevy_burrow::volume::Tally;
 use fastrand::Rng;
-use glam::{IVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 use worlds::{
     random_brush, random_brush_at_a_face, random_ground, random_rules, random_sculpting_brush, world_count,
 };
@@ -191,6 +191,88 @@ fn assert_closed(piece: &LoosePiece, what: &str) {
     }
 }
 
+/// The materials of what a world draws, by place in 1/4096 voxel.
+fn drawn_materials(world: &World) -> HashMap<IVec3, MaterialMix> {
+    let mut all = HashMap::new();
+    for (drawn, mesh) in world.drawn() {
+        let origin = world.origin(drawn) * SNAP;
+        let vertices = mesh.triangles().flatten();
+        all.extend(vertices.map(|vertex| (origin + vertex.position, vertex.materials)));
+    }
+    all
+}
+
+/// Of the vertices of pieces: how many the world had drawn, how many are of what somebody built or painted, how many lie in
+/// the sides of the world, and how many normals were compared.
+#[derive(Debug, Default)]
+struct Looks {
+    drawn: usize,
+    built: usize,
+    sides: usize,
+    normals: usize,
+}
+
+impl Looks {
+    /// Fails unless a piece looks as it did in the world that it came from, and as the ground beside it were not there.
+    fn check(&mut self, world: &World, drawn: &HashMap<IVec3, MaterialMix>, piece: &LoosePiece, what: &str) {
+        let (own, samples, grid) = (samples_of(piece), world.samples(), world.grid());
+        let is_own = |point: IVec3| own.contains(&point.to_array());
+        let is_inside =
+            |point: IVec3| (0..=grid.width()).contains(&point.x) && (0..=grid.depth()).contains(&point.z);
+        let density = |point: IVec3| match samples.distance(point) {
+            _ if !is_inside(point) => f64::from(i32::MAX / 4),
+            solid if solid < 0 && !is_own(point) => 256.0,
+            own => f64::from(own),
+        };
+        let gradient = |point: IVec3| {
+            let along = |step: IVec3| density(point + step) - density(point - step);
+            DVec3::new(along(IVec3::X), along(IVec3::Y), along(IVec3::Z))
+        };
+        let mesh = piece.mesh.as_ref().expect("what broke off has a mesh");
+        for vertex in &mesh.vertices {
+            let place = vertex.position + piece.bounds.min * SNAP;
+            let (cube, rest) = (place.div_euclid(IVec3::splat(SNAP)), place.rem_euclid(IVec3::splat(SNAP)));
+            // On a lattice point it is at the upper end of an edge of ground that nobody edited.
+            let axis = (0..3).find(|&axis| rest[axis] > 0).unwrap_or(1);
+            let from = if rest == IVec3::ZERO { cube - IVec3::Y } else { cube };
+            let way = [IVec3::X, IVec3::Y, IVec3::Z][axis];
+            let to = from + way;
+            assert!(is_own(from) != is_own(to), "{what}: {place} is not between the piece and air");
+            let (solid, out) = if is_own(from) { (from, way) } else { (to, -way) };
+
+            let stencil = || [from, to].into_iter().flat_map(|end| STEPS.map(|step| end + step));
+            let is_pristine = |point: IVec3| is_inside(point) && !samples.is_edited(point);
+            let is_sheet = is_pristine(from) && is_pristine(to) && stencil().all(is_pristine);
+            let stored = samples.stored_material(solid);
+            if stored != MaterialId::GROUND && !is_sheet {
+                assert_eq!(vertex.materials, MaterialMix::pure(stored), "{what}: {place}");
+                self.built += 1;
+            }
+            if !is_inside(solid + out) {
+                // The piece ends at its last sample.
+                assert_eq!(place, solid * SNAP + out, "{what}: {place}");
+                assert!(vertex.normal.dot(out.as_vec3()) > 0.5, "{what}: {place}: {}", vertex.normal);
+                self.sides += 1;
+            } else {
+                let step = crossing(&world.view(), from, axis);
+                assert_eq!(place, from * SNAP + way * step, "{what}: {place}");
+                // Where the heightmap is drawn, cubes have vertices that it has not.
+                if let Some(materials) = drawn.get(&place) {
+                    assert_eq!(vertex.materials, *materials, "{what}: {place}");
+                    self.drawn += 1;
+                }
+            }
+            let along = f64::from((place - from * SNAP).element_sum()) / f64::from(SNAP);
+            let expected = gradient(from).lerp(gradient(to), along);
+            if !is_sheet && expected.length() > 8.0 {
+                let apart = expected.normalize().distance(vertex.normal.as_dvec3());
+                assert!(apart < 5e-3, "{what}: {place}: {} instead of {expected}", vertex.normal);
+                self.normals += 1;
+            }
+        }
+    }
+}
+
 /// The pieces that an edit cut off: those with a sample beside one that turned to air.
 fn cut_off(before: &World, after: &World) -> Vec<Piece> {
     let turned = |point: IVec3| before.samples().is_solid(point) && !after.samples().is_solid(point);
@@ -207,6 +289,7 @@ fn cut_off(before: &World, after: &World) -> Vec<Piece> {
 #[test]
 fn edits_take_out_what_they_cut_off_and_nothing_else() {
     let (mut removed, mut broken, mut left, mut sculpted) = (0, 0, 0, 0);
+    let mut looks = Looks::default();
     for index in 0..world_count(150) {
         let mut rng = Rng::with_seed(52_000 + index);
         let (ground, chunk_size) = small_world(&mut rng, index);
@@ -233,6 +316,8 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             sculpted += if brush.operation.is_sculpting() { own.len() } else { 0 };
 
             let mut gone = Piece::new();
+            let is_broken = applied.loose.iter().any(|piece| piece.mesh.is_some());
+            let drawn = if is_broken { drawn_materials(&plain) } else { HashMap::new() };
             for piece in &applied.loose {
                 check_piece(&plain, piece, &what);
                 match piece.fate {
@@ -240,6 +325,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
                     PieceFate::Removed => removed += 1,
                     PieceFate::BrokeOff => {
                         assert_closed(piece, &what);
+                        looks.check(&plain, &drawn, piece, &what);
                         broken += 1;
                     }
                 }
@@ -289,9 +375,11 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
             assert_eq!(terrain.world().hash(), after, "{what}: redone");
         }
     }
-    println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting");
+    println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting; {looks:?}");
     assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
     assert!(sculpted > 10, "{sculpted} were cut off by sculpting");
+    let Looks { drawn, built, sides, normals } = looks;
+    assert!(drawn.min(normals) > 300 && built.min(sides) > 20, "{looks:?}");
 }
 
 #[test]

@@ -272,6 +272,68 @@ mod tests {
         assert_eq!(of(70, 50), [520, 170]);
     }
 
+    /// What edits take, and what meshing takes, in microseconds each; linear in the amount.
+    fn linear(edit: [u64; 2], mesh: [u64; 2]) -> Costs {
+        let mut costs = Costs::default();
+        for on in [0, 1] {
+            for amount in [1, 100] {
+                costs.edit[on].push(amount, Duration::from_micros(edit[on] * amount as u64));
+                costs.mesh[on].push(amount, Duration::from_micros(mesh[on] * amount as u64));
+            }
+        }
+        costs
+    }
+
+    fn micros(estimate: Estimate) -> [f64; 2] {
+        [estimate.cpu, estimate.cuda].map(|time| (time.as_secs_f64() * 1e6).round())
+    }
+
+    #[test]
+    fn roughness_takes_its_own_time() {
+        let costs = Costs { rough: [5e-6, 2e-6], ..linear([3, 4], [0, 0]) };
+        let of = |amount, rough| micros(costs.edit(Load { amount, rough, ..Load::default() }));
+        assert_eq!(of(10, 0), [30.0, 40.0]);
+        assert_eq!(of(10, 4), [30.0 + 20.0, 40.0 + 8.0]);
+        assert_eq!(of(10, 10), [30.0 + 50.0, 40.0 + 20.0]);
+    }
+
+    #[test]
+    fn what_is_missing_has_to_be_brought_to_the_card() {
+        let costs = Costs { upload: 7e-6, ..linear([3, 4], [0, 0]) };
+        let of = |amount, missing| micros(costs.edit(Load { amount, missing, ..Load::default() }));
+        assert_eq!([of(10, 0), of(10, 3)], [[30.0, 40.0], [30.0, 40.0 + 21.0]]);
+        let costs = Costs { upload: 7e-6, ..linear([0, 0], [3, 4]) };
+        let of = |amount, missing| micros(costs.mesh(Load { amount, missing, ..Load::default() }));
+        assert_eq!([of(10, 0), of(10, 3)], [[30.0, 40.0], [30.0, 40.0 + 21.0]]);
+    }
+
+    #[test]
+    fn edits_are_followed_by_the_cheaper_meshing() {
+        // Fifty blocks are meshed for forty bricks.
+        let of = |mesh, upload| {
+            let costs = Costs { upload, ..linear([1, 2], mesh) };
+            micros(costs.edit(Load { amount: 40, ..Load::default() }))
+        };
+        // On the card, even if all has to be brought there.
+        assert_eq!(of([10, 1], 5e-6), [40.0 + 50.0 + 200.0, 80.0 + 50.0]);
+        // On the processor, rather than that.
+        assert_eq!(of([10, 1], 20e-6), [40.0 + 500.0, 80.0 + 50.0]);
+        // On the processor in any case.
+        assert_eq!(of([1, 10], 5e-6), [40.0 + 50.0, 80.0 + 50.0]);
+    }
+
+    #[test]
+    fn what_was_brought_is_no_slowness_of_the_stage() {
+        let mut costs = Costs { upload: 7e-6, ..linear([3, 4], [3, 4]) };
+        let load = Load { amount: 60, missing: 10, ..Load::default() };
+        let before = [costs.mesh(load), costs.edit(load)];
+        for stage in [Stage::Mesh, Stage::Edit] {
+            (0..30).for_each(|_| costs.learn(stage, load, true, Duration::from_micros(60 * 4 + 70)));
+            (0..30).for_each(|_| costs.learn(stage, load, false, Duration::from_micros(60 * 3)));
+        }
+        assert_eq!([costs.mesh(load), costs.edit(load)].map(micros), before.map(micros));
+    }
+
     #[test]
     fn what_takes_longer_than_it_should_is_expected_to_next_time() {
         let mut costs = Costs::default();

@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3, IVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;
+use serde_json::json;
 
 use super::*;
 use crate::ground::{GreyImage, MaterialId};
@@ -97,6 +98,7 @@ fn wild_operation() -> impl Strategy<Value = Operation> {
     prop_oneof![
         Just(Operation::Dig),
         any::<u8>().prop_map(|material| Operation::Add { material: MaterialId(material) }),
+        any::<u8>().prop_map(|material| Operation::Paint { material: MaterialId(material) }),
         Just(Operation::Smooth),
         Just(Operation::Sharpen),
         (vector(), vector()).prop_map(|(point, normal)| Operation::Flatten { point, normal }),
@@ -296,20 +298,122 @@ proptest! {
             }
         }
         let _ = Edit::quantize(&brush.transformed(Quat::from_xyzw(0.6, 0.0, 0.0, 0.8), Vec3::ONE, 0.5));
-        let record = BrushRecord::from(&brush);
-        prop_assert_eq!(Brush::try_from(record).is_ok(), true);
+        // What is written of it is the same wish, or just as bad a one.
+        let read = Brush::try_from(BrushRecord::from(&brush)).unwrap();
+        match (Edit::quantize(&read), Edit::quantize(&brush)) {
+            (Ok(read), Ok(edit)) => prop_assert_eq!(read, edit),
+            (read, edit) => prop_assert_eq!(format!("{read:?}"), format!("{edit:?}")),
+        }
     }
 
     #[test]
-    fn any_integers_are_checked(center: [i32; 3], half: [i32; 3], rotation: [i16; 4], kind in 0..3) {
-        let shape = match kind {
-            0 => serde_json::json!({"cuboid": {"center": center, "half": half, "rotation": rotation}}),
-            1 => serde_json::json!({"cone": {"base": center, "axis": half, "radius": 64}}),
-            _ => serde_json::json!({"capsule": {"from": center, "to": half, "radius": 64}}),
+    fn any_integers_are_checked(
+        a in prop::array::uniform3(wild_integer()),
+        b in prop::array::uniform3(wild_integer()),
+        turn in prop_oneof![Just([0i16, 0, 0, 32_767]), any::<[i16; 4]>()],
+        kind in 0..4,
+        amplitude in prop_oneof![0..2049, any::<i32>()],
+        scale in prop_oneof![256..65_537, any::<i32>()],
+    ) {
+        let (shape, is_shape) = match kind {
+            0 => (json!({"sphere": {"center": a, "radius": b[0]}}), is_sphere(a, b[0])),
+            1 => (json!({"cuboid": {"center": a, "half": b, "rotation": turn}}), is_cuboid(a, b, turn)),
+            2 => (json!({"capsule": {"from": a, "to": b, "radius": 64}}), is_capsule(a, b, 64)),
+            _ => (json!({"cone": {"base": a, "axis": b, "radius": 64}}), is_cone(a, b, 64)),
         };
-        let grain = serde_json::json!({"amplitude": center[0], "scale": center[1], "seed": 0});
-        let json = serde_json::json!({"shape": shape, "operation": "dig", "roughness": grain, "tag": 0});
-        prop_assert!(serde_json::from_value::<Edit>(json).is_err());
+        let grain = json!({"amplitude": amplitude, "scale": scale, "seed": 0});
+        let edit = json!({"shape": shape, "operation": "dig", "roughness": grain, "tag": 0});
+        let is_grain = (0..=2048).contains(&amplitude) && (256..=65_536).contains(&scale);
+        match serde_json::from_value::<Edit>(edit.clone()) {
+            Ok(found) => {
+                prop_assert!(is_shape != Some(false) && is_grain, "{edit}");
+                prop_assert_eq!(found.check(), Ok(()));
+                let [own, written] = [edit, serde_json::to_value(&found).unwrap()];
+                prop_assert_eq!(&own["shape"], &written["shape"]);
+                // A bump of no height is none.
+                prop_assert_eq!(written["roughness"].is_null(), amplitude == 0);
+            }
+            Err(error) => {
+                prop_assert!(is_shape != Some(true) || !is_grain, "{edit}: {error}");
+                // For what they are, not for how they are written.
+                let message = error.to_string();
+                let form = ["field", "variant", "expected", "invalid"];
+                prop_assert!(form.iter().all(|word| !message.contains(word)), "{message}");
+            }
+        }
+    }
+}
+
+/// Any integer, ordinary ones among them.
+fn wild_integer() -> impl Strategy<Value = i32> {
+    prop_oneof![
+        any::<i32>(),
+        -9000..9000,
+        64..4000,
+        -(1 << 23)..(1 << 23) + 1,
+        Just(i32::MIN),
+        Just(i32::MAX),
+        Just(64),
+        Just(63),
+    ]
+}
+
+// Whether integers make a shape, by the room's table of limits; `None` where that takes more than a line.
+
+fn is_in_world(at: [i32; 3]) -> bool {
+    at.iter().all(|v| v.unsigned_abs() <= 32_768 * 256)
+}
+
+/// Box and volume, of sides and a volume in voxels. What lies on the limit to the last bit is not judged.
+fn is_small(sides: [f64; 3], volume: f64) -> Option<bool> {
+    let share = sides.into_iter().fold(volume / f64::from(1 << 25), |most, side| most.max(side / 1024.0));
+    if (share - 1.0).abs() < 1e-5 { None } else { Some(share < 1.0) }
+}
+
+fn is_sphere(center: [i32; 3], radius: i32) -> Option<bool> {
+    let r = f64::from(radius) / 256.0;
+    if radius < 64 || !is_in_world(center) {
+        return Some(false);
+    }
+    is_small([2.0 * r; 3], r * r * r * 4.0 / 3.0 * std::f64::consts::PI)
+}
+
+fn is_cuboid(center: [i32; 3], half: [i32; 3], turn: [i16; 4]) -> Option<bool> {
+    if half.iter().any(|&half| half < 64) || !is_in_world(center) {
+        return Some(false);
+    }
+    let sides = half.map(|half| f64::from(half) / 128.0);
+    let volume = sides.iter().product();
+    match turn {
+        [0, 0, 0, 32_767] => is_small(sides, volume),
+        // Whatever the turn, and whether it is one.
+        _ => is_small([0.0; 3], volume).filter(|&is| !is),
+    }
+}
+
+fn is_capsule(from: [i32; 3], to: [i32; 3], radius: i32) -> Option<bool> {
+    if !is_in_world(from) || !is_in_world(to) {
+        return Some(false);
+    }
+    let [from, to] = [from, to].map(|end| end.map(|v| f64::from(v) / 256.0));
+    let (r, apart) = (f64::from(radius) / 256.0, [0, 1, 2].map(|i| (to[i] - from[i]).abs()));
+    let length = apart.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let volume = std::f64::consts::PI * r * r * (length + r * 4.0 / 3.0);
+    is_small(apart.map(|apart| apart + 2.0 * r), volume)
+}
+
+fn is_cone(base: [i32; 3], axis: [i32; 3], radius: i32) -> Option<bool> {
+    let end = [0, 1, 2].map(|i| base[i].saturating_add(axis[i]));
+    let length = axis.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
+    if !is_in_world(base) || !is_in_world(end) || length < 64.0 {
+        return Some(false);
+    }
+    // Somewhere between the axis alone and a cuboid around it.
+    let sides = |grow: i32| axis.map(|v| (f64::from(v).abs() + f64::from(grow)) / 256.0);
+    match (is_small(sides(0), 0.0)?, is_small(sides(2 * radius + 4), 0.0)?) {
+        (false, _) => Some(false),
+        (true, true) => Some(true),
+        _ => None,
     }
 }
 

@@ -13,6 +13,18 @@
 //! | positions, sizes, axes, amplitude | voxels of terrain space | 1/256 voxel, `i32` |
 //! | rotation | unit quaternion | four `i16` of 1/32767, q and -q alike |
 //!
+//! Each wish has a twin in integers, which an [`Edit`] is made of; a game never meets those.
+//!
+//! | a wish, in floats | its twin | ready to be applied |
+//! | --- | --- | --- |
+//! | [`Brush`] | [`Edit`] | |
+//! | [`Shape`] | `Solid` | `Form`, in the [`Evaluator`] |
+//! | [`Roughness`] | `Grain` | the same, in the [`Evaluator`] |
+//! | [`Operation`] | `Deed` | `Kind`, and a `Sculptor` for those that sculpt |
+//! | [`Blend`] | `Fade`, in the `Deed` | |
+//! | [`Stamp`] | `Press`, in the `Deed` | |
+//! | [`BrushRecord`], as it stands in a line of JSON | | |
+//!
 //! # Limits
 //!
 //! | what | least | most |

@@ -315,3 +315,61 @@ pub(super) fn check_turn(rotation: [i16; 4]) -> Result<(), BrushError> {
 fn is_positive([x, y, z, w]: [i16; 4]) -> bool {
     [w, x, y, z].into_iter().find(|&v| v != 0).is_some_and(|v| v > 0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::distance::{Distance, Form};
+    use super::*;
+
+    fn depth(form: &Form, at: Vec3) -> f32 {
+        let [x, y, z] = at.to_array();
+        -match form {
+            Form::Sphere(form) => form.at(x, y, z),
+            Form::Cuboid(form) => form.at(x, y, z),
+            Form::Cylinder(form) => form.at(x, y, z),
+            Form::Capsule(form) => form.at(x, y, z),
+            Form::Cone(form) => form.at(x, y, z),
+        }
+    }
+
+    /// The greatest depth, by trying places in a box that closes in on the best of them.
+    fn deepest_by_trying(solid: &Solid) -> f32 {
+        let (form, origin, (low, high)) = (Form::of(solid), solid.origin(), solid.bounds());
+        let mut middle = (low + high).as_vec3() / 2.0 - origin.as_vec3();
+        let (mut half, mut best) = ((high - low).as_vec3() / 2.0, f32::MIN);
+        for _ in 0..60 {
+            let around = middle;
+            for i in 0..11 * 11 * 11 {
+                let step = IVec3::new(i % 11, i / 11 % 11, i / 121).as_vec3() / 5.0 - 1.0;
+                let at = around + step * half;
+                if depth(&form, at) > best {
+                    (middle, best) = (at, depth(&form, at));
+                }
+            }
+            half *= 0.8;
+        }
+        best
+    }
+
+    #[test]
+    fn the_middle_is_as_deep_as_it_is_said_to_be() {
+        let base = Vec3::new(-3.3, 100.7, 8.05);
+        for shape in [
+            Shape::sphere(base, 7.77),
+            Shape::turned_cuboid(base, Vec3::new(5.0, 9.1, 3.6), Quat::from_xyzw(0.36, -0.48, 0.64, 0.48)),
+            Shape::capsule(base, base + Vec3::new(9.0, 2.0, -3.0), 3.9),
+            // A pole and a disc.
+            Shape::cylinder(base, Vec3::new(5.5, -9.25, 17.125), 4.4),
+            Shape::cylinder(base, Vec3::new(1.0, 2.5, -0.5), 9.0),
+            // A needle, a tent and a lid.
+            Shape::cone(base, Vec3::new(1.0, 21.0, -3.0), 2.5),
+            Shape::cone(base, Vec3::new(5.0, -9.0, 7.0), 11.5),
+            Shape::cone(base, Vec3::new(0.5, 2.0, 0.0), 12.0),
+        ] {
+            let solid = Solid::quantize(&shape).unwrap();
+            let (said, found) = (solid.deepest() as f32, deepest_by_trying(&solid));
+            // Rounded down.
+            assert!((-0.2..1.2).contains(&(found - said)), "{shape:?}: {said} said, {found} found");
+        }
+    }
+}

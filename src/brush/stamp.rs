@@ -244,6 +244,14 @@ mod tests {
     }
 
     #[test]
+    fn a_stamp_is_as_deep_as_half_its_shorter_side() {
+        for (size, deep) in [(Vec2::new(6.0, 8.0), 768), (Vec2::new(8.0, 6.0), 768), (Vec2::splat(5.0), 640)]
+        {
+            assert_eq!(Press::quantize(&Stamp { size, ..ramp() }).unwrap().deep(), deep, "{size}");
+        }
+    }
+
+    #[test]
     fn a_stamp_on_a_wall_looks_along_its_normal() {
         let press = Press::quantize(&ramp().onto(Vec3::X)).unwrap();
         let middle = press.at(IVec3::new(10, 5, 20)).1;

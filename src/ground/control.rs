@@ -8,7 +8,7 @@ use super::world::{Ground, Materials};
 use crate::lattice::{Column, ONE};
 
 /// Decides the materials of every column. Images are stretched over the world, their first sample at column (0, 0),
-/// their last at the far corner.
+/// their last at the far corner. None of the materials may be [`MaterialId::GROUND`], which has no look of its own.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MaterialControl {
@@ -32,7 +32,7 @@ pub enum MaterialControl {
         overlay: MaterialId,
     },
     /// By a map of ids: each column's overlay is the id in the nearest sample, and covers the base fully. An id is the
-    /// grey level of an 8-bit image, or the high byte of a 16-bit one.
+    /// grey level of an 8-bit image, or the high byte of a 16-bit one; 255 is none.
     Ids {
         /// The map.
         map: GreyImage,
@@ -48,32 +48,62 @@ impl Default for MaterialControl {
     }
 }
 
+impl MaterialControl {
+    /// Whether the ground can be made of all that.
+    fn check(&self) -> Result<(), GroundError> {
+        let check = |name: &'static str, material: MaterialId| match material {
+            MaterialId::GROUND => {
+                let (value, allowed) = (material.0.into(), MaterialId::ALLOWED);
+                Err(GroundError::Parameter { name, value, allowed })
+            }
+            _ => Ok(()),
+        };
+        let check_base = |base: &MaterialId| check("the base material", *base);
+        match self {
+            Self::Uniform(ColumnMaterial { base, overlay, .. }) | Self::Blend { base, overlay, .. } => {
+                check_base(base)?;
+                check("the overlay material", *overlay)
+            }
+            Self::Rules { base, rules } => {
+                check_base(base)?;
+                rules.iter().enumerate().try_for_each(|(index, rule)| rule.check(index))
+            }
+            Self::Ids { map, base } => {
+                check_base(base)?;
+                map.samples().iter().try_for_each(|sample| check("an id of the material map", id(*sample)))
+            }
+        }
+    }
+}
+
+/// The id in a sample of a map.
+fn id(sample: u16) -> MaterialId {
+    let [id, _] = sample.to_be_bytes();
+    MaterialId(id)
+}
+
 impl Ground {
     /// The same heights, with materials as `control` decides.
     ///
     /// # Errors
-    /// [`GroundError::Rule`] for a rule with a parameter out of its range; [`GroundError::Memory`] if the machine has
-    /// too little.
+    /// [`GroundError::Rule`] for a rule with a parameter out of its range; [`GroundError::Parameter`] if a material is
+    /// [`MaterialId::GROUND`]; [`GroundError::Memory`] if the machine has too little.
     pub fn with_materials(self, control: &MaterialControl) -> Result<Self, GroundError> {
+        control.check()?;
         let materials = match control {
             MaterialControl::Uniform(material) => Materials::Uniform(*material),
-            MaterialControl::Rules { base, rules } => {
-                for (index, rule) in rules.iter().enumerate() {
-                    rule.check(index)?;
-                }
-                self.material_columns(|column| {
-                    let height = f64::from(self.height(column)) / f64::from(ONE);
-                    apply(*base, rules, height, self.slope(column))
-                })?
-            }
+            MaterialControl::Rules { base, rules } => self.material_columns(|column| {
+                let height = f64::from(self.height(column)) / f64::from(ONE);
+                apply(*base, rules, height, self.slope(column))
+            })?,
             MaterialControl::Blend { mask, base, overlay } => self.material_columns(|column| {
                 let grey = self.stretched(mask, column).grey();
                 let blend = (grey / 65_535.0 * 255.0).round() as u8;
                 ColumnMaterial { base: *base, overlay: *overlay, blend }
             })?,
             MaterialControl::Ids { map, base } => self.material_columns(|column| {
-                let [id, _] = self.stretched(map, column).nearest().to_be_bytes();
-                ColumnMaterial { base: *base, overlay: MaterialId(id), blend: 255 }
+                let overlay = id(self.stretched(map, column).nearest());
+                ColumnMaterial { base: *base, overlay, blend: 255 }
             })?,
         };
         Ok(self.replace_materials(materials))
@@ -185,6 +215,33 @@ mod tests {
     }
 
     #[test]
+    fn no_ground_is_made_of_what_the_ground_has() {
+        let (none, image) =
+            (MaterialId::GROUND, |grey| GreyImage::from_samples(2, 1, vec![0, grey]).unwrap());
+        let rule = MaterialRule { overlay: none, ..MaterialRule::default() };
+        let solid = ColumnMaterial::solid(ROCK);
+        for (control, what) in [
+            (MaterialControl::Uniform(ColumnMaterial { base: none, ..solid }), "the base material"),
+            (MaterialControl::Uniform(ColumnMaterial { overlay: none, ..solid }), "the overlay material"),
+            (MaterialControl::Rules { base: none, rules: vec![] }, "the base material"),
+            (
+                MaterialControl::Rules { base: ROCK, rules: vec![MaterialRule::default(), rule] },
+                "the overlay of material rule 1",
+            ),
+            (MaterialControl::Blend { mask: image(0), base: none, overlay: ROCK }, "the base material"),
+            (MaterialControl::Blend { mask: image(0), base: ROCK, overlay: none }, "the overlay material"),
+            (MaterialControl::Ids { map: image(0), base: none }, "the base material"),
+            (MaterialControl::Ids { map: image(0xff00), base: ROCK }, "an id of the material map"),
+        ] {
+            let error = Ground::flat(2, 2, 0.0).unwrap().with_materials(&control).unwrap_err();
+            let allowed = "it must be 0 to 254, as 255 means whatever the ground has";
+            assert_eq!(error.to_string(), format!("{what} is 255: {allowed}"));
+        }
+        let last = MaterialControl::Ids { map: image(0xfeff), base: ROCK };
+        assert!(Ground::flat(2, 2, 0.0).unwrap().with_materials(&last).is_ok());
+    }
+
+    #[test]
     fn a_mask_is_stretched_over_the_world() {
         let mask = GreyImage::from_samples(2, 2, vec![0, 65_535, 0, 65_535]).unwrap();
         let control = MaterialControl::Blend { mask, base: ROCK, overlay: GRASS };
@@ -197,11 +254,11 @@ mod tests {
 
     #[test]
     fn a_map_gives_the_nearest_id() {
-        let map = GreyImage::from_samples(3, 1, [7, 8, 255].map(|id| id * 257).to_vec()).unwrap();
+        let map = GreyImage::from_samples(3, 1, [7, 8, 254].map(|id| id * 257).to_vec()).unwrap();
         let control = MaterialControl::Ids { map, base: ROCK };
         let ground = Ground::flat(8, 3, 0.0).unwrap().with_materials(&control).unwrap();
         let overlay = |x| ground.column_material(Column::new(x, 2)).overlay.0;
-        assert_eq!([0, 1, 2, 4, 5, 6, 8].map(overlay), [7, 7, 8, 8, 8, 255, 255]);
+        assert_eq!([0, 1, 2, 4, 5, 6, 8].map(overlay), [7, 7, 8, 8, 8, 254, 254]);
     }
 
     #[test]
@@ -243,11 +300,15 @@ mod tests {
             let flat = || Ground::flat(world.0, world.1, 0.0).unwrap();
             let blend = MaterialControl::Blend { mask: image.clone(), base: ROCK, overlay: GRASS };
             let ids = MaterialControl::Ids { map: image, base: ROCK };
-            let (blend, ids) = (flat().with_materials(&blend).unwrap(), flat().with_materials(&ids).unwrap());
+            let (blend, ids) = (flat().with_materials(&blend).unwrap(), flat().with_materials(&ids));
+            prop_assert_eq!(ids.is_err(), grey >> 8 == 255);
             for (x, z) in (0..9).flat_map(|z| (0..9).map(move |x| (x, z))) {
                 let expected = (f64::from(grey) / 257.0).round() as u8;
                 prop_assert_eq!(blend.column_material(Column::new(x, z)).blend, expected);
-                prop_assert_eq!(ids.column_material(Column::new(x, z)).overlay, MaterialId((grey >> 8) as u8));
+                if let Ok(ids) = &ids {
+                    let overlay = ids.column_material(Column::new(x, z)).overlay;
+                    prop_assert_eq!(overlay, MaterialId((grey >> 8) as u8));
+                }
             }
         }
     }

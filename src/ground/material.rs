@@ -14,8 +14,11 @@ pub struct MaterialId(pub u8);
 
 impl MaterialId {
     /// Whatever the ground itself has there, computed and never stored: what samples have that nobody built or painted.
-    /// Painting with it restores the ground's own look.
+    /// Painting with it restores the ground's own look. No ground is made of it.
     pub const GROUND: Self = Self(u8::MAX);
+
+    /// What an id of the ground may be, in words.
+    pub(super) const ALLOWED: &str = "0 to 254, as 255 means whatever the ground has";
 }
 
 /// The materials of one column: a base all the way down and an overlay as its skin.

@@ -9,7 +9,7 @@ use super::material::{ColumnMaterial, MaterialId};
 /// outside than the fade, and in between by a straight line; height's and slope's parts are multiplied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialRule {
-    /// What the rule lays over the base.
+    /// What the rule lays over the base; not [`MaterialId::GROUND`].
     pub overlay: MaterialId,
     /// Lowest and highest height in voxels; infinite ends are open.
     pub height: (f64, f64),
@@ -32,6 +32,10 @@ impl Default for MaterialRule {
 impl MaterialRule {
     /// Checks the rule at `index` of its list.
     pub(super) fn check(&self, index: usize) -> Result<(), GroundError> {
+        if self.overlay == MaterialId::GROUND {
+            let (name, value) = ("the overlay", self.overlay.0.into());
+            return Err(GroundError::Rule { index, name, value, allowed: MaterialId::ALLOWED });
+        }
         for (name, (low, high)) in
             [("the range of heights", self.height), ("the range of slopes", self.slope)]
         {
@@ -130,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_are_no_numbers_are_refused() {
+    fn parameters_that_are_no_numbers_or_no_materials_are_refused() {
         let good = MaterialRule::default();
         let nan = f64::NAN;
         assert_eq!(good.check(0), Ok(()));
@@ -141,6 +145,7 @@ mod tests {
             MaterialRule { height_fade: -1.0, ..good },
             MaterialRule { slope_fade: nan, ..good },
             MaterialRule { slope_fade: f64::INFINITY, ..good },
+            MaterialRule { overlay: MaterialId::GROUND, ..good },
         ] {
             assert!(matches!(bad.check(4), Err(GroundError::Rule { index: 4, .. })), "{bad:?}");
         }

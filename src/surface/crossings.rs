@@ -248,3 +248,70 @@ impl<'a> StoredMaterials<'a> {
         brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + place.index))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::vertex::{Lattice, crossing};
+    use super::*;
+    use crate::ground::Ground;
+    use crate::lattice::Column;
+
+    /// An edited edge along x, by the densities at its ends.
+    struct Ends([i32; 2]);
+
+    impl Lattice for Ends {
+        fn distance(&self, point: IVec3) -> i32 {
+            self.0[point.x as usize]
+        }
+        fn is_edited(&self, _: IVec3) -> bool {
+            true
+        }
+        fn stored_material(&self, _: IVec3) -> MaterialId {
+            MaterialId::GROUND
+        }
+        fn ground(&self) -> &Ground {
+            unreachable!("an edited edge is crossed where its densities say")
+        }
+        fn is_volumetric(&self, _: Column) -> Option<bool> {
+            None
+        }
+    }
+
+    /// The steps from air of one density to ground of another one, and the other way round, which are those of the vertex
+    /// function.
+    fn steps(air: i32, ground: i32) -> [i32; 2] {
+        let [there, back] = [[air, -ground], [-ground, air]];
+        let lanes = |end: usize| i32x4::new([there[end], back[end], there[end], back[end]]);
+        let steps = linear_steps(lanes(0), lanes(1)).to_array();
+        let expected = [there, back].map(|ends| crossing(&Ends(ends), IVec3::ZERO, 0));
+        assert_eq!(steps, [expected[0], expected[1], expected[0], expected[1]], "{air} and -{ground}");
+        expected
+    }
+
+    proptest! {
+        #[test]
+        fn edges_are_crossed_where_the_vertex_function_says(air in 0..1i32 << 24, ground in 1..1i32 << 24, near in 1i32..999) {
+            steps(air, ground);
+            steps(air % 1000, near);
+            steps(air, near);
+            steps(near, ground);
+        }
+
+        #[test]
+        fn halves_are_rounded_up(step in 0..SNAP, part in 1i32..4096) {
+            // So many steps and a half, of all that there are: (2 step + 1) / 8192.
+            let (from, to) = ((2 * step + 1) * part, (2 * (SNAP - step) - 1) * part);
+            let most = SNAP - 1;
+            prop_assert_eq!(steps(from, to), [step + 1, SNAP - step].map(|step| step.clamp(1, most)));
+        }
+
+        #[test]
+        fn what_is_nearly_a_half_is_none(step in 1..SNAP - 1, sum in (1i32 << 24)..(1i32 << 25) - 1, by in -2i32..3) {
+            let half = (i64::from(2 * step + 1) * i64::from(sum) / (2 * i64::from(SNAP))) as i32;
+            let from = (half + by).clamp(0, sum - 1);
+            steps(from, sum - from);
+        }
+    }
+}

@@ -222,8 +222,9 @@ fn links(fan: &[(u32, u32, u32)]) -> usize {
     let mut groups = fan.len();
     for i in 0..fan.len() {
         for j in i + 1..fan.len() {
-            // Neighbours around the vertex share an outgoing edge of one and the incoming edge of the other.
-            if fan[i].1 == fan[j].2 || fan[i].2 == fan[j].1 {
+            // Neighbours around the vertex share an edge; whether both run it the same way is another matter.
+            let ((_, a, b), (_, c, d)) = (fan[i], fan[j]);
+            if a == d || b == c || a == c || b == d {
                 let (a, b) = (root(&mut parent, i), root(&mut parent, j));
                 if a != b {
                     parent[a] = b;
@@ -233,4 +234,160 @@ fn links(fan: &[(u32, u32, u32)]) -> usize {
         }
     }
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::{Indices, MaterialMix, Vertex};
+
+    /// Corners of two tetrahedra around the first one, and the middle of an edge; in voxels.
+    const CORNERS: [[i32; 3]; 8] = [
+        [20, 20, 20],
+        [24, 20, 20],
+        [20, 24, 20],
+        [20, 20, 24],
+        [22, 20, 20],
+        [16, 20, 20],
+        [20, 16, 20],
+        [20, 20, 16],
+    ];
+
+    /// The faces of a tetrahedron.
+    fn body([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 4] {
+        [[a, c, b], [a, b, d], [b, c, d], [c, a, d]]
+    }
+
+    fn mesh(corners: &[[i32; 3]], triangles: &[[u32; 3]]) -> SurfaceMesh {
+        let vertex = |&corner: &[i32; 3]| Vertex {
+            position: IVec3::from_array(corner) * SNAP,
+            normal: Vec3::Y,
+            materials: MaterialMix::default(),
+        };
+        let vertices: Vec<Vertex> = corners.iter().map(vertex).collect();
+        SurfaceMesh { indices: Indices::new(vertices.len(), triangles.as_flattened().to_vec()), vertices }
+    }
+
+    /// In a world of 64 x 48 cells.
+    fn report(meshes: &[(&SurfaceMesh, IVec3)]) -> SeamReport {
+        let mut soup = SeamSoup::default();
+        meshes.iter().for_each(|&(mesh, origin)| soup.add(mesh, origin));
+        soup.check(ChunkGrid::new(32, 64, 48))
+    }
+
+    /// How many faults of each kind there are; there is a place for those and no others.
+    fn counts(report: &SeamReport) -> [usize; 5] {
+        let all = [
+            (SeamFault::Open, report.open),
+            (SeamFault::Unbalanced, report.unbalanced),
+            (SeamFault::NonManifoldEdge, report.nonmanifold_edges),
+            (SeamFault::NonManifoldVertex, report.nonmanifold_vertices),
+            (SeamFault::Degenerate, report.degenerate),
+        ];
+        let found = all.iter().filter(|(_, count)| *count > 0).map(|(fault, _)| fault);
+        assert!(report.first.keys().eq(found), "{report}");
+        all.map(|(_, count)| count)
+    }
+
+    #[test]
+    fn a_closed_body_is_flawless() {
+        let found = report(&[(&mesh(&CORNERS, &body([0, 1, 2, 3])), IVec3::ZERO)]);
+        assert!(found.is_flawless() && found.is_closed(), "{found}");
+        assert_eq!(counts(&found), [0; 5]);
+        // Vertices that no triangle has count nothing.
+        assert_eq!([found.triangles, found.vertices, found.edges], [4, 4, 6]);
+        assert_eq!((found.euler, found.worst_normal_at), (2, None));
+        assert!(!report(&[]).is_closed(), "nothing is no surface");
+    }
+
+    #[test]
+    fn each_fault_is_found_and_no_other() {
+        let whole = body([0, 1, 2, 3]);
+        let [bottom, side, slope, back] = whole;
+        // Open, unbalanced, edges and vertices that are not manifold, triangles without area.
+        for (what, triangles, expected) in [
+            ("a face is missing", vec![bottom, side, slope], [3, 3, 0, 0, 0]),
+            ("a face looks inwards", vec![bottom, [0, 3, 1], slope, back], [0, 3, 0, 0, 0]),
+            ("a face is there twice", vec![bottom, side, side, slope, back], [0, 3, 3, 0, 0]),
+            ("two bodies share an edge", [whole, body([0, 1, 6, 7])].concat(), [0, 0, 1, 0, 0]),
+            ("two bodies share a corner", [whole, body([0, 5, 6, 7])].concat(), [0, 0, 0, 1, 0]),
+            ("a vertex hangs on an edge", vec![bottom, [0, 4, 3], [4, 1, 3], slope, back], [3, 3, 0, 0, 0]),
+            (
+                "a triangle is a line, and closes that gap",
+                vec![bottom, [0, 4, 3], [4, 1, 3], [0, 1, 4], slope, back],
+                [0, 0, 0, 0, 1],
+            ),
+            ("a triangle has a corner twice", [&whole[..], &[[0, 0, 1]]].concat(), [0, 0, 0, 0, 1]),
+        ] {
+            let report = report(&[(&mesh(&CORNERS, &triangles), IVec3::ZERO)]);
+            assert_eq!(counts(&report), expected, "{what}: {report}");
+            assert!(!report.is_flawless() && report.worst_normal_at.is_none(), "{what}");
+            assert_eq!(report.is_closed(), expected[..2] == [0, 0], "{what}");
+        }
+    }
+
+    #[test]
+    fn faults_are_where_they_are_said_to_be() {
+        let [bottom, side, slope, _] = body([0, 1, 2, 3]);
+        let report = report(&[(&mesh(&CORNERS, &[bottom, side, slope]), IVec3::X)]);
+        let middle = DVec3::new(21.0, 22.0, 20.0);
+        assert_eq!(report.first[&SeamFault::Open], middle);
+        assert!(report.to_string().contains("3 open"), "{report}");
+        assert!(report.to_string().contains("first Open at (21, 22, 20)"), "{report}");
+    }
+
+    #[test]
+    fn meshes_are_welded_where_they_meet_to_the_step() {
+        let [bottom, side, slope, back] = body([0, 1, 2, 3]);
+        let by = IVec3::new(7, -9, 4);
+        let moved = CORNERS.map(|corner| (IVec3::from_array(corner) - by).to_array());
+        let (first, mut second) = (mesh(&CORNERS, &[bottom, side]), mesh(&moved, &[slope, back]));
+        assert!(report(&[(&first, IVec3::ZERO), (&second, by)]).is_flawless());
+        // Both edges of the gap's one side, and both of its other.
+        second.vertices[3].position.x += 1;
+        let torn = report(&[(&first, IVec3::ZERO), (&second, by)]);
+        assert_eq!((torn.vertices, torn.open), (5, 4), "{torn}");
+    }
+
+    #[test]
+    fn only_the_rim_of_the_world_may_be_open() {
+        let sheet =
+            |corners: [[i32; 3]; 4]| report(&[(&mesh(&corners, &[[0, 1, 2], [0, 2, 3]]), IVec3::ZERO)]);
+        let [width, depth] = [64, 48];
+        let whole = [[0, 0, 0], [0, 5, depth], [width, 9, depth], [width, 3, 0]];
+        assert!(sheet(whole).is_flawless());
+        // A sheet that ends one voxel before, on each side.
+        let sides = [([0, 1], IVec3::X), ([1, 2], -IVec3::Z), ([2, 3], -IVec3::X), ([3, 0], IVec3::Z)];
+        for (corners, by) in sides {
+            let mut short = whole;
+            for corner in corners {
+                short[corner] = (IVec3::from_array(short[corner]) + by).to_array();
+            }
+            assert_eq!(counts(&sheet(short)), [1, 1, 0, 0, 0], "{by}");
+        }
+        // An edge from one side of the rim to another one lies in neither.
+        for (x, z) in [(0, 0), (0, depth), (width, 0), (width, depth)] {
+            let inwards = |at: i32| if at == 0 { 5 } else { at - 5 };
+            let corners = [[x, 0, z], [inwards(x), 0, z], [x, 0, inwards(z)]];
+            let report = report(&[(&mesh(&corners, &[[0, 1, 2]]), IVec3::ZERO)]);
+            assert_eq!(counts(&report), [1, 1, 0, 0, 0], "{x} {z}");
+        }
+    }
+
+    #[test]
+    fn the_worst_jump_between_normals_is_found() {
+        let [bottom, side, slope, back] = body([0, 1, 2, 3]);
+        let (first, mut second) = (mesh(&CORNERS, &[bottom, side]), mesh(&CORNERS, &[slope, back]));
+        // Equal, if not by their bits.
+        second.vertices[1].normal = Vec3::new(-0.0, 1.0, -0.0);
+        let both = |second: &SurfaceMesh| report(&[(&first, IVec3::ZERO), (second, IVec3::ZERO)]);
+        assert!(both(&second).is_flawless());
+        let tilted = |degrees: f32| Vec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
+        (second.vertices[2].normal, second.vertices[3].normal) = (tilted(10.0), tilted(30.0));
+        let report = both(&second);
+        assert!((report.worst_normal_jump - 30.0).abs() < 1e-3, "{report}");
+        assert_eq!(report.worst_normal_at, Some(DVec3::new(20.0, 20.0, 24.0)));
+        assert!(report.is_closed() && !report.is_flawless());
+        assert_eq!(counts(&report), [0; 5]);
+    }
 }

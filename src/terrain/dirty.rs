@@ -3,11 +3,8 @@
 //! Bricks come in order of their stacks all along, so every step goes stack by stack and needs no other, and threads share
 //! them.
 
-use std::ops::RangeInclusive;
-
 use glam::IVec3;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::surface::Mask;
@@ -16,20 +13,15 @@ use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 use crate::volume::DraftedBrick;
 
+use super::by_brick::{ByBrick, PARALLEL_PLACES, Reached, by_brick};
 use super::world::World;
-
-/// From how many bricks on what is cheap for each is spread over threads: waking these takes as long as some hundred of
-/// them.
-const PARALLEL_PLACES: usize = 512;
-
-/// Cells by the bricks that hold them: by stacks of bricks, each from below.
-pub(super) type ByBrick = Vec<(BrickPos, LatticeBox)>;
 
 /// The cells that changed samples show in.
 pub(super) fn dirty_cells(grid: ChunkGrid, changed: impl Iterator<Item = (BrickPos, LatticeBox)>) -> ByBrick {
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
     let around = |(pos, changed): (BrickPos, LatticeBox)| {
-        in_world(grid, changed.min - 2, changed.max + 1).map(|cells| (pos.0.x, cells))
+        let cells = in_world(grid, changed.min - 2, changed.max + 1)?;
+        Some(Reached { home_x: pos.0.x, cells })
     };
     by_brick(&changed.filter_map(around).collect::<Vec<_>>())
 }
@@ -38,7 +30,8 @@ pub(super) fn dirty_cells(grid: ChunkGrid, changed: impl Iterator<Item = (BrickP
 pub(super) fn sheets_in_reach(world: &World, changed: &[DraftedBrick]) -> Vec<BrickPos> {
     // A sample is a corner of the cells one below it.
     let around = |drafted: &DraftedBrick| {
-        (drafted.pos.0.x, LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max })
+        let cells = LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
+        Reached { home_x: drafted.pos.0.x, cells }
     };
     let boxes: Vec<_> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
     let near = by_brick(&boxes);
@@ -159,78 +152,6 @@ fn with_sheet(stack: &[(BrickPos, LatticeBox)], sheet: LatticeBox) -> ByBrick {
         }
     }
     all
-}
-
-/// How many places for bricks a table may have for each box.
-const PLACES: u64 = 64;
-
-/// The bricks that hold cells of these boxes, each with the box around its own of them. Every box belongs to something
-/// whose x, in bricks, stands beside it, at most one brick away; by that number they are sorted.
-fn by_brick(boxes: &[(i32, LatticeBox)]) -> ByBrick {
-    let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return ByBrick::new() };
-    if boxes.len() < PARALLEL_PLACES {
-        return those_within(first.0 - 1..=last.0 + 1, boxes);
-    }
-    let slab = |x: i32| {
-        let from = boxes.partition_point(|(home, _)| *home < x - 1);
-        let near = boxes[from..].partition_point(|(home, _)| *home <= x + 1);
-        those_within(x..=x, &boxes[from..from + near])
-    };
-    (first.0 - 1..last.0 + 2).into_par_iter().map(slab).collect::<Vec<_>>().concat()
-}
-
-/// Those of the bricks whose x lies in a range.
-fn those_within(xs: RangeInclusive<i32>, boxes: &[(i32, LatticeBox)]) -> ByBrick {
-    let within = |cells: &LatticeBox| {
-        let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
-        LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
-    };
-    let Some(all) = boxes.iter().filter_map(|(_, cells)| within(cells)).reduce(LatticeBox::union) else {
-        return ByBrick::new();
-    };
-    // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
-    let size = all.size();
-    let is_dense = all.volume() <= PLACES * boxes.len() as u64;
-    let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
-    let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
-    let mut found = ByBrick::with_capacity(boxes.len() * 4);
-    let mut enter = |brick: IVec3, cells: LatticeBox| {
-        let number = if is_dense {
-            let at = brick - all.min;
-            &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize]
-        } else {
-            index.entry(BrickPos(brick)).or_default()
-        };
-        if *number == 0 {
-            found.push((BrickPos(brick), cells));
-            *number = found.len() as u32;
-        } else {
-            let own = &mut found[*number as usize - 1].1;
-            *own = own.union(cells);
-        }
-    };
-    for (_, cells) in boxes {
-        let Some(bricks) = within(cells) else { continue };
-        // Of the cells, those from a brick's first to its last.
-        let own = |brick: i32, low: i32, high: i32| (low.max(brick * 8), high.min(brick * 8 + 7));
-        for x in bricks.min.x..=bricks.max.x {
-            let (low_x, high_x) = own(x, cells.min.x, cells.max.x);
-            for z in bricks.min.z..=bricks.max.z {
-                let (low_z, high_z) = own(z, cells.min.z, cells.max.z);
-                for y in bricks.min.y..=bricks.max.y {
-                    let (low_y, high_y) = own(y, cells.min.y, cells.max.y);
-                    let (min, max) = (IVec3::new(low_x, low_y, low_z), IVec3::new(high_x, high_y, high_z));
-                    enter(IVec3::new(x, y, z), LatticeBox { min, max });
-                }
-            }
-        }
-    }
-    if is_dense {
-        let numbers = table.iter().filter(|&&number| number != 0);
-        return numbers.map(|&number| found[number as usize - 1]).collect();
-    }
-    found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
-    found
 }
 
 /// 8x8 cells and the cells beside and diagonally beside them, as far as they lie in the word (dx, dz) further.

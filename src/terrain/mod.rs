@@ -13,6 +13,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod by_brick;
 mod change;
 mod commit;
 mod dirty;
@@ -199,19 +200,6 @@ impl Terrain {
     /// Queues an edit, say from a file or the network. It is checked like a brush.
     pub fn submit_edit(&mut self, edit: &Edit) {
         self.queue_edit(edit.tag(), edit.check().map(|()| edit.clone()));
-    }
-
-    /// Queues a brush if it reaches some column of this world; says whether it does.
-    ///
-    /// # Errors
-    /// When the brush is not valid; it is not queued then.
-    pub fn offer(&mut self, brush: &Brush) -> Result<bool, BrushError> {
-        let edit = Edit::quantize(brush)?;
-        let is_in_reach = edit.reach().intersection(self.world.grid.edit_bounds()).is_some();
-        if is_in_reach {
-            self.queue_edit(brush.tag, Ok(edit));
-        }
-        Ok(is_in_reach)
     }
 
     fn queue_edit(&mut self, tag: u64, edit: Result<Edit, BrushError>) {

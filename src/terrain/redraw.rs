@@ -6,8 +6,9 @@ use std::time::Duration;
 use glam::IVec3;
 use rayon::prelude::*;
 
+use super::by_brick::ByBrick;
 use super::commit::Stages;
-use super::dirty::{ByBrick, dirty_blocks, grown_into};
+use super::dirty::{dirty_blocks, grown_into};
 use super::surface::{ChunkSurface, Fresh, key};
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};

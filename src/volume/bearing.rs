@@ -3,8 +3,8 @@
 
 use glam::IVec3;
 
-use super::draft::Tool;
 use super::ledger::Fate;
+use super::work::Tool;
 use super::{DiggingRules, SampleView};
 use crate::brush::Around;
 use crate::lattice::{BRICK, BrickPos, LatticeBox, ONE};

@@ -4,10 +4,10 @@ use glam::IVec3;
 use wide::i16x8;
 
 use super::bearing::BrickRules;
-use super::draft::Tool;
 use super::ledger::{Counts, Fate};
 use super::surroundings::Surroundings;
 use super::view::resolve;
+use super::work::Tool;
 use super::workpiece::{Changed, Workpiece};
 use super::{Layers, Sample, SampleView};
 use crate::brush::{Around, BAND, Kind, Sculptor};

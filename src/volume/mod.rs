@@ -17,15 +17,14 @@ mod runs;
 mod surroundings;
 mod tally;
 mod view;
+mod work;
 mod workpiece;
 
 #[cfg(feature = "cuda")]
 pub(crate) use bearing::RunRules;
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub(crate) use brick::{PRISTINE, row};
-pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect, EditWork, reach};
-#[cfg(feature = "cuda")]
-pub(crate) use draft::{Job, Tool};
+pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
@@ -35,3 +34,6 @@ pub(crate) use restore::{Replaced, pristine_brick};
 pub use rules::{DiggingRules, Refused};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};
+pub use work::{EditWork, reach};
+#[cfg(feature = "cuda")]
+pub(crate) use work::{Job, Tool};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::careful::reads;
-use super::draft::reach;
+use super::work::reach;
 use crate::brush::Edit;
 use crate::lattice::{ChunkGrid, LatticeBox};
 

@@ -7,10 +7,10 @@ use wide::{i16x8, i32x8};
 
 use super::bearing::RunRules;
 use super::brick::{PRISTINE, row, solid_layers};
-use super::draft::{Job, Tool};
 use super::ledger::{Counts, Fate, Ledger, PartEffect};
 use super::surroundings::Surroundings;
 use super::view::resolve;
+use super::work::{Job, Tool};
 use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
 use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;

@@ -7,6 +7,8 @@ mod naive;
 mod play;
 mod sameness;
 mod scratch;
+mod slabs;
+mod soft;
 mod state;
 mod witness;
 #[path = "../worlds/mod.rs"]

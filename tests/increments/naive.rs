@@ -3,18 +3,80 @@
 use bevy_burrow::brush::{BAND, Evaluator};
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
-use glam::IVec3;
+use glam::{IVec2, IVec3, Quat, Vec3};
 
 use crate::witness::{Effect, Witness};
+
+/// A length in 1/256 voxel.
+fn units(voxels: f32) -> i32 {
+    (voxels * 256.0).round_ties_even() as i32
+}
+
+/// How deep the middle of a shape lies inside it, rounded down.
+fn deepest(shape: &Shape) -> i32 {
+    let length =
+        |axis: Vec3| axis.to_array().map(|part| f64::from(units(part)).powi(2)).iter().sum::<f64>().sqrt();
+    match *shape {
+        Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => units(radius),
+        Shape::Cuboid { half, .. } => units(half.min_element()),
+        Shape::Cylinder { axis, radius, .. } => units(radius).min((length(axis) / 2.0) as i32),
+        // The radius of the ball that touches base and side: the area of a section by half its outline.
+        Shape::Cone { axis, radius, .. } => {
+            let (height, radius) = (length(axis), f64::from(units(radius)));
+            let slant = (height * height + radius * radius).sqrt();
+            (radius * height / (radius + slant)) as i32
+        }
+    }
+}
+
+/// How far a point lies above a plane that lies along two axes.
+fn above_plane(point: IVec3, on: Vec3, normal: Vec3) -> i32 {
+    let from = point * 256 - IVec3::from_array(on.to_array().map(units));
+    assert_eq!(normal.as_ivec3().as_vec3().abs(), normal.abs(), "planes along axes only");
+    (from * normal.as_ivec3()).element_sum()
+}
+
+/// Half the sides of a stamp.
+fn half(stamp: &Stamp) -> IVec2 {
+    IVec2::new(units(stamp.size.x / 2.0), units(stamp.size.y / 2.0))
+}
+
+/// How far a point lies beside the image of a stamp that is not turned, and above its relief.
+fn from_relief(point: IVec3, stamp: &Stamp) -> (i32, i32) {
+    assert_eq!(stamp.rotation, Quat::IDENTITY, "stamps that are not turned only");
+    let (from, half) = (point * 256 - IVec3::from_array(stamp.center.to_array().map(units)), half(stamp));
+    let beside = (from.x.abs() - half.x).max(from.z.abs() - half.y);
+    // Where on the image, in 1/256 of a step between samples; beside it, its rim goes on.
+    let place = |from: i32, half: i32, side: u32| {
+        let last = (i64::from(side) - 1) * 256;
+        (i64::from(from + half) * last / i64::from(2 * half)).clamp(0, last)
+    };
+    let (x, z) = (place(from.x, half.x, stamp.image.width()), place(from.z, half.y, stamp.image.height()));
+    let mut grey = 0;
+    for (dx, dz) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let share = |along: i64, step: i64| if step == 0 { 256 - along % 256 } else { along % 256 };
+        let sample = stamp.image.grey((x / 256 + dx) as u32, (z / 256 + dz) as u32);
+        grey += i64::from(sample) * share(x, dx) * share(z, dz);
+    }
+    let white = 65_535 * 256 * 256;
+    let relief = (2 * grey * i64::from(units(stamp.height)) + white).div_euclid(2 * white);
+    (beside, from.y - relief as i32)
+}
 
 impl Witness {
     /// What an operation that sculpts makes of a sample, straight from what the crate's documentation says.
     fn sculpted(&self, brush: &Brush, point: IVec3, outside: i32) -> Option<i32> {
-        let units = |voxels: f32| (voxels * 256.0).round_ties_even() as i32;
-        let deepest = match brush.shape {
-            Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => units(radius),
-            Shape::Cuboid { half, .. } => units(half.min_element()),
-            _ => panic!("no such shape is sculpted here"),
+        let (mut deepest, mut outside) = (deepest(&brush.shape), outside);
+        let target = match &brush.operation {
+            Operation::Level { height } => Some(point.y * 256 - units(*height)),
+            Operation::Flatten { point: on, normal } => Some(above_plane(point, *on, *normal)),
+            Operation::Stamp(stamp) => {
+                let (beside, above) = from_relief(point, stamp);
+                // Nothing changes outside of the shape, nor of the image.
+                (outside, deepest) = (outside.max(beside), deepest.min(half(stamp).min_element()));
+                Some(above)
+            }
+            _ => None,
         };
         let (strength, falloff) = (units(brush.blend.strength), units(brush.blend.falloff).min(deepest));
         let weight = match -outside {
@@ -36,8 +98,8 @@ impl Witness {
         if weight == 0 {
             return None;
         }
-        if let Operation::Level { height } = brush.operation {
-            return Some(to(point.y * 256 - units(height)));
+        if let Some(target) = target {
+            return Some(to(target));
         }
         // Of what was cut off, no more is known than that it is a voxel farther than what is not.
         let mut middle = own;

@@ -6,7 +6,7 @@ use bevy_burrow::lattice::{Column, ONE};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 use crate::witness::Witness;
 
@@ -33,18 +33,18 @@ pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
         0 => MaterialId::GROUND,
         _ => MaterialId(rng.u8(0..4)),
     };
-    let has_depth = matches!(shape, Shape::Sphere { .. } | Shape::Cuboid { .. } | Shape::Capsule { .. });
     let by = [0.1, 1.0, 3.5, 20.0][rng.usize(0..4)];
-    let brush = match rng.u32(0..16) {
+    let brush = match rng.u32(0..18) {
         0..=3 => Brush::paint(shape, material),
         4..=7 => Brush::dig(shape),
         8..=9 => Brush::add(shape, material),
-        _ if !has_depth => Brush::add(shape, material),
         10 => Brush::smooth(shape, 1.0),
         11 => Brush::sharpen(shape, 0.7),
         12 => Brush::raise(shape, by),
         13 => Brush::lower(shape, by),
         14 => Brush::level(shape, place.y),
+        15 => Brush::flatten(shape, center, [Vec3::Y, -Vec3::Y, Vec3::X, -Vec3::Z][rng.usize(0..4)]),
+        16 => Brush::stamp(shape, any_stamp(rng, center, radius)),
         _ => Brush::terrace(shape, by.max(1.0)),
     };
     let brush = match rng.u32(0..3) {
@@ -56,6 +56,15 @@ pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
         0 => brush.with_roughness(Roughness::new(rng.f32() * 8.0, 1.0 + rng.f32() * 9.0, rng.u32(..))),
         _ => brush,
     }
+}
+
+/// A stamp about as large as that; not turned.
+fn any_stamp(rng: &mut Rng, center: Vec3, radius: f32) -> Stamp {
+    let (width, height) = (rng.u32(2..6), rng.u32(2..6));
+    let samples = (0..width * height).map(|_| rng.u16(..)).collect();
+    let image = GreyImage::from_samples(width, height, samples).expect("as many samples as it has");
+    let mut side = || 0.5 + 2.5 * radius * rng.f32();
+    Stamp::new(image, center, Vec2::new(side(), side()), 8.0 * (rng.f32() - 0.5))
 }
 
 /// A place in or near the world, its rims and corners often; mostly near the surface.

@@ -1,13 +1,14 @@
 //! What a world is, and what somebody sees of it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{Hash, Hasher};
 
-use bevy_burrow::lattice::Column;
+use bevy_burrow::lattice::{Column, LIMIT, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
 use bevy_burrow::volume::Field;
+use glam::IVec3;
 use rustc_hash::FxHasher;
 
 /// Everything that a world is, but for what counts its commits. Of samples and meshes it keeps hashes, so that hundreds of
@@ -54,6 +55,7 @@ impl State {
     /// Fails unless the world is in this state; says where it differs. Seams are a matter of meshes alone: where these are
     /// the same, seams are.
     pub fn check(&self, world: &World, what: &str) {
+        check_index(world, what);
         let now = Self::of(world);
         assert_eq!(self.hash, now.hash, "{what}: hash");
         assert_eq!(self.bricks, now.bricks, "{what}: samples or materials");
@@ -64,6 +66,18 @@ impl State {
         }
         assert_eq!(self.meshes.len(), now.meshes.len(), "{what}: what is drawn");
         assert_eq!(self.parts, now.parts, "{what}: parts and rings");
+    }
+}
+
+/// Fails unless the world finds by place what it holds: bricks above and below each other stand in lists of their own.
+fn check_index(world: &World, what: &str) {
+    let all = LatticeBox { min: IVec3::splat(-LIMIT), max: IVec3::splat(LIMIT) };
+    let listed: BTreeSet<[i32; 3]> = world.bricks_near(all).map(|pos| pos.0.to_array()).collect();
+    let held: BTreeSet<[i32; 3]> = world.bricks().map(|(pos, _)| pos.0.to_array()).collect();
+    assert_eq!(world.bricks_near(all).count(), listed.len(), "{what}: a brick is listed twice");
+    assert!(listed == held, "{what}: {} bricks by place instead of {}", listed.len(), held.len());
+    for (pos, _) in world.bricks() {
+        assert!(world.bricks_near(pos.samples()).eq([pos]), "{what}: {pos:?} is not found by place");
     }
 }
 

@@ -88,9 +88,11 @@ const WIPED: u8 = 0xff;
 /// its own, and what is used of them is copied afterwards.
 pub(super) struct Outbox {
     entry: usize,
+    /// How many entries there was room for at the start.
+    first: usize,
     host: Box<dyn HostMemory>,
     capacity: usize,
-    /// Address, and how many entries there is room for; none at first.
+    /// Address, and how many entries there is room for, never more than in the host's memory; none at first.
     own: Option<(u64, usize)>,
     is_long: bool,
     /// Entries at the front of the host's memory that are not wiped.
@@ -101,7 +103,7 @@ impl Outbox {
     /// A list of entries of so many bytes, with room for some.
     pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
         let host = device.alloc_host(entry * capacity)?;
-        Ok(Self { entry, host, capacity, own: None, is_long: false, stale: capacity })
+        Ok(Self { entry, first: capacity, host, capacity, own: None, is_long: false, stale: capacity })
     }
 
     /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
@@ -140,21 +142,31 @@ impl Outbox {
     }
 
     /// Room for so many entries, of a list that will be long or not; says whether there was too little. What was in it is
-    /// gone then.
+    /// gone then. Where memory ran out, all stays as large as it was.
     pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
         self.is_long = is_long;
         let is_short = entries > self.capacity() as usize;
-        if entries > self.capacity {
-            // Kernels count in 32 bits.
-            let room = (entries + entries / 4).min(u32::MAX as usize);
-            (self.host, self.capacity) = (device.alloc_host(room * self.entry)?, room);
-            self.stale = room;
+        if !is_short && (!self.is_own() || self.own.is_some()) {
+            return Ok(false);
         }
-        if self.is_own() && (is_short || self.own.is_none()) {
-            if let Some((address, _)) = self.own.take() {
-                device.free(address);
+        // Kernels count in 32 bits. What the host has room for says nothing of the device, which may have much less.
+        let room = (entries + entries / 4).clamp(self.first, u32::MAX as usize);
+        let own = if self.is_own() { Some(device.alloc(room * self.entry)?) } else { None };
+        if room > self.capacity {
+            match device.alloc_host(room * self.entry) {
+                Ok(host) => (self.host, self.capacity, self.stale) = (host, room, room),
+                Err(fault) => {
+                    if let Some(address) = own {
+                        device.free(address);
+                    }
+                    return Err(fault);
+                }
             }
-            self.own = Some((device.alloc(self.capacity * self.entry)?, self.capacity));
+        }
+        if let Some(address) = own
+            && let Some((former, _)) = self.own.replace((address, room))
+        {
+            device.free(former);
         }
         Ok(is_short)
     }

@@ -11,7 +11,7 @@ use super::super::windows::Windows;
 use super::Site;
 use crate::ground::GreyImage;
 use crate::lattice::BrickPos;
-use crate::volume::{EditWork, Job, Tool};
+use crate::volume::{EditWork, Job};
 
 /// How far new ground looks for its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,17 +55,20 @@ fn pos(jobs: &[Job]) -> BrickPos {
 }
 
 impl<'a> Care<'a> {
-    pub fn new(work: &EditWork<'a>, bricks: &[&[Job]], look: Look) -> Self {
+    pub fn new(work: &EditWork<'a>, bricks: &[&[Job]], look: Look) -> Result<Self, Fault> {
         let windows = Windows::around(work.base, bricks.iter().map(|jobs| pos(jobs)), look.bricks());
         let mut images = Images::default();
-        let chisel = |tool: &Tool| layout::chisel(tool, |image| images.first(image));
+        let chisel = |tool| layout::chisel(tool, |image| images.first(image));
         let chisels = work.tools.iter().map(chisel).collect();
+        if images.is_full {
+            return Err(Fault::TooLarge(work.jobs().len()));
+        }
         let rules = work.rules.as_ref().map(|rules| {
             let (rules, boxes) = layout::rules(rules);
             [bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat()
         });
         let [ref_list, chisel_list, image_list, rule_list] = [Section::default(); 4];
-        Self {
+        Ok(Self {
             look,
             last: [work.grid.width(), work.grid.depth()],
             windows,
@@ -77,7 +80,7 @@ impl<'a> Care<'a> {
             chisel_list,
             image_list,
             rule_list,
-        }
+        })
     }
 
     /// Adds what there is to send.
@@ -111,21 +114,38 @@ impl<'a> Care<'a> {
     }
 }
 
-/// Samples of images, one after the other; each image once.
+/// Most samples of the images of one launch, 32 MiB of them: 256 stamps of the largest kind that are all different.
+const MOST_SAMPLES: usize = 1 << 24;
+
+/// Samples of images, one after the other; equal ones once, whoever they belong to.
 #[derive(Default)]
-struct Images {
+struct Images<'a> {
     samples: Vec<u16>,
-    first: FxHashMap<*const GreyImage, u32>,
+    /// Where they begin, by what they are.
+    first: FxHashMap<&'a [u16], u32>,
+    /// The same by whose they are: most edits of a stroke share one image, which need not be read for each.
+    known: FxHashMap<*const GreyImage, u32>,
+    /// Were there too many?
+    is_full: bool,
 }
 
-impl Images {
+impl<'a> Images<'a> {
     /// Where an image begins.
-    fn first(&mut self, image: &GreyImage) -> u32 {
-        *self.first.entry(image).or_insert_with(|| {
-            let first = self.samples.len() as u32;
+    fn first(&mut self, image: &'a GreyImage) -> u32 {
+        if let Some(&first) = self.known.get(&std::ptr::from_ref(image)) {
+            return first;
+        }
+        let fresh = self.samples.len() as u32;
+        let first = *self.first.entry(image.samples()).or_insert(fresh);
+        if first == fresh {
+            self.is_full |= self.samples.len() + image.samples().len() > MOST_SAMPLES;
+            if self.is_full {
+                return 0;
+            }
             self.samples.extend_from_slice(image.samples());
-            first
-        })
+        }
+        self.known.insert(image, first);
+        first
     }
 }
 
@@ -153,5 +173,37 @@ impl Session {
             first += jobs.len() as u32;
         }
         Ok(sites)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(side: u32, of: u16) -> GreyImage {
+        GreyImage::from_samples(side, side, vec![of; (side * side) as usize]).expect("as many as it has")
+    }
+
+    #[test]
+    fn equal_images_are_sent_once() {
+        let (one, same, other) = (image(3, 7), image(3, 7), image(2, 7));
+        let mut images = Images::default();
+        let first = [&one, &same, &other, &one, &other, &same].map(|image| images.first(image));
+        assert_eq!(first, [0, 0, 9, 0, 9, 0]);
+        assert_eq!((images.samples, images.is_full), (vec![7; 13], false));
+    }
+
+    #[test]
+    fn more_images_than_a_launch_takes_are_told() {
+        let all: Vec<GreyImage> = (0..257).map(|of| image(256, of)).collect();
+        let mut images = Images::default();
+        for image in &all[..256] {
+            images.first(image);
+        }
+        assert!(!images.is_full);
+        assert_eq!((images.first(&all[255]), images.samples.len()), (255 << 16, MOST_SAMPLES));
+        images.first(&all[256]);
+        assert!(images.is_full);
+        assert_eq!(images.samples.len(), MOST_SAMPLES);
     }
 }

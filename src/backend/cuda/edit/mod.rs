@@ -22,6 +22,9 @@ const LONG: usize = 1024;
 /// From how many bricks on they are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 256;
 
+/// The same by jobs: many edits of few bricks write long lists too, and how long they got only the device can say.
+const COPIED_JOBS: usize = 1 << 12;
+
 /// Most passes: each gives twice the room where it is not known how much is needed.
 const PASSES: usize = 12;
 
@@ -88,7 +91,7 @@ impl Session {
         if bricks.len() > MOST_JOBS || work.jobs().len() > most {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
-        let mut care = look.map(|look| Care::new(work, bricks, look));
+        let mut care = look.map(|look| Care::new(work, bricks, look)).transpose()?;
         let sites = match &mut care {
             Some(care) => self.careful_sites(bricks, care, uploads)?,
             None => self.sites(work, bricks, uploads)?,
@@ -121,7 +124,7 @@ impl Session {
         self.inbox.put(tool_list, &tools);
         self.inbox.entries::<u32>(counters).fill(0);
         care.iter().for_each(|care| care.put(&mut self.inbox));
-        let is_long = sites.len() >= COPIED;
+        let is_long = sites.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
         self.edits.results.reserve(&mut *self.device, sites.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
 
@@ -171,7 +174,8 @@ impl Session {
             }
             // Once more, with room for all.
         }
-        Err(Fault::Failed("results changed from one pass to the next".into()))
+        // The device is fine: lists that double each time were still too short.
+        Err(Fault::TooLarge(work.jobs().len()))
     }
 
     /// The bricks that edits may reach, as the device knows them.

@@ -76,7 +76,7 @@ const _: () = assert!(size_of::<Chisel>() == 152 && size_of::<CarefulParams>() =
 const _: () = assert!(size_of::<Rules>() == 296 && size_of::<Protected>() == 24);
 
 /// What an edit that looks around needs besides; `image` says where the samples of an image begin.
-pub(crate) fn chisel(tool: &volume::Tool, image: impl FnOnce(&GreyImage) -> u32) -> Chisel {
+pub(crate) fn chisel<'a>(tool: &'a volume::Tool, image: impl FnOnce(&'a GreyImage) -> u32) -> Chisel {
     let power = if tool.is_bound { tool.power.into() } else { -1 };
     let Some(of) = tool.sculptor.as_ref().and_then(Sculptor::constants) else {
         return Chisel { power, ..Chisel::default() };

@@ -105,15 +105,15 @@ fn short_and_long_transactions_take_turns() {
         let cuboid = Shape::Cuboid { center, half, rotation: Default::default() };
         Brush::dig(cuboid).with_roughness(Roughness::new(2.0, 3.0, 5))
     };
-    // Many edits of few bricks: short lists that overflow.
+    // Many edits of few bricks: short lists that overflow, and such as are long for that alone.
     let many = |n: i32| (0..n).flat_map(|i| small(i % 9)).collect::<Vec<_>>();
     let transactions = [
         small(0).to_vec(),
-        many(150),
+        many(90),
         small(1).to_vec(),
         vec![large(20.0)],
         small(2).to_vec(),
-        many(40),
+        many(200),
         vec![],
         vec![large(10.0), large(30.0)],
         vec![Brush::dig(Shape::sphere(glam::Vec3::splat(-900.0), 5.0))],

@@ -1,0 +1,92 @@
+//! Who does a stage: the faster of both, by what is known of them.
+
+use super::room::Tight;
+use super::*;
+use crate::backend::choice::{Choice, Costs, Load};
+use crate::backend::{Estimate, Stage};
+
+/// A device that is open and needs no card, with what both take for ten blocks.
+fn cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
+    let session = Session::new(Box::new(Tight::new(1 << 30, 1 << 30)), 1 << 20).expect("a session");
+    let mut costs = Costs::default();
+    for (curve, micros) in costs.mesh.iter_mut().zip([cpu, cuda]) {
+        curve.push(10, Duration::from_micros(micros));
+    }
+    // Edits take the same on both, and are the device's where meshing is.
+    costs.edit.iter_mut().for_each(|curve| curve.push(10, Duration::from_micros(3)));
+    costs.upload = 1e-6;
+    let place = Place::Open(Box::new(session), Box::new(costs));
+    Cuda {
+        is_auto,
+        slot: Arc::new(Mutex::new(place)),
+        state: Arc::new(Mutex::new(EngineState::Cuda("tight".into()))),
+    }
+}
+
+fn blocks(amount: usize) -> Load {
+    Load { amount, ..Load::default() }
+}
+
+/// Is a stage the device's, which would do it if it were asked? And what was written down of that.
+fn offered(cuda: &Cuda, stage: Stage, load: Load, missing: usize) -> (bool, Choice) {
+    let mut choice = Choice::of(stage, load.amount);
+    let (done, _) = cuda.offer(&mut choice, load, |_| missing, |_| Ok(()));
+    assert_eq!(done.is_some(), choice.is_cuda);
+    (done.is_some(), choice)
+}
+
+#[test]
+fn auto_takes_the_device_where_it_is_faster_and_nowhere_else() {
+    for (cpu, device, is_device) in [(20, 19, true), (20, 20, false), (19, 20, false)] {
+        let auto = cuda(true, cpu, device);
+        let (is_taken, choice) = offered(&auto, Stage::Mesh, blocks(10), 0);
+        let micros = Duration::from_micros;
+        assert_eq!(choice.estimate, Some(Estimate { cpu: micros(cpu), cuda: micros(device) }));
+        assert_eq!(is_taken, is_device, "{cpu} beside {device}");
+    }
+    // A device that somebody asked for does all, but what is nothing.
+    let asked = cuda(false, 1, 100);
+    assert!(offered(&asked, Stage::Mesh, blocks(10), 50).0);
+    assert!(!offered(&asked, Stage::Mesh, blocks(0), 0).0);
+    assert!(!offered(&cuda(true, 100, 1), Stage::Mesh, blocks(0), 0).0);
+}
+
+#[test]
+fn what_the_device_does_not_have_counts_against_it() {
+    let auto = cuda(true, 20, 10);
+    for (missing, is_device) in [(0, true), (9, true), (10, false), (11, false)] {
+        let (is_taken, choice) = offered(&auto, Stage::Mesh, blocks(10), missing);
+        assert_eq!((is_taken, choice.missing), (is_device, missing));
+    }
+    // Where it is slower in any case, nobody looks.
+    let mut choice = Choice::of(Stage::Mesh, 10);
+    let slower = cuda(true, 10, 20);
+    let (done, _) = slower.offer(&mut choice, blocks(10), |_| panic!("looked"), |_| Ok(()));
+    assert!(done.is_none() && choice.missing == 0);
+}
+
+#[test]
+fn edits_are_chosen_by_what_edits_take() {
+    let auto = cuda(true, 20, 10);
+    let (is_taken, choice) = offered(&auto, Stage::Edit, blocks(8), 0);
+    // Ten blocks are meshed for eight bricks, on the device either way: edited on the processor, they have to be brought.
+    let micros = Duration::from_micros;
+    assert_eq!(choice.estimate, Some(Estimate { cpu: micros(3 + 10 + 8), cuda: micros(3 + 10) }));
+    assert!(is_taken);
+    assert!(!offered(&auto, Stage::Edit, blocks(8), 8).0);
+}
+
+#[test]
+fn a_device_is_given_up_for_what_does_not_pass() {
+    for (fault, is_kept) in
+        [(Fault::TooLarge(3), true), (Fault::Memory(9), true), (Fault::Failed("gone".into()), false)]
+    {
+        let own = cuda(true, 20, 10);
+        let mut choice = Choice::of(Stage::Mesh, 10);
+        let (done, _) = own.offer(&mut choice, blocks(10), |_| 0, |_| Err::<(), Fault>(fault.clone()));
+        // What was lost on trying is no expectation.
+        assert!(done.is_none() && !choice.is_cuda && choice.estimate.is_none());
+        assert_eq!(matches!(own.state(), EngineState::Cuda(_)), is_kept, "{fault}");
+        assert_eq!(offered(&own, Stage::Mesh, blocks(10), 0).0, is_kept, "{fault}");
+    }
+}

@@ -1,0 +1,125 @@
+//! The room of lists that kernels write, on a device that has little.
+
+use std::ops::Range;
+
+use super::super::device::{Device, Fault, HostMemory, Kernel};
+use super::super::mail::Outbox;
+
+/// A device of so many bytes beside a host of so many more, whose memory its kernels reach.
+pub(super) struct Tight {
+    left: usize,
+    host_left: usize,
+    /// What was asked of the device, and what of that it still holds.
+    asked: Vec<usize>,
+    held: Vec<(u64, usize)>,
+}
+
+impl Tight {
+    pub fn new(left: usize, host_left: usize) -> Self {
+        Self { left, host_left, asked: Vec::new(), held: Vec::new() }
+    }
+
+    fn held(&self) -> Vec<usize> {
+        self.held.iter().map(|(_, bytes)| *bytes).collect()
+    }
+}
+
+struct Reached(Vec<u128>);
+
+impl HostMemory for Reached {
+    fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.0)
+    }
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(&mut self.0)
+    }
+    fn address(&self) -> Option<u64> {
+        Some(1)
+    }
+}
+
+/// Takes bytes from what is left.
+fn take(left: &mut usize, bytes: usize) -> Result<(), Fault> {
+    *left = left.checked_sub(bytes).ok_or(Fault::Memory(bytes))?;
+    Ok(())
+}
+
+impl Device for Tight {
+    fn name(&self) -> String {
+        "tight".into()
+    }
+    fn free_memory(&mut self) -> usize {
+        self.left
+    }
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        self.asked.push(bytes);
+        take(&mut self.left, bytes)?;
+        let address = 1000 + self.asked.len() as u64;
+        self.held.push((address, bytes));
+        Ok(address)
+    }
+    fn free(&mut self, address: u64) {
+        let at = self.held.iter().position(|held| held.0 == address).expect("nothing is freed twice");
+        self.left += self.held.remove(at).1;
+    }
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        take(&mut self.host_left, bytes)?;
+        Ok(Box::new(Reached(vec![0; bytes.div_ceil(16)])))
+    }
+    fn upload(&mut self, _: &dyn HostMemory, _: Range<usize>, _: u64) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn download(&mut self, _: u64, _: &mut dyn HostMemory, _: Range<usize>) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn copy(&mut self, _: u64, _: u64, _: usize) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn launch(&mut self, _: Kernel, _: u32, _: &[u8]) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn wait(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_for() {
+    let mut device = Tight::new(10_000, 1 << 20);
+    let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
+    assert_eq!(list.reserve(&mut device, 100_000, false), Ok(true));
+    assert_eq!((list.capacity(), list.is_mapped(), device.asked.len()), (125_000, true, 0));
+    // Not 125 000 of them.
+    assert_eq!(list.reserve(&mut device, 0, true), Ok(false));
+    assert_eq!((list.capacity(), list.is_mapped(), device.held()), (16, false, vec![64]));
+    assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
+    assert_eq!((list.capacity(), device.held()), (1250, vec![5000]));
+    // A short one is where it was.
+    assert_eq!(list.reserve(&mut device, 125_000, false), Ok(false));
+    assert_eq!((list.capacity(), list.address()), (125_000, 1));
+}
+
+#[test]
+fn a_list_that_can_not_grow_stays_as_it_is() {
+    let mut device = Tight::new(10_000, 1 << 20);
+    let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
+    assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
+    let (asked, address) = (device.asked.len(), list.address());
+    assert_eq!(list.reserve(&mut device, 4000, true), Err(Fault::Memory(20_000)));
+    assert_eq!((list.capacity(), list.address(), device.held()), (1250, address, vec![5000]));
+    // And does what it did before, without asking again.
+    assert_eq!(list.reserve(&mut device, 1250, true), Ok(false));
+    assert_eq!(device.asked.len(), asked + 1);
+    assert_eq!(list.fetch(&mut device, 1250), Ok(true));
+    assert_eq!(list.entries::<u32>(1250).len(), 1250);
+}
+
+#[test]
+fn a_list_is_not_longer_on_the_device_than_on_the_host() {
+    let mut device = Tight::new(1 << 20, 1000);
+    let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
+    assert_eq!(list.reserve(&mut device, 1000, true), Err(Fault::Memory(5000)));
+    assert_eq!((list.capacity(), device.held()), (0, vec![]));
+    assert_eq!(list.reserve(&mut device, 10, true), Ok(true));
+    assert_eq!((list.capacity(), device.held()), (16, vec![64]));
+}

@@ -1,0 +1,185 @@
+//! Boxes of cells, sorted into the bricks that hold them.
+//!
+//! What changes in a brick shows in cells of the bricks beside it too. Of many boxes, threads take a slab of bricks each, as
+//! thick as one brick along x: all cells that lie in it belong to boxes that are at home there or one brick beside it.
+//!
+//! ```text
+//! home_x           3         4         5         6
+//!             |         |         |         |         |
+//! reached         [========]  [=========]                 cells of two boxes, at home in 3 and in 5
+//!                                        [=======]        one at home in 6
+//!
+//! slab 4      - - - - - |=========|                       looks at homes 3, 4, 5
+//! slab 5                          |=========|             looks at homes 4, 5, 6
+//! ```
+//!
+//! Boxes come by `home_x`, so those of a slab stand together; and slabs one after the other are in the order of stacks.
+
+use std::ops::RangeInclusive;
+
+use glam::IVec3;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use crate::lattice::{BrickPos, LatticeBox};
+
+/// From how many bricks on what is cheap for each is spread over threads: waking these takes as long as some hundred of
+/// them.
+pub(super) const PARALLEL_PLACES: usize = 512;
+
+/// How many places for bricks a table may have for each box.
+const PLACES: u64 = 64;
+
+/// Cells by the bricks that hold them: by stacks of bricks, each from below.
+pub(super) type ByBrick = Vec<(BrickPos, LatticeBox)>;
+
+/// Cells that a change reaches.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reached {
+    /// Where the change is along x, in bricks. The cells lie there, or in the bricks next to it.
+    pub home_x: i32,
+    pub cells: LatticeBox,
+}
+
+/// The bricks that hold cells of these boxes, each with the box around its own of them. Boxes must be sorted by `home_x`.
+pub(super) fn by_brick(boxes: &[Reached]) -> ByBrick {
+    let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return ByBrick::new() };
+    let slabs = first.home_x - 1..=last.home_x + 1;
+    if boxes.len() < PARALLEL_PLACES {
+        return within(slabs, boxes);
+    }
+    let slab = |x: i32| {
+        let from = boxes.partition_point(|reached| reached.home_x < x - 1);
+        let end = boxes.partition_point(|reached| reached.home_x <= x + 1);
+        within(x..=x, &boxes[from..end])
+    };
+    slabs.into_par_iter().map(slab).collect::<Vec<_>>().concat()
+}
+
+/// Those of the bricks whose x lies in a range.
+fn within(xs: RangeInclusive<i32>, boxes: &[Reached]) -> ByBrick {
+    let bricks_of = |cells: &LatticeBox| {
+        let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
+        LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
+    };
+    let Some(all) = boxes.iter().filter_map(|reached| bricks_of(&reached.cells)).reduce(LatticeBox::union)
+    else {
+        return ByBrick::new();
+    };
+    // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
+    let size = all.size();
+    let is_dense = all.volume() <= PLACES * boxes.len() as u64;
+    let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
+    let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
+    let mut found = ByBrick::with_capacity(boxes.len() * 4);
+    let mut enter = |brick: IVec3, cells: LatticeBox| {
+        let number = if is_dense {
+            let at = brick - all.min;
+            &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize]
+        } else {
+            index.entry(BrickPos(brick)).or_default()
+        };
+        if *number == 0 {
+            found.push((BrickPos(brick), cells));
+            *number = found.len() as u32;
+        } else {
+            let own = &mut found[*number as usize - 1].1;
+            *own = own.union(cells);
+        }
+    };
+    for Reached { cells, .. } in boxes {
+        let Some(bricks) = bricks_of(cells) else { continue };
+        // Of the cells, those from a brick's first to its last.
+        let own = |brick: i32, low: i32, high: i32| (low.max(brick * 8), high.min(brick * 8 + 7));
+        for x in bricks.min.x..=bricks.max.x {
+            let (low_x, high_x) = own(x, cells.min.x, cells.max.x);
+            for z in bricks.min.z..=bricks.max.z {
+                let (low_z, high_z) = own(z, cells.min.z, cells.max.z);
+                for y in bricks.min.y..=bricks.max.y {
+                    let (low_y, high_y) = own(y, cells.min.y, cells.max.y);
+                    let (min, max) = (IVec3::new(low_x, low_y, low_z), IVec3::new(high_x, high_y, high_z));
+                    enter(IVec3::new(x, y, z), LatticeBox { min, max });
+                }
+            }
+        }
+    }
+    if is_dense {
+        let numbers = table.iter().filter(|&&number| number != 0);
+        return numbers.map(|&number| found[number as usize - 1]).collect();
+    }
+    found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use fastrand::Rng;
+
+    use super::*;
+
+    /// The same, brick by brick.
+    fn naive(boxes: &[Reached]) -> ByBrick {
+        let mut all: BTreeMap<_, (BrickPos, LatticeBox)> = BTreeMap::new();
+        for Reached { cells, .. } in boxes {
+            for brick in BrickPos::covering(*cells) {
+                let own = brick.samples().intersection(*cells).expect("covered");
+                let place = (brick.0.x, brick.0.z, brick.0.y);
+                all.entry(place).and_modify(|all| all.1 = all.1.union(own)).or_insert((brick, own));
+            }
+        }
+        all.into_values().collect()
+    }
+
+    fn sorted(mut boxes: Vec<Reached>) -> Vec<Reached> {
+        boxes.sort_by_key(|reached| reached.home_x);
+        boxes
+    }
+
+    #[test]
+    fn many_boxes_are_sorted_like_few() {
+        let mut rng = Rng::with_seed(5);
+        for (count, homes, height) in
+            [(40, 3, 30), (PARALLEL_PLACES, 1, 40), (700, 4, 20), (900, 60, 2000), (2000, 9, 90)]
+        {
+            let reached = |rng: &mut Rng| {
+                let home_x = rng.i32(-homes..homes);
+                let along = |rng: &mut Rng, low: i32, high: i32| {
+                    let (a, b) = (rng.i32(low..=high), rng.i32(low..=high));
+                    (a.min(b), a.max(b))
+                };
+                // From two cells below a brick to one above.
+                let x = along(rng, home_x * 8 - 2, home_x * 8 + 8);
+                let (y, z) = (along(rng, -height, height), along(rng, -30, 30));
+                let (y, z) = ((y.0, y.1.min(y.0 + 10)), (z.0, z.1.min(z.0 + 10)));
+                let cells = LatticeBox { min: IVec3::new(x.0, y.0, z.0), max: IVec3::new(x.1, y.1, z.1) };
+                Reached { home_x, cells }
+            };
+            let boxes = sorted((0..count).map(|_| reached(&mut rng)).collect());
+            assert!(by_brick(&boxes) == naive(&boxes), "{count} boxes at {homes} homes");
+        }
+    }
+
+    /// One box at each home alone reaches beside it; all others are in the way of nobody.
+    #[test]
+    fn cells_beside_their_home_are_found_in_every_slab() {
+        let point =
+            |home_x: i32, x: i32, y: i32| Reached { home_x, cells: LatticeBox::point(IVec3::new(x, y, 4)) };
+        for home in 2..8 {
+            for beside in [home * 8 - 2, home * 8 - 1, home * 8 + 8] {
+                // The others at the same home, or at the ones at both ends.
+                for others in [[home; 2], [2, 7]] {
+                    let others =
+                        others.into_iter().flat_map(|at| (0..400).map(move |y| point(at, at * 8 + 3, y)));
+                    let boxes = sorted(others.chain([point(home, beside, 900)]).collect());
+                    assert!(boxes.len() >= PARALLEL_PLACES);
+                    let found = by_brick(&boxes);
+                    assert!(found == naive(&boxes), "{beside} of {home}");
+                    let own = BrickPos::of(IVec3::new(beside, 900, 4));
+                    assert!(found.iter().any(|(brick, _)| *brick == own), "{beside} of {home}");
+                }
+            }
+        }
+    }
+}

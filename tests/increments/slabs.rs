@@ -1,0 +1,111 @@
+//! Transactions so large that threads share what is cheap for each brick: slabs of bricks along x, batches of edits. They
+//! make what small ones make, which share nothing.
+
+use std::sync::Arc;
+
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::World;
+use glam::Vec3;
+
+use crate::bits::mesh_bits;
+
+/// A ground, and what is done to it, transaction by transaction.
+struct Script {
+    ground: Arc<Ground>,
+    chunk_size: u32,
+    transactions: Vec<Vec<Brush>>,
+}
+
+impl Script {
+    /// Plays it twice: each transaction at once, and in parts of so many brushes. At least so many bricks are edited by the
+    /// first one.
+    fn check(&self, part: usize, bricks: usize, what: &str) {
+        let settings = TerrainSettings { chunk_size: self.chunk_size, ..Default::default() };
+        let [mut once, mut parted] =
+            [0, 1].map(|_| Terrain::new(Arc::clone(&self.ground), &settings).expect("valid settings"));
+        for (number, brushes) in self.transactions.iter().enumerate() {
+            let what = format!("{what}, transaction {number}");
+            let receipts = once.apply(brushes);
+            let parts = brushes.chunks(part).flat_map(|brushes| parted.apply(brushes));
+            assert_eq!(counted(&receipts), counted(&parts.collect::<Vec<_>>()), "{what}");
+            let edited = once.world().bricks().count();
+            assert!(edited >= bricks, "{what}: {edited} bricks are few");
+            assert_same(once.world(), parted.world(), &what);
+        }
+    }
+}
+
+/// What each brush changed, by its own count.
+fn counted(receipts: &[Receipt]) -> Vec<Applied> {
+    let counts = |receipt: &Receipt| {
+        let applied = receipt.outcome.clone().expect("every brush reaches the world");
+        // Of scenarios, part by part, fields know more.
+        Applied { chunks: Vec::new(), ..applied }
+    };
+    receipts.iter().map(counts).collect()
+}
+
+fn assert_same(once: &World, parted: &World, what: &str) {
+    assert_eq!(once.hash(), parted.hash(), "{what}: hash");
+    assert_eq!(once.mask().len(), parted.mask().len(), "{what}: mask");
+    let mut others = parted.drawn();
+    for (drawn, mesh) in once.drawn() {
+        let (other, theirs) = others.next().expect("as many meshes");
+        assert_eq!(drawn, other, "{what}");
+        assert!(mesh_bits(&mesh) == mesh_bits(&theirs), "{what}: mesh of {drawn:?}");
+    }
+    assert!(others.next().is_none(), "{what}: as many meshes");
+    let report = once.check_seams();
+    assert!(report.is_flawless(), "{what}: {report}");
+}
+
+fn at(x: i32, y: f32, z: i32) -> Vec3 {
+    Vec3::new(x as f32, y, z as f32)
+}
+
+#[test]
+fn more_bricks_than_one_thread_looks_at_are_drawn_as_few_are() {
+    // Balls one beside the other, from the first slab of bricks to the last; their ends lie everywhere in a brick.
+    for (shift, chunk_size) in [(0, 32), (3, 25)] {
+        let height = |x: i32, z: i32| 20.0 + f64::from(x * 7 % 11 + z * 5 % 13) * 0.4;
+        let ground = Ground::from_fn(226, 190, height).expect("finite heights");
+        let centers: Vec<(i32, i32)> =
+            (0..13).flat_map(|i| (0..11).map(move |k| (10 + shift + 17 * i, 11 + 17 * k))).collect();
+        let balls = |y: f32, brush: &dyn Fn(Shape, usize) -> Brush| -> Vec<Brush> {
+            let ball = |(i, &(x, z)): (usize, &(i32, i32))| {
+                brush(Shape::sphere(at(x, y, z), 2.0 + (i % 4) as f32), i)
+            };
+            centers.iter().enumerate().map(ball).collect()
+        };
+        let script = Script {
+            ground: ground.into(),
+            chunk_size,
+            transactions: vec![
+                balls(22.0, &|shape, _| Brush::dig(shape)),
+                balls(24.0, &|shape, i| Brush::add(shape, MaterialId(i as u8 % 7))),
+                balls(21.0, &|shape, i| Brush::paint(shape, MaterialId(i as u8 % 5))),
+                balls(19.0, &|shape, i| {
+                    if i % 3 == 0 { Brush::smooth(shape, 1.0) } else { Brush::dig(shape) }
+                }),
+            ],
+        };
+        script.check(6, 600, &format!("moved by {shift}"));
+    }
+}
+
+#[test]
+fn more_bricks_than_one_batch_holds_are_what_few_are() {
+    // Pillars of air that together are one hall of ten thousand bricks; some come out at the surface.
+    let height = |x: i32, z: i32| 39.0 + f64::from(x * z % 5) * 0.3;
+    let ground = Ground::from_fn(268, 268, height).expect("finite heights");
+    let half = Vec3::new(18.0, 36.0, 18.0);
+    let pillar = |i: i32| {
+        let center = at(22 + i % 7 * 37, (i % 3 * 4) as f32 - 3.0, 22 + i / 7 * 37);
+        Brush::dig(Shape::cuboid(center, half))
+    };
+    let ball = |i: i32| Brush::add(Shape::sphere(at(20 + 40 * i, 0.0, 130), 6.0), MaterialId(3));
+    let mut brushes: Vec<Brush> = (0..49).map(pillar).collect();
+    brushes.extend((0..6).map(ball));
+    let script = Script { ground: ground.into(), chunk_size: 32, transactions: vec![brushes] };
+    script.check(1, 8192 + 1, "a hall");
+}
