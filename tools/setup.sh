@@ -99,7 +99,7 @@ add_component() {
 
 # What is told at the end of many tests, of which some had nothing to run on.
 tell_skipped() {
-    if ! has nvidia-smi && { [ "$(uname -s)" != Linux ] || ! { has "${CXX:-c++}" || has g++ || has clang++; }; }; then
+    if ! nvidia-smi -L >/dev/null 2>&1 && { [ "$(uname -s)" != Linux ] || ! { has "${CXX:-c++}" || has g++ || has clang++; }; }; then
         say '*** SKIPPED: CUDA kernels were not tested: neither a card nor, on Linux, a C++ compiler (g++) for the emulator ***'
     fi
     if [ "$(uname -s)" = Linux ] && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && ! has_vulkan_driver; then

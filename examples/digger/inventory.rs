@@ -22,6 +22,7 @@ use crate::landscape::{CONCRETE, MATERIALS, NewGame, name};
 use crate::phase::Phase;
 use crate::player::Playing;
 use crate::settings::Settings;
+use crate::toughness;
 
 /// Tags from here on belong to the hand. Brushes of scripts have others, and cost nothing.
 pub const FIRST: u64 = 1 << 32;
@@ -262,7 +263,10 @@ impl Plugin for InventoryPlugin {
             .add_systems(
                 Update,
                 // Steps that were collected in this frame may be answered in it.
-                (await_steps, enter_receipts, enter_history).chain().after(BurrowSystems::Commit),
+                (await_steps, enter_receipts, enter_history)
+                    .chain()
+                    .after(BurrowSystems::Commit)
+                    .after(toughness::explain),
             )
             .add_systems(Update, step_through_history.in_set(Playing).run_if(in_state(Phase::Playing)));
     }

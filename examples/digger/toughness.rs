@@ -30,7 +30,7 @@ impl Plugin for ToughnessPlugin {
     }
 }
 
-fn explain(mut receipts: MessageReader<BrushApplied>, mut hints: MessageWriter<Hint>) {
+pub fn explain(mut receipts: MessageReader<BrushApplied>, mut hints: MessageWriter<Hint>) {
     for BrushApplied { receipt, .. } in receipts.read().filter(|answer| answer.receipt.tag >= FIRST) {
         let Ok(applied) = &receipt.outcome else { continue };
         let refused = &applied.refused;

@@ -174,9 +174,10 @@ fn letter(press: &KeyboardInput) -> Option<char> {
     }
 }
 
-/// The camera stands still while the panel has pointer or keyboard.
+/// The camera stands still while the panel has pointer or keyboard, and while Control makes commands of its keys.
 fn hold_camera(
     input: Res<PanelInput>,
+    keys: Res<ButtonInput<KeyCode>>,
     mouse: Res<ButtonInput<MouseButton>>,
     mut cameras: Query<&mut FreeCameraState>,
 ) {
@@ -184,7 +185,8 @@ fn hold_camera(
         // A look around that began outside goes on over the panel.
         let goes_on =
             camera.enabled && mouse.pressed(MouseButton::Right) && !mouse.just_pressed(MouseButton::Right);
-        camera.enabled = goes_on || !input.has_pointer && !input.has_keyboard;
+        let is_command = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+        camera.enabled = goes_on || !input.has_pointer && !input.has_keyboard && !is_command;
     }
 }
 

@@ -13,7 +13,8 @@
 //!
 //! For each brush a line with what became of it, then fields, memory, and the hash of the world: a client that got the
 //! same brushes in the same order has the same one. With `--per-tick` brushes go in batches, as they would from players;
-//! the hash does not depend on that.
+//! the hash does not depend on that, but for scripts with steps: a step undoes a batch. From standard input each brush is a
+//! batch of its own.
 //!
 //! | file | subject |
 //! | --- | --- |
@@ -65,7 +66,8 @@ pub struct Options {
 
 fn ticks(text: &str) -> Result<f64, String> {
     let ticks: f64 = text.parse().map_err(|error| format!("{error}"))?;
-    if (0.0..=1000.0).contains(&ticks) { Ok(ticks) } else { Err("it is not within 0 to 1000".into()) }
+    let is_known = ticks == 0.0 || (0.001..=1000.0).contains(&ticks);
+    if is_known { Ok(ticks) } else { Err("it is neither 0 nor within 0.001 to 1000".into()) }
 }
 
 fn main() -> ExitCode {
@@ -79,6 +81,10 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
+    app(&options, source, terrain).run().report()
+}
+
+fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
     let period = Duration::try_from_secs_f64(1.0 / options.ticks).unwrap_or(Duration::ZERO);
     let mut app = App::new();
     app.add_plugins(MinimalPlugins.set(ScheduleRunnerPlugin::run_loop(period)))
@@ -87,7 +93,7 @@ fn main() -> ExitCode {
     ledger::add(&mut app, options.quiet);
     script::add(&mut app, source);
     app.world_mut().spawn(terrain);
-    app.run().report()
+    app
 }
 
 /// Hills in chunks, not touched yet.
@@ -95,4 +101,41 @@ fn terrain(options: &Options) -> Result<Terrain> {
     let noise = NoiseHeights { seed: 4, amplitude: 40.0, scale: 180.0, octaves: 5, ..default() };
     let ground = Ground::from_noise(options.side, options.side, &noise)?;
     Ok(Terrain::new(ground, &TerrainSettings { chunk_size: options.chunk, voxel_size: 1.0 })?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_undoes_the_batch_before_it_however_fast_that_was() {
+        let line = |i: u32| {
+            let (x, z) = (8 + i % 4 * 12, 8 + i / 4 * 14);
+            format!("{{\"shape\":\"sphere\",\"center\":[{x},0,{z}],\"radius\":16,\"op\":\"dig\"}}\n")
+        };
+        let place = std::env::temp_dir().join(format!("bevy_burrow_server_{}.jsonl", std::process::id()));
+        let script = (0..12).map(line).collect::<String>() + "{\"undo\":true}\n";
+        std::fs::write(&place, script).unwrap();
+        let words = ["server", "--quiet", "--side", "64", "--script"].map(std::ffi::OsStr::new);
+        let options = Options::parse_from(words.into_iter().chain([place.as_os_str()]));
+
+        let shapes = |i: u32| Vec3::new((8 + i % 4 * 12) as f32, 0.0, (8 + i / 4 * 14) as f32);
+        let mut expected = terrain(&options).unwrap();
+        let receipts = expected.apply((0..8).map(|i| Brush::dig(Shape::sphere(shapes(i), 16.0))));
+        let dug = |receipt: &Receipt| receipt.outcome.as_ref().is_ok_and(|own| own.removed.total() > 0);
+        assert!(receipts.iter().filter(|receipt| dug(receipt)).count() > 4);
+        for _ in 0..3 {
+            let source = script::open(&options).unwrap();
+            let mut app = app(&options, source, terrain(&options).unwrap());
+            app.finish();
+            app.cleanup();
+            while app.should_exit().is_none() {
+                app.update();
+            }
+            let world = app.world_mut();
+            let played = world.query::<&Terrain>().single(world).unwrap();
+            assert_eq!(played.world().hash(), expected.world().hash());
+        }
+        std::fs::remove_file(place).unwrap();
+    }
 }

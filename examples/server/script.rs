@@ -14,8 +14,9 @@ use bevy_burrow::prelude::*;
 use crate::Options;
 use crate::brush_lines::{Line, Lines};
 use crate::ledger::Ledger;
+use crate::output::complain;
 
-/// Brushes that wait for the ground at most before others are sent, and lines that wait to be sent.
+/// Lines that wait to be sent, at most.
 const MOST_WAITING: usize = 1024;
 
 /// How long nothing is done where there is nothing to do.
@@ -111,15 +112,16 @@ fn send(
     mut exit: MessageWriter<AppExit>,
 ) {
     let source = &mut *source;
-    // Who sends faster than the ground is dug waits, or memory would fill with what waits.
-    let is_full = terrains.iter().any(|terrain| terrain.queued() >= MOST_WAITING);
-    let due = if is_full { 0 } else { source.per_tick };
+    // A transaction is what goes in with one tick, or what a step undoes would depend on how fast the server is.
     let is_idle = terrains.iter().all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
+    if !is_idle || ledger.answered < source.sent {
+        return;
+    }
+    let (before, due) = (source.sent, source.due());
     for _ in 0..due {
         source.look();
-        // A step is no part of a batch: what it undoes should not depend on how fast the server is.
         let is_step = matches!(source.next, Some(Ok(Line::Undo | Line::Redo)));
-        if is_step && !(is_idle && ledger.answered >= source.sent) {
+        if is_step && source.sent > before {
             break;
         }
         match source.next.take() {
@@ -135,7 +137,7 @@ fn send(
                 }
             }
             Some(Err(error)) => {
-                eprintln!("{error}");
+                complain(format_args!("{error}"));
                 ledger.faults += 1;
             }
             None => break,
@@ -144,7 +146,7 @@ fn send(
             break;
         }
     }
-    if source.next.is_some() || !is_idle || ledger.answered < source.sent {
+    if source.next.is_some() || source.sent > before {
         return;
     }
     match source.feed {
@@ -160,6 +162,12 @@ fn send(
 }
 
 impl Source {
+    /// Lines of one tick, at most. Of those that come as somebody says them each is one of its own: how many are there by
+    /// now is chance.
+    fn due(&self) -> u64 {
+        if matches!(self.feed, Feed::Coming(_)) { 1 } else { self.per_tick }
+    }
+
     /// Takes the next line, if none is taken and there is one by now.
     fn look(&mut self) {
         if self.next.is_some() {

@@ -10,8 +10,13 @@ pub fn say(line: Arguments<'_>) {
         Ok(()) => {}
         Err(error) if error.kind() == ErrorKind::BrokenPipe => process::exit(0),
         Err(error) => {
-            eprintln!("standard output: {error}");
+            complain(format_args!("standard output: {error}"));
             process::exit(1);
         }
     }
+}
+
+/// Writes a line on standard error, if anybody reads that.
+pub fn complain(line: Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "{line}");
 }

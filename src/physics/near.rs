@@ -64,10 +64,15 @@ type Stop = (Vec2, f32);
 /// The largest stops, by which others may be covered: a crowd has thousands that are all alike, and cover none.
 const LARGEST: usize = 16;
 
+/// The far corner of a grid's columns, in voxels.
+fn end(grid: ChunkGrid) -> Vec2 {
+    let (width, depth) = grid.tile_counts();
+    Vec2::new(width as f32, depth as f32) * grid.size() as f32
+}
+
 /// Does a stop reach all of a grid?
 fn reaches_all(grid: ChunkGrid, (place, radius): Stop) -> bool {
-    let (width, depth) = grid.tile_counts();
-    let end = Vec2::new(width as f32, depth as f32) * grid.size() as f32;
+    let end = end(grid);
     place.abs().max((place - end).abs()).length() <= radius
 }
 
@@ -76,12 +81,14 @@ fn covers((large, radius): Stop, (place, small): Stop) -> bool {
     large == place && radius >= small || large.distance(place) + 1.0 <= radius - small
 }
 
-/// The stops that no other one covers.
-fn uncovered(stops: &[Stop]) -> Vec<Stop> {
-    let mut sorted = stops.to_vec();
-    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+/// The stops that no other one covers. Where some reach all of the grid, those.
+fn uncovered(grid: ChunkGrid, mut stops: Vec<Stop>) -> Vec<Stop> {
+    if stops.iter().any(|&stop| reaches_all(grid, stop)) {
+        stops.retain(|&stop| reaches_all(grid, stop));
+    }
+    stops.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<Stop> = Vec::new();
-    for stop in sorted {
+    for stop in stops {
         if !kept.iter().take(LARGEST).any(|&large| covers(large, stop)) {
             kept.push(stop);
         }
@@ -94,12 +101,10 @@ fn uncovered(stops: &[Stop]) -> Vec<Stop> {
 fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
     let stride = grid.size() as f32;
     // Not every hair's breadth of a move is news; where all of the ground is near, not even another voxel is, and what is
-    // ahead is near already.
-    let middle = (from / stride).floor() * stride + stride / 2.0;
-    let home = if radius.is_finite() { middle } else { Vec2::ZERO };
-    let all = (home, radius + 1.0);
-    if reaches_all(grid, all) {
-        return vec![all];
+    // ahead is near already. How much farther it would reach says nothing: what is nearest comes first.
+    let home = (from / stride).floor() * stride + stride / 2.0;
+    if reaches_all(grid, (home, radius + 1.0)) {
+        return vec![(home.clamp(Vec2::ZERO, end(grid)), end(grid).length() + 1.0)];
     }
     let count = (way.length() / stride).ceil();
     let apart = way / count.max(1.0);
@@ -112,6 +117,7 @@ fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
 #[derive(Debug)]
 struct Area {
     grid: ChunkGrid,
+    /// None of them is covered by another one.
     stops: Vec<Stop>,
     /// Is all of the ground within a source's radius?
     is_all: bool,
@@ -125,7 +131,7 @@ impl Area {
         let (size, (width, depth)) = (grid.size() as f32, grid.tile_counts());
         let mut columns = FxHashMap::default();
         let is_all = stops.iter().any(|&stop| reaches_all(grid, stop));
-        for (place, radius) in uncovered(&stops) {
+        for &(place, radius) in &stops {
             let reach = radius + size;
             let (low, high) = ((place - reach) / size - 1.0, (place + reach) / size);
             let (low, high) = (low.floor().as_ivec2().max(IVec2::ZERO), high.floor().as_ivec2());
@@ -215,8 +221,9 @@ pub(super) fn find_near(
             let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
             all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), (radius / size).max(own)));
         }
-        let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == all);
-        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, all)));
+        let stops = uncovered(grid, all);
+        let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
+        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));
         near.0.insert(terrain, area);
     }
     if !near.is(&known) {
@@ -261,21 +268,30 @@ mod tests {
                     stops.push((place, radius * rng.f32()));
                 }
             }
-            skipped += stops.len() - uncovered(&stops).len();
-            let area = Area::new(grid(), stops);
-            assert_eq!(area.columns, distances(grid(), &area.stops));
-            assert!(!area.is_all || area.columns.values().all(|&distance| distance <= 0.0));
+            let kept = uncovered(grid(), stops.clone());
+            skipped += stops.len() - kept.len();
+            let (area, expected) = (Area::new(grid(), kept), distances(grid(), &stops));
+            if area.is_all {
+                assert!(area.columns.len() == expected.len() && area.columns.values().all(|&own| own <= 0.0));
+            } else {
+                assert_eq!(area.columns, expected);
+            }
         }
         assert!(skipped > 1000, "{skipped}");
     }
 
     #[test]
-    fn a_source_that_reaches_all_ground_is_news_only_in_another_column_and_an_endless_one_never() {
+    fn a_source_that_reaches_all_ground_is_news_only_in_another_column() {
         let grid = grid();
         let at = |x: f32, radius: f32| stops(grid, Vec2::new(x, 50.0), Vec2::X * 200.0, radius);
-        let endless = at(10.0, f32::INFINITY);
-        assert_eq!(endless, at(-4000.0, f32::INFINITY));
-        assert!(Area::new(grid, endless).columns.values().all(|&distance| distance == f32::NEG_INFINITY));
+        // However far an endless one reaches, what is nearest to it comes first.
+        let endless = Area::new(grid, at(10.0, f32::INFINITY));
+        let [near, far] = [0, 9].map(|x| endless.columns[&TilePos { x, z: 3 }]);
+        assert!(endless.is_all && near < far && far <= 0.0, "{near} {far}");
+        assert_eq!(at(-4000.0, f32::INFINITY), at(-5000.0, f32::INFINITY));
+        // Whoever else moves is no news then.
+        let among = |x: f32| uncovered(grid, [at(10.0, f32::INFINITY), at(x, 20.0)].concat());
+        assert_eq!(among(150.0), among(40.0));
 
         let large = at(81.0, 300.0);
         assert_eq!(large.len(), 1);

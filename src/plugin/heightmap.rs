@@ -104,10 +104,18 @@ impl Plugin for HeightmapPlugin {
     }
 }
 
+/// The asset and its loader are registered.
+#[derive(Resource)]
+struct Registered;
+
 /// Does nothing without an asset server, or the second time.
 fn register(app: &mut App) {
     let world = app.world();
-    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<HeightmapImage>>() {
-        app.init_asset::<HeightmapImage>().init_asset_loader::<HeightmapLoader>();
+    if world.contains_resource::<AssetServer>() && !world.contains_resource::<Registered>() {
+        // A game may have told of the asset by itself.
+        if !world.contains_resource::<Assets<HeightmapImage>>() {
+            app.init_asset::<HeightmapImage>();
+        }
+        app.insert_resource(Registered).init_asset_loader::<HeightmapLoader>();
     }
 }

@@ -43,7 +43,7 @@ pub(super) fn collect_brushes(
             let grid = terrain.world().grid();
             match Edit::quantize(&local) {
                 Ok(edit) if edit.reach().intersection(grid.edit_bounds()).is_some() => {
-                    terrain.submit_edit(&edit);
+                    terrain.submit_quantized(edit);
                     is_answered = true;
                 }
                 Ok(_) => {}
@@ -166,7 +166,7 @@ pub(super) fn answer_with_terrain(
     commands.queue(move |_: &mut World| free_later(world));
 }
 
-/// The history of a terrain that nobody can take up again is freed in a task, too.
+/// The history of a terrain that is despawned, and so can't be taken up again, is freed in a task, too.
 pub(super) fn free_history(gone: On<Despawn, Terrain>, mut terrains: Query<&mut Terrain>) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         free_later(terrain.rebudget_undo(0));

@@ -9,7 +9,7 @@
 //! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
 //! On [`LooseGround`], [`LoosePieceFound`] tells what a brush cut off.
 //!
-//! What a game puts on the terrain's entity goes for all that is drawn below it: a `MeshMaterial3d`, [`RenderLayers`], and,
+//! What a game puts on the terrain's entity goes for its tiles, chunks and pieces: a `MeshMaterial3d`, [`RenderLayers`], and,
 //! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. Bevy asks each mesh for its own, so new tiles,
 //! chunks and [`GroundPiece`]s get the terrain's, and follow as it is put on, changed and taken off.
 //!

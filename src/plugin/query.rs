@@ -108,11 +108,16 @@ impl Terrains<'_, '_> {
     /// answers whose surface is nearest along its y.
     pub fn material(&self, place: Vec3) -> Option<MaterialId> {
         let (terrain, affine) = self.nearest(place)?;
-        Some(terrain.world().material_under(affine.inverse().transform_point3(place).as_dvec3()))
+        let local = affine.inverse().transform_point3(place).as_dvec3();
+        terrain.world().height(local.x, local.z).map(|_| terrain.world().material_under(local))
     }
 
-    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one.
+    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one. Where there
+    /// is only one terrain that is it, whether it is there or not.
     fn nearest(&self, place: Vec3) -> Option<(&Terrain, Affine3A)> {
+        if let Ok((_, terrain, at, _)) = self.terrains.single() {
+            return Some((terrain, at.affine()));
+        }
         let over = self.terrains.iter().filter_map(|(entity, terrain, at, _)| {
             let affine = at.affine();
             let local = affine.inverse().transform_point3(place).as_dvec3();

@@ -33,7 +33,7 @@ fn bounds(shape: &Shape) -> Option<(Vec3, Vec3)> {
 
 /// Half the sides of a box around a turned one.
 fn turned(half: Vec3, rotation: Quat) -> Vec3 {
-    if !rotation.is_normalized() {
+    if !half.is_finite() || !rotation.is_normalized() {
         return Vec3::splat(half.length());
     }
     let turn = Mat3::from_quat(rotation);
@@ -81,6 +81,8 @@ mod tests {
             assert_eq!(reaches(&Shape::sphere(at, radius), grid), Some(true));
         }
         assert_eq!(reaches(&Shape::sphere(at * 1e9, 3.0), grid), Some(false));
+        let endless = Shape::turned_cuboid(at - 500.0, Vec3::new(f32::INFINITY, 1.0, 1.0), Quat::IDENTITY);
+        assert_eq!(reaches(&endless, grid), Some(true));
         for place in [f32::NAN, f32::INFINITY] {
             let shape = Shape::capsule(at, Vec3::splat(place), 2.0);
             assert_eq!(reaches(&shape, grid).is_none(), place.is_nan());

@@ -24,12 +24,12 @@ impl Indices {
     /// Vertices of a mesh that has indices of 16 bits at most. One index is left free: in strips it would mean a new start.
     pub const MOST_SHORT: usize = u16::MAX as usize;
 
-    /// These indices, for a mesh of so many vertices.
+    /// These indices, for a mesh of so many vertices. One that no 16 bits hold stays as it is, though no vertex has it.
     pub fn new(vertices: usize, list: Vec<u32>) -> Self {
-        if vertices <= Self::MOST_SHORT {
-            Self::U16(list.into_iter().map(|index| index as u16).collect())
-        } else {
-            Self::U32(list)
+        let short = || list.iter().map(|&index| u16::try_from(index).ok()).collect();
+        match (vertices <= Self::MOST_SHORT).then(short).flatten() {
+            Some(short) => Self::U16(short),
+            None => Self::U32(list),
         }
     }
 

@@ -202,6 +202,12 @@ impl Terrain {
         self.queue_edit(edit.tag(), edit.check().map(|()| edit.clone()));
     }
 
+    /// Queues an edit that was made of a brush, and so is valid.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn submit_quantized(&mut self, edit: Edit) {
+        self.queue_edit(edit.tag(), Ok(edit));
+    }
+
     fn queue_edit(&mut self, tag: u64, edit: Result<Edit, BrushError>) {
         self.queue.push_back(Request::Edit(Submission { tag, edit }));
     }

@@ -48,6 +48,7 @@ fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
 /// From a page to the menu, and from the pause's menu to the game.
 fn go_back(
     keys: Res<ButtonInput<KeyCode>>,
+    mouse: Res<ButtonInput<MouseButton>>,
     pads: Query<&Gamepad>,
     actions: Res<Actions>,
     now: (Res<State<Phase>>, Res<State<Page>>),
@@ -56,7 +57,9 @@ fn go_back(
 ) {
     let presses = |button: GamepadButton| pads.iter().any(|pad| pad.just_pressed(button));
     // What chooses an item does nothing but that here, though it may be bound to the pause.
-    let chooses = keys.any_just_pressed(ui::CHOOSE) || presses(GamepadButton::South);
+    let chooses = keys.any_just_pressed(ui::CHOOSE)
+        || presses(GamepadButton::South)
+        || mouse.just_pressed(MouseButton::Left);
     let back = keys.just_pressed(KeyCode::Escape)
         || actions.just_pressed(Action::Pause) && !chooses
         || presses(GamepadButton::East);

@@ -142,7 +142,7 @@ impl Outbox {
     }
 
     /// Room for so many entries, of a list that will be long or not; says whether there was too little. What was in it is
-    /// gone then. Where memory ran out, all stays as large as it was.
+    /// gone then. Where memory ran out, it is as large as it was or, on the device, not there until there is some again.
     pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
         self.is_long = is_long;
         let is_short = entries > self.capacity() as usize;
@@ -151,7 +151,7 @@ impl Outbox {
         }
         // Kernels count in 32 bits. What the host has room for says nothing of the device, which may have much less.
         let room = (entries + entries / 4).clamp(self.first, u32::MAX as usize);
-        let own = if self.is_own() { Some(device.alloc(room * self.entry)?) } else { None };
+        let own = if self.is_own() { Some(self.alloc_own(device, room)?) } else { None };
         if room > self.capacity {
             match device.alloc_host(room * self.entry) {
                 Ok(host) => (self.host, self.capacity, self.stale) = (host, room, room),
@@ -169,6 +169,19 @@ impl Outbox {
             device.free(former);
         }
         Ok(is_short)
+    }
+
+    /// A list on the device. Where there is no room for it beside the one that it takes the place of, that one goes first.
+    fn alloc_own(&mut self, device: &mut dyn Device, room: usize) -> Result<u64, Fault> {
+        match device.alloc(room * self.entry) {
+            Err(Fault::Memory(_)) if self.own.is_some() => {
+                if let Some((former, _)) = self.own.take() {
+                    device.free(former);
+                }
+                device.alloc(room * self.entry)
+            }
+            allocated => allocated,
+        }
     }
 
     /// Where kernels write.

@@ -100,16 +100,18 @@ fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_fo
 }
 
 #[test]
-fn a_list_that_can_not_grow_stays_as_it_is() {
+fn a_list_makes_room_for_itself_and_one_that_can_not_grow_does_not_ask_for_the_same_again() {
     let mut device = Tight::new(10_000, 1 << 20);
     let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
-    let (asked, address) = (device.asked.len(), list.address());
+    // No room for both.
+    assert_eq!(list.reserve(&mut device, 2000, true), Ok(true));
+    assert_eq!((list.capacity(), device.held()), (2500, vec![10_000]));
     assert_eq!(list.reserve(&mut device, 4000, true), Err(Fault::Memory(20_000)));
-    assert_eq!((list.capacity(), list.address(), device.held()), (1250, address, vec![5000]));
-    // And does what it did before, without asking again.
-    assert_eq!(list.reserve(&mut device, 1250, true), Ok(false));
-    assert_eq!(device.asked.len(), asked + 1);
+    assert_eq!((list.capacity(), device.held()), (0, vec![]));
+    // And does what it did before.
+    assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
+    assert_eq!((list.capacity(), device.held()), (1250, vec![5000]));
     assert_eq!(list.fetch(&mut device, 1250), Ok(true));
     assert_eq!(list.entries::<u32>(1250).len(), 1250);
 }
