@@ -3,6 +3,19 @@
 use super::*;
 use crate::landscape::{CLAY, GOLD, GRASS, ROCK};
 
+fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, InventoryPlugin))
+        .init_resource::<Actions>()
+        .init_resource::<Settings>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_message::<HistoryMoved>()
+        .add_message::<BrushApplied>()
+        .add_message::<Hint>();
+    app
+}
+
 fn terrain() -> Terrain {
     let grass_on_rock = ColumnMaterial { base: ROCK, overlay: GRASS, blend: 255 };
     let ground = Ground::from_fn(64, 64, |x, z| 20.0 + f64::from(x + z) * 0.1)
@@ -186,15 +199,7 @@ fn what_is_owed_is_paid_off_first_and_where_building_is_free_nothing_is() {
 
 #[test]
 fn who_begins_to_owe_is_told_once() {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, InventoryPlugin))
-        .init_resource::<Actions>()
-        .init_resource::<Settings>()
-        .add_message::<Undo>()
-        .add_message::<Redo>()
-        .add_message::<HistoryMoved>()
-        .add_message::<BrushApplied>()
-        .add_message::<Hint>();
+    let mut app = app();
     let mut terrain = terrain();
     let told = [15.0, 30.0].map(|x| {
         let tag = app.world_mut().resource_mut::<Inventory>().tag();
@@ -307,16 +312,8 @@ fn a_brush_before_an_undo_is_what_it_takes_back() {
 
 #[test]
 fn a_step_is_awaited_until_it_is_answered() {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, InventoryPlugin))
-        .init_resource::<Actions>()
-        .init_resource::<Settings>()
-        .add_message::<Undo>()
-        .add_message::<Redo>()
-        .add_message::<HistoryMoved>()
-        .add_message::<BrushApplied>()
-        .add_message::<Hint>()
-        .insert_resource(after(&[100], &[-70]));
+    let mut app = app();
+    app.insert_resource(after(&[100], &[-70]));
     let free = |app: &mut App| {
         app.update();
         app.world().resource::<Inventory>().free(ROCK)

@@ -81,19 +81,25 @@ fn covers((large, radius): Stop, (place, small): Stop) -> bool {
     large == place && radius >= small || large.distance(place) + 1.0 <= radius - small
 }
 
-/// The stops that no other one covers. Where some reach all of the grid, those.
-fn uncovered(grid: ChunkGrid, mut stops: Vec<Stop>) -> Vec<Stop> {
-    if stops.iter().any(|&stop| reaches_all(grid, stop)) {
-        stops.retain(|&stop| reaches_all(grid, stop));
-    }
-    stops.sort_by(|a, b| b.1.total_cmp(&a.1));
+/// The stops that no other one covers.
+fn uncovered(stops: &[Stop]) -> Vec<Stop> {
+    let mut sorted = stops.to_vec();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<Stop> = Vec::new();
-    for stop in stops {
+    for stop in sorted {
         if !kept.iter().take(LARGEST).any(|&large| covers(large, stop)) {
             kept.push(stop);
         }
     }
     kept
+}
+
+/// Where some stops reach all of a grid, those: the others add nothing to them, and are no news.
+fn telling(grid: ChunkGrid, mut stops: Vec<Stop>) -> Vec<Stop> {
+    if stops.iter().any(|&stop| reaches_all(grid, stop)) {
+        stops.retain(|&stop| reaches_all(grid, stop));
+    }
+    stops
 }
 
 /// Where a source that is at `from` and goes this `way` wants ground within a `radius`, in voxels: here, and ahead, in one
@@ -117,7 +123,6 @@ fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
 #[derive(Debug)]
 struct Area {
     grid: ChunkGrid,
-    /// None of them is covered by another one.
     stops: Vec<Stop>,
     /// Is all of the ground within a source's radius?
     is_all: bool,
@@ -131,7 +136,7 @@ impl Area {
         let (size, (width, depth)) = (grid.size() as f32, grid.tile_counts());
         let mut columns = FxHashMap::default();
         let is_all = stops.iter().any(|&stop| reaches_all(grid, stop));
-        for &(place, radius) in &stops {
+        for (place, radius) in uncovered(&stops) {
             let reach = radius + size;
             let (low, high) = ((place - reach) / size - 1.0, (place + reach) / size);
             let (low, high) = (low.floor().as_ivec2().max(IVec2::ZERO), high.floor().as_ivec2());
@@ -221,7 +226,7 @@ pub(super) fn find_near(
             let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
             all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), (radius / size).max(own)));
         }
-        let stops = uncovered(grid, all);
+        let stops = telling(grid, all);
         let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
         let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));
         near.0.insert(terrain, area);
@@ -268,9 +273,9 @@ mod tests {
                     stops.push((place, radius * rng.f32()));
                 }
             }
-            let kept = uncovered(grid(), stops.clone());
-            skipped += stops.len() - kept.len();
-            let (area, expected) = (Area::new(grid(), kept), distances(grid(), &stops));
+            skipped += stops.len() - uncovered(&stops).len();
+            let (area, expected) =
+                (Area::new(grid(), telling(grid(), stops.clone())), distances(grid(), &stops));
             if area.is_all {
                 assert!(area.columns.len() == expected.len() && area.columns.values().all(|&own| own <= 0.0));
             } else {
@@ -290,7 +295,7 @@ mod tests {
         assert!(endless.is_all && near < far && far <= 0.0, "{near} {far}");
         assert_eq!(at(-4000.0, f32::INFINITY), at(-5000.0, f32::INFINITY));
         // Whoever else moves is no news then.
-        let among = |x: f32| uncovered(grid, [at(10.0, f32::INFINITY), at(x, 20.0)].concat());
+        let among = |x: f32| telling(grid, [at(10.0, f32::INFINITY), at(x, 20.0)].concat());
         assert_eq!(among(150.0), among(40.0));
 
         let large = at(81.0, 300.0);

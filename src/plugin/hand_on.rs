@@ -1,4 +1,5 @@
-//! What a terrain hands on: Bevy asks the entity of each mesh for its layers and shadows, and not that of the terrain.
+//! What a terrain hands on to its tiles and chunks: Bevy asks the entity of each mesh for its material, layers and shadows,
+//! and not that of the terrain.
 
 use bevy::camera::visibility::RenderLayers;
 #[cfg(feature = "render")]
@@ -8,54 +9,98 @@ use bevy::prelude::*;
 use super::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
-/// Has layers and shadows handed on.
+/// Has layers and shadows handed on, to pieces too.
 pub(super) fn add(app: &mut App) {
-    app.add_systems(Update, hand_on::<RenderLayers>.in_set(BurrowSystems::Dress));
+    add_with_pieces::<RenderLayers>(app);
     #[cfg(feature = "render")]
+    {
+        add_with_pieces::<NotShadowCaster>(app);
+        add_with_pieces::<NotShadowReceiver>(app);
+    }
+}
+
+fn add_with_pieces<C: Component + Clone>(app: &mut App) {
+    hand_on::<C>(app);
     app.add_systems(
         Update,
-        (hand_on::<NotShadowCaster>, hand_on::<NotShadowReceiver>).in_set(BurrowSystems::Dress),
+        (take_from_pieces::<C>, give_to_pieces::<C>).chain().in_set(BurrowSystems::Dress),
+    );
+}
+
+/// Has tiles and chunks wear a component of their terrain, as it is put on, changed and taken off; pieces do not.
+pub(crate) fn hand_on<C: Component + Clone>(app: &mut App) {
+    app.add_systems(
+        Update,
+        (take::<C>, give_to_new::<C>, give_to_all::<C>).chain().in_set(BurrowSystems::Dress),
     );
 }
 
 /// A tile or chunk.
 type Drawn = Or<(With<Tile>, With<Chunk>)>;
 
-/// What is there is given what a terrain has got or changed, and what is new what it has. A piece that comes with its own
-/// keeps that, until the terrain's changes.
-fn hand_on<C: Component + Clone>(
+/// A tile or chunk that just came.
+type New = (Drawn, Or<(Added<Tile>, Added<Chunk>)>);
+
+fn take<C: Component>(
     mut commands: Commands,
     mut removed: RemovedComponents<C>,
-    terrains: Query<(Entity, Ref<C>), With<Terrain>>,
-    bare: Query<(), (With<Terrain>, Without<C>)>,
-    children: Query<&Children>,
+    terrains: Query<&Children, (With<Terrain>, Without<C>)>,
     drawn: Query<(), Drawn>,
-    pieces: Query<(Entity, &GroundPiece)>,
-    new: Query<(Entity, &ChildOf), (Drawn, Or<(Added<Tile>, Added<Chunk>)>)>,
-    new_pieces: Query<(Entity, &GroundPiece), (Added<GroundPiece>, Without<C>)>,
 ) {
-    let parts_of = |terrain: Entity| -> Vec<Entity> {
-        let below = children.get(terrain).into_iter().flatten().copied();
-        let own = pieces.iter().filter(|(_, piece)| piece.terrain == terrain);
-        below.filter(|&child| drawn.contains(child)).chain(own.map(|(piece, _)| piece)).collect()
-    };
+    for children in removed.read().filter_map(|entity| terrains.get(entity).ok()) {
+        for child in children.iter().filter(|&child| drawn.contains(child)) {
+            commands.entity(child).try_remove::<C>();
+        }
+    }
+}
+
+fn give_to_new<C: Component + Clone>(
+    mut commands: Commands,
+    new: Query<(Entity, &ChildOf), New>,
+    terrains: Query<&C, With<Terrain>>,
+) {
+    for (entity, parent) in &new {
+        if let Ok(own) = terrains.get(parent.parent()) {
+            commands.entity(entity).try_insert(own.clone());
+        }
+    }
+}
+
+fn give_to_all<C: Component + Clone>(
+    mut commands: Commands,
+    terrains: Query<(&C, &Children), (With<Terrain>, Changed<C>)>,
+    drawn: Query<(), Drawn>,
+) {
+    for (own, children) in &terrains {
+        for child in children.iter().filter(|&child| drawn.contains(child)) {
+            commands.entity(child).try_insert(own.clone());
+        }
+    }
+}
+
+fn take_from_pieces<C: Component>(
+    mut commands: Commands,
+    mut removed: RemovedComponents<C>,
+    bare: Query<(), (With<Terrain>, Without<C>)>,
+    pieces: Query<(Entity, &GroundPiece)>,
+) {
     for terrain in removed.read().filter(|&entity| bare.contains(entity)) {
-        for part in parts_of(terrain) {
-            commands.entity(part).try_remove::<C>();
+        for (piece, _) in pieces.iter().filter(|(_, piece)| piece.terrain == terrain) {
+            commands.entity(piece).try_remove::<C>();
         }
     }
-    if terrains.is_empty() {
-        return;
-    }
-    let newly = new.iter().map(|(part, parent)| (part, parent.parent()));
-    for (part, terrain) in newly.chain(new_pieces.iter().map(|(part, piece)| (part, piece.terrain))) {
-        if let Ok((_, own)) = terrains.get(terrain) {
-            commands.entity(part).try_insert(C::clone(&own));
-        }
-    }
-    for (terrain, own) in terrains.iter().filter(|(_, own)| own.is_changed()) {
-        for part in parts_of(terrain) {
-            commands.entity(part).try_insert(C::clone(&own));
+}
+
+/// A piece that comes with its own keeps that, until the terrain's changes.
+fn give_to_pieces<C: Component + Clone>(
+    mut commands: Commands,
+    pieces: Query<(Entity, Ref<GroundPiece>, Has<C>)>,
+    terrains: Query<Ref<C>, With<Terrain>>,
+) {
+    for (entity, piece, has_own) in &pieces {
+        let Ok(own) = terrains.get(piece.terrain) else { continue };
+        if own.is_changed() || piece.is_added() && !has_own {
+            commands.entity(entity).try_insert(C::clone(&own));
         }
     }
 }

@@ -33,20 +33,15 @@ pub struct TerrainReady {
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
-    voxel_size: f32,
     task: Option<Task<Vec<Fresh>>>,
     waiting: Vec<Fresh>,
     ready: HashMap<Drawn, Loaded>,
 }
 
 impl Loading {
-    /// Are these meshes of this terrain, whatever the game did to it since? As far as that can be told: of two terrains on
-    /// the same ground the one that was dug less may pass for the other.
+    /// Are these meshes of this terrain, whatever the game did to it since?
     fn is_of(&self, terrain: &Terrain) -> bool {
-        let (world, now) = (&*self.world, terrain.world());
-        std::ptr::eq(world.ground(), now.ground())
-            && (self.voxel_size, world.grid()) == (terrain.voxel_size(), now.grid())
-            && world.revision() <= now.revision()
+        self.world.version().is_same_world(terrain.world().version())
     }
 }
 
@@ -150,7 +145,7 @@ pub(super) fn start_loading(
             AsyncComputeTaskPool::get()
                 .spawn(async move { make_all(&world, &workshop, (entity, voxel_size)) })
         });
-        let loading = Loading { world, voxel_size, task, waiting: Vec::new(), ready: HashMap::default() };
+        let loading = Loading { world, task, waiting: Vec::new(), ready: HashMap::default() };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -213,7 +208,7 @@ pub(super) fn finish_loading(
         if let Some(old) = old {
             old.despawn(&mut commands, children);
         }
-        let entities = show(&mut commands, entity, &mut loading);
+        let entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
         let is_current = entities.show(terrain.world());
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
         // What the game changed meanwhile loads next.
@@ -224,9 +219,13 @@ pub(super) fn finish_loading(
 }
 
 /// Spawns tiles, chunks and fields of a world that has loaded.
-fn show(commands: &mut Commands, terrain: Entity, loading: &mut Loading) -> TerrainEntities {
+fn show(
+    commands: &mut Commands,
+    (terrain, voxel_size): (Entity, f32),
+    loading: &mut Loading,
+) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
-    let mut entities = TerrainEntities::new(world.version(), loading.voxel_size);
+    let mut entities = TerrainEntities::new(world.version(), voxel_size);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     for drawn in world.grid().tiles().map(Drawn::Tile).chain(chunks.into_iter().map(Drawn::Chunk)) {

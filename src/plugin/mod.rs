@@ -39,6 +39,8 @@ pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, tell};
+#[cfg(feature = "render")]
+pub(crate) use hand_on::hand_on;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };

@@ -83,6 +83,14 @@ pub struct Version {
     revision: u64,
 }
 
+impl Version {
+    /// Is it the same world, whatever was committed to it in between?
+    #[cfg(feature = "plugin")]
+    pub(crate) fn is_same_world(self, other: Self) -> bool {
+        self.lineage == other.lineage
+    }
+}
+
 impl fmt::Debug for World {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("World")

@@ -37,8 +37,7 @@ use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
-use super::material::hand_on;
-use crate::plugin::BurrowSystems;
+use crate::plugin::{BurrowSystems, hand_on};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -54,7 +53,8 @@ impl Plugin for GroundPlugin {
             return;
         }
         embedded_asset!(app, "ground.wgsl");
-        hand_on::<GroundMaterial>(app);
+        // Pieces have one of their own, which knows where they were in the ground.
+        hand_on::<MeshMaterial3d<GroundMaterial>>(app);
         keep_materials(app);
         app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
             .add_systems(Update, textures::load_textures.before(dress).after(BurrowSystems::Begin));

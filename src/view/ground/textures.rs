@@ -63,12 +63,12 @@ pub struct GroundLoading {
     /// What was odd about them.
     misfit: Option<Misfit>,
     /// What those who watch for changes know.
-    told: News,
+    told: Answers,
 }
 
 /// What can be asked of [`GroundLoading`].
 #[derive(Clone, Debug, Default, PartialEq)]
-struct News {
+struct Answers {
     progress: f32,
     is_ready: bool,
     failure: Option<String>,
@@ -111,9 +111,9 @@ impl GroundLoading {
         self.failure.as_ref()
     }
 
-    fn news(&self) -> News {
+    fn answers(&self) -> Answers {
         let failure = self.failure().map(ToString::to_string);
-        News { progress: self.progress(), is_ready: self.is_ready(), failure }
+        Answers { progress: self.progress(), is_ready: self.is_ready(), failure }
     }
 
     /// Remembers why images are not used, and tells it once.
@@ -139,9 +139,9 @@ pub(super) fn load_textures(
     let unseen = loading.bypass_change_detection();
     unseen.proceed(&settings, &looks, &mut images, server.as_deref(), features);
     // Whoever watches it for changes is told of what can be asked.
-    let news = loading.news();
-    if loading.told != news {
-        loading.told = news;
+    let answers = loading.answers();
+    if loading.told != answers {
+        loading.told = answers;
     }
 }
 
