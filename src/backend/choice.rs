@@ -115,9 +115,16 @@ pub(super) struct Load {
 impl Load {
     /// What edits are to do, as if the card had all bricks.
     pub fn of_edits(work: &EditWork) -> Self {
-        let jobs = work.jobs();
-        let count =
-            |is: fn(&Tool) -> bool| jobs.iter().filter(|job| is(&work.tools[job.edit as usize])).count();
+        let (jobs, tools) = (work.jobs(), &work.tools);
+        // Mostly all edits are of one kind, and jobs are many.
+        let count = |is: fn(&Tool) -> bool| match tools.iter().filter(|tool| is(tool)).count() {
+            0 => 0,
+            all if all == tools.len() => jobs.len(),
+            _ => {
+                let is: Vec<bool> = tools.iter().map(is).collect();
+                jobs.iter().filter(|job| is[job.edit as usize]).count()
+            }
+        };
         Self {
             amount: jobs.len(),
             rough: count(|tool| tool.evaluator.is_rough()),

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::Compute;
 use crate::surface::block::{Block, Mesher, Parts};
+use crate::surface::fresh::{FreshParts, PartLists};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 
@@ -32,7 +33,14 @@ impl Compute for Cpu {
         work.run(each);
     }
 
-    fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts])) {
+    fn mesh(
+        &self,
+        view: &WorldView,
+        blocks: &[Block],
+        meanwhile: &(dyn Fn() + Sync),
+        then: &mut dyn FnMut(&dyn FreshParts),
+    ) {
+        meanwhile();
         if blocks.len() >= PARALLEL_BLOCKS {
             // Meshed into memory that is there already, and copied out as large as it has to be.
             let copy = |blocks: &&[Block]| {
@@ -42,13 +50,13 @@ impl Compute for Cpu {
                 copy
             };
             let parts: Vec<Parts> = groups(blocks).par_iter().map(copy).collect();
-            then(&parts);
+            then(&PartLists::new(&parts));
             // Freeing many lists takes its time.
             parts.into_par_iter().for_each(drop);
             return;
         }
         let parts = [mesh(view, blocks)];
-        then(&parts);
+        then(&PartLists::new(&parts));
         let [parts] = parts;
         keep(parts);
     }

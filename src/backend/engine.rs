@@ -9,7 +9,8 @@ use web_time::Instant;
 
 use super::{Backend, Choice, Compute, Cpu, Stage};
 use crate::ground::{Ground, GroundError, NoiseHeights};
-use crate::surface::block::{Block, Parts};
+use crate::surface::block::Block;
+use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 
@@ -179,25 +180,30 @@ impl Compute for Shared {
         self.remember(choice);
     }
 
-    fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts])) {
+    fn mesh(
+        &self,
+        view: &WorldView,
+        blocks: &[Block],
+        meanwhile: &(dyn Fn() + Sync),
+        then: &mut dyn FnMut(&dyn FreshParts),
+    ) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Mesh, blocks.len()));
         let mut took = Duration::ZERO;
-        let mut then = |parts: &[Parts]| {
+        let mut then = |parts: &dyn FreshParts| {
             took = start.elapsed();
             then(parts);
         };
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let (parts, load) = cuda.mesh(view, blocks, &mut choice);
-            match parts {
-                Some(parts) => then(&parts),
-                None => Cpu.mesh(view, blocks, &mut then),
+            let (is_done, load) = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
+            if !is_done {
+                Cpu.mesh(view, blocks, meanwhile, &mut then);
             }
             choice.took = took;
             cuda.learn(&choice, load);
             return self.remember(choice);
         }
-        Cpu.mesh(view, blocks, &mut then);
+        Cpu.mesh(view, blocks, meanwhile, &mut then);
         choice.took = took;
         self.remember(choice);
     }

@@ -24,7 +24,8 @@ pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
 pub use engine::{Engine, EngineFigures, EngineState};
 
-use crate::surface::block::{Block, Parts};
+use crate::surface::block::Block;
+use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 
@@ -47,7 +48,13 @@ pub(crate) trait Compute: Send + Sync {
     /// several.
     fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger));
 
-    /// Meshes blocks. `then` is called once and gets their parts, in the order of the blocks, in one list or several;
-    /// their memory is used again afterwards.
-    fn mesh(&self, view: &WorldView, blocks: &[Block], then: &mut dyn FnMut(&[Parts]));
+    /// Meshes blocks. `meanwhile` is called when there is time for other things, maybe more than once; it should only set them
+    /// going. `then` is called once and gets the surfaces, by the numbers of the blocks; their memory is used again afterwards.
+    fn mesh(
+        &self,
+        view: &WorldView,
+        blocks: &[Block],
+        meanwhile: &(dyn Fn() + Sync),
+        then: &mut dyn FnMut(&dyn FreshParts),
+    );
 }

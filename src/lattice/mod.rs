@@ -15,11 +15,13 @@
 mod boxes;
 mod grid;
 pub(crate) mod hash;
+mod pieces;
 mod places;
 mod tables;
 
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
+pub(crate) use pieces::pieces;
 pub(crate) use places::{order_of_places, sort_by_place};
 pub(crate) use tables::table_bytes;
 

@@ -1,22 +1,17 @@
-//! Sorting by place: what lies in a box of grid positions is counted into order, without comparing.
-
-use rayon::prelude::*;
+//! Sorting by place, on one thread: what lies in a box of grid positions is counted into order, without comparing.
 
 /// How many places the box around all items may have for each of them.
 const PLACES: u64 = 16;
 
-/// From how many items on sorts are spread over threads.
-const PARALLEL: usize = 2048;
-
 /// Sorts items by their positions, by the first number, then the second, then the third; equal ones stay in order.
-pub(crate) fn sort_by_place<T: Copy + Sync>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3] + Sync) {
+pub(crate) fn sort_by_place<T: Copy>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3]) {
     if !items.is_sorted_by_key(&place) {
         *items = order_of_places(items, place).into_iter().map(|item| items[item as usize]).collect();
     }
 }
 
 /// The numbers of items as [`sort_by_place`] would sort them.
-pub(crate) fn order_of_places<T: Sync>(items: &[T], place: impl Fn(&T) -> [i32; 3] + Sync) -> Vec<u32> {
+pub(crate) fn order_of_places<T>(items: &[T], place: impl Fn(&T) -> [i32; 3]) -> Vec<u32> {
     let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
     for at in items.iter().map(&place) {
         (0..3).for_each(|i| (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i])));
@@ -31,12 +26,7 @@ pub(crate) fn order_of_places<T: Sync>(items: &[T], place: impl Fn(&T) -> [i32; 
         });
     }
     let mut order: Vec<u32> = (0..items.len() as u32).collect();
-    let key = |&item: &u32| place(&items[item as usize]);
-    if items.len() < PARALLEL {
-        order.sort_by_key(key)
-    } else {
-        order.par_sort_by_key(key)
-    }
+    order.sort_by_key(|&item| place(&items[item as usize]));
     order
 }
 

@@ -35,6 +35,11 @@ impl Mask {
         self.0.get(&word).is_some_and(|bits| bits & bit != 0)
     }
 
+    /// Without cells, and with room for so many words.
+    pub(crate) fn with_room(words: usize) -> Self {
+        Self(FxHashMap::with_capacity_and_hasher(words, Default::default()))
+    }
+
     /// Puts in 8x8 cells at once: bit `z * 8 + x` is the cell (8 `word.0` + x, 8 `word.1` + z).
     pub(crate) fn insert_word(&mut self, word: (i32, i32), cells: u64) {
         if cells != 0 {

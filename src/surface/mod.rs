@@ -15,9 +15,12 @@ pub mod cases;
 mod corners;
 mod crossings;
 pub mod dense;
+pub(crate) mod fresh;
 pub mod indices;
 pub mod mask;
 pub mod mesh;
+#[cfg(feature = "cuda")]
+mod packed;
 pub mod plain;
 pub mod seams;
 mod stack;

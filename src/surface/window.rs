@@ -35,17 +35,7 @@ impl<'a> Window<'a> {
     pub fn moved<'b>(self, view: &SampleView<'b>, places: LatticeBox) -> Window<'b> {
         let mut window = Window { low: places.min, size: places.size(), bricks: emptied(self.bricks) };
         window.bricks.resize(places.volume() as usize, None);
-        for table in view.tables() {
-            // Newer tables come later; what they hold stands over what older ones do.
-            if table.len() < window.bricks.len() {
-                let near = table.iter().filter(|(pos, _)| places.contains(pos.0));
-                near.for_each(|(&pos, brick)| window.put(pos, brick));
-            } else {
-                for pos in places.points().map(BrickPos) {
-                    table.get(&pos).into_iter().for_each(|brick| window.put(pos, brick));
-                }
-            }
-        }
+        view.for_bricks(places, |pos, brick| window.put(pos, brick));
         window
     }
 
@@ -126,13 +116,40 @@ mod tests {
         let ground = Ground::flat(8, 8, 0.0).unwrap();
         let many: Vec<[i32; 3]> = (0..200).map(|i| [i % 7 - 3, i % 5 - 2, i % 11 - 4]).collect();
         let (old, new) = (bricks(&many, 1), bricks(&[[0, 0, 0], [1, -1, 2], [90, 0, 0]], 2));
-        let view = SampleView::new(&ground, &old).over(&new);
-        for (low, high) in [([0; 3], [0; 3]), ([-2, -1, 0], [1, 1, 4]), ([-9; 3], [9; 3])] {
+        let latest = bricks(&[[0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 2, 3], [1, -1, 2], [90, 0, 0]], 3);
+        let mut list: Vec<_> = latest.iter().map(|(&pos, brick)| (pos, brick.as_ref())).collect();
+        list.sort_by_key(|(pos, _)| (pos.0.x, pos.0.z, pos.0.y));
+        let view = SampleView::new(&ground, &old).over(&new).under(&list);
+        let boxes = [([0; 3], [0; 3]), ([-2, -1, 0], [1, 1, 4]), ([-9; 3], [9; 3]), ([-1, 2, 0], [90, 2, 3])];
+        for (low, high) in boxes {
             let places = LatticeBox { min: IVec3::from_array(low), max: IVec3::from_array(high) };
             let window = Window::new(&view, places);
             for pos in places.points().map(BrickPos) {
                 let seen = window.at(window.place(pos)).map(std::ptr::from_ref);
                 assert_eq!(seen, view.brick(pos).map(std::ptr::from_ref), "{pos:?}");
+                let stands = latest.get(&pos).or_else(|| new.get(&pos)).or_else(|| old.get(&pos));
+                assert_eq!(seen, stands.map(Arc::as_ptr), "{pos:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn so_it_does_under_a_long_list() {
+        let (ground, none) = (Ground::flat(8, 8, 0.0).unwrap(), Bricks::default());
+        let mut rng = fastrand::Rng::with_seed(4);
+        let point = |rng: &mut fastrand::Rng| IVec3::new(rng.i32(-9..9), rng.i32(-30..30), rng.i32(-9..9));
+        let stored: Bricks =
+            (0..900).map(|i| (BrickPos(point(&mut rng)), Arc::new(Brick::of_edited(&[i; 512])))).collect();
+        let mut list: Vec<_> = stored.iter().map(|(&pos, brick)| (pos, brick.as_ref())).collect();
+        list.sort_by_key(|(pos, _)| (pos.0.x, pos.0.z, pos.0.y));
+        let view = SampleView::new(&ground, &none).under(&list);
+        for _ in 0..300 {
+            let (a, b) = (point(&mut rng), point(&mut rng));
+            let places = LatticeBox { min: a.min(b), max: a.max(b).min(a.min(b) + 12) };
+            let window = Window::new(&view, places);
+            for pos in places.points().map(BrickPos) {
+                let seen = window.at(window.place(pos)).map(std::ptr::from_ref);
+                assert_eq!(seen, stored.get(&pos).map(Arc::as_ptr), "{pos:?} of {places:?}");
             }
         }
     }

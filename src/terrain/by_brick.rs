@@ -1,7 +1,8 @@
 //! Boxes of cells, sorted into the bricks that hold them.
 //!
 //! What changes in a brick shows in cells of the bricks beside it too. Of many boxes, threads take a slab of bricks each, as
-//! thick as one brick along x: all cells that lie in it belong to boxes that are at home there or one brick beside it.
+//! thick as one brick along x: all cells that lie in it belong to boxes that are at home there or one brick beside it. What
+//! they find is shared out again in pieces, so that few long slabs are work for many threads as well.
 //!
 //! ```text
 //! home_x           3         4         5         6
@@ -21,7 +22,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::lattice::{BrickPos, LatticeBox};
+use crate::lattice::{BrickPos, LatticeBox, pieces};
 
 /// From how many bricks on what is cheap for each is spread over threads: waking these takes as long as some hundred of
 /// them.
@@ -30,48 +31,94 @@ pub(super) const PARALLEL_PLACES: usize = 512;
 /// How many places for bricks a table may have for each box.
 const PLACES: u64 = 64;
 
+/// From how many bricks on a piece ends with its stack.
+const PIECE: usize = 128;
+
+/// A brick and cells of it.
+pub(super) type OfBrick = (BrickPos, LatticeBox);
+
 /// Cells by the bricks that hold them: by stacks of bricks, each from below.
-pub(super) type ByBrick = Vec<(BrickPos, LatticeBox)>;
+#[derive(Debug, Default)]
+pub(super) struct ByBrick {
+    /// One after the other, cut between stacks.
+    slabs: Vec<Vec<OfBrick>>,
+}
 
 /// Cells that a change reaches.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reached {
     /// Where the change is along x, in bricks. The cells lie there, or in the bricks next to it.
     pub home_x: i32,
-    pub cells: LatticeBox,
+    /// `None` where it reaches nothing.
+    pub cells: Option<LatticeBox>,
 }
 
-/// The bricks that hold cells of these boxes, each with the box around its own of them. Boxes must be sorted by `home_x`.
-pub(super) fn by_brick(boxes: &[Reached]) -> ByBrick {
-    let (Some(first), Some(last)) = (boxes.first(), boxes.last()) else { return ByBrick::new() };
-    let slabs = first.home_x - 1..=last.home_x + 1;
-    if boxes.len() < PARALLEL_PLACES {
-        return within(slabs, boxes);
+impl ByBrick {
+    /// The bricks that hold cells which changes reach, each with the box around its own of them. Changes must be sorted by
+    /// where they are at home.
+    pub fn new<T: Sync>(changes: &[T], reached: impl Fn(&T) -> Reached + Sync) -> Self {
+        let (Some(first), Some(last)) = (changes.first(), changes.last()) else { return Self::default() };
+        let home_x = |change: &T| reached(change).home_x;
+        let slabs = home_x(first) - 1..=home_x(last) + 1;
+        let boxes = |changes: &[T]| changes.iter().filter_map(|change| reached(change).cells).collect();
+        if changes.len() < PARALLEL_PLACES {
+            return Self { slabs: vec![within(slabs, boxes(changes))] };
+        }
+        let slab = |x: i32| {
+            let from = changes.partition_point(|change| home_x(change) < x - 1);
+            let end = changes.partition_point(|change| home_x(change) <= x + 1);
+            within(x..=x, boxes(&changes[from..end]))
+        };
+        Self { slabs: slabs.into_par_iter().map(slab).collect() }
     }
-    let slab = |x: i32| {
-        let from = boxes.partition_point(|reached| reached.home_x < x - 1);
-        let end = boxes.partition_point(|reached| reached.home_x <= x + 1);
-        within(x..=x, &boxes[from..end])
-    };
-    slabs.into_par_iter().map(slab).collect::<Vec<_>>().concat()
+
+    /// How many bricks.
+    pub fn len(&self) -> usize {
+        self.slabs.iter().map(Vec::len).sum()
+    }
+
+    /// Collects what `work` makes of all stacks, in order; side by side where there are many. It gets several whole stacks
+    /// at a time.
+    pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
+        if self.len() < PARALLEL_PLACES {
+            let mut found = Vec::with_capacity(self.len());
+            self.slabs.iter().for_each(|slab| work(slab, &mut found));
+            return found;
+        }
+        let pieces: Vec<&[OfBrick]> =
+            self.slabs.iter().flat_map(|slab| pieces(slab, PIECE, is_same_stack)).collect();
+        let of_piece = |piece: &&[OfBrick]| {
+            let mut found = Vec::with_capacity(piece.len());
+            work(piece, &mut found);
+            found
+        };
+        pieces.par_iter().map(of_piece).collect::<Vec<_>>().concat()
+    }
 }
 
-/// Those of the bricks whose x lies in a range.
-fn within(xs: RangeInclusive<i32>, boxes: &[Reached]) -> ByBrick {
+/// The place of the stack that a brick belongs to.
+pub(super) fn place((brick, _): &OfBrick) -> (i32, i32) {
+    (brick.0.x, brick.0.z)
+}
+
+/// Do both bricks belong to the same stack?
+pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
+    place(a) == place(b)
+}
+
+/// Those of the bricks that hold cells of boxes whose x lies in a range.
+fn within(xs: RangeInclusive<i32>, boxes: Vec<LatticeBox>) -> Vec<OfBrick> {
     let bricks_of = |cells: &LatticeBox| {
         let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
         LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
     };
-    let Some(all) = boxes.iter().filter_map(|reached| bricks_of(&reached.cells)).reduce(LatticeBox::union)
-    else {
-        return ByBrick::new();
-    };
+    let Some(all) = boxes.iter().filter_map(bricks_of).reduce(LatticeBox::union) else { return Vec::new() };
     // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
     let size = all.size();
     let is_dense = all.volume() <= PLACES * boxes.len() as u64;
     let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
     let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
-    let mut found = ByBrick::with_capacity(boxes.len() * 4);
+    let mut found: Vec<OfBrick> = Vec::with_capacity(boxes.len() * 4);
     let mut enter = |brick: IVec3, cells: LatticeBox| {
         let number = if is_dense {
             let at = brick - all.min;
@@ -87,7 +134,7 @@ fn within(xs: RangeInclusive<i32>, boxes: &[Reached]) -> ByBrick {
             *own = own.union(cells);
         }
     };
-    for Reached { cells, .. } in boxes {
+    for cells in &boxes {
         let Some(bricks) = bricks_of(cells) else { continue };
         // Of the cells, those from a brick's first to its last.
         let own = |brick: i32, low: i32, high: i32| (low.max(brick * 8), high.min(brick * 8 + 7));
@@ -107,6 +154,7 @@ fn within(xs: RangeInclusive<i32>, boxes: &[Reached]) -> ByBrick {
         let numbers = table.iter().filter(|&&number| number != 0);
         return numbers.map(|&number| found[number as usize - 1]).collect();
     }
+    found.shrink_to_fit();
     found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
     found
 }
@@ -119,12 +167,30 @@ mod tests {
 
     use super::*;
 
+    /// All of them, one after the other.
+    fn by_brick(changes: &[Reached]) -> Vec<OfBrick> {
+        let found = ByBrick::new(changes, |&reached| reached);
+        let all = found.slabs.concat();
+        assert_eq!(found.len(), all.len());
+        assert!(found.collect(|stacks, all| all.extend_from_slice(stacks)) == all);
+        // A stack is given to one thread.
+        let mut places = found.collect(|stacks, all| {
+            let mut own: Vec<_> = stacks.iter().map(place).collect();
+            own.dedup();
+            all.append(&mut own);
+        });
+        let count = places.len();
+        places.dedup();
+        assert_eq!(places.len(), count);
+        all
+    }
+
     /// The same, brick by brick.
-    fn naive(boxes: &[Reached]) -> ByBrick {
-        let mut all: BTreeMap<_, (BrickPos, LatticeBox)> = BTreeMap::new();
-        for Reached { cells, .. } in boxes {
-            for brick in BrickPos::covering(*cells) {
-                let own = brick.samples().intersection(*cells).expect("covered");
+    fn naive(changes: &[Reached]) -> Vec<OfBrick> {
+        let mut all: BTreeMap<_, OfBrick> = BTreeMap::new();
+        for cells in changes.iter().filter_map(|reached| reached.cells) {
+            for brick in BrickPos::covering(cells) {
+                let own = brick.samples().intersection(cells).expect("covered");
                 let place = (brick.0.x, brick.0.z, brick.0.y);
                 all.entry(place).and_modify(|all| all.1 = all.1.union(own)).or_insert((brick, own));
             }
@@ -154,7 +220,7 @@ mod tests {
                 let (y, z) = (along(rng, -height, height), along(rng, -30, 30));
                 let (y, z) = ((y.0, y.1.min(y.0 + 10)), (z.0, z.1.min(z.0 + 10)));
                 let cells = LatticeBox { min: IVec3::new(x.0, y.0, z.0), max: IVec3::new(x.1, y.1, z.1) };
-                Reached { home_x, cells }
+                Reached { home_x, cells: (rng.u8(..) > 9).then_some(cells) }
             };
             let boxes = sorted((0..count).map(|_| reached(&mut rng)).collect());
             assert!(by_brick(&boxes) == naive(&boxes), "{count} boxes at {homes} homes");
@@ -164,8 +230,10 @@ mod tests {
     /// One box at each home alone reaches beside it; all others are in the way of nobody.
     #[test]
     fn cells_beside_their_home_are_found_in_every_slab() {
-        let point =
-            |home_x: i32, x: i32, y: i32| Reached { home_x, cells: LatticeBox::point(IVec3::new(x, y, 4)) };
+        let point = |home_x: i32, x: i32, y: i32| Reached {
+            home_x,
+            cells: Some(LatticeBox::point(IVec3::new(x, y, 4))),
+        };
         for home in 2..8 {
             for beside in [home * 8 - 2, home * 8 - 1, home * 8 + 8] {
                 // The others at the same home, or at the ones at both ends.

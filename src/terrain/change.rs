@@ -67,8 +67,8 @@ impl Change {
 
 /// Bytes of bricks that a world holds and that a change takes away from it. Bricks that are all alike count nothing: the
 /// world keeps one of each kind in any case.
-pub(super) fn replaced_bytes(world: &World, bricks: &[(BrickPos, Option<Arc<Brick>>)]) -> usize {
-    let replaced = bricks.iter().filter_map(|(pos, _)| world.bricks.get(pos));
+pub(super) fn replaced_bytes(world: &World, bricks: impl Iterator<Item = BrickPos>) -> usize {
+    let replaced = bricks.filter_map(|pos| world.bricks.get(&pos));
     replaced.filter(|brick| brick.uniform().is_none()).map(|brick| shared_bytes(brick)).sum()
 }
 

@@ -4,7 +4,6 @@
 //! them.
 
 use glam::IVec3;
-use rayon::prelude::*;
 
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::surface::Mask;
@@ -13,107 +12,78 @@ use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 use crate::volume::DraftedBrick;
 
-use super::by_brick::{ByBrick, PARALLEL_PLACES, Reached, by_brick};
+use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack, place};
 use super::world::World;
 
-/// The cells that changed samples show in.
-pub(super) fn dirty_cells(grid: ChunkGrid, changed: impl Iterator<Item = (BrickPos, LatticeBox)>) -> ByBrick {
+/// The cells that changed samples show in: `changed` tells the brick of each change, and the box around its samples.
+pub(super) fn dirty_cells<T: Sync>(
+    grid: ChunkGrid,
+    changes: &[T],
+    changed: impl Fn(&T) -> OfBrick + Sync,
+) -> ByBrick {
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
-    let around = |(pos, changed): (BrickPos, LatticeBox)| {
-        let cells = in_world(grid, changed.min - 2, changed.max + 1)?;
-        Some(Reached { home_x: pos.0.x, cells })
-    };
-    by_brick(&changed.filter_map(around).collect::<Vec<_>>())
+    ByBrick::new(changes, |change| {
+        let (brick, changed) = changed(change);
+        Reached { home_x: brick.0.x, cells: in_world(grid, changed.min - 2, changed.max + 1) }
+    })
 }
 
-/// The bricks of whose sheet a cell may join the mask: one that a sample edited for the first time is a corner of.
-pub(super) fn sheets_in_reach(world: &World, changed: &[DraftedBrick]) -> Vec<BrickPos> {
+/// The cells that may join the mask: those that a sample edited for the first time is a corner of.
+pub(super) fn cells_in_reach(changed: &[DraftedBrick]) -> ByBrick {
     // A sample is a corner of the cells one below it.
-    let around = |drafted: &DraftedBrick| {
+    ByBrick::new(changed, |drafted| {
         let cells = LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
-        Reached { home_x: drafted.pos.0.x, cells }
-    };
-    let boxes: Vec<_> = changed.iter().filter(|drafted| drafted.is_extended).map(around).collect();
-    let near = by_brick(&boxes);
-    if near.len() < PARALLEL_PLACES {
-        near.chunk_by(same_stack).flat_map(|stack| at_sheet(world, stack)).collect()
-    } else {
-        near.par_chunk_by(same_stack).flat_map_iter(|stack| at_sheet(world, stack)).collect()
-    }
+        Reached { home_x: drafted.pos.0.x, cells: drafted.is_extended.then_some(cells) }
+    })
+}
+
+/// Rule 2 for the sheet over some cells: the words of the mask that change. Edited samples stay edited, so cells only ever
+/// join it.
+pub(super) fn joined_mask(world: &World, view: &WorldView, near: &ByBrick) -> Mask {
+    let words = near.collect(|stacks, found| {
+        let at_sheet = stacks.chunk_by(is_same_stack).flat_map(|stack| at_sheet(world, stack));
+        let bricks: Vec<BrickPos> = at_sheet.collect();
+        let mut rest = &bricks[..];
+        while let Some((count, places)) = window::shared(rest.iter().copied()) {
+            let (near, others) = rest.split_at(count);
+            let window = Window::new(&view.samples, places);
+            for stack in near.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
+                let word = (stack[0].0.x, stack[0].0.z);
+                let before = view.mask.word(word);
+                let cells = block::disturbed(view, &window, stack, before);
+                if cells != before {
+                    found.push((word, cells));
+                }
+            }
+            rest = others;
+        }
+    });
+    let mut mask = Mask::with_room(words.len());
+    words.into_iter().for_each(|(word, cells)| mask.insert_word(word, cells));
+    mask
 }
 
 /// Those bricks of a stack that the pristine surface passes through; none where all of its cells are in the mask.
-fn at_sheet(world: &World, stack: &[(BrickPos, LatticeBox)]) -> impl Iterator<Item = BrickPos> {
+fn at_sheet(world: &World, stack: &[OfBrick]) -> impl Iterator<Item = BrickPos> {
     let is_open = world.mask.word(place(&stack[0])) != u64::MAX;
     let rows = if is_open { block::stack_sheet(&world.ground, place(&stack[0])) } else { 0..0 };
     let bricks = stack.iter().map(|&(brick, _)| brick);
     bricks.filter(move |brick| is_open && brick.origin().y < rows.end && rows.start < brick.origin().y + 8)
 }
 
-/// Rule 2 for the cells of some bricks: the words of the mask that change. Edited samples stay edited, so cells only ever
-/// join it.
-pub(super) fn joined_mask(view: &WorldView, near: &[BrickPos]) -> Mask {
-    let mut windows = Vec::new();
-    let mut rest = near;
-    while let Some((count, places)) = window::shared(rest.iter().copied()) {
-        let (bricks, others) = rest.split_at(count);
-        windows.push((bricks, places));
-        rest = others;
-    }
-    let disturbed = |&(bricks, places): &(&[BrickPos], LatticeBox)| {
-        let window = Window::new(&view.samples, places);
-        let mut found = Vec::new();
-        for stack in bricks.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
-            let word = (stack[0].0.x, stack[0].0.z);
-            let before = view.mask.word(word);
-            let cells = block::disturbed(view, &window, stack, before);
-            if cells != before {
-                found.push((word, cells));
-            }
-        }
-        found
-    };
-    let words: Vec<_> = if near.len() < PARALLEL_PLACES {
-        windows.iter().flat_map(disturbed).collect()
-    } else {
-        windows.par_iter().flat_map_iter(disturbed).collect()
-    };
-    let mut mask = Mask::default();
-    words.into_iter().for_each(|(word, cells)| mask.insert_word(word, cells));
-    mask
-}
-
 /// Every block that may draw something else than before, by stacks of bricks, each from below. A word of the mask turns
 /// only where samples change, so its cells lie in stacks that have `dirty` cells.
 pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
-    let add = |stack: &[(BrickPos, LatticeBox)], found: &mut Vec<Block>| {
-        let blocks_of = |&(brick, cells): &(BrickPos, LatticeBox)| {
-            view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
-        };
-        match sheet_near(world, view, newer, place(&stack[0])) {
-            Some(sheet) => found.extend(with_sheet(stack, sheet).iter().flat_map(blocks_of)),
-            None => found.extend(stack.iter().flat_map(blocks_of)),
+    let blocks_of =
+        |&(brick, cells): &OfBrick| view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk });
+    dirty.collect(|stacks, found| {
+        for stack in stacks.chunk_by(is_same_stack) {
+            match sheet_near(world, view, newer, place(&stack[0])) {
+                Some(sheet) => found.extend(with_sheet(stack, sheet).iter().flat_map(blocks_of)),
+                None => found.extend(stack.iter().flat_map(blocks_of)),
+            }
         }
-    };
-    if dirty.len() < PARALLEL_PLACES {
-        let mut found = Vec::with_capacity(dirty.len());
-        dirty.chunk_by(same_stack).for_each(|stack| add(stack, &mut found));
-        return found;
-    }
-    let blocks = |stack: &[(BrickPos, LatticeBox)]| {
-        let mut found = Vec::new();
-        add(stack, &mut found);
-        found
-    };
-    dirty.par_chunk_by(same_stack).flat_map_iter(blocks).collect()
-}
-
-fn place((brick, _): &(BrickPos, LatticeBox)) -> (i32, i32) {
-    (brick.0.x, brick.0.z)
-}
-
-fn same_stack(a: &(BrickPos, LatticeBox), b: &(BrickPos, LatticeBox)) -> bool {
-    place(a) == place(b)
+    })
 }
 
 /// The box from `low` to `high` as far as it lies in the world.
@@ -142,7 +112,7 @@ fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) 
 }
 
 /// The cells of a stack, and those of a box in it.
-fn with_sheet(stack: &[(BrickPos, LatticeBox)], sheet: LatticeBox) -> ByBrick {
+fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
     let mut all = stack.to_vec();
     for brick in BrickPos::covering(sheet) {
         let Some(cells) = brick.samples().intersection(sheet) else { continue };

@@ -31,6 +31,7 @@ mod redraw;
 mod settings;
 mod steps;
 mod surface;
+mod tiles;
 mod transaction;
 mod triangles;
 mod world;
@@ -43,9 +44,10 @@ pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 #[cfg(feature = "avian")]
 pub(crate) use recipe::SurfaceRecipe;
-pub use redraw::{MeshUpdates, TileUpdate};
+pub use redraw::MeshUpdates;
 pub use settings::{TerrainError, TerrainSettings};
 pub use surface::ChunkSurface;
+pub use tiles::TileUpdate;
 pub use transaction::Transaction;
 pub use world::{Drawn, Memory, Version, World};
 

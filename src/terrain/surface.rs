@@ -1,7 +1,8 @@
 //! The surface of one chunk: the parts of its blocks, assembled to one mesh.
 
 use crate::lattice::BrickPos;
-use crate::surface::{Indices, SurfaceMesh, Vertex};
+use crate::surface::fresh::FreshPart;
+use crate::surface::{Indices, SurfaceMesh};
 
 /// What marching cubes draws in one chunk: one mesh, which remembers where each block's part of it is.
 #[derive(Clone, Debug, Default)]
@@ -33,8 +34,7 @@ pub(super) fn key(brick: BrickPos) -> Key {
 #[derive(Clone, Copy)]
 pub(super) struct Fresh<'a> {
     pub key: Key,
-    pub vertices: &'a [Vertex],
-    pub indices: &'a [u16],
+    pub part: FreshPart<'a>,
 }
 
 /// Where the data of a part begins: vertices, indices.
@@ -74,9 +74,9 @@ impl ChunkSurface {
                 (parts, vertices, indices) =
                     (parts - 1, vertices - (part.vertices - vertex), indices - (part.indices - index));
             }
-            if !change.indices.is_empty() {
+            if !change.part.indices.is_empty() {
                 (parts, vertices, indices) =
-                    (parts + 1, vertices + change.vertices.len(), indices + change.indices.len());
+                    (parts + 1, vertices + change.part.vertices.len(), indices + change.part.indices.len());
             }
         }
         let mut new = Self::default();
@@ -98,13 +98,11 @@ impl ChunkSurface {
     /// Is a part other than the one with its key, or without it?
     fn differs(&self, fresh: &Fresh) -> bool {
         let Some(at) = self.find(fresh.key) else {
-            return !fresh.indices.is_empty();
+            return !fresh.part.indices.is_empty();
         };
         let ((vertex, index), part) = (self.start(at), self.parts[at]);
-        let old = &self.mesh.vertices[vertex..part.vertices];
-        old.len() != fresh.vertices.len()
-            || !old.iter().zip(fresh.vertices).all(|(old, new)| old.is_same(new))
-            || !self.mesh.indices.is_part(index..part.indices, fresh.indices, vertex)
+        !fresh.part.vertices.are_same(&self.mesh.vertices[vertex..part.vertices])
+            || !self.mesh.indices.is_part(index..part.indices, fresh.part.indices, vertex)
     }
 
     /// Appends parts of another surface as they are.
@@ -126,11 +124,11 @@ impl ChunkSurface {
     }
 
     fn add(&mut self, fresh: &Fresh) {
-        if fresh.indices.is_empty() {
+        if fresh.part.indices.is_empty() {
             return;
         }
-        self.mesh.indices.extend_from_part(fresh.indices, self.mesh.vertices.len());
-        self.mesh.vertices.extend_from_slice(fresh.vertices);
+        self.mesh.indices.extend_from_part(fresh.part.indices, self.mesh.vertices.len());
+        fresh.part.vertices.append_to(&mut self.mesh.vertices);
         let (vertices, indices) = (self.mesh.vertices.len(), self.mesh.indices.len());
         self.parts.push(Part { key: fresh.key, vertices, indices });
     }

@@ -11,11 +11,13 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use web_time::Instant;
 
+use super::by_brick::PARALLEL_PLACES;
 use super::change::{Change, replaced_bytes};
 use super::commit::{Commit, Stages};
-use super::dirty::{dirty_cells, joined_mask, sheets_in_reach};
+use super::dirty::{cells_in_reach, dirty_cells, joined_mask};
 use super::drafting::{Drafted, Drafting};
 use super::field_log::{FieldLog, FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
@@ -26,10 +28,13 @@ use super::world::World;
 use super::{Submission, Work};
 use crate::backend::{Compute, Cpu, Engine};
 use crate::brush::Edit;
-use crate::lattice::{ChunkPos, LatticeBox};
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Bricks, DiggingRules, Draft, Fields, Replaced, UniformBricks, pristine_brick};
+use crate::volume::{
+    Brick, DiggingRules, Draft, DraftedBrick, EditEffect, Fields, Replaced, UniformBricks, pristine_brick,
+    reach,
+};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.
@@ -55,15 +60,40 @@ impl fmt::Debug for Transaction {
     }
 }
 
-/// What edits come to, meshes aside.
+/// What edits come to, bricks and meshes aside.
 struct Entered {
     receipts: Vec<Receipt>,
     news: Vec<(ChunkPos, FieldNews)>,
     next_field: u64,
-    change: Change,
+    /// All fields of each chunk that a field changed in.
+    fields: Vec<(ChunkPos, Fields)>,
+    /// Words of the mask that change.
+    mask: Vec<((i32, i32), u64)>,
     /// Bytes of bricks that the change takes away from the world.
     replaced_bytes: usize,
-    uniform: UniformBricks,
+}
+
+/// From how many bricks on lists that are only copied are copied side by side.
+const LONG: usize = 1 << 13;
+
+/// Bricks as a list.
+fn latest(drafted: &[DraftedBrick]) -> Vec<(BrickPos, &Brick)> {
+    if drafted.len() < LONG {
+        drafted.iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
+    } else {
+        drafted.par_iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
+    }
+}
+
+/// What changes hold of bricks. Kept as long as history has it: no larger than it has to be.
+fn changed_bricks(drafted: Vec<DraftedBrick>) -> Vec<(BrickPos, Option<Arc<Brick>>)> {
+    let changed = |drafted: DraftedBrick| (drafted.pos, Some(drafted.brick));
+    if drafted.len() >= LONG {
+        return drafted.into_par_iter().map(changed).collect();
+    }
+    let mut bricks = Vec::with_capacity(drafted.len());
+    bricks.extend(drafted.into_iter().map(changed));
+    bricks
 }
 
 impl Transaction {
@@ -89,13 +119,28 @@ impl Transaction {
     /// result does not depend on how many those are.
     pub fn run(self) -> Commit {
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
-        let commit = match &self.work {
+        let run = || match &self.work {
             Work::Edits(submissions) => self.edit(submissions, backend),
             Work::Step(step, target) => self.step(*step, target, backend),
         };
+        // All of a large one on a thread of the pool: going there and back for each of its stages takes its time.
+        let commit = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // The terrain and this hold the world. Where others do, the commit changes a copy: better made here than there.
         let is_shared = Arc::strong_count(&self.world) > 2;
         Commit { copy: is_shared.then(|| Arc::new(World::clone(&self.world))), ..commit }
+    }
+
+    /// May it reach so many bricks that several threads will work on them?
+    fn is_large(&self) -> bool {
+        let bricks_of = |reach: LatticeBox| LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }.volume();
+        match &self.work {
+            Work::Edits(submissions) => {
+                let edits = submissions.iter().filter_map(|submission| submission.edit.as_ref().ok());
+                let bricks = edits.filter_map(|edit| reach(self.world.grid, edit)).map(bricks_of);
+                bricks.fold(0, u64::saturating_add) >= PARALLEL_PLACES as u64
+            }
+            Work::Step(_, target) => target.change.bricks.len() >= PARALLEL_PLACES,
+        }
     }
 
     fn edit(&self, submissions: &[Submission], backend: &dyn Compute) -> Commit {
@@ -108,40 +153,46 @@ impl Transaction {
                 None => drafting.together(&edits),
             }
         });
-        // Three things that do not depend on each other: new bricks as a table, cells to mesh, cells that may join the mask.
-        let (drafted, Stages { edit, meshing, ring, .. }) = (&draft.bricks, &mut stages);
-        let table = || drafted.iter().map(|drafted| (drafted.pos, Arc::clone(&drafted.brick))).collect();
-        let table = || -> Bricks { Stages::time(edit, table) };
-        let changed = || drafted.iter().map(|drafted| (drafted.pos, drafted.changed));
-        let dirty = || Stages::time(meshing, || dirty_cells(world.grid, changed()));
-        let near = || Stages::time(ring, || sheets_in_reach(world, drafted));
-        let count = drafted.len();
-        let (bricks, (dirty, near)) = side_by_side(count, table, || side_by_side(count, dirty, near));
+        let Draft { bricks: drafted, effects, hash, uniform } = draft;
+        let latest = latest(&drafted);
+        // Two things that do not depend on each other: cells to mesh, cells that may join the mask.
+        let Stages { meshing, ring, .. } = &mut stages;
+        let changed = |drafted: &DraftedBrick| (drafted.pos, drafted.changed);
+        let dirty = || Stages::time(meshing, || dirty_cells(world.grid, &drafted, changed));
+        let near = || Stages::time(ring, || cells_in_reach(&drafted));
+        let (dirty, near) = side_by_side(drafted.len(), dirty, near);
 
-        let before = WorldView { samples: world.samples().over(&bricks), ..world.view() };
-        let mask = Stages::time(&mut stages.ring, || joined_mask(&before, &near));
+        let before = WorldView { samples: world.samples().under(&latest), ..world.view() };
+        let mask = Stages::time(&mut stages.ring, || joined_mask(world, &before, &near));
         let view = WorldView { mask: MaskView::new(&world.mask).over(&mask), ..before };
         let meshes = || redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
-        let enter = || self.enter(submissions, draft, pieces, &mask);
+        let enter = || self.enter(submissions, effects, pieces, &drafted, &mask);
         let (meshes, entered) = side_by_side(dirty.len(), meshes, enter);
 
-        let mut commit = self.commit(entered.change, entered.replaced_bytes, meshes, entered.uniform);
+        let change = Change {
+            bricks: changed_bricks(drafted),
+            fields: entered.fields,
+            mask: entered.mask,
+            sample_hash: hash,
+        };
+        let mut commit = self.commit(change, entered.replaced_bytes, meshes, uniform);
         (commit.receipts, commit.news) = (entered.receipts, entered.news);
         commit.next_field = entered.next_field;
         stages.whole = start.elapsed();
         Commit { stages, ..commit }
     }
 
-    /// Enters what edits did into fields and receipts, and what they change in the world.
+    /// Enters what edits did into fields and receipts, and what becomes of the mask.
     fn enter(
         &self,
         submissions: &[Submission],
-        draft: Draft,
+        effects: Vec<EditEffect>,
         mut pieces: BTreeMap<usize, Vec<LoosePiece>>,
+        drafted: &[DraftedBrick],
         mask: &Mask,
     ) -> Entered {
         let mut log = FieldLog::new(&self.world);
-        let mut effects = draft.effects.into_iter().enumerate();
+        let mut effects = effects.into_iter().enumerate();
         let receipts = submissions.iter().map(|submission| {
             let outcome = match &submission.edit {
                 Err(error) => Err((*error).into()),
@@ -157,23 +208,15 @@ impl Transaction {
         });
         let receipts = receipts.collect();
         let (news, next_field) = (log.news(), log.next);
-        // Kept as long as history has it: no larger than it has to be.
-        let mut bricks = Vec::with_capacity(draft.bricks.len());
-        bricks.extend(draft.bricks.into_iter().map(|drafted| (drafted.pos, Some(drafted.brick))));
-        let change = Change {
-            bricks,
-            fields: log.fields.into_iter().collect(),
-            mask: mask.words().collect(),
-            sample_hash: draft.hash,
-        };
-        let replaced_bytes = replaced_bytes(&self.world, &change.bricks);
-        Entered { receipts, news, next_field, change, replaced_bytes, uniform: draft.uniform }
+        let replaced_bytes = replaced_bytes(&self.world, drafted.iter().map(|drafted| drafted.pos));
+        let (fields, mask) = (log.fields.into_iter().collect(), mask.words().collect());
+        Entered { receipts, news, next_field, fields, mask, replaced_bytes }
     }
 
     /// Puts in place what a step through history holds.
     fn step(&self, step: HistoryStep, target: &Step, backend: &dyn Compute) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
-        let (change, mut bricks) = (target.change.clone(), Bricks::default());
+        let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.bricks.len()));
         let (mut replaced, mut changed) = (Replaced::default(), Vec::with_capacity(change.bricks.len()));
         Stages::time(&mut stages.edit, || {
             for (pos, after) in &change.bricks {
@@ -182,17 +225,18 @@ impl Transaction {
                 let missing = || Arc::new(pristine_brick(&world.ground, *pos));
                 let brick = after.clone().unwrap_or_else(missing);
                 changed.extend(own.map(|own| (*pos, own)));
-                bricks.insert(*pos, brick);
+                bricks.push((*pos, brick));
             }
         });
         let mut mask = Mask::default();
         change.mask.iter().for_each(|&(word, cells)| mask.lay_word(word, cells));
+        let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
         let view = WorldView {
-            samples: world.samples().over(&bricks),
+            samples: world.samples().under(&latest),
             mask: MaskView::new(&world.mask).over(&mask),
             grid: world.grid,
         };
-        let dirty = Stages::time(&mut stages.meshing, || dirty_cells(world.grid, changed.iter().copied()));
+        let dirty = Stages::time(&mut stages.meshing, || dirty_cells(world.grid, &changed, |&own| own));
         let meshes = redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
 
         let nothing = Fields::default();
@@ -204,7 +248,7 @@ impl Transaction {
         let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
         let Replaced { removed, added, painted } = replaced;
         let restored = Restored { bounds, removed, added, painted };
-        let replaced_bytes = replaced_bytes(world, &change.bricks);
+        let replaced_bytes = replaced_bytes(world, change.bricks.iter().map(|(pos, _)| *pos));
         let mut commit = self.commit(change, replaced_bytes, meshes, UniformBricks::default());
         commit.moved = Some(HistoryReceipt { step, outcome: Ok(restored) });
         commit.news = news;

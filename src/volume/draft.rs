@@ -1,6 +1,6 @@
 //! Edits applied to copies of bricks, before anything is committed.
 //!
-//! Edits are sorted by the bricks they reach (see `work`), a [`backend`](crate::backend) applies them, and here is added up
+//! Edits are sorted by the bricks they reach (see `jobs`), a [`backend`](crate::backend) applies them, and here is added up
 //! what they changed.
 //!
 //! Edits that sculpt read what is around a sample, in other bricks too. So they stand in `runs`, one after the other: what
@@ -9,6 +9,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::brick::UniformBricks;
@@ -122,6 +123,21 @@ impl Changes {
     }
 }
 
+/// From how many bricks on threads look which of them are all alike.
+const PARALLEL: usize = 1 << 13;
+
+/// The numbers of the bricks from `first` on that are all alike.
+fn uniform_ones(bricks: &[DraftedBrick], first: usize) -> Vec<usize> {
+    let is_uniform = |&(_, drafted): &(usize, &DraftedBrick)| drafted.kind.is_some();
+    let number = |(number, _): (usize, &DraftedBrick)| first + number;
+    let bricks = &bricks[first..];
+    if bricks.len() < PARALLEL {
+        bricks.iter().enumerate().filter(is_uniform).map(number).collect()
+    } else {
+        bricks.par_iter().enumerate().filter(is_uniform).map(number).collect()
+    }
+}
+
 impl Draft {
     /// What edits make of samples of this hash. Whoever applies them gets them run by run.
     pub(crate) fn make(
@@ -161,7 +177,7 @@ impl Draft {
     }
 
     /// Takes in what edits from this one on did to some bricks; one that is all alike is replaced by the one of its kind.
-    fn add(&mut self, ledger: Ledger, first: usize, uniform: &UniformBricks) {
+    fn add(&mut self, mut ledger: Ledger, first: usize, uniform: &UniformBricks) {
         self.hash = self.hash.wrapping_add(ledger.hash);
         for part in &ledger.parts {
             self.effects[first + part.edit].reach(part.chunk, part.bounds);
@@ -179,14 +195,27 @@ impl Draft {
             };
             tally.count_many(count.material, count.voxels);
         }
-        self.bricks.reserve(ledger.bricks.len());
-        for mut drafted in ledger.bricks {
-            if let Some(kind) = drafted.kind {
-                let known = uniform.get(&kind);
-                let fresh = || Arc::clone(self.uniform.entry(kind).or_insert(drafted.brick));
-                drafted.brick = known.cloned().unwrap_or_else(fresh);
-            }
-            self.bricks.push(drafted);
+        let before = self.bricks.len();
+        if before == 0 {
+            self.bricks = ledger.bricks;
+        } else {
+            self.bricks.append(&mut ledger.bricks);
+        }
+        // Bricks near each other mostly are of one kind.
+        let mut last = None;
+        for number in uniform_ones(&self.bricks, before) {
+            let drafted = &mut self.bricks[number];
+            let Some(kind) = drafted.kind else { continue };
+            let known = match last.take() {
+                Some((same, brick)) if same == kind => brick,
+                _ => {
+                    let fresh =
+                        || Arc::clone(self.uniform.entry(kind).or_insert_with(|| drafted.brick.clone()));
+                    uniform.get(&kind).cloned().unwrap_or_else(fresh)
+                }
+            };
+            drafted.brick = Arc::clone(&known);
+            last = Some((kind, known));
         }
     }
 }

@@ -1,5 +1,7 @@
 //! What edits did to bricks, entered brick by brick and added up later.
 
+use std::sync::Arc;
+
 use super::DraftedBrick;
 use crate::ground::MaterialId;
 use crate::lattice::{ChunkPos, LatticeBox};
@@ -15,18 +17,50 @@ pub(crate) struct Ledger {
 }
 
 impl Ledger {
-    /// An empty one, with room for what edits do to so many bricks as a rule.
+    /// An empty one, with room for so many bricks, and for what edits do to them as a rule.
     pub fn with_room(bricks: usize) -> Self {
         Self {
             bricks: Vec::with_capacity(bricks),
-            parts: Vec::with_capacity(bricks),
-            counts: Vec::with_capacity(bricks),
+            parts: Vec::with_capacity(bricks.min(LATEST)),
+            counts: Vec::with_capacity(bricks.min(LATEST)),
             hash: 0,
         }
     }
+
+    /// Enters a brick. One that is all alike is mostly alike with one of the latest, and shares that one's memory at once:
+    /// who adds ledgers up has fewer bricks to give up.
+    pub fn change(&mut self, mut drafted: DraftedBrick) {
+        // Materials may be stored though all of them are the ground's own.
+        let key = |of: &DraftedBrick| (of.kind, of.brick.material_bytes());
+        let mut latest = self.bricks.iter().rev().take(LATEST);
+        if drafted.kind.is_some()
+            && let Some(same) = latest.find(|other| key(other) == key(&drafted))
+        {
+            drafted.brick = Arc::clone(&same.brick);
+        }
+        self.bricks.push(drafted);
+    }
+
+    /// Enters that an edit changed samples of a chunk. Bricks beside each other mostly come to the same entry.
+    pub fn reach(&mut self, edit: usize, chunk: ChunkPos, bounds: LatticeBox) {
+        let mut latest = self.parts.iter_mut().rev().take(LATEST);
+        match latest.find(|part| (part.edit, part.chunk) == (edit, chunk)) {
+            Some(part) => part.bounds = part.bounds.union(bounds),
+            None => self.parts.push(PartEffect { edit, chunk, bounds }),
+        }
+    }
+
+    /// Where an edit counts voxels of one more brick.
+    pub(super) fn counts(&mut self, edit: usize) -> Counts<'_> {
+        let own = self.counts.iter().rev().take(LATEST).take_while(|count| count.edit == edit).count();
+        Counts { edit, first: self.counts.len() - own, list: &mut self.counts }
+    }
 }
 
-/// What one edit changed in one chunk's part of one brick.
+/// How many of the latest entries one more is compared with.
+const LATEST: usize = 8;
+
+/// What one edit changed in one chunk, in one brick or in several.
 pub(crate) struct PartEffect {
     pub edit: usize,
     pub chunk: ChunkPos,
@@ -46,7 +80,7 @@ pub(crate) enum Fate {
     Slowed,
 }
 
-/// Voxels of one material that an edit dealt with in one brick.
+/// Voxels of one material that an edit dealt with, in one brick or in several.
 pub(crate) struct Count {
     pub edit: usize,
     pub fate: Fate,
@@ -54,12 +88,12 @@ pub(crate) struct Count {
     pub voxels: u64,
 }
 
-/// What one edit does to one brick is counted here.
+/// What one edit does to a brick is counted here, beside what it did to the one before.
 pub(super) struct Counts<'l> {
-    pub edit: usize,
-    pub list: &'l mut Vec<Count>,
-    /// Where this edit's counts of this brick begin.
-    pub first: usize,
+    edit: usize,
+    list: &'l mut Vec<Count>,
+    /// Where this edit's counts begin.
+    first: usize,
 }
 
 impl Counts<'_> {

@@ -9,6 +9,7 @@ mod brick;
 mod careful;
 mod draft;
 mod field;
+mod jobs;
 mod ledger;
 mod removal;
 mod restore;
@@ -28,7 +29,7 @@ pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
-pub(crate) use ledger::{Count, Fate, PartEffect};
+pub(crate) use ledger::{Count, Fate};
 pub(crate) use removal::{TakenOut, pristine_layers, take_out};
 pub(crate) use restore::{Replaced, pristine_brick};
 pub use rules::{DiggingRules, Refused};
@@ -36,4 +37,4 @@ pub use tally::Tally;
 pub use view::{Bricks, SampleView};
 pub use work::{EditWork, reach};
 #[cfg(feature = "cuda")]
-pub(crate) use work::{Job, Tool};
+pub(crate) use {jobs::Job, work::Tool};

@@ -12,23 +12,50 @@ use crate::lattice::{BrickPos, LatticeBox};
 /// Bricks by position; a missing brick is all pristine.
 pub type Bricks = FxHashMap<BrickPos, Arc<Brick>>;
 
+/// Bricks sorted by stacks, each stack from below: by x, then z, then y.
+pub(crate) type BrickList<'a> = [(BrickPos, &'a Brick)];
+
 /// The samples of a world: its ground, its bricks, and newer bricks that a running transaction lays over them.
 #[derive(Clone, Copy)]
 pub struct SampleView<'a> {
     ground: &'a Ground,
     bricks: &'a Bricks,
     newer: Option<&'a Bricks>,
+    /// They stand over all others.
+    latest: &'a BrickList<'a>,
+}
+
+/// A list without the bricks before a place. Looks near its begin first.
+fn from<'l, 'a>(list: &'l BrickList<'a>, next: (i32, i32, i32)) -> &'l BrickList<'a> {
+    let is_before = |&(pos, _): &(BrickPos, &Brick)| place(pos) < next;
+    let mut end = 1;
+    while list.get(end).is_some_and(is_before) {
+        end *= 2;
+    }
+    let begin = end / 2;
+    &list[begin + list[begin..list.len().min(end + 1)].partition_point(is_before)..]
+}
+
+/// What bricks of a list are sorted by.
+fn place(pos: BrickPos) -> (i32, i32, i32) {
+    (pos.0.x, pos.0.z, pos.0.y)
 }
 
 impl<'a> SampleView<'a> {
     /// A view of committed bricks.
     pub fn new(ground: &'a Ground, bricks: &'a Bricks) -> Self {
-        Self { ground, bricks, newer: None }
+        Self { ground, bricks, newer: None, latest: &[] }
     }
 
     /// The same view with newer bricks in place of older ones.
     pub fn over(self, newer: &'a Bricks) -> Self {
         Self { newer: Some(newer), ..self }
+    }
+
+    /// The same view with bricks of a list in place of all others.
+    pub(crate) fn under(self, latest: &'a BrickList<'a>) -> Self {
+        debug_assert!(latest.is_sorted_by(|a, b| place(a.0) < place(b.0)));
+        Self { latest, ..self }
     }
 
     /// The pristine world below the edits.
@@ -41,13 +68,46 @@ impl<'a> SampleView<'a> {
         self.newer
     }
 
-    /// Where bricks are looked up, the older ones first.
-    pub(crate) fn tables(&self) -> impl Iterator<Item = &'a Bricks> {
-        std::iter::once(self.bricks).chain(self.newer)
+    /// Hands out the bricks at all positions of a box; of those at the same one, the one that stands comes last.
+    pub(crate) fn for_bricks(&self, places: LatticeBox, mut each: impl FnMut(BrickPos, &'a Brick)) {
+        for table in std::iter::once(self.bricks).chain(self.newer) {
+            if (table.len() as u64) < places.volume() {
+                let near = table.iter().filter(|(pos, _)| places.contains(pos.0));
+                near.for_each(|(&pos, brick)| each(pos, brick));
+            } else {
+                let found = places.points().filter_map(|at| Some((BrickPos(at), table.get(&BrickPos(at))?)));
+                found.for_each(|(pos, brick)| each(pos, brick));
+            }
+        }
+        let (min, max) = (places.min, places.max);
+        let first = self.latest.partition_point(|&(pos, _)| place(pos) < (min.x, min.z, min.y));
+        let mut latest = &self.latest[first..];
+        while let Some(&(pos, brick)) = latest.first() {
+            let BrickPos(IVec3 { x, y, z }) = pos;
+            if x > max.x {
+                break;
+            }
+            // The next place of the box that is not before this one.
+            let next = match (z < min.z, z > max.z, y < min.y, y > max.y) {
+                (true, ..) => (x, min.z, min.y),
+                (_, true, ..) => (x + 1, min.z, min.y),
+                (_, _, true, _) => (x, z, min.y),
+                (_, _, _, true) => (x, z + 1, min.y),
+                _ => {
+                    each(pos, brick);
+                    latest = &latest[1..];
+                    continue;
+                }
+            };
+            latest = from(latest, next);
+        }
     }
 
     /// A brick, `None` where all samples are pristine.
     pub fn brick(&self, pos: BrickPos) -> Option<&'a Brick> {
+        if let Ok(at) = self.latest.binary_search_by_key(&place(pos), |&(pos, _)| place(pos)) {
+            return Some(self.latest[at].1);
+        }
         self.newer.and_then(|newer| newer.get(&pos)).or_else(|| self.bricks.get(&pos)).map(Arc::as_ref)
     }
 

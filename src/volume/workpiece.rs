@@ -7,10 +7,11 @@ use wide::{i16x8, i32x8};
 
 use super::bearing::RunRules;
 use super::brick::{PRISTINE, row, solid_layers};
-use super::ledger::{Counts, Fate, Ledger, PartEffect};
+use super::jobs::Job;
+use super::ledger::{Counts, Fate, Ledger};
 use super::surroundings::Surroundings;
 use super::view::resolve;
-use super::work::{Job, Tool};
+use super::work::Tool;
 use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
 use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;
@@ -60,19 +61,18 @@ impl<'a> Workpiece<'a> {
             };
             let (from, to) = (reached.min - low, reached.max - low);
             tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
-            let first = ledger.counts.len();
-            let mut counts = Counts { edit, first, list: &mut ledger.counts };
             let rules = rules.as_ref().filter(|_| tool.is_bound);
             let around = tool.looks_around().then(|| Surroundings::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
+                let counts = &mut ledger.counts(edit);
                 let changed = match &around {
-                    Some(around) => self.carefully(tool, rules, samples, &distances, around, &mut counts),
-                    None => self.apply(tool.operation, samples, &distances, &mut counts),
+                    Some(around) => self.carefully(tool, rules, samples, &distances, around, counts),
+                    None => self.apply(tool.operation, samples, &distances, counts),
                 };
                 self.changed.iter_mut().zip(&changed).for_each(|(all, layer)| *all |= layer);
                 if let Some(bounds) = bounds(&changed, low) {
-                    ledger.parts.push(PartEffect { edit, chunk, bounds });
+                    ledger.reach(edit, chunk, bounds);
                 }
             }
         }
@@ -81,7 +81,7 @@ impl<'a> Workpiece<'a> {
         ledger.hash = ledger.hash.wrapping_add(self.hash_change(&brick));
         let before = self.base.map_or([0; 8], |brick| *brick.edited());
         let is_extended = before != *brick.edited();
-        ledger.bricks.push(DraftedBrick::new(self.pos, Arc::new(brick), changed, is_extended));
+        ledger.change(DraftedBrick::new(self.pos, Arc::new(brick), changed, is_extended));
     }
 
     /// The samples as they are now.

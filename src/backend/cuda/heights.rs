@@ -8,7 +8,7 @@ use super::device::{Device, Fault, HostMemory, Kernel};
 use super::layout::{COLUMNS, HeightsParams};
 use super::mail::Plan;
 use super::session::Session;
-use super::{Cuda, Place, lose};
+use super::{Cuda, Place, lose, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
 /// Columns from which on the device is taken to be the faster of both. Estimated, not measured on a card: so many take 16
@@ -31,7 +31,7 @@ impl Cuda {
             return None;
         }
         let heights = {
-            let mut place = self.slot.try_lock().ok()?;
+            let mut place = try_lock(&self.slot)?;
             let Place::Open(session, _) = &mut *place else { return None };
             // Nobody touches this memory before the threads that fill it.
             let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
@@ -254,7 +254,12 @@ mod tests {
     fn a_card_makes_ground_where_that_pays_and_never_keeps_anyone_waiting() {
         let open = |is_auto| {
             let device = device()?;
-            let cuda = Cuda::open_with(is_auto, Some(64 << 20), &[(1, 2.0)], || Ok(device));
+            let cuda = Cuda::open_with(
+                is_auto,
+                Some(64 << 20),
+                super::super::trial::Sizes::few(&[(1, 2.0)]),
+                || Ok(device),
+            );
             while cuda.state() == crate::backend::EngineState::Opening {
                 std::thread::sleep(std::time::Duration::from_millis(2));
             }

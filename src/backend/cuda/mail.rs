@@ -1,7 +1,6 @@
 //! Memory that launches read from and write to, kept from one to the next.
 
 use bytemuck::Pod;
-use rayon::prelude::*;
 
 use super::device::{Device, Fault, HostMemory};
 
@@ -68,6 +67,22 @@ impl Inbox {
     pub fn entries<T: Pod>(&mut self, section: Section) -> &mut [T] {
         let bytes = &mut self.host.bytes_mut()[section.start..section.start + section.len];
         bytemuck::cast_slice_mut(bytes)
+    }
+
+    /// The entries of three sections at once, to be written; they must be in the order in which they were planned.
+    pub fn entries_of<A: Pod, B: Pod, C: Pod>(
+        &mut self,
+        a: Section,
+        b: Section,
+        c: Section,
+    ) -> (&mut [A], &mut [B], &mut [C]) {
+        let (first, rest) = self.host.bytes_mut().split_at_mut(b.start);
+        let (second, third) = rest.split_at_mut(c.start - b.start);
+        (
+            bytemuck::cast_slice_mut(&mut first[a.start..a.start + a.len]),
+            bytemuck::cast_slice_mut(&mut second[..b.len]),
+            bytemuck::cast_slice_mut(&mut third[..c.len]),
+        )
     }
 
     /// Copies entries into a section.
@@ -204,24 +219,5 @@ impl Outbox {
     /// The first entries.
     pub fn entries<T: Pod>(&self, count: usize) -> &[T] {
         bytemuck::cast_slice(&self.host.bytes()[..count * size_of::<T>()])
-    }
-}
-
-/// Maps a list, side by side where it is long.
-pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
-    if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
-}
-
-/// Writes what `work` makes of each entry of a list, side by side where it is long.
-pub(super) fn fill<T: Sync, R: Send>(
-    list: &[T],
-    out: &mut [R],
-    long: usize,
-    work: impl Fn(usize, &T) -> R + Send + Sync,
-) {
-    if list.len() < long {
-        list.iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
-    } else {
-        list.par_iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
     }
 }

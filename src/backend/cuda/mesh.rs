@@ -1,16 +1,17 @@
 //! Meshing on the device: one launch for all blocks.
 
-use glam::IVec3;
-
 use super::device::{Device, Fault, Kernel};
-use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams, MeshResult, NONE};
-use super::mail::{Outbox, Plan, fill, map};
+use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams, MeshResult};
+use super::lists::{cut, fill, hand_out, map, side_by_side};
+use super::mail::{Outbox, Plan};
 use super::session::{Session, Uploads};
+use super::surfaces::Surfaces;
 use super::windows::Windows;
-use crate::lattice::SNAP;
-use crate::surface::block::{Block, Part, Parts};
+use crate::lattice::pieces;
+use crate::surface::MaterialMix;
+use crate::surface::block::Block;
+use crate::surface::fresh::PackedMixes;
 use crate::surface::vertex::WorldView;
-use crate::surface::{MaterialMix, Vertex};
 
 /// What the mesh kernel writes.
 pub(super) struct MeshOutput {
@@ -57,11 +58,32 @@ impl MeshOutput {
         Ok(grown)
     }
 
-    /// How many vertices and indices the kernel wanted to write for so many blocks.
-    fn totals(&self, blocks: usize) -> (usize, usize) {
-        self.results.entries::<MeshResult>(blocks).iter().fold((0, 0), |(vertices, indices), result| {
-            (vertices + result.vertices as usize, indices + result.indices as usize)
-        })
+    /// What the kernel wanted to write for so many blocks.
+    fn extent(&self, blocks: usize) -> Extent {
+        let all = self.results.entries::<MeshResult>(blocks);
+        let of = |results: &[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
+        if all.len() < MANY_RESULTS {
+            return of(all);
+        }
+        let pieces: Vec<&[MeshResult]> = all.chunks(MANY_RESULTS / 4).collect();
+        map(&pieces, 2, |results| of(results)).into_iter().fold(Extent::default(), Extent::join)
+    }
+
+    /// What was written and copied for blocks.
+    pub fn surfaces<'a>(&'a self, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Surfaces<'a> {
+        let (vertices, indices) = meshed.totals;
+        Surfaces {
+            grid: view.grid,
+            blocks,
+            results: self.results.entries(blocks.len()),
+            positions: self.positions.entries(vertices),
+            normals: self.normals.entries(vertices),
+            mixes: match meshed.plain {
+                Some(mix) => PackedMixes::One(mix),
+                None => PackedMixes::Each(self.mixes.entries(vertices)),
+            },
+            indices: self.indices.entries(indices),
+        }
     }
 
     /// Copies what is not here yet.
@@ -106,36 +128,100 @@ impl MeshOutput {
     }
 }
 
+/// How much blocks have together, and where the last of it ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Extent {
+    vertices: usize,
+    indices: usize,
+    vertex_end: usize,
+    index_end: usize,
+}
+
+impl Extent {
+    /// With one block more.
+    fn with(self, result: &MeshResult) -> Self {
+        let end = |first: u32, count: u32| (first as usize).saturating_add(count as usize);
+        self.join(Self {
+            vertices: result.vertices as usize,
+            indices: result.indices as usize,
+            vertex_end: end(result.vertex, result.vertices),
+            index_end: end(result.index, result.indices),
+        })
+    }
+
+    /// Of both.
+    fn join(self, other: Self) -> Self {
+        Self {
+            vertices: self.vertices + other.vertices,
+            indices: self.indices + other.indices,
+            vertex_end: self.vertex_end.max(other.vertex_end),
+            index_end: self.index_end.max(other.index_end),
+        }
+    }
+
+    /// Vertices and indices.
+    fn totals(self) -> (usize, usize) {
+        (self.vertices, self.indices)
+    }
+
+    /// Does all of it lie in lists that are as long as that?
+    fn is_in_lists(self) -> bool {
+        self.vertex_end <= self.vertices && self.index_end <= self.indices
+    }
+}
+
 /// What a launch wrote.
-struct Meshed {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meshed {
     /// Vertices and indices.
     totals: (usize, usize),
     /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
     plain: Option<MaterialMix>,
 }
 
-/// From how many things on they are dealt with side by side.
+/// Blocks of some stacks that one thread deals with.
+struct Piece<'b> {
+    blocks: &'b [Block],
+    /// The numbers of the first block, and of its stack.
+    first: usize,
+    column: u32,
+}
+
+/// A stack of blocks, with its slot.
+type Column = ((i32, i32), u32);
+
+/// From how many stacks on they are dealt with side by side.
 const LONG: usize = 256;
+
+/// How many blocks a thread deals with at a time.
+const PIECE: usize = 256;
+
+/// From how many blocks on what the kernel says of them is added up side by side.
+const MANY_RESULTS: usize = 1 << 13;
 
 /// From how many blocks on their surfaces are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 512;
 
-/// Blocks whose parts are put together by one thread.
-const GROUP: usize = 64;
-
 impl Session {
-    /// Meshes blocks: their parts in order, in one list or several.
-    pub fn mesh(&mut self, view: &WorldView, blocks: &[Block]) -> Result<Vec<Parts>, Fault> {
+    /// Meshes blocks. Their [`surfaces`](MeshOutput::surfaces) are in this session's memory until the next launch.
+    /// `meanwhile` is called when the device is at work.
+    pub fn mesh(
+        &mut self,
+        view: &WorldView,
+        blocks: &[Block],
+        meanwhile: &(dyn Fn() + Sync),
+    ) -> Result<Meshed, Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let parts = self.run_mesh(view, blocks, &mut uploads, blocks.len() >= COPIED).and_then(|meshed| {
+        let is_long = blocks.len() >= COPIED;
+        let meshed = self.run_mesh(view, blocks, &mut uploads, is_long, meanwhile).and_then(|meshed| {
             self.meshes.fetch(&mut *self.device, meshed.totals, meshed.plain.is_none())?;
-            Ok(self.meshes.parts(view, blocks, meshed.totals, meshed.plain))
+            Ok(meshed)
         });
-        if parts.is_err() {
+        if meshed.is_err() {
             self.give_up(&uploads);
         }
-        parts
+        meshed
     }
 
     /// Meshes blocks and leaves their surfaces on the device, however few they are: how many vertices and indices there
@@ -144,7 +230,7 @@ impl Session {
     pub fn mesh_there(&mut self, view: &WorldView, blocks: &[Block]) -> Result<(usize, usize), Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let meshed = self.run_mesh(view, blocks, &mut uploads, true);
+        let meshed = self.run_mesh(view, blocks, &mut uploads, true, &|| {});
         if meshed.is_err() {
             self.give_up(&uploads);
         }
@@ -159,33 +245,31 @@ impl Session {
         blocks: &[Block],
         uploads: &mut Uploads<'a>,
         is_long: bool,
+        meanwhile: &(dyn Fn() + Sync),
     ) -> Result<Meshed, Fault> {
         if blocks.len() > MOST_JOBS {
             return Err(Fault::TooLarge(blocks.len()));
         }
         let ground = view.samples.ground();
-        let places = columns(blocks);
-        let slots = places.iter().map(|&place| self.need_stack(uploads, place));
-        let columns: Vec<_> =
-            places.iter().copied().zip(slots.collect::<Result<Vec<u32>, Fault>>()?).collect();
-        let windows = Windows::around(view.samples, blocks.iter().map(|block| block.brick), 1);
-        let refs = self.refs(&windows, uploads)?;
+        let (pieces, columns) = self.columns(view, blocks, uploads)?;
+        let windows = self.windows(uploads, view.samples, blocks, |block| block.brick, 1)?;
         let single = ground.single_material().map(MaterialMix::pure);
-        let plain = single.filter(|_| refs.iter().all(|&at| at == NONE || at & 1 == 0));
+        let plain = single.filter(|_| !windows.has_materials());
 
         let mut plan = Plan::default();
         uploads.plan(&mut plan);
-        let window_list = plan.section::<u32>(refs.len());
+        let window_list = plan.section::<u32>(windows.len());
         let column_list = plan.section::<ColumnJob>(columns.len());
         let job_list = plan.section::<MeshJob>(blocks.len());
         let counters = plan.section::<u32>(4);
         self.inbox.open(&mut *self.device, &plan)?;
-        self.inbox.put(window_list, &refs);
-        let column = |_, &(place, slot): &((i32, i32), u32)| layout::column_job(view, place, slot);
-        fill(&columns, self.inbox.entries(column_list), LONG, column);
-        let numbers = column_numbers(blocks);
-        let job = |number: usize, block: &Block| mesh_job(view, &windows, number, block, numbers[number]);
-        fill(blocks, self.inbox.entries(job_list), LONG, job);
+        let (refs, column_jobs, jobs) = self.inbox.entries_of(window_list, column_list, job_list);
+        let column = |_, &(place, slot): &Column| layout::column_job(view, place, slot);
+        let write_columns = || fill(&columns, column_jobs, LONG, column);
+        let write_jobs = || write_jobs(view, &windows, &pieces, jobs);
+        side_by_side(pieces.len() > 1, write_columns, || {
+            side_by_side(pieces.len() > 1, write_jobs, || windows.write(refs))
+        });
         self.inbox.entries::<u32>(counters).fill(0);
         self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
         self.meshes.reserve(&mut *self.device, (0, 0), is_long)?;
@@ -214,11 +298,16 @@ impl Session {
             };
             self.device.launch(Kernel::Mesh, blocks.len() as u32, bytemuck::bytes_of(&params))?;
             self.meshes.results.fetch(&mut *self.device, blocks.len())?;
+            meanwhile();
             self.device.wait()?;
             self.times = self.device.times();
-            let totals = self.meshes.totals(blocks.len());
-            if !self.meshes.reserve(&mut *self.device, totals, is_long)? {
-                return Ok(Meshed { totals, plain });
+            let extent = self.meshes.extent(blocks.len());
+            if !self.meshes.reserve(&mut *self.device, extent.totals(), is_long)? {
+                // Whoever draws surfaces takes them from where results say they are.
+                if !extent.is_in_lists() {
+                    return Err(Fault::Failed("surfaces beyond the ends of their lists".into()));
+                }
+                return Ok(Meshed { totals: extent.totals(), plain });
             }
             // A second pass, with room for all.
         }
@@ -226,8 +315,20 @@ impl Session {
     }
 }
 
+/// Writes the jobs of blocks.
+fn write_jobs(view: &WorldView, windows: &Windows, pieces: &[Piece], out: &mut [MeshJob]) {
+    let places = cut(out, pieces.iter().map(|piece| piece.blocks.len()));
+    hand_out(pieces.iter().zip(places).collect(), |(piece, places)| {
+        let stacks = (piece.column..).zip(piece.blocks.chunk_by(is_same_stack));
+        let blocks = stacks.flat_map(|(column, stack)| stack.iter().map(move |block| (column, block)));
+        for ((number, (column, block)), place) in (piece.first..).zip(blocks).zip(places) {
+            *place = mesh_job(view, windows, number, block, column);
+        }
+    });
+}
+
 fn mesh_job(view: &WorldView, windows: &Windows, number: usize, block: &Block, column: u32) -> MeshJob {
-    let entry = windows.entry(number, block.brick);
+    let entry = windows.entry(number);
     let cells = block.brick.samples().intersection(view.grid.chunk_cells(block.chunk));
     MeshJob {
         window: entry.number,
@@ -242,67 +343,56 @@ fn mesh_job(view: &WorldView, windows: &Windows, number: usize, block: &Block, c
 /// A box of cells that holds none.
 const NO_CELLS: u32 = 7;
 
-impl MeshOutput {
-    /// What came back, as parts. `mix` is what all vertices are made of, if it is the same everywhere.
-    fn parts(
-        &self,
-        view: &WorldView,
-        blocks: &[Block],
-        (vertices, indices): (usize, usize),
-        mix: Option<MaterialMix>,
-    ) -> Vec<Parts> {
-        let results = self.results.entries::<MeshResult>(blocks.len());
-        let positions = self.positions.entries::<[u16; 4]>(vertices);
-        let normals = self.normals.entries::<[f32; 3]>(vertices);
-        let mixes = if mix.is_some() { &[] } else { self.mixes.entries::<[u8; 8]>(vertices) };
-        let all = self.indices.entries::<u16>(indices);
-        let range = |first: u32, count: u32| first as usize..(first + count) as usize;
-        let put = |group: &(&[Block], &[MeshResult])| {
-            let mut parts = Parts::default();
-            let sum = |of: fn(&MeshResult) -> u32| group.1.iter().map(|result| of(result) as usize).sum();
-            parts.list.reserve_exact(group.0.len());
-            parts.vertices.reserve_exact(sum(|result| result.vertices));
-            parts.indices.reserve_exact(sum(|result| result.indices));
-            for (&block, result) in group.0.iter().zip(group.1) {
-                let base = (block.brick.origin() - view.grid.origin(block.chunk)) * SNAP;
-                let own = range(result.vertex, result.vertices);
-                let near = positions[own.clone()].iter().zip(&normals[own.clone()]);
-                let vertex = |(&[x, y, z, _], &normal): (&[u16; 4], &[f32; 3])| Vertex {
-                    position: base + IVec3::new(x.into(), y.into(), z.into()),
-                    normal: normal.into(),
-                    materials: mix.unwrap_or_default(),
-                };
-                let first = parts.vertices.len();
-                parts.vertices.extend(near.map(vertex));
-                if mix.is_none() {
-                    for (vertex, mix) in parts.vertices[first..].iter_mut().zip(&mixes[own]) {
-                        let (ids, weights) = mix.split_at(4);
-                        vertex.materials.ids.copy_from_slice(ids);
-                        vertex.materials.weights.copy_from_slice(weights);
-                    }
-                }
-                parts.indices.extend_from_slice(&all[range(result.index, result.indices)]);
-                parts.list.push(Part { block, vertices: parts.vertices.len(), indices: parts.indices.len() });
-            }
-            parts
-        };
-        let groups: Vec<_> = blocks.chunks(GROUP).zip(results.chunks(GROUP)).collect();
-        map(&groups, 2, put)
-    }
-}
-
 /// The stack of bricks that a block belongs to.
 fn place(block: &Block) -> (i32, i32) {
     (block.brick.0.x, block.brick.0.z)
 }
 
-/// The stacks of blocks, in order.
-fn columns(blocks: &[Block]) -> Vec<(i32, i32)> {
-    blocks.chunk_by(|a, b| place(a) == place(b)).map(|same| place(&same[0])).collect()
+/// Do both blocks belong to the same stack?
+fn is_same_stack(a: &Block, b: &Block) -> bool {
+    place(a) == place(b)
 }
 
-/// The number of each block's stack among these.
-fn column_numbers(blocks: &[Block]) -> Vec<u32> {
-    let groups = blocks.chunk_by(|a, b| place(a) == place(b));
-    (0..).zip(groups).flat_map(|(number, same)| same.iter().map(move |_| number)).collect()
+impl Session {
+    /// Blocks in pieces, and their stacks, which are uploaded where they have to be.
+    fn columns<'b>(
+        &mut self,
+        view: &WorldView,
+        blocks: &'b [Block],
+        uploads: &mut Uploads,
+    ) -> Result<(Vec<Piece<'b>>, Vec<Column>), Fault> {
+        let (stacks, ground) = (&self.stacks, view.samples.ground());
+        let find = |stack: &[Block]| (place(&stack[0]), stacks.find(ground, place(&stack[0])));
+        let lists = pieces(blocks, PIECE, is_same_stack);
+        let found = map(&lists, 2, |blocks| blocks.chunk_by(is_same_stack).map(&find).collect::<Vec<_>>());
+        let (mut pieces, mut first) = (Vec::with_capacity(lists.len()), 0);
+        let mut columns = Vec::with_capacity(found.iter().map(Vec::len).sum());
+        for (blocks, found) in lists.into_iter().zip(found) {
+            pieces.push(Piece { blocks, first, column: columns.len() as u32 });
+            first += blocks.len();
+            for (place, slot) in found {
+                let slot = slot.map_or_else(|| self.need_stack(uploads, place), Ok)?;
+                columns.push((place, slot));
+            }
+        }
+        Ok((pieces, columns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_beyond_the_ends_of_lists_are_noticed() {
+        let result = |vertex, vertices, index, indices| MeshResult { vertex, vertices, index, indices };
+        let extent = |results: &[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
+        let whole = [result(5, 4, 0, 6), MeshResult::default(), result(0, 5, 6, 9)];
+        assert_eq!(extent(&whole).totals(), (9, 15));
+        assert!(extent(&whole).is_in_lists());
+        assert!(extent(&[]).is_in_lists());
+        for broken in [result(6, 4, 0, 6), result(5, 4, 10, 6), result(u32::MAX, 4, 0, 6)] {
+            assert!(!extent(&[broken, whole[2]]).is_in_lists(), "{broken:?}");
+        }
+    }
 }

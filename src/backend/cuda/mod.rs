@@ -14,11 +14,13 @@
 //! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
 //! - [`session`](self::session) keeps bricks and heights on it, with a budget; `slots` says where, and which go first.
 //! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
+//!   Surfaces are not unpacked: whoever draws them takes them from where they arrived, by `surfaces`.
 //! - `heights` makes new ground of noise.
 //! - `trial` compares the device with the processor, and measures both.
 //!
 //! A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
-//! processor, so nobody ever waits for the device but the task that uses it.
+//! processor, so nobody ever waits for the device but the task that uses it. It is held until surfaces are drawn, which lie
+//! in its memory.
 
 mod device;
 mod driver;
@@ -27,10 +29,12 @@ mod heights;
 #[cfg(all(feature = "interop", target_os = "linux"))]
 pub mod interop;
 mod layout;
+mod lists;
 mod mail;
 mod mesh;
 mod session;
 mod slots;
+mod surfaces;
 mod trial;
 mod windows;
 
@@ -44,11 +48,12 @@ mod mapped;
 mod tests;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use super::choice::{Costs, Load};
 use super::{Choice, EngineState, Stage};
-use crate::surface::block::{Block, Parts};
+use crate::surface::block::Block;
+use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 use device::{Device, Fault};
@@ -77,6 +82,15 @@ const MOST: usize = 1 << 30;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The same, unless somebody else has it now. Who panicked with it had what is in it to read, and changed nothing.
+fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
+    match mutex.try_lock() {
+        Ok(guard) => Some(guard),
+        Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
+    }
 }
 
 impl Cuda {
@@ -130,16 +144,21 @@ impl Cuda {
         lock(&self.state).clone()
     }
 
-    /// Does a stage on the card if that is there, free and chosen; else the processor has to do it.
-    fn offer<T>(
+    /// Does a stage on the card if that is there, free and chosen; else the processor has to do it. `then` makes something
+    /// of what was done, while it still lies in the session's memory.
+    ///
+    /// So the lock is held until `then` is through, which may run other tasks of its thread pool meanwhile, even on this
+    /// thread. That can't block: whoever else wants the session tries the lock and goes on without.
+    fn offer<T, R>(
         &self,
         choice: &mut Choice,
         mut load: Load,
         missing: impl FnOnce(&Session) -> usize,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
-    ) -> (Option<T>, Load) {
+        then: impl FnOnce(&Session, T) -> R,
+    ) -> (Option<R>, Load) {
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
-        let Ok(mut place) = self.slot.try_lock() else { return (None, load) };
+        let Some(mut place) = try_lock(&self.slot) else { return (None, load) };
         let Place::Open(session, costs) = &mut *place else { return (None, load) };
         let mut is_slower = |load: Load| {
             let estimate = match choice.stage {
@@ -164,7 +183,8 @@ impl Cuda {
             Ok(done) => {
                 choice.is_cuda = true;
                 [choice.device, choice.kernel] = session.times();
-                (Some(done), load)
+                // No fault of the device's: a panic in here is the caller's.
+                (Some(then(session, done)), load)
             }
             Err(fault) => {
                 // What was lost on trying is not the processor's time to be learnt from.
@@ -180,7 +200,7 @@ impl Cuda {
     /// Takes in how long a stage took.
     pub fn learn(&self, choice: &Choice, load: Load) {
         if choice.estimate.is_some()
-            && let Ok(mut place) = self.slot.try_lock()
+            && let Some(mut place) = try_lock(&self.slot)
             && let Place::Open(_, costs) = &mut *place
         {
             costs.learn(choice.stage, load, choice.is_cuda, choice.took);
@@ -190,19 +210,26 @@ impl Cuda {
     /// Applies edits on the card, if that is chosen.
     pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Vec<Ledger>>, Load) {
         let load = Load::of_edits(work);
-        self.offer(choice, load, |session| session.missing_edits(work), |session| session.edit(work))
+        let missing = |session: &Session| session.missing_edits(work);
+        self.offer(choice, load, missing, |session| session.edit(work), |_, ledgers| ledgers)
     }
 
-    /// Meshes blocks on the card, if that is chosen.
+    /// Meshes blocks on the card, if that is chosen: says whether it was, and `then` got their surfaces.
     pub fn mesh(
         &self,
         view: &WorldView,
         blocks: &[Block],
         choice: &mut Choice,
-    ) -> (Option<Vec<Parts>>, Load) {
+        meanwhile: &(dyn Fn() + Sync),
+        then: &mut dyn FnMut(&dyn FreshParts),
+    ) -> (bool, Load) {
         let load = Load { amount: blocks.len(), ..Load::default() };
         let missing = |session: &Session| session.missing_blocks(view, blocks);
-        self.offer(choice, load, missing, |session| session.mesh(view, blocks))
+        let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
+        let (done, load) = self.offer(choice, load, missing, work, |session, meshed| {
+            then(&session.meshes.surfaces(view, blocks, meshed));
+        });
+        (done.is_some(), load)
     }
 }
 

@@ -6,7 +6,8 @@ use rustc_hash::FxHashMap;
 
 use super::device::{Device, Fault, Kernel};
 use super::edit::EditOutput;
-use super::layout::{self, BRICK_BYTES, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
+use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
+use super::lists::{cut, fill, hand_out};
 use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
 use super::slots::{Slots, reference};
@@ -27,6 +28,8 @@ pub(super) struct Session {
     pub(super) inbox: Inbox,
     pub(super) meshes: MeshOutput,
     pub(super) edits: EditOutput,
+    /// Memory for the jobs of the next edits.
+    pub(super) edit_jobs: Vec<EditJob>,
     /// Where the table of cases is.
     pub(super) table: u64,
 }
@@ -83,17 +86,29 @@ impl Stacks {
 /// back.
 pub(super) struct Uploads<'a> {
     ground: &'a Ground,
-    bricks: Vec<(&'a Brick, u32)>,
+    bricks: Vec<Upload<'a>>,
+    /// Bytes of their records.
+    bytes: usize,
     stacks: Vec<((i32, i32), u32)>,
     jobs: Section,
-    data: Section,
+    brick_list: Section,
+    stack_list: Section,
+}
+
+/// A brick on its way to a slot.
+struct Upload<'a> {
+    brick: &'a Brick,
+    slot: u32,
+    /// Where its record begins among those of all bricks, and how long it is.
+    first: usize,
+    bytes: usize,
 }
 
 impl<'a> Uploads<'a> {
     /// Nothing yet.
     pub fn new(ground: &'a Ground) -> Self {
-        let (jobs, data) = (Section::default(), Section::default());
-        Self { ground, bricks: Vec::new(), stacks: Vec::new(), jobs, data }
+        let [jobs, brick_list, stack_list] = [Section::default(); 3];
+        Self { ground, bricks: Vec::new(), bytes: 0, stacks: Vec::new(), jobs, brick_list, stack_list }
     }
 
     /// How many bricks and stacks.
@@ -101,22 +116,41 @@ impl<'a> Uploads<'a> {
         self.bricks.len() + self.stacks.len()
     }
 
-    fn bytes(&self) -> usize {
-        let bricks: usize = self.bricks.iter().map(|(brick, _)| record_bytes(brick)).sum();
-        bricks + self.stacks.len() * size_of::<StackRecord>()
+    /// Adds a brick.
+    fn push(&mut self, brick: &'a Brick, slot: u32) {
+        let bytes = if brick.material_bytes() > 0 { BRICK_BYTES } else { RECORD_BYTES };
+        self.bricks.push(Upload { brick, slot, first: self.bytes, bytes });
+        self.bytes += bytes;
     }
 
     /// Adds what there is to upload.
     pub fn plan(&mut self, plan: &mut Plan) {
         self.jobs = plan.section::<ScatterJob>(self.len());
-        self.data = plan.section::<u8>(self.bytes());
+        self.brick_list = plan.section::<u8>(self.bytes);
+        self.stack_list = plan.section::<StackRecord>(self.stacks.len());
+    }
+
+    /// Writes the records of bricks and stacks.
+    fn write(&self, inbox: &mut Inbox) {
+        let groups = self.bricks.chunks(GROUP);
+        let lengths = groups.clone().map(|group| group.iter().map(|upload| upload.bytes).sum::<usize>());
+        let places = cut(inbox.entries::<u8>(self.brick_list), lengths);
+        hand_out(groups.zip(places).collect(), |(group, place)| {
+            let before = group.first().map_or(0, |upload| upload.first);
+            for Upload { brick, first, bytes, .. } in group {
+                layout::brick_record(brick, &mut place[first - before..][..*bytes]);
+            }
+        });
+        let record = |_, &(place, _): &((i32, i32), u32)| layout::stack_record(self.ground, place);
+        fill(&self.stacks, inbox.entries::<StackRecord>(self.stack_list), MANY_STACKS, record);
     }
 }
 
-/// Bytes of a brick's record.
-fn record_bytes(brick: &Brick) -> usize {
-    if brick.material_bytes() > 0 { BRICK_BYTES } else { RECORD_BYTES }
-}
+/// Bricks that one thread writes records of.
+const GROUP: usize = 256;
+
+/// From how many stacks on their records are written side by side; each looks at 121 columns.
+const MANY_STACKS: usize = 64;
 
 /// How many bricks are looked at to see how many are missing.
 const LOOKS: usize = 128;
@@ -148,6 +182,7 @@ impl Session {
             inbox,
             meshes,
             edits,
+            edit_jobs: Vec::new(),
             table: address,
         })
     }
@@ -216,23 +251,25 @@ impl Session {
         }
         let (slot, tag) = self.bricks.take(&mut *self.device)?;
         brick.tag.set(tag);
-        uploads.bricks.push((brick, slot));
+        uploads.push(brick, slot);
         Ok(reference(slot, brick))
     }
 
-    /// References to the bricks of windows, which are uploaded where they have to be.
-    pub(super) fn refs<'a>(
+    /// The bricks around these, which are at `pos` and sorted by stacks, and so many up and down; uploaded where they have
+    /// to be.
+    pub(super) fn windows<'a, T: Sync>(
         &mut self,
-        windows: &Windows<'a>,
         uploads: &mut Uploads<'a>,
-    ) -> Result<Vec<u32>, Fault> {
+        view: SampleView<'a>,
+        bricks: &[T],
+        pos: impl Fn(&T) -> BrickPos + Send + Sync,
+        up_and_down: i32,
+    ) -> Result<Windows<'a>, Fault> {
         let slots = &self.bricks;
         let find = |brick: &Brick| slots.find(brick.tag.get()).map(|slot| reference(slot, brick));
-        let (mut refs, missing) = windows.refs(find);
-        for (number, brick) in missing {
-            refs[number as usize] = self.need_brick(uploads, brick)?;
-        }
-        Ok(refs)
+        let mut windows = Windows::around(view, bricks, pos, up_and_down, find);
+        windows.complete(|brick| self.need_brick(uploads, brick))?;
+        Ok(windows)
     }
 
     /// Sees to it that a stack is there; returns its slot.
@@ -247,39 +284,95 @@ impl Session {
 
     /// Sends everything that was planned, and puts uploads in their slots.
     pub(super) fn send(&mut self, plan: &Plan, uploads: &Uploads) -> Result<(), Fault> {
-        let mut jobs = Vec::with_capacity(uploads.len());
-        let mut at = 0;
-        for &(brick, slot) in &uploads.bricks {
-            let bytes = record_bytes(brick);
-            let data = &mut self.inbox.entries::<u8>(uploads.data)[at..at + bytes];
-            layout::brick_record(brick, data);
-            jobs.push((self.bricks.address(slot), at, bytes));
-            at += bytes;
-        }
-        for &(place, slot) in &uploads.stacks {
-            let data = &mut self.inbox.entries::<u8>(uploads.data)[at..at + size_of::<StackRecord>()];
-            data.copy_from_slice(bytemuck::bytes_of(&layout::stack_record(uploads.ground, place)));
-            jobs.push((self.stacks.slots.address(slot), at, size_of::<StackRecord>()));
-            at += size_of::<StackRecord>();
-        }
-        let from = self.inbox.address(uploads.data);
-        let scatter = |(to, at, bytes): (u64, usize, usize)| ScatterJob {
-            to,
-            from: from + at as u64,
-            bytes: bytes as u32,
-            pad: 0,
-        };
-        for (job, entry) in self.inbox.entries::<ScatterJob>(uploads.jobs).iter_mut().zip(jobs) {
-            *job = scatter(entry);
+        if uploads.len() > 0 {
+            uploads.write(&mut self.inbox);
+            self.direct(uploads);
         }
         self.inbox.send(&mut *self.device, plan)?;
         let params = ScatterParams { jobs: self.inbox.address(uploads.jobs) };
         self.device.launch(Kernel::Scatter, uploads.len() as u32, bytemuck::bytes_of(&params))
     }
 
+    /// Writes where uploads go.
+    fn direct(&mut self, uploads: &Uploads) {
+        let Self { inbox, bricks, stacks, .. } = self;
+        let (brick_list, stack_list) = (inbox.address(uploads.brick_list), inbox.address(uploads.stack_list));
+        let job = |to: u64, from: u64, bytes: usize| ScatterJob { to, from, bytes: bytes as u32, pad: 0 };
+        let jobs = inbox.entries::<ScatterJob>(uploads.jobs);
+        let (of_bricks, of_stacks) = jobs.split_at_mut(uploads.bricks.len());
+        for (place, upload) in of_bricks.iter_mut().zip(&uploads.bricks) {
+            *place = job(bricks.address(upload.slot), brick_list + upload.first as u64, upload.bytes);
+        }
+        for ((number, &(_, slot)), place) in (0..).zip(&uploads.stacks).zip(of_stacks) {
+            let bytes = size_of::<StackRecord>();
+            *place = job(stacks.slots.address(slot), stack_list + number * bytes as u64, bytes);
+        }
+    }
+
     /// Gives slots back whose data was never sent.
     pub(super) fn give_up(&mut self, uploads: &Uploads) {
-        uploads.bricks.iter().for_each(|&(_, slot)| self.bricks.give_back(slot));
+        uploads.bricks.iter().for_each(|upload| self.bricks.give_back(upload.slot));
         uploads.stacks.iter().for_each(|&(_, slot)| self.stacks.slots.give_back(slot));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::device;
+    use super::*;
+    use crate::ground::MaterialId;
+
+    /// So many bytes of the device.
+    fn read(session: &mut Session, address: u64, bytes: usize) -> Vec<u8> {
+        let mut host = session.device.alloc_host(bytes).expect("memory of the host");
+        session.device.download(address, &mut *host, 0..bytes).expect("a download");
+        session.device.wait().expect("a download");
+        host.bytes()[..bytes].to_vec()
+    }
+
+    fn brick(number: i32) -> Brick {
+        let mut brick = Brick::of_edited(&std::array::from_fn(|at| (at as i32 * 7 + number) as i16));
+        if number % 3 == 1 {
+            brick.set_material(5, MaterialId(number as u8 | 1));
+        }
+        brick
+    }
+
+    #[test]
+    fn what_is_uploaded_is_in_its_slot() {
+        let ground = Ground::from_fn(200, 200, |x, z| f64::from(x * z % 31)).expect("finite heights");
+        // Written by one thread, and by several.
+        for count in [3, 2 * GROUP as i32 + 5] {
+            let Some(device) = device() else { return };
+            let mut session = Session::new(device, 8 << 20).expect("a session");
+            let bricks: Vec<Brick> = (0..count).map(brick).collect();
+            let stacks: Vec<(i32, i32)> = (0..count / 3).map(|number| (number % 13, number / 13)).collect();
+            session.begin();
+            let mut uploads = Uploads::new(&ground);
+            for brick in &bricks {
+                session.need_brick(&mut uploads, brick).expect("room for all");
+            }
+            for &stack in &stacks {
+                session.need_stack(&mut uploads, stack).expect("room for all");
+            }
+            let mut plan = Plan::default();
+            uploads.plan(&mut plan);
+            session.inbox.open(&mut *session.device, &plan).expect("room for all");
+            session.send(&plan, &uploads).expect("the device works");
+            session.device.wait().expect("the device works");
+            for brick in &bricks {
+                let slot = session.bricks.find(brick.tag.get()).expect("it is there");
+                let mut record = vec![0; if brick.material_bytes() > 0 { BRICK_BYTES } else { RECORD_BYTES }];
+                layout::brick_record(brick, &mut record);
+                let address = session.bricks.address(slot);
+                assert!(read(&mut session, address, record.len()) == record);
+            }
+            for &stack in &stacks {
+                let slot = session.stacks.find(&ground, stack).expect("it is there");
+                let record = layout::stack_record(&ground, stack);
+                let address = session.stacks.slots.address(slot);
+                assert!(read(&mut session, address, size_of_val(&record)) == bytemuck::bytes_of(&record));
+            }
+        }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
+use rayon::prelude::*;
+
 use super::device::{Device, Fault};
 use crate::volume::Brick;
 
@@ -13,18 +15,30 @@ pub(super) struct Slots {
     base: u64,
     /// Most slots there may be.
     most: usize,
-    /// What is in each slot, as a number that is never used again; 0 for nothing.
-    stamps: Vec<u64>,
-    /// In which round each was used last.
-    used: Vec<AtomicU32>,
+    slots: Vec<Slot>,
     free: Vec<u32>,
     round: u32,
     /// Where to look next for a slot that can be given up.
     hand: usize,
 }
 
+/// A place. Threads put things into several at once.
+#[derive(Default)]
+struct Slot {
+    /// What is in it, as a number that is never used again; 0 for nothing.
+    stamp: AtomicU64,
+    /// In which round it was used last.
+    used: AtomicU32,
+}
+
+/// How many slots are looked at for ones that can be given up before there may be enough.
+const PIECE: usize = 1 << 14;
+
 /// Slots at the start: growing takes half a millisecond of the transaction that needs more, so first digs should not.
 const FIRST: usize = 1 << 14;
+
+/// From how many slots on they are taken side by side.
+const LONG: usize = 1 << 13;
 
 /// The first of so many numbers that no other record of this process has.
 fn stamps(count: usize) -> u64 {
@@ -42,8 +56,7 @@ impl Slots {
             record,
             base: 0,
             most: (budget / record).min(1 << SLOT_BITS),
-            stamps: Vec::new(),
-            used: Vec::new(),
+            slots: Vec::new(),
             free: Vec::new(),
             round: 1,
             hand: 0,
@@ -67,21 +80,25 @@ impl Slots {
 
     /// The slot of a tag, if what was put there still is.
     pub fn find(&self, tag: u64) -> Option<u32> {
-        let slot = tag as u32 & ((1 << SLOT_BITS) - 1);
-        let is_there = tag != 0 && self.stamps.get(slot as usize) == Some(&(tag >> SLOT_BITS));
-        is_there.then(|| {
-            self.used[slot as usize].store(self.round, Ordering::Relaxed);
-            slot
-        })
+        let number = tag as u32 & ((1 << SLOT_BITS) - 1);
+        let slot = self.slots.get(number as usize)?;
+        if tag == 0 || slot.stamp.load(Ordering::Relaxed) != tag >> SLOT_BITS {
+            return None;
+        }
+        // Threads come to the same bricks. What they only read they need not pass on to each other.
+        if slot.used.load(Ordering::Relaxed) != self.round {
+            slot.used.store(self.round, Ordering::Relaxed);
+        }
+        Some(number)
     }
 
     /// A slot for something new, with its tag. `Budget` where all slots are in use in this round.
     ///
     /// May move the records, and then waits for the device.
     pub fn take(&mut self, device: &mut dyn Device) -> Result<(u32, u64), Fault> {
-        let mut taken = Vec::with_capacity(1);
-        self.take_many(device, 1, &mut taken)?;
-        taken.pop().ok_or(Fault::Budget(self.most * self.record))
+        self.make_room(device, 1)?;
+        let slot = self.free.pop().ok_or(Fault::Budget(self.most * self.record))?;
+        Ok((slot, self.put(slot, stamps(1))))
     }
 
     /// So many slots at once, all of them or none.
@@ -91,41 +108,55 @@ impl Slots {
         count: usize,
         out: &mut Vec<(u32, u64)>,
     ) -> Result<(), Fault> {
+        let rest = self.make_room(device, count)?;
+        let (free, first) = (&self.free[rest..], stamps(count));
+        let put = |(number, &slot): (usize, &u32)| (slot, self.put(slot, first + number as u64));
+        if count < LONG {
+            out.extend(free.iter().rev().enumerate().map(put));
+        } else {
+            out.par_extend(free.par_iter().rev().enumerate().map(put));
+        }
+        self.free.truncate(rest);
+        Ok(())
+    }
+
+    /// Sees to it that so many slots are free; returns how many others are.
+    fn make_room(&mut self, device: &mut dyn Device, count: usize) -> Result<usize, Fault> {
+        let full = Fault::Budget(self.most * self.record);
         if count > self.most {
-            return Err(Fault::Budget(self.most * self.record));
+            return Err(full);
         }
         while self.free.len() < count && self.grow(device, count)? {}
         if self.free.len() < count {
             self.evict(count);
         }
-        let Some(rest) = self.free.len().checked_sub(count) else {
-            return Err(Fault::Budget(self.most * self.record));
-        };
-        let first = stamps(count);
-        for (stamp, slot) in (first..).zip(self.free.drain(rest..).rev()) {
-            self.stamps[slot as usize] = stamp;
-            self.used[slot as usize].store(self.round, Ordering::Relaxed);
-            out.push((slot, stamp << SLOT_BITS | u64::from(slot)));
-        }
-        Ok(())
+        self.free.len().checked_sub(count).ok_or(full)
+    }
+
+    /// Puts something into a slot; returns its tag.
+    fn put(&self, number: u32, stamp: u64) -> u64 {
+        let slot = &self.slots[number as usize];
+        slot.stamp.store(stamp, Ordering::Relaxed);
+        slot.used.store(self.round, Ordering::Relaxed);
+        stamp << SLOT_BITS | u64::from(number)
     }
 
     /// Gives all slots back.
     pub fn clear(&mut self) {
-        self.stamps.fill(0);
+        self.slots.iter_mut().for_each(|slot| *slot.stamp.get_mut() = 0);
         self.free.clear();
-        self.free.extend((0..self.stamps.len() as u32).rev());
+        self.free.extend((0..self.slots.len() as u32).rev());
     }
 
     /// Gives a slot back.
     pub fn give_back(&mut self, slot: u32) {
-        self.stamps[slot as usize] = 0;
+        *self.slots[slot as usize].stamp.get_mut() = 0;
         self.free.push(slot);
     }
 
     /// Twice as many slots, and so many more at least, unless that is too many.
     fn grow(&mut self, device: &mut dyn Device, more: usize) -> Result<bool, Fault> {
-        let old = self.stamps.len();
+        let old = self.slots.len();
         let new = (old * 2).max(old + more).max(FIRST).min(self.most);
         if new <= old {
             return Ok(false);
@@ -138,24 +169,29 @@ impl Slots {
             device.free(self.base);
         }
         self.base = base;
-        self.stamps.resize(new, 0);
-        self.used.resize_with(new, AtomicU32::default);
+        self.slots.resize_with(new, Slot::default);
         self.free.extend((old as u32..new as u32).rev());
         Ok(true)
     }
 
     /// Frees slots that were not used in this round: as many as are wanted, and an eighth of all at least.
     fn evict(&mut self, wanted: usize) {
-        let all = self.stamps.len();
-        for _ in 0..all {
-            if self.free.len() >= wanted.max(all / 8) {
-                break;
-            }
-            self.hand = (self.hand + 1) % all;
-            let is_taken = self.stamps[self.hand] != 0;
-            if is_taken && self.used[self.hand].load(Ordering::Relaxed) != self.round {
-                self.give_back(self.hand as u32);
-            }
+        let all = self.slots.len();
+        let (mut looked, round) = (0, self.round);
+        while self.free.len() < wanted.max(all / 8) && looked < all {
+            let first = self.hand;
+            let end = (first + PIECE).min(all).min(first + all - looked);
+            let freed = |(number, slot): (usize, &mut Slot)| {
+                let (stamp, used) = (slot.stamp.get_mut(), *slot.used.get_mut());
+                let is_old = *stamp != 0 && used != round;
+                is_old.then(|| {
+                    *stamp = 0;
+                    (first + number) as u32
+                })
+            };
+            self.free.par_extend(self.slots[first..end].par_iter_mut().enumerate().filter_map(freed));
+            looked += end - first;
+            self.hand = end % all;
         }
     }
 }
@@ -172,18 +208,24 @@ mod tests {
 
     #[test]
     fn what_is_given_back_is_not_found_and_makes_room() {
-        let Some(mut device) = device() else { return };
-        let mut slots = Slots::new(16, 100 * 16);
-        let mut taken = Vec::new();
-        slots.begin();
-        slots.take_many(&mut *device, 100, &mut taken).expect("room for all");
-        assert!(taken.iter().all(|&(slot, tag)| slots.find(tag) == Some(slot)));
-        assert!(slots.take(&mut *device).is_err(), "all are in use in this round");
-        slots.give_back(taken[7].0);
-        assert_eq!((slots.find(taken[7].1), slots.find(taken[8].1)), (None, Some(taken[8].0)));
-        slots.clear();
-        assert!(taken.iter().all(|&(_, tag)| slots.find(tag).is_none()));
-        taken.clear();
-        slots.take_many(&mut *device, 100, &mut taken).expect("room for all again");
+        // One after the other, and side by side.
+        for count in [100, LONG] {
+            let Some(mut device) = device() else { return };
+            let mut slots = Slots::new(16, count * 16);
+            let mut taken = Vec::new();
+            slots.begin();
+            slots.take_many(&mut *device, count, &mut taken).expect("room for all");
+            assert!(taken.iter().map(|&(slot, _)| slot).eq(0..count as u32));
+            assert!(taken.iter().all(|&(slot, tag)| slots.find(tag) == Some(slot)));
+            assert!(slots.take(&mut *device).is_err(), "all are in use in this round");
+            slots.give_back(taken[7].0);
+            assert_eq!((slots.find(taken[7].1), slots.find(taken[8].1)), (None, Some(taken[8].0)));
+            let (again, tag) = slots.take(&mut *device).expect("room for one");
+            assert_eq!((again, slots.find(tag), slots.find(taken[7].1)), (taken[7].0, Some(again), None));
+            slots.clear();
+            assert!(taken.iter().all(|&(_, tag)| slots.find(tag).is_none()));
+            taken.clear();
+            slots.take_many(&mut *device, count, &mut taken).expect("room for all again");
+        }
     }
 }

@@ -1,18 +1,25 @@
 //! The bricks around other bricks, as tables that kernels look them up in.
 //!
-//! Bricks that lie close together share a window, a box of bricks around them: so each is looked up once.
+//! Bricks that lie close together share a window, a box of bricks around them: so each is looked up once. Where there are
+//! many, they are cut into slabs, and threads make the windows of some slabs each; bricks of two slabs share none.
 
 use glam::IVec3;
 
+use super::device::Fault;
+use super::layout::NONE;
+use super::lists::{cut, hand_out, map};
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::window::{Window, shared};
 use crate::volume::{Brick, SampleView};
 
-use super::layout::NONE;
-use super::mail::map;
+/// From how many bricks on they are cut into slabs.
+const LONG: usize = 256;
 
-/// From how many windows on they are filled side by side.
-const LONG: usize = 8;
+/// How many slabs there should be, so that all threads end together.
+const SLABS: usize = 64;
+
+/// Bricks of a slab, at least and at most: few share few windows, and many keep other threads waiting.
+const OF_A_SLAB: [usize; 2] = [128, 1024];
 
 /// Where a brick is in the tables.
 #[derive(Clone, Copy, Debug)]
@@ -23,63 +30,134 @@ pub(super) struct Entry {
     pub strides: u32,
 }
 
-/// The windows of many bricks.
+/// The windows of many bricks, as references.
 pub(super) struct Windows<'a> {
-    /// Each with the entries of all windows before it.
-    windows: Vec<(Window<'a>, u32)>,
-    /// For each brick that was asked for, its window.
-    of: Vec<u32>,
+    slabs: Vec<Slab<'a>>,
+    /// How many of the bricks that were asked for belong to a slab; the last one may have fewer.
+    of_a_slab: usize,
 }
 
-/// References by entry, and the bricks that have none, with their entries.
-pub(super) type Refs<'a> = (Vec<u32>, Vec<(u32, &'a Brick)>);
+/// The windows of some bricks that follow each other.
+#[derive(Default)]
+struct Slab<'a> {
+    /// Entries of all slabs before.
+    first: u32,
+    /// Where each brick that was asked for is, counted from there.
+    entries: Vec<Entry>,
+    /// The references of all entries; [`NONE`] where no brick is stored.
+    refs: Vec<u32>,
+    /// Bricks that have no reference yet, with their entries.
+    missing: Vec<(usize, &'a Brick)>,
+    has_materials: bool,
+}
+
+impl<'a> Slab<'a> {
+    /// The windows around bricks, `more` bricks higher and deeper than one; `find` says how kernels refer to a brick.
+    fn new(
+        view: &SampleView<'a>,
+        bricks: impl Iterator<Item = BrickPos> + Clone,
+        more: i32,
+        find: impl Fn(&Brick) -> Option<u32>,
+    ) -> Self {
+        let (mut slab, mut window, mut rest) = (Self::default(), Window::default(), bricks);
+        while let Some((count, places)) = shared(rest.clone()) {
+            let more = IVec3::Y * more;
+            window = window.moved(view, LatticeBox { min: places.min - more, max: places.max + more });
+            slab.enter(&window, rest.by_ref().take(count), &find);
+        }
+        slab
+    }
+
+    /// Enters a window and the bricks that share it.
+    fn enter(
+        &mut self,
+        window: &Window<'a>,
+        bricks: impl Iterator<Item = BrickPos>,
+        find: impl Fn(&Brick) -> Option<u32>,
+    ) {
+        let (first, [x, _, z]) = (self.refs.len(), window.steps());
+        let strides = (x | z << 16) as u32;
+        let entry = |brick| Entry { number: (first + window.place(brick)) as u32, strides };
+        self.entries.extend(bricks.map(entry));
+        self.refs.resize(first + window.bricks().len(), NONE);
+        for (number, brick) in (first..).zip(window.bricks()) {
+            let Some(brick) = *brick else { continue };
+            match find(brick) {
+                Some(reference) => self.put(number, reference),
+                None => self.missing.push((number, brick)),
+            }
+        }
+    }
+
+    fn put(&mut self, number: usize, reference: u32) {
+        self.refs[number] = reference;
+        self.has_materials |= reference & 1 == 1;
+    }
+}
 
 impl<'a> Windows<'a> {
-    /// Windows around bricks, sorted by stacks: one brick more to all sides, and so many up and down.
-    pub fn around(
+    /// Windows around bricks, sorted by stacks, which are at `pos`: one brick more to all sides, and so many up and down.
+    /// `find` says how kernels refer to a brick; those that it does not know are [`complete`](Self::complete)d afterwards.
+    pub fn around<T: Sync>(
         view: SampleView<'a>,
-        bricks: impl Iterator<Item = BrickPos> + Clone,
+        bricks: &[T],
+        pos: impl Fn(&T) -> BrickPos + Send + Sync,
         up_and_down: i32,
+        find: impl Fn(&Brick) -> Option<u32> + Send + Sync,
     ) -> Self {
-        let (mut groups, mut of, mut rest) = (Vec::new(), Vec::new(), bricks);
-        let more = IVec3::Y * (up_and_down - 1);
-        while let Some((count, places)) = shared(rest.clone()) {
-            of.resize(of.len() + count, groups.len() as u32);
-            groups.push(LatticeBox { min: places.min - more, max: places.max + more });
-            rest.by_ref().take(count).for_each(drop);
-        }
-        let mut first = 0;
-        let numbered = |window: Window<'a>| {
-            let own = first;
-            first += window.bricks().len() as u32;
-            (window, own)
+        let of_a_slab = match bricks.len() {
+            few if few < LONG => few.max(1),
+            many => many.div_ceil(SLABS).clamp(OF_A_SLAB[0], OF_A_SLAB[1]),
         };
-        let windows = map(&groups, LONG, |&places| Window::new(&view, places));
-        Self { windows: windows.into_iter().map(numbered).collect(), of }
+        let parts: Vec<&[T]> = bricks.chunks(of_a_slab).collect();
+        let slab = |part: &&[T]| Slab::new(&view, part.iter().map(&pos), up_and_down - 1, &find);
+        let mut slabs = map(&parts, 2, slab);
+        let mut first = 0;
+        for slab in &mut slabs {
+            slab.first = first;
+            first += slab.refs.len() as u32;
+        }
+        Self { slabs, of_a_slab }
+    }
+
+    /// Enters the references of bricks that had none.
+    pub fn complete(&mut self, mut need: impl FnMut(&'a Brick) -> Result<u32, Fault>) -> Result<(), Fault> {
+        for slab in &mut self.slabs {
+            for (number, brick) in std::mem::take(&mut slab.missing) {
+                slab.put(number, need(brick)?);
+            }
+        }
+        Ok(())
     }
 
     /// The entry of a brick that was asked for, by its number among those.
-    pub fn entry(&self, number: usize, brick: BrickPos) -> Entry {
-        let (window, first) = &self.windows[self.of[number] as usize];
-        let [x, _, z] = window.steps();
-        Entry { number: first + window.place(brick) as u32, strides: (x | z << 16) as u32 }
+    pub fn entry(&self, number: usize) -> Entry {
+        let slab = &self.slabs[number / self.of_a_slab];
+        let own = slab.entries[number % self.of_a_slab];
+        Entry { number: slab.first + own.number, ..own }
     }
 
-    /// What `find` says of each brick; [`NONE`] where none is stored, and where it says nothing.
-    pub fn refs(&self, find: impl Fn(&Brick) -> Option<u32> + Send + Sync) -> Refs<'a> {
-        let parts = map(&self.windows, LONG, |(window, first)| {
-            let mut missing = Vec::new();
-            let found = (*first..).zip(window.bricks()).map(|(number, brick)| {
-                let Some(brick) = *brick else { return NONE };
-                find(brick).unwrap_or_else(|| {
-                    missing.push((number, brick));
-                    NONE
-                })
-            });
-            (found.collect::<Vec<u32>>(), missing)
-        });
-        let (found, missing): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-        (found.concat(), missing.concat())
+    /// The reference of a brick that was asked for.
+    pub fn reference(&self, number: usize) -> u32 {
+        let slab = &self.slabs[number / self.of_a_slab];
+        slab.refs[slab.entries[number % self.of_a_slab].number as usize]
+    }
+
+    /// How many entries there are.
+    pub fn len(&self) -> usize {
+        self.slabs.iter().map(|slab| slab.refs.len()).sum()
+    }
+
+    /// Has any brick materials of its own?
+    pub fn has_materials(&self) -> bool {
+        self.slabs.iter().any(|slab| slab.has_materials)
+    }
+
+    /// Writes the references of all entries.
+    pub fn write(&self, out: &mut [u32]) {
+        let places = cut(out, self.slabs.iter().map(|slab| slab.refs.len()));
+        let slabs: Vec<_> = self.slabs.iter().zip(places).collect();
+        hand_out(slabs, |(slab, place)| place.copy_from_slice(&slab.refs));
     }
 }
 
@@ -92,35 +170,33 @@ mod tests {
     use crate::ground::Ground;
     use crate::volume::Bricks;
 
-    #[test]
-    fn every_neighbour_of_a_brick_has_its_entry() {
+    /// A reference that says where its brick is.
+    fn code(pos: IVec3) -> u32 {
+        (pos.x + 20 + (pos.y + 20) * 40 + (pos.z + 20) * 1600) as u32
+    }
+
+    /// A brick at (x, z, y).
+    fn pos(&(x, z, y): &(i32, i32, i32)) -> BrickPos {
+        BrickPos(IVec3::new(x, y, z))
+    }
+
+    /// Every brick around those that are asked for must be found from there.
+    fn check(stored: &Bricks, asked: &[(i32, i32, i32)]) {
         let ground = Ground::flat(8, 8, 0.0).unwrap();
-        let mut rng = fastrand::Rng::with_seed(7);
-        let place = |rng: &mut fastrand::Rng| {
-            let [x, y, z] = [rng.i32(-9..9), rng.i32(-9..9), rng.i32(-9..9)];
-            (x, z, y)
-        };
-        let code = |pos: IVec3| (pos.x + 20 + (pos.y + 20) * 40 + (pos.z + 20) * 1600) as u32;
-        let pos = |(x, z, y)| BrickPos(IVec3::new(x, y, z));
-        let mut stored = Bricks::default();
-        for at in (0..3000).map(|_| pos(place(&mut rng))) {
-            let brick = Brick::of_edited(&[0; 512]);
-            brick.tag.set(code(at.0).into());
-            stored.insert(at, Arc::new(brick));
-        }
-        let asked: BTreeSet<_> = (0..60).map(|_| place(&mut rng)).collect();
-        let windows = Windows::around(SampleView::new(&ground, &stored), asked.iter().copied().map(pos), 8);
-        let (mut refs, missing) = windows.refs(|brick| {
-            let code = brick.tag.get() as u32;
-            (!code.is_multiple_of(3)).then_some(code)
+        let own = |brick: &Brick| brick.tag.get() as u32;
+        let known = |brick: &Brick| Some(own(brick)).filter(|code| !code.is_multiple_of(3));
+        let mut windows = Windows::around(SampleView::new(&ground, stored), asked, pos, 8, known);
+        let mut missing = 0;
+        let found = windows.complete(|brick| {
+            missing += 1;
+            Ok(own(brick))
         });
-        assert!(!missing.is_empty());
-        for (entry, brick) in missing {
-            assert_eq!(refs[entry as usize], NONE);
-            refs[entry as usize] = brick.tag.get() as u32;
-        }
-        for (number, at) in asked.into_iter().map(pos).enumerate() {
-            let entry = windows.entry(number, at);
+        found.expect("nothing fails");
+        assert!(missing > 0 && windows.has_materials());
+        let mut refs = vec![7; windows.len()];
+        windows.write(&mut refs);
+        for (number, at) in asked.iter().map(pos).enumerate() {
+            let entry = windows.entry(number);
             let [x, z] = [entry.strides & 0xffff, entry.strides >> 16].map(|stride| stride as i32);
             let around = (0..27).map(|i| IVec3::new(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1));
             for step in around.chain((-8..=8).map(|up| IVec3::Y * up)) {
@@ -128,6 +204,34 @@ mod tests {
                 let expected = stored.get(&BrickPos(at.0 + step)).map_or(NONE, |_| code(at.0 + step));
                 assert_eq!(found, expected, "{at:?} {step}");
             }
+            assert_eq!(windows.reference(number), refs[entry.number as usize]);
         }
+    }
+
+    #[test]
+    fn every_neighbour_of_a_brick_has_its_entry() {
+        let mut rng = fastrand::Rng::with_seed(7);
+        let place = |rng: &mut fastrand::Rng| (rng.i32(-9..9), rng.i32(-9..9), rng.i32(-9..9));
+        let mut stored = Bricks::default();
+        for at in (0..3000).map(|_| pos(&place(&mut rng))) {
+            let brick = Brick::of_edited(&[0; 512]);
+            brick.tag.set(code(at.0).into());
+            stored.insert(at, Arc::new(brick));
+        }
+        // In one slab, and in several.
+        for count in [60, 2 * LONG] {
+            let asked: BTreeSet<_> = (0..count).map(|_| place(&mut rng)).collect();
+            check(&stored, &asked.into_iter().collect::<Vec<_>>());
+        }
+        // Bricks may be asked for more than once, as blocks of several chunks lie in one.
+        check(&stored, &[(1, 2, 3); 2 * LONG]);
+    }
+
+    #[test]
+    fn where_nothing_is_asked_for_there_is_no_entry() {
+        let (ground, stored) = (Ground::flat(8, 8, 0.0).unwrap(), Bricks::default());
+        let windows = Windows::around(SampleView::new(&ground, &stored), &[(0, 0, 0); 0], pos, 1, |_| None);
+        windows.write(&mut []);
+        assert!(windows.len() == 0 && !windows.has_materials());
     }
 }

@@ -1,17 +1,17 @@
 //! Edits that look around, sculpting ones and those that rules bear on: what they need besides.
 
-use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::super::device::Fault;
-use super::super::layout::{self, CarefulParams, Chisel, EditParams};
+use super::super::layout::{self, CarefulParams, Chisel, EditJob, EditParams};
+use super::super::lists::in_pieces;
 use super::super::mail::{Inbox, Plan, Section};
 use super::super::session::{Session, Uploads};
 use super::super::windows::Windows;
-use super::Site;
+use super::LONG;
+use super::jobs::pos;
 use crate::ground::GreyImage;
-use crate::lattice::BrickPos;
-use crate::volume::{EditWork, Job};
+use crate::volume::EditWork;
 
 /// How far new ground looks for its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,6 @@ pub(super) struct Care<'a> {
     /// The last columns of the world along x and z.
     last: [i32; 2],
     windows: Windows<'a>,
-    refs: Vec<u32>,
     chisels: Vec<Chisel>,
     images: Vec<u16>,
     /// Bytes of the rules, and of what is protected; none where there are no rules.
@@ -49,14 +48,8 @@ pub(super) struct Care<'a> {
     rule_list: Section,
 }
 
-/// Where the edits of a brick are.
-fn pos(jobs: &[Job]) -> BrickPos {
-    jobs.first().map_or(BrickPos(IVec3::ZERO), |job| job.pos())
-}
-
 impl<'a> Care<'a> {
-    pub fn new(work: &EditWork<'a>, bricks: &[&[Job]], look: Look) -> Result<Self, Fault> {
-        let windows = Windows::around(work.base, bricks.iter().map(|jobs| pos(jobs)), look.bricks());
+    fn new(work: &EditWork<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
         let mut images = Images::default();
         let chisel = |tool| layout::chisel(tool, |image| images.first(image));
         let chisels = work.tools.iter().map(chisel).collect();
@@ -72,7 +65,6 @@ impl<'a> Care<'a> {
             look,
             last: [work.grid.width(), work.grid.depth()],
             windows,
-            refs: Vec::new(),
             chisels,
             images: images.samples,
             rules: rules.unwrap_or_default(),
@@ -85,7 +77,7 @@ impl<'a> Care<'a> {
 
     /// Adds what there is to send.
     pub fn plan(&mut self, plan: &mut Plan) {
-        self.ref_list = plan.section::<u32>(self.refs.len());
+        self.ref_list = plan.section::<u32>(self.windows.len());
         self.chisel_list = plan.section::<Chisel>(self.chisels.len());
         self.image_list = plan.section::<u16>(self.images.len());
         self.rule_list = plan.section::<u8>(self.rules.len());
@@ -93,7 +85,7 @@ impl<'a> Care<'a> {
 
     /// Writes it.
     pub fn put(&self, inbox: &mut Inbox) {
-        inbox.put(self.ref_list, &self.refs);
+        self.windows.write(inbox.entries(self.ref_list));
         inbox.put(self.chisel_list, &self.chisels);
         inbox.put(self.image_list, &self.images);
         inbox.put(self.rule_list, &self.rules);
@@ -150,29 +142,23 @@ impl<'a> Images<'a> {
 }
 
 impl Session {
-    /// The bricks that edits may reach, as the device knows them, with those around.
-    pub(super) fn careful_sites<'a>(
+    /// What jobs need whose edits look around; enters where their bricks are among those around, and what they are now.
+    pub(super) fn care<'a>(
         &mut self,
-        bricks: &[&[Job]],
-        care: &mut Care<'a>,
+        work: &EditWork<'a>,
+        look: Look,
+        jobs: &mut [EditJob],
         uploads: &mut Uploads<'a>,
-    ) -> Result<Vec<Site>, Fault> {
-        care.refs = self.refs(&care.windows, uploads)?;
-        let (mut sites, mut first) = (Vec::with_capacity(bricks.len()), 0);
-        for (number, jobs) in bricks.iter().enumerate() {
-            let pos = pos(jobs);
-            let entry = care.windows.entry(number, pos);
-            sites.push(Site {
-                pos,
-                base: care.refs[entry.number as usize],
-                stack: self.need_stack(uploads, (pos.0.x, pos.0.z))?,
-                first,
-                window: entry.number,
-                strides: entry.strides,
-            });
-            first += jobs.len() as u32;
-        }
-        Ok(sites)
+    ) -> Result<Care<'a>, Fault> {
+        let windows = self.windows(uploads, work.base, jobs, pos, look.bricks())?;
+        in_pieces(jobs, LONG, |first, jobs| {
+            for (number, job) in (first..).zip(jobs) {
+                let entry = windows.entry(number);
+                (job.window, job.strides) = (entry.number, entry.strides);
+                job.base = windows.reference(number);
+            }
+        });
+        Care::new(work, windows, look)
     }
 }
 

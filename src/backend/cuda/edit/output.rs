@@ -2,16 +2,26 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
 use super::super::device::{Device, Fault};
-use super::super::layout::{self, EditCount, EditPart, EditResult, MATERIAL_BYTES, NONE, RECORD_BYTES};
-use super::super::mail::{Outbox, map};
-use super::Target;
+use super::super::layout::{
+    self, BrickRecord, EditCount, EditJob, EditPart, EditResult, MATERIAL_BYTES, NONE, RECORD_BYTES,
+};
+use super::super::lists::{map, map_numbers};
+use super::super::mail::Outbox;
+use super::jobs::pos;
+use super::{LONG, Target};
 use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
-use crate::volume::{Brick, Count, DraftedBrick, EditWork, Fate, Job, Ledger, PartEffect};
+use crate::volume::{Brick, Count, DraftedBrick, Fate, Ledger};
 
-/// Bricks that one thread makes of what came back.
-const GROUP: usize = 64;
+/// Entries of each list that one ledger adds up.
+const ENTRIES: usize = 1024;
+
+/// How many of the latest counts one more is compared with: bricks beside each other mostly come to the same.
+const LATEST: usize = 8;
 
 /// What the edit kernel writes.
 pub(in super::super) struct EditOutput {
@@ -61,13 +71,18 @@ impl EditOutput {
         Ok(grown)
     }
 
-    /// Copies what is not here yet.
-    pub(super) fn fetch(&mut self, device: &mut dyn Device, totals: Totals) -> Result<(), Fault> {
-        let mut is_copied = self.records.fetch(device, totals.records)?;
-        is_copied |= self.materials.fetch(device, totals.materials)?;
-        is_copied |= self.parts.fetch(device, totals.parts)?;
+    /// Copies what is not here yet of what edits changed and counted.
+    pub(super) fn fetch_entries(&mut self, device: &mut dyn Device, totals: Totals) -> Result<(), Fault> {
+        let mut is_copied = self.parts.fetch(device, totals.parts)?;
         is_copied |= self.counts.fetch(device, totals.counts)?;
         if is_copied { device.wait() } else { Ok(()) }
+    }
+
+    /// Begins to copy what is not here yet of what bricks are made of; says whether that has to be waited for.
+    pub(super) fn begin_bricks(&mut self, device: &mut dyn Device, totals: Totals) -> Result<bool, Fault> {
+        let mut is_copied = self.records.fetch(device, totals.records)?;
+        is_copied |= self.materials.fetch(device, totals.materials)?;
+        Ok(is_copied)
     }
 
     /// How much of each list was written. Asking the device takes longer than a small launch; so where lists are in the
@@ -110,70 +125,148 @@ impl EditOutput {
     /// Did new ground look farther for its material than windows reach?
     pub fn is_too_far(&self, results: usize) -> bool {
         let is = |result: &EditResult| result.flags & EditResult::TOO_FAR != 0;
-        self.results.entries::<EditResult>(results).iter().any(is)
+        let results = self.results.entries::<EditResult>(results);
+        if results.len() < LONG { results.iter().any(is) } else { results.par_iter().any(is) }
     }
 
-    /// What came back, as ledgers.
-    pub(super) fn ledgers(
+    /// What edits changed and counted, as ledgers: in each some entries, added up, whichever bricks those are of.
+    pub(super) fn entries(&self, grid: ChunkGrid, jobs: &[EditJob], totals: Totals) -> Vec<Ledger> {
+        let parts = self.parts.entries::<EditPart>(totals.parts);
+        let counts = self.counts.entries::<EditCount>(totals.counts);
+        map_numbers(parts.len().max(counts.len()).div_ceil(ENTRIES), 2, |number| {
+            let mut ledger = Ledger::default();
+            piece(parts, ENTRIES, number).iter().for_each(|part| add_part(grid, jobs, part, &mut ledger));
+            piece(counts, ENTRIES, number).iter().for_each(|count| add_count(count, &mut ledger.counts));
+            ledger
+        })
+    }
+
+    /// The bricks that changed.
+    pub(super) fn changed(&self, results: usize, totals: Totals) -> Result<Changed, Fault> {
+        let results = self.results.entries::<EditResult>(results);
+        let found = map_numbers(results.len().div_ceil(LONG), 2, |number| {
+            let mut found = Changed { numbers: Vec::with_capacity(LONG), ..Changed::default() };
+            for (own, result) in ((number * LONG) as u32..).zip(piece(results, LONG, number)) {
+                if result.flags & EditResult::CHANGED == 0 {
+                    continue;
+                }
+                found.numbers.push(own);
+                found.hash = found.hash.wrapping_add(result.hash);
+                if result.flags & EditResult::UNIFORM == 0 {
+                    is_there(result, totals).then_some(())?;
+                } else if !found.uniform.contains(&Uniform::new(result)) {
+                    found.uniform.push(Uniform::new(result));
+                }
+            }
+            Some(found)
+        });
+        let Some(found) = found.into_iter().collect::<Option<Vec<_>>>() else {
+            return Err(Fault::Failed("bricks beyond the ends of their lists".into()));
+        };
+        let mut all = Changed::default();
+        for mut found in found {
+            all.numbers.append(&mut found.numbers);
+            all.hash = all.hash.wrapping_add(found.hash);
+            all.uniform.append(&mut found.uniform);
+        }
+        Ok(all)
+    }
+
+    /// These bricks, in order.
+    pub(super) fn bricks(
         &self,
-        work: &EditWork,
-        bricks: &[&[Job]],
+        changed: &Changed,
+        jobs: &[EditJob],
         targets: &[Target],
         totals: Totals,
-    ) -> Vec<Ledger> {
-        let results = self.results.entries::<EditResult>(bricks.len());
-        let group = |((bricks, results), targets): &((&[&[Job]], &[EditResult]), &[Target])| {
-            let mut ledger = Ledger::default();
-            for ((jobs, result), &(_, tag)) in bricks.iter().zip(*results).zip(*targets) {
-                let Some(job) = jobs.first().filter(|_| result.flags & EditResult::CHANGED != 0) else {
-                    continue;
-                };
-                let (pos, Some(brick)) = (job.pos(), self.brick(result, tag)) else { continue };
-                ledger.hash = ledger.hash.wrapping_add(result.hash);
-                let changed = layout::unpack_box(result.bounds, pos.origin());
-                let is_extended = result.flags & EditResult::EXTENDED != 0;
-                ledger.bricks.push(DraftedBrick::new(pos, Arc::new(brick), changed, is_extended));
-            }
-            ledger
+    ) -> Ledger {
+        let results = self.results.entries::<EditResult>(jobs.len());
+        let records = self.records.entries::<BrickRecord>(totals.records);
+        let materials = self.materials.entries::<[u8; MATERIAL_BYTES]>(totals.materials);
+        let uniform: FxHashMap<Uniform, Arc<Brick>> =
+            changed.uniform.iter().map(|&kind| (kind, kind.brick())).collect();
+        let stored = |result: &EditResult, tag: u64| {
+            let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
+            let materials = has_materials.then(|| &materials[result.material as usize]);
+            let brick = layout::brick_of(&records[result.record as usize], materials);
+            brick.tag.set(tag);
+            Arc::new(brick)
         };
-        let groups: Vec<_> =
-            bricks.chunks(GROUP).zip(results.chunks(GROUP)).zip(targets.chunks(GROUP)).collect();
-        let mut ledgers = map(&groups, 2, group);
-        if let Some(first) = ledgers.first_mut() {
-            let parts = self.parts.entries::<EditPart>(totals.parts).iter();
-            first.parts = parts.filter_map(|part| effect(work.grid, bricks, part)).collect();
-            first.counts = self.counts.entries::<EditCount>(totals.counts).iter().map(count).collect();
-        }
-        ledgers
-    }
-
-    /// The brick of a result, whose place on the device has this tag.
-    fn brick<'a>(&'a self, result: &EditResult, tag: u64) -> Option<Brick> {
-        let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
-        if result.flags & EditResult::UNIFORM != 0 {
-            let [low, high, material, _] = result.uniform.to_le_bytes();
-            let material = has_materials.then_some(MaterialId(material));
-            return Some(Brick::of_one(i16::from_le_bytes([low, high]), material));
-        }
-        let entry = |list: &'a Outbox, number: u32, bytes: usize| {
-            list.entries::<u8>((number as usize + 1) * bytes).get(number as usize * bytes..)
+        let drafted = |&number: &u32| {
+            let (job, result) = (&jobs[number as usize], &results[number as usize]);
+            let brick = match result.flags & EditResult::UNIFORM {
+                0 => stored(result, targets[number as usize].1),
+                _ => Arc::clone(&uniform[&Uniform::new(result)]),
+            };
+            let bounds = layout::unpack_box(result.bounds, pos(job).origin());
+            DraftedBrick::new(pos(job), brick, bounds, result.flags & EditResult::EXTENDED != 0)
         };
-        let record = entry(&self.records, result.record, RECORD_BYTES).unwrap_or_default();
-        let materials = has_materials.then(|| entry(&self.materials, result.material, MATERIAL_BYTES));
-        let brick = layout::brick_of(record, materials.flatten())?;
-        brick.tag.set(tag);
-        Some(brick)
+        let bricks = map(&changed.numbers, LONG, drafted);
+        Ledger { bricks, hash: changed.hash, ..Ledger::default() }
     }
 }
 
-/// What an edit changed in a chunk's part of a brick.
-fn effect(grid: ChunkGrid, bricks: &[&[Job]], part: &EditPart) -> Option<PartEffect> {
-    let pos = bricks.get(part.job as usize)?.first()?.pos();
+/// Is what a brick is made of in the lists?
+fn is_there(result: &EditResult, totals: Totals) -> bool {
+    let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
+    (result.record as usize) < totals.records
+        && (!has_materials || (result.material as usize) < totals.materials)
+}
+
+/// What a brick is that is all alike.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Uniform {
+    /// As results have it.
+    of: u32,
+    has_materials: bool,
+}
+
+impl Uniform {
+    fn new(result: &EditResult) -> Self {
+        Self { of: result.uniform, has_materials: result.flags & EditResult::HAS_MATERIALS != 0 }
+    }
+
+    fn brick(self) -> Arc<Brick> {
+        let [low, high, material, _] = self.of.to_le_bytes();
+        let material = self.has_materials.then_some(MaterialId(material));
+        Arc::new(Brick::of_one(i16::from_le_bytes([low, high]), material))
+    }
+}
+
+/// Bricks that changed.
+#[derive(Default)]
+pub(super) struct Changed {
+    numbers: Vec<u32>,
+    /// By how much the world's hash did.
+    hash: u64,
+    /// What those are that are all alike, some kinds several times.
+    uniform: Vec<Uniform>,
+}
+
+/// So many entries of a list, those of this number; fewer or none at its end.
+fn piece<T>(list: &[T], length: usize, number: usize) -> &[T] {
+    list.chunks(length).nth(number).unwrap_or_default()
+}
+
+/// Adds what an edit changed in a chunk's part of a brick.
+fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, ledger: &mut Ledger) {
+    let Some(pos) = jobs.get(part.job as usize).map(pos) else { return };
     let bounds = layout::unpack_box(part.bounds, pos.origin());
-    Some(PartEffect { edit: part.edit as usize, chunk: layout::part_chunk(grid, pos, part.part), bounds })
+    ledger.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
 }
 
-fn count(count: &EditCount) -> Count {
+/// Adds a count, to one of the latest if that is of the same.
+fn add_count(count: &EditCount, counts: &mut Vec<Count>) {
+    let own = of_voxels(count);
+    let mut latest = counts.iter_mut().rev().take(LATEST);
+    let key = |of: &Count| (of.edit, of.fate, of.material);
+    match latest.find(|of| key(of) == key(&own)) {
+        Some(of) => of.voxels += own.voxels,
+        None => counts.push(own),
+    }
+}
+
+fn of_voxels(count: &EditCount) -> Count {
     let [fate, material, ..] = count.fate.to_le_bytes();
     let fate = match fate {
         0 => Fate::Removed,
@@ -185,4 +278,64 @@ fn count(count: &EditCount) -> Count {
         _ => Fate::Slowed,
     };
     Count { edit: count.edit as usize, fate, material: MaterialId(material), voxels: count.voxels.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use fastrand::Rng;
+    use glam::IVec3;
+
+    use super::*;
+    use crate::lattice::LatticeBox;
+
+    #[test]
+    fn parts_beside_each_other_come_to_one_and_nothing_is_left_out() {
+        let (mut rng, grid) = (Rng::with_seed(4), ChunkGrid::new(20, 300, 300));
+        let job = |x: i32| EditJob { brick: [x, x % 3, 2], ..EditJob::default() };
+        let jobs: Vec<EditJob> = (0..30).map(job).collect();
+        let (mut ledger, mut expected) = (Ledger::default(), BTreeMap::new());
+        for number in 0..600 {
+            let (job, edit, part) = (number / 20, rng.u32(0..3), rng.u32(0..2));
+            let pos = pos(&jobs[job as usize]);
+            let point = pos.origin() + IVec3::new(rng.i32(0..8), 3, 4);
+            let bounds = layout::pack_box(LatticeBox::point(point), pos.origin());
+            add_part(grid, &jobs, &EditPart { job, edit, part, bounds }, &mut ledger);
+            let key = (edit as usize, layout::part_chunk(grid, pos, part));
+            LatticeBox::include(expected.entry(key).or_default(), LatticeBox::point(point));
+        }
+        // A job that there is not says nothing.
+        add_part(grid, &jobs, &EditPart { job: 30, ..EditPart::default() }, &mut ledger);
+        let mut found = BTreeMap::new();
+        for part in &ledger.parts {
+            LatticeBox::include(found.entry((part.edit, part.chunk)).or_default(), part.bounds);
+        }
+        assert_eq!(found, expected);
+        assert!(ledger.parts.len() < 150, "{} parts", ledger.parts.len());
+    }
+
+    #[test]
+    fn counts_beside_each_other_come_to_one_and_no_voxel_is_left_out() {
+        let (mut rng, mut counts, mut expected) = (Rng::with_seed(5), Vec::new(), BTreeMap::new());
+        for number in 0..900 {
+            let (edit, fate, voxels) = (number / 300, rng.u32(0..7) | rng.u32(0..2) << 8, rng.u32(1..500));
+            add_count(&EditCount { edit, fate, voxels, pad: 0 }, &mut counts);
+            *expected.entry((edit as usize, fate)).or_insert(0) += u64::from(voxels);
+        }
+        let mut found = BTreeMap::new();
+        for count in &counts {
+            let fate = count.fate as u32 | u32::from(count.material.0) << 8;
+            *found.entry((count.edit, fate)).or_insert(0) += count.voxels;
+        }
+        assert_eq!(found, expected);
+        assert!(counts.len() < 600, "{} counts", counts.len());
+    }
+
+    #[test]
+    fn pieces_of_a_list_are_all_of_it() {
+        let list: Vec<u32> = (0..10).collect();
+        let all = [0, 1, 2, 3].map(|number| piece(&list, 4, number));
+        assert_eq!(all, [&list[..4], &list[4..8], &list[8..], &[]]);
+    }
 }

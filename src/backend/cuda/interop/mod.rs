@@ -369,15 +369,17 @@ mod tests {
         };
         let mut blocks: Vec<Block> = world.drawn_chunks().flat_map(of_chunk).collect();
         blocks.sort_unstable_by_key(|Block { brick, chunk }| (brick.0.x, brick.0.z, brick.0.y, *chunk));
-        let expected = session.mesh(&world.view(), &blocks).expect("the device works");
+        let view = world.view();
+        let meshed = session.mesh(&view, &blocks, &|| {}).expect("the device works");
+        let expected = trial::collected(&blocks, &session.meshes.surfaces(&view, &blocks, meshed));
+        assert_eq!(expected.list.len(), blocks.len());
         let totals = session.mesh_there(&world.view(), &blocks).expect("the device works");
         let results = session.meshes.results(blocks.len()).to_vec();
         let Session { meshes, device, .. } = &mut session;
         let lists = meshes.download(&mut **device, totals).expect("the device works");
         let (positions, normals, indices) = lists;
         let (mut vertices, mut drawn) = (0, 0);
-        for ((block, all, triangles), result) in expected.iter().flat_map(|parts| parts.iter()).zip(&results)
-        {
+        for ((block, all, triangles), result) in expected.iter().zip(&results) {
             let range = |first: u32, count: u32| first as usize..(first + count) as usize;
             let own = range(result.vertex, result.vertices);
             let base = (block.brick.origin() - world.grid().origin(block.chunk)) * SNAP;

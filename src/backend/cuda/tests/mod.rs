@@ -36,7 +36,10 @@ pub(super) fn device() -> Option<Box<dyn Device>> {
 
 /// An engine that does everything on a device, small as it may be.
 fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
-    let engine = Engine::from_cuda(Cuda::open_with(false, Some(budget), &[(4, 3.0)], || Ok(device)));
+    let engine =
+        Engine::from_cuda(Cuda::open_with(false, Some(budget), trial::Sizes::few(&[(4, 3.0)]), || {
+            Ok(device)
+        }));
     engine.wait(Duration::from_secs(60));
     engine
 }

@@ -1,6 +1,6 @@
 //! A launch of edits, and whether what came out is right.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use fastrand::Rng;
 use glam::IVec3;
@@ -8,7 +8,7 @@ use glam::IVec3;
 use super::super::super::layout::{self, *};
 use super::super::{Device, Kernel, Slots, assert_same};
 use crate::ground::GreyImage;
-use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
+use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::{Brick, EditWork, Ledger, SampleView};
 
 /// What room there is for output.
@@ -152,12 +152,12 @@ impl EditRun {
 
     /// The brick that an entry holds.
     fn brick_in_entries(&self, result: &EditResult) -> Option<Brick> {
-        let record = bytemuck::bytes_of(self.records.get(result.record as usize)?);
+        let record = self.records.get(result.record as usize)?;
         let materials = match result.flags & EditResult::HAS_MATERIALS {
             0 => None,
-            _ => Some(self.materials.get(result.material as usize)?.as_slice()),
+            _ => Some(self.materials.get(result.material as usize)?),
         };
-        brick_of(record, materials)
+        Some(brick_of(record, materials))
     }
 
     fn slot<'a>(&self, slots: &'a [u8], job: &EditJob) -> &'a [u8] {
@@ -186,8 +186,9 @@ impl EditRun {
             hash = hash.wrapping_add(result.hash);
 
             let slot = self.slot(&self.after, job);
-            let stored = slot.get(RECORD_BYTES..).filter(|_| has(EditResult::HAS_MATERIALS));
-            assert_same(&brick_of(slot, stored).expect("a slot holds a brick"), brick, pos);
+            let (record, stored) = slot.split_at(RECORD_BYTES);
+            let stored = stored.first_chunk().filter(|_| has(EditResult::HAS_MATERIALS));
+            assert_same(&brick_of(&bytemuck::pod_read_unaligned(record), stored), brick, pos);
             if let Some((sample, material)) = brick.uniform() {
                 let sample = sample.distance().unwrap_or_default() as u16;
                 assert_eq!(result.uniform, u32::from(sample) | u32::from(material.0) << 16);
@@ -206,32 +207,19 @@ impl EditRun {
         assert_eq!(self.counters[..2], [records, materials]);
     }
 
-    /// What each edit changed and counted is what the CPU says.
+    /// What each edit changed and counted is what the CPU says, to which several bricks may be one entry.
     pub fn check_effects(&self, ledger: &Ledger, work: &EditWork) {
-        type Part = (usize, [i32; 3], ChunkPos, [i32; 6]);
-        let ends = |of: LatticeBox| {
-            let ([a, b, c], [d, e, f]) = (of.min.to_array(), of.max.to_array());
-            [a, b, c, d, e, f]
-        };
-        let mut expected: Vec<Part> = ledger
-            .parts
-            .iter()
-            .map(|part| {
-                (part.edit, BrickPos::of(part.bounds.min).0.to_array(), part.chunk, ends(part.bounds))
-            })
-            .collect();
-        let mut found: Vec<Part> = self
-            .parts
-            .iter()
-            .map(|part| {
-                let brick = self.jobs[part.job as usize].brick;
-                let pos = BrickPos(IVec3::from_array(brick));
-                let bounds = ends(unpack_box(part.bounds, pos.origin()));
-                (part.edit as usize, brick, part_chunk(work.grid, pos, part.part), bounds)
-            })
-            .collect();
-        expected.sort_unstable();
-        found.sort_unstable();
+        let (mut expected, mut found) = (BTreeMap::new(), BTreeMap::new());
+        for part in &ledger.parts {
+            LatticeBox::include(expected.entry((part.edit, part.chunk)).or_default(), part.bounds);
+        }
+        let mut known = HashSet::new();
+        for part in &self.parts {
+            assert!(known.insert((part.job, part.edit, part.part)), "{part:?} stands there twice");
+            let pos = BrickPos(IVec3::from_array(self.jobs[part.job as usize].brick));
+            let key = (part.edit as usize, part_chunk(work.grid, pos, part.part));
+            LatticeBox::include(found.entry(key).or_default(), unpack_box(part.bounds, pos.origin()));
+        }
         assert_eq!(found, expected);
 
         let (mut expected, mut found) = (BTreeMap::new(), BTreeMap::new());

@@ -1,0 +1,107 @@
+//! Lists that threads work on side by side where they are long.
+
+use rayon::prelude::*;
+
+/// Maps a list, side by side where it is long.
+pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+    if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
+}
+
+/// Maps the numbers below `end`, side by side where there are many.
+pub(super) fn map_numbers<R: Send>(
+    end: usize,
+    many: usize,
+    work: impl Fn(usize) -> R + Send + Sync,
+) -> Vec<R> {
+    if end < many { (0..end).map(work).collect() } else { (0..end).into_par_iter().map(work).collect() }
+}
+
+/// Two things, at once where they are worth it.
+pub(super) fn side_by_side<A: Send, B: Send>(
+    are_long: bool,
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    if are_long { rayon::join(a, b) } else { (a(), b()) }
+}
+
+/// Writes what `work` makes of each entry of a list, side by side where it is long.
+pub(super) fn fill<T: Sync, R: Send>(
+    list: &[T],
+    out: &mut [R],
+    long: usize,
+    work: impl Fn(usize, &T) -> R + Send + Sync,
+) {
+    if list.len() < long {
+        list.iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
+    } else {
+        list.par_iter().zip(out).enumerate().for_each(|(i, (entry, out))| *out = work(i, entry));
+    }
+}
+
+/// Entries of a list that a thread works on at a time.
+const PIECE: usize = 256;
+
+/// Works on a list as a whole, or piece by piece and side by side where it is long; `work` gets the number of a piece's
+/// first entry as well.
+pub(super) fn in_pieces<T: Send, R: Send>(
+    list: &mut [T],
+    long: usize,
+    work: impl Fn(usize, &mut [T]) -> R + Send + Sync,
+) -> Vec<R> {
+    if list.len() < long {
+        return vec![work(0, list)];
+    }
+    let piece = |(number, piece): (usize, &mut [T])| work(number * PIECE, piece);
+    list.par_chunks_mut(PIECE).enumerate().map(piece).collect()
+}
+
+/// Hands out the entries of a short list, side by side where it has several.
+pub(super) fn hand_out<T: Send>(list: Vec<T>, work: impl Fn(T) + Send + Sync) {
+    if list.len() < 2 {
+        list.into_iter().for_each(work);
+    } else {
+        list.into_par_iter().for_each(work);
+    }
+}
+
+/// The first entries of a list in pieces of these lengths.
+pub(super) fn cut<T>(mut list: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
+    let cut_off = |length: usize| {
+        let (piece, others) = std::mem::take(&mut list).split_at_mut(length);
+        list = others;
+        piece
+    };
+    lengths.map(cut_off).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_written_each_in_its_place() {
+        let mut list = [0; 10];
+        let found = cut(&mut list, [3, 0, 5].into_iter());
+        assert_eq!(found.iter().map(|piece| piece.len()).collect::<Vec<_>>(), [3, 0, 5]);
+        hand_out(found.into_iter().zip(1..).collect(), |(piece, number)| piece.fill(number));
+        assert_eq!(list, [1, 1, 1, 3, 3, 3, 3, 3, 0, 0]);
+    }
+
+    #[test]
+    fn long_lists_come_out_as_short_ones_do() {
+        let numbers: Vec<usize> = (0..2 * PIECE + 3).collect();
+        for long in [1, numbers.len() + 1] {
+            let mut list = vec![0; numbers.len()];
+            let firsts = in_pieces(&mut list, long, |first, piece| {
+                piece.iter_mut().zip(first..).for_each(|(entry, number)| *entry = number);
+                first
+            });
+            assert_eq!(list, numbers);
+            assert_eq!(firsts, if long == 1 { vec![0, PIECE, 2 * PIECE] } else { vec![0] });
+            assert_eq!(map_numbers(numbers.len(), long, |number| number), numbers);
+            fill(&numbers, &mut list, long, |number, entry| number + entry);
+            assert_eq!(list, map(&numbers, long, |number| 2 * number));
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Tiles that a transaction touches: which, and what they draw now.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use glam::IVec3;
+use rayon::Scope;
+use rayon::prelude::*;
+
+use super::by_brick::PARALLEL_PLACES;
+use super::commit::Stages;
+use super::dirty::grown_into;
+use super::world::World;
+use crate::ground::Ground;
+use crate::lattice::{ChunkGrid, Column, LatticeBox, TilePos, sort_by_place};
+use crate::surface::tile::{self, Rings};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Indices, Mask, SurfaceMesh};
+
+/// What changes in a tile's mesh. Its columns stay as they are.
+#[derive(Clone, Debug)]
+pub struct TileUpdate {
+    /// The whole list of indices.
+    pub indices: Indices,
+    /// The rings; their vertices follow after those of the columns.
+    pub rings: Arc<Rings>,
+    tile: TilePos,
+    ground: Arc<Ground>,
+    grid: ChunkGrid,
+}
+
+impl TileUpdate {
+    /// The tile's whole mesh, its columns included.
+    pub fn mesh(&self) -> SurfaceMesh {
+        let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
+        SurfaceMesh { vertices, indices: self.indices.clone() }
+    }
+}
+
+/// The tiles of a transaction in the making. Which they are can be found early; they are drawn when that is known and somebody
+/// says that there is time.
+pub(super) struct TileWork<'a> {
+    world: &'a World,
+    view: &'a WorldView<'a>,
+    /// Words of the mask that change.
+    newer: &'a Mask,
+    touched: OnceLock<(Vec<Patch>, Duration)>,
+    drawn: OnceLock<(Vec<(TilePos, TileUpdate)>, Duration)>,
+    /// Of two things that drawing waits for, how many are there.
+    arrived: AtomicUsize,
+    /// Did somebody say that there is time?
+    is_called: AtomicBool,
+}
+
+impl<'a> TileWork<'a> {
+    pub fn new(world: &'a World, view: &'a WorldView<'a>, newer: &'a Mask) -> Self {
+        let (touched, drawn) = (OnceLock::new(), OnceLock::new());
+        let (arrived, is_called) = (AtomicUsize::new(0), AtomicBool::new(false));
+        Self { world, view, newer, touched, drawn, arrived, is_called }
+    }
+
+    /// Begins to find out which tiles are touched.
+    pub fn begin<'s>(&'s self, scope: &Scope<'s>) {
+        scope.spawn(|scope| {
+            self.find();
+            self.arrive(scope);
+        });
+    }
+
+    /// Says that there is time to draw them; once is enough.
+    pub fn go_on<'s>(&'s self, scope: &Scope<'s>) {
+        if !self.is_called.swap(true, Ordering::Relaxed) {
+            self.arrive(scope);
+        }
+    }
+
+    /// Whoever comes second has tiles drawn.
+    fn arrive<'s>(&'s self, scope: &Scope<'s>) {
+        if self.arrived.fetch_add(1, Ordering::AcqRel) == 1 {
+            scope.spawn(|_| self.draw());
+        }
+    }
+
+    fn find(&self) -> &[Patch] {
+        &timed(&self.touched, || touched_patches(self.world, self.view.grid, self.newer)).0
+    }
+
+    fn draw(&self) {
+        let touched = self.find();
+        timed(&self.drawn, || draw_tiles(self.world, self.view, touched));
+    }
+
+    /// The tiles, in order, and how long they took. Does what is not done yet.
+    pub fn finish(self) -> (Vec<(TilePos, TileUpdate)>, Duration) {
+        self.draw();
+        let took = self.touched.into_inner().map(|(_, took)| took).unwrap_or_default();
+        let (drawn, also) = self.drawn.into_inner().unwrap_or_default();
+        (drawn, took + also)
+    }
+}
+
+/// Does something unless it is done, and keeps how long it took. Nobody else may do it at the same time.
+fn timed<T>(done: &OnceLock<(T, Duration)>, work: impl FnOnce() -> T) -> &(T, Duration) {
+    done.get_or_init(|| {
+        let mut took = Duration::ZERO;
+        let made = Stages::time(&mut took, work);
+        (made, took)
+    })
+}
+
+/// A tile, and 8x8 cells of it as (z, x), in units of 8 cells.
+type Patch = (TilePos, (i32, i32));
+
+/// The patch itself and those beside it, in units of patches.
+const BESIDE: [(i32, i32); 5] = [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)];
+
+/// Patches that lose a cell to the mask or get one back, or border on one that does, by the tiles that draw them.
+fn touched_patches(world: &World, grid: ChunkGrid, newer: &Mask) -> Vec<Patch> {
+    let turned = |word| newer.get_word(word).map_or(0, |cells| cells ^ world.mask.word(word));
+    // Does a word turn cells of the patch that is one of these steps further, or beside it?
+    let touches = |(x, z): (i32, i32), step: usize| {
+        let (dx, dz) = BESIDE[step];
+        grown_into(turned((x - dx, z - dz)), dx, dz) != 0
+    };
+    // Of several words that touch a patch, the one of the first step tells of it.
+    let is_first = |patch, step| touches(patch, step) && !(0..step).any(|other| touches(patch, other));
+    let touched_by = |&((x, z), _): &((i32, i32), u64)| {
+        let patches = (0..).zip(BESIDE).map(move |(step, (dx, dz))| ((x + dx, z + dz), step));
+        let patches = patches.filter(|&(patch, step)| is_first(patch, step));
+        patches.flat_map(|(patch, _)| tiles_of(grid, patch).map(move |tile| (tile, (patch.1, patch.0))))
+    };
+    let words: Vec<_> = newer.words().collect();
+    let mut touched: Vec<Patch> = if words.len() < PARALLEL_PLACES {
+        words.iter().flat_map(touched_by).collect()
+    } else {
+        words.par_iter().flat_map_iter(touched_by).collect()
+    };
+    sort_by_place(&mut touched, |(tile, _)| [tile.x, tile.z, 0]);
+    touched
+}
+
+/// The tiles of these patches, with their new rings and index lists.
+fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePos, TileUpdate)> {
+    let tiles: Vec<_> = touched.chunk_by(|a, b| a.0 == b.0).collect();
+    let update = |touched: &&[Patch]| {
+        let tile = touched[0].0;
+        let mut patches: Vec<(i32, i32)> = touched.iter().map(|&(_, patch)| patch).collect();
+        patches.sort_unstable();
+        let borders = tile::borders(view, tile);
+        let nothing = Rings::default();
+        let old = world.rings.get(&tile).map_or(&nothing, Arc::as_ref);
+        let rings = Arc::new(old.updated(view, tile, &borders, &patches));
+        let indices = tile::indices(view.grid, tile, &borders, &rings);
+        (tile, TileUpdate { indices, rings, tile, ground: Arc::clone(&world.ground), grid: view.grid })
+    };
+    if tiles.len() < 8 { tiles.iter().map(update).collect() } else { tiles.par_iter().map(update).collect() }
+}
+
+/// The tiles that draw some of the 8x8 cells of a word.
+fn tiles_of(grid: ChunkGrid, (x, z): (i32, i32)) -> impl Iterator<Item = TilePos> {
+    let last = |at: i32, cells: i32| (at * 8 + 7).min(cells - 1);
+    let cells = LatticeBox::new(
+        IVec3::new((x * 8).max(0), 0, (z * 8).max(0)),
+        IVec3::new(last(x, grid.width()), 0, last(z, grid.depth())),
+    );
+    cells.into_iter().flat_map(move |cells| {
+        let (low, high) =
+            (grid.tile_of_cell(Column::of(cells.min)), grid.tile_of_cell(Column::of(cells.max)));
+        (low.z..=high.z).flat_map(move |z| (low.x..=high.x).map(move |x| TilePos { x, z }))
+    })
+}
