@@ -43,6 +43,8 @@ mod emulator;
 #[cfg(test)]
 mod kernel_tests;
 #[cfg(test)]
+mod late;
+#[cfg(test)]
 mod mapped;
 #[cfg(test)]
 mod tests;
@@ -235,7 +237,7 @@ impl Cuda {
 
 /// Gives the card up, with the one warning.
 fn lose(place: &mut Place, state: &Mutex<EngineState>, fault: &Fault) {
-    log::warn!("bevy_burrow goes on without CUDA: {fault}");
     *place = Place::Lost;
     *lock(state) = EngineState::Lost(fault.to_string());
+    log::warn!("bevy_burrow goes on without CUDA: {fault}");
 }

@@ -180,7 +180,7 @@ impl Slots {
         let (mut looked, round) = (0, self.round);
         while self.free.len() < wanted.max(all / 8) && looked < all {
             let first = self.hand;
-            let end = (first + PIECE).min(all).min(first + all - looked);
+            let end = (first + PIECE.min(all.div_ceil(8))).min(all).min(first + all - looked);
             let freed = |(number, slot): (usize, &mut Slot)| {
                 let (stamp, used) = (slot.stamp.get_mut(), *slot.used.get_mut());
                 let is_old = *stamp != 0 && used != round;
@@ -205,6 +205,29 @@ pub(super) fn reference(slot: u32, brick: &Brick) -> u32 {
 mod tests {
     use super::*;
     use crate::backend::cuda::tests::device;
+
+    #[test]
+    fn what_was_not_used_lately_makes_room_and_the_rest_stays() {
+        let Some(mut device) = device() else { return };
+        let most = 3 * FIRST + 77;
+        let mut slots = Slots::new(16, most * 16);
+        let mut rounds: Vec<Vec<(u32, u64)>> = Vec::new();
+        for round in 0..40 {
+            slots.begin();
+            // Of the round before, some are used again.
+            let again = rounds.last().map(|taken| taken[..2000].to_vec()).unwrap_or_default();
+            let kept: Vec<_> = again.into_iter().filter(|&(_, tag)| slots.find(tag).is_some()).collect();
+            let mut taken = Vec::new();
+            slots.take_many(&mut *device, 9000 + round, &mut taken).expect("room for all");
+            let mut all: Vec<u32> = taken.iter().chain(&kept).map(|&(slot, _)| slot).collect();
+            assert!(taken.iter().chain(&kept).all(|&(slot, tag)| slots.find(tag) == Some(slot)));
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), taken.len() + kept.len(), "no slot is given twice");
+            assert_eq!(kept.len(), if round == 0 { 0 } else { 2000 });
+            rounds.push(taken);
+        }
+    }
 
     #[test]
     fn what_is_given_back_is_not_found_and_makes_room() {

@@ -18,7 +18,8 @@ const LONG: usize = 256;
 /// How many slabs there should be, so that all threads end together.
 const SLABS: usize = 64;
 
-/// Bricks of a slab, at least and at most: few share few windows, and many keep other threads waiting.
+/// Bricks of a slab, at least and at most: few share few windows, and many keep other threads waiting. Of windows that are
+/// higher, fewer make one.
 const OF_A_SLAB: [usize; 2] = [128, 1024];
 
 /// Where a brick is in the tables.
@@ -105,9 +106,10 @@ impl<'a> Windows<'a> {
         up_and_down: i32,
         find: impl Fn(&Brick) -> Option<u32> + Send + Sync,
     ) -> Self {
+        let height = up_and_down.max(1) as usize;
         let of_a_slab = match bricks.len() {
-            few if few < LONG => few.max(1),
-            many => many.div_ceil(SLABS).clamp(OF_A_SLAB[0], OF_A_SLAB[1]),
+            few if few * height < LONG => few.max(1),
+            many => many.div_ceil(SLABS).clamp((OF_A_SLAB[0] / height).max(1), OF_A_SLAB[1]),
         };
         let parts: Vec<&[T]> = bricks.chunks(of_a_slab).collect();
         let slab = |part: &&[T]| Slab::new(&view, part.iter().map(&pos), up_and_down - 1, &find);

@@ -3,7 +3,7 @@
 use glam::IVec3;
 
 use super::super::device::Fault;
-use super::super::layout::{self, EditJob, NONE};
+use super::super::layout::{self, EditJob, MOST_JOBS, NONE};
 use super::super::lists::{cut, hand_out, in_pieces, map};
 use super::super::session::{Session, Uploads};
 use super::super::slots::reference;
@@ -24,15 +24,22 @@ fn place(job: &EditJob) -> (i32, i32) {
 
 /// A job for each brick that edits may reach, in order: where the brick is, which edits it takes, how chunks cut it. They
 /// take the place of what the list holds.
-pub(super) fn list(work: &EditWork, list: &mut Vec<EditJob>) {
+///
+/// # Errors
+/// More jobs than a launch may have.
+pub(super) fn list(work: &EditWork, list: &mut Vec<EditJob>) -> Result<(), Fault> {
     let pieces = pieces(work.jobs(), LONG, Job::is_same_brick);
     if let [] | [_] = &pieces[..] {
         list.clear();
         list.extend(list_from(0, work.jobs(), work.grid));
-        return;
+        return Ok(());
     }
     let counts = map(&pieces, 2, |piece| piece.chunk_by(Job::is_same_brick).count());
-    list.resize(counts.iter().sum(), EditJob::default());
+    let count = counts.iter().sum();
+    if count > MOST_JOBS {
+        return Err(Fault::TooLarge(count));
+    }
+    list.resize(count, EditJob::default());
     let mut first = 0;
     let numbered = pieces.iter().zip(cut(list, counts.into_iter())).map(|(&piece, place)| {
         let own = first;
@@ -42,6 +49,7 @@ pub(super) fn list(work: &EditWork, list: &mut Vec<EditJob>) {
     hand_out(numbered.collect(), |(first, piece, place)| {
         place.iter_mut().zip(list_from(first, piece, work.grid)).for_each(|(place, job)| *place = job);
     });
+    Ok(())
 }
 
 /// The jobs of a piece of a list of edits, which begins with this number.
@@ -130,7 +138,7 @@ mod tests {
             let edits: Vec<Edit> = (0..edits).map(edit).collect();
             let work = EditWork::new(samples, grid, &edits.iter().collect::<Vec<_>>());
             let mut jobs = vec![EditJob::default(); 7];
-            list(&work, &mut jobs);
+            list(&work, &mut jobs).expect("few enough");
             assert_eq!(jobs.len(), work.bricks().len());
             let mut next = 0;
             for (job, of_brick) in jobs.iter().zip(work.bricks()) {

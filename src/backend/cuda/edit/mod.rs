@@ -8,7 +8,7 @@ mod jobs;
 mod output;
 
 use super::device::{Fault, Kernel};
-use super::layout::{self, EditJob, EditParams, EditResult, MOST_JOBS, MOST_LIST};
+use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::{fill, side_by_side};
 use super::mail::Plan;
 use super::session::{Session, Uploads};
@@ -51,8 +51,7 @@ impl Session {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
         let mut jobs = std::mem::take(&mut self.edit_jobs);
-        jobs::list(work, &mut jobs);
-        let ledgers = self.edit_bricks(work, &mut jobs);
+        let ledgers = jobs::list(work, &mut jobs).and_then(|()| self.edit_bricks(work, &mut jobs));
         if jobs.capacity() <= KEPT_JOBS {
             self.edit_jobs = jobs;
         }
@@ -61,9 +60,6 @@ impl Session {
 
     /// The same, by the jobs of all bricks.
     fn edit_bricks(&mut self, work: &EditWork, jobs: &mut [EditJob]) -> Result<Vec<Ledger>, Fault> {
-        if jobs.len() > MOST_JOBS {
-            return Err(Fault::TooLarge(work.jobs().len()));
-        }
         if !work.looks_around() {
             return self.try_edits(work, jobs, None).map(Option::unwrap_or_default);
         }

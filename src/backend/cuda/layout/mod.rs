@@ -165,9 +165,9 @@ mod tests {
         let mut bytes = [7; BRICK_BYTES];
         for _ in 0..2 {
             brick_record(&brick, &mut bytes);
-            let record: &BrickRecord = bytemuck::from_bytes(&bytes[..RECORD_BYTES]);
+            let record: BrickRecord = bytemuck::pod_read_unaligned(&bytes[..RECORD_BYTES]);
             let materials = brick.materials().and_then(|_| bytes[RECORD_BYTES..].first_chunk());
-            let found = brick_of(record, materials);
+            let found = brick_of(&record, materials);
             assert_eq!(found.samples(), brick.samples());
             assert_eq!((found.solid(), found.edited()), (brick.solid(), brick.edited()));
             assert_eq!(found.materials(), brick.materials());

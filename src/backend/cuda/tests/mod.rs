@@ -16,6 +16,7 @@ use fastrand::Rng;
 use super::device::Device;
 use super::driver::Card;
 use super::emulator::Emulator;
+use super::late::Late;
 use super::mapped::Mapped;
 use super::*;
 use crate::backend::Engine;
@@ -125,6 +126,11 @@ fn compare_under(
     for engine in engines {
         assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
     }
+}
+
+/// An engine that panics where something is used while a copy is under way.
+fn late() -> Option<Engine> {
+    Some(engine(Box::new(Late::new(device()?)), 64 << 20))
 }
 
 /// An engine whose kernels write short lists to the host's memory, as those of a card do.

@@ -119,7 +119,7 @@ fn short_and_long_transactions_take_turns() {
         vec![Brush::dig(Shape::sphere(glam::Vec3::splat(-900.0), 5.0))],
         small(3).to_vec(),
     ];
-    for engine in [mapped(), device().map(|device| engine(device, 64 << 20))] {
+    for engine in [mapped(), late(), device().map(|device| engine(device, 64 << 20))] {
         let Some(engine) = engine else { return };
         let ground = || Ground::from_fn(120, 120, |x, z| 30.0 + f64::from(x * z % 7)).expect("valid");
         compare_on(ground(), 32, &[&engine], &transactions);
