@@ -1,4 +1,13 @@
-//! Lists cut into pieces that threads take.
+//! Work for threads: lists cut into pieces, and two things at once.
+
+/// Two things, at once where that is worth it.
+pub(crate) fn side_by_side<A: Send, B: Send>(
+    is_worth_it: bool,
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    if is_worth_it { rayon::join(a, b) } else { (a(), b()) }
+}
 
 /// A list in pieces of about this length. Entries beside each other that belong together are in the same one.
 pub(crate) fn pieces<T>(

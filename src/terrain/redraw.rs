@@ -12,7 +12,7 @@ use super::surface::{ChunkSurface, Fresh, key};
 use super::tiles::{TileUpdate, TileWork};
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};
-use crate::lattice::{ChunkPos, TilePos, order_of_places};
+use crate::lattice::{ChunkPos, TilePos, order_of_places, side_by_side};
 use crate::surface::Mask;
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
@@ -61,15 +61,6 @@ pub(super) fn updates(
     MeshUpdates { tiles, chunks }
 }
 
-/// Two things, at once where so many bricks are worth it.
-pub(super) fn side_by_side<A: Send, B: Send>(
-    bricks: usize,
-    a: impl FnOnce() -> A + Send,
-    b: impl FnOnce() -> B + Send,
-) -> (A, B) {
-    if bricks < PARALLEL_BLOCKS { (a(), b()) } else { rayon::join(a, b) }
-}
-
 /// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.
 fn mesh_blocks(
     world: &World,
@@ -90,7 +81,7 @@ fn mesh_blocks(
         });
     };
     Stages::time(meshing, || {
-        side_by_side(blocks.len(), meshed, || {
+        side_by_side(blocks.len() >= PARALLEL_BLOCKS, meshed, || {
             order();
         })
     });

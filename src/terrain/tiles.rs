@@ -1,6 +1,6 @@
 //! Tiles that a transaction touches: which, and what they draw now.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
@@ -38,6 +38,11 @@ impl TileUpdate {
     }
 }
 
+/// It is known which tiles are touched.
+const FOUND: u8 = 1;
+/// Somebody said that there is time.
+const CALLED: u8 = 2;
+
 /// The tiles of a transaction in the making. Which they are can be found early; they are drawn when that is known and somebody
 /// says that there is time.
 pub(super) struct TileWork<'a> {
@@ -47,37 +52,33 @@ pub(super) struct TileWork<'a> {
     newer: &'a Mask,
     touched: OnceLock<(Vec<Patch>, Duration)>,
     drawn: OnceLock<(Vec<(TilePos, TileUpdate)>, Duration)>,
-    /// Of two things that drawing waits for, how many are there.
-    arrived: AtomicUsize,
-    /// Did somebody say that there is time?
-    is_called: AtomicBool,
+    /// Of what drawing waits for, what is there: `FOUND`, `CALLED`.
+    there: AtomicU8,
 }
 
 impl<'a> TileWork<'a> {
     pub fn new(world: &'a World, view: &'a WorldView<'a>, newer: &'a Mask) -> Self {
-        let (touched, drawn) = (OnceLock::new(), OnceLock::new());
-        let (arrived, is_called) = (AtomicUsize::new(0), AtomicBool::new(false));
-        Self { world, view, newer, touched, drawn, arrived, is_called }
+        let (touched, drawn, there) = (OnceLock::new(), OnceLock::new(), AtomicU8::new(0));
+        Self { world, view, newer, touched, drawn, there }
     }
 
     /// Begins to find out which tiles are touched.
     pub fn begin<'s>(&'s self, scope: &Scope<'s>) {
         scope.spawn(|scope| {
             self.find();
-            self.arrive(scope);
+            self.arrive(FOUND, scope);
         });
     }
 
     /// Says that there is time to draw them; once is enough.
     pub fn go_on<'s>(&'s self, scope: &Scope<'s>) {
-        if !self.is_called.swap(true, Ordering::Relaxed) {
-            self.arrive(scope);
-        }
+        self.arrive(CALLED, scope);
     }
 
-    /// Whoever comes second has tiles drawn.
-    fn arrive<'s>(&'s self, scope: &Scope<'s>) {
-        if self.arrived.fetch_add(1, Ordering::AcqRel) == 1 {
+    /// What comes second has tiles drawn.
+    fn arrive<'s>(&'s self, what: u8, scope: &Scope<'s>) {
+        let before = self.there.fetch_or(what, Ordering::AcqRel);
+        if before | what == FOUND | CALLED && before & what == 0 {
             scope.spawn(|_| self.draw());
         }
     }

@@ -23,12 +23,12 @@ use super::field_log::{FieldLog, FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
 use super::loose::{LoosePiece, LooseSettings};
 use super::receipt::{Applied, Receipt};
-use super::redraw::{self, MeshUpdates, side_by_side};
+use super::redraw::{self, MeshUpdates};
 use super::world::World;
 use super::{Submission, Work};
-use crate::backend::{Compute, Cpu, Engine};
+use crate::backend::{Compute, Cpu, Engine, PARALLEL_BLOCKS};
 use crate::brush::Edit;
-use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox, side_by_side};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{
@@ -160,14 +160,14 @@ impl Transaction {
         let changed = |drafted: &DraftedBrick| (drafted.pos, drafted.changed);
         let dirty = || Stages::time(meshing, || dirty_cells(world.grid, &drafted, changed));
         let near = || Stages::time(ring, || cells_in_reach(&drafted));
-        let (dirty, near) = side_by_side(drafted.len(), dirty, near);
+        let (dirty, near) = side_by_side(drafted.len() >= PARALLEL_BLOCKS, dirty, near);
 
         let before = WorldView { samples: world.samples().under(&latest), ..world.view() };
         let mask = Stages::time(&mut stages.ring, || joined_mask(world, &before, &near));
         let view = WorldView { mask: MaskView::new(&world.mask).over(&mask), ..before };
         let meshes = || redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
         let enter = || self.enter(submissions, effects, pieces, &drafted, &mask);
-        let (meshes, entered) = side_by_side(dirty.len(), meshes, enter);
+        let (meshes, entered) = side_by_side(dirty.len() >= PARALLEL_BLOCKS, meshes, enter);
 
         let change = Change {
             bricks: changed_bricks(drafted),

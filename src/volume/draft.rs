@@ -201,21 +201,11 @@ impl Draft {
         } else {
             self.bricks.append(&mut ledger.bricks);
         }
-        // Bricks near each other mostly are of one kind.
-        let mut last = None;
         for number in uniform_ones(&self.bricks, before) {
             let drafted = &mut self.bricks[number];
             let Some(kind) = drafted.kind else { continue };
-            let known = match last.take() {
-                Some((same, brick)) if same == kind => brick,
-                _ => {
-                    let fresh =
-                        || Arc::clone(self.uniform.entry(kind).or_insert_with(|| drafted.brick.clone()));
-                    uniform.get(&kind).cloned().unwrap_or_else(fresh)
-                }
-            };
-            drafted.brick = Arc::clone(&known);
-            last = Some((kind, known));
+            let fresh = || Arc::clone(self.uniform.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
+            drafted.brick = uniform.get(&kind).cloned().unwrap_or_else(fresh);
         }
     }
 }

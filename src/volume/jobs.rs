@@ -11,7 +11,7 @@ use super::work::Tool;
 use crate::lattice::{BrickPos, LatticeBox, sort_by_place};
 
 /// One edit's work on one brick; sorted by brick, then by edit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Job {
     /// The brick's position as (x, z, y).
     brick: [i32; 3],

@@ -50,10 +50,14 @@ impl Ledger {
         }
     }
 
-    /// Where an edit counts voxels of one more brick.
-    pub(super) fn counts(&mut self, edit: usize) -> Counts<'_> {
-        let own = self.counts.iter().rev().take(LATEST).take_while(|count| count.edit == edit).count();
-        Counts { edit, first: self.counts.len() - own, list: &mut self.counts }
+    /// Enters what became of voxels that an edit dealt with.
+    pub fn count(&mut self, edit: usize, fate: Fate, material: MaterialId, voxels: u64) {
+        let key = (edit, fate, material);
+        let mut latest = self.counts.iter_mut().rev().take(LATEST);
+        match latest.find(|count| (count.edit, count.fate, count.material) == key) {
+            Some(count) => count.voxels += voxels,
+            None => self.counts.push(Count { edit, fate, material, voxels }),
+        }
     }
 }
 
@@ -90,18 +94,12 @@ pub(crate) struct Count {
 
 /// What one edit does to a brick is counted here, beside what it did to the one before.
 pub(super) struct Counts<'l> {
-    edit: usize,
-    list: &'l mut Vec<Count>,
-    /// Where this edit's counts begin.
-    first: usize,
+    pub edit: usize,
+    pub ledger: &'l mut Ledger,
 }
 
 impl Counts<'_> {
     pub fn add(&mut self, fate: Fate, material: MaterialId, voxels: u64) {
-        let own = &mut self.list[self.first..];
-        match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
-            Some(count) => count.voxels += voxels,
-            None => self.list.push(Count { edit: self.edit, fate, material, voxels }),
-        }
+        self.ledger.count(self.edit, fate, material, voxels);
     }
 }

@@ -27,9 +27,9 @@ pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub(crate) use brick::{PRISTINE, row};
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
-pub(crate) use ledger::Ledger;
 #[cfg(feature = "cuda")]
-pub(crate) use ledger::{Count, Fate};
+pub(crate) use ledger::Fate;
+pub(crate) use ledger::Ledger;
 pub(crate) use removal::{TakenOut, pristine_layers, take_out};
 pub(crate) use restore::{Replaced, pristine_brick};
 pub use rules::{DiggingRules, Refused};

@@ -116,6 +116,16 @@ impl<'a> EditWork<'a> {
         self.jobs.chunk_by(Job::is_same_brick).collect()
     }
 
+    /// Applies all edits on the CPU and hands out a ledger for each brick.
+    #[cfg(all(test, feature = "cuda"))]
+    pub(crate) fn run_each_brick(&self, mut each: impl FnMut(Ledger)) {
+        for jobs in self.bricks() {
+            let mut ledger = Ledger::default();
+            finish(self, jobs, &mut ledger);
+            each(ledger);
+        }
+    }
+
     /// Every brick that some edit may reach, once for each edit.
     pub(crate) fn jobs(&self) -> &[Job] {
         &self.jobs

@@ -16,15 +16,6 @@ pub(super) fn map_numbers<R: Send>(
     if end < many { (0..end).map(work).collect() } else { (0..end).into_par_iter().map(work).collect() }
 }
 
-/// Two things, at once where they are worth it.
-pub(super) fn side_by_side<A: Send, B: Send>(
-    are_long: bool,
-    a: impl FnOnce() -> A + Send,
-    b: impl FnOnce() -> B + Send,
-) -> (A, B) {
-    if are_long { rayon::join(a, b) } else { (a(), b()) }
-}
-
 /// Writes what `work` makes of each entry of a list, side by side where it is long.
 pub(super) fn fill<T: Sync, R: Send>(
     list: &[T],

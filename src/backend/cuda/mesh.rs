@@ -2,12 +2,12 @@
 
 use super::device::{Device, Fault, Kernel};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams, MeshResult};
-use super::lists::{cut, fill, hand_out, map, side_by_side};
+use super::lists::{cut, fill, hand_out, map};
 use super::mail::{Outbox, Plan};
 use super::session::{Session, Uploads};
 use super::surfaces::Surfaces;
 use super::windows::Windows;
-use crate::lattice::pieces;
+use crate::lattice::{pieces, side_by_side};
 use crate::surface::MaterialMix;
 use crate::surface::block::Block;
 use crate::surface::fresh::PackedMixes;

@@ -9,10 +9,11 @@ mod output;
 
 use super::device::{Fault, Kernel};
 use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
-use super::lists::{fill, side_by_side};
+use super::lists::fill;
 use super::mail::Plan;
 use super::session::{Session, Uploads};
 use super::slots::Slots;
+use crate::lattice::side_by_side;
 use crate::volume::{EditWork, Ledger, Tool};
 use careful::Look;
 pub(super) use output::EditOutput;

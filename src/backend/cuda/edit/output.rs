@@ -15,13 +15,10 @@ use super::jobs::pos;
 use super::{LONG, Target};
 use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
-use crate::volume::{Brick, Count, DraftedBrick, Fate, Ledger};
+use crate::volume::{Brick, DraftedBrick, Fate, Ledger};
 
 /// Entries of each list that one ledger adds up.
 const ENTRIES: usize = 1024;
-
-/// How many of the latest counts one more is compared with: bricks beside each other mostly come to the same.
-const LATEST: usize = 8;
 
 /// What the edit kernel writes.
 pub(in super::super) struct EditOutput {
@@ -136,7 +133,7 @@ impl EditOutput {
         map_numbers(parts.len().max(counts.len()).div_ceil(ENTRIES), 2, |number| {
             let mut ledger = Ledger::default();
             piece(parts, ENTRIES, number).iter().for_each(|part| add_part(grid, jobs, part, &mut ledger));
-            piece(counts, ENTRIES, number).iter().for_each(|count| add_count(count, &mut ledger.counts));
+            piece(counts, ENTRIES, number).iter().for_each(|count| add_count(count, &mut ledger));
             ledger
         })
     }
@@ -255,18 +252,8 @@ fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, ledger: &mut Led
     ledger.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
 }
 
-/// Adds a count, to one of the latest if that is of the same.
-fn add_count(count: &EditCount, counts: &mut Vec<Count>) {
-    let own = of_voxels(count);
-    let mut latest = counts.iter_mut().rev().take(LATEST);
-    let key = |of: &Count| (of.edit, of.fate, of.material);
-    match latest.find(|of| key(of) == key(&own)) {
-        Some(of) => of.voxels += own.voxels,
-        None => counts.push(own),
-    }
-}
-
-fn of_voxels(count: &EditCount) -> Count {
+/// Adds what became of voxels.
+fn add_count(count: &EditCount, ledger: &mut Ledger) {
     let [fate, material, ..] = count.fate.to_le_bytes();
     let fate = match fate {
         0 => Fate::Removed,
@@ -277,7 +264,7 @@ fn of_voxels(count: &EditCount) -> Count {
         5 => Fate::TooHard,
         _ => Fate::Slowed,
     };
-    Count { edit: count.edit as usize, fate, material: MaterialId(material), voxels: count.voxels.into() }
+    ledger.count(count.edit as usize, fate, MaterialId(material), count.voxels.into());
 }
 
 #[cfg(test)]
@@ -317,19 +304,19 @@ mod tests {
 
     #[test]
     fn counts_beside_each_other_come_to_one_and_no_voxel_is_left_out() {
-        let (mut rng, mut counts, mut expected) = (Rng::with_seed(5), Vec::new(), BTreeMap::new());
+        let (mut rng, mut ledger, mut expected) = (Rng::with_seed(5), Ledger::default(), BTreeMap::new());
         for number in 0..900 {
             let (edit, fate, voxels) = (number / 300, rng.u32(0..7) | rng.u32(0..2) << 8, rng.u32(1..500));
-            add_count(&EditCount { edit, fate, voxels, pad: 0 }, &mut counts);
+            add_count(&EditCount { edit, fate, voxels, pad: 0 }, &mut ledger);
             *expected.entry((edit as usize, fate)).or_insert(0) += u64::from(voxels);
         }
         let mut found = BTreeMap::new();
-        for count in &counts {
+        for count in &ledger.counts {
             let fate = count.fate as u32 | u32::from(count.material.0) << 8;
             *found.entry((count.edit, fate)).or_insert(0) += count.voxels;
         }
         assert_eq!(found, expected);
-        assert!(counts.len() < 600, "{} counts", counts.len());
+        assert!(ledger.counts.len() < 600, "{} counts", ledger.counts.len());
     }
 
     #[test]

@@ -60,10 +60,10 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
     brushes.iter().filter_map(|brush| Edit::quantize(brush).ok()).collect()
 }
 
-/// What the CPU makes of edits.
+/// What the CPU makes of edits, brick by brick: nothing of two bricks is one entry.
 fn ledger_of(work: &EditWork) -> Ledger {
     let mut all = Ledger::default();
-    work.run(|mut ledger| {
+    work.run_each_brick(|mut ledger| {
         all.bricks.append(&mut ledger.bricks);
         all.parts.append(&mut ledger.parts);
         all.counts.append(&mut ledger.counts);
@@ -84,24 +84,27 @@ fn compare_edits(
     let work = EditWork::new(samples, grid, &edits);
     let work = work.under((rng.u32(0..3) == 0).then_some(&rules));
     let ledger = ledger_of(&work);
-    let materials = ledger.bricks.iter().filter(|drafted| drafted.brick.materials().is_some()).count();
+    let most = EditRoom {
+        records: ledger.bricks.len(),
+        materials: ledger.bricks.iter().filter(|drafted| drafted.brick.materials().is_some()).count(),
+        parts: ledger.parts.len(),
+        counts: ledger.counts.len(),
+    };
+    let run = EditRun::new(device, &work, rng, most, FAR);
+    assert_eq!(run.counters[2..], [most.parts as u32, most.counts as u32]);
+    run.check_bricks(&ledger, true);
+    run.check_effects(&ledger, &work);
+
     let mut less = |room: usize| if rng.bool() { room } else { rng.usize(0..=room) };
-    // The processor has as many parts and counts at most: those of several bricks may be one.
     let room = EditRoom {
-        records: less(ledger.bricks.len()),
-        materials: less(materials),
-        parts: less(ledger.parts.len()),
-        counts: less(ledger.counts.len()),
+        records: less(most.records),
+        materials: less(most.materials),
+        parts: less(most.parts),
+        counts: less(most.counts),
     };
     let short = EditRun::new(device, &work, rng, room, FAR);
     short.check_bricks(&ledger, false);
-
-    let wanted = |list: usize| short.counters[list] as usize;
-    let most = EditRoom { records: wanted(0), materials: wanted(1), parts: wanted(2), counts: wanted(3) };
-    let run = EditRun::new(device, &work, rng, most, FAR);
     assert_eq!(short.counters, run.counters, "counters go on past the room");
-    run.check_bricks(&ledger, true);
-    run.check_effects(&ledger, &work);
     // Windows that end near the brick do, or it is told that they don't.
     let near = EditRun::new(device, &work, rng, most, 1);
     if near.results.iter().all(|result| result.flags & EditResult::TOO_FAR == 0) {

@@ -1,6 +1,6 @@
 //! A launch of edits, and whether what came out is right.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use fastrand::Rng;
 use glam::IVec3;
@@ -8,7 +8,7 @@ use glam::IVec3;
 use super::super::super::layout::{self, *};
 use super::super::{Device, Kernel, Slots, assert_same};
 use crate::ground::GreyImage;
-use crate::lattice::{BrickPos, LatticeBox};
+use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::volume::{Brick, EditWork, Ledger, SampleView};
 
 /// What room there is for output.
@@ -207,19 +207,32 @@ impl EditRun {
         assert_eq!(self.counters[..2], [records, materials]);
     }
 
-    /// What each edit changed and counted is what the CPU says, to which several bricks may be one entry.
+    /// What each edit changed and counted is what the CPU says.
     pub fn check_effects(&self, ledger: &Ledger, work: &EditWork) {
-        let (mut expected, mut found) = (BTreeMap::new(), BTreeMap::new());
-        for part in &ledger.parts {
-            LatticeBox::include(expected.entry((part.edit, part.chunk)).or_default(), part.bounds);
-        }
-        let mut known = HashSet::new();
-        for part in &self.parts {
-            assert!(known.insert((part.job, part.edit, part.part)), "{part:?} stands there twice");
-            let pos = BrickPos(IVec3::from_array(self.jobs[part.job as usize].brick));
-            let key = (part.edit as usize, part_chunk(work.grid, pos, part.part));
-            LatticeBox::include(found.entry(key).or_default(), unpack_box(part.bounds, pos.origin()));
-        }
+        type Part = (usize, [i32; 3], ChunkPos, [i32; 6]);
+        let ends = |of: LatticeBox| {
+            let ([a, b, c], [d, e, f]) = (of.min.to_array(), of.max.to_array());
+            [a, b, c, d, e, f]
+        };
+        let mut expected: Vec<Part> = ledger
+            .parts
+            .iter()
+            .map(|part| {
+                (part.edit, BrickPos::of(part.bounds.min).0.to_array(), part.chunk, ends(part.bounds))
+            })
+            .collect();
+        let mut found: Vec<Part> = self
+            .parts
+            .iter()
+            .map(|part| {
+                let brick = self.jobs[part.job as usize].brick;
+                let pos = BrickPos(IVec3::from_array(brick));
+                let bounds = ends(unpack_box(part.bounds, pos.origin()));
+                (part.edit as usize, brick, part_chunk(work.grid, pos, part.part), bounds)
+            })
+            .collect();
+        expected.sort_unstable();
+        found.sort_unstable();
         assert_eq!(found, expected);
 
         let (mut expected, mut found) = (BTreeMap::new(), BTreeMap::new());
