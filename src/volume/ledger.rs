@@ -53,15 +53,17 @@ impl Ledger {
     /// Enters what became of voxels that an edit dealt with.
     pub fn count(&mut self, edit: usize, fate: Fate, material: MaterialId, voxels: u64) {
         let key = (edit, fate, material);
-        let mut latest = self.counts.iter_mut().rev().take(LATEST);
-        match latest.find(|count| (count.edit, count.fate, count.material) == key) {
-            Some(count) => count.voxels += voxels,
+        // All of the edit's own that stand there, however many materials those are: so a brick has no two of a kind.
+        let is_near = |(number, count): &(usize, &mut Count)| *number < LATEST || count.edit == edit;
+        let mut latest = self.counts.iter_mut().rev().enumerate().take_while(is_near);
+        match latest.find(|(_, count)| (count.edit, count.fate, count.material) == key) {
+            Some((_, count)) => count.voxels += voxels,
             None => self.counts.push(Count { edit, fate, material, voxels }),
         }
     }
 }
 
-/// How many of the latest entries one more is compared with.
+/// How many of the latest entries one more is compared with, at least.
 const LATEST: usize = 8;
 
 /// What one edit changed in one chunk, in one brick or in several.
