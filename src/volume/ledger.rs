@@ -50,20 +50,15 @@ impl Ledger {
         }
     }
 
-    /// Enters what became of voxels that an edit dealt with.
-    pub fn count(&mut self, edit: usize, fate: Fate, material: MaterialId, voxels: u64) {
-        let key = (edit, fate, material);
-        // All of the edit's own that stand there, however many materials those are: so a brick has no two of a kind.
-        let is_near = |(number, count): &(usize, &mut Count)| *number < LATEST || count.edit == edit;
-        let mut latest = self.counts.iter_mut().rev().enumerate().take_while(is_near);
-        match latest.find(|(_, count)| (count.edit, count.fate, count.material) == key) {
-            Some((_, count)) => count.voxels += voxels,
-            None => self.counts.push(Count { edit, fate, material, voxels }),
-        }
+    /// Where an edit counts voxels: all of its own that stand at the end are looked at, however many materials those are, so
+    /// a brick has no two of a kind.
+    pub fn counts(&mut self, edit: usize) -> Counts<'_> {
+        let own = self.counts.iter().rev().take_while(|count| count.edit == edit).count();
+        Counts { edit, first: self.counts.len() - own, list: &mut self.counts }
     }
 }
 
-/// How many of the latest entries one more is compared with, at least.
+/// How many of the latest entries one more is compared with.
 const LATEST: usize = 8;
 
 /// What one edit changed in one chunk, in one brick or in several.
@@ -95,13 +90,19 @@ pub(crate) struct Count {
 }
 
 /// What one edit does to a brick is counted here, beside what it did to the one before.
-pub(super) struct Counts<'l> {
-    pub edit: usize,
-    pub ledger: &'l mut Ledger,
+pub(crate) struct Counts<'l> {
+    edit: usize,
+    list: &'l mut Vec<Count>,
+    /// Where this edit's counts begin.
+    first: usize,
 }
 
 impl Counts<'_> {
     pub fn add(&mut self, fate: Fate, material: MaterialId, voxels: u64) {
-        self.ledger.count(self.edit, fate, material, voxels);
+        let own = &mut self.list[self.first..];
+        match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
+            Some(count) => count.voxels += voxels,
+            None => self.list.push(Count { edit: self.edit, fate, material, voxels }),
+        }
     }
 }

@@ -65,7 +65,7 @@ impl<'a> Workpiece<'a> {
             let around = tool.looks_around().then(|| Surroundings::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
-                let counts = &mut Counts { edit, ledger };
+                let counts = &mut ledger.counts(edit);
                 let changed = match &around {
                     Some(around) => self.carefully(tool, rules, samples, &distances, around, counts),
                     None => self.apply(tool.operation, samples, &distances, counts),

@@ -264,7 +264,7 @@ fn add_count(count: &EditCount, ledger: &mut Ledger) {
         5 => Fate::TooHard,
         _ => Fate::Slowed,
     };
-    ledger.count(count.edit as usize, fate, MaterialId(material), count.voxels.into());
+    ledger.counts(count.edit as usize).add(fate, MaterialId(material), count.voxels.into());
 }
 
 #[cfg(test)]
