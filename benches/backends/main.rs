@@ -66,7 +66,12 @@ fn main() {
     };
     let engines = Engines { cpu: open(Backend::Cpu), cuda: open(Backend::Cuda), auto: open(Backend::Auto) };
     match engines.cuda.state() {
-        EngineState::Cuda(name) => println!("{name}, {} threads", rayon::current_num_threads()),
+        EngineState::Cuda(name) => println!(
+            "{name}, {} threads; tried out in {:.0} and {:.0} ms",
+            rayon::current_num_threads(),
+            engines.cuda.figures().trial.as_secs_f64() * 1e3,
+            engines.auto.figures().trial.as_secs_f64() * 1e3,
+        ),
         state => return println!("no card: {state:?}"),
     }
     for (name, run) in SECTIONS {

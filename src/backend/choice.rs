@@ -149,11 +149,18 @@ pub(super) struct Costs {
     /// How much longer stages take than was measured: edits, meshing, edits some of which look around, and meshing of so
     /// little that the processor does it on one thread.
     drift: [[f64; 2]; 4],
+    /// Blocks that are meshed anew for each brick that an edit may reach, as it was lately: of few such bricks, of many.
+    blocks: [f64; 2],
+    /// Such bricks of the transaction at hand.
+    edited: usize,
 }
 
-/// Blocks that are meshed anew for each brick that edits may reach, roughly.
+/// What is expected of that at first.
 #[cfg(feature = "cuda")]
-const BLOCKS_PER_BRICK: f64 = 1.25;
+const BLOCKS: f64 = 1.25;
+/// The most that one transaction may say of it: edits that hardly reach a brick are meshed with all that is around it.
+#[cfg(feature = "cuda")]
+const MOST_BLOCKS: f64 = 8.0;
 
 /// How far one transaction moves what is expected of the next.
 #[cfg(feature = "cuda")]
@@ -175,6 +182,8 @@ impl Default for Costs {
             mesh: Default::default(),
             upload: 0.0,
             drift: [[1.0; 2]; 4],
+            blocks: [BLOCKS; 2],
+            edited: 0,
         }
     }
 }
@@ -185,7 +194,8 @@ impl Costs {
     /// card before it is meshed there, and that counts already when edits are chosen.
     pub fn edit(&self, load: Load) -> Estimate {
         let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * self.drift[kind(Stage::Edit, load)][on]);
-        let mesh = self.meshing((load.amount as f64 * BLOCKS_PER_BRICK) as usize);
+        let blocks = load.amount as f64 * self.blocks[size(load.amount)];
+        let mesh = self.meshing(blocks.round() as usize);
         let brought = mesh[1] + self.upload * load.amount as f64;
         estimate(cpu + mesh[0].min(brought), cuda + self.upload * load.missing as f64 + mesh[0].min(mesh[1]))
     }
@@ -212,8 +222,20 @@ impl Costs {
         [0, 1].map(|on| self.mesh[on].at(blocks) * drift[on])
     }
 
-    /// Takes in how long a stage took that was expected to take so long, the other one's part not counted.
+    /// Takes in how long a stage took that was expected to take so long, the other one's part not counted; and how much
+    /// there is to mesh after edits.
     pub fn learn(&mut self, stage: Stage, load: Load, is_cuda: bool, took: Duration) {
+        match stage {
+            Stage::Edit => self.edited += load.amount,
+            Stage::Mesh => {
+                let edited = std::mem::take(&mut self.edited);
+                if edited > 0 {
+                    let (found, blocks) =
+                        (load.amount as f64 / edited as f64, &mut self.blocks[size(edited)]);
+                    *blocks += (found.min(MOST_BLOCKS) - *blocks) * LEARNING;
+                }
+            }
+        }
         let on = usize::from(is_cuda);
         let expected = match stage {
             Stage::Edit => self.edits(load, on),
@@ -227,6 +249,12 @@ impl Costs {
             drift[1 - on] += (1.0 - drift[1 - on]) * FORGETTING;
         }
     }
+}
+
+/// Are bricks that edits may reach few, or many?
+#[cfg(feature = "cuda")]
+fn size(bricks: usize) -> usize {
+    usize::from(bricks >= PARALLEL_BLOCKS)
 }
 
 /// Which drift is that of a stage.
@@ -327,6 +355,30 @@ mod tests {
         assert_eq!(of([10, 1], 20e-6), [40.0 + 500.0, 80.0 + 50.0]);
         // On the processor in any case.
         assert_eq!(of([1, 10], 5e-6), [40.0 + 50.0, 80.0 + 50.0]);
+    }
+
+    #[test]
+    fn as_many_blocks_are_expected_as_there_were_lately() {
+        let mut costs = linear([1, 1], [10, 10]);
+        let load = |amount| Load { amount, ..Load::default() };
+        let of = |costs: &Costs, amount| micros(costs.edit(load(amount)))[0];
+        assert_eq!([100, 40].map(|amount| of(&costs, amount)), [100.0 + 1250.0, 40.0 + 500.0]);
+        // Two runs of edits, and half as many blocks; then a step through history, which says nothing.
+        for _ in 0..40 {
+            for (stage, amount, each) in
+                [(Stage::Edit, 100, 1), (Stage::Edit, 60, 1), (Stage::Mesh, 80, 10), (Stage::Mesh, 900, 10)]
+            {
+                costs.learn(stage, load(amount), false, Duration::from_micros(amount as u64 * each));
+            }
+        }
+        // Many say nothing of few.
+        assert_eq!([100, 40].map(|amount| of(&costs, amount)), [100.0 + 500.0, 40.0 + 500.0]);
+        // However little the edits reached.
+        for _ in 0..40 {
+            costs.learn(Stage::Edit, load(1), false, Duration::from_micros(1));
+            costs.learn(Stage::Mesh, load(900), false, Duration::from_micros(9000));
+        }
+        assert_eq!(of(&costs, 40), 40.0 + 3200.0);
     }
 
     #[test]

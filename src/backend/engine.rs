@@ -55,6 +55,9 @@ pub enum EngineState {
 /// What an engine did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EngineFigures {
+    /// How long a card was tried out, in the background before it was used: compared with the processor bit by bit, and
+    /// timed beside it. Zero until that is over, and where there is no card.
+    pub trial: Duration,
     /// Stages of transactions done on the processor.
     pub cpu: u64,
     /// Stages of transactions done on a card.
@@ -107,7 +110,11 @@ impl Engine {
 
     /// What it did so far.
     pub fn figures(&self) -> EngineFigures {
-        self.0.figures.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        let figures = self.0.figures.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        #[cfg(feature = "cuda")]
+        let figures =
+            EngineFigures { trial: self.0.cuda.as_ref().map_or(Duration::ZERO, Cuda::trial), ..figures };
+        figures
     }
 
     /// Ground of `width` x `depth` cells from noise: the same, bit by bit, as [`Ground::from_noise`] makes.

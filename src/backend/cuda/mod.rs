@@ -50,7 +50,10 @@ mod mapped;
 mod tests;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+use std::time::Duration;
+
+use web_time::Instant;
 
 use super::choice::{Costs, Load};
 use super::{Choice, EngineState, Stage};
@@ -68,6 +71,8 @@ pub(super) struct Cuda {
     slot: Arc<Mutex<Place>>,
     /// What became of opening it, to be asked at any time.
     state: Arc<Mutex<EngineState>>,
+    /// How long the trial took, when it is over.
+    trial: Arc<OnceLock<Duration>>,
 }
 
 /// Where the session is.
@@ -112,14 +117,18 @@ impl Cuda {
             is_auto,
             slot: Arc::new(Mutex::new(Place::Opening)),
             state: Arc::new(Mutex::new(EngineState::Opening)),
+            trial: Arc::default(),
         };
-        let (slot, state) = (Arc::clone(&own.slot), Arc::clone(&own.state));
+        let (slot, state, took) = (Arc::clone(&own.slot), Arc::clone(&own.state), Arc::clone(&own.trial));
         let open = move || {
             let open = || {
                 let mut device = device()?;
                 let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
                 let mut session = Session::new(device, budget)?;
-                let costs = trial::run(&mut session, sizes)?;
+                let start = Instant::now();
+                // On a thread of the pool, as large transactions run: to call the pool from elsewhere takes its time.
+                let costs = rayon::scope(|_| trial::run(&mut session, sizes))?;
+                took.get_or_init(|| start.elapsed());
                 session.forget();
                 Ok((session, costs))
             };
@@ -144,6 +153,11 @@ impl Cuda {
 
     pub fn state(&self) -> EngineState {
         lock(&self.state).clone()
+    }
+
+    /// How long the card was tried out; nothing before that is over.
+    pub fn trial(&self) -> Duration {
+        self.trial.get().copied().unwrap_or_default()
     }
 
     /// Does a stage on the card if that is there, free and chosen; else the processor has to do it. `then` makes something

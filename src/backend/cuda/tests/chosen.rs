@@ -20,6 +20,7 @@ fn cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
         is_auto,
         slot: Arc::new(Mutex::new(place)),
         state: Arc::new(Mutex::new(EngineState::Cuda("tight".into()))),
+        trial: Arc::default(),
     }
 }
 

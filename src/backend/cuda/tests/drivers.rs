@@ -16,6 +16,7 @@ fn a_device_that_can_not_be_opened_is_no_device() {
         let text = fault.to_string();
         let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, move || Err(fault)));
         assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(text));
+        assert!(engine.figures().trial.is_zero());
         compare(&mut Rng::with_seed(3), 3, &engine);
     }
 }
