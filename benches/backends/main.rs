@@ -208,7 +208,7 @@ fn one_field(engines: &Engines) {
         let one = threads(1);
         for round in 0..30 {
             let mut discarded = [(); 3].map(|()| Times::default());
-            let kept = if round < 5 { &mut discarded } else { &mut samples };
+            let kept = if round < 6 { &mut discarded } else { &mut samples };
             let dig_all = |engine: &Engine, times: &mut Times| {
                 let mut terrain = level::one_field(size, round);
                 run(terrain.begin().expect("a brush waits"), engine, times);

@@ -218,8 +218,11 @@ fn main() {
         let (mut hashes, mut vertices, mut on_card, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
         // The first round warms memory and threads.
         for round in 0..=arguments.repeats {
-            // In turns: whoever comes later finds caches warm.
-            for i in (0..engines.len()).map(|turn| (turn + usize::from(round)) % engines.len()) {
+            // In turns: whoever comes later finds caches warm. Every other round runs backwards, so that nobody always comes
+            // after the same one.
+            for turn in 0..engines.len() {
+                let turn = if round.is_multiple_of(2) { turn } else { engines.len() - 1 - turn };
+                let i = (turn + usize::from(round) / 2) % engines.len();
                 let engine = &engines[i].1;
                 let outcome = run(&transaction, engine);
                 hashes.push(outcome.hash);

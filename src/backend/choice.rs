@@ -1,4 +1,4 @@
-//! Which backend is faster for what: measured once, then looked up.
+//! Which backend is faster for what: measured at the start, and learnt from every transaction since.
 
 use std::time::Duration;
 
@@ -81,6 +81,11 @@ impl Curve {
         self.points.push((amount as f64, time.as_secs_f64().max(least)));
     }
 
+    /// Does it say anything of so little?
+    fn reaches(&self, amount: usize) -> bool {
+        self.points.first().is_some_and(|&(least, _)| least <= amount as f64)
+    }
+
     /// Seconds for an amount.
     pub fn at(&self, amount: usize) -> f64 {
         let amount = amount as f64;
@@ -141,14 +146,14 @@ pub(super) struct Costs {
     pub edit: [Curve; 2],
     /// Edits that look around.
     pub careful: [Curve; 2],
-    /// Seconds that roughness adds for each brick.
-    pub rough: [f64; 2],
+    /// What roughness adds.
+    pub rough: [Curve; 2],
     pub mesh: [Curve; 2],
     /// Seconds to bring a brick to the card.
     pub upload: f64,
-    /// How much longer stages take than was measured: edits, meshing, edits some of which look around, and meshing of so
-    /// little that the processor does it on one thread.
-    drift: [[f64; 2]; 4],
+    /// How much longer stages take than was measured: edits, meshing, edits some of which look around; of so little that the
+    /// processor does it on one thread, and of more.
+    drift: [[[f64; 2]; 2]; 3],
     /// Blocks that are meshed anew for each brick that an edit may reach, as it was lately: of few such bricks, of many.
     blocks: [f64; 2],
     /// Such bricks of the transaction at hand.
@@ -167,10 +172,13 @@ const MOST_BLOCKS: f64 = 8.0;
 const LEARNING: f64 = 0.2;
 /// How fast that is forgotten of the backend that is not used.
 #[cfg(feature = "cuda")]
-const FORGETTING: f64 = 0.02;
-/// The most that it may come to, and the least.
+const FORGETTING: f64 = 0.01;
+/// The least and the most that it may come to: a card may have to draw besides, and a game may need the processor.
 #[cfg(feature = "cuda")]
-const DRIFT: [f64; 2] = [0.25, 4.0];
+const DRIFT: [f64; 2] = [1.0 / 16.0, 16.0];
+/// And what one transaction may say of it beside what was expected: one that had to wait says little of the next.
+#[cfg(feature = "cuda")]
+const SURPRISE: [f64; 2] = [0.5, 2.0];
 
 #[cfg(feature = "cuda")]
 impl Default for Costs {
@@ -178,10 +186,10 @@ impl Default for Costs {
         Self {
             edit: Default::default(),
             careful: Default::default(),
-            rough: [0.0; 2],
+            rough: Default::default(),
             mesh: Default::default(),
             upload: 0.0,
-            drift: [[1.0; 2]; 4],
+            drift: [[[1.0; 2]; 2]; 3],
             blocks: [BLOCKS; 2],
             edited: 0,
         }
@@ -193,7 +201,8 @@ impl Costs {
     /// The stages of a transaction are chosen one by one. But what is edited on the processor has to be brought to the
     /// card before it is meshed there, and that counts already when edits are chosen.
     pub fn edit(&self, load: Load) -> Estimate {
-        let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * self.drift[kind(Stage::Edit, load)][on]);
+        let drift = self.drift[kind(Stage::Edit, load)][size(load.amount)];
+        let [cpu, cuda] = [0, 1].map(|on| self.edits(load, on) * drift[on]);
         let blocks = load.amount as f64 * self.blocks[size(load.amount)];
         let mesh = self.meshing(blocks.round() as usize);
         let brought = mesh[1] + self.upload * load.amount as f64;
@@ -207,7 +216,8 @@ impl Costs {
             0 => 0.0,
             careful => (self.careful[on].at(careful) - self.edit[on].at(careful)).max(0.0),
         };
-        self.edit[on].at(load.amount) + self.rough[on] * load.rough as f64 + more
+        let rough = if load.rough > 0 { self.rough[on].at(load.rough) } else { 0.0 };
+        self.edit[on].at(load.amount) + rough + more
     }
 
     /// Meshing blocks.
@@ -218,18 +228,18 @@ impl Costs {
 
     /// Seconds that meshing takes on both, where nothing is missing.
     fn meshing(&self, blocks: usize) -> [f64; 2] {
-        let drift = self.drift[kind(Stage::Mesh, Load { amount: blocks, ..Load::default() })];
+        let drift = self.drift[kind(Stage::Mesh, Load::default())][size(blocks)];
         [0, 1].map(|on| self.mesh[on].at(blocks) * drift[on])
     }
 
     /// Takes in how long a stage took that was expected to take so long, the other one's part not counted; and how much
-    /// there is to mesh after edits.
+    /// there is to mesh after edits. Nothing to do, or less than was ever measured, says nothing.
     pub fn learn(&mut self, stage: Stage, load: Load, is_cuda: bool, took: Duration) {
         match stage {
             Stage::Edit => self.edited += load.amount,
             Stage::Mesh => {
                 let edited = std::mem::take(&mut self.edited);
-                if edited > 0 {
+                if edited > 0 && load.amount > 0 {
                     let (found, blocks) =
                         (load.amount as f64 / edited as f64, &mut self.blocks[size(edited)]);
                     *blocks += (found.min(MOST_BLOCKS) - *blocks) * LEARNING;
@@ -237,24 +247,26 @@ impl Costs {
             }
         }
         let on = usize::from(is_cuda);
-        let expected = match stage {
-            Stage::Edit => self.edits(load, on),
-            Stage::Mesh => self.mesh[on].at(load.amount),
+        let (curve, expected) = match stage {
+            Stage::Edit => (&self.edit[on], self.edits(load, on)),
+            Stage::Mesh => (&self.mesh[on], self.mesh[on].at(load.amount)),
         };
+        let is_known = load.amount > 0 && curve.reaches(load.amount);
         let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
-        let drift = &mut self.drift[kind(stage, load)];
-        if expected > 0.0 {
-            let found = (took.as_secs_f64() / expected).clamp(DRIFT[0], DRIFT[1]);
-            drift[on] += (found - drift[on]) * LEARNING;
+        let drift = &mut self.drift[kind(stage, load)][size(load.amount)];
+        if is_known && expected > 0.0 {
+            let found = took.as_secs_f64() / expected;
+            let found = found.clamp(drift[on] * SURPRISE[0], drift[on] * SURPRISE[1]);
+            drift[on] = (drift[on] + (found - drift[on]) * LEARNING).clamp(DRIFT[0], DRIFT[1]);
             drift[1 - on] += (1.0 - drift[1 - on]) * FORGETTING;
         }
     }
 }
 
-/// Are bricks that edits may reach few, or many?
+/// Is an amount small, or large?
 #[cfg(feature = "cuda")]
-fn size(bricks: usize) -> usize {
-    usize::from(bricks >= PARALLEL_BLOCKS)
+fn size(amount: usize) -> usize {
+    usize::from(amount >= PARALLEL_BLOCKS)
 }
 
 /// Which drift is that of a stage.
@@ -262,7 +274,6 @@ fn size(bricks: usize) -> usize {
 fn kind(stage: Stage, load: Load) -> usize {
     match stage {
         Stage::Edit if load.careful > 0 => 2,
-        Stage::Mesh if load.amount < PARALLEL_BLOCKS => 3,
         stage => stage as usize,
     }
 }
@@ -325,7 +336,12 @@ mod tests {
 
     #[test]
     fn roughness_takes_its_own_time() {
-        let costs = Costs { rough: [5e-6, 2e-6], ..linear([3, 4], [0, 0]) };
+        let mut costs = linear([3, 4], [0, 0]);
+        for (curve, each) in costs.rough.iter_mut().zip([5, 2]) {
+            [1, 100]
+                .into_iter()
+                .for_each(|amount| curve.push(amount, Duration::from_micros(each * amount as u64)));
+        }
         let of = |amount, rough| micros(costs.edit(Load { amount, rough, ..Load::default() }));
         assert_eq!(of(10, 0), [30.0, 40.0]);
         assert_eq!(of(10, 4), [30.0 + 20.0, 40.0 + 8.0]);
@@ -411,6 +427,21 @@ mod tests {
         // What one thread does says nothing of what all do, and the other way round.
         let few = costs.mesh(Load { amount: 40, ..load });
         assert_eq!([few.cpu, few.cuda].map(|time| time.as_micros()), [40, 40]);
+        // One that had to wait for something else says little.
+        let mut disturbed = costs.clone();
+        disturbed.learn(Stage::Mesh, load, true, Duration::from_millis(900));
+        assert!(expected(&disturbed)[1] < 125);
+        // Nothing to do says nothing, nor less than was measured.
+        for amount in [0, 9] {
+            let load = Load { amount, ..load };
+            (0..30).for_each(|_| costs.learn(Stage::Mesh, load, true, Duration::from_nanos(100)));
+            (0..30).for_each(|_| costs.learn(Stage::Edit, load, true, Duration::from_nanos(100)));
+        }
+        assert_eq!(expected(&costs), [50, 99]);
+        assert_eq!(
+            [few.cpu, few.cuda],
+            [costs.mesh(Load { amount: 40, ..load })].map(|few| [few.cpu, few.cuda])[0]
+        );
         // And forgotten while the other one is used.
         (0..400).for_each(|_| costs.learn(Stage::Mesh, load, false, Duration::from_micros(50)));
         assert_eq!(expected(&costs), [50, 50]);

@@ -56,7 +56,7 @@ pub enum EngineState {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EngineFigures {
     /// How long a card was tried out, in the background before it was used: compared with the processor bit by bit, and
-    /// timed beside it. Zero until that is over, and where there is no card.
+    /// timed beside it. Zero until it has passed, and where there is no card that did.
     pub trial: Duration,
     /// Stages of transactions done on the processor.
     pub cpu: u64,

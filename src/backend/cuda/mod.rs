@@ -126,8 +126,7 @@ impl Cuda {
                 let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
                 let mut session = Session::new(device, budget)?;
                 let start = Instant::now();
-                // On a thread of the pool, as large transactions run: to call the pool from elsewhere takes its time.
-                let costs = rayon::scope(|_| trial::run(&mut session, sizes))?;
+                let costs = trial::run(&mut session, sizes)?;
                 took.get_or_init(|| start.elapsed());
                 session.forget();
                 Ok((session, costs))
@@ -155,7 +154,7 @@ impl Cuda {
         lock(&self.state).clone()
     }
 
-    /// How long the card was tried out; nothing before that is over.
+    /// How long the card was tried out; zero until it has passed.
     pub fn trial(&self) -> Duration {
         self.trial.get().copied().unwrap_or_default()
     }
