@@ -172,7 +172,7 @@ const MOST_BLOCKS: f64 = 8.0;
 const LEARNING: f64 = 0.2;
 /// How fast that is forgotten of the backend that is not used.
 #[cfg(feature = "cuda")]
-const FORGETTING: f64 = 0.01;
+const FORGETTING: f64 = 0.04;
 /// The least and the most that it may come to: a card may have to draw besides, and a game may need the processor.
 #[cfg(feature = "cuda")]
 const DRIFT: [f64; 2] = [1.0 / 16.0, 16.0];
