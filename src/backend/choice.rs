@@ -170,7 +170,7 @@ const MOST_BLOCKS: f64 = 8.0;
 /// How far one transaction moves what is expected of the next.
 #[cfg(feature = "cuda")]
 const LEARNING: f64 = 0.2;
-/// How fast that is forgotten of the backend that is not used.
+/// How fast that is forgotten of the backend that is not used: it is tried again after some twenty stages.
 #[cfg(feature = "cuda")]
 const FORGETTING: f64 = 0.04;
 /// The least and the most that it may come to: a card may have to draw besides, and a game may need the processor.
@@ -251,10 +251,9 @@ impl Costs {
             Stage::Edit => (&self.edit[on], self.edits(load, on)),
             Stage::Mesh => (&self.mesh[on], self.mesh[on].at(load.amount)),
         };
-        let is_known = load.amount > 0 && curve.reaches(load.amount);
         let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
         let drift = &mut self.drift[kind(stage, load)][size(load.amount)];
-        if is_known && expected > 0.0 {
+        if curve.reaches(load.amount) && expected > 0.0 {
             let found = took.as_secs_f64() / expected;
             let found = found.clamp(drift[on] * SURPRISE[0], drift[on] * SURPRISE[1]);
             drift[on] = (drift[on] + (found - drift[on]) * LEARNING).clamp(DRIFT[0], DRIFT[1]);

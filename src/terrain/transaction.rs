@@ -32,8 +32,8 @@ use crate::lattice::{BrickPos, ChunkPos, LatticeBox, side_by_side};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{
-    Brick, DiggingRules, Draft, DraftedBrick, EditEffect, Fields, Replaced, UniformBricks, pristine_brick,
-    reach,
+    Brick, DiggingRules, Draft, DraftedBrick, EditEffect, Fields, Replaced, UniformBricks, latest,
+    pristine_brick, reach,
 };
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
@@ -75,15 +75,6 @@ struct Entered {
 
 /// From how many bricks on lists that are only copied are copied side by side.
 const LONG: usize = 1 << 13;
-
-/// Bricks as a list.
-fn latest(drafted: &[DraftedBrick]) -> Vec<(BrickPos, &Brick)> {
-    if drafted.len() < LONG {
-        drafted.iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
-    } else {
-        drafted.par_iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
-    }
-}
 
 /// What changes hold of bricks. Kept as long as history has it: no larger than it has to be.
 fn changed_bricks(drafted: Vec<DraftedBrick>) -> Vec<(BrickPos, Option<Arc<Brick>>)> {

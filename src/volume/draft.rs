@@ -123,8 +123,17 @@ impl Changes {
     }
 }
 
-/// From how many bricks on threads look which of them are all alike.
+/// From how many bricks on threads share what takes little for each.
 const PARALLEL: usize = 1 << 13;
+
+/// Bricks as a list that a [`SampleView`] can be laid [under](SampleView::under).
+pub(crate) fn latest(drafted: &[DraftedBrick]) -> Vec<(BrickPos, &Brick)> {
+    if drafted.len() < PARALLEL {
+        drafted.iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
+    } else {
+        drafted.par_iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
+    }
+}
 
 /// The numbers of the bricks from `first` on that are all alike.
 fn uniform_ones(bricks: &[DraftedBrick], first: usize) -> Vec<usize> {

@@ -25,6 +25,7 @@ mod workpiece;
 pub(crate) use bearing::RunRules;
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub(crate) use brick::{PRISTINE, row};
+pub(crate) use draft::latest;
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
 #[cfg(feature = "cuda")]

@@ -19,7 +19,7 @@ use crate::surface::block::{Block, Part, Parts};
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, Vertex};
-use crate::volume::{Brick, Bricks, DiggingRules, DraftedBrick, EditWork, Ledger, SampleView};
+use crate::volume::{Brick, Bricks, DiggingRules, DraftedBrick, EditWork, Ledger, SampleView, latest};
 
 /// Cells along a side of the ground.
 const SIDE: i32 = 256;
@@ -226,11 +226,6 @@ fn ledgers_of(work: &EditWork) -> Vec<Ledger> {
     let mut ledgers = Vec::new();
     Cpu.edit(work, &mut |ledger| ledgers.push(ledger));
     ledgers
-}
-
-/// Bricks as a list.
-fn latest(drafted: &[DraftedBrick]) -> Vec<(BrickPos, &Brick)> {
-    drafted.iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
 }
 
 /// The blocks that changed samples show in.
