@@ -1,6 +1,7 @@
 //! The ground itself: what every column of the pristine world is like.
 
 use std::fmt;
+use std::ops::Range;
 
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -44,6 +45,15 @@ impl Materials {
             Self::Uniform(material) => *material,
             Self::Columns(materials) => materials[index],
         }
+    }
+
+    /// Those of some columns, one after the other.
+    fn of(&self, indices: Range<usize>) -> impl Iterator<Item = ColumnMaterial> {
+        let (all, columns): (_, &[ColumnMaterial]) = match self {
+            Self::Uniform(material) => (std::iter::repeat_n(*material, indices.len()), &[]),
+            Self::Columns(columns) => (std::iter::repeat_n(ColumnMaterial::default(), 0), &columns[indices]),
+        };
+        all.chain(columns.iter().copied())
     }
 }
 
@@ -155,6 +165,46 @@ impl Ground {
         Vec3::new(-x / length, 1.0 / length, -z / length)
     }
 
+    /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, which are what
+    /// [`Self::height`], [`Self::normal`] and [`Self::column_material`] give for each. Normals go into a list of the caller's.
+    /// Of columns beyond the rim, none.
+    pub(crate) fn row<'a>(
+        &'a self,
+        low: Column,
+        count: usize,
+        normals: &'a mut Vec<Vec3>,
+    ) -> impl Iterator<Item = (i32, Vec3, ColumnMaterial)> {
+        let is_inside = self.extent.clamp(low) == low && count <= (self.width() - low.x) as usize + 1;
+        let count = if is_inside { count } else { 0 };
+        normals.clear();
+        let row = |z: i32| {
+            let start = self.extent.index(Column::new(low.x, z));
+            start..start + count
+        };
+        let z = self.extent.clamp(low).z;
+        let (north, south) = ((z - 1).max(0), (z + 1).min(self.depth()));
+        let [own, before, after] = [z, north, south].map(|z| &self.heights[row(z)]);
+        // All but those at the rim have a neighbour on either side.
+        let ends_at_rim = count > 0 && low.x + count as i32 > self.width();
+        let inner = usize::from(low.x == 0)..count.saturating_sub(ends_at_rim.into());
+        let rim = |at: usize| self.normal(low.offset(at as i32, 0));
+        normals.extend((0..inner.start.min(count)).map(rim));
+        if inner.start < inner.end {
+            let start = self.extent.index(low) + inner.start;
+            let (west, east) = (&self.heights[start - 1..], &self.heights[start + 1..]);
+            let along_x = west.iter().zip(east).map(|(west, east)| Rise { rise: east - west, run: 2 });
+            let along_z = before[inner.clone()].iter().zip(&after[inner.clone()]);
+            let along_z = along_z.map(|(before, after)| Rise { rise: after - before, run: south - north });
+            normals.extend(along_x.zip(along_z).map(|(x, z)| Self::normal_of([x, z])));
+        }
+        normals.extend((normals.len()..count).map(rim));
+        let materials = self.materials.of(row(z));
+        own.iter()
+            .zip(normals.iter())
+            .zip(materials)
+            .map(|((&height, &normal), material)| (height, normal, material))
+    }
+
     /// Steepness of the surface over a column as rise over run, from the same differences as [`Self::normal`]: 0 is
     /// level, 1 is 45 degrees.
     pub fn slope(&self, column: Column) -> f64 {
@@ -258,6 +308,35 @@ mod tests {
             for (x, z) in (0..=2).flat_map(|z| (0..=3).map(move |x| (x, z))) {
                 let normal = ground.normal(Column::new(x, z));
                 prop_assert!((normal.length() - 1.0).abs() < 1e-5 && normal.y > 0.0, "{normal}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_columns_are_the_columns() {
+        let materials = |i: u8| ColumnMaterial { base: MaterialId(i), overlay: MaterialId(i / 3), blend: i };
+        let columns: Vec<_> = (0..80).map(materials).collect();
+        let mixed = Ground::from_heights(9, 7, (0..80).map(|i| i * i * 37 % 1901 - 700).collect()).unwrap();
+        let mixed = Ground { materials: Materials::from_columns(columns), ..mixed };
+        let narrow = |width, depth, count| Ground::from_heights(width, depth, (0..count).collect()).unwrap();
+        for ground in [mixed, bumps(), narrow(1, 1, 4), narrow(1, 3, 8), narrow(5, 1, 12)] {
+            for (x, z) in (-2..12).flat_map(|z| (-2..12).map(move |x| (x, z))) {
+                for count in 0..12 {
+                    let (low, last) = (Column::new(x, z), Column::new(x + count as i32 - 1, z));
+                    let is_inside =
+                        ground.extent.clamp(low) == low && (count == 0 || ground.extent.clamp(last) == last);
+                    let expected = (0..if is_inside { count as i32 } else { 0 }).map(|at| {
+                        let column = low.offset(at, 0);
+                        let normal = ground.normal(column).to_array().map(f32::to_bits);
+                        (ground.height(column), normal, ground.column_material(column))
+                    });
+                    let mut normals = vec![Vec3::ONE; 3];
+                    let found = ground.row(low, count, &mut normals);
+                    let found = found.map(|(height, normal, material)| {
+                        (height, normal.to_array().map(f32::to_bits), material)
+                    });
+                    assert!(found.eq(expected), "{count} from ({x}, {z}) of {ground:?}");
+                }
             }
         }
     }

@@ -136,7 +136,7 @@ fn begin(
     let grounds = grounds.clone();
     Some(AsyncComputeTaskPool::get().spawn(async move {
         let prepare = |(entity, part, recipe): &(Entity, Part, SurfaceRecipe)| {
-            (*entity, grounds.prepare(part, &recipe.surface()))
+            (*entity, grounds.prepare(part, &recipe.draft().surface()))
         };
         batch.par_iter().map(prepare).collect()
     }))

@@ -8,6 +8,7 @@ use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use rayon::prelude::*;
 
 use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
@@ -19,7 +20,7 @@ use super::{
     Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
 };
 use crate::lattice::ChunkPos;
-use crate::terrain::{Commit, Drawn, FieldNews, Receipt, Terrain};
+use crate::terrain::{Commit, Drawn, FieldNews, Receipt, SurfaceDraft, Terrain};
 
 /// The transaction that a terrain waits for.
 #[derive(Component)]
@@ -37,6 +38,9 @@ struct Prepared {
     pieces: Vec<LoosePieceFound>,
     took: Duration,
 }
+
+/// From how many tiles and chunks on threads share them.
+const PARALLEL_PARTS: usize = 8;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
@@ -80,15 +84,20 @@ pub(super) fn begin_transactions(
             let part = |drawn| Part::new(entity, size, grid, revision, drawn);
             // Taken out, so that they are dropped here and not on the main thread.
             let updates = std::mem::take(&mut commit.meshes);
-            let tiles = updates.tiles.iter().map(|(tile, update)| {
-                let part = part(Drawn::Tile(*tile));
-                workshop.make(&part, update.indices.is_empty(), || Cow::Owned(update.mesh()))
-            });
-            let chunks = updates.chunks.iter().map(|(at, chunk)| {
-                let part = part(Drawn::Chunk(*at));
-                workshop.make(&part, chunk.is_empty(), || Cow::Borrowed(chunk.mesh()))
-            });
-            let parts = tiles.chain(chunks).collect();
+            let tiles = updates.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.draft()));
+            let chunks = updates
+                .chunks
+                .iter()
+                .map(|(at, chunk)| (Drawn::Chunk(*at), SurfaceDraft::Mesh(Cow::Borrowed(chunk.mesh()))));
+            let drafts: Vec<_> = tiles.chain(chunks).collect();
+            let make = |(drawn, draft): (Drawn, SurfaceDraft)| {
+                workshop.make(&part(drawn), draft.is_empty(), || draft)
+            };
+            let parts = if drafts.len() < PARALLEL_PARTS {
+                drafts.into_iter().map(make).collect()
+            } else {
+                drafts.into_par_iter().map(make).collect()
+            };
             let mut pieces: Vec<LoosePieceFound> = pieces(entity, commit.receipts()).collect();
             if let Some(wardrobe) = &workshop.wardrobe {
                 pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));

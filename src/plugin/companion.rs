@@ -1,6 +1,5 @@
 //! What else is made from surfaces: in the same task as the meshes, and shown in the same commit.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use bevy::prelude::*;
@@ -9,7 +8,7 @@ use super::ShownSurface;
 use super::meshes::{Ready, Wardrobe};
 use crate::lattice::ChunkGrid;
 use crate::surface::SurfaceMesh;
-use crate::terrain::Drawn;
+use crate::terrain::{Drawn, SurfaceDraft};
 
 /// A tile or chunk that a task works on.
 #[derive(Clone, Copy, Debug)]
@@ -124,14 +123,9 @@ impl Workshop {
         self.wardrobe.is_none() && self.companions.is_empty()
     }
 
-    /// Makes everything for a part whose surface `surface` gives. `is_empty` tells whether there are triangles, as far as
+    /// Makes everything for a part whose surface `draft` gives. `is_empty` tells whether there are triangles, as far as
     /// that is known without it.
-    pub fn make<'a>(
-        &self,
-        part: &Part,
-        is_empty: bool,
-        surface: impl FnOnce() -> Cow<'a, SurfaceMesh>,
-    ) -> Fresh {
+    pub fn make<'a>(&self, part: &Part, is_empty: bool, draft: impl FnOnce() -> SurfaceDraft<'a>) -> Fresh {
         let takers: Vec<_> = self.companions.0.iter().filter(|companion| companion.wants(part)).collect();
         let mut fresh = Fresh {
             drawn: part.drawn,
@@ -142,10 +136,13 @@ impl Workshop {
         if self.wardrobe.is_none() && takers.is_empty() {
             return fresh;
         }
-        let surface = &*surface();
-        fresh.shown.is_empty = surface.is_empty();
-        fresh.mesh = self.wardrobe.as_ref().and_then(|wardrobe| wardrobe.build(part.drawn, surface));
-        fresh.attachments = takers.into_iter().filter_map(|taker| taker.build(part, surface)).collect();
+        let draft = draft();
+        fresh.shown.is_empty = draft.is_empty();
+        fresh.mesh = self.wardrobe.as_ref().and_then(|wardrobe| wardrobe.build(part.origin, &draft));
+        if !takers.is_empty() {
+            let surface = &draft.surface();
+            fresh.attachments = takers.into_iter().filter_map(|taker| taker.build(part, surface)).collect();
+        }
         fresh
     }
 }

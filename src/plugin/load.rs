@@ -175,7 +175,7 @@ fn make_all(world: &World, workshop: &Workshop, (terrain, voxel_size): (Entity, 
     let make = |&drawn: &Drawn| {
         let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
         let recipe = world.recipe(drawn);
-        workshop.make(&part, false, || recipe.surface())
+        workshop.make(&part, false, || recipe.draft())
     };
     all.par_iter().map(make).collect()
 }

@@ -11,10 +11,10 @@ use bevy::mesh::{
 };
 
 use super::MaterialColors;
-use crate::ground::{Ground, OVERLAY_DEPTH};
-use crate::lattice::{ChunkGrid, Column, ONE, SNAP};
+use crate::ground::{ColumnMaterial, Ground, OVERLAY_DEPTH};
+use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
-use crate::terrain::{Drawn, World};
+use crate::terrain::{SurfaceDraft, TileDraft, World};
 
 /// Up to four material ids of a vertex, for materials that look them up.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
@@ -41,57 +41,142 @@ pub(crate) type Ready = Option<(Mesh, Aabb)>;
 pub(crate) struct Wardrobe {
     colors: MaterialColors,
     ground: Arc<Ground>,
-    grid: ChunkGrid,
 }
 
 impl Wardrobe {
     /// Without colours, meshes have none.
     pub(crate) fn new(world: &World, colors: Option<&MaterialColors>) -> Self {
         let colors = colors.cloned().unwrap_or(MaterialColors(Vec::new()));
-        Self { colors, ground: world.shared_ground(), grid: world.grid() }
+        Self { colors, ground: world.shared_ground() }
     }
 
-    /// Builds the Bevy mesh of a tile or chunk, in the task.
-    pub(super) fn build(&self, drawn: Drawn, surface: &SurfaceMesh) -> Ready {
-        let origin = match drawn {
-            Drawn::Tile(tile) => self.grid.tile_cells(tile).0.at(0),
-            Drawn::Chunk(chunk) => self.grid.origin(chunk),
-        };
-        self.build_at(origin, surface)
+    /// Builds the Bevy mesh of a surface whose positions count from this point, in the task.
+    pub(crate) fn build(&self, origin: IVec3, draft: &SurfaceDraft) -> Ready {
+        match draft {
+            SurfaceDraft::Mesh(surface) => self.build_whole(origin, surface),
+            SurfaceDraft::Tile(draft) => self.build_tile(origin, draft),
+        }
     }
 
-    /// Builds the Bevy mesh of a surface whose positions count from this point.
-    pub(crate) fn build_at(&self, origin: IVec3, surface: &SurfaceMesh) -> Ready {
+    /// The same of a surface that has all of its vertices.
+    pub(crate) fn build_whole(&self, origin: IVec3, surface: &SurfaceMesh) -> Ready {
         if surface.is_empty() {
             return None;
         }
-        let (min, max) = surface.bounds()?;
-        let vertices = &surface.vertices;
-        let positions: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.position_f32()).collect();
-        let normals: Vec<[f32; 3]> = vertices.iter().map(|vertex| vertex.normal.to_array()).collect();
-        let ids = vertices.iter().map(|vertex| vertex.materials.ids).collect();
-        let weights = vertices.iter().map(|vertex| vertex.materials.weights).collect();
-        let origins: Vec<Origin> =
-            vertices.iter().map(|vertex| Origin::of(&self.ground, origin * SNAP, vertex)).collect();
-        let depths: Vec<f32> = origins.iter().map(|origin| origin.depth).collect();
-        let covers = origins.iter().map(|origin| [origin.cover, origin.own, 0, 0]).collect();
+        let mut arrays = Arrays::with_capacity(surface.vertices.len(), self);
+        arrays.push(&surface.vertices, origin);
+        arrays.finish(&surface.indices)
+    }
+
+    /// The same of a tile, straight from the ground: nothing but its rings and indices depends on what was dug.
+    fn build_tile(&self, origin: IVec3, draft: &TileDraft) -> Ready {
+        if draft.indices.is_empty() {
+            return None;
+        }
+        let (low, high) = draft.grid.tile_cells(draft.tile);
+        let (width, rings) = ((high.x - low.x + 1).max(0) as usize, draft.rings.vertices());
+        let columns = width * (high.z - low.z + 1).max(0) as usize;
+        let mut arrays = Arrays::with_capacity(columns + rings.len(), self);
+        let mut normals = Vec::with_capacity(width);
+        for z in low.z..=high.z {
+            arrays.push_columns(z - low.z, draft.ground.row(Column::new(low.x, z), width, &mut normals));
+        }
+        arrays.push(rings, origin);
+        arrays.finish(&draft.indices)
+    }
+}
+
+/// The attributes of a mesh in the making.
+struct Arrays<'a> {
+    wardrobe: &'a Wardrobe,
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    ids: Vec<[u8; 4]>,
+    weights: Vec<[u8; 4]>,
+    depths: Vec<f32>,
+    covers: Vec<[u8; 4]>,
+    /// None where there are no colours to blend.
+    colors: Vec<[f32; 4]>,
+    /// The materials last blended, and what came of them.
+    blended: (MaterialMix, [f32; 4]),
+}
+
+impl<'a> Arrays<'a> {
+    fn with_capacity(vertices: usize, wardrobe: &'a Wardrobe) -> Self {
+        let blended = (MaterialMix::default(), blend(MaterialMix::default(), &wardrobe.colors));
+        Self {
+            wardrobe,
+            positions: Vec::with_capacity(vertices),
+            normals: Vec::with_capacity(vertices),
+            ids: Vec::with_capacity(vertices),
+            weights: Vec::with_capacity(vertices),
+            depths: Vec::with_capacity(vertices),
+            covers: Vec::with_capacity(vertices),
+            colors: Vec::with_capacity(if wardrobe.colors.0.is_empty() { 0 } else { vertices }),
+            blended,
+        }
+    }
+
+    /// Appends vertices whose positions count from some point.
+    fn push(&mut self, vertices: &[Vertex], origin: IVec3) {
+        let ground = &*self.wardrobe.ground;
+        self.positions.extend(vertices.iter().map(Vertex::position_f32));
+        self.normals.extend(vertices.iter().map(|vertex| vertex.normal.to_array()));
+        for vertex in vertices {
+            let Origin { depth, cover, own } = Origin::of(ground, origin * SNAP, vertex);
+            self.depths.push(depth);
+            self.covers.push([cover, own, 0, 0]);
+        }
+        vertices.iter().for_each(|vertex| self.push_mix(vertex.materials));
+    }
+
+    /// Appends a row of columns as the heightmap draws them: heights, normals, materials.
+    fn push_columns(&mut self, z: i32, row: impl Iterator<Item = (i32, Vec3, ColumnMaterial)>) {
+        for (x, (height, normal, material)) in (0..).zip(row) {
+            let y = height * (SNAP / ONE);
+            self.positions.push([x as f32, y as f32 / SNAP as f32, z as f32]);
+            self.normals.push(normal.to_array());
+            self.covers.push([Origin::own_cover(material) as u8, u8::MAX, 0, 0]);
+            self.push_mix(MaterialMix::column(material));
+        }
+        // They are the surface, and of its materials.
+        self.depths.resize(self.positions.len(), 0.0);
+    }
+
+    fn push_mix(&mut self, mix: MaterialMix) {
+        self.ids.push(mix.ids);
+        self.weights.push(mix.weights);
+        if !self.wardrobe.colors.0.is_empty() {
+            if self.blended.0 != mix {
+                self.blended = (mix, blend(mix, &self.wardrobe.colors));
+            }
+            self.colors.push(self.blended.1);
+        }
+    }
+
+    fn finish(self, indices: &surface::Indices) -> Ready {
+        let first = Vec3::from(*self.positions.first()?);
+        let corners =
+            |(min, max): (Vec3, Vec3), at: &[f32; 3]| (min.min(Vec3::from(*at)), max.max(Vec3::from(*at)));
+        let (min, max) = self.positions.iter().fold((first, first), corners);
         let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
-            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
-            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-            .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
-            .with_inserted_attribute(ATTRIBUTE_MATERIAL_WEIGHTS, VertexAttributeValues::Unorm8x4(weights))
-            .with_inserted_attribute(ATTRIBUTE_GROUND_DEPTH, depths)
-            .with_inserted_attribute(ATTRIBUTE_GROUND_COVER, VertexAttributeValues::Unorm8x4(covers))
-            .with_inserted_indices(match &surface.indices {
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, self.positions)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, self.normals)
+            .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(self.ids))
+            .with_inserted_attribute(
+                ATTRIBUTE_MATERIAL_WEIGHTS,
+                VertexAttributeValues::Unorm8x4(self.weights),
+            )
+            .with_inserted_attribute(ATTRIBUTE_GROUND_DEPTH, self.depths)
+            .with_inserted_attribute(ATTRIBUTE_GROUND_COVER, VertexAttributeValues::Unorm8x4(self.covers))
+            .with_inserted_indices(match indices {
                 surface::Indices::U16(list) => Indices::U16(list.clone()),
                 surface::Indices::U32(list) => Indices::U32(list.clone()),
             });
-        if !self.colors.0.is_empty() {
-            let blended: Vec<[f32; 4]> =
-                vertices.iter().map(|vertex| blend(vertex.materials, &self.colors)).collect();
-            mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, blended);
+        if !self.wardrobe.colors.0.is_empty() {
+            mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, self.colors);
         }
-        Some((mesh, Aabb::from_min_max(Vec3::from(min), Vec3::from(max))))
+        Some((mesh, Aabb::from_min_max(min, max)))
     }
 }
 
@@ -123,8 +208,7 @@ impl Origin {
         let depth = height - i64::from(place.y) * i64::from(ONE);
         let depth = depth as f32 / (SNAP * ONE) as f32;
         let materials = [column, next].map(|column| ground.column_material(column));
-        let [here, there] = materials
-            .map(|material| i32::from(if material.base == material.overlay { 0 } else { material.blend }));
+        let [here, there] = materials.map(Self::own_cover);
         let cover = between(here, there) / i64::from(SNAP);
         let is_skin = depth <= OVERLAY_DEPTH as f32 / ONE as f32;
         let is_own = |id: u8| {
@@ -133,6 +217,11 @@ impl Origin {
         let mix = vertex.materials;
         let own = mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
         Self { depth, cover: cover.clamp(0, 255) as u8, own: if own { 255 } else { 0 } }
+    }
+
+    /// How much a column's overlay covers: nothing, where it is what lies below.
+    fn own_cover(material: ColumnMaterial) -> i32 {
+        i32::from(if material.base == material.overlay { 0 } else { material.blend })
     }
 }
 
@@ -156,7 +245,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{ColumnMaterial, GreyImage, MaterialControl, MaterialId, NoiseHeights};
-    use crate::terrain::{Terrain, TerrainSettings};
+    use crate::terrain::{Drawn, Terrain, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
 
@@ -256,6 +345,44 @@ mod tests {
             let found = Origin::of(terrain.world().ground(), origin, &vertex);
             let is_painted = vertex.materials.ids[0] == 5;
             assert_eq!(found.own, if is_painted { 0 } else { 255 });
+        }
+    }
+
+    /// All that a Bevy mesh holds, as bytes.
+    fn bytes_of(ready: Ready) -> Option<(Vec<Vec<u8>>, Option<Indices>, Aabb)> {
+        let (mesh, bounds) = ready?;
+        let attributes = mesh.attributes().map(|(_, values)| values.get_bytes().to_vec());
+        Some((attributes.collect(), mesh.indices().cloned(), bounds))
+    }
+
+    #[test]
+    fn a_tile_straight_from_the_ground_is_the_tile() {
+        let noise = NoiseHeights { seed: 5, scale: 20.0, amplitude: 14.0, ..NoiseHeights::default() };
+        let mask = GreyImage::from_samples(70, 60, (0..70 * 60).map(|index| index % 97 * 640).collect());
+        let blend =
+            MaterialControl::Blend { mask: mask.unwrap(), base: MaterialId(2), overlay: MaterialId(1) };
+        let colors = MaterialColors(vec![LinearRgba::RED, LinearRgba::GREEN, LinearRgba::BLUE]);
+        for (chunk_size, control) in [(16, blend), (9, MaterialControl::Uniform(SKIN))] {
+            let ground = Ground::from_noise(70, 60, &noise).unwrap().with_materials(&control).unwrap();
+            let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
+            let mut terrain = Terrain::new(ground, &settings).unwrap();
+            let dressers = [None, Some(&colors)].map(|colors| Wardrobe::new(terrain.world(), colors));
+            let mut compared = 0;
+            for i in 0..9 {
+                let place = Vec3::new((i * 23 % 71) as f32, (i * 7 % 12) as f32, (i * 31 % 61) as f32);
+                terrain.submit(&Brush::dig(Shape::sphere(place, 3.0 + i as f32)));
+                let commit = terrain.begin().unwrap().run();
+                for (tile, update) in &commit.meshes.tiles {
+                    let origin = terrain.world().origin(Drawn::Tile(*tile));
+                    for dresser in &dressers {
+                        let found = bytes_of(dresser.build(origin, &update.draft()));
+                        assert!(found == bytes_of(dresser.build_whole(origin, &update.mesh())), "{tile:?}");
+                        compared += usize::from(found.is_some());
+                    }
+                }
+                terrain.commit(commit).unwrap();
+            }
+            assert!(compared > 20, "{compared}");
         }
     }
 }

@@ -108,7 +108,7 @@ impl LoosePieceFound {
 
     fn build(&self, wardrobe: &Wardrobe) -> Option<Mesh> {
         let surface = self.piece.mesh.as_ref()?;
-        wardrobe.build_at(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
+        wardrobe.build_whole(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
     }
 
     /// Makes its mesh, in the task.

@@ -10,10 +10,10 @@ use glam::IVec3;
 
 use super::indices::Indices;
 use super::mask::{Borders, sheet};
-use super::mesh::{SurfaceMesh, Vertex};
-use super::vertex::{WorldView, height_vertex, sheet_vertex};
+use super::mesh::{MaterialMix, SurfaceMesh, Vertex};
+use super::vertex::{WorldView, sheet_vertex};
 use crate::ground::Ground;
-use crate::lattice::{ChunkGrid, Column, ONE, TilePos};
+use crate::lattice::{ChunkGrid, Column, ONE, SNAP, TilePos};
 
 /// The whole mesh of a tile, relative to its lowest column at y = 0. Empty where the mask covers all of it, and where the
 /// world has no such tile.
@@ -30,9 +30,16 @@ pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
 /// The vertices of a tile: those of its columns, x fastest, then those of its rings.
 pub fn vertices(ground: &Ground, grid: ChunkGrid, tile: TilePos, rings: &Rings) -> Vec<Vertex> {
     let (low, high) = grid.tile_cells(tile);
-    let mut vertices = Vec::with_capacity(column_count(low, high) as usize + rings.vertices.len());
+    let (columns, mut normals) = (column_count(low, high) as usize, Vec::new());
+    let mut vertices = Vec::with_capacity(columns + rings.vertices.len());
+    let width = columns / (high.z - low.z + 1).max(1) as usize;
     for z in low.z..=high.z {
-        vertices.extend((low.x..=high.x).map(|x| height_vertex(ground, Column::new(x, z), low.at(0))));
+        let row = ground.row(Column::new(low.x, z), width, &mut normals);
+        vertices.extend((0..).zip(row).map(|(x, (height, normal, material))| Vertex {
+            position: IVec3::new(x * SNAP, height * (SNAP / ONE), (z - low.z) * SNAP),
+            normal,
+            materials: MaterialMix::column(material),
+        }));
     }
     vertices.extend_from_slice(&rings.vertices);
     vertices
@@ -268,5 +275,28 @@ pub fn fan<T: Copy>(first: &[T], second: &[T], mut emit: impl FnMut([T; 3])) {
     }
     for pair in second[1..].windows(2) {
         emit([first[0], pair[0], pair[1]]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::vertex::height_vertex;
+    use super::*;
+    use crate::ground::NoiseHeights;
+
+    #[test]
+    fn columns_are_the_heightmaps_own_vertices() {
+        let noise = NoiseHeights { seed: 3, scale: 12.0, amplitude: 20.0, ..NoiseHeights::default() };
+        let ground = Ground::from_noise(50, 37, &noise).expect("valid hills");
+        let grid = ChunkGrid::new(16, 50, 37);
+        for tile in grid.tiles() {
+            let (low, high) = grid.tile_cells(tile);
+            let columns = (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Column::new(x, z)));
+            let expected: Vec<Vertex> =
+                columns.map(|column| height_vertex(&ground, column, low.at(0))).collect();
+            let found = vertices(&ground, grid, tile, &Rings::default());
+            assert_eq!(found.len(), expected.len(), "{tile:?}");
+            assert!(found.iter().zip(&expected).all(|(own, other)| own.is_same(other)), "{tile:?}");
+        }
     }
 }

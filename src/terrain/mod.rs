@@ -44,6 +44,8 @@ pub use query::{RayHit, Span};
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 #[cfg(feature = "avian")]
 pub(crate) use recipe::SurfaceRecipe;
+#[cfg(feature = "plugin")]
+pub(crate) use recipe::{SurfaceDraft, TileDraft};
 pub use redraw::MeshUpdates;
 pub use settings::{TerrainError, TerrainSettings};
 pub use surface::ChunkSurface;

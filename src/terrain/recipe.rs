@@ -7,9 +7,9 @@ use super::surface::ChunkSurface;
 use super::world::{Drawn, World};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, TilePos};
-use crate::surface::SurfaceMesh;
 use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
+use crate::surface::{Indices, SurfaceMesh};
 
 /// All that the surface of one tile or chunk is made from, for somebody who makes it elsewhere: unlike a snapshot it leaves
 /// the world alone, and the next commit has nothing to copy.
@@ -40,14 +40,59 @@ impl World {
 
 impl SurfaceRecipe {
     /// The surface, relative to the origin of the tile or chunk; empty where nothing is drawn.
-    pub fn surface(&self) -> Cow<'_, SurfaceMesh> {
+    pub fn draft(&self) -> SurfaceDraft<'_> {
         match &self.0 {
-            Source::Nothing => Cow::default(),
-            Source::Tile { tile, grid, ground, borders, rings } => Cow::Owned(SurfaceMesh {
-                vertices: tile::vertices(ground, *grid, *tile, rings),
-                indices: tile::indices(*grid, *tile, borders, rings),
+            Source::Nothing => SurfaceDraft::Mesh(Cow::default()),
+            Source::Tile { tile, grid, ground, borders, rings } => SurfaceDraft::Tile(TileDraft {
+                tile: *tile,
+                grid: *grid,
+                ground,
+                rings,
+                indices: Cow::Owned(tile::indices(*grid, *tile, borders, rings)),
             }),
-            Source::Chunk(surface) => Cow::Borrowed(surface.mesh()),
+            Source::Chunk(surface) => SurfaceDraft::Mesh(Cow::Borrowed(surface.mesh())),
+        }
+    }
+}
+
+/// A surface that may not have its vertices yet.
+pub(crate) enum SurfaceDraft<'a> {
+    /// All of it.
+    Mesh(Cow<'a, SurfaceMesh>),
+    /// A tile: whoever wants its columns in another form makes them of the ground.
+    Tile(TileDraft<'a>),
+}
+
+/// A tile's mesh without its columns.
+pub(crate) struct TileDraft<'a> {
+    pub tile: TilePos,
+    pub grid: ChunkGrid,
+    pub ground: &'a Ground,
+    pub rings: &'a Rings,
+    pub indices: Cow<'a, Indices>,
+}
+
+impl TileDraft<'_> {
+    fn mesh(&self) -> SurfaceMesh {
+        let vertices = tile::vertices(self.ground, self.grid, self.tile, self.rings);
+        SurfaceMesh { vertices, indices: self.indices.clone().into_owned() }
+    }
+}
+
+impl SurfaceDraft<'_> {
+    /// Is nothing drawn?
+    pub fn is_empty(&self) -> bool {
+        match self {
+            Self::Mesh(mesh) => mesh.is_empty(),
+            Self::Tile(draft) => draft.indices.is_empty(),
+        }
+    }
+
+    /// The whole surface.
+    pub fn surface(&self) -> Cow<'_, SurfaceMesh> {
+        match self {
+            Self::Mesh(mesh) => Cow::Borrowed(mesh),
+            Self::Tile(draft) => Cow::Owned(draft.mesh()),
         }
     }
 }
@@ -74,10 +119,12 @@ mod tests {
             }
             let world = terrain.world();
             for (drawn, mesh) in world.drawn() {
-                assert!(*world.recipe(drawn).surface() == mesh, "{drawn:?} after {number} digs");
+                let recipe = world.recipe(drawn);
+                assert!(*recipe.draft().surface() == mesh, "{drawn:?} after {number} digs");
+                assert_eq!(recipe.draft().is_empty(), mesh.is_empty());
             }
         }
         let outside = Drawn::Tile(TilePos { x: 90, z: 0 });
-        assert!(terrain.world().recipe(outside).surface().is_empty());
+        assert!(terrain.world().recipe(outside).draft().is_empty());
     }
 }

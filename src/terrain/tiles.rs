@@ -11,6 +11,8 @@ use rayon::prelude::*;
 use super::by_brick::PARALLEL_PLACES;
 use super::commit::Stages;
 use super::dirty::grown_into;
+#[cfg(feature = "plugin")]
+use super::recipe::{SurfaceDraft, TileDraft};
 use super::world::World;
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, Column, LatticeBox, TilePos, sort_by_place};
@@ -35,6 +37,14 @@ impl TileUpdate {
     pub fn mesh(&self) -> SurfaceMesh {
         let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
         SurfaceMesh { vertices, indices: self.indices.clone() }
+    }
+
+    /// The same without its columns, as long as nobody asks for them.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn draft(&self) -> SurfaceDraft<'_> {
+        let Self { indices, rings, tile, ground, grid } = self;
+        let indices = std::borrow::Cow::Borrowed(indices);
+        SurfaceDraft::Tile(TileDraft { tile: *tile, grid: *grid, ground, rings, indices })
     }
 }
 
