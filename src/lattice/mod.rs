@@ -23,7 +23,7 @@ pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
 pub(crate) use pieces::{pieces, side_by_side};
 pub(crate) use places::{order_of_places, sort_by_place};
-pub(crate) use tables::table_bytes;
+pub(crate) use tables::{give_back, table_bytes};
 
 use glam::IVec3;
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use crate::ground::Ground;
-use crate::lattice::{Column, ceil, table_bytes};
+use crate::lattice::{Column, ceil, give_back, table_bytes};
 
 /// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
 /// lattice point counts below it.
@@ -61,6 +61,11 @@ impl Mask {
     pub(crate) fn replace_word(&mut self, word: (i32, i32), cells: u64) -> u64 {
         let before = if cells == 0 { self.0.remove(&word) } else { self.0.insert(word, cells) };
         before.unwrap_or_default()
+    }
+
+    /// Gives back what words held that are gone.
+    pub(crate) fn give_back(&mut self) {
+        give_back(&mut self.0);
     }
 
     /// The 8x8 cells of a word that was put in or laid.

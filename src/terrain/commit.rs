@@ -61,7 +61,7 @@ pub struct Stages {
     pub assembly: Duration,
     /// The mask, rings and index lists.
     pub ring: Duration,
-    /// The whole transaction: the above, fields and receipts.
+    /// The whole transaction: the above, fields and receipts, and a copy of the world's index where others hold the world.
     pub whole: Duration,
 }
 
@@ -119,6 +119,7 @@ impl Commit {
                 world.rings.insert(tile, rings);
             }
         }
+        world.give_back();
         world.next_field = self.next_field;
         world.revision += 1;
         let replaced = (!self.change.bricks.is_empty()).then(|| Step::new(self.change, self.replaced_bytes));

@@ -117,8 +117,10 @@ impl Transaction {
         // All of a large one on a thread of the pool: going there and back for each of its stages takes its time.
         let commit = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // The terrain and this hold the world. Where others do, the commit changes a copy: better made here than there.
-        let is_shared = Arc::strong_count(&self.world) > 2;
-        Commit { copy: is_shared.then(|| Arc::new(World::clone(&self.world))), ..commit }
+        let (is_shared, mut stages) = (Arc::strong_count(&self.world) > 2, commit.stages);
+        let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
+        let copy = Stages::time(&mut stages.whole, copy);
+        Commit { copy, stages, ..commit }
     }
 
     /// May it reach so many bricks that several threads will work on them?

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::surface::ChunkSurface;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, hash, table_bytes};
+use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, give_back, hash, table_bytes};
 use crate::surface::block;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
@@ -33,7 +33,8 @@ pub struct Memory {
     pub samples: usize,
     /// Materials of bricks.
     pub materials: usize,
-    /// Meshes of chunks, from whose unchanged parts the next ones are copied.
+    /// Meshes of chunks, from whose unchanged parts the next ones are copied. Besides, each thread that meshes keeps room for
+    /// its next transaction, a few MiB at most, which belongs to no world.
     pub meshes: usize,
     /// Where parts are in meshes, and rings of tiles.
     pub parts: usize,
@@ -229,6 +230,16 @@ impl World {
             soup.add(&mesh, self.origin(drawn));
         }
         soup.check(self.grid)
+    }
+
+    /// Gives back what the index held of bricks, fields and surfaces that are gone.
+    pub(super) fn give_back(&mut self) {
+        give_back(&mut self.bricks);
+        give_back(&mut self.stacks);
+        give_back(&mut self.fields);
+        give_back(&mut self.surfaces);
+        give_back(&mut self.rings);
+        self.mask.give_back();
     }
 
     /// Bytes that the world takes.
