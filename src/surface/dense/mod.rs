@@ -61,7 +61,8 @@ use stream::Stream;
 /// A triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DenseMesh {
-    /// Vertices, in voxels from sample (0, 0, 0), the apron included. One for each lattice edge that the surface crosses.
+    /// Vertices, in voxels from sample (0, 0, 0), the apron included. One for each lattice edge that the surface crosses, in
+    /// its middle where the difference between its two samples is no finite number.
     pub positions: Vec<[f32; 3]>,
     /// Unit normals towards the air, one for each vertex; empty with [`Normals::None`].
     pub normals: Vec<[f32; 3]>,
@@ -83,7 +84,8 @@ pub enum Normals {
 /// Meshes dense grids, and keeps its memory from one to the next.
 ///
 /// The first grids make it allocate. Nothing is allocated for a grid with no longer sides, no more crossed cells and no more
-/// vertices and triangles than one before, if the mesh is reused as well.
+/// vertices and triangles than one before, if the mesh is reused as well. It takes some 34 bytes for each cell of a layer in
+/// z, crossed or not: of a flat grid, a long side should lie along z.
 #[derive(Debug, Default)]
 pub struct DenseMesher {
     low: Signs,

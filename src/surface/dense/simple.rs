@@ -47,8 +47,8 @@ fn add_vertex<S: Density>(
     let mut end = start;
     end[axis] += 1;
     let (low, high) = (sample(grid, start), sample(grid, end));
-    let crossing = low / (low - high);
-    let crossing = if crossing.is_nan() { 0.5 } else { crossing };
+    let difference = low - high;
+    let crossing = if difference.is_finite() { low / difference } else { 0.5 };
     let mut position = start.map(|coordinate| coordinate as f32);
     position[axis] += crossing;
     mesh.positions.push(position);

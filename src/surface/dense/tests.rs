@@ -136,6 +136,25 @@ fn sphere(side: usize, radius: f32) -> Vec<f32> {
 }
 
 #[test]
+fn samples_too_far_apart_are_crossed_in_the_middle() {
+    let most = f32::MAX;
+    for (low, high, crossing) in [
+        (-most, most, 0.5),
+        (most, -most, 0.5),
+        (f32::NEG_INFINITY, 5.0, 0.5),
+        (-5.0, f32::INFINITY, 0.5),
+        (-most / 2.0, most / 2.0, 0.5),
+        (-1.0, 3.0, 0.25),
+    ] {
+        let (samples, mut mesh) = ([low, high].repeat(4), DenseMesh::default());
+        let grid = DenseGrid::new(&samples, [2, 2, 2]).expect("a grid");
+        DenseMesher::new().mesh(grid, Normals::None, &mut mesh);
+        assert_eq!(mesh.positions.len(), 4);
+        assert!(mesh.positions.iter().all(|position| position[0] == crossing), "{low} {high}: {mesh:?}");
+    }
+}
+
+#[test]
 fn no_number_upsets_the_mesher() {
     let special = [
         f32::NAN,

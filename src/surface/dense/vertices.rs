@@ -211,12 +211,11 @@ fn border_gradients<S: Density, const AXIS: usize>(
     gradients
 }
 
-/// Where the surface crosses edges, 0 to 1; in the middle where numbers fail.
+/// Where the surface crosses edges, 0 to 1; in the middle where the samples' difference is no finite number.
 #[inline(always)]
 fn crossing([start, end]: [f32x4; 2]) -> f32x4 {
-    let crossing = start / (start - end);
-    // NaN alone is not equal to itself.
-    crossing.simd_eq(crossing).bitselect(crossing, f32x4::HALF)
+    let difference = start - end;
+    difference.abs().simd_le(f32x4::splat(f32::MAX)).bitselect(start / difference, f32x4::HALF)
 }
 
 /// Scaled to length 1; and a bit for each lane where numbers did not fail.
