@@ -1,4 +1,4 @@
-//! What the process takes. Each test runs in a process of its own for that, so that none is charged for another's data.
+//! A test in a process of its own: what it takes there, and what its edits cost where nothing has been allocated before.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -6,87 +6,73 @@ use std::process::{Command, Stdio};
 use serde::{Deserialize, Serialize};
 
 use crate::PaperError;
-use crate::backend::Backend;
-use crate::edits::{Run, Scene};
+use crate::clock::Lap;
+use crate::edits::Run;
 use crate::full::{DenseField, FullWorld, Output};
 use crate::measure::{Setup, Subject};
-use crate::play;
+use crate::play::{self, Played};
 
-/// Kilobytes in memory (resident set) at the end of each run; `None` where the system does not tell.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Footprint {
-    /// With the landscape made and nothing else.
+/// Both runs of a test that a process played, and nothing else.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Alone {
+    /// Kilobytes in memory (resident set) with the landscape made and nothing else; `None` where the system does not tell.
     pub start: Option<u64>,
-    pub first: Option<u64>,
-    pub second: Option<u64>,
+    pub first: AloneRun,
+    pub second: AloneRun,
 }
 
-impl Footprint {
-    pub fn after(&self, run: Run) -> Option<u64> {
+/// One of them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct AloneRun {
+    /// Kilobytes in memory when it was over.
+    pub resident: Option<u64>,
+    /// What each edit took.
+    pub laps: Vec<Lap>,
+}
+
+impl Alone {
+    pub fn of(&self, run: Run) -> &AloneRun {
         match run {
-            Run::First => self.first,
-            Run::Second => self.second,
+            Run::First => &self.first,
+            Run::Second => &self.second,
         }
     }
 
-    /// Plays both runs of a test in this process, untimed.
+    /// Plays both runs of a test in this process.
     pub fn here(subject: Subject, setup: &Setup) -> Result<Self, PaperError> {
         let scene = setup.scene()?;
-        let mut footprint = Self { start: resident(), ..Self::default() };
-        let mut ends = match subject {
-            Subject::Hybrid { backend, chunk_size } => hybrid(&scene, backend, chunk_size)?,
-            Subject::Full(Output::Same) => same(&scene)?,
-            Subject::Full(Output::Bare) => bare(&scene)?,
-        }
-        .into_iter();
-        footprint.first = ends.next().flatten();
-        footprint.second = ends.next().flatten();
-        Ok(footprint)
-    }
-
-    /// Plays both runs in a process of its own; nothing is known where none can be started.
-    pub fn apart(subject: Subject, setup: &Setup) -> Self {
-        let ask = || -> Option<Self> {
-            let child = Command::new(std::env::current_exe().ok()?)
-                .args(["--footprint-of", &subject.key()])
-                .args(setup.arguments())
-                .stderr(Stdio::null())
-                .output()
-                .ok()
-                .filter(|child| child.status.success())?;
-            serde_json::from_slice(&child.stdout).ok()
+        let (start, brushes) = (resident(), Run::BOTH.map(|run| scene.brushes(run)));
+        let ran = |played: Played| AloneRun { resident: resident(), laps: played.laps };
+        let [first, second] = match subject {
+            Subject::Hybrid { backend, chunk_size } => {
+                let (runner, mut terrain) = (backend.open()?, play::terrain(&scene, chunk_size)?);
+                let mut run = |brushes: &[_]| play::hybrid(&mut terrain, &runner, brushes).map(ran);
+                [run(&brushes[0])?, run(&brushes[1])?]
+            }
+            Subject::Full(Output::Same) => {
+                let mut full = FullWorld::new(&scene)?;
+                brushes.map(|brushes| ran(play::same(&mut full, &brushes)))
+            }
+            Subject::Full(Output::Bare) => {
+                let mut field = DenseField::new(&scene.ground)?;
+                let mut run = |brushes: &[_]| play::bare(&mut field, brushes).map(ran);
+                [run(&brushes[0])?, run(&brushes[1])?]
+            }
         };
-        ask().unwrap_or_default()
+        Ok(Self { start, first, second })
     }
-}
 
-fn hybrid(scene: &Scene, backend: Backend, chunk_size: u32) -> Result<[Option<u64>; 2], PaperError> {
-    let mut runner = backend.open()?;
-    let mut terrain = play::terrain(scene, chunk_size)?;
-    let mut ends = [None; 2];
-    for (run, end) in Run::BOTH.into_iter().zip(&mut ends) {
-        play::hybrid(&mut terrain, &mut runner, &scene.brushes(run))?;
-        *end = resident();
+    /// Plays both runs in a process of its own; `None` where none can be started.
+    pub fn apart(subject: Subject, setup: &Setup) -> Option<Self> {
+        let child = Command::new(std::env::current_exe().ok()?)
+            .args(["--alone", &subject.key()])
+            .args(setup.arguments())
+            .stderr(Stdio::null())
+            .output()
+            .ok()
+            .filter(|child| child.status.success())?;
+        serde_json::from_slice(&child.stdout).ok()
     }
-    Ok(ends)
-}
-
-fn same(scene: &Scene) -> Result<[Option<u64>; 2], PaperError> {
-    let mut full = FullWorld::new(scene)?;
-    Ok(Run::BOTH.map(|run| {
-        play::same(&mut full, &scene.brushes(run));
-        resident()
-    }))
-}
-
-fn bare(scene: &Scene) -> Result<[Option<u64>; 2], PaperError> {
-    let mut field = DenseField::new(&scene.ground)?;
-    let mut ends = [None; 2];
-    for (run, end) in Run::BOTH.into_iter().zip(&mut ends) {
-        play::bare(&mut field, &scene.brushes(run))?;
-        *end = resident();
-    }
-    Ok(ends)
 }
 
 /// Kilobytes that this process has in memory.

@@ -12,8 +12,25 @@ pub enum Backend {
     Cuda,
 }
 
-/// Runs a transaction to its commit.
-pub type Runner = Box<dyn FnMut(Transaction) -> Commit>;
+/// Runs transactions to their commits.
+pub struct Runner {
+    /// The card's; without one, the processor does it.
+    engine: Option<Engine>,
+}
+
+impl Runner {
+    pub fn run(&self, transaction: Transaction) -> Commit {
+        match &self.engine {
+            Some(engine) => transaction.run_on(engine),
+            None => transaction.run(),
+        }
+    }
+
+    /// Stages that a card left to the processor, so far.
+    pub fn left_over(&self) -> u64 {
+        self.engine.as_ref().map_or(0, |engine| engine.figures().cpu)
+    }
+}
 
 /// Why a backend computes nothing here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -26,12 +43,12 @@ impl Backend {
     /// The backend, ready to run.
     pub fn open(self) -> Result<Runner, NoBackend> {
         let kind = match self {
-            Self::Cpu => return Ok(Box::new(Transaction::run)),
+            Self::Cpu => return Ok(Runner { engine: None }),
             Self::Cuda => Kind::Cuda,
         };
         let engine = Engine::new(kind);
         match engine.wait(Duration::from_secs(30)) {
-            EngineState::Cuda(_) => Ok(Box::new(move |transaction| transaction.run_on(&engine))),
+            EngineState::Cuda(_) => Ok(Runner { engine: Some(engine) }),
             _ => Err(NoBackend("CUDA")),
         }
     }

@@ -3,8 +3,10 @@
 
 use std::time::Instant;
 
+use serde::{Deserialize, Serialize};
+
 /// Seconds that something took.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Lap {
     /// By the wall clock.
     pub seconds: f64,

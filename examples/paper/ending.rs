@@ -3,7 +3,7 @@
 use std::panic::resume_unwind;
 
 use bevy_burrow::surface::SeamReport;
-use bevy_burrow::terrain::{Memory, World};
+use bevy_burrow::terrain::{Memory, Terrain, World};
 
 use crate::full::{DenseField, FullWorld};
 
@@ -31,8 +31,8 @@ pub struct EndingWorld {
 }
 
 impl EndingWorld {
-    fn new(world: &World, seams: &SeamReport) -> Self {
-        Self { hash: world.hash(), is_flawless: seams.is_flawless(), data: world.memory() }
+    fn new(world: &World, seams: &SeamReport, data: Memory) -> Self {
+        Self { hash: world.hash(), is_flawless: seams.is_flawless(), data }
     }
 }
 
@@ -43,15 +43,16 @@ fn aside<T: Send>(look: impl FnOnce() -> T + Send) -> T {
 }
 
 impl Ending {
-    pub fn of_world(world: &World) -> Self {
+    pub fn of_terrain(terrain: &Terrain) -> Self {
+        let world = terrain.world();
         let seams = aside(|| world.check_seams());
-        let triangles = seams.triangles;
-        Self { triangles, world: Some(EndingWorld::new(world, &seams)), sample_bytes: 0, mesh_bytes: 0 }
+        let (triangles, world) = (seams.triangles, EndingWorld::new(world, &seams, terrain.memory()));
+        Self { triangles, world: Some(world), sample_bytes: 0, mesh_bytes: 0 }
     }
 
     pub fn of_full(full: &FullWorld) -> Self {
         let seams = aside(|| full.check_seams());
-        let world = Some(EndingWorld::new(full.world(), &seams));
+        let world = Some(EndingWorld::new(full.world(), &seams, full.memory()));
         Self { triangles: seams.triangles, world, sample_bytes: 0, mesh_bytes: full.mesh_bytes() }
     }
 
@@ -64,9 +65,14 @@ impl Ending {
         }
     }
 
-    /// Bytes of ground and samples, with all that is kept besides.
+    /// Bytes of ground and samples, with all that is kept besides, history aside.
     pub fn data_bytes(&self) -> usize {
         self.world.map_or(self.sample_bytes, |world| world.data.ground + world.data.edits())
+    }
+
+    /// Bytes of what can be undone.
+    pub fn undo_bytes(&self) -> usize {
+        self.world.map_or(0, |world| world.data.undo)
     }
 
     /// Did the same come out?

@@ -16,8 +16,9 @@
 //! | `plots/*.svg` | the plots that the page shows |
 //!
 //! It fails when a check does: seams, equal worlds in all chunk sizes, ground and surface of the full fields against the
-//! hybrid's. With `--results` the page goes there as well, and the plots into `plots/` beside it.
+//! hybrid's. With `--results` the page goes there as well if all holds, and the plots into `plots/` beside it.
 
+mod alone;
 mod backend;
 mod clock;
 mod compare;
@@ -26,7 +27,6 @@ mod ending;
 mod full;
 mod machine;
 mod measure;
-mod memory;
 mod play;
 mod plots;
 mod published;
@@ -47,9 +47,9 @@ use bevy_burrow::terrain::{StaleCommit, TerrainError};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use alone::Alone;
 use machine::Machine;
 use measure::{Measurements, Setup, Subject, measure};
-use memory::Footprint;
 
 /// Reproduces the paper's Tables 1 to 5 and writes them beside the paper's own figures.
 #[derive(Parser)]
@@ -70,9 +70,9 @@ struct Args {
     /// Threads that edits may use
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=256))]
     threads: u32,
-    /// Prints what one test takes in memory; the program asks itself this
+    /// Plays one test alone and prints what it took; the program asks itself this
     #[arg(long, hide = true)]
-    footprint_of: Option<Subject>,
+    alone: Option<Subject>,
 }
 
 impl Args {
@@ -100,6 +100,8 @@ enum PaperError {
     Grid(#[from] DenseGridError),
     #[error(transparent)]
     Backend(#[from] backend::NoBackend),
+    #[error("{0} stages of a run on the card were done by the processor: it failed, or had no memory left")]
+    LeftTheCard(u64),
     #[error(transparent)]
     Stale(#[from] StaleCommit),
     #[error("a terrain had no transaction to begin")]
@@ -131,13 +133,14 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> Result<(), PaperError> {
     let setup = args.setup();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(setup.threads).build()?;
-    if let Some(subject) = args.footprint_of {
-        let footprint = pool.install(|| Footprint::here(subject, &setup))?;
-        println!("{}", serde_json::to_string(&footprint)?);
+    if let Some(subject) = args.alone {
+        let alone = pool.install(|| Alone::here(subject, &setup))?;
+        println!("{}", serde_json::to_string(&alone)?);
         return Ok(());
     }
     // A folder that cannot be written is found before the long work.
-    make_folder(&args.out.join("plots"))?;
+    let page = args.results.as_deref().map(folder_of);
+    [Some(args.out.as_path()), page].into_iter().flatten().try_for_each(try_folder)?;
     let measurements = pool.install(|| {
         let bar = progress_bar(&setup);
         let measured = measure(setup, backend::Backend::missing(), || bar.inc(1));
@@ -152,13 +155,12 @@ fn run(args: &Args) -> Result<(), PaperError> {
     println!("{}", report::checks(&measurements));
     println!("{}", report::ratio_table(&report::ratios(&measurements)));
     write(&measurements, &machine, &args.out)?;
-    if let Some(results) = &args.results {
-        publish(&args.out, results)?;
+    // What does not hold is not published.
+    let faults = report::faults(&measurements);
+    if !faults.is_empty() {
+        return Err(PaperError::Faults(faults.join("\n")));
     }
-    match report::faults(&measurements) {
-        faults if faults.is_empty() => Ok(()),
-        faults => Err(PaperError::Faults(faults.join("\n"))),
-    }
+    args.results.as_deref().map_or(Ok(()), |results| publish(&args.out, results))
 }
 
 /// A bar of runs, drawn between them and never during one.
@@ -183,10 +185,24 @@ fn write(measurements: &Measurements, machine: &Machine, out: &Path) -> Result<(
 
 /// Copies the page and its plots to where it is read.
 fn publish(out: &Path, results: &Path) -> Result<(), PaperError> {
-    let plots = results.parent().unwrap_or(Path::new("")).join("plots");
+    let plots = folder_of(results).join("plots");
     make_folder(&plots)?;
     copy(&out.join("RESULTS.md"), results)?;
     plots::PLOTS.iter().try_for_each(|(file, _)| copy(&out.join("plots").join(file), &plots.join(file)))
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().unwrap_or(Path::new(""))
+}
+
+/// Makes a folder and one for plots in it, and tries to write into both.
+fn try_folder(folder: &Path) -> Result<(), PaperError> {
+    [folder.to_owned(), folder.join("plots")].iter().try_for_each(|folder| {
+        make_folder(folder)?;
+        let probe = folder.join(format!("paper-{}.tmp", std::process::id()));
+        write_file(&probe, "")?;
+        fs::remove_file(&probe).map_err(|reason| PaperError::Write { path: probe.clone(), reason })
+    })
 }
 
 fn make_folder(path: &Path) -> Result<(), PaperError> {

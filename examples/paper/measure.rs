@@ -3,12 +3,13 @@
 use bevy_burrow::terrain::{ScenarioCounts, Terrain};
 
 use crate::PaperError;
+use crate::alone::{Alone, AloneRun};
 use crate::backend::{Backend, NoBackend};
+use crate::clock::Lap;
 use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
 use crate::ending::Ending;
 use crate::full::{DenseField, FullWorld, Output};
-use crate::memory::Footprint;
 use crate::play::{self, Played};
 use crate::published::CHUNK_SIZES;
 
@@ -97,8 +98,8 @@ pub struct Measured {
     /// Edits that changed no sample, and that changed no mesh, in one repeat.
     pub unchanged: usize,
     pub undrawn: usize,
-    /// Kilobytes of the process after the run.
-    pub resident: Option<u64>,
+    /// The same run in processes that play one test each; none where no process can be started.
+    pub alone: Vec<AloneRun>,
     pub ending: Ending,
 }
 
@@ -117,6 +118,13 @@ pub struct Measurements {
     pub sizes: Vec<f64>,
     /// Part of columns steeper than 45 degrees, and the steepest rise over run.
     pub steepness: (f64, f64),
+}
+
+impl Measured {
+    /// Kilobytes of a process after the run.
+    pub fn resident(&self) -> Option<u64> {
+        self.alone.first()?.resident
+    }
 }
 
 impl Measurements {
@@ -144,20 +152,22 @@ pub fn measure(
     subjects.extend(Output::BOTH.map(Subject::Full));
 
     let mut measured: Vec<Measured> = Vec::new();
-    // Repeats outside: what else the machine does meanwhile falls on all subjects alike.
+    // Repeats outside: what else the machine does meanwhile falls on all subjects alike. So does what the one before
+    // leaves behind: nobody always follows the same one.
+    let (mut rng, mut order) = (fastrand::Rng::with_seed(setup.seed), subjects.clone());
     for _ in 0..setup.repeats {
-        for &subject in &subjects {
+        for &subject in &order {
             let mut keep = |run, played, ending| {
                 progress();
                 keep(&mut measured, setup.threads, subject, run, played, ending)
             };
             match subject {
                 Subject::Hybrid { backend, chunk_size } => {
-                    let mut runner = backend.open()?;
+                    let runner = backend.open()?;
                     let mut terrain = play::terrain(&scene, chunk_size)?;
                     for run in Run::BOTH {
-                        let played = play::hybrid(&mut terrain, &mut runner, &scene.brushes(run))?;
-                        keep(run, played, Ending::of_world(terrain.world()))?;
+                        let played = play::hybrid(&mut terrain, &runner, &scene.brushes(run))?;
+                        keep(run, played, Ending::of_terrain(&terrain))?;
                     }
                 }
                 Subject::Full(Output::Same) => {
@@ -176,11 +186,14 @@ pub fn measure(
                 }
             }
         }
+        rng.shuffle(&mut order);
     }
     for &subject in &subjects {
-        let footprint = Footprint::apart(subject, &setup);
+        // Of full fields, only what they take in memory is asked.
+        let times = if matches!(subject, Subject::Full(_)) { 1 } else { setup.repeats };
+        let alone: Vec<Alone> = (0..times).map_while(|_| Alone::apart(subject, &setup)).collect();
         for measured in measured.iter_mut().filter(|measured| measured.subject == subject) {
-            measured.resident = footprint.after(measured.run);
+            measured.alone = alone.iter().map(|alone| alone.of(measured.run).clone()).collect();
         }
     }
     Ok(Measurements {
@@ -205,9 +218,7 @@ fn keep(
     ending: Ending,
 ) -> Result<(), PaperError> {
     let Played { laps, voxels, unchanged, undrawn } = played;
-    let seconds: Vec<f64> = laps.iter().map(|lap| lap.seconds).collect();
-    let processor: Vec<f64> =
-        laps.iter().map(|lap| if threads == 1 { lap.processor } else { lap.seconds }).collect();
+    let (seconds, processor) = both_clocks(&laps, threads);
     match measured.iter_mut().find(|measured| measured.subject == subject && measured.run == run) {
         Some(earlier) if !earlier.ending.agrees(&ending) => Err(PaperError::Unrepeatable(subject.key())),
         Some(earlier) => {
@@ -225,12 +236,18 @@ fn keep(
                 voxels,
                 unchanged,
                 undrawn,
-                resident: None,
+                alone: Vec::new(),
                 ending,
             });
             Ok(())
         }
     }
+}
+
+/// Seconds of laps by both clocks. With several threads, the processor's is not known, and the other takes its place.
+pub fn both_clocks(laps: &[Lap], threads: usize) -> (Vec<f64>, Vec<f64>) {
+    let processor = |lap: &Lap| if threads == 1 { lap.processor } else { lap.seconds };
+    (laps.iter().map(|lap| lap.seconds).collect(), laps.iter().map(processor).collect())
 }
 
 /// Which of the paper's scenarios the first run consists of.

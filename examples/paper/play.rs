@@ -43,13 +43,13 @@ pub fn terrain(scene: &Scene, chunk_size: u32) -> Result<Terrain, PaperError> {
 
 /// Plays edits on a terrain, one transaction each: brush in, world committed, vertex and index buffers of all changed
 /// chunks and tiles in hand.
-pub fn hybrid(terrain: &mut Terrain, runner: &mut Runner, brushes: &[Brush]) -> Result<Played, PaperError> {
-    let mut played = Played::default();
+pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Result<Played, PaperError> {
+    let (mut played, left_before) = (Played::default(), runner.left_over());
     for brush in brushes {
         let (lap, answer) = clock::time(|| -> Result<_, PaperError> {
             terrain.submit(brush);
             let transaction = terrain.begin().ok_or(PaperError::Busy)?;
-            let mut commit = runner(transaction);
+            let mut commit = runner.run(transaction);
             // The caller's now; a game uploads them.
             let meshes = black_box(std::mem::take(&mut commit.meshes));
             Ok((terrain.commit(commit)?, meshes))
@@ -59,7 +59,11 @@ pub fn hybrid(terrain: &mut Terrain, runner: &mut Runner, brushes: &[Brush]) -> 
         played.look_at(&receipts);
         played.undrawn += usize::from(meshes.chunks.is_empty() && meshes.tiles.is_empty());
     }
-    Ok(played)
+    // Where there is nothing to do, nothing is sent to a card.
+    match runner.left_over() - left_before {
+        left if left <= (played.unchanged + played.undrawn) as u64 => Ok(played),
+        left => Err(PaperError::LeftTheCard(left)),
+    }
 }
 
 /// Plays edits on the full field with the hybrid's output: the same transaction, then the whole mesh made again.

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use bevy_burrow::prelude::{Edit, Operation};
 use clap::{CommandFactory, Parser};
 
+use crate::alone::Alone;
 use crate::backend::{Backend, NoBackend};
 use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
 use crate::full::{DenseField, FullWorld, Output};
 use crate::machine::Machine;
 use crate::measure::{Measurements, Setup, Subject, measure};
-use crate::memory::Footprint;
 use crate::published::{self, CHUNK_SIZES};
 use crate::stats::{self, Statistics};
 use crate::{Args, play, plots, publish, report, write};
@@ -21,7 +21,15 @@ const SMALL: Setup = Setup { side: 72, edits: 10, repeats: 2, threads: 1, seed: 
 
 fn measurements() -> Measurements {
     // Whatever this machine has: pages and tables look the same on all.
-    measure(SMALL, vec![(Backend::Cuda, NoBackend("CUDA"))], || ()).expect("a small experiment")
+    let mut all =
+        measure(SMALL, vec![(Backend::Cuda, NoBackend("CUDA"))], || ()).expect("a small experiment");
+    // The program that runs these tests does not play one when asked.
+    assert!(all.measured.iter().all(|measured| measured.alone.is_empty()));
+    for measured in &mut all.measured {
+        let alone = (0..2).map(|_| Alone::here(measured.subject, &SMALL).expect("a small experiment"));
+        measured.alone = alone.map(|alone| alone.of(measured.run).clone()).collect();
+    }
+    all
 }
 
 /// An empty folder that goes when the test ends.
@@ -230,7 +238,9 @@ fn the_papers_ratios_are_those_of_its_text() {
     // 3138 %.
     assert!((paper("full over hybrid 25, same output, total") - 31.38).abs() < 0.01);
     assert!((paper("chunk size 100 over 25") - 3.84).abs() < 0.01);
-    assert!((paper("first over second run, average, chunk size 25") - 15.76).abs() < 0.01);
+    assert!(
+        (paper("first over second run, each process alone, average, chunk size 25") - 15.76).abs() < 0.01
+    );
     let gpu = ratios.iter().filter(|ratio| ratio.what.starts_with("GPU over CPU"));
     assert!(gpu.clone().count() == 8 && gpu.clone().all(|ratio| ratio.here.is_none()));
     assert!(gpu.clone().all(|ratio| ratio.paper.is_some_and(|ratio| ratio > 1.0)), "the GPU always lost");
@@ -269,13 +279,16 @@ fn everything_is_written_and_published() {
 fn the_process_tells_what_it_takes() {
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size: 25 };
     for subject in Output::BOTH.map(Subject::Full).into_iter().chain([hybrid]) {
-        let footprint = Footprint::here(subject, &SMALL).expect("a small experiment");
-        let known = [footprint.start, footprint.first, footprint.second].map(|figure| figure.is_some());
+        let alone = Alone::here(subject, &SMALL).expect("a small experiment");
+        let Alone { start, first, second } = &alone;
+        let known = [*start, first.resident, second.resident].map(|figure| figure.is_some());
         assert_eq!(known, [cfg!(target_os = "linux"); 3]);
+        assert_eq!([first, second].map(|run| run.laps.len()), [SMALL.edits; 2]);
+        assert!(first.laps.iter().chain(&second.laps).all(|lap| lap.seconds > 0.0));
         assert_eq!(subject.key().parse(), Ok(subject));
     }
     let on_a_card = Subject::Hybrid { backend: Backend::Cuda, chunk_size: 25 };
-    assert_eq!(Footprint::here(on_a_card, &SMALL).is_err(), Backend::Cuda.open().is_err());
+    assert_eq!(Alone::here(on_a_card, &SMALL).is_err(), Backend::Cuda.open().is_err());
 }
 
 #[test]
@@ -286,7 +299,7 @@ fn bad_arguments_are_refused() {
         &["paper", "--threads", "0"],
         &["paper", "--threads", "-1"],
         &["paper", "--quick", "--repeats", "3"],
-        &["paper", "--footprint-of", "cpu_26"],
+        &["paper", "--alone", "cpu_26"],
         &["paper", "--chunk-size", "25"],
     ] {
         assert!(Args::try_parse_from(line).is_err(), "{line:?}");

@@ -6,7 +6,7 @@ use bevy_burrow::lattice::{BrickPos, LatticeBox, ONE, SNAP};
 use bevy_burrow::surface::block::{Block, Mesher, Parts};
 use bevy_burrow::surface::vertex::WorldView;
 use bevy_burrow::surface::{Indices, Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh, Vertex};
-use bevy_burrow::terrain::{Receipt, Terrain, World};
+use bevy_burrow::terrain::{Memory, Receipt, Terrain, World};
 use glam::{IVec3, Vec3};
 
 use crate::PaperError;
@@ -72,6 +72,11 @@ impl FullWorld {
 
     pub fn world(&self) -> &World {
         self.terrain.world()
+    }
+
+    /// Bytes of its ground and samples, with all that is kept besides.
+    pub fn memory(&self) -> Memory {
+        self.terrain.memory()
     }
 
     /// The vertex buffer, in 1/4096 voxel of the world.

@@ -59,10 +59,11 @@ fn write(page: &mut String, measurements: &Measurements, machine: &Machine) -> s
         "Total: mean of the repeats; average: of all edits and repeats; max and min: of all single edits. The paper's \
          clock ticks about every 2 ms, hence its zeros. \"Memory, process\" is the resident set of a process that runs \
          this one test and nothing else{}; \"terrain data\" is ground, samples, index and surface parts as the library \
-         counts them, for the full field with positions and normals only its samples. The full field with the same output \
+         counts them, for the full field with positions and normals only its samples; \"undo history\" is what a terrain \
+         keeps besides, up to a budget, to take edits back. The full field with the same output \
          has made and given back a world painted all over before its first edit, to get a mask of all cells; its process \
          may still hold some of that memory.\n",
-        if measurements.measured.iter().any(|measured| measured.resident.is_none()) {
+        if measurements.measured.iter().any(|measured| measured.resident().is_none()) {
             " (n/a where the system does not tell)"
         } else {
             ""
@@ -174,12 +175,14 @@ fn experiment(page: &mut String, measurements: &Measurements) -> std::fmt::Resul
         "- **First run**: nobody has edited the terrain, nothing is allocated. **Second run**: the same shapes at the same \
          places with the polarity reversed. A second dig of the same hole would change nothing here and cost next to \
          nothing; reversed, each edit changes samples and meshes that are there already. The table of checks counts those \
-         that did not; none is left out of the times."
+         that did not; none is left out of the times. The ratio of both runs comes from processes that play one test and \
+         nothing else, so that their first edits find no memory that another test used."
     )?;
     writeln!(
         page,
         "- **One edit is timed** as in the paper, from its start to the meshes: brush checked, samples and fields changed, \
-         vertex and index buffers of every changed chunk and tile filled, world committed. Drawing is not part of it."
+         vertex and index buffers of every changed chunk filled, and index list and rings of every changed tile, whose \
+         other vertices no edit moves; world committed. Drawing is not part of it."
     )?;
     writeln!(
         page,

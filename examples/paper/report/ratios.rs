@@ -3,8 +3,9 @@
 use super::markdown::{Table, significant};
 use crate::backend::Backend;
 use crate::edits::Run;
+use crate::ending::Ending;
 use crate::full::Output;
-use crate::measure::{Measured, Measurements, Subject};
+use crate::measure::{Measured, Measurements, Subject, both_clocks};
 use crate::published::{self, CHUNK_SIZES};
 use crate::stats::{self, Statistics};
 
@@ -50,18 +51,31 @@ struct Averages {
 }
 
 impl Averages {
-    fn of(measured: &Measured) -> Self {
+    fn of(seconds: &[Vec<f64>], processor: &[Vec<f64>]) -> Self {
         Self {
-            plain: Statistics::of(&measured.repeats).average,
-            medians: Statistics::of(&[stats::by_edit(&measured.processor)]).average,
+            plain: Statistics::of(seconds).average,
+            medians: Statistics::of(&[stats::by_edit(processor)]).average,
         }
     }
+}
+
+/// Timings of the processes that played a run alone: seconds of each edit by repeat, and the same in processor time.
+pub fn alone(measured: &Measured, threads: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    measured.alone.iter().map(|alone| both_clocks(&alone.laps, threads)).unzip()
 }
 
 /// Every ratio that the paper draws, and those that have a target.
 pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
     let cpu = |chunk_size| Subject::Hybrid { backend: Backend::Cpu, chunk_size };
-    let averages = |subject, run| measurements.get(subject, run).map(Averages::of);
+    let averages = |subject, run| {
+        let measured = measurements.get(subject, run)?;
+        Some(Averages::of(&measured.repeats, &measured.processor))
+    };
+    let averages_alone = |subject, run| {
+        let measured = measurements.get(subject, run).filter(|measured| !measured.alone.is_empty())?;
+        let (seconds, processor) = alone(measured, measurements.setup.threads);
+        Some(Averages::of(&seconds, &processor))
+    };
     let divide = |what: String, paper, above: Option<Averages>, below: Option<Averages>, target| {
         let both = above.zip(below);
         Ratio {
@@ -129,10 +143,10 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
     ));
     for (at, chunk_size) in CHUNK_SIZES.into_iter().enumerate() {
         ratios.push(divide(
-            format!("first over second run, average, chunk size {chunk_size}"),
+            format!("first over second run, each process alone, average, chunk size {chunk_size}"),
             Some(paper(Backend::Cpu, first, at).average / paper(Backend::Cpu, second, at).average),
-            averages(cpu(chunk_size), first),
-            averages(cpu(chunk_size), second),
+            averages_alone(cpu(chunk_size), first),
+            averages_alone(cpu(chunk_size), second),
             Some(Target::AtMost(1.5)),
         ));
     }
@@ -149,9 +163,10 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
     }
     for chunk_size in CHUNK_SIZES {
         let here = measurements.get(cpu(chunk_size), first);
-        let here = here.map(|measured| measured.ending.data_bytes() as f64 / 1e6);
+        let bytes = |ending: &Ending| ending.data_bytes() + ending.undo_bytes();
+        let here = here.map(|measured| bytes(&measured.ending) as f64 / 1e6);
         ratios.push(Ratio {
-            what: format!("terrain data after the first run, MB, chunk size {chunk_size}"),
+            what: format!("terrain data and undo history after the first run, MB, chunk size {chunk_size}"),
             paper: None,
             here,
             by_processor: None,

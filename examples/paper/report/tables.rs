@@ -1,6 +1,7 @@
 //! Tables 1 to 5, the paper's figures and ours side by side.
 
 use super::markdown::{Table, kilobytes, thousands};
+use super::ratios::alone;
 use crate::backend::Backend;
 use crate::edits::Run;
 use crate::ending::Ending;
@@ -32,7 +33,7 @@ const ROWS: [Row; 5] = [
     (
         "Memory, process",
         |paper| paper.memory.map_or("-".into(), process),
-        |measured, _| measured.resident.map_or("n/a".into(), process),
+        |measured, _| measured.resident().map_or("n/a".into(), process),
     ),
 ];
 
@@ -69,6 +70,7 @@ fn hybrid(measurements: &Measurements, backend: Backend, run: Run, number: usize
         table.note = reason.map_or_else(String::new, |(_, reason)| format!("Here: {reason}."));
     } else {
         extra(&mut table, "Memory, terrain data", &columns, Ending::data_bytes);
+        extra(&mut table, "Memory, undo history", &columns, Ending::undo_bytes);
     }
     table
 }
@@ -132,17 +134,27 @@ pub fn medians(measurements: &Measurements) -> Table {
         "longest of medians",
     ];
     let mut table = Table::new("How times are spread", header);
-    for measured in &measurements.measured {
-        let name = measured.subject.title();
-        let all = Statistics::of(&measured.repeats);
-        let by_edit = Statistics::of(&[stats::by_edit(&measured.processor)]);
-        let processor = Statistics::of(&measured.processor);
+    let mut row = |measured: &Measured, how: &str, seconds: &[Vec<f64>], processor: &[Vec<f64>]| {
+        let all = Statistics::of(seconds);
+        let by_edit = Statistics::of(&[stats::by_edit(processor)]);
+        let processor = Statistics::of(processor);
         let figures = [all.median, all.p99, all.max, processor.median, by_edit.average, by_edit.max];
         let figures = figures.iter().map(|seconds| format!("{:.1}", seconds * 1e6));
-        table.row(std::iter::once(format!("{name}, {}", measured.run.title())).chain(figures));
+        let name = format!("{}, {}{how}", measured.subject.title(), measured.run.title());
+        table.row(std::iter::once(name).chain(figures));
+    };
+    for measured in &measurements.measured {
+        row(measured, "", &measured.repeats, &measured.processor);
+        if let (Subject::Hybrid { .. }, Run::First, [_, ..]) =
+            (measured.subject, measured.run, &measured.alone[..])
+        {
+            let (seconds, processor) = alone(measured, measurements.setup.threads);
+            row(measured, ", alone", &seconds, &processor);
+        }
     }
     table.note = "The last three columns are processor time, which leaves out what else the machine did meanwhile; the last \
-                  two take each edit with its median over the repeats."
+                  two take each edit with its median over the repeats. \"Alone\": in processes that play one test each, where \
+                  nothing was allocated before."
         .into();
     table
 }
