@@ -17,6 +17,7 @@ import subprocess
 import sys
 
 WHEEL = "nvidia-cuda-nvrtc-cu12==12.0.140"
+VERSION = (12, 0)
 LIBRARY = "nvidia/cuda_nvrtc/lib/libnvrtc.so.12"
 FOLDER = pathlib.Path(__file__).resolve().parent.parent / "src" / "backend" / "cuda"
 # PTX 8.0 for Turing and later; the driver compiles it for the device it has. The last four: exactly rounded, nothing
@@ -49,9 +50,13 @@ def compiler():
         if subprocess.run(install).returncode != 0 or not path.exists():
             fail(f"pip could not install {WHEEL}")
     try:
-        return ctypes.CDLL(str(path))
+        nvrtc = ctypes.CDLL(str(path))
     except OSError as error:
         fail(f"NVRTC does not run on this machine: {error}")
+    major, minor = ctypes.c_int(), ctypes.c_int()
+    if nvrtc.nvrtcVersion(ctypes.byref(major), ctypes.byref(minor)) != 0 or (major.value, minor.value) != VERSION:
+        fail(f"{path} is NVRTC {major.value}.{minor.value}, and {VERSION[0]}.{VERSION[1]} is needed")
+    return nvrtc
 
 
 def compiled():

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use bevy_burrow::backend::{Backend, Choice, Engine, EngineState, Stage};
 use bevy_burrow::prelude::{Brush, Shape};
-use bevy_burrow::terrain::{Commit, Stages, Transaction};
+use bevy_burrow::terrain::{Commit, Stages, Terrain, Transaction};
 use glam::Vec3;
 
 use landscape::{dig, landscape, threads};
@@ -45,11 +45,61 @@ struct Engines {
     auto: Engine,
 }
 
-impl Engines {
-    /// Each with its name.
-    fn named(&self) -> [(&str, &Engine); 3] {
-        [("CPU", &self.cpu), ("CUDA", &self.cuda), ("Auto", &self.auto)]
+/// Which of them.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Who {
+    Cpu,
+    Cuda,
+    Auto,
+}
+
+impl Who {
+    const ALL: [Self; 3] = [Self::Cpu, Self::Cuda, Self::Auto];
+
+    const fn name(self) -> &'static str {
+        ["CPU", "CUDA", "Auto"][self as usize]
     }
+}
+
+impl Engines {
+    /// One transaction on an engine.
+    ///
+    /// # Panics
+    /// Where the card left any of it to the processor, whose time would be taken for the card's.
+    fn run(&self, transaction: Transaction, who: Who, times: &mut Times) -> Commit {
+        let engine = [&self.cpu, &self.cuda, &self.auto][who as usize];
+        let commit = transaction.run_on(engine);
+        let choices = engine.figures().choices;
+        assert!(who == Who::Cpu || matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+        let is_there = |choice: &Choice| choice.is_cuda || choice.amount == 0;
+        assert!(
+            who != Who::Cuda || choices.iter().all(is_there),
+            "the processor did the card's work: {choices:?}"
+        );
+        times.push(&commit.stages, &choices);
+        commit
+    }
+
+    /// Plays brushes in one transaction on a terrain that only this engine edits, so that a card has what it made; returns how
+    /// many seconds they took.
+    fn play(
+        &self,
+        terrain: &mut Terrain,
+        brushes: impl IntoIterator<Item = Brush>,
+        who: Who,
+        times: &mut Times,
+    ) -> f64 {
+        brushes.into_iter().for_each(|brush| terrain.submit(&brush));
+        let commit = self.run(terrain.begin().expect("brushes wait"), who, times);
+        let took = commit.stages.whole.as_secs_f64();
+        terrain.commit(commit).expect("nothing else commits");
+        took
+    }
+}
+
+fn assert_same(terrains: &[Terrain; 3]) {
+    let hashes = terrains.each_ref().map(|terrain| terrain.world().hash());
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]), "the same world");
 }
 
 fn main() {
@@ -152,13 +202,6 @@ fn turns(round: usize) -> [usize; 3] {
     if (round / 3).is_multiple_of(2) { [a, b, c] } else { [c, b, a] }
 }
 
-/// One transaction on an engine.
-fn run(transaction: Transaction, engine: &Engine, times: &mut Times) -> Commit {
-    let commit = transaction.run_on(engine);
-    times.push(&commit.stages, &engine.figures().choices);
-    commit
-}
-
 /// 512 fields of 32x32x32, all of them dirty: made, and then dug all over again.
 fn bulk(engines: &Engines, are_rough: bool) {
     let level = Level::new();
@@ -168,16 +211,16 @@ fn bulk(engines: &Engines, are_rough: bool) {
     for round in 0..12 {
         let mut hashes = Vec::new();
         let mut wholes = [[0.0; 2]; 2];
-        let mut contenders = [(0, &engines.cpu, &mut cpu), (1, &engines.cuda, &mut cuda)];
+        let mut contenders = [(Who::Cpu, &mut cpu), (Who::Cuda, &mut cuda)];
         contenders.rotate_left(round % 2);
-        for (who, engine, times) in contenders {
+        for (who, times) in contenders {
             let mut terrain = level.terrain();
             for (pass, times) in times.iter_mut().enumerate() {
                 level.brushes(pass, are_rough).for_each(|brush| terrain.submit(&brush));
                 let mut discarded = Times::default();
                 let transaction = terrain.begin().expect("brushes wait");
-                let commit = run(transaction, engine, if round < 2 { &mut discarded } else { times });
-                wholes[who][pass] = commit.stages.whole.as_secs_f64();
+                let commit = engines.run(transaction, who, if round < 2 { &mut discarded } else { times });
+                wholes[who as usize][pass] = commit.stages.whole.as_secs_f64();
                 vertices = commit.meshes.chunks.iter().map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
                 terrain.commit(commit).expect("nothing else commits");
             }
@@ -209,15 +252,15 @@ fn one_field(engines: &Engines) {
         for round in 0..30 {
             let mut discarded = [(); 3].map(|()| Times::default());
             let kept = if round < 6 { &mut discarded } else { &mut samples };
-            let dig_all = |engine: &Engine, times: &mut Times| {
+            let dig_all = |who: Who, times: &mut Times| {
                 let mut terrain = level::one_field(size, round);
-                run(terrain.begin().expect("a brush waits"), engine, times);
+                engines.run(terrain.begin().expect("a brush waits"), who, times);
             };
             for who in turns(round as usize) {
                 match who {
-                    0 => one.install(|| dig_all(&engines.cpu, &mut kept[0])),
-                    1 => dig_all(&engines.cpu, &mut kept[1]),
-                    _ => dig_all(&engines.cuda, &mut kept[2]),
+                    0 => one.install(|| dig_all(Who::Cpu, &mut kept[0])),
+                    1 => dig_all(Who::Cpu, &mut kept[1]),
+                    _ => dig_all(Who::Cuda, &mut kept[2]),
                 }
             }
         }
@@ -231,19 +274,18 @@ fn one_field(engines: &Engines) {
 fn brush(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     header("radius 4");
     let mut times = [(); 3].map(|()| Times::default());
-    let mut terrain = landscape(32);
+    let mut terrains = [(); 3].map(|()| landscape(32));
     for (round, at) in landscape::Places::new(600).iter().enumerate() {
-        terrain.apply([dig(at, 4.0)]);
-        terrain.submit(&brush(at + Vec3::splat(2.0), 4.0));
-        let transaction = terrain.begin().expect("a brush waits");
         for who in turns(round) {
-            let (mut discarded, (_, engine)) = (Times::default(), engines.named()[who]);
-            run(transaction.clone(), engine, if round < 102 { &mut discarded } else { &mut times[who] });
+            let (mut discarded, terrain) = (Times::default(), &mut terrains[who]);
+            engines.play(terrain, [dig(at, 4.0)], Who::ALL[who], &mut discarded);
+            let kept = if round < 102 { &mut discarded } else { &mut times[who] };
+            engines.play(terrain, [brush(at + Vec3::splat(2.0), 4.0)], Who::ALL[who], kept);
         }
-        terrain.commit(transaction.run()).expect("nothing else commits");
     }
-    for ((who, _), times) in engines.named().into_iter().zip(&times) {
-        times.print(who);
+    assert_same(&terrains);
+    for (who, times) in Who::ALL.into_iter().zip(&times) {
+        times.print(who.name());
     }
 }
 
@@ -258,25 +300,24 @@ fn sweep(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
         let mut times = [(); 3].map(|()| Times::default());
         let mut ratios = Sample::default();
         let mut blocks = 0;
-        let mut terrain = landscape(32);
+        let mut terrains = [(); 3].map(|()| landscape(32));
         let places: Vec<Vec3> = landscape::Places::new(4096).iter().collect();
         for round in 0..30 {
             let radius = if count == 1 { 1.0 } else { 3.0 };
-            let own = places.iter().cycle().skip(round * count).take(count);
-            own.for_each(|&place| terrain.submit(&brush(place + Vec3::splat(round as f32 * 0.1), radius)));
-            let transaction = terrain.begin().expect("brushes wait");
+            let own = || places.iter().cycle().skip(round * count).take(count);
+            let brushes = || own().map(|&place| brush(place + Vec3::splat(round as f32 * 0.1), radius));
             let mut taken = [0.0; 3];
             for who in turns(round) {
-                let (mut discarded, (_, engine)) = (Times::default(), engines.named()[who]);
+                let mut discarded = Times::default();
                 let kept = if round < 6 { &mut discarded } else { &mut times[who] };
-                taken[who] = run(transaction.clone(), engine, kept).stages.whole.as_secs_f64();
+                taken[who] = engines.play(&mut terrains[who], brushes(), Who::ALL[who], kept);
             }
             blocks = engines.auto.figures().choices.back().map_or(blocks, |choice| choice.amount);
             if round >= 6 {
                 ratios.push(taken[2] / taken[0].min(taken[1]));
             }
-            terrain.commit(transaction.run()).expect("nothing else commits");
         }
+        assert_same(&terrains);
         let [cpu, cuda, auto] = times.each_ref().map(|times| times.whole.median() * 1e6);
         let ratio = auto / cpu.min(cuda);
         worst = worst.max(ratio);

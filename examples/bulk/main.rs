@@ -157,12 +157,25 @@ fn time_ground(side: u32, repeats: u16, engine: &Engine) -> (f64, Ground) {
     (median((0..repeats).map(time).collect()), ground)
 }
 
+/// Times the making of ground on all engines.
+fn compare_ground(side: u32, repeats: u16, engines: &[(Backend, Engine); 3]) {
+    let [(cpu, expected), (cuda, found), (auto, other)] =
+        engines.each_ref().map(|(_, engine)| time_ground(side, repeats, engine));
+    assert!(expected == found && expected == other, "all make the same ground");
+    println!(
+        "Ground of {side} x {side} cells from noise: {cpu:.1} ms with Cpu, {cuda:.1} ms with Cuda, {auto:.1} ms with Auto; \
+         hash {:016x} of all",
+        found.hash()
+    );
+}
+
 /// What one engine made of a scene, and how long it took.
 struct Outcome {
     commit: Commit,
     hash: u64,
-    /// The stages that went to the card.
+    /// The stages that went to the card, and those that did not though there was something to do.
     on_card: u64,
+    left: usize,
     /// What was expected of processor and card, in milliseconds: all choices together.
     expected: [f64; 2],
 }
@@ -174,12 +187,25 @@ fn run(transaction: &Transaction, engine: &Engine) -> Outcome {
     let figures = engine.figures();
     let on_card = figures.cuda - before.cuda;
     let fresh = (figures.cuda + figures.cpu - before.cuda - before.cpu) as usize;
-    let estimates = figures.choices.iter().rev().take(fresh).filter_map(|choice| choice.estimate);
+    let choices = || figures.choices.iter().rev().take(fresh);
+    let left = choices().filter(|choice| !choice.is_cuda && choice.amount > 0).count();
+    let estimates = choices().filter_map(|choice| choice.estimate);
     let expected = estimates.fold([0.0; 2], |[cpu, cuda], estimate| {
         [cpu + estimate.cpu.as_secs_f64() * 1e3, cuda + estimate.cuda.as_secs_f64() * 1e3]
     });
     let hash = commit.sample_hash();
-    Outcome { commit, hash, on_card, expected }
+    Outcome { commit, hash, on_card, left, expected }
+}
+
+/// Do both draw the same?
+fn are_same(a: &Commit, b: &Commit) -> bool {
+    let (a, b) = (&a.meshes, &b.meshes);
+    let mut chunks = a.chunks.iter().zip(&b.chunks);
+    let mut tiles = a.tiles.iter().zip(&b.tiles);
+    (a.chunks.len(), a.tiles.len()) == (b.chunks.len(), b.tiles.len())
+        && chunks.all(|((a, own), (b, other))| a == b && own.mesh() == other.mesh())
+        && tiles
+            .all(|((a, own), (b, other))| a == b && own.indices == other.indices && own.rings == other.rings)
 }
 
 fn main() {
@@ -194,16 +220,12 @@ fn main() {
             _ => println!("{backend:?}: the processor, {} threads", rayon::current_num_threads()),
         }
     }
-    let [(_, cpu), (_, cuda), _] = &engines;
-    let side = arguments.ground_side;
-    let [(cpu, expected), (cuda, found)] =
-        [cpu, cuda].map(|engine| time_ground(side, arguments.repeats, engine));
-    assert_eq!(expected, found, "both make the same ground");
-    println!(
-        "\nGround of {side} x {side} cells from noise: {cpu:.1} ms with Cpu, {cuda:.1} ms with Cuda; hash {:016x} of both",
-        found.hash()
-    );
-    drop((expected, found));
+    let has_card = matches!(engines[1].1.state(), EngineState::Cuda(_));
+    println!();
+    for side in [256, 512, 1024, 2048].into_iter().filter(|&side| side < arguments.ground_side) {
+        compare_ground(side, arguments.repeats, &engines);
+    }
+    compare_ground(arguments.ground_side, arguments.repeats, &engines);
     let names = engines.each_ref().map(|(backend, _)| format!("{backend:?}"));
     let [cpu, cuda, auto] = names.each_ref().map(|name| format!("{name:>9}"));
     println!("\n{:<24}{:>9}{:>10}{cpu}{cuda}{auto}   ms, medians", "", "brushes", "vertices");
@@ -216,6 +238,7 @@ fn main() {
         let transaction = terrain.begin().expect("brushes wait");
         let mut times = [const { Vec::new() }; 3];
         let (mut hashes, mut vertices, mut on_card, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
+        let mut first: Option<Commit> = None;
         // The first round warms memory and threads.
         for round in 0..=arguments.repeats {
             // In turns: whoever comes later finds caches warm. Every other round runs backwards, so that nobody always comes
@@ -229,10 +252,23 @@ fn main() {
                 on_card[i] = outcome.on_card;
                 // In the end, of Auto.
                 expected = if i == 2 { outcome.expected } else { expected };
+                let is_card = engines[i].0 == Backend::Cuda && has_card;
+                assert!(
+                    !is_card || outcome.left == 0,
+                    "the processor did the card's work: {:?}",
+                    engine.state()
+                );
                 let meshes = outcome.commit.meshes.chunks.iter();
                 vertices = meshes.map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
                 if round > 0 {
                     times[i].push(outcome.commit.stages.whole);
+                    continue;
+                }
+                match &first {
+                    Some(first) => {
+                        assert!(are_same(first, &outcome.commit), "all engines make the same meshes")
+                    }
+                    None => first = Some(outcome.commit),
                 }
             }
         }

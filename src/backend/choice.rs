@@ -154,6 +154,8 @@ pub(super) struct Costs {
     /// How much longer stages take than was measured: edits, meshing, edits some of which look around; of so little that the
     /// processor does it on one thread, and of more.
     drift: [[[f64; 2]; 2]; 3],
+    /// How many stages of that kind the other backend did since this one did any.
+    idle: [[[u32; 2]; 2]; 3],
     /// Blocks that are meshed anew for each brick that an edit may reach, as it was lately: of few such bricks, of many.
     blocks: [f64; 2],
     /// Such bricks of the transaction at hand.
@@ -170,9 +172,19 @@ const MOST_BLOCKS: f64 = 8.0;
 /// How far one transaction moves what is expected of the next.
 #[cfg(feature = "cuda")]
 const LEARNING: f64 = 0.2;
-/// How fast that is forgotten of the backend that is not used: it is tried again after some twenty stages.
+/// The same, of one by the backend that had not been used for long.
+#[cfg(feature = "cuda")]
+const LEARNING_ANEW: f64 = 0.5;
+/// How fast it is forgotten that a backend took longer than was measured, while it is not used: it is tried again after some
+/// twenty stages.
 #[cfg(feature = "cuda")]
 const FORGETTING: f64 = 0.04;
+/// After how many stages a backend is tried again that is expected to be slower: only what is used is known to be so fast.
+#[cfg(feature = "cuda")]
+const IDLE: u32 = 32;
+/// But not where it is expected to take so many times as long.
+#[cfg(feature = "cuda")]
+const HOPELESS: u32 = 3;
 /// The least and the most that it may come to: a card may have to draw besides, and a game may need the processor.
 #[cfg(feature = "cuda")]
 const DRIFT: [f64; 2] = [1.0 / 16.0, 16.0];
@@ -190,6 +202,7 @@ impl Default for Costs {
             mesh: Default::default(),
             upload: 0.0,
             drift: [[[1.0; 2]; 2]; 3],
+            idle: Default::default(),
             blocks: [BLOCKS; 2],
             edited: 0,
         }
@@ -198,6 +211,20 @@ impl Default for Costs {
 
 #[cfg(feature = "cuda")]
 impl Costs {
+    /// What a stage takes on either backend, and whether it is the card's: the faster one does it, but for a look at the
+    /// other one now and then.
+    pub fn choose(&self, stage: Stage, load: Load) -> (Estimate, bool) {
+        let estimate = match stage {
+            Stage::Edit => self.edit(load),
+            Stage::Mesh => self.mesh(load),
+        };
+        let Estimate { cpu, cuda } = estimate;
+        let is_faster = cuda < cpu;
+        let idle = self.idle[kind(stage, load)][size(load.amount)][usize::from(!is_faster)];
+        let is_turn = idle >= IDLE && cpu.max(cuda) < cpu.min(cuda) * HOPELESS;
+        (estimate, is_faster != is_turn)
+    }
+
     /// The stages of a transaction are chosen one by one. But what is edited on the processor has to be brought to the
     /// card before it is meshed there, and that counts already when edits are chosen.
     pub fn edit(&self, load: Load) -> Estimate {
@@ -253,11 +280,14 @@ impl Costs {
         };
         let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
         let drift = &mut self.drift[kind(stage, load)][size(load.amount)];
+        let idle = &mut self.idle[kind(stage, load)][size(load.amount)];
         if curve.reaches(load.amount) && expected > 0.0 {
             let found = took.as_secs_f64() / expected;
             let found = found.clamp(drift[on] * SURPRISE[0], drift[on] * SURPRISE[1]);
-            drift[on] = (drift[on] + (found - drift[on]) * LEARNING).clamp(DRIFT[0], DRIFT[1]);
-            drift[1 - on] += (1.0 - drift[1 - on]) * FORGETTING;
+            let learning = if idle[on] >= IDLE { LEARNING_ANEW } else { LEARNING };
+            drift[on] = (drift[on] + (found - drift[on]) * learning).clamp(DRIFT[0], DRIFT[1]);
+            drift[1 - on] -= (drift[1 - on] - 1.0).max(0.0) * FORGETTING;
+            (idle[on], idle[1 - on]) = (0, idle[1 - on].saturating_add(1));
         }
     }
 }
@@ -444,5 +474,38 @@ mod tests {
         // And forgotten while the other one is used.
         (0..400).for_each(|_| costs.learn(Stage::Mesh, load, false, Duration::from_micros(50)));
         assert_eq!(expected(&costs), [50, 50]);
+    }
+
+    /// Plays stages that take so many microseconds on either; returns how many of them the card did.
+    fn play(costs: &mut Costs, stage: Stage, truth: [u64; 2], stages: usize) -> usize {
+        let load = Load { amount: 60, ..Load::default() };
+        let mut stage = || {
+            let (_, is_cuda) = costs.choose(stage, load);
+            costs.learn(stage, load, is_cuda, Duration::from_micros(truth[usize::from(is_cuda)]));
+            is_cuda
+        };
+        (0..stages).filter(|_| stage()).count()
+    }
+
+    #[test]
+    fn a_backend_that_is_faster_than_it_was_measured_is_found_out() {
+        // Six hundred beside four hundred and eighty microseconds were measured.
+        let measured = || linear([1, 1], [10, 8]);
+        for stages in [100, 300, 1000] {
+            let mut costs = measured();
+            let card = play(&mut costs, Stage::Mesh, [180, 360], stages);
+            assert!(card < 100 + stages / IDLE as usize + 1, "{card} of {stages}");
+            // And the other way round.
+            let mut costs = linear([1, 1], [8, 10]);
+            let card = play(&mut costs, Stage::Mesh, [360, 180], stages);
+            assert!(stages - card < 100 + stages / IDLE as usize + 1, "{card} of {stages}");
+        }
+        // What is slower indeed costs a stage now and then, and nothing at first.
+        let mut costs = measured();
+        assert_eq!(play(&mut costs, Stage::Mesh, [600, 480], IDLE as usize), IDLE as usize);
+        assert!(play(&mut costs, Stage::Mesh, [600, 480], 330) >= 320);
+        // Or nothing at all, where there is no hope.
+        let mut costs = linear([1, 1], [20, 6]);
+        assert_eq!(play(&mut costs, Stage::Mesh, [1200, 360], 500), 500);
     }
 }

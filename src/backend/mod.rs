@@ -38,7 +38,8 @@ pub enum Backend {
     Auto,
     /// The processor.
     Cpu,
-    /// A CUDA card for all transactions, small ones too, as soon as it is found. Where there is none, the processor.
+    /// A CUDA card for all transactions, small ones too, as soon as it is found and whenever no other terrain uses it. Where
+    /// there is none, the processor.
     Cuda,
 }
 

@@ -10,7 +10,7 @@
 //
 // Kernels: 0 scatter, 1 edit, 2 mesh, 3 heights, 4 careful. At the end of the input it ends. Past each allocation lies
 // memory that nobody may touch. With BURROW_EMULATOR_SHUFFLE set to a number, the threads of a block run in another order
-// after each barrier, which shows where one is missing.
+// after each barrier, and some warps wait while others run on, which shows where a barrier is missing.
 
 #include "emulator.h"
 
@@ -134,15 +134,21 @@ bool meet_block(bool word) {
 
 static uint64_t shuffle_state = 0;
 
-// The order in which fibers take turns.
-static void reorder(int* order) {
+// A number below another one.
+static int any(int below) {
+    shuffle_state = shuffle_state * 6364136223846793005ull + 1442695040888963407ull;
+    return (int)((shuffle_state >> 33) % (unsigned)below);
+}
+
+// The order in which fibers take turns, and which warps do.
+static void reorder(int* order, bool* is_held) {
     if (shuffle_state == 0) return;
     for (int i = THREADS - 1; i > 0; i--) {
-        shuffle_state = shuffle_state * 6364136223846793005ull + 1442695040888963407ull;
-        int other = (int)((shuffle_state >> 33) % (unsigned)(i + 1)), kept = order[i];
+        int other = any(i + 1), kept = order[i];
         order[i] = order[other];
         order[other] = kept;
     }
+    for (int warp = 0; warp < WARPS; warp++) is_held[warp] = any(4) != 0;
 }
 
 static bool all_are(int first, int count, State state) {
@@ -165,6 +171,7 @@ static void run_block(unsigned block) {
     memset(__start_emulator_shared, 0xa5, (size_t)(__stop_emulator_shared - __start_emulator_shared));
 #endif
     int order[THREADS];
+    bool is_held[WARPS] = {};
     for (int i = 0; i < THREADS; i++) {
         Fiber& fiber = fibers[i];
         order[i] = i;
@@ -179,10 +186,10 @@ static void run_block(unsigned block) {
     block_bringing = false;
     while (!all_are(0, THREADS, State::DONE)) {
         bool has_moved = false;
-        reorder(order);
+        reorder(order, is_held);
         for (int number : order) {
             if (fibers[number].state != State::READY) continue;
-            resume(number);
+            if (!is_held[number / LANES]) resume(number);
             has_moved = true;
         }
         for (int warp = 0; warp < WARPS; warp++) {

@@ -1,7 +1,7 @@
 //! A CUDA card, through its driver.
 //!
-//! All of the crate's unsafe code is here, and in `interop` where that is built. Addresses come from the driver and are handed back to it alone; what kernels do
-//! with them is bounded by the capacities they are given.
+//! All of the crate's unsafe code is here, and in `interop` where that is built, but for what tests have (`mapped`). Addresses
+//! come from the driver and are handed back to it alone; what kernels do with them is bounded by the capacities they are given.
 #![allow(unsafe_code)]
 
 use std::ffi::{CString, c_void};

@@ -3,6 +3,7 @@
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::ops::Range;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::device::{Device, Fault, HostMemory, Kernel};
 
@@ -59,7 +60,11 @@ impl Emulator {
         }
         assert!(built.status.success(), "the emulator can be built");
         let path = String::from_utf8(built.stdout).expect("a path");
+        // Each orders threads in a way of its own.
+        static STARTED: AtomicU64 = AtomicU64::new(1);
+        let shuffle = STARTED.fetch_add(1, Ordering::Relaxed).to_string();
         let mut child = Command::new(path.trim())
+            .env("BURROW_EMULATOR_SHUFFLE", shuffle)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

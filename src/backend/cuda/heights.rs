@@ -8,7 +8,7 @@ use super::device::{Device, Fault, HostMemory, Kernel};
 use super::layout::{COLUMNS, HeightsParams};
 use super::mail::Plan;
 use super::session::Session;
-use super::{Cuda, Place, lose, try_lock};
+use super::{Cuda, Place, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
 /// Columns from which on the device is taken to be the faster of both. Estimated, not measured on a card: so many take 16
@@ -39,9 +39,7 @@ impl Cuda {
             let done = catch_unwind(AssertUnwindSafe(|| session.heights(&terms, &mut heights)))
                 .unwrap_or_else(|_| Err(Fault::Failed("panic while it was used".into())));
             if let Err(fault) = done {
-                if !fault.is_passing() {
-                    lose(&mut place, &self.state, &fault);
-                }
+                self.meet(&mut place, &fault);
                 return None;
             }
             heights
@@ -257,7 +255,7 @@ mod tests {
             let cuda = Cuda::open_with(
                 is_auto,
                 Some(64 << 20),
-                super::super::trial::Sizes::few(&[(1, 2.0)]),
+                super::super::trial::Sizes::few(&[(1, 2.0)], None),
                 || Ok(device),
             );
             while cuda.state() == crate::backend::EngineState::Opening {

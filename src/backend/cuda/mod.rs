@@ -50,13 +50,14 @@ mod mapped;
 mod tests;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 use std::time::Duration;
 
 use web_time::Instant;
 
 use super::choice::{Costs, Load};
-use super::{Choice, EngineState, Stage};
+use super::{Choice, EngineState};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
@@ -73,6 +74,8 @@ pub(super) struct Cuda {
     state: Arc<Mutex<EngineState>>,
     /// How long the trial took, when it is over.
     trial: Arc<OnceLock<Duration>>,
+    /// Was it said that something was too much for the card?
+    has_passed: AtomicBool,
 }
 
 /// Where the session is.
@@ -118,6 +121,7 @@ impl Cuda {
             slot: Arc::new(Mutex::new(Place::Opening)),
             state: Arc::new(Mutex::new(EngineState::Opening)),
             trial: Arc::default(),
+            has_passed: AtomicBool::default(),
         };
         let (slot, state, took) = (Arc::clone(&own.slot), Arc::clone(&own.state), Arc::clone(&own.trial));
         let open = move || {
@@ -137,7 +141,9 @@ impl Cuda {
             match opened {
                 Ok((session, costs)) => {
                     let name = session.name();
-                    *lock(&slot) = Place::Open(Box::new(session), Box::new(costs));
+                    // Nobody may lose it before it is said to be there.
+                    let mut place = lock(&slot);
+                    *place = Place::Open(Box::new(session), Box::new(costs));
                     *lock(&state) = EngineState::Cuda(name);
                 }
                 Err(fault) => lose(&mut lock(&slot), &state, &fault),
@@ -175,20 +181,17 @@ impl Cuda {
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
         let Some(mut place) = try_lock(&self.slot) else { return (None, load) };
         let Place::Open(session, costs) = &mut *place else { return (None, load) };
-        let mut is_slower = |load: Load| {
-            let estimate = match choice.stage {
-                Stage::Edit => costs.edit(load),
-                Stage::Mesh => costs.mesh(load),
-            };
+        let mut is_chosen = |load: Load| {
+            let (estimate, is_chosen) = costs.choose(choice.stage, load);
             (choice.missing, choice.estimate) = (load.missing, Some(estimate));
-            load.amount == 0 || self.is_auto && estimate.cpu <= estimate.cuda
+            load.amount > 0 && (is_chosen || !self.is_auto)
         };
         // Whatever is missing only makes the card slower, so small transactions need not look for it.
-        if is_slower(load) {
+        if !is_chosen(load) {
             return (None, load);
         }
         load.missing = missing(session);
-        if is_slower(load) {
+        if !is_chosen(load) {
             return (None, load);
         }
         // A driver may do anything, and nobody else would finish the transaction.
@@ -204,11 +207,18 @@ impl Cuda {
             Err(fault) => {
                 // What was lost on trying is not the processor's time to be learnt from.
                 choice.estimate = None;
-                if !fault.is_passing() {
-                    lose(&mut place, &self.state, &fault);
-                }
+                self.meet(&mut place, &fault);
                 (None, load)
             }
+        }
+    }
+
+    /// Gives the card up, unless it is fine and only what was asked too much for it; either way with one warning.
+    fn meet(&self, place: &mut Place, fault: &Fault) {
+        if !fault.is_passing() {
+            lose(place, &self.state, fault);
+        } else if !self.has_passed.swap(true, Ordering::Relaxed) {
+            log::warn!("bevy_burrow does without CUDA what is too much for the device: {fault}");
         }
     }
 

@@ -161,7 +161,11 @@ impl Slots {
         if new <= old {
             return Ok(false);
         }
-        let Ok(base) = device.alloc(new * self.record) else { return Ok(false) };
+        let base = match device.alloc(new * self.record) {
+            Ok(base) => base,
+            Err(Fault::Memory(_)) => return Ok(false),
+            Err(fault) => return Err(fault),
+        };
         if old > 0 {
             device.wait()?;
             device.copy(self.base, base, old * self.record)?;

@@ -44,30 +44,59 @@ pub(super) const FULL: Sizes =
 impl Sizes {
     /// To look whether all works.
     #[cfg(test)]
-    pub const fn few(compared: &'static [(i32, f32)]) -> Self {
-        Self { compared, timed: None }
+    pub const fn few(compared: &'static [(i32, f32)], timed: Option<(i32, f32)>) -> Self {
+        Self { compared, timed }
     }
 }
 
 /// Tries a device out and measures it beside the processor.
 ///
 /// # Errors
-/// Where it fails, or differs from the processor in a single bit.
+/// Where it fails, or differs from the processor in a single bit; or has too little memory for the smallest thing that is
+/// compared.
 pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
     compare_heights(session)?;
     let ground = ground()?;
     let none = Bricks::default();
     let (samples, grid) = (SampleView::new(&ground, &none), ChunkGrid::new(32, SIDE, SIDE));
-    let mut costs = Costs::default();
-    for &(count, radius) in sizes.compared {
-        let [smooth, rough] = [false, true].map(|is_rough| edits(&ground, count, radius, is_rough));
-        let work = EditWork::new(samples, grid, &smooth.iter().collect::<Vec<_>>());
+    let mut trial = Trial { session, ground: &ground, samples, grid, costs: Costs::default() };
+    for (number, &(count, radius)) in sizes.compared.iter().enumerate() {
+        match trial.compare(count, radius) {
+            // It may be used for what is no more than that.
+            Err(fault) if fault.is_passing() && number > 0 => return Ok(trial.costs),
+            other => other?,
+        }
+    }
+    if let Some((count, radius)) = sizes.timed {
+        match trial.time(count, radius) {
+            Err(fault) if fault.is_passing() && !sizes.compared.is_empty() => {}
+            other => other?,
+        }
+    }
+    Ok(trial.costs)
+}
+
+/// A trial under way.
+struct Trial<'a> {
+    session: &'a mut Session,
+    ground: &'a Ground,
+    samples: SampleView<'a>,
+    grid: ChunkGrid,
+    costs: Costs,
+}
+
+impl Trial<'_> {
+    /// Compares and times what so many brushes do.
+    fn compare(&mut self, count: i32, radius: f32) -> Result<(), Fault> {
+        let Self { session, ground, samples, grid, costs } = self;
+        let [smooth, rough] = [false, true].map(|is_rough| edits(ground, count, radius, is_rough));
+        let work = EditWork::new(*samples, *grid, &smooth.iter().collect::<Vec<_>>());
         let jobs = work.jobs().len();
         compare_edits(session, &work)?;
         let (times, drafted) = time_edits(session, &work)?;
         enter(&mut costs.edit, jobs, times);
 
-        let work = EditWork::new(samples, grid, &rough.iter().collect::<Vec<_>>());
+        let work = EditWork::new(*samples, *grid, &rough.iter().collect::<Vec<_>>());
         compare_edits(session, &work)?;
         let (times, _) = time_edits(session, &work)?;
         let jobs = work.jobs().len();
@@ -81,32 +110,34 @@ pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
 
         let latest = latest(&drafted);
         let dug = samples.under(&latest);
-        let sculpting = sculpting_edits(&ground, count, radius);
-        let work = EditWork::new(dug, grid, &sculpting.iter().collect::<Vec<_>>());
+        let sculpting = sculpting_edits(ground, count, radius);
+        let work = EditWork::new(dug, *grid, &sculpting.iter().collect::<Vec<_>>());
         compare_edits(session, &work)?;
         enter(&mut costs.careful, work.jobs().len(), time_edits(session, &work)?.0);
 
         let mask = Mask::default();
-        let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid };
-        let blocks = dirty(grid, &drafted);
+        let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid: *grid };
+        let blocks = dirty(*grid, &drafted);
         compare_meshes(session, &view, &blocks)?;
-        time_meshes(session, &mut costs, &view, &blocks, &drafted)?;
+        time_meshes(session, costs, &view, &blocks, &drafted)
     }
-    if let Some((count, radius)) = sizes.timed {
-        let sculpting = sculpting_edits(&ground, count, radius);
-        let work = EditWork::new(samples, grid, &sculpting.iter().collect::<Vec<_>>());
+
+    /// Times what so many brushes do, and compares nothing.
+    fn time(&mut self, count: i32, radius: f32) -> Result<(), Fault> {
+        let Self { session, ground, samples, grid, costs } = self;
+        let sculpting = sculpting_edits(ground, count, radius);
+        let work = EditWork::new(*samples, *grid, &sculpting.iter().collect::<Vec<_>>());
         enter(&mut costs.careful, work.jobs().len(), time_edits(session, &work)?.0);
 
-        let smooth = edits(&ground, count, radius, false);
-        let work = EditWork::new(samples, grid, &smooth.iter().collect::<Vec<_>>());
+        let smooth = edits(ground, count, radius, false);
+        let work = EditWork::new(*samples, *grid, &smooth.iter().collect::<Vec<_>>());
         let (times, drafted) = time_edits(session, &work)?;
         enter(&mut costs.edit, work.jobs().len(), times);
 
         let (mask, latest) = (Mask::default(), latest(&drafted));
-        let view = WorldView { samples: samples.under(&latest), mask: MaskView::new(&mask), grid };
-        time_meshes(session, &mut costs, &view, &dirty(grid, &drafted), &drafted)?;
+        let view = WorldView { samples: samples.under(&latest), mask: MaskView::new(&mask), grid: *grid };
+        time_meshes(session, costs, &view, &dirty(*grid, &drafted), &drafted)
     }
-    Ok(costs)
 }
 
 /// Enters what an amount took on both.

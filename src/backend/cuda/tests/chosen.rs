@@ -1,5 +1,6 @@
 //! Who does a stage: the faster of both, by what is known of them.
 
+use super::faults::logged;
 use super::room::Tight;
 use super::*;
 use crate::backend::choice::{Choice, Costs, Load};
@@ -21,6 +22,7 @@ fn cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
         slot: Arc::new(Mutex::new(place)),
         state: Arc::new(Mutex::new(EngineState::Cuda("tight".into()))),
         trial: Arc::default(),
+        has_passed: AtomicBool::default(),
     }
 }
 
@@ -79,15 +81,21 @@ fn edits_are_chosen_by_what_edits_take() {
 
 #[test]
 fn a_device_is_given_up_for_what_does_not_pass() {
-    for (fault, is_kept) in
-        [(Fault::TooLarge(3), true), (Fault::Memory(9), true), (Fault::Failed("gone".into()), false)]
-    {
+    for (fault, is_kept) in [
+        (Fault::TooLarge(1_234_003), true),
+        (Fault::Memory(1_234_009), true),
+        (Fault::Failed("gone for good".into()), false),
+    ] {
         let own = cuda(true, 20, 10);
-        let mut choice = Choice::of(Stage::Mesh, 10);
-        let work = |_: &mut Session| Err::<(), Fault>(fault.clone());
-        let (done, _) = own.offer(&mut choice, blocks(10), |_| 0, work, |_, done| done);
-        // What was lost on trying is no expectation.
-        assert!(done.is_none() && !choice.is_cuda && choice.estimate.is_none());
+        assert_eq!(logged(&fault.to_string()), 0);
+        for _ in 0..3 {
+            let mut choice = Choice::of(Stage::Mesh, 10);
+            let work = |_: &mut Session| Err::<(), Fault>(fault.clone());
+            let (done, _) = own.offer(&mut choice, blocks(10), |_| 0, work, |_, done| done);
+            // What was lost on trying is no expectation.
+            assert!(done.is_none() && !choice.is_cuda && choice.estimate.is_none());
+            assert_eq!(logged(&fault.to_string()), 1, "one warning, and no other");
+        }
         assert_eq!(matches!(own.state(), EngineState::Cuda(_)), is_kept, "{fault}");
         assert_eq!(offered(&own, Stage::Mesh, blocks(10), 0).0, is_kept, "{fault}");
     }
@@ -116,4 +124,36 @@ fn whoever_comes_while_surfaces_are_drawn_goes_on_without_the_device() {
     let (is_other, _) = own.offer(&mut choice, blocks(10), |_| 0, |_| Ok(()), draw);
     assert_eq!(is_other, Some(false));
     assert!(offered(&own, Stage::Mesh, blocks(10), 0).0);
+}
+
+#[test]
+fn auto_knows_from_its_trial_what_both_take_and_learns_from_what_they_do() {
+    let Some(device) = device() else { return };
+    let (name, sizes) = (device.name(), trial::Sizes::few(&[(1, 2.0), (4, 3.0)], Some((5, 5.0))));
+    let auto = Cuda::open_with(true, Some(64 << 20), sizes, || Ok(device));
+    let slot = Arc::clone(&auto.slot);
+    let engine = Engine::from_cuda(auto);
+    assert_eq!(engine.wait(Duration::from_secs(60)), EngineState::Cuda(name));
+    assert!(!engine.figures().trial.is_zero());
+    let costs = || match &*lock(&slot) {
+        Place::Open(_, costs) => costs.clone(),
+        _ => panic!("the device is there"),
+    };
+    let load = Load { rough: 80, careful: 80, missing: 9, ..blocks(80) };
+    let estimates = |costs: &Costs| [costs.choose(Stage::Edit, load).0, costs.choose(Stage::Mesh, load).0];
+    let before = costs();
+    for curves in [&before.edit, &before.careful, &before.mesh] {
+        // More takes longer, and the largest was measured too.
+        assert!(curves.iter().all(|curve| 0.0 < curve.at(1) && curve.at(40) < curve.at(4000)), "{before:?}");
+    }
+    // Whoever does them, and looks at the other one now and then.
+    for _ in 0..4 {
+        (0..10).for_each(|index| compare(&mut Rng::with_seed(index), index, &engine));
+    }
+    let figures = engine.figures();
+    assert!(figures.cpu > 40, "{figures:?}");
+    assert!(
+        figures.choices.iter().all(|choice| choice.estimate.is_some_and(|estimate| !estimate.cpu.is_zero()))
+    );
+    assert_ne!(estimates(&before), estimates(&costs()), "nothing was learnt");
 }

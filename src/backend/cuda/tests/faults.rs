@@ -1,6 +1,6 @@
 //! Devices that fail when they are told to: nothing is lost.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, Once};
 
 use super::super::device::{Device, Fault, HostMemory, Kernel};
 use super::*;
@@ -97,10 +97,19 @@ impl log::Log for Log {
 
 static LOG: Log = Log(Mutex::new(Vec::new()));
 
+/// How many lines that were logged so far hold something; from the first call on, all are kept.
+pub(super) fn logged(what: &str) -> usize {
+    static KEPT: Once = Once::new();
+    KEPT.call_once(|| {
+        log::set_logger(&LOG).expect("nobody else logs");
+        log::set_max_level(log::LevelFilter::Warn);
+    });
+    lock(&LOG.0).iter().filter(|line| line.contains(what)).count()
+}
+
 #[test]
 fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_lost() {
-    log::set_logger(&LOG).expect("no other test logs");
-    log::set_max_level(log::LevelFilter::Warn);
+    logged("");
     let mut lost = 0;
     for calls in 0..40 {
         let Some(own) = device() else { return };
@@ -112,7 +121,7 @@ fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_l
         let mut rng = Rng::with_seed(u64::from(calls));
         (0..2).for_each(|index| compare(&mut rng, index, &engine));
         let is_lost = matches!(engine.state(), EngineState::Lost(_));
-        let warnings = lock(&LOG.0).iter().filter(|line| line.contains(&name)).count();
+        let warnings = logged(&name);
         assert_eq!(warnings, usize::from(is_lost), "after {calls} calls");
         lost += warnings;
     }

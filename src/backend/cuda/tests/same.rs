@@ -165,7 +165,7 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
     let mut rng = Rng::with_seed(31);
-    for index in 0..worlds::world_count(40) / 2 {
+    for index in 0..worlds::world_count(40).div_ceil(2) {
         let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
         // Many in one place, so that most read what others change.
         let brushes = |rng: &mut Rng| {
@@ -241,7 +241,7 @@ fn new_ground_far_from_all_other_finds_its_material() {
 fn what_is_under_rules_is_that_of_the_processor() {
     let Some(engine) = mapped() else { return };
     let mut rng = Rng::with_seed(32);
-    for index in 0..worlds::world_count(40) / 4 {
+    for index in 0..worlds::world_count(40).div_ceil(4) {
         let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
         let rules = worlds::random_rules(&mut rng, &ground);
         let settings = TerrainSettings { chunk_size, ..Default::default() };
