@@ -59,6 +59,7 @@ setup: ## Install what is missing
 test-model:
 	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example paper
 	cargo test $(WITHOUT_BEVY) --doc
+	cargo test --no-default-features --features interop --lib -- interop::
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::

@@ -17,6 +17,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::surface::tile::{self, Rings};
 use glam::Vec3;
 use landscape::{Places, dig, landscape, one_thread};
+use stages::Played;
 use statistics::{Sample, header, row};
 
 const SECTIONS: [(&str, fn()); 7] = [
@@ -47,62 +48,84 @@ fn main() {
 /// One brush a transaction, by its radius, on ground that nobody touched and beside what is dug already.
 fn by_radius() {
     stages::header("brush");
-    for radius in [2.0, 4.0, 8.0, 16.0] {
-        one_thread(|| {
-            let mut terrain = landscape(32);
-            for (ground, offset) in [("fresh", 0.0), ("dug", 3.0)] {
-                let places = Places::new(200);
-                let digs =
-                    places.iter().map(|at| Brush::dig(Shape::sphere(at + Vec3::splat(offset), radius)));
-                stages::row(&format!("radius {radius}, {ground} ground"), &stages::play(&mut terrain, digs));
+    one_thread(|| {
+        let mut terrains = [2.0, 4.0, 8.0, 16.0].map(|radius| (radius, landscape(32)));
+        for (ground, offset) in [("fresh", 0.0), ("dug", 3.0)] {
+            for (radius, played) in in_turns(&mut terrains, Places::new(200), offset, |&radius| radius) {
+                stages::row(&format!("radius {radius}, {ground} ground"), &played);
             }
-        });
-    }
+        }
+    });
 }
 
 /// The same brushes, by chunk size.
 fn by_chunk_size() {
     stages::header("radius 4, dug ground");
-    for chunk_size in [8, 25, 32, 50, 75, 100, 128] {
-        one_thread(|| {
-            let mut terrain = landscape(chunk_size);
-            for offset in [0.0, 3.0] {
-                let places = Places::new(300);
-                let digs = places.iter().map(|at| Brush::dig(Shape::sphere(at + Vec3::splat(offset), 4.0)));
-                let played = stages::play(&mut terrain, digs);
-                if offset > 0.0 {
-                    stages::row(&format!("chunk size {chunk_size}"), &played);
-                }
-            }
-        });
+    one_thread(|| {
+        let mut terrains = [8, 25, 32, 50, 75, 100, 128].map(|size| (size, landscape(size)));
+        in_turns(&mut terrains, Places::new(300), 0.0, |_| 4.0);
+        for (chunk_size, played) in in_turns(&mut terrains, Places::new(300), 3.0, |_| 4.0) {
+            stages::row(&format!("chunk size {chunk_size}"), &played);
+        }
+    });
+}
+
+/// Digs at each place in all terrains, one after the other, and each time another one first.
+fn in_turns<T: Copy>(
+    terrains: &mut [(T, Terrain)],
+    places: Places,
+    offset: f32,
+    radius: impl Fn(&T) -> f32,
+) -> Vec<(T, Played)> {
+    let mut played: Vec<_> = terrains.iter().map(|&(which, _)| (which, Played::default())).collect();
+    for (turn, place) in places.iter().enumerate() {
+        for at in 0..terrains.len() {
+            let at = (at + turn) % terrains.len();
+            let (which, terrain) = &mut terrains[at];
+            played[at].1.play(terrain, &dig(place + Vec3::splat(offset), radius(which)));
+        }
     }
+    played
 }
 
 /// Many brushes in one transaction: all over the landscape, and all in one place.
 fn by_batch() {
     header("radius 4, by brushes in a transaction", "an edit");
-    for (kind, spread) in [("all over", true), ("in one place", false)] {
-        for count in [1, 10, 100, 1000] {
-            one_thread(|| {
-                let mut each = Sample::default();
-                for round in 0..(2000 / count).clamp(3, 40) {
-                    let mut terrain = landscape(32);
-                    let places = Places::new(count).offset(round);
-                    let center = Places::new(1).offset(round).iter().next().unwrap_or_default();
-                    for (i, place) in (0..).zip(places.iter()) {
-                        let near =
-                            Vec3::new((i * 7 % 13) as f32, (i * 5 % 7) as f32, (i * 3 % 11) as f32) * 0.3;
-                        terrain.submit(&dig(if spread { place } else { center + near }, 4.0));
-                    }
-                    let start = Instant::now();
-                    let commit = terrain.begin().map(|transaction| transaction.run());
-                    each.push(start.elapsed().as_secs_f64() / count as f64);
-                    assert!(commit.is_some_and(|commit| !commit.meshes.chunks.is_empty()));
-                }
-                row(&format!("{count} {kind}"), &each);
-            });
+    let kinds = [("all over", true), ("in one place", false)];
+    let cases = kinds.into_iter().flat_map(|kind| [1, 10, 100, 1000].map(|count| (kind, count)));
+    let mut all: Vec<_> = cases.map(|case| (case, Sample::default())).collect();
+    one_thread(|| {
+        for round in 0..30 {
+            for (((_, is_spread), count), each) in &mut all {
+                let mut terrain = landscape(32);
+                submit(&mut terrain, *count, round, *is_spread);
+                each.push(run(&mut terrain) / *count as f64);
+            }
         }
+    });
+    for (((kind, _), count), each) in &all {
+        row(&format!("{count} {kind}"), each);
     }
+}
+
+/// Submits digs of radius 4.
+pub fn submit(terrain: &mut Terrain, count: usize, round: usize, is_spread: bool) {
+    let places = Places::new(count).offset(round);
+    let center = Places::new(1).offset(round).iter().next().unwrap_or_default();
+    for (i, place) in (0..).zip(places.iter()) {
+        let near = Vec3::new((i * 7 % 13) as f32, (i * 5 % 7) as f32, (i * 3 % 11) as f32) * 0.3;
+        terrain.submit(&dig(if is_spread { place } else { center + near }, 4.0));
+    }
+}
+
+/// How many seconds a transaction takes.
+pub fn run(terrain: &mut Terrain) -> f64 {
+    let transaction = terrain.begin().expect("brushes wait");
+    let start = Instant::now();
+    let commit = transaction.run();
+    let took = start.elapsed().as_secs_f64();
+    assert!(!commit.meshes.chunks.is_empty());
+    took
 }
 
 /// Hiding the heightmap: the list of indices of a tile, by its size.

@@ -14,15 +14,6 @@ pub struct Played {
     pub commits: Sample,
 }
 
-/// Plays brushes, a transaction each.
-pub fn play(terrain: &mut Terrain, brushes: impl IntoIterator<Item = Brush>) -> Played {
-    let mut played = Played::default();
-    for brush in brushes {
-        played.play(terrain, &brush);
-    }
-    played
-}
-
 impl Played {
     /// Plays one more brush; returns what it changed.
     pub fn play(&mut self, terrain: &mut Terrain, brush: &Brush) -> Applied {
@@ -43,12 +34,12 @@ impl Played {
 
 /// Heads the lines that [`row`] prints.
 pub fn header(what: &str) {
-    let names = ["whole", "p99", "edit", "meshing", "assembly", "ring", "commit"];
+    let names = ["whole", "p99", "edit", "meshing", "assembly", "ring", "commit", "a second"];
     let names: String = names.iter().map(|name| format!("{name:>9}")).collect();
-    println!("  {what:<64}{names}   us, medians but for p99");
+    println!("  {what:<64}{names}   us, medians but for p99; edits one after the other");
 }
 
-/// One line: the whole transaction, its stages, and the commit.
+/// One line: the whole transaction, its stages, the commit, and how many are done in a second.
 pub fn row(what: &str, played: &Played) {
     let whole = played.stage(|stages| stages.whole);
     let stages: [fn(&Stages) -> Duration; 4] =
@@ -58,5 +49,6 @@ pub fn row(what: &str, played: &Played) {
         .chain(stages.map(|stage| played.stage(stage).median()))
         .chain([played.commits.median()]);
     let figures: String = figures.map(|seconds| format!("{:>9.1}", seconds * 1e6)).collect();
-    println!("  {what:<64}{figures}");
+    let a_second = 1.0 / (whole.mean() + played.commits.mean());
+    println!("  {what:<64}{figures}{a_second:>9.0}");
 }

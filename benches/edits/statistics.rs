@@ -20,6 +20,10 @@ impl Sample {
         self.percentile(0.5)
     }
 
+    pub fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
     pub fn len(&self) -> usize {
         self.0.len()
     }

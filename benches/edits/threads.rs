@@ -1,20 +1,36 @@
-//! One transaction of 64 dirty chunks on one, two and all threads, in turns. Beside it, what the machine itself gives: as
-//! many such transactions at once, each on a thread and a terrain of its own.
+//! Transactions on one, two and all threads, in turns: one of 64 dirty chunks, and batches of small digs. Beside them, what
+//! the machine itself gives: as many transactions at once, each on a thread and a terrain of its own.
 
-use std::time::Instant;
+use std::sync::Barrier;
 
 use bevy_burrow::lattice::Column;
+use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::Stages;
 use glam::Vec3;
+use rayon::ThreadPool;
 
 use crate::landscape::{dig, ground, landscape, threads};
-use crate::statistics::Sample;
+use crate::statistics::{Sample, header, row};
+use crate::{run, submit};
 
 pub fn section() {
     let all = std::thread::available_parallelism().map_or(2, std::num::NonZero::get);
     let mut counts = vec![1, 2, all];
     counts.dedup();
-    let pools: Vec<_> = counts.iter().map(|&count| threads(count)).collect();
+    let pools: Vec<_> = counts.iter().map(|&count| (count, threads(count))).collect();
+    many_chunks(&pools);
+    for &count in &counts[1..] {
+        println!("  {count:>3} at once, a thread each: {:.2} times as many as one", at_once(count));
+    }
+    batches(&pools);
+}
+
+/// Whose turn it is: everybody's in each round, and each time another one's first.
+fn turns(round: usize, count: usize) -> impl Iterator<Item = usize> {
+    (0..count).map(move |at| (at + round) % count)
+}
+
+fn many_chunks(pools: &[(usize, ThreadPool)]) {
     let mut times = vec![Sample::default(); pools.len()];
     let mut ratios = vec![Sample::default(); pools.len()];
     let mut stages = vec![[(); 4].map(|()| Sample::default()); pools.len()];
@@ -25,7 +41,8 @@ pub fn section() {
             transaction(round);
             transaction(round)
         };
-        let runs: Vec<Stages> = pools.iter().map(|pool| pool.install(third)).collect();
+        let mut runs = vec![Stages::default(); pools.len()];
+        turns(round, pools.len()).for_each(|at| runs[at] = pools[at].1.install(third));
         for (i, run) in runs.iter().enumerate() {
             times[i].push(run.whole.as_secs_f64());
             ratios[i].push(runs[0].whole.as_secs_f64() / run.whole.as_secs_f64());
@@ -34,7 +51,7 @@ pub fn section() {
             }
         }
     }
-    for (i, count) in counts.iter().enumerate() {
+    for (i, (count, _)) in pools.iter().enumerate() {
         let (time, ratio) = (times[i].median() * 1e6, ratios[i].median());
         let [edit, meshing, assembly, ring] = stages[i].each_ref().map(|stage| stage.median() * 1e6);
         println!(
@@ -42,39 +59,69 @@ pub fn section() {
              meshing {meshing:.0}, assembly {assembly:.0}, ring {ring:.0})"
         );
     }
-    for &count in &counts[1..] {
-        println!("  {count:>3} at once, a thread each: {:.2} times as many as one", at_once(count));
+}
+
+/// How many times as many transactions are done in a time, if several threads work for themselves: medians of pairs of
+/// transactions that begin at the same moment.
+fn at_once(count: usize) -> f64 {
+    let pools: Vec<_> = (0..count).map(|_| threads(1)).collect();
+    let busy = |pools: &[ThreadPool], round: usize| {
+        let start = Barrier::new(pools.len());
+        let third = || {
+            transaction(round);
+            transaction(round);
+            let mut terrain = ready(round);
+            start.wait();
+            run(&mut terrain)
+        };
+        std::thread::scope(|scope| {
+            let threads: Vec<_> = pools.iter().map(|pool| scope.spawn(|| pool.install(third))).collect();
+            let times = threads.into_iter().map(|thread| thread.join().expect("no transaction panics"));
+            times.fold(0.0, f64::max)
+        })
+    };
+    let ratio = |round: usize| {
+        let mut times = [0.0; 2];
+        turns(round, 2).for_each(|at| times[at] = busy(&pools[..[1, count][at]], round));
+        count as f64 * times[0] / times[1]
+    };
+    (0..40).map(ratio).collect::<Sample>().median()
+}
+
+/// Small digs all over the landscape, by how many there are in a transaction.
+fn batches(pools: &[(usize, ThreadPool)]) {
+    header("radius 4 all over, by brushes in a transaction", "an edit");
+    for count in [10, 100, 1000] {
+        let mut times = vec![Sample::default(); pools.len()];
+        for round in 0..20 {
+            for at in turns(round, pools.len()) {
+                let took = pools[at].1.install(|| {
+                    let mut terrain = landscape(32);
+                    submit(&mut terrain, count, round, true);
+                    run(&mut terrain)
+                });
+                times[at].push(took / count as f64);
+            }
+        }
+        for ((threads, _), times) in pools.iter().zip(&times) {
+            row(&format!("{count} on {threads} threads"), times);
+        }
     }
 }
 
-/// How many times as many transactions are done in a time, if several threads work for themselves.
-fn at_once(count: usize) -> f64 {
-    let busy = |threads_at_once: usize| {
-        let start = Instant::now();
-        std::thread::scope(|scope| {
-            for _ in 0..threads_at_once {
-                scope.spawn(|| {
-                    threads(1).install(|| {
-                        (0..20).map(transaction).for_each(|stages| assert!(!stages.whole.is_zero()))
-                    })
-                });
-            }
-        });
-        start.elapsed().as_secs_f64()
-    };
-    let ratios: Sample = (0..5).map(|_| count as f64 * busy(1) / busy(count)).collect();
-    ratios.median()
-}
-
-/// A transaction that digs in each of 8x8 chunks.
-fn transaction(round: i32) -> Stages {
-    let mut terrain = landscape(32);
+/// Digs in each of 8x8 chunks.
+fn ready(round: usize) -> Terrain {
+    let (mut terrain, round) = (landscape(32), round as i32);
     for i in 0..64 {
         let (x, z) = (round % 20 * 32 + i % 8 * 32 + 16, round % 17 * 32 + i / 8 * 32 + 16);
         let height = ground().height(Column::new(x, z)) as f32 / 256.0;
         terrain.submit(&dig(Vec3::new(x as f32, height, z as f32), 7.0));
     }
-    let commit = terrain.begin().expect("brushes wait").run();
+    terrain
+}
+
+fn transaction(round: usize) -> Stages {
+    let commit = ready(round).begin().expect("brushes wait").run();
     assert!(commit.meshes.chunks.len() >= 64);
     commit.stages
 }

@@ -9,8 +9,9 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::contender::{Contender, Part, Shading};
-use crate::fields::{Border, Field};
-use crate::topology::Topology;
+use crate::fields::{Border, Field, Grid};
+use crate::timing::CHUNK_CELLS;
+use crate::topology::{Topology, open_inside};
 
 /// What one contender made of a closed grid.
 #[derive(Debug, Serialize)]
@@ -84,6 +85,36 @@ pub fn closed_grid(contenders: &mut [Box<dyn Contender>], field: Field, size: us
         findings.push(Finding { field, size, name, topology, remarks, fatal });
     }
     findings
+}
+
+/// Meshes a chunk of a stream; says what is wrong. Ours must have the same triangles, whatever they read, and marching cubes
+/// no open edge but on the chunk's faces.
+pub fn chunk(contenders: &mut [Box<dyn Contender>], chunk: &Grid) -> Vec<String> {
+    let (mut remarks, mut expected) = (Vec::new(), None);
+    for contender in contenders {
+        let (name, class) = (contender.name(), contender.class());
+        contender.load(chunk);
+        contender.mesh(chunk, Part::WithinApron);
+        let (mesh, triangles) = (contender.result(), contender.triangles());
+        if mesh.indices.len() != triangles * 3 {
+            remarks.push(format!("{name}: {triangles} triangles, {} indices", mesh.indices.len()));
+        }
+        if class.dual {
+            continue;
+        }
+        match open_inside(&mesh, class.sharing, [1.0, (CHUNK_CELLS + 1) as f32]) {
+            Ok(0) => {}
+            Ok(open) => remarks.push(format!("{name}: {open} open edges inside the chunk")),
+            Err(error) => remarks.push(format!("{name}: {error}")),
+        }
+        if *expected.get_or_insert(triangles) != triangles {
+            remarks.push(format!("{name}: {triangles} triangles, not {expected:?}"));
+        }
+        if !mesh.normals.iter().all(|&normal| is_unit(normal)) {
+            remarks.push(format!("{name}: normals that are not of unit length"));
+        }
+    }
+    remarks
 }
 
 fn is_unit([x, y, z]: [f32; 3]) -> bool {

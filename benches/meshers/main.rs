@@ -1,7 +1,7 @@
 //! Dense meshing beside public crates: `cargo bench --no-default-features --bench meshers`.
 //!
-//! The same grids, in one process, on one thread, in turns: see [`timing`]. Every mesh is checked before any is timed:
-//! see [`check`]. First single grids again and again, which flatters everybody's branch predictor; then a stream of
+//! The same grids, in one process, on one thread, in turns: see [`timing`]. Before any is timed, the same fields are meshed
+//! as closed grids, and as the first chunks of the streams, and the meshes are checked: see [`check`]. First single grids again and again, which flatters everybody's branch predictor; then a stream of
 //! chunks that all differ, as a game meshes them. Ratios are paired: round by round, or chunk by chunk.
 //!
 //! | module | subject |
@@ -107,7 +107,8 @@ fn run(args: &Args) -> std::io::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let findings = check_all(args);
-    if findings.iter().any(|finding| finding.fatal) {
+    let are_chunks_right = check_streams(args);
+    if findings.iter().any(|finding| finding.fatal) || !are_chunks_right {
         eprintln!("meshers: meshes are wrong, or not of the same surface; nothing is timed");
         return Ok(ExitCode::FAILURE);
     }
@@ -135,6 +136,22 @@ fn check_all(args: &Args) -> Vec<Finding> {
         }
     }
     all
+}
+
+/// Chunks of each stream that are checked.
+const CHECKED: usize = 20;
+
+fn check_streams(args: &Args) -> bool {
+    let mut is_right = true;
+    for &field in &args.fields {
+        let chunks = timing::chunks(field, CHECKED);
+        let remarks = |chunk| check::chunk(&mut contender::of_streams(), chunk);
+        let remarks: Vec<String> = chunks.iter().flat_map(remarks).collect();
+        println!("  {:<8} {CHECKED} chunks of the stream: {} faults", field.name(), remarks.len());
+        remarks.iter().for_each(|remark| println!("      WRONG {remark}"));
+        is_right &= remarks.is_empty();
+    }
+    is_right
 }
 
 fn time_grids(args: &Args) -> Vec<Row> {

@@ -106,8 +106,9 @@ pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Pa
     times
 }
 
-/// Many chunks, each once: a round per chunk. Its samples are read before every call, as they would have been by whoever
-/// made the chunk, so that nobody pays for the memory that another has fetched.
+/// Many chunks, each once by everybody: times are in the order of chunks. In a round, everybody gets another chunk, so that
+/// nobody meshes what a relative's branches have just learnt. A chunk's samples are read before every call, as they would
+/// have been by whoever made it, so that nobody pays for the memory that another has fetched.
 pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Times> {
     let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
     // Buffers grow and tables are made before the clock runs.
@@ -117,13 +118,16 @@ pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Tim
             contender.mesh(chunk, Part::WithinApron);
         }
     }
-    for (round, chunk) in chunks.iter().enumerate() {
+    let (count, apart) = (chunks.len(), chunks.len() / contenders.len());
+    times.iter_mut().for_each(|times| times.rounds.resize(count, 0.0));
+    for round in 0..count {
         for turn in turns(contenders.len(), round) {
-            let contender = &mut *contenders[turn];
+            let (contender, number) = (&mut *contenders[turn], (round + turn * apart) % count);
+            let chunk = &chunks[number];
             contender.load(chunk);
             black_box(chunk.samples.iter().sum::<f32>());
             black_box(chunk.fixed.iter().map(|&sample| i64::from(sample)).sum::<i64>());
-            times[turn].rounds.push(once(contender, chunk, Part::WithinApron));
+            times[turn].rounds[number] = once(contender, chunk, Part::WithinApron);
             times[turn].triangles += contender.triangles();
         }
     }

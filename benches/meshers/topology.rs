@@ -53,17 +53,7 @@ pub enum TopologyError {
 impl Topology {
     /// Of a mesh. Vertices that are not shared are welded when they lie on the same edge of the lattice.
     pub fn of(mesh: &Mesh, sharing: Sharing) -> Result<Self, TopologyError> {
-        let written = mesh.positions.len();
-        if let Some(&index) = mesh.indices.iter().find(|&&index| index as usize >= written) {
-            return Err(TopologyError::Index { index, vertices: written });
-        }
-        let number = match sharing {
-            Sharing::Shared => (0..written).collect(),
-            Sharing::Partly | Sharing::Soup => weld(&mesh.positions)?,
-        };
-        let corners =
-            mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|index| number[index as usize]));
-        let triangles: Vec<[usize; 3]> = corners.collect();
+        let (written, triangles) = (mesh.positions.len(), welded(mesh, sharing)?);
         let mut pieces = Pieces::new(written);
         // Runs along an edge, from low to high and back.
         let mut runs: HashMap<(usize, usize), [u32; 2]> = HashMap::new();
@@ -95,6 +85,37 @@ impl Topology {
     pub fn genus(&self) -> i64 {
         self.components as i64 - self.euler / 2
     }
+}
+
+/// Edges of a chunk's mesh that some triangle runs along more often than others run back, but for those on a face of the
+/// chunk, where its neighbours go on: it reaches from one coordinate to another along each axis.
+pub fn open_inside(mesh: &Mesh, sharing: Sharing, faces: [f32; 2]) -> Result<usize, TopologyError> {
+    let mut runs: HashMap<(usize, usize), i32> = HashMap::new();
+    for [a, b, c] in welded(mesh, sharing)? {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            *runs.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
+        }
+    }
+    let is_on_face = |(a, b): (usize, usize)| {
+        let (a, b) = (mesh.positions[a], mesh.positions[b]);
+        (0..3).any(|axis| faces.contains(&a[axis]) && a[axis] == b[axis])
+    };
+    Ok(runs.into_iter().filter(|&(edge, more)| more != 0 && !is_on_face(edge)).count())
+}
+
+/// The corners of all triangles. Vertices that are not shared are those on the same edge of the lattice.
+fn welded(mesh: &Mesh, sharing: Sharing) -> Result<Vec<[usize; 3]>, TopologyError> {
+    let written = mesh.positions.len();
+    if let Some(&index) = mesh.indices.iter().find(|&&index| index as usize >= written) {
+        return Err(TopologyError::Index { index, vertices: written });
+    }
+    let number = match sharing {
+        Sharing::Shared => (0..written).collect(),
+        Sharing::Partly | Sharing::Soup => weld(&mesh.positions)?,
+    };
+    let corners =
+        mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|index| number[index as usize]));
+    Ok(corners.collect())
 }
 
 /// Six times the volume that a mesh encloses.
