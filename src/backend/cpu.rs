@@ -49,7 +49,7 @@ impl Compute for Cpu {
                 keep(parts);
                 copy
             };
-            let parts: Vec<Parts> = groups(blocks).par_iter().map(copy).collect();
+            let parts: Vec<Parts> = groups(blocks).par_iter().with_max_len(1).map(copy).collect();
             then(&PartLists::new(&parts));
             // Freeing many lists takes its time.
             parts.into_par_iter().for_each(drop);

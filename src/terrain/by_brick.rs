@@ -92,7 +92,7 @@ impl ByBrick {
             work(piece, &mut found);
             found
         };
-        pieces.par_iter().map(of_piece).collect::<Vec<_>>().concat()
+        pieces.par_iter().with_max_len(1).map(of_piece).collect::<Vec<_>>().concat()
     }
 }
 

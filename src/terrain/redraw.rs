@@ -121,7 +121,7 @@ fn assemble(
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh))?)))
     };
     if blocks.len() >= PARALLEL_PARTS {
-        chunks.par_iter().filter_map(update).collect()
+        chunks.par_iter().with_max_len(1).filter_map(update).collect()
     } else {
         chunks.iter().filter_map(update).collect()
     }

@@ -57,7 +57,7 @@ pub(super) fn jobs(tools: &[Tool]) -> Vec<Job> {
         sort(&mut jobs);
         jobs
     };
-    slabs.par_iter().map(of_slab).collect::<Vec<_>>().concat()
+    slabs.par_iter().with_max_len(1).map(of_slab).collect::<Vec<_>>().concat()
 }
 
 /// Those of one brick stay in their order.
