@@ -165,7 +165,11 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
         let indices = tile::indices(view.grid, tile, &borders, &rings);
         (tile, TileUpdate { indices, rings, tile, ground: Arc::clone(&world.ground), grid: view.grid })
     };
-    if tiles.len() < 8 { tiles.iter().map(update).collect() } else { tiles.par_iter().with_max_len(1).map(update).collect() }
+    if tiles.len() < 8 {
+        tiles.iter().map(update).collect()
+    } else {
+        tiles.par_iter().with_max_len(1).map(update).collect()
+    }
 }
 
 /// The tiles that draw some of the 8x8 cells of a word.

@@ -148,7 +148,8 @@ impl<'a> EditWork<'a> {
             match &pieces(batch, group, Job::is_same_brick)[..] {
                 [own] => each(work(own)),
                 groups => {
-                    let ledgers: Vec<Ledger> = groups.par_iter().with_max_len(1).map(|jobs| work(jobs)).collect();
+                    let ledgers: Vec<Ledger> =
+                        groups.par_iter().with_max_len(1).map(|jobs| work(jobs)).collect();
                     ledgers.into_iter().for_each(&mut each);
                 }
             }
