@@ -3,6 +3,7 @@
 #
 #   tools/instructions.sh            fails where a count grew by more than 3 %, and says what shrank
 #   tools/instructions.sh --update   writes the counts as the new baseline
+#   tools/instructions.sh --profile NAME   shows where one workload spends them: functions, with what they call
 #
 # Counts depend on the compiler and the C library: the baseline names those it was made with, and under others they are
 # shown but nothing fails. What the library would choose by the processor at hand it does not choose here. Where valgrind
@@ -13,12 +14,13 @@ cd "$(dirname "$0")/.."
 
 baseline=benches/instructions.txt
 allowed_percent=3
-update=false
-case ${1:-} in
-    '') ;;
-    --update) update=true ;;
+update=false profile=
+case "$#:${1:-}" in
+    0:) ;;
+    1:--update) update=true ;;
+    2:--profile) profile=$2 ;;
     *)
-        echo "usage: tools/instructions.sh [--update]" >&2
+        echo "usage: tools/instructions.sh [--update | --profile NAME]" >&2
         exit 2
         ;;
 esac
@@ -47,10 +49,25 @@ bench=$(cargo bench --no-default-features --features cuda --bench instructions -
 counts=$(mktemp)
 trap 'rm -f "$counts"' EXIT
 
+# callgrind NAME FILE: does a workload, and leaves in the file what each function did.
+callgrind() {
+    GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512VL,-AVX512F,-AVX2,-AVX,-ERMS,-FSRM \
+        valgrind --tool=callgrind --toggle-collect='*counted_workload*' --callgrind-out-file="$2" "$bench" "$1" 2>&1
+}
+
+if [ -n "$profile" ]; then
+    if ! "$bench" | grep -qxF "$profile"; then
+        echo "there is no workload $profile" >&2
+        exit 2
+    fi
+    callgrind "$profile" "$counts" >/dev/null
+    callgrind_annotate --inclusive=yes "$counts" | sed -n 's/ \[[^]]*\]$//; /%).*bevy_burrow/s/???://p' | head -n 40
+    exit 0
+fi
+
 # count NAME: the workload's name and its instructions.
 count() {
-    GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512VL,-AVX512F,-AVX2,-AVX,-ERMS,-FSRM \
-        valgrind --tool=callgrind --toggle-collect='*counted_workload*' --callgrind-out-file=/dev/null "$bench" "$1" 2>&1 |
+    callgrind "$1" /dev/null |
         awk -v name="$1" '/Collected :/ { count = $NF } { last = $0 }
             END { if (!count) { print name ": " last > "/dev/stderr"; exit 1 } print name, count }'
 }
