@@ -7,8 +7,7 @@
 #
 # Counts depend on the compiler and the C library: the baseline names those it was made with, and under others they are
 # shown but nothing fails. What the library would choose by the processor at hand it does not choose here. Where valgrind
-# can't be had, nothing is counted and nothing fails. With BURROW_REQUIRE set, both are failures: nobody looks at the lines
-# of a gate that judged nothing.
+# can't be had, nothing is counted and nothing fails, unless BURROW_REQUIRE is set.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -29,17 +28,10 @@ PATH="$HOME/.cargo/bin:$PATH"
 CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$HOME/.cache/bevy_burrow/target}
 export PATH CARGO_TARGET_DIR
 tools/setup.sh instructions || true
-# Ends with an error where somebody relies on a verdict.
-no_verdict() {
-    if [ -n "${BURROW_REQUIRE:-}" ]; then
-        echo "BURROW_REQUIRE is set, but $1" >&2
-        exit 1
-    fi
-    echo "$1"
-}
 if ! command -v valgrind >/dev/null 2>&1; then
-    no_verdict 'valgrind is not installed: instructions are not counted'
-    exit 0
+    echo 'valgrind is not installed: instructions are not counted'
+    [ -z "${BURROW_REQUIRE:-}" ]
+    exit
 fi
 
 cargo bench --no-default-features --features cuda --bench instructions --no-run
@@ -47,7 +39,7 @@ cargo bench --no-default-features --features cuda --bench instructions --no-run
 bench=$(cargo bench --no-default-features --features cuda --bench instructions --no-run --message-format=json 2>/dev/null |
     sed -n 's/.*"name":"instructions".*"executable":"\([^"]*\)".*/\1/p')
 counts=$(mktemp)
-trap 'rm -f "$counts"' EXIT
+trap 'rm -f "$counts" "$counts.log"' EXIT
 
 # callgrind NAME FILE: does a workload, and leaves in the file what each function did.
 callgrind() {
@@ -60,7 +52,7 @@ if [ -n "$profile" ]; then
         echo "there is no workload $profile" >&2
         exit 2
     fi
-    callgrind "$profile" "$counts" >/dev/null
+    callgrind "$profile" "$counts" >"$counts.log" || { cat "$counts.log" >&2; exit 1; }
     callgrind_annotate --inclusive=yes "$counts" | sed -n 's/ \[[^]]*\]$//; /%).*bevy_burrow/s/???://p' | head -n 40
     exit 0
 fi
@@ -88,7 +80,7 @@ fi
 fatal=1
 if ! grep -qxF "$compiler" "$baseline"; then
     printf '%s\n%s\n' "$(head -n 1 "$baseline")" "$compiler"
-    no_verdict 'another compiler or C library than those of the baseline, so nothing fails; --update makes a new one'
+    echo 'SKIPPED: another compiler or C library than those of the baseline, so nothing fails; --update makes a new one'
     fatal=0
 fi
 awk -v fatal="$fatal" -v allowed="$allowed_percent" '

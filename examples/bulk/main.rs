@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Commit, Transaction};
+use bevy_burrow::terrain::Commit;
 use clap::Parser;
 use fastrand::Rng;
 use glam::{Quat, Vec2, Vec3};
@@ -180,10 +180,11 @@ struct Outcome {
     expected: [f64; 2],
 }
 
-/// Runs a transaction, which stays as it is.
-fn run(transaction: &Transaction, engine: &Engine) -> Outcome {
+/// Runs what waits, which goes on waiting. Nobody else holds the world meanwhile: it would be copied.
+fn run(terrain: &mut Terrain, engine: &Engine) -> Outcome {
     let before = engine.figures();
-    let commit = transaction.clone().run_on(engine);
+    let commit = terrain.begin().expect("brushes wait").run_on(engine);
+    terrain.abandon();
     let figures = engine.figures();
     let on_card = figures.cuda - before.cuda;
     let fresh = (figures.cuda + figures.cpu - before.cuda - before.cpu) as usize;
@@ -235,7 +236,6 @@ fn main() {
             Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
         terrain.apply((scene.before)(&ground, &mut Rng::with_seed(2)));
         brushes.iter().for_each(|brush| terrain.submit(brush));
-        let transaction = terrain.begin().expect("brushes wait");
         let mut times = [const { Vec::new() }; 3];
         let (mut hashes, mut vertices, mut on_card, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
         let mut first: Option<Commit> = None;
@@ -247,7 +247,7 @@ fn main() {
                 let turn = if round.is_multiple_of(2) { turn } else { engines.len() - 1 - turn };
                 let i = (turn + usize::from(round) / 2) % engines.len();
                 let engine = &engines[i].1;
-                let outcome = run(&transaction, engine);
+                let outcome = run(&mut terrain, engine);
                 hashes.push(outcome.hash);
                 on_card[i] = outcome.on_card;
                 // In the end, of Auto.

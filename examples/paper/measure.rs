@@ -191,7 +191,8 @@ pub fn measure(
     for &subject in &subjects {
         // Of full fields, only what they take in memory is asked.
         let times = if matches!(subject, Subject::Full(_)) { 1 } else { setup.repeats };
-        let alone: Vec<Alone> = (0..times).map_while(|_| Alone::apart(subject, &setup)).collect();
+        let alone: Option<Vec<Alone>> = (0..times).map(|_| Alone::apart(subject, &setup)).collect();
+        let alone = alone.unwrap_or_default();
         for measured in measured.iter_mut().filter(|measured| measured.subject == subject) {
             measured.alone = alone.iter().map(|alone| alone.of(measured.run).clone()).collect();
         }

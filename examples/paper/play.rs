@@ -61,7 +61,7 @@ pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Resu
     }
     // Where there is nothing to do, nothing is sent to a card.
     match runner.left_over() - left_before {
-        left if left <= (played.unchanged + played.undrawn) as u64 => Ok(played),
+        left if left <= played.undrawn as u64 => Ok(played),
         left => Err(PaperError::LeftTheCard(left)),
     }
 }

@@ -32,8 +32,8 @@ pub struct Choice {
     pub stage: Stage,
     /// Bricks that edits may reach, or blocks to be meshed.
     pub amount: usize,
-    /// Bricks and stacks of the ground that the card does not have yet, roughly; 0 where the card would be slower even
-    /// if it had them all.
+    /// Bricks and stacks of the ground that the card does not have yet, roughly; 0 where nobody looked, as it was the
+    /// processor's even if the card had them all.
     pub missing: usize,
     /// What was expected, for edits with the meshing that follows; `None` where the card is not there, busy, or
     /// could not do it.
@@ -156,6 +156,8 @@ pub(super) struct Costs {
     drift: [[[f64; 2]; 2]; 3],
     /// How many stages of that kind the other backend did since this one did any.
     idle: [[[u32; 2]; 2]; 3],
+    /// How many times in a row a backend that came back to such stages was the slower one still.
+    in_vain: [[u32; 2]; 3],
     /// Blocks that are meshed anew for each brick that an edit may reach, as it was lately: of few such bricks, of many.
     blocks: [f64; 2],
     /// Such bricks of the transaction at hand.
@@ -172,19 +174,22 @@ const MOST_BLOCKS: f64 = 8.0;
 /// How far one transaction moves what is expected of the next.
 #[cfg(feature = "cuda")]
 const LEARNING: f64 = 0.2;
-/// The same, of one by the backend that had not been used for long.
-#[cfg(feature = "cuda")]
-const LEARNING_ANEW: f64 = 0.5;
 /// How fast it is forgotten that a backend took longer than was measured, while it is not used: it is tried again after some
 /// twenty stages.
 #[cfg(feature = "cuda")]
 const FORGETTING: f64 = 0.04;
-/// After how many stages a backend is tried again that is expected to be slower: only what is used is known to be so fast.
+/// After how many stages a backend is looked at again that is expected to be slower: only what is used is known to be so fast.
 #[cfg(feature = "cuda")]
 const IDLE: u32 = 32;
 /// But not where it is expected to take so many times as long.
 #[cfg(feature = "cuda")]
 const HOPELESS: u32 = 3;
+/// After how many stages a backend that is used again has come back, and the other one was not just looked at.
+#[cfg(feature = "cuda")]
+const AWAY: u32 = 4;
+/// How often both last twice as long where a backend came back in vain.
+#[cfg(feature = "cuda")]
+const PATIENCE: u32 = 5;
 /// The least and the most that it may come to: a card may have to draw besides, and a game may need the processor.
 #[cfg(feature = "cuda")]
 const DRIFT: [f64; 2] = [1.0 / 16.0, 16.0];
@@ -203,6 +208,7 @@ impl Default for Costs {
             upload: 0.0,
             drift: [[[1.0; 2]; 2]; 3],
             idle: Default::default(),
+            in_vain: Default::default(),
             blocks: [BLOCKS; 2],
             edited: 0,
         }
@@ -220,9 +226,21 @@ impl Costs {
         };
         let Estimate { cpu, cuda } = estimate;
         let is_faster = cuda < cpu;
-        let idle = self.idle[kind(stage, load)][size(load.amount)][usize::from(!is_faster)];
-        let is_turn = idle >= IDLE && cpu.max(cuda) < cpu.min(cuda) * HOPELESS;
+        let is_turn = self.has_waited(stage, load, !is_faster) && cpu.max(cuda) < cpu.min(cuda) * HOPELESS;
         (estimate, is_faster != is_turn)
+    }
+
+    /// Has a backend not been used for so long that it is worth a look?
+    fn has_waited(&self, stage: Stage, load: Load, is_cuda: bool) -> bool {
+        let (kind, size) = (kind(stage, load), size(load.amount));
+        self.idle[kind][size][usize::from(is_cuda)] >= IDLE << self.in_vain[kind][size]
+    }
+
+    /// Takes in that the card could not do a stage.
+    pub fn fail(&mut self, stage: Stage, load: Load) {
+        let (kind, size) = (kind(stage, load), size(load.amount));
+        self.idle[kind][size][1] = 0;
+        self.in_vain[kind][size] = (self.in_vain[kind][size] + 1).min(PATIENCE);
     }
 
     /// The stages of a transaction are chosen one by one. But what is edited on the processor has to be brought to the
@@ -273,21 +291,32 @@ impl Costs {
                 }
             }
         }
-        let on = usize::from(is_cuda);
+        let (on, is_look) = (usize::from(is_cuda), self.has_waited(stage, load, is_cuda));
+        let (kind, size) = (kind(stage, load), size(load.amount));
+        let is_back = self.idle[kind][size][on] >= AWAY;
+        (self.idle[kind][size][on], self.idle[kind][size][1 - on]) =
+            (0, self.idle[kind][size][1 - on].saturating_add(1));
         let (curve, expected) = match stage {
-            Stage::Edit => (&self.edit[on], self.edits(load, on)),
-            Stage::Mesh => (&self.mesh[on], self.mesh[on].at(load.amount)),
+            Stage::Edit => (&self.edit[on], [0, 1].map(|on| self.edits(load, on))),
+            Stage::Mesh => (&self.mesh[on], [0, 1].map(|on| self.mesh[on].at(load.amount))),
         };
-        let expected = expected + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
-        let drift = &mut self.drift[kind(stage, load)][size(load.amount)];
-        let idle = &mut self.idle[kind(stage, load)][size(load.amount)];
-        if curve.reaches(load.amount) && expected > 0.0 {
-            let found = took.as_secs_f64() / expected;
+        let own = expected[on] + if is_cuda { self.upload * load.missing as f64 } else { 0.0 };
+        if !curve.reaches(load.amount) || own <= 0.0 {
+            return;
+        }
+        let (drift, in_vain) = (&mut self.drift[kind][size], &mut self.in_vain[kind][size]);
+        let found = took.as_secs_f64() / own;
+        // What nobody has seen for long is news; else, one that had to wait says little of the next.
+        drift[on] = if is_look {
+            found.clamp(DRIFT[0], DRIFT[1])
+        } else {
             let found = found.clamp(drift[on] * SURPRISE[0], drift[on] * SURPRISE[1]);
-            let learning = if idle[on] >= IDLE { LEARNING_ANEW } else { LEARNING };
-            drift[on] = (drift[on] + (found - drift[on]) * learning).clamp(DRIFT[0], DRIFT[1]);
-            drift[1 - on] -= (drift[1 - on] - 1.0).max(0.0) * FORGETTING;
-            (idle[on], idle[1 - on]) = (0, idle[1 - on].saturating_add(1));
+            (drift[on] + (found - drift[on]) * LEARNING).clamp(DRIFT[0], DRIFT[1])
+        };
+        drift[1 - on] -= (drift[1 - on] - 1.0).max(0.0) * FORGETTING / f64::from(1 << *in_vain);
+        if is_back {
+            let is_slower = expected[on] * drift[on] > expected[1 - on] * drift[1 - on];
+            *in_vain = if is_slower { (*in_vain + 1).min(PATIENCE) } else { 0 };
         }
     }
 }
@@ -476,36 +505,67 @@ mod tests {
         assert_eq!(expected(&costs), [50, 50]);
     }
 
-    /// Plays stages that take so many microseconds on either; returns how many of them the card did.
-    fn play(costs: &mut Costs, stage: Stage, truth: [u64; 2], stages: usize) -> usize {
+    /// Plays meshing of sixty blocks that takes so many microseconds on either; returns how many of all stages the card did,
+    /// and how many times as long all of them took as on the faster one.
+    fn play(costs: &mut Costs, truth: [u64; 2], stages: usize) -> (usize, f64) {
         let load = Load { amount: 60, ..Load::default() };
-        let mut stage = || {
-            let (_, is_cuda) = costs.choose(stage, load);
-            costs.learn(stage, load, is_cuda, Duration::from_micros(truth[usize::from(is_cuda)]));
-            is_cuda
-        };
-        (0..stages).filter(|_| stage()).count()
+        let (mut card, mut took) = (0, 0);
+        for _ in 0..stages {
+            let (_, is_cuda) = costs.choose(Stage::Mesh, load);
+            let time = truth[usize::from(is_cuda)];
+            costs.learn(Stage::Mesh, load, is_cuda, Duration::from_micros(time));
+            (card, took) = (card + usize::from(is_cuda), took + time);
+        }
+        (card, took as f64 / (truth[0].min(truth[1]) * stages as u64) as f64)
     }
 
     #[test]
     fn a_backend_that_is_faster_than_it_was_measured_is_found_out() {
-        // Six hundred beside four hundred and eighty microseconds were measured.
-        let measured = || linear([1, 1], [10, 8]);
+        // Six hundred beside four hundred and eighty microseconds were measured; the other way round for the other one.
         for stages in [100, 300, 1000] {
-            let mut costs = measured();
-            let card = play(&mut costs, Stage::Mesh, [180, 360], stages);
-            assert!(card < 100 + stages / IDLE as usize + 1, "{card} of {stages}");
-            // And the other way round.
-            let mut costs = linear([1, 1], [8, 10]);
-            let card = play(&mut costs, Stage::Mesh, [360, 180], stages);
-            assert!(stages - card < 100 + stages / IDLE as usize + 1, "{card} of {stages}");
+            let (card, took) = play(&mut linear([1, 1], [10, 8]), [180, 360], stages);
+            assert!(card < 50 && took < 1.5, "{card} of {stages}: {took}");
+            let (card, took) = play(&mut linear([1, 1], [8, 10]), [360, 180], stages);
+            assert!(stages - card < 50 && took < 1.5, "{card} of {stages}: {took}");
         }
-        // What is slower indeed costs a stage now and then, and nothing at first.
-        let mut costs = measured();
-        assert_eq!(play(&mut costs, Stage::Mesh, [600, 480], IDLE as usize), IDLE as usize);
-        assert!(play(&mut costs, Stage::Mesh, [600, 480], 330) >= 320);
-        // Or nothing at all, where there is no hope.
-        let mut costs = linear([1, 1], [20, 6]);
-        assert_eq!(play(&mut costs, Stage::Mesh, [1200, 360], 500), 500);
+        // Nothing is looked at soon, nor where there is no hope.
+        let load = IDLE as usize;
+        assert_eq!(play(&mut linear([1, 1], [10, 8]), [600, 480], load), (load, 1.0));
+        assert_eq!(play(&mut linear([1, 1], [20, 6]), [1200, 360], 500), (500, 1.0));
+    }
+
+    #[test]
+    fn a_backend_that_is_slower_is_looked_at_less_and_less() {
+        // The processor takes sixty microseconds. Of the card, what was measured, its truth, and the most that all stages may take.
+        for (measured, truth, most) in [
+            (90, 90, 1.01),
+            (90, 300, 1.02),
+            (90, 900, 1.06),
+            (170, 170, 1.01),
+            (30, 600, 1.15),
+            (30, 1800, 1.4),
+        ] {
+            let mut costs = Costs::default();
+            for (on, time) in [(0, 60), (1, measured)] {
+                costs.mesh[on].push(60, Duration::from_micros(time));
+            }
+            let (card, took) = play(&mut costs, [60, truth], 5000);
+            assert!(took <= most && card < 100, "{measured}, {truth}: {card}, {took}");
+        }
+    }
+
+    #[test]
+    fn what_the_card_can_not_do_is_no_reason_to_look_again_at_once() {
+        let (mut costs, load) = (linear([1, 1], [8, 10]), Load { amount: 60, ..Load::default() });
+        let mut failed = 0;
+        for _ in 0..1000 {
+            if costs.choose(Stage::Mesh, load).1 {
+                costs.fail(Stage::Mesh, load);
+                failed += 1;
+            } else {
+                costs.learn(Stage::Mesh, load, false, Duration::from_micros(480));
+            }
+        }
+        assert!((1..8).contains(&failed), "{failed}");
     }
 }

@@ -32,8 +32,8 @@ use crate::volume::{EditWork, Ledger};
 /// What an [`Engine`] may run on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Backend {
-    /// Whichever is faster, by measurement, for each transaction. Until a card is found and measured, and where there is
-    /// none, the processor.
+    /// Whichever is faster, by measurement, for each stage of a transaction; now and then the other one, to see what it takes
+    /// by now. Until a card is found and measured, and where there is none, the processor.
     #[default]
     Auto,
     /// The processor.

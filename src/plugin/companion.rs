@@ -50,7 +50,8 @@ pub type Attachment = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 ///
 /// A companion is asked in the task that also makes the meshes, off the main thread, whenever a terrain loads and
 /// whenever a transaction changes a surface. What it hands back is done to the tile's or chunk's entity in the commit, in
-/// one frame with the meshes or not at all. That holds on a server without meshes too.
+/// one frame with the meshes or not at all. That holds on a server without meshes too. Where there are many parts, several
+/// threads of rayon's ask at once: a companion that uses rayon itself should hold no lock meanwhile.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -72,14 +72,7 @@ pub(crate) struct TileDraft<'a> {
     pub indices: Cow<'a, Indices>,
 }
 
-impl TileDraft<'_> {
-    fn mesh(&self) -> SurfaceMesh {
-        let vertices = tile::vertices(self.ground, self.grid, self.tile, self.rings);
-        SurfaceMesh { vertices, indices: self.indices.clone().into_owned() }
-    }
-}
-
-impl SurfaceDraft<'_> {
+impl<'a> SurfaceDraft<'a> {
     /// Is nothing drawn?
     pub fn is_empty(&self) -> bool {
         match self {
@@ -89,10 +82,13 @@ impl SurfaceDraft<'_> {
     }
 
     /// The whole surface.
-    pub fn surface(&self) -> Cow<'_, SurfaceMesh> {
+    pub fn surface(self) -> Cow<'a, SurfaceMesh> {
         match self {
-            Self::Mesh(mesh) => Cow::Borrowed(mesh),
-            Self::Tile(draft) => Cow::Owned(draft.mesh()),
+            Self::Mesh(mesh) => mesh,
+            Self::Tile(TileDraft { tile, grid, ground, rings, indices }) => Cow::Owned(SurfaceMesh {
+                vertices: tile::vertices(ground, grid, tile, rings),
+                indices: indices.into_owned(),
+            }),
         }
     }
 }

@@ -153,8 +153,8 @@ pub fn medians(measurements: &Measurements) -> Table {
         }
     }
     table.note = "The last three columns are processor time, which leaves out what else the machine did meanwhile; the last \
-                  two take each edit with its median over the repeats. \"Alone\": in processes that play one test each, where \
-                  nothing was allocated before."
+                  two take each edit with its median over the repeats. \"Alone\": in processes that play one test each, one \
+                  for each repeat, where nothing was allocated before; n/a where none could be started."
         .into();
     table
 }

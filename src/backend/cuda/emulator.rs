@@ -60,9 +60,11 @@ impl Emulator {
         }
         assert!(built.status.success(), "the emulator can be built");
         let path = String::from_utf8(built.stdout).expect("a path");
-        // Each orders threads in a way of its own.
+        // Each orders threads in a way of its own, which can be had again.
         static STARTED: AtomicU64 = AtomicU64::new(1);
-        let shuffle = STARTED.fetch_add(1, Ordering::Relaxed).to_string();
+        let fresh = || STARTED.fetch_add(1, Ordering::Relaxed).to_string();
+        let shuffle = std::env::var("BURROW_EMULATOR_SHUFFLE").unwrap_or_else(|_| fresh());
+        println!("BURROW_EMULATOR_SHUFFLE={shuffle}");
         let mut child = Command::new(path.trim())
             .env("BURROW_EMULATOR_SHUFFLE", shuffle)
             .stdin(Stdio::piped())

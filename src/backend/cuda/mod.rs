@@ -207,6 +207,7 @@ impl Cuda {
             Err(fault) => {
                 // What was lost on trying is not the processor's time to be learnt from.
                 choice.estimate = None;
+                costs.fail(choice.stage, load);
                 self.meet(&mut place, &fault);
                 (None, load)
             }
