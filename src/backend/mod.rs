@@ -12,6 +12,8 @@
 //! ```
 
 mod choice;
+#[cfg(feature = "cuda")]
+mod costs;
 mod cpu;
 #[cfg(feature = "cuda")]
 mod cuda;

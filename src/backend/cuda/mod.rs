@@ -56,7 +56,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::choice::{Costs, Load};
+use super::costs::{Costs, Load};
 use super::{Choice, EngineState};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;

@@ -10,7 +10,7 @@ use web_time::Instant;
 
 use super::device::Fault;
 use super::session::Session;
-use crate::backend::choice::{Costs, Curve};
+use crate::backend::costs::{Costs, Curve};
 use crate::backend::{Compute, Cpu};
 use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
 use crate::ground::{GreyImage, Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};

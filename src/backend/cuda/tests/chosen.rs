@@ -3,8 +3,8 @@
 use super::faults::logged;
 use super::room::Tight;
 use super::*;
-use crate::backend::choice::{Choice, Costs, Load};
-use crate::backend::{Estimate, Stage};
+use crate::backend::costs::{Costs, Load};
+use crate::backend::{Choice, Estimate, Stage};
 
 /// A device that is open and needs no card, with what both take for ten blocks.
 fn cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
