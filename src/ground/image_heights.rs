@@ -147,7 +147,7 @@ fn extended(place: i64, count: u32, value: impl Fn(u32) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ground::ImageLimits;
+    use crate::ground::{ImageLimits, MAX_OCTAVES, MAX_SCALE};
     use crate::lattice::{Column, ONE};
     use proptest::prelude::*;
 
@@ -222,9 +222,17 @@ mod tests {
             }
         }
 
+        /// With detail, about two in five are all in range where the step is small; without, three in four.
         #[test]
         fn any_scale_makes_ground_or_an_error(
-            image in image(2, 3), step: u32, low: f64, high: f64, amplitude: f64, scale: f64, octaves: u32, seed: u32,
+            image in image(2, 3),
+            step: u32,
+            low in prop_oneof![3 => -900.0..900.0, 1 => any::<f64>()],
+            high in prop_oneof![3 => -900.0..900.0, 1 => any::<f64>()],
+            amplitude in prop_oneof![3 => -9.0..9.0, 1 => any::<f64>()],
+            scale in prop_oneof![3 => 1.0..MAX_SCALE, 1 => any::<f64>()],
+            octaves in prop_oneof![3 => 1..=MAX_OCTAVES, 1 => any::<u32>()],
+            seed: u32,
         ) {
             let detail = Some(Detail { amplitude, scale, octaves, seed });
             for voxels_per_sample in [step, step % 65] {

@@ -1,5 +1,7 @@
 //! Brushes and settings of any numbers.
 
+use std::cell::Cell;
+
 use bevy_burrow::lattice::LIMIT;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::TerrainError;
@@ -103,32 +105,6 @@ proptest! {
     }
 
     #[test]
-    fn any_json_is_an_edit_or_an_error(numbers in prop::array::uniform8(any::<i32>()), small: bool, shape in 0..5usize) {
-        let [a, b, c, d, e, f, g, seed] = if small { numbers.map(|n| n % 4000) } else { numbers };
-        let shape = match shape {
-            0 => format!(r#"{{"sphere":{{"center":[{a},{b},{c}],"radius":{d}}}}}"#),
-            1 => format!(
-                r#"{{"cuboid":{{"center":[{a},{b},{c}],"half":[{d},{e},{f}],"rotation":[{},{},{},{}]}}}}"#,
-                a as i16, b as i16, c as i16, d as i16
-            ),
-            2 => format!(r#"{{"cylinder":{{"base":[{a},{b},{c}],"axis":[{d},{e},{f}],"radius":{g}}}}}"#),
-            3 => format!(r#"{{"capsule":{{"from":[{a},{b},{c}],"to":[{d},{e},{f}],"radius":{g}}}}}"#),
-            _ => format!(r#"{{"cone":{{"base":[{a},{b},{c}],"axis":[{d},{e},{f}],"radius":{g}}}}}"#),
-        };
-        let roughness = if seed % 2 == 0 { "null".into() } else {
-            format!(r#"{{"amplitude":{},"scale":{},"seed":{}}}"#, g % 3000, f, seed.unsigned_abs())
-        };
-        let json = format!(r#"{{"shape":{shape},"operation":"dig","roughness":{roughness},"tag":9}}"#);
-        let Ok(edit) = serde_json::from_str::<Edit>(&json) else { return Ok(()) };
-        prop_assert!(edit.check().is_ok());
-        let mut terrain = small_terrain();
-        terrain.submit_edit(&edit);
-        let receipts = terrain.begin().map(|transaction| transaction.run()).map(|commit| terrain.commit(commit));
-        prop_assert!(matches!(receipts, Some(Ok(ref receipts)) if receipts.len() == 1 && receipts[0].tag == 9));
-        prop_assert!(terrain.world().check_seams().is_flawless(), "{}", json);
-    }
-
-    #[test]
     fn any_settings_make_a_terrain_or_an_error(chunk_size in prop_oneof![0u32..200, any::<u32>()], bits: u32, power in -5i32..6, plain: bool) {
         let voxel_size = if plain { 2f32.powi(power) } else { f32::from_bits(bits) };
         let ground = Ground::flat(5, 5, 1.0).expect("finite heights");
@@ -147,6 +123,50 @@ proptest! {
             Err(other) => prop_assert!(false, "{}", other),
         }
     }
+}
+
+/// Lengths and places in 1/256 voxel, and a seed, as they stand in JSON: any numbers, small ones, or such as make sense.
+fn units() -> impl Strategy<Value = [i32; 8]> {
+    let sensible = (prop::array::uniform3(-4000i32..4000), prop::array::uniform5(64i32..4000));
+    prop_oneof![
+        1 => any::<[i32; 8]>(),
+        1 => prop::array::uniform8(-4000i32..4000),
+        2 => sensible.prop_map(|([a, b, c], [d, e, f, g, seed])| [a, b, c, d, e, f, g, seed]),
+    ]
+}
+
+#[test]
+fn any_json_is_an_edit_or_an_error() {
+    let accepted: [Cell<u32>; 5] = Default::default();
+    let config = ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() };
+    proptest!(config, |(numbers in units(), is_turned in any::<bool>(), number in 0..5usize)| {
+        let [a, b, c, d, e, f, g, seed] = numbers;
+        let rotation = if is_turned { [a, b, c, d].map(|part| part as i16) } else { [0, 0, 0, 32_767] };
+        let shape = match number {
+            0 => format!(r#"{{"sphere":{{"center":[{a},{b},{c}],"radius":{d}}}}}"#),
+            1 => format!(
+                r#"{{"cuboid":{{"center":[{a},{b},{c}],"half":[{d},{e},{f}],"rotation":{rotation:?}}}}}"#
+            ),
+            2 => format!(r#"{{"cylinder":{{"base":[{a},{b},{c}],"axis":[{d},{e},{f}],"radius":{g}}}}}"#),
+            3 => format!(r#"{{"capsule":{{"from":[{a},{b},{c}],"to":[{d},{e},{f}],"radius":{g}}}}}"#),
+            _ => format!(r#"{{"cone":{{"base":[{a},{b},{c}],"axis":[{d},{e},{f}],"radius":{g}}}}}"#),
+        };
+        let roughness = match seed % 2 {
+            0 => "null".to_string(),
+            _ => format!(r#"{{"amplitude":{},"scale":{f},"seed":{}}}"#, g % 3000, seed.unsigned_abs()),
+        };
+        let json = format!(r#"{{"shape":{shape},"operation":"dig","roughness":{roughness},"tag":9}}"#);
+        let Ok(edit) = serde_json::from_str::<Edit>(&json) else { return Ok(()) };
+        accepted[number].set(accepted[number].get() + 1);
+        prop_assert!(edit.check().is_ok());
+        let mut terrain = small_terrain();
+        terrain.submit_edit(&edit);
+        let receipts = terrain.begin().map(|transaction| transaction.run()).map(|commit| terrain.commit(commit));
+        prop_assert!(matches!(receipts, Some(Ok(ref receipts)) if receipts.len() == 1 && receipts[0].tag == 9));
+        prop_assert!(terrain.world().check_seams().is_flawless(), "{}", json);
+    });
+    // Of some eighty of each shape, half have numbers that make sense; of the boxes among them, half are not turned.
+    assert!(accepted.iter().all(|count| count.get() > 0), "{accepted:?}");
 }
 
 #[test]

@@ -10,7 +10,8 @@ use crate::worlds::{any_random_brush, random_ground, random_sculpting_brush, wor
 
 #[test]
 fn nothing_changes_outside_the_shape() {
-    for seed in 0..world_count(60) {
+    let (worlds, mut changed) = (world_count(60), 0);
+    for seed in 0..worlds {
         let mut rng = Rng::with_seed(seed);
         let (ground, chunk_size) = random_ground(&mut rng, seed);
         let brushes: Vec<Brush> = (0..4).map(|_| any_random_brush(&mut rng, &ground)).collect();
@@ -21,6 +22,7 @@ fn nothing_changes_outside_the_shape() {
         terrain.apply(&brushes);
         let before = terrain.snapshot();
         terrain.apply([&brush]);
+        changed += u64::from(terrain.world().hash() != before.hash());
         let evaluator = edit.evaluator();
         for point in edit.reach().grown(2).points() {
             let (old, new) = (before.samples(), terrain.world().samples());
@@ -32,6 +34,7 @@ fn nothing_changes_outside_the_shape() {
             assert!(is_kept, "world {seed} at {point}: edited without a change");
         }
     }
+    assert!(changed * 5 > worlds, "{changed} of {worlds} brushes changed something");
 }
 
 #[test]
@@ -61,14 +64,15 @@ fn new_ground_is_what_lies_below_or_beside_it_or_what_it_is_told() {
 
 #[test]
 fn receipts_of_sculpting_count_what_changed() {
+    let mut sums = (0, 0);
     for seed in 0..40 {
         let mut rng = Rng::with_seed(seed);
         let (ground, chunk_size) = random_ground(&mut rng, seed);
         let mut terrain =
             Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid");
         for _ in 0..4 {
-            let brush = any_random_brush(&mut rng, terrain.world().ground());
-            let Ok(edit) = Edit::quantize(&brush) else { continue };
+            let brush = random_sculpting_brush(&mut rng, terrain.world().ground());
+            let Ok(edit) = Edit::quantize(&brush) else { panic!("{brush:?}") };
             let before = terrain.snapshot();
             let receipts = terrain.apply([&brush]);
             let Ok(applied) = &receipts[0].outcome else { continue };
@@ -86,8 +90,10 @@ fn receipts_of_sculpting_count_what_changed() {
                 (added, removed),
                 "{seed}: {brush:?}"
             );
+            sums = (sums.0 + added, sums.1 + removed);
         }
     }
+    assert!(sums.0 > 200 && sums.1 > 200, "{sums:?} voxels were added and removed");
 }
 
 #[test]
