@@ -35,7 +35,8 @@ impl MaterialMix {
         }
     }
 
-    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves.
+    /// The mix at `step` of [`SNAP`] steps from `a` to `b`, in integers. Equal ends give themselves; where nothing has any
+    /// weight, it is `a`.
     pub fn lerp(a: Self, b: Self, step: i32) -> Self {
         if a == b {
             return a;
@@ -57,6 +58,7 @@ impl MaterialMix {
         let parts = &mut parts[..count];
         parts.sort_unstable_by_key(|&(id, weight)| (-weight, id));
         let kept = &parts[..count.min(4)];
+        let Some(&(heaviest, _)) = kept.first() else { return a };
         let total: i32 = kept.iter().map(|part| part.1).sum::<i32>().max(1);
         let mut result = Self::default();
         let mut rest = 255;
@@ -65,7 +67,7 @@ impl MaterialMix {
             result.weights[slot] = (weight * 255 / total) as u8;
             rest -= weight * 255 / total;
         }
-        (result.ids[0], result.weights[0]) = (kept[0].0, rest as u8);
+        (result.ids[0], result.weights[0]) = (heaviest, rest as u8);
         result
     }
 }
@@ -143,6 +145,15 @@ mod tests {
             let mix = MaterialMix::lerp(a, b, step);
             prop_assert_eq!(mix.weights.iter().map(|&w| u32::from(w)).sum::<u32>(), 255);
             prop_assert_eq!(MaterialMix::lerp(a, a, step), a);
+        }
+    }
+
+    #[test]
+    fn a_mix_without_weight_is_its_first_end() {
+        let (none, other) = (MaterialMix::default(), MaterialMix { ids: [1, 0, 0, 0], weights: [0; 4] });
+        for step in [0, 1, SNAP] {
+            assert_eq!(MaterialMix::lerp(none, other, step), none);
+            assert_eq!(MaterialMix::lerp(other, none, step), other);
         }
     }
 }

@@ -66,7 +66,7 @@ impl Change {
 }
 
 /// Bytes of bricks that a world holds and that a change takes away from it. Bricks that are all alike count nothing: the
-/// world keeps one of each kind in any case.
+/// world keeps the one of their kind for as long as history has it.
 pub(super) fn replaced_bytes(world: &World, bricks: impl Iterator<Item = BrickPos>) -> usize {
     let replaced = bricks.filter_map(|pos| world.bricks.get(&pos));
     replaced.filter(|brick| brick.uniform().is_none()).map(|brick| shared_bytes(brick)).sum()

@@ -18,6 +18,7 @@ use crate::surface::tile::Rings;
 use crate::volume::UniformBricks;
 
 /// The result of a transaction: only what changed.
+#[must_use = "nothing has changed before `Terrain::commit` takes it"]
 pub struct Commit {
     pub(super) ticket: u64,
     pub(super) change: Change,
@@ -104,7 +105,7 @@ impl Commit {
     /// Makes this the world.
     pub(super) fn install(mut self, world: &mut World) -> Installed {
         self.change.swap(world);
-        world.uniform.extend(self.uniform);
+        world.enter_kinds(self.uniform);
         for (chunk, surface) in self.surfaces {
             if surface.is_empty() {
                 world.surfaces.remove(&chunk);

@@ -31,12 +31,15 @@ pub(super) struct FieldLog<'a> {
     world: &'a World,
     pub fields: BTreeMap<ChunkPos, Fields>,
     merged: Vec<(ChunkPos, FieldNews)>,
+    /// Where those of each chunk stand among them.
+    merged_in: BTreeMap<ChunkPos, Vec<usize>>,
     pub next: u64,
 }
 
 impl<'a> FieldLog<'a> {
     pub fn new(world: &'a World) -> Self {
-        Self { world, fields: BTreeMap::new(), merged: Vec::new(), next: world.next_field }
+        let (fields, merged_in) = (BTreeMap::new(), BTreeMap::new());
+        Self { world, fields, merged: Vec::new(), merged_in, next: world.next_field }
     }
 
     /// Enters what an edit changed; returns what its receipt says.
@@ -63,17 +66,21 @@ impl<'a> FieldLog<'a> {
         });
         let existed = |id| committed.is_some_and(|fields| fields.get(id).is_some());
         let into = absorbed.field;
-        // What went into a field that goes now as well is in the last one.
-        let merged = if absorbed.gone.is_empty() { &mut [] } else { self.merged.as_mut_slice() };
-        for (_, news) in merged.iter_mut().filter(|(at, _)| *at == chunk) {
-            if let FieldNews::Merged { into: earlier, .. } = news
-                && absorbed.gone.contains(earlier)
-            {
-                *earlier = into;
+        if !absorbed.gone.is_empty() {
+            let own = self.merged_in.entry(chunk).or_default();
+            // What went into a field that goes now as well is in the last one.
+            for &at in &*own {
+                if let (_, FieldNews::Merged { into: earlier, .. }) = &mut self.merged[at]
+                    && absorbed.gone.contains(earlier)
+                {
+                    *earlier = into;
+                }
             }
+            let gone = absorbed.gone.iter().filter(|&&id| existed(id));
+            let before = self.merged.len();
+            self.merged.extend(gone.map(|&gone| (chunk, FieldNews::Merged { gone, into })));
+            own.extend(before..self.merged.len());
         }
-        let gone = absorbed.gone.iter().filter(|&&id| existed(id));
-        self.merged.extend(gone.map(|&gone| (chunk, FieldNews::Merged { gone, into })));
         ChunkScenario { chunk, scenario: absorbed.scenario, field: absorbed.field }
     }
 

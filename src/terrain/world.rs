@@ -15,6 +15,9 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
 use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
+/// While there are fewer kinds of bricks that are all alike, none is let go of.
+const FEW_KINDS: usize = 64;
+
 /// Something that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Drawn {
@@ -70,6 +73,8 @@ pub struct World {
     /// Of tiles that bordered on the mask when they were last drawn; some may have none.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
+    /// How many kinds there will be when those are looked for that nobody holds.
+    many_kinds: usize,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,
     /// Tells worlds of one process apart.
@@ -117,6 +122,7 @@ impl World {
             surfaces: FxHashMap::default(),
             rings: FxHashMap::default(),
             uniform: UniformBricks::default(),
+            many_kinds: FEW_KINDS,
             sample_hash: 0,
             next_field: 0,
             lineage: super::unique(),
@@ -232,6 +238,17 @@ impl World {
         soup.check(self.grid)
     }
 
+    /// Takes in kinds of bricks that are all alike. Once there are twice as many as were left the last time, those go that
+    /// nobody else holds: neither a brick of this world, nor its history, nor another world.
+    pub(super) fn enter_kinds(&mut self, kinds: UniformBricks) {
+        self.uniform.extend(kinds);
+        if self.uniform.len() >= self.many_kinds {
+            self.uniform.retain(|_, brick| Arc::strong_count(brick) > 1);
+            give_back(&mut self.uniform);
+            self.many_kinds = FEW_KINDS.max(2 * self.uniform.len());
+        }
+    }
+
     /// Gives back what the index held of bricks, fields and surfaces that are gone.
     pub(super) fn give_back(&mut self) {
         give_back(&mut self.bricks);
@@ -263,5 +280,70 @@ impl World {
         memory.index += self.fields.values().map(Fields::bytes).sum::<usize>();
         memory.index += self.stacks.values().map(|stack| stack.capacity() * size_of::<i32>()).sum::<usize>();
         memory
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::MaterialId;
+    use crate::terrain::{Terrain, TerrainSettings};
+
+    /// One of the brick from (8, 24, 8) to (15, 31, 15), so many voxels larger on all sides.
+    fn cube(more: f32) -> Shape {
+        Shape::cuboid(Vec3::new(11.5, 27.5, 11.5), Vec3::splat(4.0 + more))
+    }
+
+    /// A block over the ground, so thick that its middle is a brick all alike.
+    fn block() -> Terrain {
+        let ground = Ground::flat(32, 32, 0.0).unwrap();
+        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).unwrap();
+        terrain.apply([Brush::add(cube(4.0), MaterialId(0))]);
+        assert_eq!(terrain.world.uniform.len(), 1);
+        terrain
+    }
+
+    /// Paints the brick with one material after the other; returns the most kinds there were.
+    fn paint(terrain: &mut Terrain, materials: std::ops::Range<u8>) -> usize {
+        let kinds = materials.map(|id| {
+            terrain.apply([Brush::paint(cube(0.0), MaterialId(id))]);
+            terrain.world.uniform.len()
+        });
+        kinds.max().unwrap_or_default()
+    }
+
+    #[test]
+    fn kinds_of_bricks_that_came_and_went_are_let_go_of() {
+        let mut terrain = block();
+        terrain.set_undo_budget(0);
+        let (before, most) = (terrain.world.memory(), paint(&mut terrain, 1..250));
+        assert!((2..=FEW_KINDS).contains(&most), "{most}");
+        let bytes = |memory: Memory| (memory.samples / Brick::BYTES, memory.materials);
+        let ((samples, materials), now) = (bytes(before), bytes(terrain.world.memory()));
+        let more = terrain.world.uniform.len() - 1;
+        assert_eq!(now, (samples + more, materials + more * 512));
+    }
+
+    #[test]
+    fn kinds_that_history_holds_stay() {
+        let mut terrain = block();
+        assert_eq!(paint(&mut terrain, 1..100), 100);
+        let hash = terrain.world.hash();
+        assert_eq!((0..).take_while(|_| terrain.undo().outcome.is_ok()).count(), 100);
+        assert!(terrain.world.bricks.is_empty());
+        assert_eq!((0..).take_while(|_| terrain.redo().outcome.is_ok()).count(), 100);
+        assert_eq!((terrain.world.hash(), terrain.world.uniform.len()), (hash, 100));
+        // The brick is that of its kind.
+        let middle = BrickPos(IVec3::new(1, 3, 1));
+        let shared =
+            terrain.world.uniform.values().filter(|kind| Arc::ptr_eq(kind, &terrain.world.bricks[&middle]));
+        assert_eq!(shared.count(), 1);
+        // Without history, they go.
+        terrain.set_undo_budget(0);
+        paint(&mut terrain, 100..200);
+        assert!(terrain.world.uniform.len() <= FEW_KINDS);
     }
 }

@@ -30,7 +30,7 @@ impl Workpiece<'_> {
     ) -> Layers {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
-        let (mut layers, mut below) = ([0; 8], Below::default());
+        let (mut layers, mut sights) = ([0; 8], Sights::default());
         for y in from.y..=to.y {
             let mut changed = Changed::default();
             for (z, x) in (from.z..=to.z).flat_map(|z| (from.x..=to.x).map(move |x| (z, x))) {
@@ -58,7 +58,7 @@ impl Workpiece<'_> {
                 let mut new = || match &tool.sculptor {
                     Some(sculptor) => sculptor
                         .material()
-                        .unwrap_or_else(|| below.material(&self.view, point, &around.around(local))),
+                        .unwrap_or_else(|| sights.material(&self.view, point, &around.around(local))),
                     None => tool.operation.material().unwrap_or(MaterialId::GROUND),
                 };
                 let mut after = Sample::edited(proposed);
@@ -135,12 +135,17 @@ impl Workpiece<'_> {
     }
 }
 
-/// What lies below the columns of a brick, for edits that build without a material of their own. Asked from below.
-struct Below([Option<Seen>; 64]);
+/// What lies straight below and above the samples of a brick, for edits that build without a material of their own. Each
+/// column is asked from below.
+struct Sights {
+    below: [Option<Seen>; 64],
+    /// Up to where nothing is solid above the last sample that looked up.
+    clear: [i32; 64],
+}
 
-impl Default for Below {
+impl Default for Sights {
     fn default() -> Self {
-        Self([None; 64])
+        Self { below: [None; 64], clear: [i32::MIN; 64] }
     }
 }
 
@@ -151,10 +156,11 @@ struct Seen {
     solid: Option<(i32, MaterialId)>,
 }
 
-impl Below {
+impl Sights {
     /// What a point is made of that becomes solid: what lies straight below, else straight above, else beside it.
     fn material(&mut self, view: &SampleView, point: IVec3, around: &Around) -> MaterialId {
-        let known = &mut self.0[((point.z & 7) * 8 + (point.x & 7)) as usize];
+        let column = ((point.z & 7) * 8 + (point.x & 7)) as usize;
+        let known = &mut self.below[column];
         let end = known.map_or(point.y - LOOK, |seen| seen.from);
         let fresh = (end..point.y).rev().map(|y| point.with_y(y)).find(|&at| view.is_solid(at));
         let solid = match fresh {
@@ -165,7 +171,9 @@ impl Below {
         if let Some((_, material)) = solid.filter(|(y, _)| point.y - y <= LOOK) {
             return material;
         }
-        let above = (1..=LOOK).map(|up| point + IVec3::Y * up).find(|&at| view.is_solid(at));
+        let (clear, end) = (&mut self.clear[column], point.y + LOOK);
+        let above = ((*clear).max(point.y) + 1..=end).map(|y| point.with_y(y)).find(|&at| view.is_solid(at));
+        *clear = above.map_or(end, |at| at.y - 1);
         let beside = || {
             let ways = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].into_iter();
             ways.filter(|way| around.density(*way) < 0).map(|way| point + way).next()
@@ -179,4 +187,56 @@ pub(super) fn reads(sculptor: Option<&Sculptor>, is_bound: bool, reach: LatticeB
     let look = IVec3::Y * if sculptor.is_some_and(|own| own.material().is_none()) { LOOK } else { 0 };
     let all = reach.grown(1);
     (is_bound || sculptor.is_some()).then_some(LatticeBox { min: all.min - look, max: all.max + look })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use fastrand::Rng;
+
+    use super::*;
+    use crate::ground::Ground;
+    use crate::lattice::BrickPos;
+    use crate::volume::{Brick, Bricks};
+
+    /// The material of new ground, straight from what is said about it.
+    fn plainly(view: &SampleView, point: IVec3) -> MaterialId {
+        let along = |way: IVec3| (1..=LOOK).map(move |step| point + way * step);
+        let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|way| point + way);
+        let mut places = along(IVec3::NEG_Y).chain(along(IVec3::Y)).chain(beside);
+        places.find(|&at| view.is_solid(at)).map_or(MaterialId::GROUND, |at| view.stored_material(at))
+    }
+
+    /// A brick of air with a few solid samples in it.
+    fn crumbs(rng: &mut Rng, share: f32) -> Brick {
+        let is_solid: [bool; 512] = std::array::from_fn(|_| rng.f32() < share);
+        let mut brick = Brick::of_edited(&is_solid.map(|solid| if solid { -90 } else { 300 }));
+        (0..512).for_each(|at| brick.set_material(at, MaterialId(rng.u8(..9))));
+        brick
+    }
+
+    #[test]
+    fn new_ground_in_mid_air_is_what_lies_nearest_below_above_or_beside() {
+        let ground = Ground::flat(24, 24, -300.0).unwrap();
+        let pos = BrickPos(IVec3::new(1, 0, 1));
+        let mut found = [0; 2];
+        for seed in 0..24 {
+            let mut rng = Rng::with_seed(seed);
+            let share = [0.003, 0.01, 0.1][seed as usize % 3];
+            let mut bricks = Bricks::default();
+            for at in (LatticeBox { min: IVec3::new(0, -9, 0), max: IVec3::new(2, 9, 2) }).points() {
+                bricks.insert(BrickPos(at), Arc::new(crumbs(&mut rng, share)));
+            }
+            let view = SampleView::new(&ground, &bricks);
+            let (around, mut sights) = (Surroundings::new(&view, pos), Sights::default());
+            for point in pos.samples().points().filter(|_| rng.u32(..3) > 0) {
+                let local = (point - pos.origin()).as_usizevec3().to_array();
+                let material = sights.material(&view, point, &around.around(local));
+                assert_eq!(material, plainly(&view, point), "world {seed} at {point}");
+                found[usize::from(material == MaterialId::GROUND)] += 1;
+            }
+        }
+        assert!(found[0] > 1000 && found[1] > 100, "{found:?}");
+    }
 }

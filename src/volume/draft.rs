@@ -4,7 +4,7 @@
 //! what they changed.
 //!
 //! Edits that sculpt read what is around a sample, in other bricks too. So they stand in `runs`, one after the other: what
-//! an edit of a run reads, no earlier one of the same run changes.
+//! an edit of a run reads, no earlier one of the same run changes. No run is so long that its jobs take much memory.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::brick::UniformBricks;
 use super::ledger::{Fate, Ledger};
-use super::runs::runs;
+use super::runs::{MOST_BRICKS, Scope, runs};
 use super::work::{EditWork, is_bound, reach};
 use super::{Brick, Bricks, DiggingRules, Refused, Sample, SampleView, Tally};
 use crate::brush::Edit;
@@ -158,23 +158,40 @@ impl Draft {
         rules: Option<&DiggingRules>,
         mut apply: impl FnMut(&EditWork, &mut dyn FnMut(Ledger)),
     ) -> Self {
-        let mut draft = Self { hash, ..Self::default() };
-        draft.effects.resize_with(edits.len(), EditEffect::default);
-        let bound: Vec<bool> =
-            edits.iter().map(|edit| is_bound(rules, reach(grid, edit), edit.power())).collect();
-        let mut add = |draft: &mut Self, base: SampleView, run: &Range<usize>| {
-            let work = EditWork::new(base, grid, &edits[run.clone()]).bound(rules, &bound[run.clone()]);
-            apply(&work, &mut |ledger| draft.add(ledger, run.start, uniform));
+        let scope = |edit: &&Edit| {
+            let reach = reach(grid, edit);
+            Scope { reach, is_bound: is_bound(rules, reach, edit.power()) }
         };
-        let runs = runs(grid, edits, &bound);
-        if let [] | [_] = &runs[..] {
+        let scopes: Vec<Scope> = edits.iter().map(scope).collect();
+        let runs = runs(edits, &scopes, MOST_BRICKS);
+        Self::of_runs(base, edits.len(), &runs, hash, uniform, |base, run, each| {
+            let bound = scopes[run.clone()].iter().map(|scope| scope.is_bound);
+            apply(&EditWork::new(base, grid, &edits[run.clone()]).bound(rules, bound), each);
+        })
+    }
+
+    /// What so many edits make of samples of this hash, in these runs.
+    fn of_runs(
+        base: SampleView,
+        edits: usize,
+        runs: &[Range<usize>],
+        hash: u64,
+        uniform: &UniformBricks,
+        mut apply: impl FnMut(SampleView, &Range<usize>, &mut dyn FnMut(Ledger)),
+    ) -> Self {
+        let mut draft = Self { hash, ..Self::default() };
+        draft.effects.resize_with(edits, EditEffect::default);
+        let mut add = |draft: &mut Self, base: SampleView, run: &Range<usize>| {
+            apply(base, run, &mut |ledger| draft.add(ledger, run.start, uniform));
+        };
+        if let [] | [_] = runs {
             runs.iter().for_each(|run| add(&mut draft, base, run));
             return draft;
         }
         // Each run sees what those before it changed, and what others did before all of them.
         let mut changes =
             Changes { newer: base.newer().cloned().unwrap_or_default(), drafted: FxHashMap::default() };
-        for run in &runs {
+        for run in runs {
             add(&mut draft, base.over(&changes.newer), run);
             changes.take(std::mem::take(&mut draft.bricks));
         }
@@ -215,6 +232,67 @@ impl Draft {
             let Some(kind) = drafted.kind else { continue };
             let fresh = || Arc::clone(self.uniform.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
             drafted.brick = uniform.get(&kind).cloned().unwrap_or_else(fresh);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+    use glam::Vec3;
+
+    use super::*;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::Ground;
+
+    /// Balls around the surface, and one far below and one far above, in which bricks are all alike.
+    fn balls(count: usize) -> Vec<Edit> {
+        let mut rng = Rng::with_seed(5);
+        let ball = |x, y, z, radius| Shape::sphere(Vec3::new(x, y, z), radius);
+        let near = |number: usize| {
+            let radius = [3.0, 6.0, 16.0][number % 3];
+            let shape = ball(rng.f32() * 80.0, rng.f32() * 40.0, rng.f32() * 70.0, radius);
+            let material = MaterialId(rng.u8(..4));
+            match rng.u32(..4) {
+                0 => Brush::paint(shape, material),
+                1 => Brush::add(shape, material),
+                _ => Brush::dig(shape),
+            }
+        };
+        let mut brushes: Vec<Brush> = (0..count).map(near).collect();
+        brushes.push(Brush::dig(ball(40.0, -40.0, 35.0, 16.0)));
+        brushes.push(Brush::add(ball(20.0, 80.0, 20.0, 16.0), MaterialId(2)));
+        brushes.iter().map(|brush| Edit::quantize(brush).unwrap()).collect()
+    }
+
+    #[test]
+    fn plain_edits_come_to_the_same_in_runs_of_any_length() {
+        let ground = Ground::from_fn(80, 70, |x, z| 20.0 + f64::from(x * 7 % 5 + z * 3 % 4)).unwrap();
+        let (grid, bricks, edits) = (ChunkGrid::new(25, 80, 70), Bricks::default(), balls(40));
+        let edits: Vec<&Edit> = edits.iter().collect();
+        let draft = |length: usize| {
+            let begins = (0..edits.len()).step_by(length);
+            let runs: Vec<_> = begins.map(|from| from..(from + length).min(edits.len())).collect();
+            let (base, none) = (SampleView::new(&ground, &bricks), UniformBricks::default());
+            Draft::of_runs(base, edits.len(), &runs, 7, &none, |base, run, each| {
+                EditWork::new(base, grid, &edits[run.clone()]).run(each);
+            })
+        };
+        let bricks_of = |draft: &Draft| {
+            let brick = |own: &DraftedBrick| {
+                let samples: Vec<_> = own.brick.edited_samples(own.pos).collect();
+                (own.pos, own.changed, own.is_extended, own.kind, *own.brick.solid(), samples)
+            };
+            draft.bricks.iter().map(brick).collect::<Vec<_>>()
+        };
+        let kinds = |draft: &Draft| draft.uniform.keys().copied().collect::<FxHashSet<_>>();
+        let whole = draft(edits.len());
+        assert!(kinds(&whole).len() > 1, "bricks that are all alike");
+        for length in [1, 3, 39] {
+            let cut = draft(length);
+            assert_eq!((cut.hash, &cut.effects), (whole.hash, &whole.effects), "runs of {length}");
+            assert!(bricks_of(&cut) == bricks_of(&whole), "bricks in runs of {length}");
+            assert_eq!(kinds(&cut), kinds(&whole), "runs of {length}");
         }
     }
 }

@@ -36,7 +36,7 @@ const PARALLEL: u64 = 1024;
 
 /// Every brick that some edit may reach, once for each edit: by brick, and for each brick in order of the edits.
 pub(super) fn jobs(tools: &[Tool]) -> Vec<Job> {
-    let reaches = || (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, bricks_around(tool)?)));
+    let reaches = || (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, bricks_around(tool.reach?))));
     let around = reaches().fold(0, |sum: u64, (_, bricks)| sum.saturating_add(bricks.volume()));
     if around < PARALLEL {
         let mut jobs = Vec::with_capacity(around as usize);
@@ -66,8 +66,8 @@ fn sort(jobs: &mut Vec<Job>) {
 }
 
 /// The bricks around an edit's reach.
-fn bricks_around(tool: &Tool) -> Option<LatticeBox> {
-    tool.reach.map(|reach| LatticeBox { min: reach.min >> 3, max: reach.max >> 3 })
+pub(super) fn bricks_around(reach: LatticeBox) -> LatticeBox {
+    LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }
 }
 
 /// Adds jobs for those of some bricks that an edit may reach.

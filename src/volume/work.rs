@@ -94,12 +94,16 @@ impl<'a> EditWork<'a> {
     pub(crate) fn under(self, rules: Option<&'a DiggingRules>) -> Self {
         let bound: Vec<bool> =
             self.tools.iter().map(|tool| is_bound(rules, tool.reach, tool.power)).collect();
-        self.bound(rules, &bound)
+        self.bound(rules, bound)
     }
 
     /// The same under rules, which bear on these of the edits.
-    pub(super) fn bound(mut self, rules: Option<&'a DiggingRules>, bound: &[bool]) -> Self {
-        self.tools.iter_mut().zip(bound).for_each(|(tool, &is_bound)| tool.is_bound = is_bound);
+    pub(super) fn bound(
+        mut self,
+        rules: Option<&'a DiggingRules>,
+        bound: impl IntoIterator<Item = bool>,
+    ) -> Self {
+        self.tools.iter_mut().zip(bound).for_each(|(tool, is_bound)| tool.is_bound = is_bound);
         self.rules = rules.and_then(|rules| RunRules::new(rules, &self.tools));
         self
     }

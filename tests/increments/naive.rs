@@ -26,6 +26,7 @@ fn deepest(shape: &Shape) -> i32 {
             let slant = (height * height + radius * radius).sqrt();
             (radius * height / (radius + slant)) as i32
         }
+        _ => panic!("{shape:?}"),
     }
 }
 

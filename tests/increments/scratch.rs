@@ -89,5 +89,6 @@ fn large_brushes_over_small_ones_are_as_if_made_from_scratch() {
     {
         witness.apply(&[brush], &format!("large brush {i}"));
     }
+    assert!(witness.kinds.len() > 1, "bricks that are all alike: {:?}", witness.kinds);
     play(&mut witness, &mut rng, 4, 6.0, "small again");
 }

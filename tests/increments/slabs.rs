@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use glam::Vec3;
@@ -17,12 +18,17 @@ struct Script {
 }
 
 impl Script {
-    /// Plays it twice: each transaction at once, and in parts of so many brushes. At least so many bricks are edited by the
-    /// first one.
-    fn check(&self, part: usize, bricks: usize, what: &str) {
+    fn terrain(&self) -> Terrain {
         let settings = TerrainSettings { chunk_size: self.chunk_size, ..Default::default() };
-        let [mut once, mut parted] =
-            [0, 1].map(|_| Terrain::new(Arc::clone(&self.ground), &settings).expect("valid settings"));
+        Terrain::new(Arc::clone(&self.ground), &settings).expect("valid settings")
+    }
+
+    /// Plays it several times: in parts of so many brushes, and each transaction at once with as many threads as there are,
+    /// with 1, 2 and 5. At least so many bricks are edited by the first one.
+    fn check(&self, part: usize, bricks: usize, what: &str) {
+        let pool = |count| rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("threads");
+        let mut pooled = [1, 2, 5].map(|count| (pool(count), self.terrain()));
+        let (mut once, mut parted) = (self.terrain(), self.terrain());
         for (number, brushes) in self.transactions.iter().enumerate() {
             let what = format!("{what}, transaction {number}");
             let receipts = once.apply(brushes);
@@ -31,6 +37,13 @@ impl Script {
             let edited = once.world().bricks().count();
             assert!(edited >= bricks, "{what}: {edited} bricks are few");
             assert_same(once.world(), parted.world(), &what);
+            let report = once.world().check_seams();
+            assert!(report.is_flawless(), "{what}: {report}");
+            for (pool, terrain) in &mut pooled {
+                let what = format!("{what}, {} threads", pool.current_num_threads());
+                assert!(pool.install(|| terrain.apply(brushes)) == receipts, "{what}: receipts");
+                assert_same(once.world(), terrain.world(), &what);
+            }
         }
     }
 }
@@ -55,8 +68,6 @@ fn assert_same(once: &World, parted: &World, what: &str) {
         assert!(mesh_bits(&mesh) == mesh_bits(&theirs), "{what}: mesh of {drawn:?}");
     }
     assert!(others.next().is_none(), "{what}: as many meshes");
-    let report = once.check_seams();
-    assert!(report.is_flawless(), "{what}: {report}");
 }
 
 fn at(x: i32, y: f32, z: i32) -> Vec3 {
@@ -108,4 +119,34 @@ fn more_bricks_than_one_batch_holds_are_what_few_are() {
     brushes.extend((0..6).map(ball));
     let script = Script { ground: ground.into(), chunk_size: 32, transactions: vec![brushes] };
     script.check(1, 8192 + 1, "a hall");
+}
+
+#[test]
+fn edits_with_too_many_bricks_around_them_for_one_list_are_what_single_ones_are() {
+    // Shafts from corner to corner of boxes of some 300,000 bricks, all through one place in the middle.
+    let ground = Ground::flat(400, 400, 0.0).expect("valid");
+    let shaft = |i: i32| {
+        let (from, to) = (at(0, -990.0, 10 * i), at(400, 10.0, 400 - 10 * i));
+        let shape = Shape::capsule(from, to, 1.5 + i as f32 * 0.1);
+        if i % 3 == 1 { Brush::add(shape, MaterialId(i as u8)) } else { Brush::dig(shape) }
+    };
+    let shafts: Vec<Brush> = (0..8).map(shaft).collect();
+    let around = |brush: &Brush| {
+        let reach = Edit::quantize(brush).expect("valid").reach();
+        LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }.volume()
+    };
+    assert!(shafts.iter().map(around).sum::<u64>() > 2 << 20, "they are less than two lists");
+    let script = Script { ground: ground.into(), chunk_size: 32, transactions: vec![] };
+    let [mut once, mut single] = [0, 1].map(|_| script.terrain());
+    let pristine = once.world().hash();
+    let receipts = once.apply(&shafts);
+    let singles: Vec<Receipt> = shafts.iter().flat_map(|shaft| single.apply([shaft])).collect();
+    assert_eq!(receipts, singles);
+    assert!(receipts.iter().any(|own| own.outcome.as_ref().is_ok_and(|own| own.added.total() > 0)));
+    assert_same(once.world(), single.world(), "shafts");
+    // All of them are one step of history.
+    assert!(once.undo().outcome.is_ok());
+    assert_eq!(once.world().hash(), pristine);
+    assert!(once.redo().outcome.is_ok());
+    assert_eq!(once.world().hash(), single.world().hash());
 }

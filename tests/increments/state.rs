@@ -78,7 +78,7 @@ impl Witness {
                 Some(kind) => {
                     let one = *shared.entry(kind).or_insert(brick);
                     assert!(std::ptr::eq(one, brick), "{what}: {pos:?} of {kind:?} is not shared");
-                    self.kinds.insert(kind);
+                    self.kinds.insert(kind, brick.material_bytes());
                 }
                 None => {
                     single += 1;
@@ -87,8 +87,11 @@ impl Witness {
             }
         }
         let memory = world.memory();
+        // From 64 kinds on a world may let go of those that are gone.
+        assert!(self.kinds.len() < 64, "{what}: more kinds than can be counted from here");
         assert_eq!(memory.samples, Brick::BYTES * (single + self.kinds.len()), "{what}: memory of samples");
-        assert!(memory.materials >= materials, "{what}: memory of materials");
+        materials += self.kinds.values().sum::<usize>();
+        assert_eq!(memory.materials, materials, "{what}: memory of materials");
     }
 
     /// Each edited sample lies in one field of its chunk, fields keep apart, and news tell how they came.

@@ -1,6 +1,6 @@
 //! What a world under test is compared with.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use bevy_burrow::lattice::{ChunkPos, LatticeBox, TilePos};
 use bevy_burrow::prelude::*;
@@ -30,8 +30,8 @@ pub struct Witness {
     /// Meshes as a game has them that only ever hears of updates.
     pub tiles: HashMap<TilePos, MeshBits>,
     pub chunks: HashMap<ChunkPos, MeshBits>,
-    /// Kinds of bricks that were all alike at some commit.
-    pub kinds: HashSet<(i32, MaterialId)>,
+    /// Kinds of bricks that were all alike at some commit, with the bytes of their materials.
+    pub kinds: HashMap<(i32, MaterialId), usize>,
     pub fields: BTreeSet<(ChunkPos, FieldId)>,
     pub mesher: Mesher,
     /// A tall cliff's sheets have too many blocks to be meshed twice each time.
@@ -49,7 +49,7 @@ impl Witness {
             samples: Samples::default(),
             tiles,
             chunks: HashMap::new(),
-            kinds: HashSet::new(),
+            kinds: HashMap::new(),
             fields: BTreeSet::new(),
             mesher: Mesher::default(),
             is_meshed_again: true,

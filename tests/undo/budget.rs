@@ -1,10 +1,15 @@
 //! What history takes: no more than its budget, and as many bytes as it says.
 
 use allocation_counter::measure;
+use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::World;
+use bevy_burrow::volume::Brick;
 use fastrand::Rng;
+use glam::Vec3;
 
 use crate::scripts::{any_brush, terrain};
+use crate::state::State;
 use crate::worlds::{random_ground, world_count};
 
 #[test]
@@ -44,4 +49,46 @@ fn history_takes_the_bytes_it_says_and_stays_within_its_budget() {
         assert!(terrain.undo().outcome == Err(HistoryRejection::NothingToUndo));
     }
     assert!(full > 3, "old steps fell off in {full} worlds only");
+}
+
+/// Bricks all of whose samples were edited to the same.
+fn uniform_bricks(world: &World) -> usize {
+    let is_uniform = |brick: &Brick, pos: BrickPos| {
+        let of = |point| (brick.sample(point), brick.material(point));
+        let first = of(pos.origin());
+        first.0.distance().is_some() && pos.samples().points().all(|point| of(point) == first)
+    };
+    world.bricks().filter(|&(pos, brick)| is_uniform(brick, pos)).count()
+}
+
+#[test]
+fn a_large_hole_and_its_filling_are_undone_and_cost_what_they_say() {
+    let ground = Ground::from_fn(72, 70, |x, z| 40.0 + f64::from(x * 5 % 7 + z * 3 % 5) * 0.3);
+    let mut terrain =
+        Terrain::new(ground.expect("finite heights"), &TerrainSettings::default()).expect("valid settings");
+    let ball = Shape::sphere(Vec3::new(36.0, 20.0, 35.0), 28.0);
+    let mut states = vec![State::of(terrain.world())];
+    for brush in [Brush::dig(ball), Brush::add(ball, MaterialId(3)), Brush::paint(ball, MaterialId(4))] {
+        terrain.apply([brush]);
+        states.push(State::of(terrain.world()));
+        let alike = uniform_bricks(terrain.world());
+        assert!(alike > 20, "{alike} bricks are all alike");
+    }
+    let check = |terrain: &Terrain, state: usize, what: &str| {
+        states[state].check(terrain.world(), what);
+        assert_eq!(terrain.memory().undo, terrain.history().bytes, "{what}");
+    };
+    for state in (0..3).rev() {
+        assert!(terrain.undo().outcome.is_ok());
+        check(&terrain, state, &format!("back to {state}"));
+    }
+    for state in 1..3 {
+        assert!(terrain.redo().outcome.is_ok());
+        check(&terrain, state, &format!("forth to {state}"));
+    }
+    let (history, before) = (terrain.history(), terrain.world().memory());
+    assert_eq!((history.undos, history.redos), (2, 1));
+    let freed = measure(|| terrain.set_undo_budget(0));
+    assert_eq!(-freed.bytes_current, history.bytes as i64, "{history:?}");
+    assert_eq!(terrain.world().memory(), before);
 }

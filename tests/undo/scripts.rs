@@ -93,6 +93,7 @@ fn operation(brush: &Brush) -> &'static str {
         Operation::Lower { .. } => "lower",
         Operation::Stamp(_) => "stamp",
         Operation::Terrace { .. } => "terrace",
+        _ => panic!("{brush:?}"),
     }
 }
 
@@ -103,5 +104,6 @@ fn shape(brush: &Brush) -> &'static str {
         Shape::Cylinder { .. } => "cylinder",
         Shape::Capsule { .. } => "capsule",
         Shape::Cone { .. } => "cone",
+        _ => panic!("{brush:?}"),
     }
 }
