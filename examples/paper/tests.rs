@@ -188,12 +188,14 @@ fn both_full_fields_have_a_triangle_for_a_triangle() {
 }
 
 #[test]
-fn edits_of_median_size_are_the_tenth_in_the_middle() {
+fn edits_are_cut_into_fifths_by_their_voxels() {
     let voxels: Vec<u64> = (0..100).map(|edit| edit * 37 % 100).collect();
-    let middle: Vec<u64> = report::middle_edits(&voxels).into_iter().map(|edit| voxels[edit]).collect();
-    assert_eq!(middle, (45..55).collect::<Vec<_>>());
-    assert_eq!(report::middle_edits(&[5, 1, 3]), [2]);
-    assert!(report::middle_edits(&[]).is_empty());
+    let parts: Vec<Vec<u64>> =
+        report::parts(&voxels).iter().map(|part| part.iter().map(|&edit| voxels[edit]).collect()).collect();
+    assert!(parts.len() == 5 && parts[0] == (0..20).collect::<Vec<_>>());
+    assert_eq!(parts.concat(), (0..100).collect::<Vec<_>>());
+    assert_eq!(report::parts(&[5, 1, 3]).concat(), [1, 2, 0]);
+    assert!(report::parts(&[]).is_empty());
 }
 
 #[test]
@@ -219,7 +221,9 @@ fn tables_have_the_papers_shape_and_the_page_holds_them_all() {
 
     let page = report::document(&measurements, &Machine::here());
     assert!(page.contains(&report::agreement(&measurements)));
-    for table in tables.iter().chain([&report::medians(&measurements), &report::checks(&measurements)]) {
+    let sizes = report::by_size(&measurements).expect("both were played");
+    let others = [&sizes, &report::medians(&measurements), &report::checks(&measurements)];
+    for table in tables.iter().chain(others) {
         assert!(page.contains(&table.to_string()), "{} is missing", table.title);
     }
     assert!(page.contains(&report::ratio_table(&report::ratios(&measurements)).to_string()));

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::markdown::thousands;
-use super::ratios::{FASTER, middle_edits};
-use super::{agreement, checks, medians, ratio_table, ratios, tables};
+use super::ratios::FASTER;
+use super::{agreement, by_size, checks, medians, ratio_table, ratios, tables};
 use crate::backend::Backend;
 use crate::clock;
 use crate::edits::Run;
@@ -98,17 +98,8 @@ fn gains(page: &mut String, measurements: &Measurements) -> std::fmt::Result {
             median * 1e6 / FASTER
         )?;
     }
-    if let Some(voxels) = voxels(measurements) {
-        let middle: Vec<u64> = middle_edits(voxels).into_iter().map(|edit| voxels[edit]).collect();
-        let (least, most) = (middle.first().copied(), middle.last().copied());
-        writeln!(
-            page,
-            "- Edits of median size are the {} in the middle when all are sorted by the voxels that they dig or fill: {} to \
-             {} voxels.",
-            middle.len(),
-            thousands(least.unwrap_or_default()),
-            thousands(most.unwrap_or_default())
-        )?;
+    if let Some(table) = by_size(measurements) {
+        writeln!(page, "\n{table}")?;
     }
     writeln!(page)
 }

@@ -5,13 +5,15 @@ mod document;
 mod files;
 mod markdown;
 mod ratios;
+mod sizes;
 mod tables;
 
 pub use checks::{agreement, checks, faults};
 pub use document::document;
 pub use files::{summary, timings};
 pub use markdown::Table;
-#[cfg(test)]
-pub use ratios::middle_edits;
 pub use ratios::{ratios, table as ratio_table};
+pub use sizes::by_size;
+#[cfg(test)]
+pub use sizes::parts;
 pub use tables::{all as tables, medians};

@@ -117,19 +117,6 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
             ratios.push(Ratio { what, paper: None, here, by_processor, target: target(output) });
         }
     }
-    if let Some(hybrid) = measurements.get(cpu(CHUNK_SIZES[0]), second) {
-        let middle = middle_edits(&hybrid.voxels);
-        for output in Output::BOTH {
-            let all = by_edit(measurements, Subject::Full(output), hybrid.subject);
-            let [here, by_processor] = both(all, &|all| stats::median(middle.iter().map(|&edit| all[edit])));
-            let what = format!(
-                "full over hybrid {}, {}, edits of median size, second run",
-                CHUNK_SIZES[0],
-                output.title()
-            );
-            ratios.push(Ratio { what, paper: None, here, by_processor, target: None });
-        }
-    }
     let growth = |backend| {
         let average = |at| paper(backend, second, at).average;
         Some(average(3) / average(0))
@@ -178,22 +165,13 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
 
 /// For each edit of the second run how many times longer one test takes than another, by its medians: of the time that
 /// passed, and of the processor's.
-fn by_edit(measurements: &Measurements, above: Subject, below: Subject) -> Option<[Vec<f64>; 2]> {
+pub fn by_edit(measurements: &Measurements, above: Subject, below: Subject) -> Option<[Vec<f64>; 2]> {
     let (above, below) = (measurements.get(above, Run::Second)?, measurements.get(below, Run::Second)?);
     let divide = |of: fn(&Measured) -> &[Vec<f64>]| {
         let (above, below) = (stats::by_edit(of(above)), stats::by_edit(of(below)));
         above.iter().zip(below).map(|(above, below)| above / below).collect()
     };
     Some([divide(|measured| &measured.repeats), divide(|measured| &measured.processor)])
-}
-
-/// The tenth of all edits whose size is nearest to the median, by voxels changed.
-pub fn middle_edits(voxels: &[u64]) -> Vec<usize> {
-    let mut edits: Vec<usize> = (0..voxels.len()).collect();
-    edits.sort_by_key(|&edit| voxels[edit]);
-    let count = (edits.len() / 10).max(1).min(edits.len());
-    let start = (edits.len() - count) / 2;
-    edits[start..start + count].to_vec()
 }
 
 /// The ratios as a table.
