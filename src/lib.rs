@@ -54,6 +54,7 @@
 //! | --- | --- |
 //! | a landscape | [`Ground`](ground::Ground) from an image, noise or a function; [`MaterialControl`](ground::MaterialControl) |
 //! | to put it into the world | the [`Terrain`](terrain::Terrain) component; `BurrowPlugins` |
+//! | another level | a new [`Terrain`](terrain::Terrain), inserted in place of the old one |
 //! | to dig, build, paint | [`Brush`](brush::Brush) messages; [`Shape`](brush::Shape), [`Roughness`](brush::Roughness) |
 //! | to sculpt | [`Brush::smooth`](brush::Brush::smooth), `flatten`, `level`, `raise`, `stamp`, ...; [`Blend`](brush::Blend) |
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
@@ -136,6 +137,7 @@
 //! ```
 //!
 //! **Loose pieces**: what a dig cuts off falls, lies about and crumbles (feature `avian`); without that it is a message.
+//! `DebrisPlugin` wants the `PhysicsPlugins`, the `TerrainPhysicsPlugin` and a `ColliderSource` of the part below.
 //!
 //! ```
 //! # #[cfg(feature = "avian")] {
@@ -273,8 +275,9 @@
 //! # Limits
 //!
 //! Lattice coordinates stay within 32768 voxels, a world's sides within 16384 cells. Chunks are all drawn at full detail.
-//! A terrain may be moved by whole voxels and scaled by powers of two; rotated, stretched or moved by a part of a voxel,
-//! its seams lose their equal bits.
+//! A terrain may be moved by whole voxels and scaled by powers of two, by
+//! [`TerrainSettings::voxel_size`](terrain::TerrainSettings::voxel_size) or by a parent: the scale of its own `Transform` is
+//! the plugin's. Rotated, stretched or moved by a part of a voxel, its seams lose their equal bits.
 
 // Tests of the crate share worlds with those beside it.
 #[cfg(test)]

@@ -254,7 +254,7 @@ fn one_field(engines: &Engines) {
             let kept = if round < 6 { &mut discarded } else { &mut samples };
             let dig_all = |who: Who, times: &mut Times| {
                 let mut terrain = level::one_field(size, round);
-                engines.run(terrain.begin().expect("a brush waits"), who, times);
+                drop(engines.run(terrain.begin().expect("a brush waits"), who, times));
             };
             for who in turns(round as usize) {
                 match who {

@@ -78,8 +78,18 @@ impl Player {
     }
 }
 
-fn arrive(ready: On<TerrainReady>, mut commands: Commands, terrains: Query<&Terrain>, places: Res<Places>) {
+fn arrive(
+    ready: On<TerrainReady>,
+    mut commands: Commands,
+    terrains: Query<&Terrain>,
+    places: Res<Places>,
+    players: Query<(), With<Player>>,
+) {
     let Ok(terrain) = terrains.get(ready.entity) else { return };
+    // Land that was loaded anew under his feet.
+    if !players.is_empty() {
+        return;
+    }
     let height = |place: Vec2| terrain.world().height(place.x.into(), place.y.into());
     let feet = rim::start(&places, |place| height(place).map(|height| height as f32));
     let hill = places.hillside.mouth + Vec3::Y * 2.5;

@@ -379,5 +379,6 @@ fn centre(shape: &Shape) -> Vec3 {
         Shape::Sphere { center, .. } | Shape::Cuboid { center, .. } => center,
         Shape::Cylinder { base, axis, .. } | Shape::Cone { base, axis, .. } => base + axis / 2.0,
         Shape::Capsule { from, to, .. } => from.midpoint(to),
+        _ => panic!("no shape of the tour's: {shape:?}"),
     }
 }

@@ -48,15 +48,8 @@ fn seal(mut receipts: MessageReader<BrushApplied>, mut terrains: Query<&mut Terr
         return;
     }
     for mut terrain in &mut terrains {
-        empty_history(&mut terrain);
+        terrain.clear_history();
     }
-}
-
-/// Without room for it, history is empty; it has as much as before then.
-fn empty_history(terrain: &mut Terrain) {
-    let budget = terrain.undo_budget();
-    terrain.set_undo_budget(0);
-    terrain.set_undo_budget(budget);
 }
 
 /// The same ones in every game.

@@ -11,6 +11,7 @@ use crate::ground::MaterialId;
 /// *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change nothing outside. Beyond the
 /// world's rim they take all to go on as it is at the rim.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Operation {
     /// Takes ground away.
     Dig,

@@ -5,7 +5,8 @@ use glam::{Quat, Vec3};
 use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
-/// A wish to change the ground, in voxels of terrain space.
+/// A wish to change the ground, in voxels of terrain space. One that is sent to the plugin as a message is in world space
+/// and its units, metres: each terrain takes it into its own.
 ///
 /// Nothing is checked here: [`Edit::quantize`](super::Edit::quantize) does, and says what is wrong.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,31 +97,37 @@ impl Brush {
     }
 
     /// The brush with another strength, if it sculpts: 0 to 1.
+    #[must_use]
     pub fn with_strength(self, strength: f32) -> Self {
         Self { blend: Blend { strength, ..self.blend }, ..self }
     }
 
     /// The brush with another falloff, if it sculpts: over so many voxels its change fades in.
+    #[must_use]
     pub fn with_falloff(self, falloff: f32) -> Self {
         Self { blend: Blend { falloff, ..self.blend }, ..self }
     }
 
     /// The brush with a material for the ground that it builds, if it sculpts.
+    #[must_use]
     pub fn with_material(self, material: MaterialId) -> Self {
         Self { blend: Blend { material: Some(material), ..self.blend }, ..self }
     }
 
     /// The brush with less than full power: what the terrain's rules call harder takes longer, or can't be dug.
+    #[must_use]
     pub fn with_power(self, power: u8) -> Self {
         Self { power, ..self }
     }
 
     /// The brush with bumps on its surface.
+    #[must_use]
     pub fn with_roughness(self, roughness: Roughness) -> Self {
         Self { roughness: Some(roughness), ..self }
     }
 
     /// The brush with a number of the game's own, which the receipt carries back.
+    #[must_use]
     pub fn with_tag(self, tag: u64) -> Self {
         Self { tag, ..self }
     }
@@ -131,6 +138,7 @@ impl Brush {
     ///
     /// `rotation` should have length 1. Other numbers give a brush that [`Edit::quantize`](super::Edit::quantize)
     /// refuses or that is deformed.
+    #[must_use]
     pub fn transformed(&self, rotation: Quat, translation: Vec3, scale: f32) -> Self {
         Self {
             shape: self.shape.transformed(rotation, translation, scale),

@@ -2,8 +2,10 @@
 
 use glam::{Quat, Vec3};
 
-/// A solid in voxels of terrain space.
+/// A solid in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the plugin's, in units of world
+/// space.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Shape {
     /// A ball.
     Sphere {

@@ -40,11 +40,13 @@ impl Stamp {
     }
 
     /// The stamp with its plane turned.
+    #[must_use]
     pub fn with_rotation(self, rotation: Quat) -> Self {
         Self { rotation, ..self }
     }
 
     /// The stamp on a plane: its up becomes `normal`, by the shortest turn. A normal of no direction leaves it as it is.
+    #[must_use]
     pub fn onto(self, normal: Vec3) -> Self {
         match normal.try_normalize() {
             Some(normal) => self.with_rotation(Quat::from_rotation_arc(Vec3::Y, normal)),

@@ -19,10 +19,10 @@
 //! | [`normals`](BurrowDebug::normals) | normals of vertices: golden of tiles, blue of chunks |
 //! | [`wires`](BurrowDebug::wires) | edges of triangles: golden of tiles, blue of chunks, white what both share |
 //!
-//! Views are lines below the terrain's entity, in its own space, so they move and scale along. They are made for what is
-//! near a place, at most so many lines each, and again when the world or the place has changed. Their cost depends on how
-//! far they reach, and not on how large the world is; `dirty` looks through the box of each edit as well, once, by columns
-//! of bricks. [`SeamWires`] and [`draw_shape`] are for own use.
+//! Views are lines below the terrain's entity, in its own space, so they move and scale along, and on its `RenderLayers`.
+//! They are made for what is near a place, at most so many lines each, and again when the world or the place has changed.
+//! Their cost depends on how far they reach, and not on how large the world is; `dirty` looks through the box of each edit
+//! as well, once, by columns of bricks. [`SeamWires`] and [`draw_shape`] are for own use.
 
 mod lines;
 mod plugin;

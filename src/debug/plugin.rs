@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use bevy::asset::AssetEventSystems;
+use bevy::camera::visibility::RenderLayers;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
@@ -23,6 +24,7 @@ const BIAS: f32 = -0.0004;
 const BOX_LINES: usize = 12;
 
 /// Adds the debug views to a game that has `BurrowPlugins`; all are off until [`BurrowDebug`] says otherwise.
+#[derive(Default)]
 pub struct BurrowDebugPlugin;
 
 impl Plugin for BurrowDebugPlugin {
@@ -101,6 +103,8 @@ struct Key {
     settings: BurrowDebug,
     /// Counts frames in which bricks fade.
     fading: u64,
+    /// Those of the terrain.
+    render_layers: Option<RenderLayers>,
 }
 
 /// A view as it was drawn last.
@@ -117,7 +121,7 @@ fn draw(
     time: Res<Time>,
     debug: Res<BurrowDebug>,
     dirty: Res<DirtyBricks>,
-    terrains: Query<(Entity, &Terrain, &GlobalTransform, &InheritedVisibility)>,
+    terrains: Query<(Entity, &Terrain, &GlobalTransform, Option<&RenderLayers>, &InheritedVisibility)>,
     cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
     shown: Query<(Entity, &DebugLines, &ChildOf)>,
     mut assets: ResMut<Assets<GizmoAsset>>,
@@ -139,7 +143,7 @@ fn draw(
     *frames += u64::from(!dirty.0.is_empty() || *faded);
     *faded = !dirty.0.is_empty();
     let now = time.elapsed();
-    for (entity, terrain, own_place, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
+    for (entity, terrain, own_place, render_layers, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
         let Some(focus) = focus(&debug, terrain, own_place, &cameras) else { continue };
         let scale = own_place.scale().x.abs().max(f32::MIN_POSITIVE);
         // In steps, so that not every move of the camera draws everything anew.
@@ -153,12 +157,15 @@ fn draw(
                 focus: steps.as_ivec3(),
                 settings: debug.clone(),
                 fading,
+                render_layers: render_layers.cloned(),
             };
             let own =
                 shown.iter().filter(|(_, lines, parent)| lines.view == view && parent.parent() == entity);
             let own: Vec<Entity> = own.map(|(lines, ..)| lines).collect();
             if let Some(Drawing { key: old, since, layers }) = drawn.get(&(entity, view)) {
-                let is_urgent = old.settings != key.settings || old.fading != key.fading;
+                let is_urgent = old.settings != key.settings
+                    || old.fading != key.fading
+                    || old.render_layers != key.render_layers;
                 let is_as_it_was = *old == key || !is_urgent && now.saturating_sub(*since) < PERIOD;
                 if is_as_it_was && own.len() == *layers {
                     continue;
@@ -178,7 +185,11 @@ fn draw(
             drawn.insert((entity, view), Drawing { key, since: now, layers: layers.len() });
             for layer in layers {
                 // They are drawn in this very frame, and nobody places them any more.
-                commands.spawn((DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity), *own_place));
+                let lines = (DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity), *own_place);
+                let mut lines = commands.spawn(lines);
+                if let Some(render_layers) = render_layers {
+                    lines.insert(render_layers.clone());
+                }
             }
         }
     }

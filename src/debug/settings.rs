@@ -55,6 +55,7 @@ impl Default for BurrowDebug {
 /// One of the debug views.
 #[derive(Reflect, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the switches of BurrowDebug say what they are")]
+#[non_exhaustive]
 pub enum DebugView {
     Chunks,
     Fields,

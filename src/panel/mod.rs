@@ -63,6 +63,7 @@ const WORLD: &str = "burrow world";
 
 /// Adds the panel to a game that has `BurrowPlugins`, and egui if it is not there. A game that adds egui by itself does so
 /// before.
+#[derive(Default)]
 pub struct BurrowPanelPlugin;
 
 impl Plugin for BurrowPanelPlugin {

@@ -98,6 +98,7 @@ impl Verdict {
 
 /// A button of the panel. Games may send these too, from keys say.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PanelAction {
     /// Looks at every triangle of the terrain, in a task, and shows whether all seams are closed.
     CheckSeams,

@@ -39,6 +39,7 @@ use super::walking::Walk;
     CharacterSteering,
     CharacterMotion,
     Transform,
+    Visibility,
     RigidBody::Kinematic,
     CustomPositionIntegration,
     SpeculativeMargin(0.0)

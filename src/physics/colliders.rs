@@ -19,9 +19,11 @@ use crate::surface::SurfaceMesh;
 use crate::terrain::Drawn;
 
 /// A tile's or chunk's collider: on the entity of the tile or chunk, while it has one.
-#[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
 pub struct GroundCollider {
     /// The entity with the [`Collider`], a child of this one; `None` for a surface without triangles.
+    #[entities]
     pub body: Option<Entity>,
     /// The revision of the world that it was made from.
     pub revision: u64,
@@ -38,8 +40,10 @@ pub struct GroundBody {
     pub drawn: Drawn,
 }
 
-/// What ground is to bodies. Changes count for colliders that come later.
-#[derive(Resource, Clone, Debug, Default)]
+/// What ground is to bodies. A change counts for each collider from when it is made, or made anew because its ground
+/// changed.
+#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Resource, Default)]
 pub struct GroundContact {
     /// How slippery it is; avian's `DefaultFriction` if nothing is said.
     pub friction: Option<Friction>,
@@ -47,6 +51,25 @@ pub struct GroundContact {
     pub restitution: Option<Restitution>,
     /// What collides with it.
     pub layers: CollisionLayers,
+}
+
+impl GroundContact {
+    /// Has a body of ground be like this. Avian looks its layers up whenever they are put on, so not without need.
+    fn apply(&self, body: &mut EntityWorldMut) {
+        if body.get::<CollisionLayers>() != Some(&self.layers) {
+            body.insert(self.layers);
+        }
+        set(body, self.friction);
+        set(body, self.restitution);
+    }
+}
+
+/// Puts a component on, or takes it off.
+fn set<C: Component>(body: &mut EntityWorldMut, component: Option<C>) {
+    match component {
+        Some(component) => body.insert(component),
+        None => body.remove::<C>(),
+    };
 }
 
 /// What tasks and the main thread know of ground.
@@ -152,6 +175,7 @@ impl PreparedCollider {
                 world.resource_mut::<PhysicsFigures>().changes = count;
             }
             world.resource_mut::<PhysicsFigures>().swaps += 1;
+            let contact = world.resource::<GroundContact>().clone();
             match (self.shape, old.and_then(|old| world.get_entity_mut(old).ok())) {
                 (None, None) => None,
                 (None, Some(old)) => {
@@ -166,11 +190,11 @@ impl PreparedCollider {
                         let bounds = collider.aabb(place.0, *turn).grow(Vec3::splat(MARGIN));
                         old.insert((bounds, EnlargedAabb::new(bounds)));
                     }
+                    contact.apply(&mut old);
                     old.insert(collider);
                     Some(old.id())
                 }
                 (Some(shape), None) => {
-                    let contact = world.resource::<GroundContact>().clone();
                     let mut body = world.spawn((
                         GroundBody { terrain: self.part.terrain, part: owner, drawn: self.part.drawn },
                         RigidBody::Static,
@@ -180,12 +204,7 @@ impl PreparedCollider {
                         contact.layers,
                         Collider::from(SharedShape(shape)),
                     ));
-                    if let Some(friction) = contact.friction {
-                        body.insert(friction);
-                    }
-                    if let Some(restitution) = contact.restitution {
-                        body.insert(restitution);
-                    }
+                    contact.apply(&mut body);
                     Some(body.id())
                 }
             }

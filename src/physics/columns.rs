@@ -6,7 +6,7 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
 use super::colliders::GroundCollider;
-use crate::lattice::{ChunkPos, TilePos};
+use crate::lattice::TilePos;
 use crate::plugin::{Chunk, ShownSurface, Tile};
 use crate::terrain::Drawn;
 
@@ -23,8 +23,8 @@ pub(super) fn column(drawn: Drawn) -> TilePos {
 
 /// Which tile or chunk an entity is.
 fn drawn(tile: Option<&Tile>, chunk: Option<&Chunk>) -> Option<Drawn> {
-    let tile = tile.map(|&Tile { x, z }| Drawn::Tile(TilePos { x, z }));
-    tile.or(chunk.map(|&Chunk { x, y, z }| Drawn::Chunk(ChunkPos { x, y, z })))
+    let tile = tile.map(|&tile| Drawn::Tile(tile.into()));
+    tile.or_else(|| chunk.map(|&chunk| Drawn::Chunk(chunk.into())))
 }
 
 /// Tiles and chunks that show a surface, and the colliders they have.

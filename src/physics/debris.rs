@@ -16,6 +16,9 @@ use crate::terrain::{PieceFate, Restored, Terrain};
 /// loses it; it falls, and is in the way, when its collider is done, which a task makes. Its mesh comes with the transaction;
 /// only where a game commits by itself is it made on the main thread.
 ///
+/// Needs avian's `PhysicsPlugins` and the [`TerrainPhysicsPlugin`](super::TerrainPhysicsPlugin), and for ground to fall on a
+/// [`ColliderSource`](super::ColliderSource) nearby.
+///
 /// ```no_run
 /// # use bevy::prelude::*;
 /// # use bevy_burrow::prelude::*;
@@ -34,7 +37,7 @@ pub struct DebrisPlugin;
 pub struct DebrisSettings {
     /// Pieces at once. While there are as many, others vanish.
     pub most: usize,
-    /// Seconds that a piece lies about before it crumbles.
+    /// Seconds from when a piece takes shape as a body until it crumbles.
     pub stay: f32,
     /// How slippery pieces are.
     pub friction: Friction,

@@ -19,8 +19,9 @@ use super::{
     Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
     Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
 };
-use crate::lattice::ChunkPos;
-use crate::terrain::{Commit, Drawn, FieldNews, Receipt, SurfaceDraft, Terrain};
+use crate::backend::Engine;
+use crate::lattice::{ChunkGrid, ChunkPos};
+use crate::terrain::{Commit, Drawn, FieldNews, Receipt, SurfaceDraft, Terrain, Transaction};
 
 /// The transaction that a terrain waits for.
 #[derive(Component)]
@@ -41,6 +42,50 @@ struct Prepared {
 
 /// From how many tiles and chunks on threads share them.
 const PARALLEL_PARTS: usize = 8;
+
+/// A transaction on its way into a task, with what its meshes are made with.
+struct Job {
+    /// The terrain's entity.
+    terrain: Entity,
+    transaction: Transaction,
+    engine: Engine,
+    workshop: Workshop,
+    /// Metres along a voxel's side.
+    voxel_size: f32,
+    grid: ChunkGrid,
+    /// Of the world once this is committed.
+    revision: u64,
+}
+
+impl Job {
+    /// Runs the transaction, and makes all that is shown with its commit.
+    fn run(self) -> Prepared {
+        let start = Instant::now();
+        let Self { terrain, transaction, engine, workshop, voxel_size, grid, revision } = self;
+        let mut commit = transaction.run_on(&engine);
+        let part = |drawn| Part::new(terrain, voxel_size, grid, revision, drawn);
+        // Taken out, so that they are dropped here and not on the main thread.
+        let updates = std::mem::take(&mut commit.meshes);
+        let tiles = updates.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.draft()));
+        let chunks = updates
+            .chunks
+            .iter()
+            .map(|(at, chunk)| (Drawn::Chunk(*at), SurfaceDraft::Mesh(Cow::Borrowed(chunk.mesh()))));
+        let drafts: Vec<_> = tiles.chain(chunks).collect();
+        let make =
+            |(drawn, draft): (Drawn, SurfaceDraft)| workshop.make(&part(drawn), draft.is_empty(), || draft);
+        let parts = if drafts.len() < PARALLEL_PARTS {
+            drafts.into_iter().map(make).collect()
+        } else {
+            drafts.into_par_iter().map(make).collect()
+        };
+        let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
+        if let Some(wardrobe) = &workshop.wardrobe {
+            pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
+        }
+        Prepared { commit, parts, pieces, took: start.elapsed() }
+    }
+}
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
@@ -76,34 +121,16 @@ pub(super) fn begin_transactions(
         let engine = terrain.engine().unwrap_or(&engine).clone();
         let wardrobe = draws.then(|| Wardrobe::new(terrain.world(), colors));
         let workshop = Workshop { wardrobe, companions: companions.clone() };
-        let (size, grid) = (terrain.voxel_size(), terrain.world().grid());
-        let revision = terrain.world().revision() + 1;
-        let task = AsyncComputeTaskPool::get().spawn(async move {
-            let start = Instant::now();
-            let mut commit = transaction.run_on(&engine);
-            let part = |drawn| Part::new(entity, size, grid, revision, drawn);
-            // Taken out, so that they are dropped here and not on the main thread.
-            let updates = std::mem::take(&mut commit.meshes);
-            let tiles = updates.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.draft()));
-            let chunks = updates
-                .chunks
-                .iter()
-                .map(|(at, chunk)| (Drawn::Chunk(*at), SurfaceDraft::Mesh(Cow::Borrowed(chunk.mesh()))));
-            let drafts: Vec<_> = tiles.chain(chunks).collect();
-            let make = |(drawn, draft): (Drawn, SurfaceDraft)| {
-                workshop.make(&part(drawn), draft.is_empty(), || draft)
-            };
-            let parts = if drafts.len() < PARALLEL_PARTS {
-                drafts.into_iter().map(make).collect()
-            } else {
-                drafts.into_par_iter().map(make).collect()
-            };
-            let mut pieces: Vec<LoosePieceFound> = pieces(entity, commit.receipts()).collect();
-            if let Some(wardrobe) = &workshop.wardrobe {
-                pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
-            }
-            Prepared { commit, parts, pieces, took: start.elapsed() }
-        });
+        let job = Job {
+            terrain: entity,
+            transaction,
+            engine,
+            workshop,
+            voxel_size: terrain.voxel_size(),
+            grid: terrain.world().grid(),
+            revision: terrain.world().revision() + 1,
+        };
+        let task = AsyncComputeTaskPool::get().spawn(async move { job.run() });
         *number += 1;
         commands.entity(entity).try_insert(InFlight { number: *number, task, done: None });
     }
@@ -243,19 +270,18 @@ impl Screen<'_, '_> {
             return;
         }
         let child = child.unwrap_or_else(|| entities.spawn(commands, entity, terrain.world(), drawn));
-        let is_chunk = matches!(drawn, Drawn::Chunk(_));
+        let has_changed = fresh.is_some();
         if let Some(fresh) = fresh {
             if let Some(assets) = &mut self.assets {
                 swap(commands, assets, child, self.meshes.get(child).ok(), fresh.mesh);
                 self.figures.swaps += 1;
-                if is_chunk && !is_new {
-                    tell(commands, ChunkChanged { entity: child });
-                }
             }
             attach(commands, child, fresh.shown, fresh.attachments);
         }
-        if is_chunk && is_new {
-            tell(commands, ChunkCreated { entity: child });
+        match drawn {
+            Drawn::Chunk(_) if is_new => tell(commands, ChunkCreated { entity: child }),
+            Drawn::Chunk(_) if has_changed => tell(commands, ChunkChanged { entity: child }),
+            _ => {}
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What else is made from surfaces: in the same task as the meshes, and shown in the same commit.
 
+use std::fmt;
 use std::sync::Arc;
 
 use bevy::prelude::*;
@@ -99,6 +100,12 @@ impl Companions {
     /// Is there none?
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+}
+
+impl fmt::Debug for Companions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Companions").field("count", &self.0.len()).finish_non_exhaustive()
     }
 }
 

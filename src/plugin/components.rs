@@ -67,26 +67,30 @@ pub struct Field {
 }
 
 /// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
-/// gets the terrain's material, layers and shadows as a [`Tile`] does, and what is drawn on it stays where it was in the
-/// ground, wherever it goes. With a `GroundLook` it follows the terrain's look as long as that terrain is there.
+/// gets the terrain's material, layers and shadows as a [`Tile`] does, unless it comes with its own, and follows as they
+/// change or are taken off, as long as that terrain is there. With a `GroundLook`, what is drawn on it stays where it was in
+/// the ground, wherever it goes.
 ///
 /// ```
 /// # use bevy::prelude::*;
 /// # use bevy_burrow::prelude::*;
-/// # fn system(
-/// #     mut commands: Commands,
-/// #     mut found: MessageReader<LoosePieceFound>,
-/// #     terrains: Query<(&Terrain, &MaterialColors)>,
-/// #     mut meshes: ResMut<Assets<Mesh>>,
-/// # ) {
-/// for found in found.read() {
-///     let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
-///     let Some(mesh) = found.mesh(terrain, colors) else { continue };
-///     let piece = GroundPiece { terrain: found.terrain, origin: found.piece.bounds.min };
-///     let place = Transform::from_translation(found.origin()); // below the terrain, which may be scaled
-///     commands.entity(found.terrain).with_child((piece, Mesh3d(meshes.add(mesh)), place));
+/// fn show(
+///     mut commands: Commands,
+///     mut found: MessageReader<LoosePieceFound>,
+///     terrains: Query<(&Terrain, &MaterialColors)>,
+///     mut meshes: ResMut<Assets<Mesh>>,
+/// ) {
+///     for found in found.read() {
+///         let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
+///         let Some(mesh) = found.mesh(terrain, colors) else { continue };
+///         let piece = GroundPiece { terrain: found.terrain, origin: found.piece.bounds.min };
+///         let place = Transform::from_translation(found.origin()); // below the terrain, which may be scaled
+///         commands.entity(found.terrain).with_child((piece, Mesh3d(meshes.add(mesh)), place));
+///     }
 /// }
-/// # }
+/// # let mut app = App::new();
+/// // In the frame in which the ground loses it, and dressed.
+/// app.add_systems(Update, show.after(BurrowSystems::Commit).before(BurrowSystems::Dress));
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
@@ -108,6 +112,18 @@ impl From<TilePos> for Tile {
 impl From<ChunkPos> for Chunk {
     fn from(chunk: ChunkPos) -> Self {
         Self { x: chunk.x, y: chunk.y, z: chunk.z }
+    }
+}
+
+impl From<Tile> for TilePos {
+    fn from(Tile { x, z }: Tile) -> Self {
+        Self { x, z }
+    }
+}
+
+impl From<Chunk> for ChunkPos {
+    fn from(Chunk { x, y, z }: Chunk) -> Self {
+        Self { x, y, z }
     }
 }
 

@@ -1,5 +1,10 @@
-//! What a terrain hands on to its tiles and chunks: Bevy asks the entity of each mesh for its material, layers and shadows,
-//! and not that of the terrain.
+//! What a terrain hands on to its tiles, chunks and pieces: Bevy asks the entity of each mesh for its material, layers and
+//! shadows, and not that of the terrain.
+//!
+//! Bevy's `HierarchyPropagatePlugin` would hand them on to everything below a terrain, what a game has put there included,
+//! and to no piece that is elsewhere.
+
+use std::marker::PhantomData;
 
 use bevy::camera::visibility::RenderLayers;
 #[cfg(feature = "render")]
@@ -9,17 +14,28 @@ use bevy::prelude::*;
 use super::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
-/// Has layers and shadows handed on, to pieces too.
+/// Has layers and shadows handed on.
 pub(super) fn add(app: &mut App) {
-    add_with_pieces::<RenderLayers>(app);
+    hand_on_with_pieces::<RenderLayers>(app);
     #[cfg(feature = "render")]
     {
-        add_with_pieces::<NotShadowCaster>(app);
-        add_with_pieces::<NotShadowReceiver>(app);
+        hand_on_with_pieces::<NotShadowCaster>(app);
+        hand_on_with_pieces::<NotShadowReceiver>(app);
     }
 }
 
-fn add_with_pieces<C: Component + Clone>(app: &mut App) {
+/// On a piece that has a component of this type from its terrain, and not of its own.
+#[derive(Component)]
+pub(crate) struct HandedOn<C: Component>(PhantomData<fn() -> C>);
+
+impl<C: Component> Default for HandedOn<C> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
+}
+
+/// Has tiles and chunks wear a component of their terrain, and pieces as well.
+pub(crate) fn hand_on_with_pieces<C: Component + Clone>(app: &mut App) {
     hand_on::<C>(app);
     app.add_systems(
         Update,
@@ -78,15 +94,16 @@ fn give_to_all<C: Component + Clone>(
     }
 }
 
-fn take_from_pieces<C: Component>(
+/// Pieces of a terrain that has lost a component lose what they have from it.
+pub(crate) fn take_from_pieces<C: Component>(
     mut commands: Commands,
     mut removed: RemovedComponents<C>,
     bare: Query<(), (With<Terrain>, Without<C>)>,
-    pieces: Query<(Entity, &GroundPiece)>,
+    pieces: Query<(Entity, &GroundPiece), With<HandedOn<C>>>,
 ) {
     for terrain in removed.read().filter(|&entity| bare.contains(entity)) {
         for (piece, _) in pieces.iter().filter(|(_, piece)| piece.terrain == terrain) {
-            commands.entity(piece).try_remove::<C>();
+            commands.entity(piece).try_remove::<(C, HandedOn<C>)>();
         }
     }
 }
@@ -100,7 +117,7 @@ fn give_to_pieces<C: Component + Clone>(
     for (entity, piece, has_own) in &pieces {
         let Ok(own) = terrains.get(piece.terrain) else { continue };
         if own.is_changed() || piece.is_added() && !has_own {
-            commands.entity(entity).try_insert(C::clone(&own));
+            commands.entity(entity).try_insert((C::clone(&own), HandedOn::<C>::default()));
         }
     }
 }

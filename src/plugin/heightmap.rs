@@ -90,6 +90,7 @@ async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, st
 }
 
 /// Adds the heightmap asset and its loader, where there is an asset server.
+#[derive(Default)]
 pub struct HeightmapPlugin;
 
 impl Plugin for HeightmapPlugin {

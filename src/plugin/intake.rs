@@ -8,7 +8,8 @@ use super::{
     BrushApplied, BurrowFigures, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush, Undo,
     free_later,
 };
-use crate::brush::{Brush, Edit, Operation, Shape};
+use crate::brush::{Brush, BrushError, Edit, Operation, Shape};
+use crate::lattice::ChunkGrid;
 use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain};
 
 /// Moves brushes into their terrains' space and queues them. A terrain that a brush reaches and that can't take it
@@ -35,29 +36,25 @@ pub(super) fn collect_brushes(
         answers.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
     };
     for brush in brushes.read() {
-        let (mut is_answered, mut why) = (false, Rejection::OutsideWorld);
+        // What the brush is told if no terrain answers.
+        let mut unanswered = Some(Rejection::OutsideWorld);
         // A terrain is borrowed to be changed only once it takes a brush: for `Changed<Terrain>`, others stay as they are.
         for (entity, mut terrain) in &mut terrains {
             let Ok(place) = places.compute_global_transform(entity) else { continue };
-            let local = to_terrain(brush, &place);
-            let grid = terrain.world().grid();
-            match Edit::quantize(&local) {
-                Ok(edit) if edit.reach().intersection(grid.edit_bounds()).is_some() => {
+            match Claim::of(brush, &place, terrain.world().grid()) {
+                Claim::Taken(edit) => {
                     terrain.submit_quantized(edit);
-                    is_answered = true;
+                    unanswered = None;
                 }
-                Ok(_) => {}
-                Err(error) => match reaches(&local.shape, grid) {
-                    Some(true) => {
-                        reject(brush, Some(entity), error.into());
-                        is_answered = true;
-                    }
-                    Some(false) => {}
-                    None => why = error.into(),
-                },
+                Claim::Refused(error) => {
+                    reject(brush, Some(entity), error.into());
+                    unanswered = None;
+                }
+                Claim::Beside => {}
+                Claim::Nowhere(error) => unanswered = unanswered.map(|_| error.into()),
             }
         }
-        if !is_answered {
+        if let Some(why) = unanswered {
             reject(brush, None, why);
         }
     }
@@ -68,6 +65,33 @@ pub(super) fn collect_brushes(
         }
     }
     figures.main_thread = start.elapsed();
+}
+
+/// What a brush in world space is to a terrain.
+enum Claim {
+    /// An edit that reaches it.
+    Taken(Edit),
+    /// It reaches the terrain, which can't take it.
+    Refused(BrushError),
+    /// It does not reach the terrain.
+    Beside,
+    /// Its place is no number.
+    Nowhere(BrushError),
+}
+
+impl Claim {
+    fn of(brush: &Brush, place: &GlobalTransform, grid: ChunkGrid) -> Self {
+        let local = to_terrain(brush, place);
+        match Edit::quantize(&local) {
+            Ok(edit) if edit.reach().intersection(grid.edit_bounds()).is_some() => Self::Taken(edit),
+            Ok(_) => Self::Beside,
+            Err(error) => match reaches(&local.shape, grid) {
+                Some(true) => Self::Refused(error),
+                Some(false) => Self::Beside,
+                None => Self::Nowhere(error),
+            },
+        }
+    }
 }
 
 /// Queues steps through history, behind the brushes of this frame. One that no terrain can take is answered at once.
@@ -115,6 +139,16 @@ pub(super) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Ite
             ready: None,
         })
     })
+}
+
+/// A terrain that is [`LooseGround`] looks for pieces at once, whoever edits it.
+pub(super) fn start_looking(
+    new: On<Insert, (LooseGround, Terrain)>,
+    mut terrains: Query<(&mut Terrain, &LooseGround)>,
+) {
+    if let Ok((mut terrain, &loose)) = terrains.get_mut(new.entity) {
+        terrain.set_loose(Some(loose.into()));
+    }
 }
 
 /// A terrain that is no [`LooseGround`] any more looks for nothing.

@@ -23,6 +23,9 @@ use crate::terrain::{Drawn, Terrain, World};
 /// Shown is not painted: while textures are made or loaded, a terrain with a `GroundLook` has no material, and nothing of
 /// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
 /// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
+///
+/// It comes again whenever a terrain has loaded anew: another one took its place, or the game changed it by itself, with
+/// [`Terrain::apply`] or [`Terrain::undo`] say. Whoever spawns something then looks first whether it is there.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainReady {
     /// The terrain's entity.
@@ -88,7 +91,7 @@ pub(super) fn take_in(
     }
     let Ok(now) = places.p1().compute_global_transform(entity) else { return };
     if let Ok(place) = places.p2().get_mut(entity) {
-        put(place, now, terrain);
+        put(place, now);
     }
 }
 
@@ -153,18 +156,25 @@ pub(super) fn start_loading(
 /// Places terrains before anyone asks about them; Bevy itself does so only at the end of the frame, if at all.
 pub(super) fn place_terrains(
     places: TransformHelper,
-    mut terrains: Query<(Entity, &Terrain, &mut GlobalTransform)>,
+    mut terrains: Query<(Entity, &mut GlobalTransform), With<Terrain>>,
 ) {
-    for (entity, terrain, place) in &mut terrains {
-        let Ok(now) = places.compute_global_transform(entity) else { continue };
-        put(place, now, terrain);
+    for (entity, place) in &mut terrains {
+        match places.compute_global_transform(entity) {
+            Ok(now) => put(place, now),
+            Err(error) => warn_once!("the terrain {entity} is nowhere, and no brush reaches it: {error}"),
+        }
     }
 }
 
-fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform, terrain: &Terrain) {
+fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform) {
     if *place != now {
         *place = now;
-        warn_about_placement(&now, terrain.voxel_size());
+        if !keeps_bits(&now) {
+            warn_once!(
+                "a terrain is rotated, scaled by no power of two, or moved by a part of a voxel: hairline cracks may \
+                 show at its seams"
+            );
+        }
     }
 }
 
@@ -248,15 +258,52 @@ fn show(
     entities
 }
 
-/// Seams have the same bits on both sides as long as a terrain is evenly scaled and moved by whole voxels.
-fn warn_about_placement(place: &GlobalTransform, voxel_size: f32) {
+/// Have seams the same bits on both sides there? They have as long as a terrain is not turned, its voxels are as large as
+/// a power of two, and it is moved by whole ones.
+fn keeps_bits(place: &GlobalTransform) -> bool {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
-    let exact = scale == Vec3::splat(voxel_size)
+    scale == Vec3::splat(scale.x)
+        && is_power_of_two(scale.x)
         && rotation == Quat::IDENTITY
-        && (translation / voxel_size).fract() == Vec3::ZERO;
-    if !exact {
-        warn_once!(
-            "a terrain is rotated, stretched, or moved by a part of a voxel: hairline cracks may show at its seams"
-        );
+        && (translation / scale.x).fract() == Vec3::ZERO
+}
+
+fn is_power_of_two(number: f32) -> bool {
+    let has_mantissa = number.to_bits().trailing_zeros() < f32::MANTISSA_DIGITS - 1;
+    number.is_normal() && number > 0.0 && !has_mantissa
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seams_keep_their_bits_on_whole_voxels_of_a_power_of_two() {
+        let place = |x, scale| Transform::from_xyz(x, -3.0, 12.0).with_scale(Vec3::splat(scale));
+        let keeps = |place: Transform| keeps_bits(&place.into());
+        for (x, scale) in [(70.0, 1.0), (0.5, 0.5), (3.0, 0.0625), (-8.0, 1.0)] {
+            assert!(keeps(place(x, scale)), "{scale} at {x}");
+        }
+        for (x, scale) in [(70.5, 1.0), (0.75, 0.5), (70.0, 2.0), (0.0, 0.3), (12.0, 3.0), (0.0, -1.0)] {
+            assert!(!keeps(place(x, scale)), "{scale} at {x}");
+        }
+        assert!(!keeps(Transform::from_scale(Vec3::new(1.0, 2.0, 1.0))));
+        assert!(!keeps(Transform::from_rotation(Quat::from_rotation_y(0.5))));
+    }
+
+    #[test]
+    fn a_parent_may_have_a_scale_of_a_power_of_two_as_well() {
+        let terrain = Transform::from_xyz(1.5, 2.0, -4.0).with_scale(Vec3::splat(0.5));
+        let below = |parent: Transform| keeps_bits(&(GlobalTransform::from(parent) * terrain));
+        assert!([0.25, 1.0, 4.0].into_iter().all(|scale| below(Transform::from_scale(Vec3::splat(scale)))));
+        assert!(!below(Transform::from_scale(Vec3::splat(3.0))));
+        // Half a voxel of a metre.
+        assert!(!below(Transform::from_xyz(0.5, 0.0, 0.0).with_scale(Vec3::splat(2.0))));
+    }
+
+    #[test]
+    fn powers_of_two_have_no_mantissa() {
+        assert!([1.0, 0.125, 64.0, f32::MIN_POSITIVE].into_iter().all(is_power_of_two));
+        assert!(![0.0, 3.0, 1.5, -2.0, f32::INFINITY, f32::NAN].into_iter().any(is_power_of_two));
     }
 }

@@ -9,7 +9,7 @@ use super::meshes::Wardrobe;
 use crate::brush::Brush;
 use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
 
-/// A brush in world space: every terrain that it reaches obeys it.
+/// A brush in world space: every terrain that it reaches obeys it, hidden ones too.
 ///
 /// On a terrain that a parent stretches, a brush's points, axes and heights are where the world has them. Its sizes (radii,
 /// half sides, amounts, falloff, roughness) are scaled by the cube root of what a volume is scaled by: counted in voxels, a
@@ -124,7 +124,7 @@ pub struct ChunkCreated {
     pub entity: Entity,
 }
 
-/// A chunk's mesh was swapped. Its removal is Bevy's own `On<Remove, Chunk>`.
+/// A chunk's surface changed, on servers without meshes too. Its removal is Bevy's own `On<Remove, Chunk>`.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChunkChanged {
     /// The chunk's entity.

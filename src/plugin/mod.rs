@@ -11,7 +11,8 @@
 //!
 //! What a game puts on the terrain's entity goes for its tiles, chunks and pieces: a `MeshMaterial3d`, [`RenderLayers`], and,
 //! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. Bevy asks each mesh for its own, so new tiles,
-//! chunks and [`GroundPiece`]s get the terrain's, and follow as it is put on, changed and taken off.
+//! chunks and [`GroundPiece`]s get the terrain's, and follow as it is put on, changed and taken off. A piece that comes with
+//! its own keeps that until the terrain's changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //!
@@ -40,7 +41,7 @@ pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Ti
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, tell};
 #[cfg(feature = "render")]
-pub(crate) use hand_on::hand_on;
+pub(crate) use hand_on::{HandedOn, hand_on, hand_on_with_pieces, take_from_pieces};
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
@@ -104,6 +105,7 @@ pub enum BurrowSystems {
 }
 
 /// Transactions, entities and messages; works in `MinimalPlugins`.
+#[derive(Default)]
 pub struct TerrainPlugin;
 
 impl Plugin for TerrainPlugin {
@@ -125,6 +127,7 @@ impl Plugin for TerrainPlugin {
             .add_observer(load::take_in)
             .add_observer(intake::free_history)
             .add_observer(intake::answer_with_terrain)
+            .add_observer(intake::start_looking)
             .add_observer(intake::stop_looking)
             .add_observer(entities::remove_with_terrain)
             .configure_sets(

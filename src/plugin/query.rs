@@ -9,7 +9,7 @@ use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 use crate::terrain::{Span, Terrain};
 
-/// A system parameter that asks all terrains about the ground, in world space.
+/// A system parameter that asks all terrains about the ground, in world space, hidden ones too.
 ///
 /// Terrains may be moved, rotated and evenly scaled; for [`height`](Self::height) and [`spans`](Self::spans) they must
 /// not be rotated. A terrain is asked where it was when it was inserted, or at the start of this frame's

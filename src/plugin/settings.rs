@@ -17,7 +17,7 @@ use crate::terrain::LooseSettings;
 /// # use bevy_burrow::prelude::*;
 /// App::new().insert_resource(BurrowEngine(Engine::new(Backend::Cpu)));
 /// ```
-#[derive(Resource, Clone, Deref)]
+#[derive(Resource, Clone, Debug, Deref)]
 pub struct BurrowEngine(pub Engine);
 
 impl Default for BurrowEngine {
@@ -33,7 +33,7 @@ pub struct BurrowSettings {
     /// Meshes swapped per frame. A commit is never cut: one that is larger goes in whole, and others wait for the next
     /// frame.
     pub swaps_per_frame: usize,
-    /// Tile meshes handed to the renderer per frame while a terrain loads. They show only when all are there.
+    /// Meshes of tiles and chunks handed to the renderer per frame while a terrain loads. They show only when all are there.
     pub loads_per_frame: usize,
 }
 
@@ -44,7 +44,9 @@ impl Default for BurrowSettings {
 }
 
 /// Put on a terrain's entity, brushes look for pieces of ground that they cut off, and [`LoosePieceFound`] tells of each;
-/// take it off, and they stop.
+/// take it off, and they stop. What a game [applies](crate::terrain::Terrain::apply) by itself looks for them too. A terrain
+/// that is not spawned yet knows nothing of this: before a journal is replayed on it,
+/// `terrain.set_loose(Some(loose.into()))` has to tell it.
 ///
 /// ```
 /// # use bevy::prelude::*;

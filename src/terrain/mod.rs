@@ -103,6 +103,12 @@ enum Work {
 ///
 /// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
 /// to it. Committing by oneself, with [`apply`](Self::apply) say, works too, but then all of its meshes are made again.
+///
+/// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
+/// any other; a parent may scale it further.
+///
+/// To change levels, insert a new one on the same entity. Assigned through `&mut Terrain`, a new one is shown as well, but
+/// what waited in the old one goes without a receipt, and debris that fell from it stays.
 pub struct Terrain {
     world: Arc<World>,
     engine: Option<Engine>,
@@ -242,6 +248,7 @@ impl Terrain {
     /// [`commit`](Self::commit).
     ///
     /// Steps that find nothing to undo or redo need no transaction; they are answered at once.
+    #[must_use = "the terrain waits for the commit of its transaction"]
     pub fn begin(&mut self) -> Option<Transaction> {
         self.begin_for(false)
     }
@@ -339,6 +346,9 @@ impl Terrain {
     /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.
     /// Returns the receipts of these brushes; those of brushes that waited are kept for
     /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
+    ///
+    /// All of it is one transaction, and so one step back; a game that replays a journal may want to
+    /// [forget](Self::clear_history) it. Where steps through history waited, brushes before and after each are one.
     ///
     /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
     pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(

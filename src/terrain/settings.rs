@@ -1,7 +1,8 @@
 //! Settings that a terrain is made with, and what may be wrong with them.
 
 /// How a terrain is cut up and how large it is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct TerrainSettings {
     /// Cells along a chunk's side, 8..=128. Small chunks redraw faster, large ones need fewer draws.
     pub chunk_size: u32,

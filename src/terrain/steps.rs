@@ -49,6 +49,27 @@ impl Terrain {
         self.timeline.budget()
     }
 
+    /// Forgets what can be undone and redone; the budget stays. What waits or is under way comes into history once it is
+    /// committed, and steps that wait find nothing.
+    ///
+    /// ```
+    /// # use bevy_burrow::prelude::*;
+    /// # use glam::Vec3;
+    /// # let journal = [Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0))];
+    /// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+    /// terrain.apply(&journal);
+    /// assert_eq!(terrain.history().undos, 1);
+    /// // Nobody who loads a game takes back what was dug in it.
+    /// terrain.clear_history();
+    /// assert_eq!(terrain.history(), History::default());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn clear_history(&mut self) {
+        let budget = self.undo_budget();
+        self.set_undo_budget(0);
+        self.set_undo_budget(budget);
+    }
+
     /// Bytes that the terrain takes: its world, and its history.
     pub fn memory(&self) -> Memory {
         Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
@@ -105,14 +126,21 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
-    use crate::terrain::TerrainSettings;
+    use crate::terrain::{HistoryRejection, TerrainSettings};
+
+    fn terrain() -> Terrain {
+        let ground = Ground::flat(64, 64, 8.0).expect("valid");
+        Terrain::new(ground, &TerrainSettings::default()).expect("valid")
+    }
+
+    fn dig(x: f32) -> Brush {
+        Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0))
+    }
 
     #[test]
     fn what_a_smaller_budget_has_no_room_for_is_left_to_whoever_sets_it() {
-        let ground = Ground::flat(64, 64, 8.0).expect("valid");
-        let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+        let mut terrain = terrain();
         assert_eq!(terrain.undo_budget(), UNDO_BUDGET);
-        let dig = |x| Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 30.0), 5.0));
         for x in [20.0, 40.0] {
             terrain.apply([dig(x)]);
         }
@@ -121,5 +149,47 @@ mod tests {
         assert_eq!((terrain.undo_budget(), terrain.history().undos), (1 << 30, 2));
         assert!(!terrain.rebudget_undo(0).is_empty());
         assert_eq!((terrain.undo_budget(), terrain.history()), (0, History::default()));
+    }
+
+    fn counts(terrain: &Terrain) -> (usize, usize) {
+        let History { undos, redos, .. } = terrain.history();
+        (undos, redos)
+    }
+
+    /// Runs what waits, forgets history meanwhile, and commits.
+    fn clear_meanwhile(terrain: &mut Terrain) {
+        let commit = terrain.begin().expect("something waits").run();
+        terrain.clear_history();
+        assert_eq!(terrain.history(), History::default());
+        terrain.commit(commit).expect("the one under way");
+    }
+
+    #[test]
+    fn history_that_is_forgotten_begins_anew_with_what_was_under_way() {
+        let mut terrain = terrain();
+        terrain.set_undo_budget(1 << 30);
+        terrain.apply([dig(20.0)]);
+        let before = terrain.world().hash();
+        terrain.submit(&dig(40.0));
+        clear_meanwhile(&mut terrain);
+        let after = terrain.world().hash();
+        assert_eq!((terrain.undo_budget(), counts(&terrain)), (1 << 30, (1, 0)));
+        terrain.submit_undo();
+        clear_meanwhile(&mut terrain);
+        assert_eq!((terrain.world().hash(), counts(&terrain)), (before, (0, 1)));
+        assert!(terrain.redo().outcome.is_ok());
+        assert_eq!(terrain.world().hash(), after);
+    }
+
+    #[test]
+    fn steps_that_wait_when_history_is_forgotten_find_nothing() {
+        let mut terrain = terrain();
+        terrain.apply([dig(20.0)]);
+        terrain.submit_undo();
+        terrain.clear_history();
+        assert!(terrain.begin().is_none());
+        let receipts = terrain.take_history_receipts();
+        let outcomes: Vec<_> = receipts.into_iter().map(|receipt| receipt.outcome).collect();
+        assert_eq!(outcomes, [Err(HistoryRejection::NothingToUndo)]);
     }
 }

@@ -4,11 +4,11 @@ use std::marker::PhantomData;
 
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, GroundPiece, hand_on};
-use crate::terrain::Terrain;
+use crate::plugin::hand_on_with_pieces;
 
-/// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles and chunks, and again whenever it changes; and to
-/// each [`GroundPiece`] once.
+/// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles, chunks and
+/// [pieces](crate::plugin::GroundPiece), again whenever it changes, and takes it off with the terrain's. A piece that comes
+/// with its own keeps that until the terrain's changes.
 ///
 /// `BurrowPlugins` has it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
 /// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
@@ -24,19 +24,6 @@ impl<M: Material> Default for TerrainMaterialPlugin<M> {
 
 impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
-        hand_on::<MeshMaterial3d<M>>(app);
-        app.add_systems(Update, dress_pieces::<M>.in_set(BurrowSystems::Dress));
-    }
-}
-
-fn dress_pieces<M: Material>(
-    mut commands: Commands,
-    bare: Query<(Entity, &GroundPiece), Without<MeshMaterial3d<M>>>,
-    terrains: Query<&MeshMaterial3d<M>, With<Terrain>>,
-) {
-    for (entity, piece) in &bare {
-        if let Ok(material) = terrains.get(piece.terrain) {
-            commands.entity(entity).try_insert(material.clone());
-        }
+        hand_on_with_pieces::<MeshMaterial3d<M>>(app);
     }
 }

@@ -45,23 +45,27 @@ pub struct DiggingRules {
 
 impl DiggingRules {
     /// The rules with another hardness of a material.
+    #[must_use]
     pub fn with_hardness(mut self, material: MaterialId, hardness: u8) -> Self {
         self.hardness.insert(material, hardness);
         self
     }
 
     /// The rules with one more material that no brush takes away.
+    #[must_use]
     pub fn with_unbreakable(mut self, material: MaterialId) -> Self {
         self.unbreakable.insert(material);
         self
     }
 
     /// The rules with bedrock below a height, in voxels.
+    #[must_use]
     pub fn with_bedrock(self, below: i32) -> Self {
         Self { bedrock: Some(below), ..self }
     }
 
     /// The rules with one more protected box.
+    #[must_use]
     pub fn with_protected(mut self, samples: LatticeBox) -> Self {
         self.protected.push(samples);
         self

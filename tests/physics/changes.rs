@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
-use bevy_burrow::physics::{Character, GroundBody, GroundShape, debris_collider};
+use bevy_burrow::physics::{Character, GroundBody, GroundContact, GroundShape, debris_collider};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 
@@ -310,4 +310,34 @@ fn who_is_put_into_the_ground_is_lifted_and_what_is_buried_on_purpose_stays() {
     assert!((8.3..8.7).contains(&stage.place(lost).y), "{}", stage.place(lost));
     assert_eq!((stage.place(kept), stage.place(off)), (deep(20.0), deep(30.0)));
     assert_eq!(stage.figures().lifted, 1);
+}
+
+#[test]
+fn ground_that_changes_is_to_bodies_what_the_game_says_by_then() {
+    let (mut stage, _) = Stage::with_ground(level(64, 1.0));
+    let before = stage.ground();
+    let plain = GroundContact::default();
+    let ice = GroundContact {
+        friction: Some(Friction::new(0.02)),
+        restitution: Some(Restitution::new(0.8)),
+        layers: CollisionLayers::from_bits(1, 3),
+    };
+    let like = |stage: &mut Stage, contact: &GroundContact| {
+        let mut ground = stage.ground();
+        ground.retain(|&body| {
+            let body = stage.app.world().entity(body);
+            let (friction, restitution) = (body.get().copied(), body.get().copied());
+            let layers = body.get().copied().unwrap_or_default();
+            GroundContact { friction, restitution, layers } == *contact
+        });
+        ground
+    };
+    stage.app.insert_resource(ice.clone());
+    stage.dig([pit(24.0, 8.0, 24.0, 3.0)]);
+    let changed = like(&mut stage, &ice);
+    assert_eq!(changed.len(), 2, "a tile, and a new chunk");
+    assert!(changed.iter().any(|body| before.contains(body)), "the tile's body stays");
+    stage.app.insert_resource(plain.clone());
+    stage.dig([pit(24.0, 8.0, 24.0, 4.0)]);
+    assert_eq!(like(&mut stage, &plain).len(), before.len() + 1);
 }

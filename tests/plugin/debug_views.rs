@@ -1,5 +1,6 @@
 //! Debug views: drawn below their terrains while they are on, and gone when they are off.
 
+use bevy::camera::visibility::RenderLayers;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy_burrow::debug::{BurrowDebug, BurrowDebugPlugin, DebugLines, DebugView};
@@ -112,6 +113,24 @@ fn lines_go_with_their_terrain() {
     world.despawn(other);
     stage.frames(2);
     assert_eq!(stage.count::<DebugLines>(), 0);
+}
+
+#[test]
+fn lines_are_on_the_layers_of_their_terrain() {
+    let (mut stage, terrain) = dug_stage();
+    switch(&mut stage, DebugView::Chunks, true);
+    for layers in [Some(RenderLayers::layer(2)), Some(RenderLayers::layer(3)), None] {
+        let mut entity = stage.app.world_mut().entity_mut(terrain);
+        match layers.clone() {
+            Some(layers) => entity.insert(layers),
+            None => entity.remove::<RenderLayers>(),
+        };
+        stage.frame();
+        let world = stage.app.world_mut();
+        let mut lines = world.query_filtered::<Option<&RenderLayers>, With<DebugLines>>();
+        let own: Vec<_> = lines.iter(world).map(|own| own.cloned()).collect();
+        assert!(!own.is_empty() && own.iter().all(|own| *own == layers), "{own:?} for {layers:?}");
+    }
 }
 
 #[test]

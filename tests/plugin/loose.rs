@@ -52,3 +52,21 @@ fn what_breaks_off_is_told_with_its_mesh() {
         assert_ne!(stage.hash(terrain), model.world().hash());
     }
 }
+
+#[test]
+fn a_game_that_edits_by_itself_finds_what_it_cuts_off_before_any_brush() {
+    let loose = LooseGround { debris: 9000, ..default() };
+    let spawns: [fn(&mut World, LooseGround) -> Entity; 3] = [
+        |world, loose| world.spawn((table(), loose)).id(),
+        |world, loose| world.spawn(table()).insert(loose).id(),
+        |world, loose| world.spawn(loose).insert(table()).id(),
+    ];
+    for spawn in spawns {
+        let mut stage = Stage::server();
+        let world = stage.app.world_mut();
+        let entity = spawn(world, loose);
+        let mut terrain = world.get_mut::<Terrain>(entity).expect("a terrain");
+        let receipts = terrain.apply([saw()]);
+        assert_eq!(receipts[0].outcome.as_ref().map(|applied| applied.loose.len()), Ok(1));
+    }
+}

@@ -106,6 +106,55 @@ fn a_material_that_is_taken_off_a_terrain_is_taken_off_its_tiles() {
     assert!(is_bare::<StandardMaterial>(&mut stage), "tiles wear both materials");
 }
 
+/// What a piece wears: the standard material, and that of the game's own.
+fn worn(stage: &Stage, piece: Entity) -> (Option<Handle<StandardMaterial>>, Option<Handle<Glow>>) {
+    let piece = stage.app.world().entity(piece);
+    let standard = piece.get::<MeshMaterial3d<StandardMaterial>>();
+    let glow = piece.get::<MeshMaterial3d<Glow>>();
+    (standard.map(|worn| worn.0.clone()), glow.map(|worn| worn.0.clone()))
+}
+
+#[test]
+fn pieces_wear_what_their_terrain_wears() {
+    let mut stage = stage();
+    let terrain = stage.show(level(1.0));
+    let [first, second] = [(); 2].map(|()| add(&mut stage, StandardMaterial::default()));
+    let glow = add(&mut stage, Glow::default());
+    let piece = stage.app.world_mut().spawn(GroundPiece { terrain, origin: IVec3::ZERO }).id();
+    for material in [first, second] {
+        stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(material.clone()));
+        stage.frame();
+        assert_eq!(worn(&stage, piece), (Some(material), None));
+    }
+    stage
+        .app
+        .world_mut()
+        .entity_mut(terrain)
+        .remove::<MeshMaterial3d<StandardMaterial>>()
+        .insert(MeshMaterial3d(glow.clone()));
+    stage.frame();
+    assert_eq!(worn(&stage, piece), (None, Some(glow)));
+}
+
+#[test]
+fn a_piece_keeps_the_material_that_it_came_with_until_the_terrain_gets_another_one() {
+    let mut stage = stage();
+    let terrain = stage.show(level(1.0));
+    let [first, second, own] = [(); 3].map(|()| add(&mut stage, StandardMaterial::default()));
+    stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(first));
+    stage.frame();
+    let piece = GroundPiece { terrain, origin: IVec3::ZERO };
+    let piece = stage.app.world_mut().spawn((piece, MeshMaterial3d(own.clone()))).id();
+    stage.frame();
+    assert_eq!(worn(&stage, piece), (Some(own.clone()), None));
+    stage.app.world_mut().entity_mut(terrain).remove::<MeshMaterial3d<StandardMaterial>>();
+    stage.frame();
+    assert_eq!(worn(&stage, piece), (Some(own), None), "it did not come from the terrain");
+    stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(second.clone()));
+    stage.frame();
+    assert_eq!(worn(&stage, piece), (Some(second), None));
+}
+
 #[test]
 fn vertex_colours_are_those_of_the_terrain() {
     let mut stage = Stage::drawing();

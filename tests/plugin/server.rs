@@ -2,6 +2,7 @@
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
+use bevy_burrow::plugin::ChunkChanged;
 use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
@@ -57,5 +58,27 @@ fn questions_are_answered_on_a_server_too() {
         };
         let answers = stage.app.world_mut().run_system_once(ask).expect("it runs");
         assert_eq!(answers, (Some(24.0), Some(26.0)));
+    }
+}
+
+#[test]
+fn a_server_hears_of_a_chunk_that_is_dug_again() {
+    #[derive(Resource, Default)]
+    struct Told(Vec<Entity>);
+
+    for mut stage in [Stage::drawing(), Stage::server()] {
+        stage
+            .app
+            .init_resource::<Told>()
+            .add_observer(|changed: On<ChunkChanged>, mut all: ResMut<Told>| all.0.push(changed.entity));
+        stage.show(level(1.0));
+        let mut deepen = |radius| {
+            stage.send(dig(24.0, 8.0, 24.0, radius));
+            stage.settle();
+            (stage.with_component::<Chunk>(), stage.app.world().resource::<Told>().0.clone())
+        };
+        let (chunks, changed) = deepen(3.0);
+        assert_eq!((chunks.len(), changed), (1, vec![]), "it is new");
+        assert_eq!(deepen(4.0), (chunks.clone(), chunks));
     }
 }

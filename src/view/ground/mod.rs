@@ -37,7 +37,7 @@ use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, hand_on};
+use crate::plugin::{BurrowSystems, hand_on, take_from_pieces};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -76,7 +76,9 @@ fn keep_materials(app: &mut App) {
         Update,
         (
             (dress, undress).chain().after(BurrowSystems::Begin).before(BurrowSystems::Dress),
-            pieces::dress.in_set(BurrowSystems::Dress),
+            (take_from_pieces::<MeshMaterial3d<GroundMaterial>>, pieces::dress)
+                .chain()
+                .in_set(BurrowSystems::Dress),
         ),
     )
     // Where meshes are drawn is known then; a material that changes later is drawn as it was.

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::look::GroundLook;
 use super::material::{GroundExtension, GroundMaterial};
-use crate::plugin::GroundPiece;
+use crate::plugin::{GroundPiece, HandedOn};
 use crate::terrain::Terrain;
 
 /// What a piece of this terrain is drawn with.
@@ -24,7 +24,8 @@ pub(super) fn dress(
         let Some(terrain) = terrain.and_then(|terrain| materials.get(&terrain.0)) else { continue };
         let own =
             GroundMaterial { base: terrain.base.clone(), extension: of_piece(&terrain.extension, piece) };
-        commands.entity(entity).try_insert(MeshMaterial3d(materials.add(own)));
+        let own = MeshMaterial3d(materials.add(own));
+        commands.entity(entity).try_insert((own, HandedOn::<MeshMaterial3d<GroundMaterial>>::default()));
     }
 }
 
@@ -105,6 +106,8 @@ mod tests {
 
         app.world_mut().entity_mut(terrain).remove::<GroundLook>();
         app.update();
+        let is_dressed = |entity| app.world().get::<MeshMaterial3d<GroundMaterial>>(entity).is_some();
+        assert!(!pieces.iter().any(|&(_, entity)| is_dressed(entity)) && is_dressed(stranger));
         app.world_mut().entity_mut(terrain).insert(GroundLook::default());
         app.update();
         check(&app, "a look that came back");

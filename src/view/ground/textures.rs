@@ -1,5 +1,7 @@
 //! Textures: baked by the project, or a game's own.
 
+use std::fmt;
+
 use bevy::asset::LoadState;
 use bevy::prelude::*;
 use bevy::render::render_resource::WgpuFeatures;
@@ -64,6 +66,16 @@ pub struct GroundLoading {
     misfit: Option<Misfit>,
     /// What those who watch for changes know.
     told: Answers,
+}
+
+impl fmt::Debug for GroundLoading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GroundLoading")
+            .field("progress", &self.progress())
+            .field("is_ready", &self.is_ready())
+            .field("failure", &self.failure())
+            .finish_non_exhaustive()
+    }
 }
 
 /// What can be asked of [`GroundLoading`].
