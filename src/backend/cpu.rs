@@ -1,12 +1,14 @@
 //! The processor, with all threads of the current rayon pool where there is enough to do.
 
 use std::cell::RefCell;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
 use super::Compute;
 use crate::surface::block::{Block, Mesher, Parts};
-use crate::surface::fresh::{FreshParts, PartLists};
+use crate::surface::fresh::{FreshParts, Group, PartLists};
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 
@@ -16,13 +18,20 @@ pub(crate) const PARALLEL_BLOCKS: usize = 48;
 /// How many stacks of bricks a thread takes at a time.
 const STACKS: usize = 4;
 
-/// Most vertices whose memory a thread keeps for its next transaction.
-const KEPT_VERTICES: usize = 1 << 16;
+/// About how many vertices a list has room for that several threads make.
+const LIST: usize = 1 << 13;
+
+/// Most lists whose memory is kept for the next large transaction, for each thread; and for so many threads at least.
+const KEPT_LISTS: usize = 8;
+const FEW_THREADS: usize = 4;
 
 thread_local! {
     /// Working memory of the mesher, and parts that wait for assembly.
     static MESHER: RefCell<(Mesher, Parts)> = RefCell::default();
 }
+
+/// Memory for parts that several threads make.
+static KEPT: Mutex<Vec<Parts>> = Mutex::new(Vec::new());
 
 /// The processor.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,41 +50,81 @@ impl Compute for Cpu {
         then: &mut dyn FnMut(&dyn FreshParts),
     ) {
         meanwhile();
-        if blocks.len() >= PARALLEL_BLOCKS {
-            // Meshed into memory that is there already, and copied out as large as it has to be.
-            let copy = |blocks: &&[Block]| {
-                let parts = mesh(view, blocks);
-                let copy = parts.clone();
-                keep(parts);
-                copy
-            };
-            let parts: Vec<Parts> = groups(blocks).par_iter().with_max_len(1).map(copy).collect();
-            then(&PartLists::new(&parts));
-            // Freeing many lists takes its time.
-            parts.into_par_iter().for_each(drop);
+        if blocks.len() < PARALLEL_BLOCKS {
+            let mut parts = MESHER.with_borrow_mut(|(_, kept)| std::mem::take(kept));
+            mesh(view, blocks, &mut parts);
+            then(&parts);
+            parts.clear();
+            MESHER.with_borrow_mut(|(_, kept)| *kept = parts);
             return;
         }
-        let parts = [mesh(view, blocks)];
-        then(&PartLists::new(&parts));
-        let [parts] = parts;
-        keep(parts);
+        let lists = Lists::default();
+        let group = |blocks: &&[Block]| {
+            let (list, mut parts) = lists.take();
+            let group = Group { count: blocks.len(), list, first: parts.list.len() };
+            mesh(view, blocks, &mut parts);
+            lists.put(list, parts);
+            group
+        };
+        let groups: Vec<Group> = groups(blocks).par_iter().with_max_len(1).map(group).collect();
+        let lists = lists.all();
+        then(&PartLists::new(&lists, &groups));
+        keep(lists);
     }
 }
 
-/// Meshes blocks on this thread, into memory that [`keep`] should get back.
-fn mesh(view: &WorldView, blocks: &[Block]) -> Parts {
-    MESHER.with_borrow_mut(|(mesher, parts)| {
-        parts.clear();
-        mesher.mesh(view, blocks, parts);
-        std::mem::take(parts)
-    })
+/// Meshes blocks on this thread.
+fn mesh(view: &WorldView, blocks: &[Block], parts: &mut Parts) {
+    MESHER.with_borrow_mut(|(mesher, _)| mesher.mesh(view, blocks, parts));
 }
 
-/// Keeps memory for the next call, unless it is much.
-fn keep(parts: Parts) {
-    if parts.vertices.capacity() <= KEPT_VERTICES {
-        MESHER.with_borrow_mut(|(_, kept)| *kept = parts);
+/// Lists of parts that threads add to, until they are full. Each is in the hands of one thread at a time.
+#[derive(Default)]
+struct Lists {
+    count: AtomicUsize,
+    /// By number: those that nobody has, and that have room.
+    open: Mutex<Vec<(usize, Parts)>>,
+    full: Mutex<Vec<(usize, Parts)>>,
+}
+
+impl Lists {
+    /// A list with room that nobody has, and its number.
+    fn take(&self) -> (usize, Parts) {
+        let open = lock(&self.open).pop();
+        open.unwrap_or_else(|| {
+            let kept = lock(&KEPT).pop();
+            (self.count.fetch_add(1, Ordering::Relaxed), kept.unwrap_or_else(|| Parts::with_room(LIST)))
+        })
     }
+
+    /// Takes a list back.
+    fn put(&self, number: usize, parts: Parts) {
+        let is_full = parts.vertices.len() > LIST / 4 * 3;
+        lock(if is_full { &self.full } else { &self.open }).push((number, parts));
+    }
+
+    /// All of them, by number.
+    fn all(self) -> Vec<Parts> {
+        let [mut all, full] =
+            [self.open, self.full].map(|lists| lists.into_inner().unwrap_or_else(PoisonError::into_inner));
+        all.extend(full);
+        all.sort_unstable_by_key(|&(number, _)| number);
+        all.into_iter().map(|(_, parts)| parts).collect()
+    }
+}
+
+/// Keeps lists for the next transaction, unless they are many or large.
+fn keep(mut lists: Vec<Parts>) {
+    lists.iter_mut().for_each(Parts::clear);
+    lists.retain(|parts| parts.vertices.capacity() <= 2 * LIST && parts.indices.capacity() <= 12 * LIST);
+    let most = KEPT_LISTS * rayon::current_num_threads().max(FEW_THREADS);
+    let mut kept = lock(&KEPT);
+    lists.truncate(most.saturating_sub(kept.len()));
+    kept.append(&mut lists);
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Blocks in groups of some stacks of bricks.

@@ -59,6 +59,15 @@ pub struct Parts {
 }
 
 impl Parts {
+    /// An empty list with room for about so many vertices and what comes with them.
+    pub fn with_room(vertices: usize) -> Self {
+        Self {
+            list: Vec::with_capacity(vertices / 32),
+            vertices: Vec::with_capacity(vertices),
+            indices: Vec::with_capacity(vertices * 6),
+        }
+    }
+
     /// Forgets all parts and keeps the memory.
     pub fn clear(&mut self) {
         self.list.clear();

@@ -58,28 +58,51 @@ impl FreshVertices<'_> {
     }
 }
 
-/// Lists of parts, one after the other.
+impl FreshParts for Parts {
+    fn part(&self, number: usize) -> Option<FreshPart<'_>> {
+        let (vertices, indices) = self.get(number)?;
+        Some(FreshPart { vertices: FreshVertices::Made(vertices), indices })
+    }
+}
+
+/// Blocks that follow each other, and whose parts do in some list.
+#[derive(Clone, Copy)]
+pub(crate) struct Group {
+    /// How many.
+    pub count: usize,
+    /// The number of the list.
+    pub list: usize,
+    /// Where they begin in it.
+    pub first: usize,
+}
+
+/// Parts in several lists, group by group.
 pub(crate) struct PartLists<'a> {
     lists: &'a [Parts],
-    /// Of each, the number of the block that it begins with.
+    groups: &'a [Group],
+    /// Of each group, the number of the block that it begins with.
     firsts: Vec<usize>,
 }
 
 impl<'a> PartLists<'a> {
-    pub fn new(lists: &'a [Parts]) -> Self {
-        let count = |end: &mut usize, parts: &Parts| {
+    pub fn new(lists: &'a [Parts], groups: &'a [Group]) -> Self {
+        let first = |end: &mut usize, group: &Group| {
             let first = *end;
-            *end += parts.list.len();
+            *end += group.count;
             Some(first)
         };
-        Self { lists, firsts: lists.iter().scan(0, count).collect() }
+        Self { lists, groups, firsts: groups.iter().scan(0, first).collect() }
     }
 }
 
 impl FreshParts for PartLists<'_> {
     fn part(&self, number: usize) -> Option<FreshPart<'_>> {
-        let list = self.firsts.partition_point(|&first| first <= number).checked_sub(1)?;
-        let (vertices, indices) = self.lists.get(list)?.get(number - self.firsts[list])?;
-        Some(FreshPart { vertices: FreshVertices::Made(vertices), indices })
+        let at = self.firsts.partition_point(|&first| first <= number).checked_sub(1)?;
+        let Group { count, list, first } = self.groups[at];
+        let number = number - self.firsts[at];
+        if number >= count {
+            return None;
+        }
+        self.lists.get(list)?.part(first + number)
     }
 }
