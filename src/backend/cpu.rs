@@ -21,9 +21,11 @@ const STACKS: usize = 4;
 /// About how many vertices a list has room for that several threads make.
 const LIST: usize = 1 << 13;
 
-/// Most lists whose memory is kept for the next large transaction, for each thread; and for so many threads at least.
+/// Most lists whose memory is kept for the next large transaction, for each thread; and for how many threads at least and at
+/// most. A list takes some 400 KB, and none that is kept takes more than 1.2 MB.
 const KEPT_LISTS: usize = 8;
 const FEW_THREADS: usize = 4;
+const MANY_THREADS: usize = 8;
 
 thread_local! {
     /// Working memory of the mesher, and parts that wait for assembly.
@@ -99,7 +101,7 @@ impl Lists {
 
     /// Takes a list back.
     fn put(&self, number: usize, parts: Parts) {
-        let is_full = parts.vertices.len() > LIST / 4 * 3;
+        let is_full = parts.vertices.len() > LIST / 4 * 3 || parts.list.len() > LIST;
         lock(if is_full { &self.full } else { &self.open }).push((number, parts));
     }
 
@@ -116,8 +118,10 @@ impl Lists {
 /// Keeps lists for the next transaction, unless they are many or large.
 fn keep(mut lists: Vec<Parts>) {
     lists.iter_mut().for_each(Parts::clear);
-    lists.retain(|parts| parts.vertices.capacity() <= 2 * LIST && parts.indices.capacity() <= 12 * LIST);
-    let most = KEPT_LISTS * rayon::current_num_threads().max(FEW_THREADS);
+    lists.retain(|Parts { list, vertices, indices }| {
+        list.capacity().max(vertices.capacity()) <= 2 * LIST && indices.capacity() <= 12 * LIST
+    });
+    let most = KEPT_LISTS * rayon::current_num_threads().clamp(FEW_THREADS, MANY_THREADS);
     let mut kept = lock(&KEPT);
     lists.truncate(most.saturating_sub(kept.len()));
     kept.append(&mut lists);

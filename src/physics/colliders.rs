@@ -41,7 +41,7 @@ pub struct GroundBody {
 }
 
 /// What ground is to bodies. A change counts for each collider from when it is made, or made anew because its ground
-/// changed.
+/// changed; what a game puts on a [`GroundBody`] itself stays until then.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct GroundContact {
@@ -53,14 +53,19 @@ pub struct GroundContact {
     pub layers: CollisionLayers,
 }
 
+/// What was said of ground when a body became like that.
+#[derive(Component)]
+struct Applied(GroundContact);
+
 impl GroundContact {
-    /// Has a body of ground be like this. Avian looks its layers up whenever they are put on, so not without need.
-    fn apply(&self, body: &mut EntityWorldMut) {
-        if body.get::<CollisionLayers>() != Some(&self.layers) {
+    /// Has a body of ground be like this, unless it was told so before: what a game put on that body itself stays.
+    fn apply(self, body: &mut EntityWorldMut) {
+        if body.get::<Applied>().is_none_or(|applied| applied.0 != self) {
             body.insert(self.layers);
+            set(body, self.friction);
+            set(body, self.restitution);
+            body.insert(Applied(self));
         }
-        set(body, self.friction);
-        set(body, self.restitution);
     }
 }
 
@@ -201,7 +206,6 @@ impl PreparedCollider {
                         // Shapes are in metres already.
                         Transform::from_scale(Vec3::splat(self.part.voxel_size.recip())),
                         ChildOf(owner),
-                        contact.layers,
                         Collider::from(SharedShape(shape)),
                     ));
                     contact.apply(&mut body);

@@ -67,7 +67,7 @@ pub struct Field {
 }
 
 /// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
-/// gets the terrain's material, layers and shadows as a [`Tile`] does, unless it comes with its own, and follows as they
+/// gets the terrain's material, layers and shadows as a [`Tile`] does, unless it comes with its own of the same type, and follows as they
 /// change or are taken off, as long as that terrain is there. With a `GroundLook`, what is drawn on it stays where it was in
 /// the ground, wherever it goes.
 ///

@@ -116,7 +116,8 @@ fn give_to_pieces<C: Component + Clone>(
 ) {
     for (entity, piece, has_own) in &pieces {
         let Ok(own) = terrains.get(piece.terrain) else { continue };
-        if own.is_changed() || piece.is_added() && !has_own {
+        let is_due = if piece.is_added() { !has_own } else { own.is_changed() };
+        if is_due {
             commands.entity(entity).try_insert((C::clone(&own), HandedOn::<C>::default()));
         }
     }

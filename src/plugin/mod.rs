@@ -12,7 +12,7 @@
 //! What a game puts on the terrain's entity goes for its tiles, chunks and pieces: a `MeshMaterial3d`, [`RenderLayers`], and,
 //! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. Bevy asks each mesh for its own, so new tiles,
 //! chunks and [`GroundPiece`]s get the terrain's, and follow as it is put on, changed and taken off. A piece that comes with
-//! its own keeps that until the terrain's changes.
+//! its own, of the same type, keeps that until the terrain's changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //!

@@ -44,7 +44,8 @@ impl Default for BurrowSettings {
 }
 
 /// Put on a terrain's entity, brushes look for pieces of ground that they cut off, and [`LoosePieceFound`] tells of each;
-/// take it off, and they stop. What a game [applies](crate::terrain::Terrain::apply) by itself looks for them too. A terrain
+/// take it off, and they stop. What a game [applies](crate::terrain::Terrain::apply) by itself looks for them too; its
+/// receipts list them, no message tells of them, and none falls as debris. A terrain
 /// that is not spawned yet knows nothing of this: before a journal is replayed on it,
 /// `terrain.set_loose(Some(loose.into()))` has to tell it.
 ///

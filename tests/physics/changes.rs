@@ -340,4 +340,13 @@ fn ground_that_changes_is_to_bodies_what_the_game_says_by_then() {
     stage.app.insert_resource(plain.clone());
     stage.dig([pit(24.0, 8.0, 24.0, 4.0)]);
     assert_eq!(like(&mut stage, &plain).len(), before.len() + 1);
+
+    // What a game puts on one of them itself is not touched by a dig.
+    for &body in &changed {
+        stage.app.world_mut().entity_mut(body).insert(Friction::new(0.5));
+    }
+    stage.dig([pit(24.0, 8.0, 24.0, 5.0)]);
+    let rough = GroundContact { friction: Some(Friction::new(0.5)), ..plain };
+    let same = like(&mut stage, &rough);
+    assert!(same.len() == 2 && same.iter().all(|body| changed.contains(body)), "{same:?} of {changed:?}");
 }

@@ -156,6 +156,19 @@ fn a_piece_keeps_the_material_that_it_came_with_until_the_terrain_gets_another_o
 }
 
 #[test]
+fn a_piece_that_comes_with_the_terrains_material_keeps_its_own() {
+    let mut stage = stage();
+    let terrain = stage.show(level(1.0));
+    let [first, own] = [(); 2].map(|()| add(&mut stage, StandardMaterial::default()));
+    stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(first));
+    let piece = GroundPiece { terrain, origin: IVec3::ZERO };
+    let piece = stage.app.world_mut().spawn((piece, MeshMaterial3d(own.clone()))).id();
+    stage.frame();
+    stage.frame();
+    assert_eq!(worn(&stage, piece), (Some(own), None));
+}
+
+#[test]
 fn vertex_colours_are_those_of_the_terrain() {
     let mut stage = Stage::drawing();
     let terrain = stage.spawn(level(1.0));
