@@ -2,11 +2,11 @@
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::Compute;
+use super::{Compute, lock};
 use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::fresh::{FreshParts, Group, PartLists};
 use crate::surface::vertex::WorldView;
@@ -125,10 +125,6 @@ fn keep(mut lists: Vec<Parts>) {
     let mut kept = lock(&KEPT);
     lists.truncate(most.saturating_sub(kept.len()));
     kept.append(&mut lists);
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Blocks in groups of some stacks of bricks.

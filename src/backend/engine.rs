@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use web_time::Instant;
 
-use super::{Backend, Choice, Compute, Cpu, Stage};
+use super::{Backend, Choice, Compute, Cpu, Stage, lock};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
@@ -110,7 +110,7 @@ impl Engine {
 
     /// What it did so far.
     pub fn figures(&self) -> EngineFigures {
-        let figures = self.0.figures.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let figures = lock(&self.0.figures).clone();
         #[cfg(feature = "cuda")]
         let figures =
             EngineFigures { trial: self.0.cuda.as_ref().map_or(Duration::ZERO, Cuda::trial), ..figures };
@@ -155,7 +155,7 @@ impl Engine {
 
 impl Shared {
     fn remember(&self, choice: Choice) {
-        let mut figures = self.figures.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut figures = lock(&self.figures);
         if choice.is_cuda {
             figures.cuda += 1
         } else {

@@ -26,6 +26,8 @@ pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
 pub use engine::{Engine, EngineFigures, EngineState};
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
@@ -60,4 +62,9 @@ pub(crate) trait Compute: Send + Sync {
         meanwhile: &(dyn Fn() + Sync),
         then: &mut dyn FnMut(&dyn FreshParts),
     );
+}
+
+/// Takes a lock. Who panicked with it had what is in it to read, or had finished writing.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -36,8 +36,8 @@ pub struct Memory {
     pub samples: usize,
     /// Materials of bricks.
     pub materials: usize,
-    /// Meshes of chunks, from whose unchanged parts the next ones are copied. Besides, each thread that meshes keeps room for
-    /// its next transaction, a few MiB at most, which belongs to no world.
+    /// Meshes of chunks, from whose unchanged parts the next ones are copied. Besides, room for the next
+    /// transaction is kept, which belongs to no world: some 3 MiB for each thread that meshes, up to 8 of them.
     pub meshes: usize,
     /// Where parts are in meshes, and rings of tiles.
     pub parts: usize,

@@ -95,15 +95,16 @@ fn a_material_that_is_taken_off_a_terrain_is_taken_off_its_tiles() {
     stage.frame();
     assert!(wears(&mut stage, terrain, &standard));
     // Both at once would be drawn both.
-    stage
-        .app
-        .world_mut()
-        .entity_mut(terrain)
-        .remove::<MeshMaterial3d<StandardMaterial>>()
-        .insert(MeshMaterial3d(glow.clone()));
-    stage.frame();
+    exchange(&mut stage, terrain, &glow);
     assert!(wears(&mut stage, terrain, &glow));
     assert!(is_bare::<StandardMaterial>(&mut stage), "tiles wear both materials");
+}
+
+/// Takes the standard material off a terrain, and puts the game's own on.
+fn exchange(stage: &mut Stage, terrain: Entity, glow: &Handle<Glow>) {
+    let mut terrain = stage.app.world_mut().entity_mut(terrain);
+    terrain.remove::<MeshMaterial3d<StandardMaterial>>().insert(MeshMaterial3d(glow.clone()));
+    stage.frame();
 }
 
 /// What a piece wears: the standard material, and that of the game's own.
@@ -126,13 +127,7 @@ fn pieces_wear_what_their_terrain_wears() {
         stage.frame();
         assert_eq!(worn(&stage, piece), (Some(material), None));
     }
-    stage
-        .app
-        .world_mut()
-        .entity_mut(terrain)
-        .remove::<MeshMaterial3d<StandardMaterial>>()
-        .insert(MeshMaterial3d(glow.clone()));
-    stage.frame();
+    exchange(&mut stage, terrain, &glow);
     assert_eq!(worn(&stage, piece), (None, Some(glow)));
 }
 

@@ -51,13 +51,13 @@ mod tests;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, TryLockError};
 use std::time::Duration;
 
 use web_time::Instant;
 
 use super::costs::{Costs, Load};
-use super::{Choice, EngineState};
+use super::{Choice, EngineState, lock};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
@@ -89,10 +89,6 @@ enum Place {
 const SHARE: usize = 4;
 /// And the most of it.
 const MOST: usize = 1 << 30;
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// The same, unless somebody else has it now. Who panicked with it had what is in it to read, and changed nothing.
 fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
