@@ -40,7 +40,7 @@ static KEPT: Mutex<Vec<Parts>> = Mutex::new(Vec::new());
 pub(crate) struct Cpu;
 
 impl Compute for Cpu {
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
+    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])) {
         work.run(each);
     }
 

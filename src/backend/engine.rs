@@ -169,13 +169,13 @@ impl Shared {
 }
 
 impl Compute for Shared {
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger)) {
+    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let (ledgers, load) = cuda.edit(work, &mut choice);
-            match ledgers {
-                Some(ledgers) => ledgers.into_iter().for_each(each),
+            let (ledger, load) = cuda.edit(work, &mut choice);
+            match ledger {
+                Some(ledger) => each(&mut [ledger]),
                 None => Cpu.edit(work, each),
             }
             choice.took = start.elapsed();
@@ -202,11 +202,11 @@ impl Compute for Shared {
         };
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let (is_done, load) = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
-            if !is_done {
+            let (waited, load) = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
+            if waited.is_none() {
                 Cpu.mesh(view, blocks, meanwhile, &mut then);
             }
-            choice.took = took;
+            choice.took = took + waited.unwrap_or_default();
             cuda.learn(&choice, load);
             return self.remember(choice);
         }

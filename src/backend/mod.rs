@@ -50,11 +50,13 @@ pub enum Backend {
 /// The heavy work of a transaction. All who do it give the same bits, so a transaction need not know whom it asks.
 pub(crate) trait Compute: Send + Sync {
     /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one ledger or as
-    /// several.
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(Ledger));
+    /// several, once or more often; it may take out of them what it wants.
+    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(&mut [Ledger]));
 
     /// Meshes blocks. `meanwhile` is called when there is time for other things, maybe more than once; it should only set them
-    /// going. `then` is called once and gets the surfaces, by the numbers of the blocks; their memory is used again afterwards.
+    /// going. `then` gets the surfaces, by the numbers of the blocks, some of which may still be on their way; their memory is
+    /// used again afterwards. Where some never came it is called once more, with all of them, and what it made before is to
+    /// be forgotten.
     fn mesh(
         &self,
         view: &WorldView,

@@ -15,7 +15,7 @@ use std::sync::LazyLock;
 
 use super::apron::{Apron, Neighbours};
 use super::cases::{self, Case};
-use super::corners::{self, Corners, X, Z};
+use super::corners::{self, Corners, Heights, X, Z};
 use super::crossings::{Crossings, Edge};
 use super::mask::sheet;
 use super::mesh::Vertex;
@@ -369,36 +369,58 @@ pub(crate) fn prepare() {
     LazyLock::force(&SLOTS);
 }
 
+/// What is pristine over the 8x8 cells of a stack of bricks.
+pub(crate) struct Sheet {
+    /// Where the stack is.
+    pub stack: (i32, i32),
+    heights: Heights,
+    /// Lowest and highest of the corners.
+    range: (i32, i32),
+}
+
+impl Sheet {
+    /// Over the stack (x, z).
+    pub fn new(ground: &Ground, stack: (i32, i32)) -> Self {
+        let heights = corners::heights(ground, Column::new(stack.0 * 8, stack.1 * 8));
+        Self { stack, heights, range: corners::range(&heights) }
+    }
+
+    /// Lattice y of the cubes that the surface crosses.
+    pub fn rows(&self) -> Range<i32> {
+        sheet([self.range.0, self.range.1])
+    }
+}
+
 /// Cells of a stack that belong to the mask, those `before` and those that samples around some of its bricks put there
 /// (rule 2): a corner of a cube of their sheet is edited. As 8x8 cells, bit `z * 8 + x`. The window must reach one brick
 /// further.
-pub(crate) fn disturbed(view: &WorldView, window: &Window, bricks: &[BrickPos], before: u64) -> u64 {
-    let Some(stack) = bricks.first().map(|&brick| stack_of(brick)) else { return before };
-    let heights = corners::heights(view.samples.ground(), Column::new(stack.0 * 8, stack.1 * 8));
-    let range = corners::range(&heights);
+pub(crate) fn disturbed(
+    view: &WorldView,
+    window: &Window,
+    sheet: &Sheet,
+    bricks: &[BrickPos],
+    before: u64,
+) -> u64 {
+    let Sheet { stack, heights, range } = sheet;
     let mut cells = corners::spread(before);
     for &brick in bricks {
         let low = brick.origin().y;
-        if pristine_side(range, low).is_some() {
+        if pristine_side(*range, low).is_some() {
             continue;
         }
         let around = Neighbours::corners_of(window, brick);
         let near = [around.corners(0), around.corners(1)];
-        let pristine = corners::pristine(&heights, range, low);
-        for y in 0..8 {
+        let pristine = corners::pristine(heights, *range, low);
+        // Above and below these layers, nothing of the sheet is.
+        for y in corners::between(*range, low) {
             let sheet = corners::mixed(pristine[y], pristine[y + 1]);
             if sheet & !cells != 0 {
                 cells |= sheet & corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1));
             }
         }
     }
-    let cells = cells & world_cells(view, stack);
+    let cells = cells & world_cells(view, *stack);
     (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))
-}
-
-/// Lattice y of the cubes that the pristine surface crosses over a stack of bricks.
-pub(crate) fn stack_sheet(ground: &Ground, (x, z): (i32, i32)) -> Range<i32> {
-    sheet(ground.heights::<9>(Column::new(x * 8, z * 8)).into_iter().flatten())
 }
 
 /// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.

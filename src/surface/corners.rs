@@ -131,6 +131,13 @@ pub fn pristine(heights: &Heights, range: (i32, i32), y: i32) -> [Corners; 9] {
     layers
 }
 
+/// Of the 8 layers of cells from `y` on, those that have both signs somewhere, under columns of heights in a range; all others
+/// are solid or air.
+pub fn between(range: (i32, i32), y: i32) -> std::ops::Range<usize> {
+    let [all, some] = [ceil(range.0), ceil(range.1)].map(|top| (top - y).clamp(0, 9) as usize);
+    all.saturating_sub(1)..some.min(8)
+}
+
 /// Corners whose columns are higher than this.
 fn below(heights: &Heights, y: i32) -> Corners {
     let mut words = [0u64; 2];
@@ -150,14 +157,16 @@ pub fn heights(ground: &Ground, low: Column) -> Heights {
     ground.heights(low.offset(-1, -1))
 }
 
-/// The heights of a stack's own 9x9 corners.
-fn corner_heights(heights: &Heights) -> impl Iterator<Item = i32> {
-    heights[1..10].iter().flat_map(|row| row[1..10].iter().copied())
-}
-
 /// Lowest and highest of a stack's own 9x9 corners.
 pub fn range(heights: &Heights) -> (i32, i32) {
-    corner_heights(heights).fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)))
+    // Row by row, so that several are compared at once.
+    let (mut low, mut high) = ([i32::MAX; 9], [i32::MIN; 9]);
+    for row in &heights[1..10] {
+        for ((low, high), &height) in low.iter_mut().zip(&mut high).zip(&row[1..10]) {
+            (*low, *high) = (height.min(*low), height.max(*high));
+        }
+    }
+    (low.into_iter().fold(i32::MAX, i32::min), high.into_iter().fold(i32::MIN, i32::max))
 }
 
 #[cfg(test)]
@@ -213,7 +222,8 @@ mod tests {
             std::array::from_fn(|z| std::array::from_fn(|x| (z * 11 + x) as i32 * 4051 % 3001 - 900));
         let layers = pristine(&heights, range(&heights), -3);
         for (y, layer) in (-3..).zip(layers) {
-            for (bit, height) in corner_heights(&heights).enumerate() {
+            for (bit, height) in heights[1..10].iter().flat_map(|row| row[1..10].iter().copied()).enumerate()
+            {
                 assert_eq!(layer >> bit & 1 == 1, y * ONE < height);
             }
         }

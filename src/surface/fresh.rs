@@ -8,7 +8,13 @@ pub(crate) use super::packed::{PackedMixes, PackedVertices};
 
 /// The surfaces of blocks, by the blocks' numbers.
 pub(crate) trait FreshParts: Sync {
-    /// The surface of a block; `None` where there is no such block.
+    /// Waits until the surfaces of the first so many blocks are here, and tells how many of the first ones are. Where that is
+    /// less, they will never be, and all that was made of others is to be forgotten.
+    fn wait_for(&self, _blocks: usize) -> usize {
+        usize::MAX
+    }
+
+    /// The surface of a block, which is waited for; `None` where there is no such block, or it will never be here.
     fn part(&self, number: usize) -> Option<FreshPart<'_>>;
 }
 

@@ -35,7 +35,14 @@ const PLACES: u64 = 64;
 const PIECE: usize = 128;
 
 /// A brick and cells of it.
-pub(super) type OfBrick = (BrickPos, LatticeBox);
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct OfBrick {
+    pub brick: BrickPos,
+    /// The box around the cells that changes reach.
+    pub cells: LatticeBox,
+    /// May any cell of the brick join the mask?
+    pub may_join: bool,
+}
 
 /// Cells by the bricks that hold them: by stacks of bricks, each from below.
 #[derive(Debug, Default)]
@@ -51,6 +58,8 @@ pub(super) struct Reached {
     pub home_x: i32,
     /// `None` where it reaches nothing.
     pub cells: Option<LatticeBox>,
+    /// Of these, the ones that may join the mask.
+    pub joining: Option<LatticeBox>,
 }
 
 impl ByBrick {
@@ -60,14 +69,14 @@ impl ByBrick {
         let (Some(first), Some(last)) = (changes.first(), changes.last()) else { return Self::default() };
         let home_x = |change: &T| reached(change).home_x;
         let slabs = home_x(first) - 1..=home_x(last) + 1;
-        let boxes = |changes: &[T]| changes.iter().filter_map(|change| reached(change).cells).collect();
+        let all = |changes: &[T]| changes.iter().map(&reached).collect();
         if changes.len() < PARALLEL_PLACES {
-            return Self { slabs: vec![within(slabs, boxes(changes))] };
+            return Self { slabs: vec![within(slabs, all(changes))] };
         }
         let slab = |x: i32| {
             let from = changes.partition_point(|change| home_x(change) < x - 1);
             let end = changes.partition_point(|change| home_x(change) <= x + 1);
-            within(x..=x, boxes(&changes[from..end]))
+            within(x..=x, all(&changes[from..end]))
         };
         Self { slabs: slabs.into_par_iter().map(slab).collect() }
     }
@@ -97,8 +106,8 @@ impl ByBrick {
 }
 
 /// The place of the stack that a brick belongs to.
-pub(super) fn place((brick, _): &OfBrick) -> (i32, i32) {
-    (brick.0.x, brick.0.z)
+pub(super) fn place(own: &OfBrick) -> (i32, i32) {
+    (own.brick.0.x, own.brick.0.z)
 }
 
 /// Do both bricks belong to the same stack?
@@ -106,57 +115,112 @@ pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
     place(a) == place(b)
 }
 
+/// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x, 8 to 15 along y,
+/// 16 to 23 along z. What is around two boxes is the one or the other. And may any of them join the mask?
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Bits(u32);
+
+impl Bits {
+    const MAY_JOIN: u32 = 1 << 24;
+
+    /// The part of a side that lies in a brick.
+    fn side(brick: i32, low: i32, high: i32) -> u32 {
+        let (low, high) = ((low - brick * 8).max(0), (high - brick * 8).min(7));
+        0xff << low & 0xff >> (7 - high)
+    }
+
+    fn include(&mut self, other: u32) {
+        self.0 |= other;
+    }
+
+    fn of(self, brick: IVec3) -> OfBrick {
+        let sides = [self.0, self.0 >> 8, self.0 >> 16].map(|side| (side & 0xff) as u8);
+        let first = IVec3::from_array(sides.map(|side| side.trailing_zeros() as i32));
+        let last = IVec3::from_array(sides.map(|side| 7 - side.leading_zeros() as i32));
+        let cells = LatticeBox { min: brick * 8 + first, max: brick * 8 + last };
+        OfBrick { brick: BrickPos(brick), cells, may_join: self.0 & Self::MAY_JOIN != 0 }
+    }
+}
+
 /// Those of the bricks that hold cells of boxes whose x lies in a range.
-fn within(xs: RangeInclusive<i32>, boxes: Vec<LatticeBox>) -> Vec<OfBrick> {
-    let bricks_of = |cells: &LatticeBox| {
+fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
+    let bricks_of = |cells: LatticeBox| {
         let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
         LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
     };
-    let Some(all) = boxes.iter().filter_map(bricks_of).reduce(LatticeBox::union) else { return Vec::new() };
+    let boxes = || changes.iter().filter_map(|change| Some((change, bricks_of(change.cells?)?)));
+    let Some(all) = boxes().map(|(_, bricks)| bricks).reduce(LatticeBox::union) else { return Vec::new() };
     // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
     let size = all.size();
-    let is_dense = all.volume() <= PLACES * boxes.len() as u64;
-    let mut table = if is_dense { vec![0u32; all.volume() as usize] } else { Vec::new() };
-    let mut index: FxHashMap<BrickPos, u32> = FxHashMap::default();
-    let mut found: Vec<OfBrick> = Vec::with_capacity(boxes.len() * 4);
-    let mut enter = |brick: IVec3, cells: LatticeBox| {
-        let number = if is_dense {
-            let at = brick - all.min;
-            &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize]
-        } else {
-            index.entry(BrickPos(brick)).or_default()
-        };
-        if *number == 0 {
-            found.push((BrickPos(brick), cells));
-            *number = found.len() as u32;
-        } else {
-            let own = &mut found[*number as usize - 1].1;
-            *own = own.union(cells);
-        }
-    };
-    for cells in &boxes {
-        let Some(bricks) = bricks_of(cells) else { continue };
-        // Of the cells, those from a brick's first to its last.
-        let own = |brick: i32, low: i32, high: i32| (low.max(brick * 8), high.min(brick * 8 + 7));
-        for x in bricks.min.x..=bricks.max.x {
-            let (low_x, high_x) = own(x, cells.min.x, cells.max.x);
-            for z in bricks.min.z..=bricks.max.z {
-                let (low_z, high_z) = own(z, cells.min.z, cells.max.z);
-                for y in bricks.min.y..=bricks.max.y {
-                    let (low_y, high_y) = own(y, cells.min.y, cells.max.y);
-                    let (min, max) = (IVec3::new(low_x, low_y, low_z), IVec3::new(high_x, high_y, high_z));
-                    enter(IVec3::new(x, y, z), LatticeBox { min, max });
-                }
+    if all.volume() > PLACES * changes.len() as u64 {
+        let mut index: FxHashMap<BrickPos, Bits> = FxHashMap::default();
+        enter_all(boxes(), |low, high, column| {
+            for y in low.y..=high {
+                index.entry(BrickPos(low.with_y(y))).or_default().include(column.bits(y));
+            }
+        });
+        let mut found: Vec<OfBrick> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
+        found.sort_unstable_by_key(|own| (own.brick.0.x, own.brick.0.z, own.brick.0.y));
+        return found;
+    }
+    let mut table = vec![Bits::default(); all.volume() as usize];
+    enter_all(boxes(), |low, high, column| {
+        let at = low - all.min;
+        let bricks = &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize..];
+        (low.y..=high).zip(bricks).for_each(|(y, own)| own.include(column.bits(y)));
+    });
+    let mut found = Vec::with_capacity(table.iter().filter(|bits| bits.0 != 0).count());
+    for (at, stack) in (0..).zip(table.chunks_exact(size.y as usize)) {
+        let low = all.min + IVec3::new(at / size.z, 0, at % size.z);
+        let filled = (0..).zip(stack).filter(|(_, bits)| bits.0 != 0);
+        found.extend(filled.map(|(y, bits)| bits.of(low + IVec3::new(0, y, 0))));
+    }
+    found
+}
+
+/// Cells of bricks above each other.
+struct Column {
+    /// Along x and z, as [`Bits`] have them.
+    sides: u32,
+    /// The lowest and the highest one.
+    cells: [i32; 2],
+    /// The same in bricks, of those that may join the mask.
+    joining: Option<[i32; 2]>,
+}
+
+impl Column {
+    /// Those of the brick at this height.
+    fn bits(&self, y: i32) -> u32 {
+        let [low, high] = self.cells;
+        let may_join = self.joining.is_some_and(|[low, high]| low <= y && y <= high);
+        self.sides | Bits::side(y, low, high) << 8 | if may_join { Bits::MAY_JOIN } else { 0 }
+    }
+}
+
+/// Enters the cells of changes into some bricks of each: `enter` gets the lowest and the highest one of bricks above each other,
+/// and their cells.
+fn enter_all<'r>(
+    changes: impl Iterator<Item = (&'r Reached, LatticeBox)>,
+    mut enter: impl FnMut(IVec3, i32, &Column),
+) {
+    for (change, LatticeBox { min, max }) in changes {
+        let Some(cells) = change.cells else { continue };
+        let joining = change.joining.map(|cells| LatticeBox { min: cells.min >> 3, max: cells.max >> 3 });
+        for x in min.x..=max.x {
+            let of_x = Bits::side(x, cells.min.x, cells.max.x);
+            for z in min.z..=max.z {
+                let is_beside = |bricks: &LatticeBox| {
+                    bricks.min.x <= x && x <= bricks.max.x && bricks.min.z <= z && z <= bricks.max.z
+                };
+                let column = Column {
+                    sides: Bits::side(z, cells.min.z, cells.max.z) << 16 | of_x,
+                    cells: [cells.min.y, cells.max.y],
+                    joining: joining.filter(is_beside).map(|bricks| [bricks.min.y, bricks.max.y]),
+                };
+                enter(IVec3::new(x, min.y, z), max.y, &column);
             }
         }
     }
-    if is_dense {
-        let numbers = table.iter().filter(|&&number| number != 0);
-        return numbers.map(|&number| found[number as usize - 1]).collect();
-    }
-    found.shrink_to_fit();
-    found.sort_unstable_by_key(|(brick, _)| (brick.0.x, brick.0.z, brick.0.y));
-    found
 }
 
 #[cfg(test)]
@@ -188,11 +252,15 @@ mod tests {
     /// The same, brick by brick.
     fn naive(changes: &[Reached]) -> Vec<OfBrick> {
         let mut all: BTreeMap<_, OfBrick> = BTreeMap::new();
-        for cells in changes.iter().filter_map(|reached| reached.cells) {
+        for (reached, cells) in changes.iter().filter_map(|reached| Some((reached, reached.cells?))) {
             for brick in BrickPos::covering(cells) {
                 let own = brick.samples().intersection(cells).expect("covered");
+                let may_join =
+                    reached.joining.is_some_and(|joining| brick.samples().intersection(joining).is_some());
                 let place = (brick.0.x, brick.0.z, brick.0.y);
-                all.entry(place).and_modify(|all| all.1 = all.1.union(own)).or_insert((brick, own));
+                let all = all.entry(place).or_insert(OfBrick { brick, cells: own, may_join });
+                all.cells = all.cells.union(own);
+                all.may_join |= may_join;
             }
         }
         all.into_values().collect()
@@ -220,7 +288,8 @@ mod tests {
                 let (y, z) = (along(rng, -height, height), along(rng, -30, 30));
                 let (y, z) = ((y.0, y.1.min(y.0 + 10)), (z.0, z.1.min(z.0 + 10)));
                 let cells = LatticeBox { min: IVec3::new(x.0, y.0, z.0), max: IVec3::new(x.1, y.1, z.1) };
-                Reached { home_x, cells: (rng.u8(..) > 9).then_some(cells) }
+                let joining = LatticeBox::new(cells.min + 1, cells.max - 1).filter(|_| rng.bool());
+                Reached { home_x, cells: (rng.u8(..) > 9).then_some(cells), joining }
             };
             let boxes = sorted((0..count).map(|_| reached(&mut rng)).collect());
             assert!(by_brick(&boxes) == naive(&boxes), "{count} boxes at {homes} homes");
@@ -233,6 +302,7 @@ mod tests {
         let point = |home_x: i32, x: i32, y: i32| Reached {
             home_x,
             cells: Some(LatticeBox::point(IVec3::new(x, y, 4))),
+            joining: None,
         };
         for home in 2..8 {
             for beside in [home * 8 - 2, home * 8 - 1, home * 8 + 8] {
@@ -245,7 +315,7 @@ mod tests {
                     let found = by_brick(&boxes);
                     assert!(found == naive(&boxes), "{beside} of {home}");
                     let own = BrickPos::of(IVec3::new(beside, 900, 4));
-                    assert!(found.iter().any(|(brick, _)| *brick == own), "{beside} of {home}");
+                    assert!(found.iter().any(|found| found.brick == own), "{beside} of {home}");
                 }
             }
         }

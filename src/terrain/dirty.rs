@@ -7,50 +7,50 @@ use glam::IVec3;
 
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::surface::Mask;
-use crate::surface::block::{self, Block};
+use crate::surface::block::{self, Block, Sheet};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
-use crate::volume::DraftedBrick;
 
 use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack, place};
 use super::world::World;
 
-/// The cells that changed samples show in: `changed` tells the brick of each change, and the box around its samples.
+/// The cells that changed samples show in. `changed` tells the brick of each change, the box around its samples, and whether
+/// one of them is edited for the first time: then cells that it is a corner of may join the mask.
 pub(super) fn dirty_cells<T: Sync>(
     grid: ChunkGrid,
     changes: &[T],
-    changed: impl Fn(&T) -> OfBrick + Sync,
+    changed: impl Fn(&T) -> (BrickPos, LatticeBox, bool) + Sync,
 ) -> ByBrick {
     // A sample is a corner of the cells one below it; gradients look one sample further on both sides.
     ByBrick::new(changes, |change| {
-        let (brick, changed) = changed(change);
-        Reached { home_x: brick.0.x, cells: in_world(grid, changed.min - 2, changed.max + 1) }
-    })
-}
-
-/// The cells that may join the mask: those that a sample edited for the first time is a corner of.
-pub(super) fn cells_in_reach(changed: &[DraftedBrick]) -> ByBrick {
-    // A sample is a corner of the cells one below it.
-    ByBrick::new(changed, |drafted| {
-        let cells = LatticeBox { min: drafted.changed.min - 1, max: drafted.changed.max };
-        Reached { home_x: drafted.pos.0.x, cells: drafted.is_extended.then_some(cells) }
+        let (brick, changed, is_extended) = changed(change);
+        let cells = in_world(grid, changed.min - 2, changed.max + 1);
+        let joining = LatticeBox { min: changed.min - 1, max: changed.max };
+        Reached { home_x: brick.0.x, cells, joining: is_extended.then_some(joining) }
     })
 }
 
 /// Rule 2 for the sheet over some cells: the words of the mask that change. Edited samples stay edited, so cells only ever
 /// join it.
-pub(super) fn joined_mask(world: &World, view: &WorldView, near: &ByBrick) -> Mask {
-    let words = near.collect(|stacks, found| {
-        let at_sheet = stacks.chunk_by(is_same_stack).flat_map(|stack| at_sheet(world, stack));
-        let bricks: Vec<BrickPos> = at_sheet.collect();
-        let mut rest = &bricks[..];
+pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> Mask {
+    let words = dirty.collect(|stacks, found| {
+        let mut bricks = Vec::with_capacity(stacks.len());
+        let at_sheet = stacks.chunk_by(is_same_stack).filter_map(|stack| at_sheet(world, stack, &mut bricks));
+        let sheets: Vec<Sheet> = at_sheet.collect();
+        let (mut rest, mut sheets) = (&bricks[..], &sheets[..]);
         while let Some((count, places)) = window::shared(rest.iter().copied()) {
             let (near, others) = rest.split_at(count);
             let window = Window::new(&view.samples, places);
             for stack in near.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
                 let word = (stack[0].0.x, stack[0].0.z);
+                while let [first, others @ ..] = sheets
+                    && first.stack != word
+                {
+                    sheets = others;
+                }
+                let Some(sheet) = sheets.first() else { continue };
                 let before = view.mask.word(word);
-                let cells = block::disturbed(view, &window, stack, before);
+                let cells = block::disturbed(view, &window, sheet, stack, before);
                 if cells != before {
                     found.push((word, cells));
                 }
@@ -63,19 +63,26 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, near: &ByBrick) -> Ma
     mask
 }
 
-/// Those bricks of a stack that the pristine surface passes through; none where all of its cells are in the mask.
-fn at_sheet(world: &World, stack: &[OfBrick]) -> impl Iterator<Item = BrickPos> {
-    let is_open = world.mask.word(place(&stack[0])) != u64::MAX;
-    let rows = if is_open { block::stack_sheet(&world.ground, place(&stack[0])) } else { 0..0 };
-    let bricks = stack.iter().map(|&(brick, _)| brick);
-    bricks.filter(move |brick| is_open && brick.origin().y < rows.end && rows.start < brick.origin().y + 8)
+/// Lists those bricks of a stack that the pristine surface passes through and that may have cells that join the mask; returns
+/// that surface. `None` where there are no such bricks.
+fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Option<Sheet> {
+    let word = place(&stack[0]);
+    if !stack.iter().any(|own| own.may_join) || world.mask.word(word) == u64::MAX {
+        return None;
+    }
+    let (sheet, before) = (Sheet::new(&world.ground, word), bricks.len());
+    let rows = sheet.rows();
+    let is_there = |brick: &BrickPos| brick.origin().y < rows.end && rows.start < brick.origin().y + 8;
+    bricks.extend(stack.iter().filter(|own| own.may_join).map(|own| own.brick).filter(is_there));
+    (bricks.len() > before).then_some(sheet)
 }
 
 /// Every block that may draw something else than before, by stacks of bricks, each from below. A word of the mask turns
 /// only where samples change, so its cells lie in stacks that have `dirty` cells.
 pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
-    let blocks_of =
-        |&(brick, cells): &OfBrick| view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk });
+    let blocks_of = |&OfBrick { brick, cells, .. }: &OfBrick| {
+        view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
+    };
     dirty.collect(|stacks, found| {
         for stack in stacks.chunk_by(is_same_stack) {
             match sheet_near(world, view, newer, place(&stack[0])) {
@@ -116,9 +123,9 @@ fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
     let mut all = stack.to_vec();
     for brick in BrickPos::covering(sheet) {
         let Some(cells) = brick.samples().intersection(sheet) else { continue };
-        match all.binary_search_by_key(&brick.0.y, |(own, _)| own.0.y) {
-            Ok(at) => all[at].1 = all[at].1.union(cells),
-            Err(at) => all.insert(at, (brick, cells)),
+        match all.binary_search_by_key(&brick.0.y, |own| own.brick.0.y) {
+            Ok(at) => all[at].cells = all[at].cells.union(cells),
+            Err(at) => all.insert(at, OfBrick { brick, cells, may_join: false }),
         }
     }
     all

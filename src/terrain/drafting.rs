@@ -42,7 +42,7 @@ impl Drafting<'_> {
 
     /// What edits make of samples of this hash; bricks of a `known` kind are shared.
     fn draft(&self, base: SampleView, edits: &[&Edit], hash: u64, known: &UniformBricks) -> Draft {
-        let apply = |work: &EditWork, each: &mut dyn FnMut(Ledger)| self.backend.edit(work, each);
+        let apply = |work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])| self.backend.edit(work, each);
         Draft::make(base, self.world.grid, edits, hash, known, self.rules, apply)
     }
 

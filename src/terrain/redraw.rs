@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::by_brick::ByBrick;
 use super::commit::Stages;
 use super::dirty::dirty_blocks;
-use super::surface::{ChunkSurface, Fresh, key};
+use super::surface::{ChunkSurface, Fresh, Key, key};
 use super::tiles::{TileUpdate, TileWork};
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};
@@ -74,7 +74,7 @@ fn mesh_blocks(
     let (mut chunks, mut own) = (Vec::new(), Duration::ZERO);
     // Found while blocks are meshed, unless that is over sooner.
     let order = OnceLock::new();
-    let order = || order.get_or_init(|| order_by_chunk(blocks));
+    let order = || order.get_or_init(|| ByChunk::new(blocks));
     let meshed = || {
         backend.mesh(view, blocks, meanwhile, &mut |parts| {
             chunks = Stages::time(&mut own, || assemble(world, blocks, order(), parts));
@@ -91,38 +91,95 @@ fn mesh_blocks(
     chunks
 }
 
-/// The numbers of blocks, by their chunks, and in each chunk in the order of its parts. No other thread helps: who waits for
-/// this must not do so while this one does something else.
-fn order_by_chunk(blocks: &[Block]) -> Vec<u32> {
-    let of = |number: u32| &blocks[number as usize];
-    let mut order = order_of_places(blocks, |block| block.chunk.as_ivec3().to_array());
-    let chunks = order.chunk_by_mut(|&a, &b| of(a).chunk == of(b).chunk);
-    chunks.for_each(|chunk| chunk.sort_unstable_by_key(|&number| key(of(number).brick)));
-    order
+/// Blocks by their chunks.
+struct ByChunk {
+    /// The numbers of blocks, chunk by chunk, and in each chunk in the order of its parts.
+    order: Vec<u32>,
+    chunks: Vec<OfChunk>,
 }
 
-/// The surfaces of chunks with the parts of these blocks, in order, in place of old ones.
-fn assemble(
-    world: &World,
-    blocks: &[Block],
-    order: &[u32],
-    parts: &dyn FreshParts,
-) -> Vec<(ChunkPos, Arc<ChunkSurface>)> {
+/// Blocks of a chunk.
+struct OfChunk {
+    chunk: ChunkPos,
+    /// How many there are.
+    count: usize,
+    /// One more than the greatest of their numbers.
+    end: usize,
+}
+
+impl ByChunk {
+    /// No other thread helps: who waits for this must not do so while this one does something else.
+    fn new(blocks: &[Block]) -> Self {
+        let of = |number: u32| &blocks[number as usize];
+        let mut order = order_of_places(blocks, |block| block.chunk.as_ivec3().to_array());
+        let mut keyed = Vec::new();
+        let of_chunk = |numbers: &mut [u32]| {
+            let end = numbers.iter().max().map_or(0, |&last| last as usize + 1);
+            // By the keys of their parts, each of which is looked up once and compared as one number.
+            keyed.clear();
+            keyed.extend(numbers.iter().map(|&number| as_number(key(of(number).brick), number)));
+            keyed.sort_unstable();
+            numbers.iter_mut().zip(&keyed).for_each(|(number, &own)| *number = own as u32);
+            OfChunk { chunk: of(numbers[0]).chunk, count: numbers.len(), end }
+        };
+        let chunks = order.chunk_by_mut(|&a, &b| of(a).chunk == of(b).chunk).map(of_chunk).collect();
+        Self { order, chunks }
+    }
+
+    /// The chunks, each with the numbers of its blocks.
+    fn iter(&self) -> impl Iterator<Item = (&OfChunk, &[u32])> {
+        let mut order = &self.order[..];
+        self.chunks.iter().map(move |chunk| {
+            let (own, others) = order.split_at(chunk.count);
+            order = others;
+            (chunk, own)
+        })
+    }
+}
+
+/// A part's key and the number of its block, as one number in the same order.
+fn as_number(key: Key, number: u32) -> u128 {
+    let unsigned = key.map(|at| u128::from(at.cast_unsigned() ^ 1 << 31));
+    unsigned[0] << 96 | unsigned[1] << 64 | unsigned[2] << 32 | u128::from(number)
+}
+
+/// A chunk, and its surface.
+type Updated = (ChunkPos, Arc<ChunkSurface>);
+
+/// The surfaces of chunks with the parts of these blocks, in order, in place of old ones. Threads begin with those whose parts
+/// are here.
+fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn FreshParts) -> Vec<Updated> {
     let fresh = |&number: &u32| {
         let number = number as usize;
         Some(Fresh { key: key(blocks[number].brick), part: parts.part(number)? })
     };
-    let chunk = |number: u32| blocks[number as usize].chunk;
-    let chunks: Vec<&[u32]> = order.chunk_by(|&a, &b| chunk(a) == chunk(b)).collect();
-    let update = |numbers: &&[u32]| {
-        let chunk = chunk(numbers[0]);
+    let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh))?)))
     };
-    if blocks.len() >= PARALLEL_PARTS {
-        chunks.par_iter().with_max_len(1).filter_map(update).collect()
-    } else {
-        chunks.iter().filter_map(update).collect()
+    if blocks.len() < PARALLEL_PARTS {
+        return by_chunk.iter().filter_map(|(own, numbers)| update(own.chunk, numbers)).collect();
     }
+    let chunks: Vec<(&OfChunk, &[u32])> = by_chunk.iter().collect();
+    let mut updated: Vec<Option<Updated>> = vec![None; chunks.len()];
+    let update = &update;
+    rayon::scope(|scope| {
+        let (mut chunks, mut places) = (&chunks[..], &mut updated[..]);
+        while let Some((first, _)) = chunks.first() {
+            let here = parts.wait_for(first.end);
+            let ((own, others), (own_places, other_places)) =
+                match chunks.iter().take_while(|(chunk, _)| chunk.end <= here).count() {
+                    // They will never be here.
+                    0 => break,
+                    count => (chunks.split_at(count), places.split_at_mut(count)),
+                };
+            (chunks, places) = (others, other_places);
+            scope.spawn(move |_| {
+                let own = own.par_iter().zip(own_places).with_max_len(1);
+                own.for_each(|((chunk, numbers), place)| *place = update(chunk.chunk, numbers));
+            });
+        }
+    });
+    updated.into_iter().flatten().collect()
 }

@@ -17,7 +17,7 @@ use web_time::Instant;
 use super::by_brick::PARALLEL_PLACES;
 use super::change::{Change, replaced_bytes};
 use super::commit::{Commit, Stages};
-use super::dirty::{cells_in_reach, dirty_cells, joined_mask};
+use super::dirty::{dirty_cells, joined_mask};
 use super::drafting::{Drafted, Drafting};
 use super::field_log::{FieldLog, FieldNews, news_of_replaced};
 use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
@@ -147,16 +147,11 @@ impl Transaction {
             }
         });
         let Draft { bricks: drafted, effects, hash, uniform } = draft;
-        let latest = latest(&drafted);
-        // Two things that do not depend on each other: cells to mesh, cells that may join the mask.
-        let Stages { meshing, ring, .. } = &mut stages;
-        let changed = |drafted: &DraftedBrick| (drafted.pos, drafted.changed);
-        let dirty = || Stages::time(meshing, || dirty_cells(world.grid, &drafted, changed));
-        let near = || Stages::time(ring, || cells_in_reach(&drafted));
-        let (dirty, near) = side_by_side(drafted.len() >= PARALLEL_BLOCKS, dirty, near);
-
+        let changed = |drafted: &DraftedBrick| (drafted.pos, drafted.changed, drafted.is_extended);
+        let dirty = || Stages::time(&mut stages.meshing, || dirty_cells(world.grid, &drafted, changed));
+        let (dirty, latest) = side_by_side(drafted.len() >= PARALLEL_PLACES, dirty, || latest(&drafted));
         let before = WorldView { samples: world.samples().under(&latest), ..world.view() };
-        let mask = Stages::time(&mut stages.ring, || joined_mask(world, &before, &near));
+        let mask = Stages::time(&mut stages.ring, || joined_mask(world, &before, &dirty));
         let view = WorldView { mask: MaskView::new(&world.mask).over(&mask), ..before };
         let meshes = || redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
         let enter = || self.enter(submissions, effects, pieces, &drafted, &mask);
@@ -229,7 +224,9 @@ impl Transaction {
             mask: MaskView::new(&world.mask).over(&mask),
             grid: world.grid,
         };
-        let dirty = Stages::time(&mut stages.meshing, || dirty_cells(world.grid, &changed, |&own| own));
+        let dirty = Stages::time(&mut stages.meshing, || {
+            dirty_cells(world.grid, &changed, |&(pos, own)| (pos, own, false))
+        });
         let meshes = redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
 
         let nothing = Fields::default();

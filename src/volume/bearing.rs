@@ -183,7 +183,7 @@ mod plain_edits {
         let dig = |x| Edit::quantize(&Brush::dig(Shape::sphere(Vec3::new(x, 0.0, 30.0), 4.0))).unwrap();
         let runs = |edits: &[Edit], rules: DiggingRules| {
             let (edits, mut runs) = (edits.iter().collect::<Vec<_>>(), Vec::new());
-            let note = |work: &EditWork, _: &mut dyn FnMut(Ledger)| {
+            let note = |work: &EditWork, _: &mut dyn FnMut(&mut [Ledger])| {
                 runs.push((work.tools.len(), !work.looks_around()));
             };
             let view = SampleView::new(&ground, &bricks);

@@ -126,6 +126,9 @@ impl Changes {
 /// From how many bricks on threads share what takes little for each.
 const PARALLEL: usize = 1 << 13;
 
+/// From how many parts and counts on threads enter them.
+const MANY_ENTRIES: usize = 1 << 11;
+
 /// Bricks as a list that a [`SampleView`] can be laid [under](SampleView::under).
 pub(crate) fn latest(drafted: &[DraftedBrick]) -> Vec<(BrickPos, &Brick)> {
     if drafted.len() < PARALLEL {
@@ -156,7 +159,7 @@ impl Draft {
         hash: u64,
         uniform: &UniformBricks,
         rules: Option<&DiggingRules>,
-        mut apply: impl FnMut(&EditWork, &mut dyn FnMut(Ledger)),
+        mut apply: impl FnMut(&EditWork, &mut dyn FnMut(&mut [Ledger])),
     ) -> Self {
         let scope = |edit: &&Edit| {
             let reach = reach(grid, edit);
@@ -177,12 +180,12 @@ impl Draft {
         runs: &[Range<usize>],
         hash: u64,
         uniform: &UniformBricks,
-        mut apply: impl FnMut(SampleView, &Range<usize>, &mut dyn FnMut(Ledger)),
+        mut apply: impl FnMut(SampleView, &Range<usize>, &mut dyn FnMut(&mut [Ledger])),
     ) -> Self {
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits, EditEffect::default);
         let mut add = |draft: &mut Self, base: SampleView, run: &Range<usize>| {
-            apply(base, run, &mut |ledger| draft.add(ledger, run.start, uniform));
+            apply(base, run, &mut |ledgers| draft.add(ledgers, run.start, uniform));
         };
         if let [] | [_] = runs {
             runs.iter().for_each(|run| add(&mut draft, base, run));
@@ -203,36 +206,73 @@ impl Draft {
     }
 
     /// Takes in what edits from this one on did to some bricks; one that is all alike is replaced by the one of its kind.
-    fn add(&mut self, mut ledger: Ledger, first: usize, uniform: &UniformBricks) {
-        self.hash = self.hash.wrapping_add(ledger.hash);
-        for part in &ledger.parts {
-            self.effects[first + part.edit].reach(part.chunk, part.bounds);
+    fn add(&mut self, ledgers: &mut [Ledger], first: usize, uniform: &UniformBricks) {
+        let (effects, before) = (&mut self.effects[first..], self.bricks.len());
+        enter_effects(ledgers, effects);
+        for ledger in ledgers {
+            self.hash = self.hash.wrapping_add(ledger.hash);
+            effects.iter_mut().zip(ledger.effects.drain(..)).for_each(|(effect, own)| *effect = own);
+            if self.bricks.is_empty() {
+                self.bricks = std::mem::take(&mut ledger.bricks);
+            } else {
+                self.bricks.append(&mut ledger.bricks);
+            }
         }
-        for count in &ledger.counts {
-            let effect = &mut self.effects[first + count.edit];
-            let tally = match count.fate {
-                Fate::Removed => &mut effect.removed,
-                Fate::Added => &mut effect.added,
-                Fate::Painted => &mut effect.painted,
-                Fate::Protected => &mut effect.refused.protected,
-                Fate::Unbreakable => &mut effect.refused.unbreakable,
-                Fate::TooHard => &mut effect.refused.too_hard,
-                Fate::Slowed => &mut effect.refused.slowed,
-            };
-            tally.count_many(count.material, count.voxels);
-        }
-        let before = self.bricks.len();
-        if before == 0 {
-            self.bricks = ledger.bricks;
-        } else {
-            self.bricks.append(&mut ledger.bricks);
-        }
+        let mut latest: Option<((Sample, MaterialId), Arc<Brick>)> = None;
         for number in uniform_ones(&self.bricks, before) {
             let drafted = &mut self.bricks[number];
             let Some(kind) = drafted.kind else { continue };
-            let fresh = || Arc::clone(self.uniform.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
-            drafted.brick = uniform.get(&kind).cloned().unwrap_or_else(fresh);
+            // Bricks beside each other are mostly of one kind.
+            let known = match latest.take_if(|(own, _)| *own == kind) {
+                Some((_, known)) => known,
+                None => {
+                    let fresh =
+                        || Arc::clone(self.uniform.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
+                    uniform.get(&kind).cloned().unwrap_or_else(fresh)
+                }
+            };
+            if !Arc::ptr_eq(&known, &drafted.brick) {
+                drafted.brick = Arc::clone(&known);
+            }
+            latest = Some((kind, known));
         }
+    }
+}
+
+/// Enters what ledgers say of edits.
+pub(crate) fn enter_effects(ledgers: &[Ledger], effects: &mut [EditEffect]) {
+    let entries: usize = ledgers.iter().map(|ledger| ledger.parts.len() + ledger.counts.len()).sum();
+    if entries < MANY_ENTRIES {
+        return ledgers.iter().for_each(|ledger| enter_some(ledger, 0, effects));
+    }
+    // Each thread enters what some of the edits did.
+    let length = effects.len().div_ceil(rayon::current_num_threads()).max(1);
+    effects.par_chunks_mut(length).enumerate().for_each(|(number, effects)| {
+        ledgers.iter().for_each(|ledger| enter_some(ledger, number * length, effects));
+    });
+}
+
+/// Enters what a ledger says of edits, if it is of these; `first` is the number of the first of them.
+fn enter_some(ledger: &Ledger, first: usize, effects: &mut [EditEffect]) {
+    for part in &ledger.parts {
+        let own = part.edit.checked_sub(first).and_then(|number| effects.get_mut(number));
+        if let Some(effect) = own {
+            effect.reach(part.chunk, part.bounds);
+        }
+    }
+    for count in &ledger.counts {
+        let own = count.edit.checked_sub(first).and_then(|number| effects.get_mut(number));
+        let Some(effect) = own else { continue };
+        let tally = match count.fate {
+            Fate::Removed => &mut effect.removed,
+            Fate::Added => &mut effect.added,
+            Fate::Painted => &mut effect.painted,
+            Fate::Protected => &mut effect.refused.protected,
+            Fate::Unbreakable => &mut effect.refused.unbreakable,
+            Fate::TooHard => &mut effect.refused.too_hard,
+            Fate::Slowed => &mut effect.refused.slowed,
+        };
+        tally.count_many(count.material, count.voxels);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::DraftedBrick;
+use super::{DraftedBrick, EditEffect};
 use crate::ground::MaterialId;
 use crate::lattice::{ChunkPos, LatticeBox};
 
@@ -12,6 +12,8 @@ pub(crate) struct Ledger {
     pub bricks: Vec<DraftedBrick>,
     pub parts: Vec<PartEffect>,
     pub counts: Vec<Count>,
+    /// All that edits did, one after the other, where parts and counts are entered already; else none.
+    pub effects: Vec<EditEffect>,
     /// By how much the hash of the world's samples changes.
     pub hash: u64,
 }
@@ -23,6 +25,7 @@ impl Ledger {
             bricks: Vec::with_capacity(bricks),
             parts: Vec::with_capacity(bricks.min(LATEST)),
             counts: Vec::with_capacity(bricks.min(LATEST)),
+            effects: Vec::new(),
             hash: 0,
         }
     }

@@ -25,6 +25,8 @@ mod workpiece;
 pub(crate) use bearing::RunRules;
 pub use brick::{Brick, Layers, Sample, UniformBricks};
 pub(crate) use brick::{PRISTINE, row};
+#[cfg(feature = "cuda")]
+pub(crate) use draft::enter_effects;
 pub(crate) use draft::latest;
 pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect};
 pub use field::{Absorbed, Field, FieldId, Fields, Scenario};

@@ -137,24 +137,24 @@ impl<'a> EditWork<'a> {
 
     /// Applies all edits on the CPU and hands out what they changed, brick by brick. The result does not depend on how
     /// many threads there are.
-    pub(crate) fn run(&self, mut each: impl FnMut(Ledger)) {
+    pub(crate) fn run(&self, mut each: impl FnMut(&mut [Ledger])) {
         let work = |jobs: &[Job]| {
             let mut ledger = Ledger::with_room(jobs.len().min(GROUP[1]));
             jobs.chunk_by(Job::is_same_brick).for_each(|jobs| finish(self, jobs, &mut ledger));
             ledger
         };
         if self.jobs.len() < PARALLEL_JOBS {
-            each(work(&self.jobs));
+            each(&mut [work(&self.jobs)]);
             return;
         }
         for batch in pieces(&self.jobs, BATCH, Job::is_same_brick) {
             let group = (batch.len() / (TURNS * rayon::current_num_threads())).clamp(GROUP[0], GROUP[1]);
             match &pieces(batch, group, Job::is_same_brick)[..] {
-                [own] => each(work(own)),
+                [own] => each(&mut [work(own)]),
                 groups => {
-                    let ledgers: Vec<Ledger> =
+                    let mut ledgers: Vec<Ledger> =
                         groups.par_iter().with_max_len(1).map(|jobs| work(jobs)).collect();
-                    ledgers.into_iter().for_each(&mut each);
+                    each(&mut ledgers);
                 }
             }
         }

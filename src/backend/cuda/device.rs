@@ -80,11 +80,23 @@ pub(super) trait HostMemory: Send + Sync {
     /// Its bytes. Not to be looked at between the start of a copy and the next [`Device::wait`].
     fn bytes(&self) -> &[u8];
 
+    /// Some of its bytes. Of a copy that was asked for before a [`Mark`], they may be looked at once that is passed.
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]>;
+
     /// Its bytes, to be written.
     fn bytes_mut(&mut self) -> &mut [u8];
 
+    /// Some of its bytes, to be written while copies to others may be under way.
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]>;
+
     /// Where kernels find it, if they can read and write it without a copy.
     fn address(&self) -> Option<u64>;
+}
+
+/// A place in what a device was asked for.
+pub(super) trait Mark: Send + Sync {
+    /// Waits until all that was asked for before is done. From any thread.
+    fn wait(&self) -> Result<(), Fault>;
 }
 
 /// A device. Copies and launches happen in the order in which they are asked for, and later: [`wait`](Self::wait) waits for
@@ -116,6 +128,9 @@ pub(super) trait Device: Send {
 
     /// Runs a kernel, a block for each of its jobs.
     fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault>;
+
+    /// Marks what was asked for up to now.
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault>;
 
     /// Of what was last waited for: how long it took from the first upload on, and the last kernel alone; zero where nobody
     /// knows.

@@ -14,7 +14,7 @@ use cudarc::driver::{CudaContext, CudaEvent, CudaStream, DriverError, result};
 
 use rustc_hash::FxHashSet;
 
-use super::device::{Device, Fault, HostMemory, Kernel};
+use super::device::{Device, Fault, HostMemory, Kernel, Mark};
 use super::layout::THREADS;
 
 /// The kernels, compiled ahead.
@@ -173,6 +173,15 @@ unsafe impl Send for Pinned {}
 // SAFETY: shared references only read.
 unsafe impl Sync for Pinned {}
 
+impl Pinned {
+    /// Where some of its bytes begin, if it has them.
+    fn within(&self, range: &Range<usize>) -> Option<*mut u8> {
+        let is_within = range.start <= range.end && range.end <= self.len;
+        // SAFETY: `start` is `len` bytes of memory.
+        is_within.then(|| unsafe { self.start.add(range.start) })
+    }
+}
+
 impl HostMemory for Pinned {
     fn bytes(&self) -> &[u8] {
         // SAFETY: `start` is `len` bytes of initialised memory, which the card does not write to now: whoever started a
@@ -180,9 +189,22 @@ impl HostMemory for Pinned {
         unsafe { std::slice::from_raw_parts(self.start, self.len) }
     }
 
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        let start = self.within(&range)?;
+        // SAFETY: `start` is so many bytes of initialised memory, and whoever started a copy to them has waited for that one.
+        // Copies to other parts may be under way.
+        Some(unsafe { std::slice::from_raw_parts(start, range.len()) })
+    }
+
     fn bytes_mut(&mut self) -> &mut [u8] {
         // SAFETY: as above, and nobody else has a reference.
         unsafe { std::slice::from_raw_parts_mut(self.start, self.len) }
+    }
+
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        let start = self.within(&range)?;
+        // SAFETY: as in `bytes_of`, and nobody else has a reference.
+        Some(unsafe { std::slice::from_raw_parts_mut(start, range.len()) })
     }
 
     fn address(&self) -> Option<u64> {
@@ -199,6 +221,26 @@ impl Drop for Pinned {
             let _ = unsafe { result::free_host(self.start.cast()) };
         }
     }
+}
+
+/// An event in the stream.
+struct Passed(CudaEvent);
+
+impl Mark for Passed {
+    fn wait(&self) -> Result<(), Fault> {
+        wait_for(&self.0)
+    }
+}
+
+/// Waits until an event has happened. Small transactions take less time than a sleeping thread needs to wake.
+fn wait_for(event: &CudaEvent) -> Result<(), Fault> {
+    for _ in 0..20_000 {
+        if event.try_is_complete().map_err(failed)? {
+            return Ok(());
+        }
+        std::hint::spin_loop();
+    }
+    event.synchronize().map_err(failed)
 }
 
 impl Device for Card {
@@ -254,8 +296,9 @@ impl Device for Card {
 
     fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
         self.bind()?;
-        let bytes = to.bytes_mut().get_mut(bytes);
-        let Some(bytes) = bytes else { return Err(Fault::Failed("copy out of range".into())) };
+        let Some(bytes) = to.bytes_of_mut(bytes) else {
+            return Err(Fault::Failed("copy out of range".into()));
+        };
         // SAFETY: callers keep the memory and do not look at it until they have waited; `from` has so many bytes.
         unsafe { result::memcpy_dtoh_async(bytes, from, self.stream.cu_stream()) }.map_err(failed)
     }
@@ -287,6 +330,13 @@ impl Device for Card {
             .map_err(failed)
     }
 
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        self.bind()?;
+        let event = self.context.new_event(None).map_err(failed)?;
+        event.record(&self.stream).map_err(failed)?;
+        Ok(Box::new(Passed(event)))
+    }
+
     fn times(&mut self) -> [Duration; 2] {
         if !self.is_timed {
             return [Duration::ZERO; 2];
@@ -301,13 +351,6 @@ impl Device for Card {
         self.bind()?;
         self.is_begun = false;
         self.done.record(&self.stream).map_err(failed)?;
-        // Small transactions take less time than a sleeping thread needs to wake.
-        for _ in 0..20_000 {
-            if self.done.try_is_complete().map_err(failed)? {
-                return Ok(());
-            }
-            std::hint::spin_loop();
-        }
-        self.done.synchronize().map_err(failed)
+        wait_for(&self.done)
     }
 }

@@ -5,13 +5,22 @@ use std::ops::Range;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::device::{Device, Fault, HostMemory, Kernel};
+use super::device::{Device, Fault, HostMemory, Kernel, Mark};
 
 /// The process; it ends with this.
 pub(super) struct Emulator {
     child: Child,
     input: BufWriter<ChildStdin>,
     output: BufReader<ChildStdout>,
+}
+
+/// All is done as soon as it is asked for.
+struct Done;
+
+impl Mark for Done {
+    fn wait(&self) -> Result<(), Fault> {
+        Ok(())
+    }
 }
 
 /// Plain memory, which the process does not see.
@@ -25,8 +34,16 @@ impl HostMemory for Plain {
         &bytemuck::cast_slice(&self.words)[..self.len]
     }
 
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        self.bytes().get(range)
+    }
+
     fn bytes_mut(&mut self) -> &mut [u8] {
         &mut bytemuck::cast_slice_mut(&mut self.words)[..self.len]
+    }
+
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        self.bytes_mut().get_mut(range)
     }
 
     fn address(&self) -> Option<u64> {
@@ -135,7 +152,8 @@ impl Device for Emulator {
 
     fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
         self.ask(&[READ, from, bytes.len() as u64])?;
-        self.receive(&mut to.bytes_mut()[bytes])
+        let out_of_range = || Fault::Failed("copy out of range".into());
+        self.receive(to.bytes_of_mut(bytes).ok_or_else(out_of_range)?)
     }
 
     fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
@@ -153,6 +171,10 @@ impl Device for Emulator {
             0 => Ok(()),
             status => Err(Fault::Failed(format!("status {status}"))),
         }
+    }
+
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        Ok(Box::new(Done))
     }
 
     fn wait(&mut self) -> Result<(), Fault> {

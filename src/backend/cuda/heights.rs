@@ -1,14 +1,12 @@
 //! New ground from noise: heights are computed on the device and come back slice by slice.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use rayon::prelude::*;
 
 use super::device::{Device, Fault, HostMemory, Kernel};
 use super::layout::{COLUMNS, HeightsParams};
 use super::mail::Plan;
 use super::session::Session;
-use super::{Cuda, Place, try_lock};
+use super::{Cuda, Place, guarded, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
 /// Columns from which on the device is taken to be the faster of both. Estimated, not measured on a card: so many take 16
@@ -36,8 +34,7 @@ impl Cuda {
             // Nobody touches this memory before the threads that fill it.
             let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
             // As transactions have it: a driver may do anything.
-            let done = catch_unwind(AssertUnwindSafe(|| session.heights(&terms, &mut heights)))
-                .unwrap_or_else(|_| Err(Fault::Failed("panic while it was used".into())));
+            let done = guarded(|| session.heights(&terms, &mut heights));
             if let Err(fault) = done {
                 self.meet(&mut place, &fault);
                 return None;

@@ -1,18 +1,24 @@
-//! A device whose copies last until it is waited for: whoever looks at memory, or writes to it, before that panics. The
+//! A device whose copies last until they are waited for: whoever looks at memory, or writes to it, before that panics. The
 //! emulator alone is done at once, and would not tell.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Weak};
+use std::sync::{Arc, Mutex, Weak};
 
-use super::device::{Device, Fault, HostMemory, Kernel};
+use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::lock;
 
-/// What copies do with memory of the host until the next wait.
-#[derive(Default)]
-struct Copies {
-    read: AtomicBool,
-    write: AtomicBool,
+/// A copy that is under way.
+struct Copy {
+    /// Bytes of the host's memory.
+    bytes: Range<usize>,
+    /// Does it write these, or read them?
+    writes: bool,
+    /// How many marks there were when it was asked for.
+    marks: usize,
 }
+
+/// Copies under way from or to a piece of memory.
+type Copies = Mutex<Vec<Copy>>;
 
 /// Memory that copies may be under way from or to.
 struct Watched {
@@ -20,16 +26,35 @@ struct Watched {
     copies: Arc<Copies>,
 }
 
+impl Watched {
+    fn assert_none(&self, bytes: &Range<usize>, what: &str, is_meant: impl Fn(&Copy) -> bool) {
+        let is_there = |copy: &Copy| copy.bytes.start < bytes.end && bytes.start < copy.bytes.end;
+        let copies = lock(&self.copies);
+        assert!(!copies.iter().any(|copy| is_there(copy) && is_meant(copy)), "{what}");
+    }
+}
+
 impl HostMemory for Watched {
     fn bytes(&self) -> &[u8] {
-        assert!(!self.copies.write.load(Ordering::SeqCst), "memory is looked at while a copy writes it");
-        self.own.bytes()
+        let bytes = self.own.bytes();
+        self.assert_none(&(0..bytes.len()), "memory is looked at while a copy writes it", |copy| copy.writes);
+        bytes
+    }
+
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        self.assert_none(&range, "memory is looked at while a copy writes it", |copy| copy.writes);
+        self.own.bytes_of(range)
     }
 
     fn bytes_mut(&mut self) -> &mut [u8] {
-        assert!(!self.copies.read.load(Ordering::SeqCst), "memory is written while a copy reads it");
-        assert!(!self.copies.write.load(Ordering::SeqCst), "memory is written while a copy writes it");
+        let all = 0..self.own.bytes().len();
+        self.assert_none(&all, "memory is written while a copy reads or writes it", |_| true);
         self.own.bytes_mut()
+    }
+
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        self.assert_none(&range, "memory is written while a copy reads or writes it", |_| true);
+        self.own.bytes_of_mut(range)
     }
 
     fn address(&self) -> Option<u64> {
@@ -37,28 +62,54 @@ impl HostMemory for Watched {
     }
 }
 
+/// Memory that lives, by where it begins.
+type All = Vec<(usize, Weak<Copies>)>;
+
 /// The device.
 pub(super) struct Late {
     own: Box<dyn Device>,
-    /// All memory that lives, by where it begins.
-    all: Vec<(usize, Weak<Copies>)>,
+    all: Arc<Mutex<All>>,
+    marks: usize,
+}
+
+/// A mark of that device, with its number.
+struct LateMark {
+    own: Box<dyn Mark>,
+    all: Arc<Mutex<All>>,
+    number: usize,
+}
+
+/// Copies that were asked for when there were so many marks, or fewer, are done.
+fn finish(all: &Mutex<All>, marks: usize) {
+    for copies in lock(all).iter().filter_map(|(_, copies)| copies.upgrade()) {
+        lock(&copies).retain(|copy| copy.marks > marks);
+    }
+}
+
+impl Mark for LateMark {
+    fn wait(&self) -> Result<(), Fault> {
+        self.own.wait()?;
+        finish(&self.all, self.number);
+        Ok(())
+    }
 }
 
 impl Late {
     pub fn new(own: Box<dyn Device>) -> Self {
-        Self { own, all: Vec::new() }
+        Self { own, all: Arc::default(), marks: 0 }
     }
 
-    /// What copies do with this memory.
-    fn copies(&self, start: usize) -> Arc<Copies> {
-        let found = self.all.iter().filter(|(own, _)| *own == start).find_map(|(_, copies)| copies.upgrade());
-        found.expect("memory of this device")
+    /// A copy is under way.
+    fn begin(&self, start: usize, bytes: Range<usize>, writes: bool) {
+        let all = lock(&self.all);
+        let found = all.iter().filter(|(own, _)| *own == start).find_map(|(_, copies)| copies.upgrade());
+        lock(&found.expect("memory of this device")).push(Copy { bytes, writes, marks: self.marks });
     }
 }
 
-/// Where memory begins.
+/// Where memory begins. Nobody looks at it.
 fn start(memory: &dyn HostMemory) -> usize {
-    memory.bytes().as_ptr() as usize
+    memory.bytes_of(0..0).expect("a place").as_ptr() as usize
 }
 
 impl Device for Late {
@@ -80,21 +131,21 @@ impl Device for Late {
 
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
         let (own, copies) = (self.own.alloc_host(bytes)?, Arc::default());
-        self.all.retain(|(_, copies)| copies.strong_count() > 0);
-        self.all.push((start(&*own), Arc::downgrade(&copies)));
+        let mut all = lock(&self.all);
+        all.retain(|(_, copies)| copies.strong_count() > 0);
+        all.push((start(&*own), Arc::downgrade(&copies)));
         Ok(Box::new(Watched { own, copies }))
     }
 
     fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
-        self.own.upload(from, bytes, to)?;
-        self.copies(start(from)).read.store(true, Ordering::SeqCst);
+        self.own.upload(from, bytes.clone(), to)?;
+        self.begin(start(from), bytes, false);
         Ok(())
     }
 
     fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
-        let copies = self.copies(start(to));
-        self.own.download(from, to, bytes)?;
-        copies.write.store(true, Ordering::SeqCst);
+        self.own.download(from, to, bytes.clone())?;
+        self.begin(start(to), bytes, true);
         Ok(())
     }
 
@@ -106,12 +157,15 @@ impl Device for Late {
         self.own.launch(kernel, blocks, params)
     }
 
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        let mark = LateMark { own: self.own.mark()?, all: Arc::clone(&self.all), number: self.marks };
+        self.marks += 1;
+        Ok(Box::new(mark))
+    }
+
     fn wait(&mut self) -> Result<(), Fault> {
         self.own.wait()?;
-        for copies in self.all.iter().filter_map(|(_, copies)| copies.upgrade()) {
-            copies.read.store(false, Ordering::SeqCst);
-            copies.write.store(false, Ordering::SeqCst);
-        }
+        finish(&self.all, usize::MAX);
         Ok(())
     }
 }

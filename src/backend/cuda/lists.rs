@@ -7,6 +7,15 @@ pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -
     if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
 }
 
+/// Maps the entries of a short list, side by side where it has several.
+pub(super) fn map_into<T: Send, R: Send>(list: Vec<T>, work: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
+    if list.len() < 2 {
+        list.into_iter().map(work).collect()
+    } else {
+        list.into_par_iter().map(work).collect()
+    }
+}
+
 /// Maps the numbers below `end`, side by side where there are many.
 pub(super) fn map_numbers<R: Send>(
     end: usize,

@@ -1,5 +1,7 @@
 //! Memory that launches read from and write to, kept from one to the next.
 
+use std::ops::Range;
+
 use bytemuck::Pod;
 
 use super::device::{Device, Fault, HostMemory};
@@ -207,10 +209,16 @@ impl Outbox {
 
     /// Sees to it that so many entries are here after the next [`Device::wait`]; says whether that has to be.
     pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
+        self.fetch_part(device, 0..entries)
+    }
+
+    /// The same for some entries.
+    pub fn fetch_part(&mut self, device: &mut dyn Device, entries: Range<usize>) -> Result<bool, Fault> {
         match self.own {
-            Some((address, _)) if entries > 0 && self.is_own() => {
-                self.wrote(entries);
-                device.download(address, &mut *self.host, 0..entries * self.entry).map(|()| true)
+            Some((address, _)) if !entries.is_empty() && self.is_own() => {
+                self.wrote(entries.end);
+                let bytes = entries.start * self.entry..entries.end * self.entry;
+                device.download(address + bytes.start as u64, &mut *self.host, bytes).map(|()| true)
             }
             _ => Ok(false),
         }
@@ -219,5 +227,11 @@ impl Outbox {
     /// The first entries.
     pub fn entries<T: Pod>(&self, count: usize) -> &[T] {
         bytemuck::cast_slice(&self.host.bytes()[..count * size_of::<T>()])
+    }
+
+    /// Some entries, while others may still be on their way.
+    pub fn part<T: Pod>(&self, entries: Range<usize>) -> Option<&[T]> {
+        let bytes = entries.start.checked_mul(size_of::<T>())?..entries.end.checked_mul(size_of::<T>())?;
+        self.host.bytes_of(bytes).map(bytemuck::cast_slice)
     }
 }

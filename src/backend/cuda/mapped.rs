@@ -7,7 +7,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use super::device::{Device, Fault, HostMemory, Kernel};
+use super::device::{Device, Fault, HostMemory, Kernel, Mark};
 use super::lock;
 
 /// Memory of the host, and where its shadow is.
@@ -29,9 +29,17 @@ impl HostMemory for Piece {
         unsafe { std::slice::from_raw_parts(self.start, self.len) }
     }
 
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        self.bytes().get(range)
+    }
+
     fn bytes_mut(&mut self) -> &mut [u8] {
         // SAFETY: as above.
         unsafe { std::slice::from_raw_parts_mut(self.start, self.len) }
+    }
+
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        self.bytes_mut().get_mut(range)
     }
 
     fn address(&self) -> Option<u64> {
@@ -58,8 +66,16 @@ impl HostMemory for Owned {
         self.piece.bytes()
     }
 
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        self.piece.bytes_of(range)
+    }
+
     fn bytes_mut(&mut self) -> &mut [u8] {
         self.piece.bytes_mut()
+    }
+
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        self.piece.bytes_of_mut(range)
     }
 
     fn address(&self) -> Option<u64> {
@@ -153,6 +169,10 @@ impl Device for Mapped {
             self.is_running = true;
         }
         self.own.launch(kernel, blocks, params)
+    }
+
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        self.own.mark()
     }
 
     fn wait(&mut self) -> Result<(), Fault> {

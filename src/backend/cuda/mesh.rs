@@ -1,25 +1,32 @@
 //! Meshing on the device: one launch for all blocks.
 
-use super::device::{Device, Fault, Kernel};
+use std::ops::Range;
+
+use super::device::{Device, Fault, Kernel, Mark};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams, MeshResult};
 use super::lists::{cut, fill, hand_out, map};
 use super::mail::{Outbox, Plan};
-use super::session::{Session, Uploads};
-use super::surfaces::Surfaces;
+use super::session::{Session, Stacks, Uploads, windows};
+use super::surfaces::{Arrival, Surfaces};
 use super::windows::Windows;
+use crate::ground::Ground;
 use crate::lattice::{pieces, side_by_side};
 use crate::surface::MaterialMix;
 use crate::surface::block::Block;
-use crate::surface::fresh::PackedMixes;
 use crate::surface::vertex::WorldView;
 
 /// What the mesh kernel writes.
 pub(super) struct MeshOutput {
     results: Outbox,
-    positions: Outbox,
-    normals: Outbox,
-    mixes: Outbox,
-    indices: Outbox,
+    lists: MeshLists,
+}
+
+/// Surfaces of all blocks.
+pub(super) struct MeshLists {
+    pub positions: Outbox,
+    pub normals: Outbox,
+    pub mixes: Outbox,
+    pub indices: Outbox,
 }
 
 /// Positions, normals and indices.
@@ -36,74 +43,44 @@ impl MeshOutput {
     pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
         Ok(Self {
             results: Outbox::new(device, size_of::<MeshResult>(), 1 << 10)?,
-            positions: Outbox::new(device, size_of::<[u16; 4]>(), FIRST_VERTICES)?,
-            normals: Outbox::new(device, size_of::<[f32; 3]>(), FIRST_VERTICES)?,
-            mixes: Outbox::new(device, size_of::<[u8; 8]>(), FIRST_VERTICES)?,
-            indices: Outbox::new(device, size_of::<u16>(), FIRST_VERTICES * INDICES)?,
+            lists: MeshLists {
+                positions: Outbox::new(device, size_of::<[u16; 4]>(), FIRST_VERTICES)?,
+                normals: Outbox::new(device, size_of::<[f32; 3]>(), FIRST_VERTICES)?,
+                mixes: Outbox::new(device, size_of::<[u8; 8]>(), FIRST_VERTICES)?,
+                indices: Outbox::new(device, size_of::<u16>(), FIRST_VERTICES * INDICES)?,
+            },
         })
     }
 
-    /// Room for so many vertices and indices; says whether there was too little.
-    fn reserve(
-        &mut self,
-        device: &mut dyn Device,
-        (vertices, indices): (usize, usize),
-        is_long: bool,
-    ) -> Result<bool, Fault> {
-        let mut grown = false;
-        for list in [&mut self.positions, &mut self.normals, &mut self.mixes] {
-            grown |= list.reserve(device, vertices, is_long)?;
-        }
-        grown |= self.indices.reserve(device, indices, is_long)?;
-        Ok(grown)
-    }
-
-    /// What the kernel wanted to write for so many blocks.
-    fn extent(&self, blocks: usize) -> Extent {
-        let all = self.results.entries::<MeshResult>(blocks);
-        let of = |results: &[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
-        if all.len() < MANY_RESULTS {
-            return of(all);
-        }
-        let pieces: Vec<&[MeshResult]> = all.chunks(MANY_RESULTS / 4).collect();
-        map(&pieces, 2, |results| of(results)).into_iter().fold(Extent::default(), Extent::join)
+    /// What the kernel wanted to write for the blocks of each piece and all before it.
+    fn extents(&self, blocks: usize) -> Vec<Extent> {
+        let of = |results: &&[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
+        let pieces: Vec<&[MeshResult]> = self.results.entries::<MeshResult>(blocks).chunks(PIECE).collect();
+        let mut extents = map(&pieces, 2, of);
+        let mut all = Extent::default();
+        extents.iter_mut().for_each(|own| {
+            all = all.join(*own);
+            *own = all;
+        });
+        extents
     }
 
     /// What was written and copied for blocks.
     pub fn surfaces<'a>(&'a self, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Surfaces<'a> {
-        let (vertices, indices) = meshed.totals;
         Surfaces {
             grid: view.grid,
             blocks,
             results: self.results.entries(blocks.len()),
-            positions: self.positions.entries(vertices),
-            normals: self.normals.entries(vertices),
-            mixes: match meshed.plain {
-                Some(mix) => PackedMixes::One(mix),
-                None => PackedMixes::Each(self.mixes.entries(vertices)),
-            },
-            indices: self.indices.entries(indices),
+            lists: &self.lists,
+            plain: meshed.plain,
+            arrival: Arrival::new(meshed.marks),
         }
-    }
-
-    /// Copies what is not here yet.
-    fn fetch(
-        &mut self,
-        device: &mut dyn Device,
-        (vertices, indices): (usize, usize),
-        with_mixes: bool,
-    ) -> Result<(), Fault> {
-        let mut is_copied = self.positions.fetch(device, vertices)?;
-        is_copied |= self.normals.fetch(device, vertices)?;
-        is_copied |= self.indices.fetch(device, indices)?;
-        is_copied |= with_mixes && self.mixes.fetch(device, vertices)?;
-        if is_copied { device.wait() } else { Ok(()) }
     }
 
     /// Where positions, normals and indices are on the device.
     #[cfg(all(feature = "interop", target_os = "linux"))]
     pub fn there(&self) -> [u64; 3] {
-        [&self.positions, &self.normals, &self.indices].map(Outbox::address)
+        [&self.lists.positions, &self.lists.normals, &self.lists.indices].map(Outbox::address)
     }
 
     /// Where the surfaces of so many blocks are in these lists.
@@ -119,8 +96,68 @@ impl MeshOutput {
         device: &mut dyn Device,
         (vertices, indices): (usize, usize),
     ) -> Result<Lists<'_>, Fault> {
-        self.fetch(device, (vertices, indices), false)?;
-        Ok((self.positions.entries(vertices), self.normals.entries(vertices), self.indices.entries(indices)))
+        let lists = &mut self.lists;
+        lists.fetch(device, 0..vertices, 0..indices, false)?;
+        device.wait()?;
+        Ok((
+            lists.positions.entries(vertices),
+            lists.normals.entries(vertices),
+            lists.indices.entries(indices),
+        ))
+    }
+}
+
+impl MeshLists {
+    /// Room for so many vertices and indices; says whether there was too little.
+    fn reserve(
+        &mut self,
+        device: &mut dyn Device,
+        (vertices, indices): (usize, usize),
+        is_long: bool,
+    ) -> Result<bool, Fault> {
+        let mut grown = false;
+        for list in [&mut self.positions, &mut self.normals, &mut self.mixes] {
+            grown |= list.reserve(device, vertices, is_long)?;
+        }
+        grown |= self.indices.reserve(device, indices, is_long)?;
+        Ok(grown)
+    }
+
+    /// Begins to copy some vertices and indices, where they are not written straight to the host's memory.
+    fn fetch(
+        &mut self,
+        device: &mut dyn Device,
+        vertices: Range<usize>,
+        indices: Range<usize>,
+        with_mixes: bool,
+    ) -> Result<(), Fault> {
+        self.positions.fetch_part(device, vertices.clone())?;
+        self.normals.fetch_part(device, vertices.clone())?;
+        self.indices.fetch_part(device, indices)?;
+        if with_mixes {
+            self.mixes.fetch_part(device, vertices)?;
+        }
+        Ok(())
+    }
+
+    /// Begins to copy all, piece by piece: each goes as far as its extent, and has a mark. None where nothing is to be copied.
+    fn begin_fetch(
+        &mut self,
+        device: &mut dyn Device,
+        extents: &[Extent],
+        with_mixes: bool,
+    ) -> Result<Vec<Box<dyn Mark>>, Fault> {
+        if self.positions.is_mapped() {
+            return Ok(Vec::new());
+        }
+        let (mut marks, mut before) = (Vec::with_capacity(extents.len()), Extent::default());
+        for &own in extents {
+            let (vertices, indices) = (before.vertex_end..own.vertex_end, before.index_end..own.index_end);
+            self.fetch(device, vertices, indices, with_mixes)?;
+            marks.push(device.mark()?);
+            before = own;
+        }
+        Ok(marks)
     }
 
     fn vertex_capacity(&self) -> u32 {
@@ -171,12 +208,14 @@ impl Extent {
 }
 
 /// What a launch wrote.
-#[derive(Clone, Copy, Debug)]
 pub(super) struct Meshed {
     /// Vertices and indices.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
     totals: (usize, usize),
     /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
     plain: Option<MaterialMix>,
+    /// Copies to the host that are under way, one for each [`PIECE`] of blocks.
+    marks: Vec<Box<dyn Mark>>,
 }
 
 /// Blocks of some stacks that one thread deals with.
@@ -194,17 +233,26 @@ type Column = ((i32, i32), u32);
 const LONG: usize = 256;
 
 /// How many blocks a thread deals with at a time.
-const PIECE: usize = 256;
+const OF_A_THREAD: usize = 256;
 
-/// From how many blocks on what the kernel says of them is added up side by side.
-const MANY_RESULTS: usize = 1 << 13;
+/// How many blocks' surfaces are copied at a time.
+pub(super) const PIECE: usize = 1 << 12;
 
 /// From how many blocks on their surfaces are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 512;
 
+/// Where surfaces are wanted.
+#[derive(Clone, Copy)]
+struct Wanted {
+    /// Are they written on the device, to be copied, instead of straight to the host's memory?
+    is_long: bool,
+    /// Are they copied?
+    on_host: bool,
+}
+
 impl Session {
-    /// Meshes blocks. Their [`surfaces`](MeshOutput::surfaces) are in this session's memory until the next launch.
-    /// `meanwhile` is called when the device is at work.
+    /// Meshes blocks. Their [`surfaces`](MeshOutput::surfaces) are in this session's memory until the next launch, or on their
+    /// way there. `meanwhile` is called when the device is at work.
     pub fn mesh(
         &mut self,
         view: &WorldView,
@@ -213,11 +261,8 @@ impl Session {
     ) -> Result<Meshed, Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let is_long = blocks.len() >= COPIED;
-        let meshed = self.run_mesh(view, blocks, &mut uploads, is_long, meanwhile).and_then(|meshed| {
-            self.meshes.fetch(&mut *self.device, meshed.totals, meshed.plain.is_none())?;
-            Ok(meshed)
-        });
+        let wanted = Wanted { is_long: blocks.len() >= COPIED, on_host: true };
+        let meshed = self.run_mesh(view, blocks, &mut uploads, wanted, meanwhile);
         if meshed.is_err() {
             self.give_up(&uploads);
         }
@@ -230,29 +275,35 @@ impl Session {
     pub fn mesh_there(&mut self, view: &WorldView, blocks: &[Block]) -> Result<(usize, usize), Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let meshed = self.run_mesh(view, blocks, &mut uploads, true, &|| {});
+        let wanted = Wanted { is_long: true, on_host: false };
+        let meshed = self.run_mesh(view, blocks, &mut uploads, wanted, &|| {});
         if meshed.is_err() {
             self.give_up(&uploads);
         }
         meshed.map(|meshed| meshed.totals)
     }
 
-    /// Has blocks meshed; their [`MeshResult`]s are here then, and surfaces not yet. `is_long`: they are written on the
-    /// device and to be copied, instead of straight to the host's memory.
+    /// Has blocks meshed; their [`MeshResult`]s are here then, and surfaces not yet.
     fn run_mesh<'a>(
         &mut self,
         view: &WorldView<'a>,
         blocks: &[Block],
         uploads: &mut Uploads<'a>,
-        is_long: bool,
+        wanted: Wanted,
         meanwhile: &(dyn Fn() + Sync),
     ) -> Result<Meshed, Fault> {
+        let is_long = wanted.is_long;
         if blocks.len() > MOST_JOBS {
             return Err(Fault::TooLarge(blocks.len()));
         }
         let ground = view.samples.ground();
-        let (pieces, columns) = self.columns(view, blocks, uploads)?;
-        let windows = self.windows(uploads, view.samples, blocks, |block| block.brick, 1)?;
+        let (found, mut windows) = side_by_side(
+            blocks.len() >= LONG,
+            || stacks_of(&self.stacks, ground, blocks),
+            || windows(&self.bricks, view.samples, blocks, |block| block.brick, 1, &mut self.kept),
+        );
+        let (pieces, columns) = self.columns(found, uploads)?;
+        self.complete(uploads, &mut windows)?;
         let single = ground.single_material().map(MaterialMix::pure);
         let plain = single.filter(|_| !windows.has_materials());
 
@@ -272,7 +323,7 @@ impl Session {
         });
         self.inbox.entries::<u32>(counters).fill(0);
         self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
-        self.meshes.reserve(&mut *self.device, (0, 0), is_long)?;
+        self.meshes.lists.reserve(&mut *self.device, (0, 0), is_long)?;
 
         for _ in 0..2 {
             self.send(&plan, uploads)?;
@@ -284,13 +335,13 @@ impl Session {
                 jobs: self.inbox.address(job_list),
                 table: self.table,
                 results: self.meshes.results.address(),
-                positions: self.meshes.positions.address(),
-                normals: self.meshes.normals.address(),
-                mixes: if plain.is_some() { 0 } else { self.meshes.mixes.address() },
-                indices: self.meshes.indices.address(),
+                positions: self.meshes.lists.positions.address(),
+                normals: self.meshes.lists.normals.address(),
+                mixes: if plain.is_some() { 0 } else { self.meshes.lists.mixes.address() },
+                indices: self.meshes.lists.indices.address(),
                 counters: self.inbox.address(counters),
-                vertex_capacity: self.meshes.vertex_capacity(),
-                index_capacity: self.meshes.indices.capacity(),
+                vertex_capacity: self.meshes.lists.vertex_capacity(),
+                index_capacity: self.meshes.lists.indices.capacity(),
                 width: view.grid.width(),
                 depth: view.grid.depth(),
                 single: layout::single_mix(ground),
@@ -301,13 +352,23 @@ impl Session {
             meanwhile();
             self.device.wait()?;
             self.times = self.device.times();
-            let extent = self.meshes.extent(blocks.len());
-            if !self.meshes.reserve(&mut *self.device, extent.totals(), is_long)? {
+            let extents = self.meshes.extents(blocks.len());
+            let all = extents.last().copied().unwrap_or_default();
+            let lists = &mut self.meshes.lists;
+            if !lists.reserve(&mut *self.device, all.totals(), is_long)? {
                 // Whoever draws surfaces takes them from where results say they are.
-                if !extent.is_in_lists() {
+                if !all.is_in_lists() {
                     return Err(Fault::Failed("surfaces beyond the ends of their lists".into()));
                 }
-                return Ok(Meshed { totals: extent.totals(), plain });
+                let extents = if wanted.on_host { &extents[..] } else { &[] };
+                let marks = lists.begin_fetch(&mut *self.device, extents, plain.is_none())?;
+                self.kept.put(windows);
+                return Ok(Meshed {
+                    #[cfg(all(feature = "interop", target_os = "linux"))]
+                    totals: all.totals(),
+                    plain,
+                    marks,
+                });
             }
             // A second pass, with room for all.
         }
@@ -354,29 +415,34 @@ fn is_same_stack(a: &Block, b: &Block) -> bool {
 }
 
 impl Session {
-    /// Blocks in pieces, and their stacks, which are uploaded where they have to be.
+    /// These blocks in pieces, and their stacks, which are uploaded where they have to be.
     fn columns<'b>(
         &mut self,
-        view: &WorldView,
-        blocks: &'b [Block],
+        found: Vec<FoundStacks<'b>>,
         uploads: &mut Uploads,
     ) -> Result<(Vec<Piece<'b>>, Vec<Column>), Fault> {
-        let (stacks, ground) = (&self.stacks, view.samples.ground());
-        let find = |stack: &[Block]| (place(&stack[0]), stacks.find(ground, place(&stack[0])));
-        let lists = pieces(blocks, PIECE, is_same_stack);
-        let found = map(&lists, 2, |blocks| blocks.chunk_by(is_same_stack).map(&find).collect::<Vec<_>>());
-        let (mut pieces, mut first) = (Vec::with_capacity(lists.len()), 0);
-        let mut columns = Vec::with_capacity(found.iter().map(Vec::len).sum());
-        for (blocks, found) in lists.into_iter().zip(found) {
+        let (mut pieces, mut first) = (Vec::with_capacity(found.len()), 0);
+        let mut columns = Vec::with_capacity(found.iter().map(|(_, stacks)| stacks.len()).sum());
+        for (blocks, stacks) in found {
             pieces.push(Piece { blocks, first, column: columns.len() as u32 });
             first += blocks.len();
-            for (place, slot) in found {
+            for (place, slot) in stacks {
                 let slot = slot.map_or_else(|| self.need_stack(uploads, place), Ok)?;
                 columns.push((place, slot));
             }
         }
         Ok((pieces, columns))
     }
+}
+
+/// Blocks of some stacks, and for each of these the slot that it has, if any.
+type FoundStacks<'b> = (&'b [Block], Vec<((i32, i32), Option<u32>)>);
+
+/// The stacks of blocks, in pieces.
+fn stacks_of<'b>(stacks: &Stacks, ground: &Ground, blocks: &'b [Block]) -> Vec<FoundStacks<'b>> {
+    let find = |stack: &[Block]| (place(&stack[0]), stacks.find(ground, place(&stack[0])));
+    let lists = pieces(blocks, OF_A_THREAD, is_same_stack);
+    map(&lists, 2, |&blocks| (blocks, blocks.chunk_by(is_same_stack).map(&find).collect()))
 }
 
 #[cfg(test)]

@@ -131,10 +131,7 @@ impl Cuda {
                 session.forget();
                 Ok((session, costs))
             };
-            // A driver may do anything, and nobody else would hear of it.
-            let opened = catch_unwind(AssertUnwindSafe(open))
-                .unwrap_or_else(|_| Err(Fault::Failed("panic while it was opened".into())));
-            match opened {
+            match guarded(open) {
                 Ok((session, costs)) => {
                     let name = session.name();
                     // Nobody may lose it before it is said to be there.
@@ -162,7 +159,8 @@ impl Cuda {
     }
 
     /// Does a stage on the card if that is there, free and chosen; else the processor has to do it. `then` makes something
-    /// of what was done, while it still lies in the session's memory.
+    /// of what was done, while it still lies in the session's memory. What it made of things that the card did not bring in
+    /// the end is lost.
     ///
     /// So the lock is held until `then` is through, which may run other tasks of its thread pool meanwhile, even on this
     /// thread. That can't block: whoever else wants the session tries the lock and goes on without.
@@ -172,7 +170,7 @@ impl Cuda {
         mut load: Load,
         missing: impl FnOnce(&Session) -> usize,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
-        then: impl FnOnce(&Session, T) -> R,
+        then: impl FnOnce(&mut Session, T) -> Result<R, Fault>,
     ) -> (Option<R>, Load) {
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
         let Some(mut place) = try_lock(&self.slot) else { return (None, load) };
@@ -190,15 +188,14 @@ impl Cuda {
         if !is_chosen(load) {
             return (None, load);
         }
-        // A driver may do anything, and nobody else would finish the transaction.
-        let done = catch_unwind(AssertUnwindSafe(|| work(session)))
-            .unwrap_or_else(|_| Err(Fault::Failed("panic while it was used".into())));
-        match done {
-            Ok(done) => {
+        let done = guarded(|| work(session));
+        let times = session.times();
+        // No fault of the device's: a panic in here is the caller's.
+        match done.and_then(|done| then(session, done)) {
+            Ok(made) => {
                 choice.is_cuda = true;
-                [choice.device, choice.kernel] = session.times();
-                // No fault of the device's: a panic in here is the caller's.
-                (Some(then(session, done)), load)
+                [choice.device, choice.kernel] = times;
+                (Some(made), load)
             }
             Err(fault) => {
                 // What was lost on trying is not the processor's time to be learnt from.
@@ -230,13 +227,14 @@ impl Cuda {
     }
 
     /// Applies edits on the card, if that is chosen.
-    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Vec<Ledger>>, Load) {
+    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Ledger>, Load) {
         let load = Load::of_edits(work);
         let missing = |session: &Session| session.missing_edits(work);
-        self.offer(choice, load, missing, |session| session.edit(work), |_, ledgers| ledgers)
+        self.offer(choice, load, missing, |session| session.edit(work), |_, ledger| Ok(ledger))
     }
 
-    /// Meshes blocks on the card, if that is chosen: says whether it was, and `then` got their surfaces.
+    /// Meshes blocks on the card, if that is chosen: says for how long `then` waited for their surfaces, which it got. `None`
+    /// where the processor has to mesh them, and what `then` made of some that never came has to be forgotten.
     pub fn mesh(
         &self,
         view: &WorldView,
@@ -244,15 +242,25 @@ impl Cuda {
         choice: &mut Choice,
         meanwhile: &(dyn Fn() + Sync),
         then: &mut dyn FnMut(&dyn FreshParts),
-    ) -> (bool, Load) {
+    ) -> (Option<Duration>, Load) {
         let load = Load { amount: blocks.len(), ..Load::default() };
         let missing = |session: &Session| session.missing_blocks(view, blocks);
         let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
-        let (done, load) = self.offer(choice, load, missing, work, |session, meshed| {
-            then(&session.meshes.surfaces(view, blocks, meshed));
-        });
-        (done.is_some(), load)
+        self.offer(choice, load, missing, work, |session, meshed| {
+            let surfaces = session.meshes.surfaces(view, blocks, meshed);
+            then(&surfaces);
+            let waited = surfaces.arrival.end()?;
+            // Whoever needed no more than some of them did not wait for all.
+            guarded(|| session.device.wait())?;
+            Ok(waited)
+        })
     }
+}
+
+/// Does something with a driver, which may do anything: a panic of it is a fault, and somebody finishes the transaction.
+fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    let failed = |_| Err(Fault::Failed("its driver panicked".into()));
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(failed)
 }
 
 /// Gives the card up, with the one warning.

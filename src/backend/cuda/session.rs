@@ -11,7 +11,7 @@ use super::lists::{cut, fill, hand_out};
 use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
 use super::slots::{Slots, reference};
-use super::windows::Windows;
+use super::windows::{KeptSlabs, Windows};
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::surface::block::Block;
@@ -28,8 +28,9 @@ pub(super) struct Session {
     pub(super) inbox: Inbox,
     pub(super) meshes: MeshOutput,
     pub(super) edits: EditOutput,
-    /// Memory for the jobs of the next edits.
+    /// Memory for the jobs and windows of the next launch.
     pub(super) edit_jobs: Vec<EditJob>,
+    pub(super) kept: KeptSlabs,
     /// Where the table of cases is.
     pub(super) table: u64,
 }
@@ -149,6 +150,20 @@ impl<'a> Uploads<'a> {
 /// Bricks that one thread writes records of.
 const GROUP: usize = 256;
 
+/// The bricks around these, which are at `pos` and sorted by stacks, and so many up and down. Those that have no slot are to be
+/// [completed](Session::complete).
+pub(super) fn windows<'a, T: Sync>(
+    slots: &Slots,
+    view: SampleView<'a>,
+    bricks: &[T],
+    pos: impl Fn(&T) -> BrickPos + Send + Sync,
+    up_and_down: i32,
+    kept: &mut KeptSlabs,
+) -> Windows<'a> {
+    let find = |brick: &Brick| slots.find(brick.tag.get()).map(|slot| reference(slot, brick));
+    Windows::around(view, bricks, pos, up_and_down, find, kept)
+}
+
 /// From how many stacks on their records are written side by side; each looks at 121 columns.
 const MANY_STACKS: usize = 64;
 
@@ -183,6 +198,7 @@ impl Session {
             meshes,
             edits,
             edit_jobs: Vec::new(),
+            kept: KeptSlabs::default(),
             table: address,
         })
     }
@@ -255,21 +271,13 @@ impl Session {
         Ok(reference(slot, brick))
     }
 
-    /// The bricks around these, which are at `pos` and sorted by stacks, and so many up and down; uploaded where they have
-    /// to be.
-    pub(super) fn windows<'a, T: Sync>(
+    /// Enters the bricks of windows that have no reference yet; they are uploaded.
+    pub(super) fn complete<'a>(
         &mut self,
         uploads: &mut Uploads<'a>,
-        view: SampleView<'a>,
-        bricks: &[T],
-        pos: impl Fn(&T) -> BrickPos + Send + Sync,
-        up_and_down: i32,
-    ) -> Result<Windows<'a>, Fault> {
-        let slots = &self.bricks;
-        let find = |brick: &Brick| slots.find(brick.tag.get()).map(|slot| reference(slot, brick));
-        let mut windows = Windows::around(view, bricks, pos, up_and_down, find);
-        windows.complete(|brick| self.need_brick(uploads, brick))?;
-        Ok(windows)
+        windows: &mut Windows<'a>,
+    ) -> Result<(), Fault> {
+        windows.complete(|brick| self.need_brick(uploads, brick))
     }
 
     /// Sees to it that a stack is there; returns its slot.

@@ -38,7 +38,7 @@ const PIECE: usize = 1 << 14;
 const FIRST: usize = 1 << 14;
 
 /// From how many slots on they are taken side by side.
-const LONG: usize = 1 << 13;
+const LONG: usize = 1 << 10;
 
 /// The first of so many numbers that no other record of this process has.
 fn stamps(count: usize) -> u64 {
@@ -101,20 +101,27 @@ impl Slots {
         Ok((slot, self.put(slot, stamps(1))))
     }
 
-    /// So many slots at once, all of them or none.
-    pub fn take_many(
+    /// Slots for all entries of a list, or none: slots with their tags come into `taken`, and what `with` makes of entries and
+    /// their slots into `out`.
+    pub fn take_many<T: Sync, R: Send>(
         &mut self,
         device: &mut dyn Device,
-        count: usize,
-        out: &mut Vec<(u32, u64)>,
+        list: &[T],
+        out: &mut [R],
+        taken: &mut Vec<(u32, u64)>,
+        with: impl Fn(&T, u32) -> R + Sync,
     ) -> Result<(), Fault> {
-        let rest = self.make_room(device, count)?;
-        let (free, first) = (&self.free[rest..], stamps(count));
-        let put = |(number, &slot): (usize, &u32)| (slot, self.put(slot, first + number as u64));
-        if count < LONG {
-            out.extend(free.iter().rev().enumerate().map(put));
+        let rest = self.make_room(device, list.len())?;
+        let (free, first) = (&self.free[rest..], stamps(list.len()));
+        let put = |((number, &slot), (entry, out)): ((usize, &u32), (&T, &mut R))| {
+            *out = with(entry, slot);
+            (slot, self.put(slot, first + number as u64))
+        };
+        if list.len() < LONG {
+            taken.extend(free.iter().rev().enumerate().zip(list.iter().zip(out)).map(put));
         } else {
-            out.par_extend(free.par_iter().rev().enumerate().map(put));
+            let entries = list.par_iter().zip(out);
+            taken.par_extend(free.par_iter().rev().enumerate().zip(entries).map(put));
         }
         self.free.truncate(rest);
         Ok(())
@@ -210,6 +217,14 @@ mod tests {
     use super::*;
     use crate::backend::cuda::tests::device;
 
+    /// So many slots at once.
+    fn take(slots: &mut Slots, device: &mut dyn Device, count: usize, out: &mut Vec<(u32, u64)>) {
+        let (list, mut found) = (vec![7; count], vec![0; count]);
+        let taken = slots.take_many(device, &list, &mut found, out, |entry, slot| slot + entry);
+        taken.expect("room for all");
+        assert!(found.iter().zip(&*out).all(|(found, (slot, _))| *found == slot + 7));
+    }
+
     #[test]
     fn what_was_not_used_lately_makes_room_and_the_rest_stays() {
         let Some(mut device) = device() else { return };
@@ -222,7 +237,7 @@ mod tests {
             let again = rounds.last().map(|taken| taken[..2000].to_vec()).unwrap_or_default();
             let kept: Vec<_> = again.into_iter().filter(|&(_, tag)| slots.find(tag).is_some()).collect();
             let mut taken = Vec::new();
-            slots.take_many(&mut *device, 9000 + round, &mut taken).expect("room for all");
+            take(&mut slots, &mut *device, 9000 + round, &mut taken);
             let mut all: Vec<u32> = taken.iter().chain(&kept).map(|&(slot, _)| slot).collect();
             assert!(taken.iter().chain(&kept).all(|&(slot, tag)| slots.find(tag) == Some(slot)));
             all.sort_unstable();
@@ -241,7 +256,7 @@ mod tests {
             let mut slots = Slots::new(16, count * 16);
             let mut taken = Vec::new();
             slots.begin();
-            slots.take_many(&mut *device, count, &mut taken).expect("room for all");
+            take(&mut slots, &mut *device, count, &mut taken);
             assert!(taken.iter().map(|&(slot, _)| slot).eq(0..count as u32));
             assert!(taken.iter().all(|&(slot, tag)| slots.find(tag) == Some(slot)));
             assert!(slots.take(&mut *device).is_err(), "all are in use in this round");
@@ -252,7 +267,7 @@ mod tests {
             slots.clear();
             assert!(taken.iter().all(|&(_, tag)| slots.find(tag).is_none()));
             taken.clear();
-            slots.take_many(&mut *device, count, &mut taken).expect("room for all again");
+            take(&mut slots, &mut *device, count, &mut taken);
         }
     }
 }

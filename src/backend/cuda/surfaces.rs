@@ -1,23 +1,85 @@
-//! Surfaces of blocks as the mesh kernel wrote them: whoever draws them takes them from there, with no copy in between.
+//! Surfaces of blocks as the mesh kernel wrote them: whoever draws them takes them from where they arrive, with no copy in
+//! between. They arrive one after the other, in the order of their blocks, while the first ones are drawn already.
 
 use std::ops::Range;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
 
+use web_time::Instant;
+
+use super::device::{Fault, Mark};
+use super::guarded;
 use super::layout::MeshResult;
+use super::mesh::{MeshLists, PIECE};
 use crate::lattice::{ChunkGrid, SNAP};
+use crate::surface::MaterialMix;
 use crate::surface::block::Block;
 use crate::surface::fresh::{FreshPart, FreshParts, FreshVertices, PackedMixes, PackedVertices};
 
-/// What a launch wrote for some blocks. All lists are those of all blocks together.
+/// What a launch wrote for some blocks.
 pub(super) struct Surfaces<'a> {
     pub grid: ChunkGrid,
     pub blocks: &'a [Block],
     /// Where the surface of each block is.
     pub results: &'a [MeshResult],
-    /// From the lowest sample of a block's brick.
-    pub positions: &'a [[u16; 4]],
-    pub normals: &'a [[f32; 3]],
-    pub mixes: PackedMixes<'a>,
-    pub indices: &'a [u16],
+    /// Those of all blocks together. Positions count from the lowest sample of a block's brick.
+    pub lists: &'a MeshLists,
+    /// What all vertices are made of, where that is the same; else each has its own.
+    pub plain: Option<MaterialMix>,
+    pub arrival: Arrival,
+}
+
+/// Copies on their way, each with the surfaces of so many blocks more.
+pub(super) struct Arrival {
+    /// None where nothing had to be copied.
+    marks: Vec<Box<dyn Mark>>,
+    /// How many copies are here.
+    here: AtomicUsize,
+    fault: OnceLock<Fault>,
+    /// Nanoseconds that were waited.
+    waited: AtomicU64,
+}
+
+impl Arrival {
+    /// After these marks.
+    pub fn new(marks: Vec<Box<dyn Mark>>) -> Self {
+        Self { marks, here: AtomicUsize::new(0), fault: OnceLock::new(), waited: AtomicU64::new(0) }
+    }
+
+    /// Waits for the surfaces of the first blocks; tells how many are here.
+    fn wait_for(&self, blocks: usize) -> usize {
+        let wanted = blocks.div_ceil(PIECE).min(self.marks.len());
+        let here = self.here.load(Ordering::Acquire);
+        if here < wanted {
+            let start = Instant::now();
+            self.pass(here, wanted);
+            self.waited.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        }
+        match self.here.load(Ordering::Acquire) {
+            all if all == self.marks.len() => usize::MAX,
+            some => some * PIECE,
+        }
+    }
+
+    /// Waits for copies, from one to another; for none behind one that failed.
+    fn pass(&self, here: usize, wanted: usize) {
+        for (number, mark) in (here..).zip(&self.marks[here..wanted]) {
+            if let Err(fault) = guarded(|| mark.wait()) {
+                self.fault.get_or_init(|| fault);
+                return;
+            }
+            self.here.fetch_max(number + 1, Ordering::AcqRel);
+        }
+    }
+
+    /// How long was waited; or the fault, where some never came.
+    pub fn end(self) -> Result<Duration, Fault> {
+        match self.fault.into_inner() {
+            Some(fault) => Err(fault),
+            None => Ok(Duration::from_nanos(self.waited.into_inner())),
+        }
+    }
 }
 
 fn range(first: u32, count: u32) -> Range<usize> {
@@ -25,19 +87,25 @@ fn range(first: u32, count: u32) -> Range<usize> {
 }
 
 impl FreshParts for Surfaces<'_> {
+    fn wait_for(&self, blocks: usize) -> usize {
+        self.arrival.wait_for(blocks)
+    }
+
     fn part(&self, number: usize) -> Option<FreshPart<'_>> {
         let (block, result) = (self.blocks.get(number)?, self.results.get(number)?);
+        // What is looked at has to be here.
+        (number < self.wait_for(number + 1)).then_some(())?;
         let own = range(result.vertex, result.vertices);
         let vertices = PackedVertices {
             origin: (block.brick.origin() - self.grid.origin(block.chunk)) * SNAP,
-            positions: self.positions.get(own.clone())?,
-            normals: self.normals.get(own.clone())?,
-            mixes: match self.mixes {
-                PackedMixes::One(mix) => PackedMixes::One(mix),
-                PackedMixes::Each(mixes) => PackedMixes::Each(mixes.get(own)?),
+            positions: self.lists.positions.part(own.clone())?,
+            normals: self.lists.normals.part(own.clone())?,
+            mixes: match self.plain {
+                Some(mix) => PackedMixes::One(mix),
+                None => PackedMixes::Each(self.lists.mixes.part(own)?),
             },
         };
-        let indices = self.indices.get(range(result.index, result.indices))?;
+        let indices = self.lists.indices.part(range(result.index, result.indices))?;
         Some(FreshPart { vertices: FreshVertices::Packed(vertices), indices })
     }
 }

@@ -7,7 +7,7 @@ use glam::IVec3;
 
 use super::device::Fault;
 use super::layout::NONE;
-use super::lists::{cut, hand_out, map};
+use super::lists::{cut, hand_out, map_into};
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::window::{Window, shared};
 use crate::volume::{Brick, SampleView};
@@ -32,6 +32,7 @@ pub(super) struct Entry {
 }
 
 /// The windows of many bricks, as references.
+#[derive(Default)]
 pub(super) struct Windows<'a> {
     slabs: Vec<Slab<'a>>,
     /// How many of the bricks that were asked for belong to a slab; the last one may have fewer.
@@ -43,24 +44,58 @@ pub(super) struct Windows<'a> {
 struct Slab<'a> {
     /// Entries of all slabs before.
     first: u32,
-    /// Where each brick that was asked for is, counted from there.
-    entries: Vec<Entry>,
-    /// The references of all entries; [`NONE`] where no brick is stored.
-    refs: Vec<u32>,
+    lists: SlabLists,
     /// Bricks that have no reference yet, with their entries.
     missing: Vec<(usize, &'a Brick)>,
     has_materials: bool,
 }
 
+/// Of each slab.
+#[derive(Default)]
+struct SlabLists {
+    /// Where each brick that was asked for is, counted from the slab's first entry.
+    entries: Vec<Entry>,
+    /// The references of all entries; [`NONE`] where no brick is stored.
+    refs: Vec<u32>,
+}
+
+/// Memory of slabs, kept from one launch to the next: who frees what other threads allocated may have to wait for them.
+#[derive(Default)]
+pub(super) struct KeptSlabs(Vec<SlabLists>);
+
+/// Most entries of a slab whose memory is kept.
+const KEPT_ENTRIES: usize = 1 << 14;
+
+impl KeptSlabs {
+    /// Lists for so many slabs.
+    fn take(&mut self, slabs: usize) -> Vec<SlabLists> {
+        let mut lists = std::mem::take(&mut self.0);
+        lists.resize_with(slabs, SlabLists::default);
+        lists
+    }
+
+    /// Takes the memory of windows that are not needed any more.
+    pub fn put(&mut self, windows: Windows) {
+        let lists = windows.slabs.into_iter().map(|slab| slab.lists);
+        let is_small = |lists: &SlabLists| lists.refs.capacity() <= KEPT_ENTRIES;
+        self.0.extend(lists.filter(is_small));
+        self.0.truncate(SLABS);
+    }
+}
+
 impl<'a> Slab<'a> {
-    /// The windows around bricks, `more` bricks higher and deeper than one; `find` says how kernels refer to a brick.
+    /// The windows around bricks, `more` bricks higher and deeper than one, in these lists; `find` says how kernels refer to a
+    /// brick.
     fn new(
+        mut lists: SlabLists,
         view: &SampleView<'a>,
         bricks: impl Iterator<Item = BrickPos> + Clone,
         more: i32,
         find: impl Fn(&Brick) -> Option<u32>,
     ) -> Self {
-        let (mut slab, mut window, mut rest) = (Self::default(), Window::default(), bricks);
+        lists.entries.clear();
+        lists.refs.clear();
+        let (mut slab, mut window, mut rest) = (Self { lists, ..Self::default() }, Window::default(), bricks);
         while let Some((count, places)) = shared(rest.clone()) {
             let more = IVec3::Y * more;
             window = window.moved(view, LatticeBox { min: places.min - more, max: places.max + more });
@@ -76,11 +111,12 @@ impl<'a> Slab<'a> {
         bricks: impl Iterator<Item = BrickPos>,
         find: impl Fn(&Brick) -> Option<u32>,
     ) {
-        let (first, [x, _, z]) = (self.refs.len(), window.steps());
+        let SlabLists { entries, refs } = &mut self.lists;
+        let (first, [x, _, z]) = (refs.len(), window.steps());
         let strides = (x | z << 16) as u32;
         let entry = |brick| Entry { number: (first + window.place(brick)) as u32, strides };
-        self.entries.extend(bricks.map(entry));
-        self.refs.resize(first + window.bricks().len(), NONE);
+        entries.extend(bricks.map(entry));
+        refs.resize(first + window.bricks().len(), NONE);
         for (number, brick) in (first..).zip(window.bricks()) {
             let Some(brick) = *brick else { continue };
             match find(brick) {
@@ -91,7 +127,7 @@ impl<'a> Slab<'a> {
     }
 
     fn put(&mut self, number: usize, reference: u32) {
-        self.refs[number] = reference;
+        self.lists.refs[number] = reference;
         self.has_materials |= reference & 1 == 1;
     }
 }
@@ -105,19 +141,23 @@ impl<'a> Windows<'a> {
         pos: impl Fn(&T) -> BrickPos + Send + Sync,
         up_and_down: i32,
         find: impl Fn(&Brick) -> Option<u32> + Send + Sync,
+        kept: &mut KeptSlabs,
     ) -> Self {
         let height = up_and_down.max(1) as usize;
         let of_a_slab = match bricks.len() {
             few if few * height < LONG => few.max(1),
             many => many.div_ceil(SLABS).clamp((OF_A_SLAB[0] / height).max(1), OF_A_SLAB[1]),
         };
-        let parts: Vec<&[T]> = bricks.chunks(of_a_slab).collect();
-        let slab = |part: &&[T]| Slab::new(&view, part.iter().map(&pos), up_and_down - 1, &find);
-        let mut slabs = map(&parts, 2, slab);
+        let parts = bricks.chunks(of_a_slab);
+        let slab = |(part, lists): (&[T], SlabLists)| {
+            Slab::new(lists, &view, part.iter().map(&pos), up_and_down - 1, &find)
+        };
+        let lists = kept.take(parts.len());
+        let mut slabs = map_into(parts.zip(lists).collect(), slab);
         let mut first = 0;
         for slab in &mut slabs {
             slab.first = first;
-            first += slab.refs.len() as u32;
+            first += slab.lists.refs.len() as u32;
         }
         Self { slabs, of_a_slab }
     }
@@ -135,19 +175,19 @@ impl<'a> Windows<'a> {
     /// The entry of a brick that was asked for, by its number among those.
     pub fn entry(&self, number: usize) -> Entry {
         let slab = &self.slabs[number / self.of_a_slab];
-        let own = slab.entries[number % self.of_a_slab];
+        let own = slab.lists.entries[number % self.of_a_slab];
         Entry { number: slab.first + own.number, ..own }
     }
 
     /// The reference of a brick that was asked for.
     pub fn reference(&self, number: usize) -> u32 {
         let slab = &self.slabs[number / self.of_a_slab];
-        slab.refs[slab.entries[number % self.of_a_slab].number as usize]
+        slab.lists.refs[slab.lists.entries[number % self.of_a_slab].number as usize]
     }
 
     /// How many entries there are.
     pub fn len(&self) -> usize {
-        self.slabs.iter().map(|slab| slab.refs.len()).sum()
+        self.slabs.iter().map(|slab| slab.lists.refs.len()).sum()
     }
 
     /// Has any brick materials of its own?
@@ -157,9 +197,9 @@ impl<'a> Windows<'a> {
 
     /// Writes the references of all entries.
     pub fn write(&self, out: &mut [u32]) {
-        let places = cut(out, self.slabs.iter().map(|slab| slab.refs.len()));
+        let places = cut(out, self.slabs.iter().map(|slab| slab.lists.refs.len()));
         let slabs: Vec<_> = self.slabs.iter().zip(places).collect();
-        hand_out(slabs, |(slab, place)| place.copy_from_slice(&slab.refs));
+        hand_out(slabs, |(slab, place)| place.copy_from_slice(&slab.lists.refs));
     }
 }
 
@@ -187,7 +227,11 @@ mod tests {
         let ground = Ground::flat(8, 8, 0.0).unwrap();
         let own = |brick: &Brick| brick.tag.get() as u32;
         let known = |brick: &Brick| Some(own(brick)).filter(|code| !code.is_multiple_of(3));
-        let mut windows = Windows::around(SampleView::new(&ground, stored), asked, pos, 8, known);
+        let (view, mut kept) = (SampleView::new(&ground, stored), KeptSlabs::default());
+        // In the memory of others.
+        let others = Windows::around(view, &[(0, 0, 0), (5, 6, 7)], pos, 8, known, &mut kept);
+        kept.put(others);
+        let mut windows = Windows::around(view, asked, pos, 8, known, &mut kept);
         let mut missing = 0;
         let found = windows.complete(|brick| {
             missing += 1;
@@ -232,7 +276,8 @@ mod tests {
     #[test]
     fn where_nothing_is_asked_for_there_is_no_entry() {
         let (ground, stored) = (Ground::flat(8, 8, 0.0).unwrap(), Bricks::default());
-        let windows = Windows::around(SampleView::new(&ground, &stored), &[(0, 0, 0); 0], pos, 1, |_| None);
+        let (view, mut kept) = (SampleView::new(&ground, &stored), KeptSlabs::default());
+        let windows = Windows::around(view, &[(0, 0, 0); 0], pos, 1, |_| None, &mut kept);
         windows.write(&mut []);
         assert!(windows.len() == 0 && !windows.has_materials());
     }

@@ -6,8 +6,8 @@ use super::super::device::Fault;
 use super::super::layout::{self, CarefulParams, Chisel, EditJob, EditParams};
 use super::super::lists::in_pieces;
 use super::super::mail::{Inbox, Plan, Section};
-use super::super::session::{Session, Uploads};
-use super::super::windows::Windows;
+use super::super::session::{Session, Uploads, windows};
+use super::super::windows::{KeptSlabs, Windows};
 use super::LONG;
 use super::jobs::pos;
 use crate::ground::GreyImage;
@@ -83,9 +83,10 @@ impl<'a> Care<'a> {
         self.rule_list = plan.section::<u8>(self.rules.len());
     }
 
-    /// Writes it.
-    pub fn put(&self, inbox: &mut Inbox) {
+    /// Writes it, and gives the windows back.
+    pub fn put(&mut self, inbox: &mut Inbox, kept: &mut KeptSlabs) {
         self.windows.write(inbox.entries(self.ref_list));
+        kept.put(std::mem::take(&mut self.windows));
         inbox.put(self.chisel_list, &self.chisels);
         inbox.put(self.image_list, &self.images);
         inbox.put(self.rule_list, &self.rules);
@@ -150,7 +151,8 @@ impl Session {
         jobs: &mut [EditJob],
         uploads: &mut Uploads<'a>,
     ) -> Result<Care<'a>, Fault> {
-        let windows = self.windows(uploads, work.base, jobs, pos, look.bricks())?;
+        let mut windows = windows(&self.bricks, work.base, jobs, pos, look.bricks(), &mut self.kept);
+        self.complete(uploads, &mut windows)?;
         in_pieces(jobs, LONG, |first, jobs| {
             for (number, job) in (first..).zip(jobs) {
                 let entry = windows.entry(number);

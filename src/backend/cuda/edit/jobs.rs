@@ -1,15 +1,16 @@
 //! Jobs of the edit kernels: the bricks that edits may reach, each with its edits, its stack and what it is now.
 
 use glam::IVec3;
+use rayon::prelude::*;
 
 use super::super::device::Fault;
 use super::super::layout::{self, EditJob, MOST_JOBS, NONE};
-use super::super::lists::{cut, hand_out, in_pieces, map};
+use super::super::lists::{cut, map};
 use super::super::session::{Session, Uploads};
 use super::super::slots::reference;
-use super::LONG;
+use super::{LONG, PIECE};
 use crate::lattice::{BrickPos, ChunkGrid, pieces};
-use crate::volume::{EditWork, Job, SampleView};
+use crate::volume::{Brick, EditWork, Job};
 
 /// Which brick a job is about.
 pub(super) fn pos(job: &EditJob) -> BrickPos {
@@ -23,16 +24,22 @@ fn place(job: &EditJob) -> (i32, i32) {
 }
 
 /// A job for each brick that edits may reach, in order: where the brick is, which edits it takes, how chunks cut it. They
-/// take the place of what the list holds.
+/// take the place of what the list holds. `complete` gets those of some bricks that follow each other, and the number of the
+/// first; what it makes of them comes back in order.
 ///
 /// # Errors
 /// More jobs than a launch may have.
-pub(super) fn list(work: &EditWork, list: &mut Vec<EditJob>) -> Result<(), Fault> {
-    let pieces = pieces(work.jobs(), LONG, Job::is_same_brick);
+pub(super) fn list<R: Send>(
+    work: &EditWork,
+    list: &mut Vec<EditJob>,
+    complete: impl Fn(usize, &mut [EditJob]) -> R + Send + Sync,
+) -> Result<Vec<R>, Fault> {
+    let length = if work.jobs().len() < LONG { LONG } else { PIECE };
+    let pieces = pieces(work.jobs(), length, Job::is_same_brick);
     if let [] | [_] = &pieces[..] {
         list.clear();
         list.extend(list_from(0, work.jobs(), work.grid));
-        return Ok(());
+        return Ok(vec![complete(0, list)]);
     }
     let counts = map(&pieces, 2, |piece| piece.chunk_by(Job::is_same_brick).count());
     let count = counts.iter().sum();
@@ -40,16 +47,17 @@ pub(super) fn list(work: &EditWork, list: &mut Vec<EditJob>) -> Result<(), Fault
         return Err(Fault::TooLarge(count));
     }
     list.resize(count, EditJob::default());
-    let mut first = 0;
+    let (mut edit, mut brick) = (0, 0);
     let numbered = pieces.iter().zip(cut(list, counts.into_iter())).map(|(&piece, place)| {
-        let own = first;
-        first += piece.len();
-        (own, piece, place)
+        let own = (edit, brick, piece, place);
+        (edit, brick) = (edit + piece.len(), brick + own.3.len());
+        own
     });
-    hand_out(numbered.collect(), |(first, piece, place)| {
-        place.iter_mut().zip(list_from(first, piece, work.grid)).for_each(|(place, job)| *place = job);
+    let made = numbered.collect::<Vec<_>>().into_par_iter().map(|(edit, brick, piece, place)| {
+        place.iter_mut().zip(list_from(edit, piece, work.grid)).for_each(|(place, job)| *place = job);
+        complete(brick, place)
     });
-    Ok(())
+    Ok(made.collect())
 }
 
 /// The jobs of a piece of a list of edits, which begins with this number.
@@ -63,57 +71,52 @@ fn list_from(first: usize, piece: &[Job], grid: ChunkGrid) -> impl Iterator<Item
     })
 }
 
-impl Session {
-    /// Enters stacks, which are uploaded where they have to be.
-    pub(super) fn enter_stacks(
-        &mut self,
-        work: &EditWork,
-        jobs: &mut [EditJob],
-        uploads: &mut Uploads,
-    ) -> Result<(), Fault> {
-        let (stacks, ground) = (&self.stacks, work.base.ground());
-        let missing = in_pieces(jobs, LONG, |first, jobs| {
-            let (mut first, mut missing) = (first, Vec::new());
-            for stack in jobs.chunk_by_mut(|a, b| place(a) == place(b)) {
-                match stacks.find(ground, place(&stack[0])) {
-                    Some(slot) => stack.iter_mut().for_each(|job| job.stack = slot),
-                    None => missing.push(first),
-                }
-                first += stack.len();
-            }
-            missing
-        });
-        for first in missing.into_iter().flatten() {
-            let stack = place(&jobs[first]);
-            let slot = self.need_stack(uploads, stack)?;
-            let own = jobs[first..].iter_mut().take_while(|job| place(job) == stack);
-            own.for_each(|job| job.stack = slot);
-        }
-        Ok(())
-    }
+/// What jobs need and the device does not have, by the jobs' numbers.
+#[derive(Default)]
+struct Missing<'a> {
+    stacks: Vec<usize>,
+    bricks: Vec<(usize, &'a Brick)>,
+}
 
-    /// Enters what bricks are now; they are uploaded where they have to be.
-    pub(super) fn enter_bricks<'a>(
+impl Session {
+    /// Lists jobs with their stacks and with what their bricks are now; what is missing is uploaded.
+    pub(super) fn list_edits<'a>(
         &mut self,
-        base: SampleView<'a>,
-        jobs: &mut [EditJob],
+        work: &EditWork<'a>,
+        jobs: &mut Vec<EditJob>,
         uploads: &mut Uploads<'a>,
     ) -> Result<(), Fault> {
-        let slots = &self.bricks;
-        let missing = in_pieces(jobs, LONG, |first, jobs| {
-            let mut missing = Vec::new();
-            for (number, job) in (first..).zip(jobs) {
-                job.base = NONE;
-                let Some(brick) = base.brick(pos(job)) else { continue };
-                match slots.find(brick.tag.get()) {
-                    Some(slot) => job.base = reference(slot, brick),
-                    None => missing.push((number, brick)),
+        let (stacks, slots, base) = (&self.stacks, &self.bricks, work.base);
+        let missing = list(work, jobs, |first, jobs| {
+            let (mut number, mut missing) = (first, Missing::default());
+            for stack in jobs.chunk_by_mut(|a, b| place(a) == place(b)) {
+                let slot = stacks.find(base.ground(), place(&stack[0]));
+                if slot.is_none() {
+                    missing.stacks.push(number);
                 }
+                for (number, job) in (number..).zip(&mut *stack) {
+                    job.stack = slot.unwrap_or_default();
+                    job.base = NONE;
+                    let Some(brick) = base.brick(pos(job)) else { continue };
+                    match slots.find(brick.tag.get()) {
+                        Some(slot) => job.base = reference(slot, brick),
+                        None => missing.bricks.push((number, brick)),
+                    }
+                }
+                number += stack.len();
             }
             missing
-        });
-        for (number, brick) in missing.into_iter().flatten() {
-            jobs[number].base = self.need_brick(uploads, brick)?;
+        })?;
+        for Missing { stacks, bricks } in missing {
+            for first in stacks {
+                let stack = place(&jobs[first]);
+                let slot = self.need_stack(uploads, stack)?;
+                let own = jobs[first..].iter_mut().take_while(|job| place(job) == stack);
+                own.for_each(|job| job.stack = slot);
+            }
+            for (number, brick) in bricks {
+                jobs[number].base = self.need_brick(uploads, brick)?;
+            }
         }
         Ok(())
     }
@@ -124,7 +127,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Edit, Shape};
     use crate::ground::Ground;
-    use crate::volume::Bricks;
+    use crate::volume::{Bricks, SampleView};
 
     #[test]
     fn every_brick_has_one_job_with_all_of_its_edits() {
@@ -138,7 +141,11 @@ mod tests {
             let edits: Vec<Edit> = (0..edits).map(edit).collect();
             let work = EditWork::new(samples, grid, &edits.iter().collect::<Vec<_>>());
             let mut jobs = vec![EditJob::default(); 7];
-            list(&work, &mut jobs).expect("few enough");
+            let pieces = list(&work, &mut jobs, |first, jobs| (first, jobs.len())).expect("few enough");
+            assert_eq!(
+                pieces.iter().fold(0, |end, &(first, len)| if first == end { end + len } else { 0 }),
+                jobs.len()
+            );
             assert_eq!(jobs.len(), work.bricks().len());
             let mut next = 0;
             for (job, of_brick) in jobs.iter().zip(work.bricks()) {

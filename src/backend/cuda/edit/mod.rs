@@ -14,13 +14,16 @@ use super::mail::Plan;
 use super::session::{Session, Uploads};
 use super::slots::Slots;
 use crate::lattice::side_by_side;
-use crate::volume::{EditWork, Ledger, Tool};
+use crate::volume::{EditEffect, EditWork, Ledger, Tool, enter_effects};
 use careful::Look;
 pub(super) use output::EditOutput;
 use output::Totals;
 
 /// From how many bricks on they are dealt with side by side.
 const LONG: usize = 1024;
+
+/// How many a thread deals with at a time then: few, so that all threads end together.
+const PIECE: usize = 256;
 
 /// From how many entries on plain lists are copied side by side.
 const LONG_LIST: usize = 1 << 14;
@@ -45,29 +48,29 @@ type Target = (u32, u64);
 
 impl Session {
     /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
-    pub fn edit(&mut self, work: &EditWork) -> Result<Vec<Ledger>, Fault> {
+    pub fn edit(&mut self, work: &EditWork) -> Result<Ledger, Fault> {
         // Edits that look around enter twice as many counts.
         let most = if work.looks_around() { MOST_LIST / 2 } else { MOST_LIST };
         if work.jobs().len() > most {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
         let mut jobs = std::mem::take(&mut self.edit_jobs);
-        let ledgers = jobs::list(work, &mut jobs).and_then(|()| self.edit_bricks(work, &mut jobs));
+        let ledger = self.edit_bricks(work, &mut jobs);
         if jobs.capacity() <= KEPT_JOBS {
             self.edit_jobs = jobs;
         }
-        ledgers
+        ledger
     }
 
-    /// The same, by the jobs of all bricks.
-    fn edit_bricks(&mut self, work: &EditWork, jobs: &mut [EditJob]) -> Result<Vec<Ledger>, Fault> {
+    /// The same, in this memory for the jobs of all bricks.
+    fn edit_bricks(&mut self, work: &EditWork, jobs: &mut Vec<EditJob>) -> Result<Ledger, Fault> {
         if !work.looks_around() {
             return self.try_edits(work, jobs, None).map(Option::unwrap_or_default);
         }
         // Most new ground finds its material close by.
         for look in [Look::Near, Look::Far] {
-            if let Some(ledgers) = self.try_edits(work, jobs, Some(look))? {
-                return Ok(ledgers);
+            if let Some(ledger) = self.try_edits(work, jobs, Some(look))? {
+                return Ok(ledger);
             }
         }
         Err(Fault::Failed("new ground looked too far".into()))
@@ -77,12 +80,12 @@ impl Session {
     fn try_edits(
         &mut self,
         work: &EditWork,
-        jobs: &mut [EditJob],
+        jobs: &mut Vec<EditJob>,
         look: Option<Look>,
-    ) -> Result<Option<Vec<Ledger>>, Fault> {
+    ) -> Result<Option<Ledger>, Fault> {
         self.begin();
         let mut uploads = Uploads::new(work.base.ground());
-        let mut targets = Vec::with_capacity(jobs.len());
+        let mut targets = Vec::new();
         let ledgers = self.run_edits(work, jobs, look, &mut uploads, &mut targets);
         if ledgers.is_err() {
             self.give_up(&uploads);
@@ -96,20 +99,13 @@ impl Session {
     fn run_edits<'a>(
         &mut self,
         work: &EditWork<'a>,
-        jobs: &mut [EditJob],
+        jobs: &mut Vec<EditJob>,
         look: Option<Look>,
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
-    ) -> Result<Option<Vec<Ledger>>, Fault> {
-        let mut care = match look {
-            Some(look) => Some(self.care(work, look, jobs, uploads)?),
-            None => {
-                self.enter_bricks(work.base, jobs, uploads)?;
-                None
-            }
-        };
-        self.enter_stacks(work, jobs, uploads)?;
-        self.bricks.take_many(&mut *self.device, jobs.len(), targets)?;
+    ) -> Result<Option<Ledger>, Fault> {
+        self.list_edits(work, jobs, uploads)?;
+        let mut care = look.map(|look| self.care(work, look, jobs, uploads)).transpose()?;
         let mut plan = Plan::default();
         uploads.plan(&mut plan);
         let job_list = plan.section::<EditJob>(jobs.len());
@@ -119,15 +115,18 @@ impl Session {
         care.iter_mut().for_each(|care| care.plan(&mut plan));
         self.inbox.open(&mut *self.device, &plan)?;
         let (all_jobs, tools, list) = self.inbox.entries_of(job_list, tool_list, edits);
-        let targeted = |number: usize, job: &EditJob| EditJob { target: targets[number].0, ..*job };
         let are_many = jobs.len() >= LONG;
+        let (bricks, device) = (&mut self.bricks, &mut self.device);
+        let take = || {
+            bricks.take_many(&mut **device, jobs, all_jobs, targets, |job, target| EditJob { target, ..*job })
+        };
         let write_lists = || {
             fill(&work.tools, tools, MANY, |_, own| tool(own));
             fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
         };
-        side_by_side(are_many, || fill(jobs, all_jobs, LONG, targeted), write_lists);
+        side_by_side(are_many, take, write_lists).0?;
         self.inbox.entries::<u32>(counters).fill(0);
-        care.iter().for_each(|care| care.put(&mut self.inbox));
+        care.iter_mut().for_each(|care| care.put(&mut self.inbox, &mut self.kept));
         let is_long = jobs.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
         self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
@@ -172,7 +171,9 @@ impl Session {
                 return Ok(None);
             }
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
-                return self.take_edits(work, jobs, targets, totals).map(Some);
+                // Whatever comes of it, it gives slots back itself.
+                let targets = std::mem::take(targets);
+                return self.take_edits(work, jobs, &targets, totals).map(Some);
             }
             // Once more, with room for all.
         }
@@ -187,23 +188,28 @@ impl Session {
         jobs: &[EditJob],
         targets: &[Target],
         totals: Totals,
-    ) -> Result<Vec<Ledger>, Fault> {
+    ) -> Result<Ledger, Fault> {
         let are_many = jobs.len() >= LONG;
         self.edits.fetch_entries(&mut *self.device, totals)?;
         let are_coming = self.edits.begin_bricks(&mut *self.device, totals)?;
         let changed = || self.edits.changed(jobs.len(), totals);
-        let (changed, mut ledgers) =
+        let (changed, entries) =
             side_by_side(are_many, changed, || self.edits.entries(work.grid, jobs, totals));
-        if are_coming {
-            self.device.wait()?;
-        }
-        let changed = changed?;
-        let Self { bricks, edits, .. } = self;
-        let results = edits.results.entries(jobs.len());
-        let drafted = || edits.bricks(&changed, jobs, targets, totals);
-        let (drafted, ()) = side_by_side(are_many, drafted, || free_targets(bricks, results, targets));
-        ledgers.push(drafted);
-        Ok(ledgers)
+        let Self { bricks, edits, device, .. } = self;
+        let drafted = || {
+            if are_coming {
+                device.wait()?;
+            }
+            Ok(edits.bricks(&changed?, jobs, targets, totals))
+        };
+        let finish = || {
+            free_targets(bricks, edits.results.entries(jobs.len()), targets);
+            let mut effects = vec![EditEffect::default(); work.tools.len()];
+            enter_effects(&entries, &mut effects);
+            effects
+        };
+        let (drafted, effects) = side_by_side(are_many, drafted, finish);
+        Ok(Ledger { effects, ..drafted? })
     }
 }
 

@@ -12,7 +12,7 @@ use super::super::layout::{
 use super::super::lists::{map, map_numbers};
 use super::super::mail::Outbox;
 use super::jobs::pos;
-use super::{LONG, Target};
+use super::{LONG, PIECE, Target};
 use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
 use crate::volume::{Brick, DraftedBrick, Fate, Ledger};
@@ -141,9 +141,9 @@ impl EditOutput {
     /// The bricks that changed.
     pub(super) fn changed(&self, results: usize, totals: Totals) -> Result<Changed, Fault> {
         let results = self.results.entries::<EditResult>(results);
-        let found = map_numbers(results.len().div_ceil(LONG), 2, |number| {
-            let mut found = Changed { numbers: Vec::with_capacity(LONG), ..Changed::default() };
-            for (own, result) in ((number * LONG) as u32..).zip(piece(results, LONG, number)) {
+        let found = map_numbers(results.len().div_ceil(PIECE), LONG / PIECE, |number| {
+            let mut found = Changed { numbers: Vec::with_capacity(PIECE), ..Changed::default() };
+            for (own, result) in ((number * PIECE) as u32..).zip(piece(results, PIECE, number)) {
                 if result.flags & EditResult::CHANGED == 0 {
                     continue;
                 }

@@ -33,7 +33,7 @@ fn blocks(amount: usize) -> Load {
 /// Is a stage the device's, which would do it if it were asked? And what was written down of that.
 fn offered(cuda: &Cuda, stage: Stage, load: Load, missing: usize) -> (bool, Choice) {
     let mut choice = Choice::of(stage, load.amount);
-    let (done, _) = cuda.offer(&mut choice, load, |_| missing, |_| Ok(()), |_, done| done);
+    let (done, _) = cuda.offer(&mut choice, load, |_| missing, |_| Ok(()), |_, done| Ok(done));
     assert_eq!(done.is_some(), choice.is_cuda);
     (done.is_some(), choice)
 }
@@ -64,7 +64,8 @@ fn what_the_device_does_not_have_counts_against_it() {
     // Where it is slower in any case, nobody looks.
     let mut choice = Choice::of(Stage::Mesh, 10);
     let slower = cuda(true, 10, 20);
-    let (done, _) = slower.offer(&mut choice, blocks(10), |_| panic!("looked"), |_| Ok(()), |_, done| done);
+    let (done, _) =
+        slower.offer(&mut choice, blocks(10), |_| panic!("looked"), |_| Ok(()), |_, done| Ok(done));
     assert!(done.is_none() && choice.missing == 0);
 }
 
@@ -91,7 +92,7 @@ fn a_device_is_given_up_for_what_does_not_pass() {
         for _ in 0..3 {
             let mut choice = Choice::of(Stage::Mesh, 10);
             let work = |_: &mut Session| Err::<(), Fault>(fault.clone());
-            let (done, _) = own.offer(&mut choice, blocks(10), |_| 0, work, |_, done| done);
+            let (done, _) = own.offer(&mut choice, blocks(10), |_| 0, work, |_, done| Ok(done));
             // What was lost on trying is no expectation.
             assert!(done.is_none() && !choice.is_cuda && choice.estimate.is_none());
             assert_eq!(logged(&fault.to_string()), 1, "one warning, and no other");
@@ -105,7 +106,7 @@ fn a_device_is_given_up_for_what_does_not_pass() {
 fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
     let own = cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 10);
-    let then = |_: &Session, ()| -> u32 { panic!("as planned") };
+    let then = |_: &mut Session, ()| -> Result<u32, Fault> { panic!("as planned") };
     let offer = || own.offer(&mut choice, blocks(10), |_| 0, |_| Ok(()), then);
     assert!(catch_unwind(AssertUnwindSafe(offer)).is_err());
     assert!(matches!(own.state(), EngineState::Cuda(_)));
@@ -117,9 +118,9 @@ fn whoever_comes_while_surfaces_are_drawn_goes_on_without_the_device() {
     let own = cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 10);
     let late = Choice { estimate: Some(Estimate::default()), ..choice };
-    let draw = |_: &Session, ()| {
+    let draw = |_: &mut Session, ()| {
         own.learn(&late, blocks(10));
-        offered(&own, Stage::Mesh, blocks(10), 0).0
+        Ok(offered(&own, Stage::Mesh, blocks(10), 0).0)
     };
     let (is_other, _) = own.offer(&mut choice, blocks(10), |_| 0, |_| Ok(()), draw);
     assert_eq!(is_other, Some(false));

@@ -2,27 +2,29 @@
 
 use std::sync::{Mutex, Once};
 
-use super::super::device::{Device, Fault, HostMemory, Kernel};
+use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
 use super::*;
 use crate::backend::Stage;
+
+/// Calls to go until a device fails, and how; for lack of memory, only calls that ask for some.
+struct Plan(Arc<Mutex<Option<(u32, Fault)>>>);
 
 /// A device that fails when it is told to.
 struct Faulty {
     own: Box<dyn Device>,
-    /// Calls to go until it fails, and how; for lack of memory, only calls that ask for some.
-    plan: Arc<Mutex<Option<(u32, Fault)>>>,
+    plan: Plan,
 }
 
 /// A fault that is a panic.
 const PANIC: Fault = Fault::SelfTest;
 
-impl Faulty {
+impl Plan {
     fn call(&self) -> Result<(), Fault> {
-        if matches!(&*lock(&self.plan), Some((_, Fault::Memory(_)))) { Ok(()) } else { self.ask() }
+        if matches!(&*lock(&self.0), Some((_, Fault::Memory(_)))) { Ok(()) } else { self.ask() }
     }
 
     fn ask(&self) -> Result<(), Fault> {
-        let mut plan = lock(&self.plan);
+        let mut plan = lock(&self.0);
         match &mut *plan {
             Some((0, PANIC)) => panic!("as planned"),
             Some((0, fault)) => Err(fault.clone()),
@@ -43,18 +45,18 @@ impl Device for Faulty {
         self.own.free_memory()
     }
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-        self.ask()?;
+        self.plan.ask()?;
         self.own.alloc(bytes)
     }
     fn free(&mut self, address: u64) {
         self.own.free(address);
     }
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
-        self.ask()?;
+        self.plan.ask()?;
         self.own.alloc_host(bytes)
     }
     fn upload(&mut self, from: &dyn HostMemory, bytes: std::ops::Range<usize>, to: u64) -> Result<(), Fault> {
-        self.call()?;
+        self.plan.call()?;
         self.own.upload(from, bytes, to)
     }
     fn download(
@@ -63,19 +65,36 @@ impl Device for Faulty {
         to: &mut dyn HostMemory,
         bytes: std::ops::Range<usize>,
     ) -> Result<(), Fault> {
-        self.call()?;
+        self.plan.call()?;
         self.own.download(from, to, bytes)
     }
     fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-        self.call()?;
+        self.plan.call()?;
         self.own.copy(from, to, bytes)
     }
     fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
-        self.call()?;
+        self.plan.call()?;
         self.own.launch(kernel, blocks, params)
     }
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        self.plan.call()?;
+        Ok(Box::new(FaultyMark { own: self.own.mark()?, plan: Plan(Arc::clone(&self.plan.0)) }))
+    }
     fn wait(&mut self) -> Result<(), Fault> {
-        self.call()?;
+        self.plan.call()?;
+        self.own.wait()
+    }
+}
+
+/// A mark of such a device: waiting for it is one of the calls.
+struct FaultyMark {
+    own: Box<dyn Mark>,
+    plan: Plan,
+}
+
+impl Mark for FaultyMark {
+    fn wait(&self) -> Result<(), Fault> {
+        self.plan.call()?;
         self.own.wait()
     }
 }
@@ -114,7 +133,7 @@ fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_l
     for calls in 0..40 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
         assert!(matches!(engine.state(), EngineState::Cuda(_)));
         let name = format!("CUDA_ERROR_LAUNCH_FAILED after {calls}.");
         *lock(&plan) = Some((calls, Fault::Failed(name.clone())));
@@ -147,7 +166,7 @@ fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
     for calls in (0..).step_by(3) {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
         let fault = if calls % 2 == 0 { Fault::Failed("in the middle".into()) } else { PANIC };
         *lock(&plan) = Some((calls, fault));
         let mut found = terrain();
@@ -175,7 +194,7 @@ fn ground_is_made_by_the_processor_where_a_device_fails() {
     for calls in 0..13 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
         assert!(matches!(engine.state(), EngineState::Cuda(_)));
         *lock(&plan) = Some((calls, Fault::Failed("CUDA_ERROR_LAUNCH_FAILED".into())));
         assert_eq!(engine.ground_from_noise(width, depth, &noise), expected, "after {calls} calls");
@@ -194,7 +213,7 @@ fn a_device_without_memory_for_ground_is_kept() {
     let expected = Ground::from_noise(70, 50, &noise);
     let Some(own) = device() else { return };
     let plan = Arc::new(Mutex::new(None));
-    let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+    let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
     // Memory of the host twice, then of the device.
     for calls in 0..3 {
         *lock(&plan) = Some((calls, Fault::Memory(1 << 20)));
@@ -210,7 +229,7 @@ fn a_device_that_panics_is_given_up_and_nothing_is_lost() {
     for calls in [0, 3, 9] {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
         *lock(&plan) = Some((calls, PANIC));
         (0..2).for_each(|index| compare(&mut Rng::with_seed(8), index, &engine));
         assert!(matches!(engine.state(), EngineState::Lost(_)), "{:?}", engine.state());
@@ -223,7 +242,7 @@ fn a_device_without_memory_for_a_transaction_does_the_next_one() {
     for allocations in 0..12 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Arc::clone(&plan) }), 64 << 20);
+        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
         let ground = Arc::new(Ground::flat(120, 120, 30.0).expect("valid"));
         let [mut expected, mut found] = [0, 1]
             .map(|_| Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings"));

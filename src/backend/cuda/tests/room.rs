@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::device::{Device, Fault, HostMemory, Kernel};
+use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
 use super::super::mail::Outbox;
 
 /// A device of so many bytes beside a host of so many more, whose memory its kernels reach.
@@ -30,8 +30,14 @@ impl HostMemory for Reached {
     fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.0)
     }
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        self.bytes().get(range)
+    }
     fn bytes_mut(&mut self) -> &mut [u8] {
         bytemuck::cast_slice_mut(&mut self.0)
+    }
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        self.bytes_mut().get_mut(range)
     }
     fn address(&self) -> Option<u64> {
         Some(1)
@@ -77,6 +83,9 @@ impl Device for Tight {
     }
     fn launch(&mut self, _: Kernel, _: u32, _: &[u8]) -> Result<(), Fault> {
         Ok(())
+    }
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        Err(Fault::Failed("nobody marks anything".into()))
     }
     fn wait(&mut self) -> Result<(), Fault> {
         Ok(())
