@@ -189,7 +189,8 @@ impl Times {
 
 /// Heads the lines of [`Times::print`].
 fn header(what: &str) {
-    // What a backend does of edit and meshing comes before them.
+    // What a backend does of edit and meshing comes before them. Surfaces that come while chunks are assembled count for
+    // that, and for the backend too as long as they are waited for.
     let names = ["whole", "p99", "edits", "blocks", "edit", "meshing", "assembly", "ring"];
     let names = names.map(|name| format!("{name:>9}")).concat();
     println!("  {what:<28}{names}   edits and blocks on the card (kernels); us, medians but for p99");

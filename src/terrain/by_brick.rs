@@ -58,7 +58,7 @@ pub(super) struct Reached {
     pub home_x: i32,
     /// `None` where it reaches nothing.
     pub cells: Option<LatticeBox>,
-    /// Of these, the ones that may join the mask.
+    /// The cells that may join the mask; beyond the world's rim there may be some as well.
     pub joining: Option<LatticeBox>,
 }
 
@@ -154,9 +154,9 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
     let size = all.size();
     if all.volume() > PLACES * changes.len() as u64 {
         let mut index: FxHashMap<BrickPos, Bits> = FxHashMap::default();
-        enter_all(boxes(), |low, high, column| {
+        enter_all(boxes(), |low, high, pile| {
             for y in low.y..=high {
-                index.entry(BrickPos(low.with_y(y))).or_default().include(column.bits(y));
+                index.entry(BrickPos(low.with_y(y))).or_default().include(pile.bits(y));
             }
         });
         let mut found: Vec<OfBrick> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
@@ -164,10 +164,10 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
         return found;
     }
     let mut table = vec![Bits::default(); all.volume() as usize];
-    enter_all(boxes(), |low, high, column| {
+    enter_all(boxes(), |low, high, pile| {
         let at = low - all.min;
         let bricks = &mut table[((at.x * size.z + at.z) * size.y + at.y) as usize..];
-        (low.y..=high).zip(bricks).for_each(|(y, own)| own.include(column.bits(y)));
+        (low.y..=high).zip(bricks).for_each(|(y, own)| own.include(pile.bits(y)));
     });
     let mut found = Vec::with_capacity(table.iter().filter(|bits| bits.0 != 0).count());
     for (at, stack) in (0..).zip(table.chunks_exact(size.y as usize)) {
@@ -179,7 +179,7 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
 }
 
 /// Cells of bricks above each other.
-struct Column {
+struct Pile {
     /// Along x and z, as [`Bits`] have them.
     sides: u32,
     /// The lowest and the highest one.
@@ -188,7 +188,7 @@ struct Column {
     joining: Option<[i32; 2]>,
 }
 
-impl Column {
+impl Pile {
     /// Those of the brick at this height.
     fn bits(&self, y: i32) -> u32 {
         let [low, high] = self.cells;
@@ -201,7 +201,7 @@ impl Column {
 /// and their cells.
 fn enter_all<'r>(
     changes: impl Iterator<Item = (&'r Reached, LatticeBox)>,
-    mut enter: impl FnMut(IVec3, i32, &Column),
+    mut enter: impl FnMut(IVec3, i32, &Pile),
 ) {
     for (change, LatticeBox { min, max }) in changes {
         let Some(cells) = change.cells else { continue };
@@ -209,15 +209,15 @@ fn enter_all<'r>(
         for x in min.x..=max.x {
             let of_x = Bits::side(x, cells.min.x, cells.max.x);
             for z in min.z..=max.z {
-                let is_beside = |bricks: &LatticeBox| {
+                let is_in_line = |bricks: &LatticeBox| {
                     bricks.min.x <= x && x <= bricks.max.x && bricks.min.z <= z && z <= bricks.max.z
                 };
-                let column = Column {
+                let pile = Pile {
                     sides: Bits::side(z, cells.min.z, cells.max.z) << 16 | of_x,
                     cells: [cells.min.y, cells.max.y],
-                    joining: joining.filter(is_beside).map(|bricks| [bricks.min.y, bricks.max.y]),
+                    joining: joining.filter(is_in_line).map(|bricks| [bricks.min.y, bricks.max.y]),
                 };
-                enter(IVec3::new(x, min.y, z), max.y, &column);
+                enter(IVec3::new(x, min.y, z), max.y, &pile);
             }
         }
     }

@@ -58,7 +58,7 @@ pub struct Stages {
     pub edit: Duration,
     /// Marching cubes over dirty blocks, and finding these.
     pub meshing: Duration,
-    /// Putting parts among those that stay.
+    /// Putting parts among those that stay, the first ones while others are still on their way from a card.
     pub assembly: Duration,
     /// The mask, rings and index lists.
     pub ring: Duration,

@@ -185,7 +185,7 @@ impl Draft {
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits, EditEffect::default);
         let mut add = |draft: &mut Self, base: SampleView, run: &Range<usize>| {
-            apply(base, run, &mut |ledgers| draft.add(ledgers, run.start, uniform));
+            apply(base, run, &mut |ledgers| draft.add(ledgers, run, uniform));
         };
         if let [] | [_] = runs {
             runs.iter().for_each(|run| add(&mut draft, base, run));
@@ -205,9 +205,9 @@ impl Draft {
         draft
     }
 
-    /// Takes in what edits from this one on did to some bricks; one that is all alike is replaced by the one of its kind.
-    fn add(&mut self, ledgers: &mut [Ledger], first: usize, uniform: &UniformBricks) {
-        let (effects, before) = (&mut self.effects[first..], self.bricks.len());
+    /// Takes in what these edits did to some bricks; one that is all alike is replaced by the one of its kind.
+    fn add(&mut self, ledgers: &mut [Ledger], edits: &Range<usize>, uniform: &UniformBricks) {
+        let (effects, before) = (&mut self.effects[edits.clone()], self.bricks.len());
         enter_effects(ledgers, effects);
         for ledger in ledgers {
             self.hash = self.hash.wrapping_add(ledger.hash);
@@ -279,8 +279,9 @@ fn enter_some(ledger: &Ledger, first: usize, effects: &mut [EditEffect]) {
 #[cfg(test)]
 mod tests {
     use fastrand::Rng;
-    use glam::Vec3;
+    use glam::{IVec3, Vec3};
 
+    use super::super::ledger::PartEffect;
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
@@ -303,6 +304,33 @@ mod tests {
         brushes.push(Brush::dig(ball(40.0, -40.0, 35.0, 16.0)));
         brushes.push(Brush::add(ball(20.0, 80.0, 20.0, 16.0), MaterialId(2)));
         brushes.iter().map(|brush| Edit::quantize(brush).unwrap()).collect()
+    }
+
+    #[test]
+    fn what_threads_enter_is_what_one_does() {
+        let mut rng = Rng::with_seed(3);
+        let fates = [Fate::Removed, Fate::Added, Fate::Painted, Fate::Protected, Fate::Slowed, Fate::TooHard];
+        for edits in [1, 37] {
+            let mut ledger = || {
+                let mut ledger = Ledger::default();
+                for _ in 0..MANY_ENTRIES / 3 {
+                    let point = IVec3::new(rng.i32(-90..90), rng.i32(-9..9), rng.i32(-90..90));
+                    ledger.parts.push(PartEffect {
+                        edit: rng.usize(..edits),
+                        chunk: ChunkPos::from_ivec3(IVec3::new(rng.i32(..4), 0, rng.i32(..3))),
+                        bounds: LatticeBox::point(point),
+                    });
+                    let (edit, fate) = (rng.usize(..edits), fates[rng.usize(..fates.len())]);
+                    ledger.counts(edit).add(fate, MaterialId(rng.u8(..5)), rng.u64(1..9));
+                }
+                ledger
+            };
+            let ledgers = [ledger(), ledger(), ledger()];
+            let [mut expected, mut found] = [(); 2].map(|()| vec![EditEffect::default(); edits]);
+            ledgers.iter().for_each(|ledger| enter_some(ledger, 0, &mut expected));
+            enter_effects(&ledgers, &mut found);
+            assert!(expected == found && expected.iter().all(|effect| effect.chunks.len() > 3));
+        }
     }
 
     #[test]

@@ -197,7 +197,7 @@ impl HostMemory for Pinned {
     }
 
     fn bytes_mut(&mut self) -> &mut [u8] {
-        // SAFETY: as above, and nobody else has a reference.
+        // SAFETY: as in `bytes`, and nobody else has a reference.
         unsafe { std::slice::from_raw_parts_mut(self.start, self.len) }
     }
 
@@ -224,11 +224,15 @@ impl Drop for Pinned {
 }
 
 /// An event in the stream.
-struct Passed(CudaEvent);
+struct Passed {
+    context: Arc<CudaContext>,
+    event: CudaEvent,
+}
 
 impl Mark for Passed {
     fn wait(&self) -> Result<(), Fault> {
-        wait_for(&self.0)
+        self.context.bind_to_thread().map_err(failed)?;
+        wait_for(&self.event)
     }
 }
 
@@ -334,7 +338,7 @@ impl Device for Card {
         self.bind()?;
         let event = self.context.new_event(None).map_err(failed)?;
         event.record(&self.stream).map_err(failed)?;
-        Ok(Box::new(Passed(event)))
+        Ok(Box::new(Passed { context: Arc::clone(&self.context), event }))
     }
 
     fn times(&mut self) -> [Duration; 2] {

@@ -65,7 +65,7 @@ impl MeshOutput {
         extents
     }
 
-    /// What was written and copied for blocks.
+    /// What was written for blocks, on its way to the host where it is not there.
     pub fn surfaces<'a>(&'a self, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Surfaces<'a> {
         Surfaces {
             grid: view.grid,
@@ -229,14 +229,14 @@ struct Piece<'b> {
 /// A stack of blocks, with its slot.
 type Column = ((i32, i32), u32);
 
-/// From how many stacks on they are dealt with side by side.
+/// From how many stacks or blocks on they are dealt with side by side.
 const LONG: usize = 256;
 
 /// How many blocks a thread deals with at a time.
 const OF_A_THREAD: usize = 256;
 
-/// How many blocks' surfaces are copied at a time.
-pub(super) const PIECE: usize = 1 << 12;
+/// How many blocks' surfaces are copied at a time; few in tests, so that there are several such pieces.
+pub(super) const PIECE: usize = if cfg!(test) { 150 } else { 1 << 12 };
 
 /// From how many blocks on their surfaces are copied, instead of written to the host's memory by the kernel.
 const COPIED: usize = 512;
@@ -246,7 +246,7 @@ const COPIED: usize = 512;
 struct Wanted {
     /// Are they written on the device, to be copied, instead of straight to the host's memory?
     is_long: bool,
-    /// Are they copied?
+    /// Are they wanted on the host?
     on_host: bool,
 }
 

@@ -49,7 +49,7 @@ mod mapped;
 #[cfg(test)]
 mod tests;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, TryLockError};
 use std::time::Duration;
@@ -190,7 +190,7 @@ impl Cuda {
         }
         let done = guarded(|| work(session));
         let times = session.times();
-        // No fault of the device's: a panic in here is the caller's.
+        // A panic in `then` is the caller's, and no fault of the device's.
         match done.and_then(|done| then(session, done)) {
             Ok(made) => {
                 choice.is_cuda = true;
@@ -247,19 +247,22 @@ impl Cuda {
         let missing = |session: &Session| session.missing_blocks(view, blocks);
         let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
         self.offer(choice, load, missing, work, |session, meshed| {
-            let surfaces = session.meshes.surfaces(view, blocks, meshed);
-            then(&surfaces);
-            let waited = surfaces.arrival.end()?;
-            // Whoever needed no more than some of them did not wait for all.
-            guarded(|| session.device.wait())?;
-            Ok(waited)
+            let Session { meshes, device, .. } = session;
+            let surfaces = meshes.surfaces(view, blocks, meshed);
+            let drawn = catch_unwind(AssertUnwindSafe(|| then(&surfaces)));
+            // Whoever needed no more than some of them did not wait for all; and who panicked leaves the session to others.
+            let is_over = surfaces.arrival.is_over();
+            let waited = surfaces.arrival.end();
+            let ended = if is_over { Ok(()) } else { guarded(|| device.wait()) };
+            drawn.unwrap_or_else(|panic| resume_unwind(panic));
+            ended.and(waited)
         })
     }
 }
 
-/// Does something with a driver, which may do anything: a panic of it is a fault, and somebody finishes the transaction.
+/// Does something with a device, whose driver may do anything: a panic is a fault, and somebody finishes the transaction.
 fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
-    let failed = |_| Err(Fault::Failed("its driver panicked".into()));
+    let failed = |_| Err(Fault::Failed("panic while it was used".into()));
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(failed)
 }
 

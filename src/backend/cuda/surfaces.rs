@@ -73,6 +73,11 @@ impl Arrival {
         }
     }
 
+    /// Is all here?
+    pub fn is_over(&self) -> bool {
+        self.here.load(Ordering::Acquire) == self.marks.len()
+    }
+
     /// How long was waited; or the fault, where some never came.
     pub fn end(self) -> Result<Duration, Fault> {
         match self.fault.into_inner() {

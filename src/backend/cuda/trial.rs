@@ -29,7 +29,7 @@ const SIDE: i32 = 256;
 /// How often each thing is timed once more in vain, and at all; the shortest time counts.
 const IN_VAIN: usize = 2;
 const MOST_REPEATS: usize = 9;
-/// And for how long, but for the second time.
+/// And for how long, if that is often enough.
 const LONG_ENOUGH: Duration = Duration::from_millis(2);
 
 /// How thorough a trial is: brushes at once, and their radius, smallest first.
@@ -194,11 +194,11 @@ fn shortest<T: Send>(mut work: impl FnMut() -> Result<T, Fault> + Send) -> Resul
         let start = Instant::now();
         let (mut best, mut made) = timed()?;
         let mut in_vain = 0;
-        for _ in 1..MOST_REPEATS {
+        for repeat in 1..MOST_REPEATS {
             let (took, other) = timed()?;
             in_vain = if took < best - best / 10 { 0 } else { in_vain + 1 };
             (best, made) = (best.min(took), other);
-            if in_vain == IN_VAIN || start.elapsed() > LONG_ENOUGH {
+            if in_vain == IN_VAIN || repeat >= IN_VAIN && start.elapsed() > LONG_ENOUGH {
                 break;
             }
         }

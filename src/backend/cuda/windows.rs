@@ -69,7 +69,7 @@ const KEPT_ENTRIES: usize = 1 << 14;
 impl KeptSlabs {
     /// Lists for so many slabs.
     fn take(&mut self, slabs: usize) -> Vec<SlabLists> {
-        let mut lists = std::mem::take(&mut self.0);
+        let mut lists = self.0.split_off(self.0.len().saturating_sub(slabs));
         lists.resize_with(slabs, SlabLists::default);
         lists
     }

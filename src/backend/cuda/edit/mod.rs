@@ -171,7 +171,7 @@ impl Session {
                 return Ok(None);
             }
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
-                // Whatever comes of it, it gives slots back itself.
+                // It gives slots back itself. Where it fails, the device is lost, and all slots with it.
                 let targets = std::mem::take(targets);
                 return self.take_edits(work, jobs, &targets, totals).map(Some);
             }
@@ -181,7 +181,7 @@ impl Session {
         Err(Fault::TooLarge(work.jobs().len()))
     }
 
-    /// What came back, as ledgers. Bricks are on their way while all else is looked through.
+    /// What came back, as a ledger. Bricks are on their way while all else is looked through.
     fn take_edits(
         &mut self,
         work: &EditWork,

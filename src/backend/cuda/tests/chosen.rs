@@ -4,7 +4,9 @@ use super::faults::logged;
 use super::room::Tight;
 use super::*;
 use crate::backend::costs::{Costs, Load};
-use crate::backend::{Choice, Estimate, Stage};
+use crate::backend::{Choice, Compute, Cpu, Estimate, Stage};
+use crate::lattice::{BrickPos, LatticeBox};
+use crate::surface::block::Parts;
 
 /// A device that is open and needs no card, with what both take for ten blocks.
 fn cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
@@ -111,6 +113,31 @@ fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
     assert!(catch_unwind(AssertUnwindSafe(offer)).is_err());
     assert!(matches!(own.state(), EngineState::Cuda(_)));
     assert!(offered(&own, Stage::Mesh, blocks(10), 0).0);
+}
+
+#[test]
+fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
+    let Some(engine) = late() else { return };
+    let half = glam::Vec3::new(40.0, 9.0, 40.0);
+    let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
+    let ground = Ground::from_fn(120, 120, |x, z| 30.0 + f64::from(x * z % 7)).expect("valid");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    terrain.apply([brush.with_roughness(Roughness::new(2.0, 3.0, 5))]);
+    let view = terrain.world().view();
+    let around = LatticeBox { min: glam::IVec3::ZERO, max: glam::IVec3::new(119, 47, 119) };
+    let mut bricks: Vec<BrickPos> = BrickPos::covering(around).collect();
+    bricks.sort_unstable_by_key(|brick| (brick.0.x, brick.0.z, brick.0.y));
+    let block = |&brick: &BrickPos| Block { brick, chunk: view.grid.chunk_of(brick.origin()) };
+    let blocks: Vec<Block> = bricks.iter().map(block).collect();
+    let mesh = |then: &mut dyn FnMut(&dyn FreshParts)| engine.compute().mesh(&view, &blocks, &|| {}, then);
+    let drawn = catch_unwind(AssertUnwindSafe(|| mesh(&mut |_| panic!("as planned"))));
+    assert!(drawn.is_err());
+    let mut found = Parts::default();
+    mesh(&mut |parts| found = trial::collected(&blocks, parts));
+    assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+    let mut expected = Parts::default();
+    Cpu.mesh(&view, &blocks, &|| {}, &mut |parts| expected = trial::collected(&blocks, parts));
+    assert!(found.vertices.len() > 10_000 && found.indices == expected.indices);
 }
 
 #[test]

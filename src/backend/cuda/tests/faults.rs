@@ -6,7 +6,8 @@ use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
 use super::*;
 use crate::backend::Stage;
 
-/// Calls to go until a device fails, and how; for lack of memory, only calls that ask for some.
+/// Calls to go until a device fails, and how. For lack of memory, only calls that ask for some count; for what is
+/// [`refused`], only those that wait for marks.
 struct Plan(Arc<Mutex<Option<(u32, Fault)>>>);
 
 /// A device that fails when it is told to.
@@ -18,9 +19,19 @@ struct Faulty {
 /// A fault that is a panic.
 const PANIC: Fault = Fault::SelfTest;
 
+/// The fault of marks alone.
+fn refused() -> Fault {
+    Fault::Refused("a mark".into())
+}
+
 impl Plan {
     fn call(&self) -> Result<(), Fault> {
-        if matches!(&*lock(&self.0), Some((_, Fault::Memory(_)))) { Ok(()) } else { self.ask() }
+        let is_other = matches!(&*lock(&self.0), Some((_, Fault::Memory(_) | Fault::Refused(_))));
+        if is_other { Ok(()) } else { self.ask() }
+    }
+
+    fn pass_mark(&self) -> Result<(), Fault> {
+        if matches!(&*lock(&self.0), Some((_, Fault::Refused(_)))) { self.ask() } else { self.call() }
     }
 
     fn ask(&self) -> Result<(), Fault> {
@@ -94,7 +105,7 @@ struct FaultyMark {
 
 impl Mark for FaultyMark {
     fn wait(&self) -> Result<(), Fault> {
-        self.plan.call()?;
+        self.plan.pass_mark()?;
         self.own.wait()
     }
 }
@@ -183,6 +194,33 @@ fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
     // None, some, all of seven.
     assert!(runs_done.is_sorted() && runs_done.first() == Some(&0), "{runs_done:?}");
     assert!((0..=7).all(|runs| runs_done.contains(&runs)), "{runs_done:?}");
+}
+
+#[test]
+fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
+    let half = glam::Vec3::new(40.0, 9.0, 40.0);
+    let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
+    let brushes = [brush.with_roughness(Roughness::new(2.0, 3.0, 5))];
+    let ground = Arc::new(Ground::from_fn(120, 120, |x, z| 30.0 + f64::from(x * z % 7)).expect("valid"));
+    let terrain = || Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
+    let mut expected = terrain();
+    expected.apply(&brushes);
+    let mut lost = 0;
+    for marks in 0.. {
+        let Some(own) = device() else { return };
+        let plan = Arc::new(Mutex::new(None));
+        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        *lock(&plan) = Some((marks, refused()));
+        let mut found = terrain();
+        found.set_engine(engine.clone());
+        found.apply(&brushes);
+        assert_same(expected.world(), found.world(), marks.into());
+        if !matches!(engine.state(), EngineState::Lost(_)) {
+            break;
+        }
+        lost += 1;
+    }
+    assert!(lost > 4, "{lost} pieces");
 }
 
 #[test]
