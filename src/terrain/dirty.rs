@@ -102,21 +102,30 @@ fn in_world(grid: ChunkGrid, low: IVec3, high: IVec3) -> Option<LatticeBox> {
 /// A cell that joins the mask draws its sheet, and one that leaves it draws it no longer; beside it, vertices leave the
 /// mask's border or come to it. The box around all of these in a stack of bricks.
 fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) -> Option<LatticeBox> {
-    let mut cells = 0;
-    for (dx, dz) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dz| (dx, dz))) {
+    if newer.is_empty() {
+        return None;
+    }
+    let (own, before) = (newer.get_word(stack), world.mask.word(stack));
+    // A word that does not change is the one from before.
+    let all = own.unwrap_or(before) | before;
+    let mut cells = own.map_or(0, |own| grown_into(own ^ before, 0, 0));
+    for (dx, dz) in BESIDE {
+        // Of stacks in the midst of what changed, all cells are near already.
+        if all & !cells == 0 {
+            break;
+        }
         let word = (stack.0 - dx, stack.1 - dz);
         if let Some(own) = newer.get_word(word) {
             cells |= grown_into(own ^ world.mask.word(word), dx, dz);
         }
     }
-    if cells == 0 {
-        return None;
-    }
-    let drawn = cells & (view.mask.word(stack) | world.mask.word(stack));
-    let low = Column::new(stack.0 * 8, stack.1 * 8);
+    let (drawn, low) = (cells & all, Column::new(stack.0 * 8, stack.1 * 8));
     let rows = (drawn != 0).then(|| block::sheet_rows(view.samples.ground(), low, drawn))?;
     in_world(view.grid, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))
 }
+
+/// Where the stacks beside and diagonally beside one are.
+const BESIDE: [(i32, i32); 8] = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
 
 /// The cells of a stack, and those of a box in it.
 fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
