@@ -170,9 +170,11 @@ fn auto_knows_from_its_trial_what_both_take_and_learns_from_what_they_do() {
     let load = Load { rough: 80, careful: 80, missing: 9, ..blocks(80) };
     let estimates = |costs: &Costs| [costs.choose(Stage::Edit, load).0, costs.choose(Stage::Mesh, load).0];
     let before = costs();
-    for curves in [&before.edit, &before.careful, &before.mesh] {
-        // More takes longer, and the largest was measured too.
-        assert!(curves.iter().all(|curve| 0.0 < curve.at(1) && curve.at(40) < curve.at(4000)), "{before:?}");
+    // More takes longer, and the largest was measured too. A card may take as long for either.
+    for on in [0, 1] {
+        let curves = || [&before.edit, &before.careful, &before.mesh].map(|curves| &curves[on]).into_iter();
+        assert!(curves().all(|curve| 0.0 < curve.at(1) && curve.at(40) <= curve.at(4000)), "{before:?}");
+        assert!(curves().any(|curve| curve.at(40) < curve.at(4000)), "{before:?}");
     }
     // Whoever does them, and looks at the other one now and then.
     for _ in 0..4 {
