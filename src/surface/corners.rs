@@ -121,8 +121,7 @@ pub static PLACES: [Place; 81] = {
 /// Which corners of the 9 layers from `y` on are solid in the pristine world, under columns of these heights, of which
 /// `range` is the range.
 pub fn pristine(heights: &Heights, range: (i32, i32), y: i32) -> [Corners; 9] {
-    // Below the lowest height all is solid, from the highest on nothing is.
-    let [all, some] = [ceil(range.0), ceil(range.1)].map(|top| (top - y).clamp(0, 9) as usize);
+    let [all, some] = filled(range, y);
     let mut layers = [0; 9];
     layers[..all].fill(ALL);
     for (layer, y) in layers[all..some].iter_mut().zip(y + all as i32..) {
@@ -134,8 +133,14 @@ pub fn pristine(heights: &Heights, range: (i32, i32), y: i32) -> [Corners; 9] {
 /// Of the 8 layers of cells from `y` on, those that have both signs somewhere, under columns of heights in a range; all others
 /// are solid or air.
 pub fn between(range: (i32, i32), y: i32) -> std::ops::Range<usize> {
-    let [all, some] = [ceil(range.0), ceil(range.1)].map(|top| (top - y).clamp(0, 9) as usize);
+    let [all, some] = filled(range, y);
     all.saturating_sub(1)..some.min(8)
+}
+
+/// How many of the 9 layers from `y` on are all solid, and how many have anything solid: below the lowest height all is, from
+/// the highest on nothing is.
+fn filled(range: (i32, i32), y: i32) -> [usize; 2] {
+    [range.0, range.1].map(|height| (ceil(height) - y).clamp(0, 9) as usize)
 }
 
 /// Corners whose columns are higher than this.

@@ -1,11 +1,10 @@
 //! Jobs of the edit kernels: the bricks that edits may reach, each with its edits, its stack and what it is now.
 
 use glam::IVec3;
-use rayon::prelude::*;
 
 use super::super::device::Fault;
 use super::super::layout::{self, EditJob, MOST_JOBS, NONE};
-use super::super::lists::{cut, map};
+use super::super::lists::{cut, map, map_into};
 use super::super::session::{Session, Uploads};
 use super::super::slots::reference;
 use super::{LONG, PIECE};
@@ -53,11 +52,10 @@ pub(super) fn list<R: Send>(
         (edit, brick) = (edit + piece.len(), brick + own.3.len());
         own
     });
-    let made = numbered.collect::<Vec<_>>().into_par_iter().map(|(edit, brick, piece, place)| {
+    Ok(map_into(numbered.collect(), |(edit, brick, piece, place): (usize, usize, &[Job], &mut [EditJob])| {
         place.iter_mut().zip(list_from(edit, piece, work.grid)).for_each(|(place, job)| *place = job);
         complete(brick, place)
-    });
-    Ok(made.collect())
+    }))
 }
 
 /// The jobs of a piece of a list of edits, which begins with this number.
@@ -79,11 +77,12 @@ struct Missing<'a> {
 }
 
 impl Session {
-    /// Lists jobs with their stacks and with what their bricks are now; what is missing is uploaded.
+    /// Lists jobs with their stacks and, `with_bricks`, with what their bricks are now; what is missing is uploaded.
     pub(super) fn list_edits<'a>(
         &mut self,
         work: &EditWork<'a>,
         jobs: &mut Vec<EditJob>,
+        with_bricks: bool,
         uploads: &mut Uploads<'a>,
     ) -> Result<(), Fault> {
         let (stacks, slots, base) = (&self.stacks, &self.bricks, work.base);
@@ -97,7 +96,8 @@ impl Session {
                 for (number, job) in (number..).zip(&mut *stack) {
                     job.stack = slot.unwrap_or_default();
                     job.base = NONE;
-                    let Some(brick) = base.brick(pos(job)) else { continue };
+                    let brick = if with_bricks { base.brick(pos(job)) } else { None };
+                    let Some(brick) = brick else { continue };
                     match slots.find(brick.tag.get()) {
                         Some(slot) => job.base = reference(slot, brick),
                         None => missing.bricks.push((number, brick)),

@@ -86,14 +86,14 @@ impl Session {
         self.begin();
         let mut uploads = Uploads::new(work.base.ground());
         let mut targets = Vec::new();
-        let ledgers = self.run_edits(work, jobs, look, &mut uploads, &mut targets);
-        if ledgers.is_err() {
+        let ledger = self.run_edits(work, jobs, look, &mut uploads, &mut targets);
+        if ledger.is_err() {
             self.give_up(&uploads);
         }
-        if !matches!(ledgers, Ok(Some(_))) {
+        if !matches!(ledger, Ok(Some(_))) {
             targets.iter().for_each(|&(slot, _)| self.bricks.give_back(slot));
         }
-        ledgers
+        ledger
     }
 
     fn run_edits<'a>(
@@ -104,7 +104,8 @@ impl Session {
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
     ) -> Result<Option<Ledger>, Fault> {
-        self.list_edits(work, jobs, uploads)?;
+        // Who looks around finds bricks among those around.
+        self.list_edits(work, jobs, look.is_none(), uploads)?;
         let mut care = look.map(|look| self.care(work, look, jobs, uploads)).transpose()?;
         let mut plan = Plan::default();
         uploads.plan(&mut plan);

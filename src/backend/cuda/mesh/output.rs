@@ -1,0 +1,236 @@
+//! What the mesh kernel writes, and its way to the host.
+
+use std::ops::Range;
+
+use super::super::device::{Device, Fault, Mark};
+use super::super::layout::MeshResult;
+use super::super::lists::map;
+use super::super::mail::Outbox;
+use super::super::surfaces::{Arrival, Surfaces};
+use crate::surface::MaterialMix;
+use crate::surface::block::Block;
+use crate::surface::vertex::WorldView;
+
+/// What the mesh kernel writes.
+pub(in super::super) struct MeshOutput {
+    pub(super) results: Outbox,
+    pub(super) lists: MeshLists,
+}
+
+/// Surfaces of all blocks.
+pub(in super::super) struct MeshLists {
+    pub positions: Outbox,
+    pub normals: Outbox,
+    pub mixes: Outbox,
+    pub indices: Outbox,
+}
+
+/// Positions, normals and indices.
+#[cfg(all(feature = "interop", target_os = "linux"))]
+pub(in super::super) type Lists<'a> = (&'a [[u16; 4]], &'a [[f32; 3]], &'a [u16]);
+
+/// Vertices that there is room for at the start; indices are six times as many.
+const FIRST_VERTICES: usize = 1 << 14;
+
+/// Indices for each vertex: two triangles, as surfaces have.
+const INDICES: usize = 6;
+
+/// How many blocks' surfaces are copied at a time; few in tests, so that there are several such pieces.
+pub(in super::super) const PIECE: usize = if cfg!(test) { 150 } else { 1 << 12 };
+
+impl MeshOutput {
+    pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
+        Ok(Self {
+            results: Outbox::new(device, size_of::<MeshResult>(), 1 << 10)?,
+            lists: MeshLists {
+                positions: Outbox::new(device, size_of::<[u16; 4]>(), FIRST_VERTICES)?,
+                normals: Outbox::new(device, size_of::<[f32; 3]>(), FIRST_VERTICES)?,
+                mixes: Outbox::new(device, size_of::<[u8; 8]>(), FIRST_VERTICES)?,
+                indices: Outbox::new(device, size_of::<u16>(), FIRST_VERTICES * INDICES)?,
+            },
+        })
+    }
+
+    /// What the kernel wanted to write for the blocks of each piece and all before it.
+    pub(super) fn extents(&self, blocks: usize) -> Vec<Extent> {
+        let of = |results: &&[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
+        let pieces: Vec<&[MeshResult]> = self.results.entries::<MeshResult>(blocks).chunks(PIECE).collect();
+        let mut extents = map(&pieces, 2, of);
+        let mut all = Extent::default();
+        extents.iter_mut().for_each(|own| {
+            all = all.join(*own);
+            *own = all;
+        });
+        extents
+    }
+
+    /// What was written for blocks, on its way to the host where it is not there.
+    pub fn surfaces<'a>(&'a self, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Surfaces<'a> {
+        Surfaces {
+            grid: view.grid,
+            blocks,
+            results: self.results.entries(blocks.len()),
+            lists: &self.lists,
+            plain: meshed.plain,
+            arrival: Arrival::new(meshed.marks),
+        }
+    }
+
+    /// Where positions, normals and indices are on the device.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn there(&self) -> [u64; 3] {
+        [&self.lists.positions, &self.lists.normals, &self.lists.indices].map(Outbox::address)
+    }
+
+    /// Where the surfaces of so many blocks are in these lists.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn results(&self, blocks: usize) -> &[MeshResult] {
+        self.results.entries(blocks)
+    }
+
+    /// Copies positions, normals and indices to the host.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub fn download(
+        &mut self,
+        device: &mut dyn Device,
+        (vertices, indices): (usize, usize),
+    ) -> Result<Lists<'_>, Fault> {
+        let lists = &mut self.lists;
+        lists.fetch(device, 0..vertices, 0..indices, false)?;
+        device.wait()?;
+        Ok((
+            lists.positions.entries(vertices),
+            lists.normals.entries(vertices),
+            lists.indices.entries(indices),
+        ))
+    }
+}
+
+impl MeshLists {
+    /// Room for so many vertices and indices; says whether there was too little.
+    pub(super) fn reserve(
+        &mut self,
+        device: &mut dyn Device,
+        (vertices, indices): (usize, usize),
+        is_long: bool,
+    ) -> Result<bool, Fault> {
+        let mut grown = false;
+        for list in [&mut self.positions, &mut self.normals, &mut self.mixes] {
+            grown |= list.reserve(device, vertices, is_long)?;
+        }
+        grown |= self.indices.reserve(device, indices, is_long)?;
+        Ok(grown)
+    }
+
+    /// Begins to copy some vertices and indices, where they are not written straight to the host's memory.
+    fn fetch(
+        &mut self,
+        device: &mut dyn Device,
+        vertices: Range<usize>,
+        indices: Range<usize>,
+        with_mixes: bool,
+    ) -> Result<(), Fault> {
+        self.positions.fetch_part(device, vertices.clone())?;
+        self.normals.fetch_part(device, vertices.clone())?;
+        self.indices.fetch_part(device, indices)?;
+        if with_mixes {
+            self.mixes.fetch_part(device, vertices)?;
+        }
+        Ok(())
+    }
+
+    /// Begins to copy all, piece by piece: each goes as far as its extent, and has a mark. None where nothing is to be copied.
+    pub(super) fn begin_fetch(
+        &mut self,
+        device: &mut dyn Device,
+        extents: &[Extent],
+        with_mixes: bool,
+    ) -> Result<Vec<Box<dyn Mark>>, Fault> {
+        if self.positions.is_mapped() {
+            return Ok(Vec::new());
+        }
+        let (mut marks, mut before) = (Vec::with_capacity(extents.len()), Extent::default());
+        for &own in extents {
+            let (vertices, indices) = (before.vertex_end..own.vertex_end, before.index_end..own.index_end);
+            self.fetch(device, vertices, indices, with_mixes)?;
+            marks.push(device.mark()?);
+            before = own;
+        }
+        Ok(marks)
+    }
+
+    pub(super) fn vertex_capacity(&self) -> u32 {
+        self.positions.capacity().min(self.normals.capacity()).min(self.mixes.capacity())
+    }
+}
+
+/// How much blocks have together, and where the last of it ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Extent {
+    vertices: usize,
+    indices: usize,
+    vertex_end: usize,
+    index_end: usize,
+}
+
+impl Extent {
+    /// With one block more.
+    fn with(self, result: &MeshResult) -> Self {
+        let end = |first: u32, count: u32| (first as usize).saturating_add(count as usize);
+        self.join(Self {
+            vertices: result.vertices as usize,
+            indices: result.indices as usize,
+            vertex_end: end(result.vertex, result.vertices),
+            index_end: end(result.index, result.indices),
+        })
+    }
+
+    /// Of both.
+    fn join(self, other: Self) -> Self {
+        Self {
+            vertices: self.vertices + other.vertices,
+            indices: self.indices + other.indices,
+            vertex_end: self.vertex_end.max(other.vertex_end),
+            index_end: self.index_end.max(other.index_end),
+        }
+    }
+
+    /// Vertices and indices.
+    pub(super) fn totals(self) -> (usize, usize) {
+        (self.vertices, self.indices)
+    }
+
+    /// Does all of it lie in lists that are as long as that?
+    pub(super) fn is_in_lists(self) -> bool {
+        self.vertex_end <= self.vertices && self.index_end <= self.indices
+    }
+}
+
+/// What a launch wrote.
+pub(in super::super) struct Meshed {
+    /// Vertices and indices.
+    #[cfg(all(feature = "interop", target_os = "linux"))]
+    pub(super) totals: (usize, usize),
+    /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
+    pub(super) plain: Option<MaterialMix>,
+    /// Copies to the host that are under way, one for each [`PIECE`] of blocks.
+    pub(super) marks: Vec<Box<dyn Mark>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_beyond_the_ends_of_lists_are_noticed() {
+        let result = |vertex, vertices, index, indices| MeshResult { vertex, vertices, index, indices };
+        let extent = |results: &[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
+        let whole = [result(5, 4, 0, 6), MeshResult::default(), result(0, 5, 6, 9)];
+        assert_eq!(extent(&whole).totals(), (9, 15));
+        assert!(extent(&whole).is_in_lists());
+        assert!(extent(&[]).is_in_lists());
+        for broken in [result(6, 4, 0, 6), result(5, 4, 10, 6), result(u32::MAX, 4, 0, 6)] {
+            assert!(!extent(&[broken, whole[2]]).is_in_lists(), "{broken:?}");
+        }
+    }
+}
