@@ -24,7 +24,7 @@ use crate::lattice::{LatticeBox, ONE};
 ///
 /// ```json
 /// {"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},
-///  "roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0}
+///  "roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0,"stroke":null}
 /// ```
 ///
 /// The operation of a brush with less than full power stands in a wrapping of its own:
@@ -40,6 +40,7 @@ pub struct Edit {
     power: u8,
     roughness: Option<Grain>,
     tag: u64,
+    stroke: Option<u64>,
 }
 
 /// An edit as it stands in a file or comes from a network.
@@ -50,6 +51,8 @@ struct Unchecked {
     operation: WrittenDeed,
     roughness: Option<Grain>,
     tag: u64,
+    #[serde(default)]
+    stroke: Option<u64>,
 }
 
 impl Edit {
@@ -68,6 +71,7 @@ impl Edit {
             power: brush.power,
             roughness: roughness.filter(|grain| grain.amplitude != 0),
             tag: brush.tag,
+            stroke: brush.stroke,
         })
     }
 
@@ -127,6 +131,11 @@ impl Edit {
         self.tag
     }
 
+    /// The stroke that the brush was part of.
+    pub fn stroke(&self) -> Option<u64> {
+        self.stroke
+    }
+
     /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6).
     ///
     /// At the rim of the lattice the box reaches beyond [`LIMIT`](crate::lattice::LIMIT) by at most some thousand
@@ -153,6 +162,7 @@ impl From<&Edit> for Brush {
             operation: edit.operation(),
             roughness: edit.roughness(),
             tag: edit.tag(),
+            stroke: edit.stroke(),
             blend: edit.blend().unwrap_or_default(),
             power: edit.power(),
         }
@@ -170,17 +180,17 @@ impl TryFrom<&Brush> for Edit {
 impl TryFrom<Unchecked> for Edit {
     type Error = BrushError;
 
-    fn try_from(Unchecked { shape, operation, roughness, tag }: Unchecked) -> Result<Self, BrushError> {
+    fn try_from(Unchecked { shape, operation, roughness, tag, stroke }: Unchecked) -> Result<Self, BrushError> {
         let (deed, power) = operation.unlimited()?;
-        let edit = Self { shape, deed, power, roughness, tag };
+        let edit = Self { shape, deed, power, roughness, tag, stroke };
         edit.check()?;
         Ok(Self { roughness: roughness.filter(|grain| grain.amplitude != 0), ..edit })
     }
 }
 
 impl From<Edit> for Unchecked {
-    fn from(Edit { shape, deed, power, roughness, tag }: Edit) -> Self {
-        Self { shape, operation: deed.limited(power), roughness, tag }
+    fn from(Edit { shape, deed, power, roughness, tag, stroke }: Edit) -> Self {
+        Self { shape, operation: deed.limited(power), roughness, tag, stroke }
     }
 }
 
@@ -256,7 +266,7 @@ mod tests {
     fn the_documented_form_is_the_form() {
         let brush = Brush::add(Shape::sphere(Vec3::new(1.0, 0.0, -2.0), 4.0), MaterialId(3));
         let edit = Edit::quantize(&brush.with_roughness(Roughness::new(0.5, 4.0, 7))).unwrap();
-        let json = r#"{"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0}"#;
+        let json = r#"{"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0,"stroke":null}"#;
         assert_eq!(serde_json::to_string(&edit).unwrap(), json);
         assert_eq!(serde_json::from_str::<Edit>(json).unwrap(), edit);
     }
@@ -300,7 +310,7 @@ mod tests {
             let edit = Edit::quantize(&brush).unwrap();
             let json = serde_json::to_string(&edit).unwrap();
             let expected = format!(
-                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":512}}}},"operation":{form},"roughness":null,"tag":0}}"#
+                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":512}}}},"operation":{form},"roughness":null,"tag":0,"stroke":null}}"#
             );
             assert_eq!(json, expected);
             assert_eq!(serde_json::from_str::<Edit>(&json).unwrap(), edit);
@@ -364,7 +374,7 @@ mod tests {
         let edit = Edit::quantize(&plain).unwrap();
         assert_eq!(Edit::quantize(&rough).unwrap(), edit);
         let json = serde_json::to_string(&edit).unwrap();
-        let read = |grain: &str| serde_json::from_str::<Edit>(&json.replace("null", grain));
+        let read = |grain: &str| serde_json::from_str::<Edit>(&json.replacen("null", grain, 1));
         assert_eq!(read(r#"{"amplitude":0,"scale":1024,"seed":7}"#).unwrap(), edit);
         assert!(read(r#"{"amplitude":0,"scale":0,"seed":7}"#).is_err());
     }

@@ -72,13 +72,16 @@ fn wild_brush() -> impl Strategy<Value = Brush> {
     let blend = (wild(), wild(), prop::option::of(any::<u8>().prop_map(MaterialId)))
         .prop_map(|(strength, falloff, material)| Blend { strength, falloff, material });
     let blend = prop_oneof![Just(Blend::default()), blend];
-    (shape, wild_operation(), blend, prop::option::of(roughness), any::<u64>(), any::<u8>()).prop_map(
-        |(shape, operation, blend, roughness, tag, power)| Brush {
+    let stroke = prop::option::of(any::<u64>());
+    let roughness = prop::option::of(roughness);
+    (shape, wild_operation(), blend, roughness, any::<u64>(), stroke, any::<u8>()).prop_map(
+        |(shape, operation, blend, roughness, tag, stroke, power)| Brush {
             shape,
             operation,
             blend,
             roughness,
             tag,
+            stroke,
             power,
         },
     )

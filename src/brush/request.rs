@@ -19,6 +19,9 @@ pub struct Brush {
     pub roughness: Option<Roughness>,
     /// Any number of the game's own; the receipt carries it back.
     pub tag: u64,
+    /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames they
+    /// come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply).
+    pub stroke: Option<u64>,
     /// How operations that sculpt fade, and what they build of.
     pub blend: Blend,
     /// How hard the material may be that it takes away, where the terrain has rules for that: [`FULL_POWER`] takes away
@@ -28,7 +31,7 @@ pub struct Brush {
 
 impl Brush {
     fn new(shape: Shape, operation: Operation) -> Self {
-        Self { shape, operation, roughness: None, tag: 0, blend: Blend::default(), power: FULL_POWER }
+        Self { shape, operation, roughness: None, tag: 0, stroke: None, blend: Blend::default(), power: FULL_POWER }
     }
 
     /// The brush of an operation, as the functions below make it.
@@ -132,6 +135,12 @@ impl Brush {
         Self { tag, ..self }
     }
 
+    /// The brush as part of a stroke, by any number of the game's own: see [`stroke`](Self::stroke).
+    #[must_use]
+    pub fn with_stroke(self, stroke: u64) -> Self {
+        Self { stroke: Some(stroke), ..self }
+    }
+
     /// The brush after every point p moved to `rotation * (p * scale) + translation`: from world space to terrain
     /// space, say. Sizes and roughness grow with `scale`, which should be positive; the roughness pattern itself stays
     /// tied to the lattice.
@@ -149,6 +158,7 @@ impl Brush {
                 ..roughness
             }),
             tag: self.tag,
+            stroke: self.stroke,
             blend: Blend { falloff: self.blend.falloff * scale, ..self.blend },
             power: self.power,
         }

@@ -60,7 +60,6 @@ impl Customs {
 mod tests {
     use bevy::math::Vec3;
     use bevy::prelude::{DetectChanges, World};
-    use bevy::tasks::{AsyncComputeTaskPool, TaskPool};
 
     use super::*;
     use crate::brush::{Brush, Shape};
@@ -106,7 +105,6 @@ mod tests {
 
     #[test]
     fn each_terrain_has_its_own_budget_of_undo() {
-        AsyncComputeTaskPool::get_or_init(TaskPool::default);
         let mut world = World::new();
         let [large, small] = [20.0, 40.0].map(|x| {
             let ground = Ground::flat(64, 64, 8.0).expect("valid");

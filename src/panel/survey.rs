@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::plot::Line;
 use super::state::{BurrowPanel, Note, Verdict};
 use crate::backend::{Choice, EngineState};
-use crate::plugin::{BurrowEngine, BurrowFigures};
+use crate::plugin::{BurrowEngine, BurrowFigures, ThreadTask, Threads};
 use crate::surface::SeamReport;
 use crate::terrain::{Memory, Terrain, Version, World};
 
@@ -32,7 +31,7 @@ pub struct Counts {
 pub struct Survey {
     /// Whose counts these are, and of which commit.
     of: Option<(Entity, Version)>,
-    counting: Option<(Entity, Version, Task<Counts>)>,
+    counting: Option<(Entity, Version, ThreadTask<Counts>)>,
     since: Duration,
     pub counts: Option<Counts>,
     /// The engine: its state, stages on processor and card, the last choice.
@@ -78,7 +77,7 @@ pub(super) fn count_terrain(
 ) {
     let survey = &mut *survey;
     if let Some((entity, version, task)) = &mut survey.counting
-        && let Some(counts) = check_ready(task)
+        && let Some(counts) = task.finish()
     {
         (survey.of, survey.counts) = (Some((*entity, *version)), Some(counts));
         survey.counting = None;
@@ -101,7 +100,7 @@ pub(super) fn count_terrain(
         return;
     }
     let world = terrain.snapshot();
-    let task = AsyncComputeTaskPool::get().spawn(async move { count(&world) });
+    let task = ThreadTask::start(Threads::Background, move || count(&world));
     survey.counting = Some((entity, version, task));
 }
 
@@ -118,7 +117,7 @@ fn count(world: &World) -> Counts {
 
 /// A seam check under way.
 #[derive(Resource)]
-pub(super) struct SeamCheck(Task<Verdict>);
+pub(super) struct SeamCheck(ThreadTask<Verdict>);
 
 /// Starts a check of a terrain as it is now.
 pub(super) fn start_seam_check(
@@ -128,7 +127,7 @@ pub(super) fn start_seam_check(
     terrain: &Terrain,
 ) {
     let world = terrain.snapshot();
-    let task = AsyncComputeTaskPool::get().spawn(async move { check_seams(entity, &world) });
+    let task = ThreadTask::start(Threads::Background, move || check_seams(entity, &world));
     panel.note = Some(Note::Busy("checking every seam ...".into()));
     commands.insert_resource(SeamCheck(task));
 }
@@ -139,7 +138,7 @@ pub(super) fn finish_seam_check(
     check: Option<ResMut<SeamCheck>>,
     mut panel: ResMut<BurrowPanel>,
 ) {
-    let Some(verdict) = check.and_then(|mut check| check_ready(&mut check.0)) else { return };
+    let Some(verdict) = check.and_then(|mut check| check.0.finish()) else { return };
     commands.remove_resource::<SeamCheck>();
     let Verdict { is_flawless, text, .. } = &verdict;
     if *is_flawless {

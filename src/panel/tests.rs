@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use bevy::tasks::{AsyncComputeTaskPool, TaskPool};
 use bevy_egui::egui::{Event, Modifiers, PointerButton, Pos2, RawInput, Rect};
 use bevy_egui::{EguiContext, EguiUserTextures};
 
@@ -498,7 +497,6 @@ fn flat() -> Terrain {
 
 #[test]
 fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
-    AsyncComputeTaskPool::get_or_init(TaskPool::default);
     let mut app = App::new();
     app.init_resource::<BurrowPanel>()
         .add_message::<PanelAction>()

@@ -2,12 +2,11 @@
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, SNAP};
-use crate::plugin::{BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, tell};
+use crate::plugin::{BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, ThreadTask, Threads, tell};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, Restored, Terrain};
 
@@ -82,7 +81,7 @@ pub struct DebrisCrumbled {
 #[require(Transform, Visibility)]
 struct Shaping {
     debris: Debris,
-    task: Task<Option<Collider>>,
+    task: ThreadTask<Option<Collider>>,
 }
 
 impl Plugin for DebrisPlugin {
@@ -121,7 +120,7 @@ fn break_off(
         let middle = ground.transform_point(found.origin() + size.as_vec3() / 2.0);
         let place = Transform::from_translation(middle).with_rotation(ground.rotation());
         let corner = Transform::from_translation(-debris.half).with_scale(Vec3::splat(scale));
-        let task = AsyncComputeTaskPool::get().spawn(async move {
+        let task = ThreadTask::start(Threads::Background, move || {
             let mut surface = SurfaceMesh::clone(&surface);
             surface.vertices.iter_mut().for_each(|vertex| vertex.position -= size * (SNAP / 2));
             debris_collider(&surface, scale)
@@ -186,7 +185,7 @@ fn take_shape(
     mut shaping: Query<(Entity, &mut Shaping)>,
 ) {
     for (entity, mut piece) in &mut shaping {
-        let Some(collider) = check_ready(&mut piece.task) else { continue };
+        let Some(collider) = piece.task.finish() else { continue };
         let mut entity = commands.entity(entity);
         let Some(collider) = collider else {
             entity.try_despawn();

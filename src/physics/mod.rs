@@ -75,9 +75,8 @@ pub use shape::GroundShape;
 
 use std::time::Duration;
 
-use avian3d::collider_tree::ColliderTreeOptimization;
 use avian3d::physics_transform::PhysicsTransformSystems;
-use avian3d::prelude::PhysicsSystems;
+use avian3d::prelude::{PhysicsSchedule, PhysicsSystems};
 use bevy::prelude::*;
 
 use crate::plugin::{BurrowSystems, Companions};
@@ -86,7 +85,8 @@ use crate::plugin::{BurrowSystems, Companions};
 ///
 /// Avian has to run in `FixedPostUpdate`, where `PhysicsPlugins::default()` puts it: what the plugin does before and after a
 /// step is in `FixedPreUpdate` and `FixedPostUpdate`, see [`TerrainPhysicsSystems`]. With `PhysicsPlugins::new` and another
-/// schedule, colliders would follow a terrain that moves, and bodies would be lifted, at other times than steps are taken.
+/// schedule, colliders would follow a terrain that moves, and bodies would be lifted, at other times than steps are taken: an
+/// error says so.
 #[derive(Default)]
 pub struct TerrainPhysicsPlugin;
 
@@ -140,6 +140,7 @@ impl Plugin for TerrainPhysicsPlugin {
         app.init_resource::<Companions>()
             .init_resource::<PhysicsFigures>()
             .init_resource::<GroundContact>()
+            .init_resource::<IsAroundSteps>()
             .init_resource::<wake::GroundChanges>()
             .init_resource::<wake::Watched>()
             .init_resource::<upkeep::Work>()
@@ -183,15 +184,30 @@ impl Plugin for TerrainPhysicsPlugin {
                         .run_if(wake::is_last_step)
                         .after(PhysicsSystems::Last)
                         .in_set(TerrainPhysicsSystems::Wake),
+                    (come_to_steps.before(PhysicsSystems::First), leave_steps.after(PhysicsSystems::Last)).chain(),
                 ),
-            );
+            )
+            .add_systems(PhysicsSchedule, check_schedule);
     }
+}
 
-    fn finish(&self, app: &mut App) {
-        if let Some(mut settings) = app.world_mut().get_resource_mut::<ColliderTreeOptimization>()
-            && *settings == ColliderTreeOptimization::default()
-        {
-            settings.use_async_tasks = false;
-        }
+/// Is avian's schedule the one that the plugin works around?
+#[derive(Resource, Default)]
+struct IsAroundSteps(bool);
+
+fn come_to_steps(mut is_around: ResMut<IsAroundSteps>) {
+    is_around.0 = true;
+}
+
+fn leave_steps(mut is_around: ResMut<IsAroundSteps>) {
+    is_around.0 = false;
+}
+
+fn check_schedule(is_around: Res<IsAroundSteps>) {
+    if !is_around.0 {
+        error_once!(
+            "avian runs outside `FixedPostUpdate`, so colliders of terrains follow late and bodies are not lifted out of \
+             the ground: add `PhysicsPlugins::default()`"
+        );
     }
 }

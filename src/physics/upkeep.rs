@@ -5,14 +5,13 @@ use std::time::Duration;
 
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
 use super::PhysicsFigures;
 use super::colliders::{Grounds, PreparedCollider, detach};
 use super::columns::{Columns, Look, Parts};
 use super::near::Neighbourhood;
-use crate::plugin::{Part, TerrainEntities};
+use crate::plugin::{Part, TerrainEntities, ThreadTask, Threads};
 use crate::terrain::{SurfaceRecipe, Terrain};
 
 /// Parts that one task makes colliders for: few, so that the nearest come soon.
@@ -24,14 +23,14 @@ const FRAME_TIME: Duration = Duration::from_micros(150);
 /// The colliders under way.
 #[derive(Resource, Default)]
 pub(super) struct Work {
-    task: Option<Task<Vec<(Entity, PreparedCollider)>>>,
+    task: Option<ThreadTask<Vec<(Entity, PreparedCollider)>>>,
     /// Done, and waiting for their frame.
     done: VecDeque<(Entity, PreparedCollider)>,
 }
 
 /// Puts colliders that are done in their places.
 pub(super) fn finish(mut commands: Commands, mut work: ResMut<Work>) {
-    if let Some(done) = work.task.as_mut().and_then(check_ready) {
+    if let Some(done) = work.task.as_mut().and_then(ThreadTask::finish) {
         (work.task, work.done) = (None, done.into());
     }
     if !work.done.is_empty() {
@@ -106,7 +105,7 @@ fn begin(
     terrains: &Query<(&Terrain, &TerrainEntities)>,
     columns: &Columns,
     near: &Neighbourhood,
-) -> Option<Task<Vec<(Entity, PreparedCollider)>>> {
+) -> Option<ThreadTask<Vec<(Entity, PreparedCollider)>>> {
     let is_shown =
         |&terrain: &Entity| terrains.get(terrain).is_ok_and(|(model, entities)| entities.show(model.world()));
     let missing = columns.waiting().filter(is_shown).flat_map(|terrain| {
@@ -134,7 +133,7 @@ fn begin(
         })
         .collect();
     let grounds = grounds.clone();
-    Some(AsyncComputeTaskPool::get().spawn(async move {
+    Some(ThreadTask::start(Threads::Background, move || {
         let prepare = |(entity, part, recipe): &(Entity, Part, SurfaceRecipe)| {
             (*entity, grounds.prepare(part, &recipe.draft().surface()))
         };

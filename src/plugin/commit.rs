@@ -7,7 +7,6 @@ use bevy::camera::visibility::NoAutoAabb;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
 use super::companion::{Fresh, Workshop};
@@ -15,29 +14,42 @@ use super::entities::{TerrainEntities, tell};
 use super::intake::{pieces, tell_steps};
 use super::load::Loading;
 use super::meshes::{Ready, Wardrobe};
+use super::threads::{ThreadTask, Threads};
 use super::{
     Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
-    Companions, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
+    Companions, HistoryMoved, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
 };
 use crate::backend::Engine;
 use crate::lattice::{ChunkGrid, ChunkPos};
-use crate::terrain::{Commit, Drawn, FieldNews, Receipt, SurfaceDraft, Terrain, Transaction};
+use crate::terrain::{
+    Commit, Drawn, FieldNews, Receipt, Rejection, SurfaceDraft, SurfaceRecipe, Terrain, Transaction, Unseen,
+};
 
-/// The transaction that a terrain waits for.
+/// The transaction, or what is shown of what the game committed itself, that a terrain waits for.
 #[derive(Component)]
 pub(super) struct InFlight {
-    /// Counts transactions, over all terrains.
+    /// Counts them, over all terrains.
     number: u64,
-    task: Task<Prepared>,
+    task: ThreadTask<Prepared>,
     done: Option<Prepared>,
 }
 
-/// A commit with its meshes and what goes with them, as they come from the task.
+/// Meshes and what goes with them, as they come from the task, and what they show.
 struct Prepared {
-    commit: Commit,
+    what: Shows,
     parts: Vec<Fresh>,
     pieces: Vec<LoosePieceFound>,
     took: Duration,
+}
+
+/// What is shown.
+enum Shows {
+    /// A commit, once it is settled.
+    Commit(Commit),
+    /// What the game committed itself.
+    Unseen(Unseen),
+    /// Nothing: the task panicked.
+    Nothing,
 }
 
 /// From how many tiles and chunks on threads share them.
@@ -74,16 +86,52 @@ impl Job {
         let drafts: Vec<_> = tiles.chain(chunks).collect();
         let make =
             |(drawn, draft): (Drawn, SurfaceDraft)| workshop.make(&part(drawn), draft.is_empty(), || draft);
-        let parts = if drafts.len() < PARALLEL_PARTS {
-            drafts.into_iter().map(make).collect()
-        } else {
-            drafts.into_par_iter().map(make).collect()
-        };
+        let parts = for_each_part(drafts, make);
         let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
         if let Some(wardrobe) = &workshop.wardrobe {
             pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
         }
-        Prepared { commit, parts, pieces, took: start.elapsed() }
+        Prepared { what: Shows::Commit(commit), parts, pieces, took: start.elapsed() }
+    }
+}
+
+/// Makes parts, several at a time where there are many.
+fn for_each_part<T: Send>(parts: Vec<T>, make: impl Fn(T) -> Fresh + Sync + Send) -> Vec<Fresh> {
+    if parts.len() < PARALLEL_PARTS {
+        parts.into_iter().map(make).collect()
+    } else {
+        parts.into_par_iter().map(make).collect()
+    }
+}
+
+/// Starts on what the game changed of a terrain that is shown.
+pub(super) fn begin_unseen(
+    commands: &mut Commands,
+    (entity, terrain): (Entity, &Terrain),
+    unseen: Unseen,
+    workshop: Workshop,
+    number: u64,
+) {
+    let (world, voxel_size) = (terrain.world(), terrain.voxel_size());
+    let part = |drawn| Part::new(entity, voxel_size, world.grid(), world.revision(), drawn);
+    let parts: Vec<(Part, SurfaceRecipe)> =
+        unseen.drawn().map(|drawn| (part(drawn), world.recipe(drawn))).collect();
+    let task = ThreadTask::start(Threads::Transactions, move || {
+        let start = Instant::now();
+        let parts = for_each_part(parts, |(part, recipe)| workshop.make(&part, false, || recipe.draft()));
+        Prepared { what: Shows::Unseen(unseen), parts, pieces: Vec::new(), took: start.elapsed() }
+    });
+    commands.entity(entity).try_insert(InFlight { number, task, done: None });
+}
+
+/// Counts transactions over all terrains, so that they are committed in the order in which they began.
+#[derive(Resource, Default)]
+pub(super) struct Numbers(u64);
+
+impl Numbers {
+    pub fn next(&mut self) -> u64 {
+        self.0 += 1;
+        self.0
     }
 }
 
@@ -91,7 +139,7 @@ impl Job {
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &TerrainEntities, Option<&MaterialColors>, Option<&LooseGround>),
+        (Entity, &mut Terrain, &TerrainEntities, Option<&MaterialColors>),
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -99,21 +147,18 @@ pub(super) fn begin_transactions(
     engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
     mut moved: MessageWriter<HistoryMoved>,
-    mut number: Local<u64>,
+    mut numbers: ResMut<Numbers>,
 ) {
     let start = Instant::now();
     let draws = assets.is_some();
-    for (entity, mut terrain, entities, colors, loose) in &mut terrains {
+    for (entity, mut terrain, entities, colors) in &mut terrains {
         // The game put a terrain here whose task another entity had.
         if terrain.waits_for_plugin() {
             terrain.abandon();
         }
-        // A world that the game changed by itself is loaded again first.
+        // What the game changed by itself is shown first.
         if terrain.queued() == 0 || !entities.show(terrain.world()) {
             continue;
-        }
-        if let Some(&loose) = loose {
-            terrain.set_loose(Some(loose.into()));
         }
         let transaction = terrain.begin_for(true);
         tell_steps(entity, &mut terrain, &mut moved);
@@ -130,9 +175,9 @@ pub(super) fn begin_transactions(
             grid: terrain.world().grid(),
             revision: terrain.world().revision() + 1,
         };
-        let task = AsyncComputeTaskPool::get().spawn(async move { job.run() });
-        *number += 1;
-        commands.entity(entity).try_insert(InFlight { number: *number, task, done: None });
+        let task = ThreadTask::start(Threads::Transactions, move || job.run());
+        let number = numbers.next();
+        commands.entity(entity).try_insert(InFlight { number, task, done: None });
     }
     figures.main_thread += start.elapsed();
 }
@@ -193,7 +238,7 @@ fn done_in_order(
     let mut done = Vec::new();
     for (entity, _, _, mut transaction) in terrains.iter_mut() {
         if transaction.done.is_none() {
-            transaction.done = check_ready(&mut transaction.task);
+            transaction.done = transaction.task.check().map(|done| done.unwrap_or_else(|_| Prepared::nothing()));
         }
         if transaction.done.is_some() {
             done.push((transaction.number, entity));
@@ -214,19 +259,46 @@ fn commit(
     news: &mut News,
 ) -> bool {
     let start = Instant::now();
-    let Prepared { commit, parts, pieces, took } = prepared;
+    let Prepared { what, parts, pieces, took } = prepared;
+    let commit = match what {
+        Shows::Unseen(unseen) => {
+            let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
+            if is_shown {
+                entities.shown = unseen.version();
+                screen.show(entity, &terrain, &mut entities, parts, unseen.fields(), true);
+                entities.tell_ready(&mut screen.commands, entity, terrain.world());
+                screen.figures.main_thread += start.elapsed();
+            }
+            return is_shown;
+        }
+        Shows::Commit(commit) => commit,
+        Shows::Nothing => match terrain.refused() {
+            Some(commit) => commit,
+            None => return false,
+        },
+    };
     let fields = commit.field_news().to_vec();
-    let Ok((receipts, waste)) = terrain.settle(commit) else { return false };
+    let Ok((receipts, waste)) = terrain.settle_shown(commit) else { return false };
     if !waste.is_empty() {
         free_later(waste);
     }
     let is_step = terrain.has_history_receipts();
     tell_steps(entity, &mut terrain, &mut news.moved);
+    entities.shown = terrain.world().version();
     screen.show(entity, &terrain, &mut entities, parts, &fields, is_step);
     let brushes = receipts.len() as u64;
+    if receipts.iter().any(|receipt| receipt.outcome == Err(Rejection::Panicked)) {
+        warn_once!("a brush was rejected because applying it panicked; this is a bug, please report it");
+    }
     news.tell(entity, receipts, pieces);
     screen.figures.count(brushes, took, start.elapsed());
     true
+}
+
+impl Prepared {
+    fn nothing() -> Self {
+        Self { what: Shows::Nothing, parts: Vec::new(), pieces: Vec::new(), took: Duration::ZERO }
+    }
 }
 
 impl Screen<'_, '_> {
@@ -241,7 +313,6 @@ impl Screen<'_, '_> {
         is_step: bool,
     ) {
         let world = terrain.world();
-        entities.shown = world.version();
         let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
         let with_surfaces = parts.into_iter().map(|fresh| (fresh.drawn, Some(fresh)));
         let mut touched = Vec::new();

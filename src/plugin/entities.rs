@@ -4,7 +4,7 @@ use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
-use super::{Chunk, Field, FieldChanged, FieldCreated, FieldMerged, Tile};
+use super::{Chunk, Field, FieldChanged, FieldCreated, FieldMerged, TerrainReady, Tile};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, FieldNews, Terrain, Version, World};
 use crate::volume::{self, FieldId};
@@ -17,16 +17,26 @@ pub struct TerrainEntities {
     pub(super) voxel_size: f32,
     drawn: HashMap<Drawn, Entity>,
     fields: HashMap<FieldId, Entity>,
+    /// Does the game know that the terrain is ready?
+    is_told: bool,
 }
 
 impl TerrainEntities {
     pub(super) fn new(shown: Version, voxel_size: f32) -> Self {
-        Self { shown, voxel_size, drawn: HashMap::default(), fields: HashMap::default() }
+        Self { shown, voxel_size, drawn: HashMap::default(), fields: HashMap::default(), is_told: false }
     }
 
     /// Are they those of this world, as it is now? Not while one that the game changed by itself loads.
     pub(crate) fn show(&self, world: &World) -> bool {
         self.shown == world.version()
+    }
+
+    /// Tells that a terrain is ready, once it shows all there is.
+    pub(super) fn tell_ready(&mut self, commands: &mut Commands, terrain: Entity, world: &World) {
+        if !self.is_told && self.show(world) {
+            self.is_told = true;
+            tell(commands, TerrainReady { entity: terrain });
+        }
     }
 
     /// Despawns tiles and chunks; fields lie below these. The last of the terrain's children goes first: Bevy looks for

@@ -10,21 +10,27 @@ use super::{
 };
 use crate::brush::{Brush, BrushError, Edit, Operation, Shape};
 use crate::lattice::ChunkGrid;
-use crate::terrain::{HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain};
+use crate::terrain::{
+    HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain, Together, unique,
+};
 
 /// Moves brushes into their terrains' space and queues them. A terrain that a brush reaches and that can't take it
 /// answers at once, and so does a brush that reaches none.
 pub(super) fn collect_brushes(
     mut brushes: MessageReader<Brush>,
     mut targeted: MessageReader<TargetedBrush>,
-    mut terrains: Query<(Entity, &mut Terrain)>,
+    mut terrains: Query<(Entity, &mut Terrain, Option<&LooseGround>)>,
     places: TransformHelper,
     mut answers: MessageWriter<BrushApplied>,
     mut found: MessageWriter<LoosePieceFound>,
     mut figures: ResMut<BurrowFigures>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain) in &mut terrains {
+    for (entity, mut terrain, loose) in &mut terrains {
+        let loose = loose.map(|&loose| loose.into());
+        if loose.is_some() && loose.as_ref() != terrain.loose() {
+            terrain.set_loose(loose);
+        }
         if terrain.has_answered() {
             let answered = terrain.take_answered();
             found.write_batch(pieces(entity, &answered));
@@ -35,15 +41,20 @@ pub(super) fn collect_brushes(
     let mut reject = |brush: &Brush, terrain, rejection| {
         answers.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
     };
+    // Those of one frame are one step of undo.
+    let together = Together::Batch(unique());
     for brush in brushes.read() {
         // What the brush is told if no terrain answers.
         let mut unanswered = Some(Rejection::OutsideWorld);
         // A terrain is borrowed to be changed only once it takes a brush: for `Changed<Terrain>`, others stay as they are.
-        for (entity, mut terrain) in &mut terrains {
+        for (entity, mut terrain, _) in &mut terrains {
             let Ok(place) = places.compute_global_transform(entity) else { continue };
             match Claim::of(brush, &place, terrain.world().grid()) {
                 Claim::Taken(edit) => {
-                    terrain.submit_quantized(edit);
+                    match terrain.admit(Some(&edit)) {
+                        Ok(()) => terrain.queue_edit(brush.tag, Ok(edit), brush.stroke, together),
+                        Err(rejection) => reject(brush, Some(entity), rejection),
+                    }
                     unanswered = None;
                 }
                 Claim::Refused(error) => {
@@ -58,10 +69,16 @@ pub(super) fn collect_brushes(
             reject(brush, None, why);
         }
     }
-    for TargetedBrush { terrain, brush } in targeted.read() {
-        match (terrains.get_mut(*terrain), places.compute_global_transform(*terrain)) {
-            (Ok((_, mut terrain)), Ok(place)) => terrain.submit(&to_terrain(brush, &place)),
-            _ => reject(brush, Some(*terrain), Rejection::TerrainGone),
+    for &TargetedBrush { terrain: entity, ref brush } in targeted.read() {
+        match (terrains.get_mut(entity), places.compute_global_transform(entity)) {
+            (Ok((_, mut terrain, _)), Ok(place)) => {
+                let edit = Edit::quantize(&to_terrain(brush, &place)).map_err(Rejection::from);
+                match terrain.admit(edit.as_ref().ok()) {
+                    Ok(()) => terrain.queue_edit(brush.tag, edit, brush.stroke, together),
+                    Err(rejection) => reject(brush, Some(entity), rejection),
+                }
+            }
+            _ => reject(brush, Some(entity), Rejection::TerrainGone),
         }
     }
     figures.main_thread = start.elapsed();
@@ -103,9 +120,6 @@ pub(super) fn collect_steps(
     mut figures: ResMut<BurrowFigures>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain) in &mut terrains {
-        tell_steps(entity, &mut terrain, &mut moved);
-    }
     let undos = undos.read().map(|&Undo { terrain }| (HistoryStep::Undo, terrain));
     let redos = redos.read().map(|&Redo { terrain }| (HistoryStep::Redo, terrain));
     for (step, target) in undos.chain(redos) {
@@ -124,6 +138,10 @@ pub(super) fn collect_steps(
         if !is_taken {
             moved.write(gone(target, step));
         }
+    }
+    // Those that there was no room for, and those of steps that the game took itself.
+    for (entity, mut terrain) in &mut terrains {
+        tell_steps(entity, &mut terrain, &mut moved);
     }
     figures.main_thread += start.elapsed();
 }
@@ -249,7 +267,14 @@ fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) ->
         Operation::Level { height } => lift(height),
         Operation::Terrace { step, base } => [step, base].into_iter().for_each(lift),
         Operation::Stamp(stamp) => stretch(&mut stamp.center),
-        _ => {}
+        // Nothing in them has a place or a height; amounts are scaled as sizes are.
+        Operation::Dig
+        | Operation::Add { .. }
+        | Operation::Paint { .. }
+        | Operation::Smooth
+        | Operation::Sharpen
+        | Operation::Raise { .. }
+        | Operation::Lower { .. } => {}
     }
     brush
 }

@@ -7,13 +7,13 @@ use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::NoAutoAabb;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use rayon::prelude::*;
 
-use super::commit::{InFlight, attach};
+use super::commit::{InFlight, Numbers, attach, begin_unseen};
 use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
 use super::meshes::Wardrobe;
+use super::threads::{ThreadTask, Threads};
 use super::{BurrowSettings, ChunkCreated, Companions, MaterialColors, Part};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
@@ -24,8 +24,8 @@ use crate::terrain::{Drawn, Terrain, World};
 /// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
 /// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
 ///
-/// It comes again whenever a terrain has loaded anew: another one took its place, or the game changed it by itself, with
-/// [`Terrain::apply`] or [`Terrain::undo`] say. Whoever spawns something then looks first whether it is there.
+/// It comes again whenever a terrain has loaded anew, because another one took its place. Whoever spawns something then
+/// looks first whether it is there.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainReady {
     /// The terrain's entity.
@@ -36,7 +36,7 @@ pub struct TerrainReady {
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
-    task: Option<Task<Vec<Fresh>>>,
+    task: Option<ThreadTask<Vec<Fresh>>>,
     waiting: Vec<Fresh>,
     ready: HashMap<Drawn, Loaded>,
 }
@@ -127,26 +127,34 @@ fn drop_misfits(
     }
 }
 
-/// Starts the task of each terrain that is new, or whose world the game changed by itself.
+/// Starts the task of each terrain that is new, or whose world the game changed by itself: then only what that changed is
+/// made anew.
 pub(super) fn start_loading(
     mut commands: Commands,
-    terrains: Query<(Entity, &Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
+    mut terrains: Query<(Entity, &mut Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
     assets: Option<Res<Assets<Mesh>>>,
     companions: Res<Companions>,
+    mut numbers: ResMut<Numbers>,
 ) {
-    for (entity, terrain, colors, entities) in &terrains {
+    for (entity, mut terrain, colors, entities) in &mut terrains {
         if entities.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
-        let (world, voxel_size) = (terrain.snapshot(), terrain.voxel_size());
         let workshop = Workshop {
-            wardrobe: assets.is_some().then(|| Wardrobe::new(&world, colors)),
+            wardrobe: assets.is_some().then(|| Wardrobe::new(terrain.world(), colors)),
             companions: companions.clone(),
         };
+        // Not a change that the game has to hear of.
+        let model = terrain.bypass_change_detection();
+        if let Some(unseen) = entities.and_then(|entities| model.take_unseen(entities.shown)) {
+            begin_unseen(&mut commands, (entity, model), unseen, workshop, numbers.next());
+            continue;
+        }
+        model.watch();
+        let (world, voxel_size) = (model.snapshot(), model.voxel_size());
         let task = (!workshop.is_idle()).then(|| {
             let world = Arc::clone(&world);
-            AsyncComputeTaskPool::get()
-                .spawn(async move { make_all(&world, &workshop, (entity, voxel_size)) })
+            ThreadTask::start(Threads::Background, move || make_all(&world, &workshop, (entity, voxel_size)))
         });
         let loading = Loading { world, task, waiting: Vec::new(), ready: HashMap::default() };
         commands.entity(entity).try_insert(loading);
@@ -201,7 +209,7 @@ pub(super) fn finish_loading(
     let mut budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
     for (entity, terrain, mut loading, old, children) in &mut terrains {
         if let Some(task) = &mut loading.task {
-            let Some(parts) = check_ready(task) else { continue };
+            let Some(parts) = task.finish() else { continue };
             (loading.task, loading.waiting) = (None, parts);
         }
         let rest = loading.waiting.len().saturating_sub(budget);
@@ -218,13 +226,10 @@ pub(super) fn finish_loading(
         if let Some(old) = old {
             old.despawn(&mut commands, children);
         }
-        let entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
-        let is_current = entities.show(terrain.world());
+        let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
+        // What the game changed meanwhile is shown next.
+        entities.tell_ready(&mut commands, entity, terrain.world());
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
-        // What the game changed meanwhile loads next.
-        if is_current {
-            tell(&mut commands, TerrainReady { entity });
-        }
     }
 }
 

@@ -2,11 +2,11 @@
 //!
 //! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that digging
 //! touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become transactions
-//! that run on [`AsyncComputeTaskPool`]; a finished one is committed in a single frame:
+//! that run on threads of the plugin's own; a finished one is committed in a single frame:
 //! meshes, entities, [`BrushApplied`] receipts and entity events. Without an `Assets<Mesh>`, on a server with
 //! `MinimalPlugins`, all of that happens but the meshes.
 //!
-//! [`Undo`] and [`Redo`] messages go back and forth by whole transactions, and [`HistoryMoved`] tells when.
+//! [`Undo`] and [`Redo`] messages go back and forth by whole strokes, and [`HistoryMoved`] tells when.
 //! On [`LooseGround`], [`LoosePieceFound`] tells what a brush cut off.
 //!
 //! What a game puts on the terrain's entity goes for its tiles, chunks and pieces: a `MeshMaterial3d`, [`RenderLayers`], and,
@@ -18,8 +18,6 @@
 //!
 //! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
 //! commit: see [`Companion`].
-//!
-//! Bevy's `multi_threaded` feature keeps transactions off the main thread; without it they run within the frame.
 
 mod commit;
 mod companion;
@@ -34,6 +32,7 @@ mod messages;
 mod query;
 mod reach;
 mod settings;
+mod threads;
 mod times;
 
 pub use companion::{Attachment, Companion, Companions, Part};
@@ -55,11 +54,13 @@ pub use messages::{
 };
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings, LooseGround};
+#[cfg(any(feature = "render", feature = "avian"))]
+pub(crate) use threads::{ThreadTask, Threads};
+pub(crate) use threads::free_later;
 pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
-use bevy::tasks::AsyncComputeTaskPool;
 
 use crate::brush::Brush;
 use crate::terrain::Terrain;
@@ -113,6 +114,7 @@ impl Plugin for TerrainPlugin {
         app.init_resource::<BurrowSettings>()
             .init_resource::<BurrowFigures>()
             .init_resource::<BurrowEngine>()
+            .init_resource::<commit::Numbers>()
             .init_resource::<Companions>()
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
@@ -159,12 +161,5 @@ impl Plugin for TerrainPlugin {
                 ),
             );
         hand_on::add(app);
-    }
-}
-
-/// Frees in a task what takes its time; here, where there are no tasks.
-pub(crate) fn free_later(waste: impl Send + 'static) {
-    if let Some(tasks) = AsyncComputeTaskPool::try_get() {
-        tasks.spawn(async move { drop(waste) }).detach();
     }
 }

@@ -52,6 +52,11 @@ impl Mask {
         self.0.iter().map(|(&word, &cells)| (word, cells))
     }
 
+    /// Stands the words of a newer mask in place of those that are here.
+    pub(crate) fn lay(&mut self, newer: &Self) {
+        newer.words().for_each(|(word, cells)| self.lay_word(word, cells));
+    }
+
     /// Stands 8x8 cells in place of those of a word, even if that leaves it empty: for masks that lie over another one.
     pub(crate) fn lay_word(&mut self, word: (i32, i32), cells: u64) {
         self.0.insert(word, cells);

@@ -56,6 +56,20 @@ impl Change {
         std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
     }
 
+    /// Puts back what was before two changes, of which `later` came second. Returns the bytes of its bricks that come in.
+    pub fn go_back_to_before(&mut self, mut later: Self) -> usize {
+        let bytes = fill_in(&mut self.bricks, later.bricks, brick_order, |brick| {
+            brick.iter().map(|brick| brick_bytes(brick)).sum()
+        });
+        fill_in(&mut self.fields, later.fields, |chunk| chunk, |_| 0);
+        // They come in no order.
+        for words in [&mut self.mask, &mut later.mask] {
+            words.sort_unstable_by_key(|own| own.0);
+        }
+        fill_in(&mut self.mask, later.mask, |word| word, |_| 0);
+        bytes
+    }
+
     /// Bytes of the lists, and of the fields in them; bricks come on top.
     pub fn bytes(&self) -> usize {
         self.bricks.capacity() * size_of::<(BrickPos, Option<Arc<Brick>>)>()
@@ -65,14 +79,47 @@ impl Change {
     }
 }
 
+/// What one group of edits, or one step through history, puts in place.
+pub(super) struct GroupChange {
+    pub change: Change,
+    /// Bytes of bricks that the change takes away from the world.
+    pub replaced_bytes: usize,
+    /// The number of the group.
+    pub group: u64,
+    /// The tags of its edits that changed something.
+    pub tags: Vec<u64>,
+}
+
+/// What bricks are sorted by.
+pub(super) fn brick_order(pos: BrickPos) -> (i32, i32, i32) {
+    (pos.0.x, pos.0.z, pos.0.y)
+}
+
+/// Adds to a sorted list what another one has at other places. Returns the sum of the `bytes` of what it adds.
+fn fill_in<K: Copy, V, O: Ord>(
+    list: &mut Vec<(K, V)>,
+    other: Vec<(K, V)>,
+    order: impl Fn(K) -> O,
+    bytes: impl Fn(&V) -> usize,
+) -> usize {
+    let before = list.len();
+    let is_new = |(key, _): &(K, V)| list.binary_search_by_key(&order(*key), |own| order(own.0)).is_err();
+    let mut new: Vec<(K, V)> = other.into_iter().filter(is_new).collect();
+    // History tells its bytes: no list has room to spare.
+    list.reserve_exact(new.len());
+    list.append(&mut new);
+    let added = list[before..].iter().map(|(_, value)| bytes(value)).sum();
+    list.sort_by_key(|own| order(own.0));
+    added
+}
+
 /// Bytes of bricks that a world holds and that a change takes away from it. Bricks that are all alike count nothing: the
 /// world keeps the one of their kind for as long as history has it.
 pub(super) fn replaced_bytes(world: &World, bricks: impl Iterator<Item = BrickPos>) -> usize {
-    let replaced = bricks.filter_map(|pos| world.bricks.get(&pos));
-    replaced.filter(|brick| brick.uniform().is_none()).map(|brick| shared_bytes(brick)).sum()
+    bricks.filter_map(|pos| world.bricks.get(&pos)).map(|brick| brick_bytes(brick)).sum()
 }
 
-/// Bytes of a brick with the counters of its `Arc`.
-fn shared_bytes(brick: &Brick) -> usize {
-    2 * size_of::<usize>() + Brick::BYTES + brick.material_bytes()
+/// Bytes of a brick with the counters of its `Arc`; nothing where it is all alike.
+pub(super) fn brick_bytes(brick: &Brick) -> usize {
+    if brick.uniform().is_some() { 0 } else { 2 * size_of::<usize>() + Brick::BYTES + brick.material_bytes() }
 }

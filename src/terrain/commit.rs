@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::change::Change;
+use super::change::GroupChange;
 use super::field_log::FieldNews;
 use super::history::{HistoryReceipt, Step};
 use super::receipt::Receipt;
@@ -21,9 +21,9 @@ use crate::volume::UniformBricks;
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
 pub struct Commit {
     pub(super) ticket: u64,
-    pub(super) change: Change,
-    /// Bytes of bricks that the change takes away from the world.
-    pub(super) replaced_bytes: usize,
+    /// What groups of edits put in place one after the other, or a step through history.
+    pub(super) changes: Vec<GroupChange>,
+    pub(super) sample_hash: u64,
     pub(super) uniform: UniformBricks,
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
@@ -81,14 +81,14 @@ pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
     /// What became of a step through history, if the commit was one.
     pub moved: Option<HistoryReceipt>,
-    /// What was replaced; `None` where nothing was.
-    pub replaced: Option<Step>,
+    /// What was replaced, by each group that replaced something.
+    pub replaced: Vec<Step>,
 }
 
 impl Commit {
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
     pub fn sample_hash(&self) -> u64 {
-        self.change.sample_hash
+        self.sample_hash
     }
 
     /// What happens to fields when this is committed, by chunk.
@@ -103,8 +103,14 @@ impl Commit {
     }
 
     /// Makes this the world.
-    pub(super) fn install(mut self, world: &mut World) -> Installed {
-        self.change.swap(world);
+    pub(super) fn install(self, world: &mut World) -> Installed {
+        let mut replaced = Vec::with_capacity(self.changes.len());
+        for mut own in self.changes {
+            own.change.swap(world);
+            if !own.change.bricks.is_empty() {
+                replaced.push(Step::new(own));
+            }
+        }
         world.enter_kinds(self.uniform);
         for (chunk, surface) in self.surfaces {
             if surface.is_empty() {
@@ -123,7 +129,6 @@ impl Commit {
         world.give_back();
         world.next_field = self.next_field;
         world.revision += 1;
-        let replaced = (!self.change.bricks.is_empty()).then(|| Step::new(self.change, self.replaced_bytes));
         Installed { receipts: self.receipts, moved: self.moved, replaced }
     }
 }

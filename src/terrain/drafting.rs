@@ -4,20 +4,27 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::loose::{self, LoosePiece, LooseSettings, Lowest};
+use super::queue::Submission;
 use super::world::World;
 use crate::backend::Compute;
 use crate::brush::{Edit, Operation};
+use crate::ground::MaterialId;
 use crate::volume::{
-    Bricks, ChunkEffect, DiggingRules, Draft, DraftedBrick, EditEffect, EditWork, Ledger, SampleView,
+    Brick, Bricks, ChunkEffect, DiggingRules, Draft, DraftedBrick, EditEffect, EditWork, Ledger, Sample, SampleView,
     TakenOut, UniformBricks,
 };
 
-/// Who drafts, over what.
+/// Who drafts, over what: a world, and what was drafted over it so far.
 pub(super) struct Drafting<'a> {
-    pub world: &'a World,
-    /// What edits may do; `None`: everything.
-    pub rules: Option<&'a DiggingRules>,
-    pub backend: &'a dyn Compute,
+    world: &'a World,
+    backend: &'a dyn Compute,
+    /// Bricks drafted so far, and the lowest of each stack.
+    over: Bricks,
+    lowest: Lowest,
+    /// Hash of all samples.
+    hash: u64,
+    /// Kinds of uniform bricks; `None`: those of the world.
+    known: Option<UniformBricks>,
 }
 
 /// What edits make of a world.
@@ -32,47 +39,78 @@ fn can_remove(edit: &Edit) -> bool {
     !matches!(edit.operation(), Operation::Add { .. } | Operation::Paint { .. })
 }
 
-impl Drafting<'_> {
-    /// All edits at once: each brick takes all of its edits.
-    pub fn together(&self, edits: &[&Edit]) -> Drafted {
-        let world = self.world;
-        let draft = self.draft(world.samples(), edits, world.sample_hash, &world.uniform);
-        Drafted { draft, pieces: BTreeMap::new() }
+impl<'a> Drafting<'a> {
+    pub fn new(world: &'a World, backend: &'a dyn Compute) -> Self {
+        let (over, lowest) = (Bricks::default(), Lowest::default());
+        Self { world, backend, over, lowest, hash: world.sample_hash, known: None }
     }
 
-    /// What edits make of samples of this hash; bricks of a `known` kind are shared.
-    fn draft(&self, base: SampleView, edits: &[&Edit], hash: u64, known: &UniformBricks) -> Draft {
+    /// The samples as they are so far.
+    pub fn samples(&self) -> SampleView<'_> {
+        let samples = self.world.samples();
+        if self.over.is_empty() { samples } else { samples.over(&self.over) }
+    }
+
+    /// What a group of edits makes of the samples so far. What it comes to is [laid](Self::lay) over them before the next.
+    pub fn draft(&mut self, group: &[Submission]) -> Drafted {
+        let edits: Vec<&Edit> = group.iter().filter_map(|submission| submission.edit.as_ref().ok()).collect();
+        let terms = group.first().map(|first| &first.terms);
+        let rules = terms.and_then(|terms| terms.rules.as_deref());
+        let drafted = match terms.and_then(|terms| terms.loose.as_ref()) {
+            Some(settings) => self.one_by_one(&edits, rules, settings),
+            None => Drafted { draft: self.together(&edits, rules), pieces: BTreeMap::new() },
+        };
+        self.hash = drafted.draft.hash;
+        drafted
+    }
+
+    /// Takes in what was drafted, for more edits to come.
+    pub fn lay(&mut self, draft: &Draft) {
+        lay(&mut self.over, &mut self.lowest, &draft.bricks);
+        self.learn(draft.uniform.iter().map(|(&kind, brick)| (kind, Arc::clone(brick))));
+    }
+
+    /// All edits at once: each brick takes all of its edits.
+    fn together(&self, edits: &[&Edit], rules: Option<&DiggingRules>) -> Draft {
         let apply = |work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])| self.backend.edit(work, each);
-        Draft::make(base, self.world.grid, edits, hash, known, self.rules, apply)
+        let known = self.known.as_ref().unwrap_or(&self.world.uniform);
+        Draft::make(self.samples(), self.world.grid, edits, self.hash, known, rules, apply)
+    }
+
+    fn learn(&mut self, kinds: impl IntoIterator<Item = ((Sample, MaterialId), Arc<Brick>)>) {
+        let known = self.known.get_or_insert_with(|| self.world.uniform.clone());
+        known.extend(kinds);
     }
 
     /// The same world, but each edit that can remove ground comes by itself, and what it cuts off falls before the next.
-    pub fn one_by_one(&self, edits: &[&Edit], settings: &LooseSettings) -> Drafted {
+    fn one_by_one(
+        &mut self,
+        edits: &[&Edit],
+        rules: Option<&DiggingRules>,
+        settings: &LooseSettings,
+    ) -> Drafted {
         let world = self.world;
-        let (mut over, mut lowest, mut pieces) = (Bricks::default(), Lowest::default(), BTreeMap::new());
-        let mut all = Draft { hash: world.sample_hash, ..Draft::default() };
+        let mut pieces = BTreeMap::new();
+        let mut all = Draft { hash: self.hash, ..Draft::default() };
         let mut bricks: BTreeMap<[i32; 3], DraftedBrick> = BTreeMap::new();
-        let mut known = world.uniform.clone();
         // Where one reads what another one left, `Draft::make` sees to it.
         let is_free = |edit: &Edit| !can_remove(edit);
         for group in edits.chunk_by(|a, b| is_free(a) && is_free(b)) {
-            let base = world.samples().over(&over);
-            let Draft { bricks: mut drafted, mut effects, hash, uniform } =
-                self.draft(base, group, all.hash, &known);
-            all.hash = hash;
-            known.extend(uniform);
+            let Draft { bricks: mut drafted, mut effects, hash, uniform } = self.together(group, rules);
+            self.hash = hash;
+            self.learn(uniform);
             let is_looked_after = group.iter().any(|edit| can_remove(edit));
-            let seeds = is_looked_after.then(|| loose::seeds(world, &over, &drafted));
-            lay(&mut over, &mut lowest, &drafted);
+            let seeds = is_looked_after.then(|| loose::seeds(world, &self.over, &drafted));
+            lay(&mut self.over, &mut self.lowest, &drafted);
             if let Some(seeds) = seeds {
-                let fallen = loose::fall(world, self.rules, &over, &lowest, &seeds, settings);
+                let fallen = loose::fall(world, rules, &self.over, &self.lowest, &seeds, settings);
                 for TakenOut { drafted: mut taken, hash, chunks } in fallen.taken {
-                    all.hash = all.hash.wrapping_add(hash);
+                    self.hash = self.hash.wrapping_add(hash);
                     if let Some(effect) = effects.last_mut() {
                         chunks.into_iter().for_each(|chunk| reach(effect, chunk));
                     }
-                    share(&mut known, &mut taken);
-                    lay(&mut over, &mut lowest, [&taken]);
+                    self.share(&mut taken);
+                    lay(&mut self.over, &mut self.lowest, [&taken]);
                     drafted.push(taken);
                 }
                 if !fallen.pieces.is_empty() {
@@ -82,11 +120,21 @@ impl Drafting<'_> {
             drafted.into_iter().for_each(|drafted| merge(&mut bricks, drafted));
             all.effects.append(&mut effects);
         }
+        all.hash = self.hash;
         all.bricks = bricks.into_values().collect();
         let kinds = all.bricks.iter().filter_map(|drafted| drafted.kind);
         let fresh = kinds.filter(|kind| !world.uniform.contains_key(kind));
+        let known = self.known.as_ref().unwrap_or(&world.uniform);
         all.uniform = fresh.filter_map(|kind| Some((kind, Arc::clone(known.get(&kind)?)))).collect();
         Drafted { draft: all, pieces }
+    }
+
+    /// A brick that is all alike is replaced by the one of its kind.
+    fn share(&mut self, drafted: &mut DraftedBrick) {
+        if let Some(kind) = drafted.kind {
+            let known = self.known.get_or_insert_with(|| self.world.uniform.clone());
+            drafted.brick = Arc::clone(known.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
+        }
     }
 }
 
@@ -100,19 +148,12 @@ fn lay<'d>(over: &mut Bricks, lowest: &mut Lowest, drafted: impl IntoIterator<It
 }
 
 /// Takes in what a brick is now, and what changed in it beside what did before.
-fn merge(bricks: &mut BTreeMap<[i32; 3], DraftedBrick>, mut drafted: DraftedBrick) {
+pub(super) fn merge(bricks: &mut BTreeMap<[i32; 3], DraftedBrick>, mut drafted: DraftedBrick) {
     let key = [drafted.pos.0.x, drafted.pos.0.z, drafted.pos.0.y];
     if let Some(own) = bricks.get(&key) {
         drafted.after(own);
     }
     bricks.insert(key, drafted);
-}
-
-/// A brick that is all alike is replaced by the one of its kind.
-fn share(known: &mut UniformBricks, drafted: &mut DraftedBrick) {
-    if let Some(kind) = drafted.kind {
-        drafted.brick = Arc::clone(known.entry(kind).or_insert_with(|| Arc::clone(&drafted.brick)));
-    }
 }
 
 /// Takes in that an edit changed samples of a chunk.

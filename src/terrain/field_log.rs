@@ -1,6 +1,6 @@
 //! What a transaction does to fields.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::receipt::{Applied, ChunkScenario, Rejection};
 use super::world::World;
@@ -29,7 +29,9 @@ pub enum FieldNews {
 /// The fields that a transaction touches, and what happened to them.
 pub(super) struct FieldLog<'a> {
     world: &'a World,
-    pub fields: BTreeMap<ChunkPos, Fields>,
+    fields: BTreeMap<ChunkPos, Fields>,
+    /// Chunks whose fields changed since they were last taken.
+    changed: BTreeSet<ChunkPos>,
     merged: Vec<(ChunkPos, FieldNews)>,
     /// Where those of each chunk stand among them.
     merged_in: BTreeMap<ChunkPos, Vec<usize>>,
@@ -39,7 +41,8 @@ pub(super) struct FieldLog<'a> {
 impl<'a> FieldLog<'a> {
     pub fn new(world: &'a World) -> Self {
         let (fields, merged_in) = (BTreeMap::new(), BTreeMap::new());
-        Self { world, fields, merged: Vec::new(), merged_in, next: world.next_field }
+        let (changed, merged) = (BTreeSet::new(), Vec::new());
+        Self { world, fields, changed, merged, merged_in, next: world.next_field }
     }
 
     /// Enters what an edit changed; returns what its receipt says.
@@ -57,8 +60,15 @@ impl<'a> FieldLog<'a> {
         Ok(Applied { chunks, bounds, removed, added, painted, refused, loose: Vec::new() })
     }
 
+    /// All fields of each chunk that a field changed in since the last call, by chunk.
+    pub fn take_changed(&mut self) -> Vec<(ChunkPos, Fields)> {
+        let changed = std::mem::take(&mut self.changed).into_iter();
+        changed.filter_map(|chunk| Some((chunk, self.fields.get(&chunk)?.clone()))).collect()
+    }
+
     fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {
         let committed = self.world.fields.get(&chunk);
+        self.changed.insert(chunk);
         let fields = self.fields.entry(chunk).or_insert_with(|| committed.cloned().unwrap_or_default());
         let absorbed = fields.absorb(bounds, || {
             self.next += 1;

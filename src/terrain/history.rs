@@ -1,13 +1,14 @@
-//! Undo and redo: what transactions replaced, kept as far back as a budget of bytes allows.
+//! Undo and redo: what edits replaced, kept as far back as a budget of bytes allows.
 //!
-//! A step holds the bricks, fields and words of the mask that one transaction replaced. Bricks are shared with whoever
-//! holds them, so a step takes as many bytes as there are bricks in it that nobody else holds. Going back puts the old
-//! ones in place of the new, which in turn are what redo needs.
+//! A step holds the bricks, fields and words of the mask that the edits of one group replaced: those of a stroke, or those
+//! that were submitted together. Transactions know nothing of groups: one may hold many, and a stroke may take many. Bricks
+//! are shared with whoever holds them, so a step takes as many bytes as there are bricks in it that nobody else holds. Going
+//! back puts the old ones in place of the new, which in turn are what redo needs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::Change;
+use super::change::{Change, GroupChange};
 use super::world::World;
 use crate::lattice::LatticeBox;
 use crate::volume::Tally;
@@ -15,7 +16,7 @@ use crate::volume::Tally;
 /// One step through a terrain's history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HistoryStep {
-    /// Back to before the last transaction.
+    /// Back to before the last group of edits: a stroke, or what was submitted together.
     Undo,
     /// What was undone last is done again.
     Redo,
@@ -24,9 +25,9 @@ pub enum HistoryStep {
 /// What a terrain's history holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct History {
-    /// Transactions that can be undone.
+    /// Steps that can be undone.
     pub undos: usize,
-    /// Transactions that can be done again.
+    /// Steps that can be done again.
     pub redos: usize,
     /// Bytes that history alone holds. What it shares with the world is not counted.
     pub bytes: usize,
@@ -45,6 +46,8 @@ pub struct HistoryReceipt {
 /// pieces is among it here, though it is not among a receipt's `removed`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restored {
+    /// The tags of the brushes that it took back, or did again, in order; those that had changed nothing are left out.
+    pub tags: Vec<u64>,
     /// Box around all samples that changed.
     pub bounds: Option<LatticeBox>,
     /// Voxels that are air now, by the material they had.
@@ -68,6 +71,12 @@ pub enum HistoryRejection {
     /// The terrain was removed before the step's turn came, or the entity never had one.
     #[error("the terrain is gone")]
     TerrainGone,
+    /// Too much work [waits](super::WorkLimits::waiting).
+    #[error("too much work waits already")]
+    Overloaded,
+    /// Taking it panicked. The world is as it was before, and so is its history.
+    #[error("the step panicked; this is a bug of the plugin's")]
+    Panicked,
 }
 
 impl HistoryStep {
@@ -81,26 +90,39 @@ impl HistoryStep {
     }
 }
 
-/// What one transaction replaced.
+/// What a group of edits replaced.
 pub(super) struct Step {
     pub change: Change,
     /// A box around everything in it.
     pub bounds: Option<LatticeBox>,
     /// Bytes of its bricks that nobody else holds.
     pub brick_bytes: usize,
+    /// Whose edits they were.
+    pub group: u64,
+    /// The tags of those that changed something.
+    pub tags: Vec<u64>,
 }
 
 impl Step {
-    /// A step of what a commit replaced.
-    pub fn new(change: Change, brick_bytes: usize) -> Self {
+    /// A step of what a change replaced, which was put in its place.
+    pub fn new(GroupChange { change, replaced_bytes, group, tags }: GroupChange) -> Self {
         let boxes = change.bricks.iter().map(|(pos, _)| pos.samples());
         let bounds = boxes.reduce(LatticeBox::union);
-        Self { change, bounds, brick_bytes }
+        Self { change, bounds, brick_bytes: replaced_bytes, group, tags }
+    }
+
+    /// Takes in what later edits of the same group replaced.
+    fn go_on(&mut self, later: Self) {
+        self.brick_bytes += self.change.go_back_to_before(later.change);
+        self.bounds = self.bounds.into_iter().chain(later.bounds).reduce(LatticeBox::union);
+        self.tags.reserve_exact(later.tags.len());
+        self.tags.extend(later.tags);
     }
 
     /// Bytes that go with it, the counters of its `Arc` included.
     fn bytes(&self) -> usize {
-        2 * size_of::<usize>() + size_of::<Self>() + self.change.bytes() + self.brick_bytes
+        let own = 2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&self.tags[..]);
+        own + self.change.bytes() + self.brick_bytes
     }
 }
 
@@ -129,12 +151,14 @@ pub(super) struct Timeline {
     budget: usize,
     /// Bytes of all steps.
     held: usize,
+    /// The greatest number of a group whose step the budget had no room for: what is left of it is no step either.
+    lost: u64,
 }
 
 impl Timeline {
     /// An empty one with a budget of bytes.
     pub fn new(budget: usize) -> Self {
-        Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, held: 0 }
+        Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, held: 0, lost: 0 }
     }
 
     fn list(&mut self, step: HistoryStep) -> &mut VecDeque<Arc<Step>> {
@@ -180,18 +204,28 @@ impl Timeline {
         waste
     }
 
-    /// An edit was committed: that can be undone now, and nothing can be redone.
-    pub fn record(&mut self, replaced: Step) -> Waste {
-        let mut waste = Waste { steps: self.redo.drain(..).collect(), copy: None };
-        self.held -= waste.steps.iter().map(|step| step.bytes()).sum::<usize>();
-        self.keep(HistoryStep::Undo, replaced);
-        self.trim(&mut waste);
-        waste
+    /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can be
+    /// redone.
+    pub fn record(&mut self, replaced: Step, waste: &mut Waste) {
+        let first = waste.steps.len();
+        waste.steps.extend(self.redo.drain(..));
+        self.held -= waste.steps[first..].iter().map(|step| step.bytes()).sum::<usize>();
+        let latest = self.undo.back_mut().filter(|latest| latest.group == replaced.group);
+        // A transaction that goes back holds a step that no edit can join any more.
+        if let Some(latest) = latest.and_then(Arc::get_mut) {
+            self.held -= latest.bytes();
+            latest.go_on(replaced);
+            self.held += latest.bytes();
+        } else if replaced.group > self.lost {
+            self.keep(HistoryStep::Undo, replaced);
+        } else {
+            waste.steps.push(Arc::new(replaced));
+        }
+        self.trim(waste);
     }
 
     /// A step was committed that put `used` in place; what that replaced is the step in the other direction.
-    pub fn passed(&mut self, step: HistoryStep, used: &Arc<Step>, replaced: Step) -> Waste {
-        let mut waste = Waste::default();
+    pub fn passed(&mut self, step: HistoryStep, used: &Arc<Step>, replaced: Step, waste: &mut Waste) {
         // The budget may have let go of it meanwhile.
         if self.next(step).is_some_and(|next| Arc::ptr_eq(next, used)) {
             waste.steps.extend(self.list(step).pop_back());
@@ -202,8 +236,7 @@ impl Timeline {
             HistoryStep::Redo => HistoryStep::Undo,
         };
         self.keep(other, replaced);
-        self.trim(&mut waste);
-        waste
+        self.trim(waste);
     }
 
     fn keep(&mut self, step: HistoryStep, replaced: Step) {
@@ -216,6 +249,7 @@ impl Timeline {
         while self.bytes() > self.budget {
             let Some(gone) = self.undo.pop_front().or_else(|| self.redo.pop_front()) else { break };
             self.held -= gone.bytes();
+            self.lost = self.lost.max(gone.group);
             waste.steps.push(gone);
             // A list without steps needs no room, nor does one that had many.
             for list in [&mut self.undo, &mut self.redo] {

@@ -18,11 +18,14 @@ mod change;
 mod commit;
 mod dirty;
 mod drafting;
+mod faults;
 mod field_log;
+mod groups;
 mod history;
 mod inspect;
 mod loose;
 mod query;
+mod queue;
 mod ray;
 mod receipt;
 #[cfg(any(feature = "plugin", test))]
@@ -30,10 +33,13 @@ mod recipe;
 mod redraw;
 mod settings;
 mod steps;
+mod submit;
 mod surface;
 mod tiles;
 mod transaction;
 mod triangles;
+#[cfg(feature = "plugin")]
+mod unseen;
 mod world;
 
 pub use commit::{Commit, Stages};
@@ -41,16 +47,19 @@ pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use query::{RayHit, Span};
-pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
-#[cfg(feature = "avian")]
-pub(crate) use recipe::SurfaceRecipe;
 #[cfg(feature = "plugin")]
-pub(crate) use recipe::{SurfaceDraft, TileDraft};
+pub(crate) use queue::Together;
+pub use queue::WorkLimits;
+pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
+#[cfg(feature = "plugin")]
+pub(crate) use recipe::{SurfaceDraft, SurfaceRecipe, TileDraft};
 pub use redraw::MeshUpdates;
 pub use settings::{TerrainError, TerrainSettings};
 pub use surface::ChunkSurface;
 pub use tiles::TileUpdate;
 pub use transaction::Transaction;
+#[cfg(feature = "plugin")]
+pub(crate) use unseen::Unseen;
 pub use world::{Drawn, Memory, Version, World};
 
 use std::collections::VecDeque;
@@ -59,11 +68,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::backend::Engine;
-use crate::brush::{Brush, BrushError, Edit};
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
 use crate::volume::DiggingRules;
 use history::{Step, Timeline, Waste};
+use queue::{Queue, Request, Submission, Taken};
 
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -72,23 +81,13 @@ use history::{Step, Timeline, Waste};
 )]
 pub struct StaleCommit;
 
-/// A number that no other transaction or world of this process has.
-fn unique() -> u64 {
+/// Receipts of a commit, and what history lets go of.
+pub(crate) type Settled = (Vec<Receipt>, Waste);
+
+/// A number that no other transaction, batch or world of this process has.
+pub(crate) fn unique() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
-}
-
-/// A brush on its way into the world.
-#[derive(Clone, Debug)]
-pub(crate) struct Submission {
-    tag: u64,
-    edit: Result<Edit, BrushError>,
-}
-
-/// What waits for its transaction.
-enum Request {
-    Edit(Submission),
-    Step(HistoryStep),
 }
 
 /// What one transaction does.
@@ -102,7 +101,7 @@ enum Work {
 /// A world, the edits that wait for it, and the one transaction that may be under way.
 ///
 /// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
-/// to it. Committing by oneself, with [`apply`](Self::apply) say, works too, but then all of its meshes are made again.
+/// to it. Committing by oneself, with [`apply`](Self::apply) say, works too: what that changed is shown some frames later.
 ///
 /// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
 /// any other; a parent may scale it further.
@@ -113,13 +112,16 @@ pub struct Terrain {
     world: Arc<World>,
     engine: Option<Engine>,
     voxel_size: f32,
-    queue: VecDeque<Request>,
+    queue: Queue,
     in_flight: Option<InFlight>,
-    answered: Vec<Receipt>,
+    answered: VecDeque<Receipt>,
     rules: Option<Arc<DiggingRules>>,
     loose: Option<LooseSettings>,
     timeline: Timeline,
-    moves: Vec<HistoryReceipt>,
+    moves: VecDeque<HistoryReceipt>,
+    /// What the game committed itself since the plugin last showed the world; `None` while it shows none.
+    #[cfg(feature = "plugin")]
+    unseen: Option<Unseen>,
 }
 
 impl fmt::Debug for Terrain {
@@ -137,6 +139,8 @@ impl fmt::Debug for Terrain {
 struct InFlight {
     ticket: u64,
     work: Work,
+    /// How much that is, as the queue counts.
+    estimate: u64,
     /// Has the plugin a task for it?
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
     is_plugins: bool,
@@ -154,13 +158,15 @@ impl Terrain {
             world: Arc::new(world),
             engine: None,
             voxel_size: settings.voxel_size,
-            queue: VecDeque::new(),
+            queue: Queue::default(),
             in_flight: None,
-            answered: Vec::new(),
+            answered: VecDeque::new(),
             rules: None,
             loose: None,
             timeline: Timeline::new(steps::UNDO_BUDGET),
-            moves: Vec::new(),
+            moves: VecDeque::new(),
+            #[cfg(feature = "plugin")]
+            unseen: None,
         })
     }
 
@@ -170,8 +176,8 @@ impl Terrain {
         self.engine = Some(engine);
     }
 
-    /// From now on, edits obey these rules; what is there stays as it is. A transaction under way keeps those it began
-    /// with. A journal is replayed exactly only if rules change at the same edits.
+    /// Edits that are submitted from now on obey these rules; those that wait or are under way keep theirs, and what is there
+    /// stays as it is. A journal is replayed exactly only if rules change at the same edits.
     pub fn set_rules(&mut self, rules: DiggingRules) {
         self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
     }
@@ -202,27 +208,7 @@ impl Terrain {
         Arc::clone(&self.world)
     }
 
-    /// Queues a brush. One that is not valid is queued too: its receipt says why it was rejected.
-    pub fn submit(&mut self, brush: &Brush) {
-        self.queue_edit(brush.tag, Edit::quantize(brush));
-    }
-
-    /// Queues an edit, say from a file or the network. It is checked like a brush.
-    pub fn submit_edit(&mut self, edit: &Edit) {
-        self.queue_edit(edit.tag(), edit.check().map(|()| edit.clone()));
-    }
-
-    /// Queues an edit that was made of a brush, and so is valid.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn submit_quantized(&mut self, edit: Edit) {
-        self.queue_edit(edit.tag(), Ok(edit));
-    }
-
-    fn queue_edit(&mut self, tag: u64, edit: Result<Edit, BrushError>) {
-        self.queue.push_back(Request::Edit(Submission { tag, edit }));
-    }
-
-    /// From the next transaction on, edits look for pieces of ground that they cut off, and receipts list them; `None`
+    /// Edits that are submitted from now on look for pieces of ground that they cut off, and receipts list them; `None`
     /// turns that off, as it is at first. A terrain whose world has to be the same elsewhere needs the same settings there.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;
@@ -243,7 +229,8 @@ impl Terrain {
         self.in_flight.is_some()
     }
 
-    /// Makes one transaction of what is queued: of all brushes up to the first step through history, or of such a step.
+    /// Makes one transaction of what is queued: of the brushes up to the first step through history, as many as the
+    /// [limits](Self::set_work_limits) allow, or of such a step.
     /// `None` when nothing waits, or when one is under way already. Run it anywhere, then hand its commit to
     /// [`commit`](Self::commit).
     ///
@@ -257,39 +244,21 @@ impl Terrain {
         if self.is_busy() {
             return None;
         }
-        let work = loop {
-            match self.queue.front()? {
-                Request::Edit(_) => break Work::Edits(self.take_edits()),
-                &Request::Step(step) => {
-                    self.queue.pop_front();
-                    match self.timeline.next(step) {
-                        Some(target) => break Work::Step(step, Arc::clone(target)),
-                        None => self.moves.push(step.nothing()),
+        let (work, estimate) = loop {
+            match self.queue.take()? {
+                (Taken::Edits(edits), estimate) => break (Work::Edits(edits), estimate),
+                (Taken::Step(step), estimate) => match self.timeline.next(step) {
+                    Some(target) => break (Work::Step(step, Arc::clone(target)), estimate),
+                    None => {
+                        self.queue.finish(estimate);
+                        self.answer_step(step.nothing());
                     }
-                }
+                },
             }
         };
         let ticket = unique();
-        self.in_flight = Some(InFlight { ticket, work: work.clone(), is_plugins });
-        Some(Transaction {
-            ticket,
-            world: self.snapshot(),
-            work,
-            rules: self.rules.clone(),
-            loose: self.loose,
-            engine: self.engine.clone(),
-        })
-    }
-
-    /// The edits in front of the queue.
-    fn take_edits(&mut self) -> Arc<[Submission]> {
-        let is_edit = |request: &Request| matches!(request, Request::Edit(_));
-        let count = self.queue.iter().position(|request| !is_edit(request)).unwrap_or(self.queue.len());
-        let edits = self.queue.drain(..count).filter_map(|request| match request {
-            Request::Edit(submission) => Some(submission),
-            Request::Step(_) => None,
-        });
-        edits.collect()
+        self.in_flight = Some(InFlight { ticket, work: work.clone(), estimate, is_plugins });
+        Some(Transaction { ticket, world: self.snapshot(), work, engine: self.engine.clone() })
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
@@ -297,11 +266,16 @@ impl Terrain {
     /// # Errors
     /// When the commit is not that of the transaction under way; nothing is changed then.
     pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
-        self.settle(commit).map(|(receipts, _)| receipts)
+        #[cfg(feature = "plugin")]
+        let news = self.note(&commit);
+        let (receipts, _) = self.settle(commit)?;
+        #[cfg(feature = "plugin")]
+        self.enter_unseen(news);
+        Ok(receipts)
     }
 
     /// The same; what history lets go of is left to the caller, who may free it elsewhere.
-    pub(crate) fn settle(&mut self, mut commit: Commit) -> Result<(Vec<Receipt>, Waste), StaleCommit> {
+    fn settle(&mut self, mut commit: Commit) -> Result<Settled, StaleCommit> {
         let done = self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket).ok_or(StaleCommit)?;
         let mut copy = commit.copy.take();
         if Arc::get_mut(&mut self.world).is_none()
@@ -310,24 +284,26 @@ impl Terrain {
             self.world = copy;
         }
         let installed = commit.install(Arc::make_mut(&mut self.world));
-        self.moves.extend(installed.moved);
-        let mut waste = match (done.work, installed.replaced) {
-            (Work::Edits(_), Some(replaced)) => self.timeline.record(replaced),
-            (Work::Step(step, used), Some(replaced)) => self.timeline.passed(step, &used, replaced),
-            (_, None) => Waste::default(),
-        };
+        self.queue.finish(done.estimate);
+        installed.moved.into_iter().for_each(|moved| self.answer_step(moved));
+        let mut waste = Waste::default();
         waste.copy = copy;
+        for replaced in installed.replaced {
+            match &done.work {
+                Work::Edits(_) => self.timeline.record(replaced, &mut waste),
+                Work::Step(step, used) => self.timeline.passed(*step, used, replaced, &mut waste),
+            }
+        }
         Ok((installed.receipts, waste))
     }
 
     /// Gives up the transaction that is under way, whose task was lost; what it had to do is queued again, in front.
     pub fn abandon(&mut self) {
         let Some(lost) = self.in_flight.take() else { return };
-        let requests: Vec<Request> = match lost.work {
-            Work::Edits(submissions) => submissions.iter().cloned().map(Request::Edit).collect(),
-            Work::Step(step, _) => vec![Request::Step(step)],
-        };
-        requests.into_iter().rev().for_each(|request| self.queue.push_front(request));
+        match lost.work {
+            Work::Edits(submissions) => self.queue.put_back(submissions.iter().cloned().map(Request::Edit)),
+            Work::Step(step, _) => self.queue.put_back(std::iter::once(Request::Step(step))),
+        }
     }
 
     /// Is a transaction under way that the plugin began?
@@ -343,56 +319,10 @@ impl Terrain {
         self.queue.clear();
     }
 
-    /// Applies brushes at once, after everything that waits: queue, transaction and commit in one call, on this thread.
-    /// Returns the receipts of these brushes; those of brushes that waited are kept for
-    /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
-    ///
-    /// All of it is one transaction, and so one step back; a game that replays a journal may want to
-    /// [forget](Self::clear_history) it. Where steps through history waited, brushes before and after each are one.
-    ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
-    pub fn apply<'a, B: std::borrow::Borrow<Brush> + 'a>(
-        &mut self,
-        brushes: impl IntoIterator<Item = B>,
-    ) -> Vec<Receipt> {
-        self.abandon();
-        let waiting = self.queue.iter().filter(|request| matches!(request, Request::Edit(_))).count();
-        for brush in brushes {
-            self.submit(brush.borrow());
-        }
-        let mut receipts = self.finish();
-        let own = receipts.split_off(waiting.min(receipts.len()));
-        self.answered.append(&mut receipts);
-        own
-    }
-
-    /// Runs and commits everything that waits.
-    fn finish(&mut self) -> Vec<Receipt> {
-        let mut receipts = Vec::new();
-        while let Some(transaction) = self.begin() {
-            receipts.append(&mut self.commit(transaction.run()).unwrap_or_default());
-        }
-        receipts
-    }
-
-    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, in order; each is handed out once.
-    pub fn take_answered(&mut self) -> Vec<Receipt> {
-        std::mem::take(&mut self.answered)
-    }
-
-    /// Is there any receipt to [take](Self::take_answered)?
-    pub fn has_answered(&self) -> bool {
-        !self.answered.is_empty()
-    }
-
     /// Tags of all brushes without a receipt, in order.
     #[cfg(feature = "plugin")]
     pub(crate) fn unanswered(&self) -> impl Iterator<Item = u64> {
-        let queued = self.queue.iter().filter_map(|request| match request {
-            Request::Edit(submission) => Some(submission),
-            Request::Step(_) => None,
-        });
-        self.submissions_in_flight().chain(queued).map(|submission| submission.tag)
+        self.submissions_in_flight().chain(self.queue.edits()).map(|submission| submission.tag)
     }
 
     #[cfg(feature = "plugin")]
@@ -406,17 +336,14 @@ impl Terrain {
     /// Is nothing on its way to these samples? A step through history that waits may reach all that history does. Pieces
     /// that an edit will cut off nobody knows yet; they may reach further than the edit.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
-        let misses = |submission: &Submission| {
-            submission.edit.as_ref().map_or(true, |edit| edit.reach().intersection(bounds).is_none())
-        };
         let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
-            Work::Edits(submissions) => submissions.iter().all(misses),
+            Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
             Work::Step(_, target) => target.bounds.is_none_or(|own| own.intersection(bounds).is_none()),
         });
         let mut queued = self.queue.iter();
         in_flight
             && queued.all(|request| match request {
-                Request::Edit(submission) => misses(submission),
+                Request::Edit(submission) => submission.misses(bounds),
                 Request::Step(_) => !self.timeline.reaches(bounds),
             })
     }

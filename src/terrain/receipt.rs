@@ -65,6 +65,12 @@ pub enum Rejection {
     /// The brush reaches no column of the world.
     #[error("the brush lies outside the world")]
     OutsideWorld,
+    /// Too much work [waits](super::WorkLimits::waiting) already.
+    #[error("too much work waits already")]
+    Overloaded,
+    /// Applying it panicked. The others of its transaction were applied without it.
+    #[error("applying the brush panicked; this is a bug of the plugin's")]
+    Panicked,
 }
 
 /// How often each of the paper's scenarios took place.

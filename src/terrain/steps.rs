@@ -1,30 +1,41 @@
 //! A terrain's steps through its history.
 
+use super::history::HistoryRejection;
+use super::{History, HistoryReceipt, HistoryStep, Memory, Terrain, Waste};
 #[cfg(feature = "plugin")]
-use super::Work;
-use super::{History, HistoryReceipt, HistoryStep, Memory, Request, Terrain, Waste};
+use super::{Work, queue::Request};
 
 /// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
 pub(super) const UNDO_BUDGET: usize = 64 << 20;
 
 impl Terrain {
-    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last transaction
-    /// that changed the world. Its [`HistoryReceipt`] says what came of it.
+    /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of edits
+    /// that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no room](Self::set_work_limits)
+    /// for it, it is answered at once.
     ///
-    /// What is undone is a transaction: all edits that waited together when it [began](Self::begin), or that one call of
-    /// [`apply`](Self::apply) was given. One that changed nothing is no step.
+    /// A group is decided when edits are submitted, and not by when their transactions begin: brushes of one
+    /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
+    /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
     ///
-    /// Afterwards all is as it was before that transaction, bit by bit: [`World::hash`](super::World::hash), samples, materials, fields with
+    /// Afterwards all is as it was before that group, bit by bit: [`World::hash`](super::World::hash), samples, materials, fields with
     /// their names, boxes and revisions, mask, meshes and rings. Other than before are [`World::revision`](super::World::revision), which counts
     /// this as one more commit, and the names that fields will get from then on: none is ever used for two.
     pub fn submit_undo(&mut self) {
-        self.queue.push_back(Request::Step(HistoryStep::Undo));
+        self.submit_step(HistoryStep::Undo);
     }
 
     /// Queues a step forth: it does again what was undone last. An edit that changes something in between forgets what
     /// there was to redo.
     pub fn submit_redo(&mut self) {
-        self.queue.push_back(Request::Step(HistoryStep::Redo));
+        self.submit_step(HistoryStep::Redo);
+    }
+
+    fn submit_step(&mut self, step: HistoryStep) {
+        if self.queue.has_room(self.world.grid(), None) {
+            self.queue.push_step(step);
+        } else {
+            self.answer_step(HistoryReceipt { step, outcome: Err(HistoryRejection::Overloaded) });
+        }
     }
 
     /// What can be undone and redone, and what it takes.
@@ -75,7 +86,7 @@ impl Terrain {
         Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
     }
 
-    /// Undoes the last transaction at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
+    /// Undoes the last group of edits at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
     pub fn undo(&mut self) -> HistoryReceipt {
         self.step(HistoryStep::Undo)
     }
@@ -87,16 +98,17 @@ impl Terrain {
 
     fn step(&mut self, step: HistoryStep) -> HistoryReceipt {
         self.abandon();
-        self.queue.push_back(Request::Step(step));
-        let mut receipts = self.finish();
-        self.answered.append(&mut receipts);
+        self.queue.push_step(step);
+        let receipts = self.finish();
+        self.answer(receipts);
         // It was the last one.
-        self.moves.pop().unwrap_or_else(|| step.nothing())
+        self.moves.pop_back().unwrap_or_else(|| step.nothing())
     }
 
-    /// What became of steps through history that were submitted, in order; each is handed out once.
+    /// What became of steps through history that were submitted, in order; each is handed out once. Where nobody takes them,
+    /// the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
-        std::mem::take(&mut self.moves)
+        std::mem::take(&mut self.moves).into()
     }
 
     /// Is there any to [take](Self::take_history_receipts)?

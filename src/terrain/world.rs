@@ -19,7 +19,7 @@ use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 const FEW_KINDS: usize = 64;
 
 /// Something that is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Drawn {
     /// A tile of the heightmap.
     Tile(TilePos),

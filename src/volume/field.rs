@@ -96,7 +96,11 @@ impl Fields {
         };
         let id = met.first().map_or_else(fresh, |oldest| oldest.id);
         let revision = met.iter().map(|field| field.revision).max().map_or(0, |newest| newest + 1);
+        self.0.reserve_exact(1);
         self.0.push(Field { id, bounds, revision });
+        if met.len() > 1 {
+            self.0.shrink_to_fit();
+        }
         self.0.sort_by_key(|field| field.id);
         Absorbed { scenario, field: id, gone: met.iter().skip(1).map(|field| field.id).collect() }
     }

@@ -59,6 +59,7 @@ proptest! {
     #[test]
     fn any_operation_in_json_is_an_edit_or_an_error(
         numbers in prop::array::uniform8(integer()), operation in 0..8usize, straight: bool, is_faded: bool, power: u8,
+        stroke in prop::option::of(any::<u64>()),
     ) {
         let [a, b, c, d, e, f, g, h] = numbers;
         let fade = if is_faded { [256, 1024] } else { [g, h] };
@@ -82,8 +83,9 @@ proptest! {
         };
         let own = format!("{{{own}{fade}}}}}");
         let own = if power < 99 { format!(r#"{{"limited":{{"power":{power},"operation":{own}}}}}"#) } else { own };
+        let stroke = stroke.map_or("null".into(), |stroke| stroke.to_string());
         let json = format!(
-            r#"{{"shape":{{"sphere":{{"center":[1792,2304,1536],"radius":900}}}},"operation":{own},"roughness":null,"tag":9}}"#
+            r#"{{"shape":{{"sphere":{{"center":[1792,2304,1536],"radius":900}}}},"operation":{own},"roughness":null,"tag":9,"stroke":{stroke}}}"#
         );
         let json = json.replace(' ', "");
         let Ok(edit) = serde_json::from_str::<Edit>(&json) else { return Ok(()) };

@@ -19,8 +19,7 @@ fn steps_keep_their_place_among_brushes() {
     let mut terrain = level();
     let pristine = terrain.world().hash();
     terrain.submit_undo();
-    terrain.submit(&ball(10.0, 10.0, 10.0, 3.0).with_tag(1));
-    terrain.submit(&ball(12.0, 10.0, 10.0, 3.0).with_tag(2));
+    terrain.submit_all([ball(10.0, 10.0, 10.0, 3.0).with_tag(1), ball(12.0, 10.0, 10.0, 3.0).with_tag(2)]);
     terrain.submit_undo();
     terrain.submit(&ball(40.0, 10.0, 40.0, 3.0).with_tag(3));
     terrain.submit_redo();

@@ -44,7 +44,7 @@ fn walks_through_history_meet_the_states_that_were() {
                     let (count, ground) = (rng.usize(1..4), terrain.snapshot());
                     let brush = |_| any_brush(&mut rng, ground.ground(), chunk_size);
                     let brushes: Vec<Brush> = (0..count).map(brush).collect();
-                    brushes.iter().for_each(|brush| terrain.submit(brush));
+                    terrain.submit_all(&brushes);
                     let undos = terrain.history().undos;
                     let receipts = screen.play(&mut terrain);
                     brushes.iter().zip(&receipts).for_each(|(brush, receipt)| account.enter(brush, receipt));

@@ -46,7 +46,7 @@ use crate::ground::MaterialId;
 /// | `terrace` | `step`, perhaps `height` (of a tread, else 0) |
 ///
 /// All but the first three may have `strength`, `falloff` and `material`, which are those of a [`Blend`](super::Blend);
-/// `roughness`, `power` and `tag` may be left out. Deserialising refuses fields of any other name, and turning the record
+/// `roughness`, `power`, `tag` and `stroke` may be left out. Deserialising refuses fields of any other name, and turning the record
 /// into a [`Brush`](super::Brush) refuses those that its shape and operation do not have. The numbers themselves are
 /// checked by [`Edit::quantize`](super::Edit::quantize).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,6 +77,8 @@ pub struct BrushRecord {
     pub roughness: Option<Roughness>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stroke: Option<u64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub point: Option<[f32; 3]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -42,6 +42,7 @@ impl TryFrom<BrushRecord> for Brush {
         Ok(Self {
             roughness: record.roughness,
             tag: record.tag.unwrap_or(0),
+            stroke: record.stroke,
             blend: record.read_blend(brush.blend),
             power: record.power.unwrap_or(FULL_POWER),
             ..brush

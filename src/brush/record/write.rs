@@ -15,6 +15,7 @@ impl From<&Brush> for BrushRecord {
         }
         record.roughness = brush.roughness;
         record.tag = (brush.tag != 0).then_some(brush.tag);
+        record.stroke = brush.stroke;
         record.power = (brush.power != FULL_POWER).then_some(brush.power);
         record
     }
@@ -36,6 +37,7 @@ impl BrushRecord {
             material: None,
             roughness: None,
             tag: None,
+            stroke: None,
             point: None,
             normal: None,
             height: None,

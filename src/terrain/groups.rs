@@ -1,0 +1,193 @@
+//! The edits of a transaction, group by group: each is one step of undo, and has its own rules and loose settings.
+//!
+//! Only what history and receipts need is made for each group. What is drawn is made once, of all of them.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use web_time::Instant;
+
+use super::by_brick::{ByBrick, PARALLEL_PLACES};
+use super::change::{Change, GroupChange, brick_bytes, replaced_bytes};
+use super::commit::{Commit, Stages};
+use super::dirty::{dirty_cells, joined_mask};
+use super::drafting::{Drafted, Drafting, merge};
+use super::field_log::{FieldLog, FieldNews};
+use super::loose::LoosePiece;
+use super::queue::Submission;
+use super::receipt::{Applied, Receipt, Rejection};
+use super::redraw;
+use super::transaction::Transaction;
+use super::world::World;
+use crate::backend::{Compute, PARALLEL_BLOCKS};
+use crate::lattice::{BrickPos, ChunkPos, side_by_side};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Mask, MaskView};
+use crate::volume::{Brick, Draft, DraftedBrick, EditEffect, Fields, UniformBricks, latest};
+
+/// A group of edits, and what they come to.
+struct Group<'a> {
+    submissions: &'a [Submission],
+    /// Its effects stand apart.
+    draft: Draft,
+    /// Words of the mask that change.
+    mask: Mask,
+}
+
+/// What each edit of a group did, and what was cut off, by the number of the edit.
+type Effects = (Vec<EditEffect>, BTreeMap<usize, Vec<LoosePiece>>);
+
+/// What edits come to, bricks and meshes aside.
+struct Entered {
+    receipts: Vec<Receipt>,
+    news: Vec<(ChunkPos, FieldNews)>,
+    next_field: u64,
+    groups: Vec<EnteredGroup>,
+}
+
+/// The same of one group.
+struct EnteredGroup {
+    /// All fields of each chunk that a field changed in.
+    fields: Vec<(ChunkPos, Fields)>,
+    /// Words of the mask that change.
+    mask: Vec<((i32, i32), u64)>,
+    /// Bytes of bricks that it takes away from the world.
+    replaced_bytes: usize,
+    tags: Vec<u64>,
+}
+
+/// From how many bricks on lists that are only copied are copied side by side.
+const LONG: usize = 1 << 13;
+
+/// What changes hold of bricks. Kept as long as history has it: no larger than it has to be.
+fn changed_bricks(drafted: Vec<DraftedBrick>) -> Vec<(BrickPos, Option<Arc<Brick>>)> {
+    let changed = |drafted: DraftedBrick| (drafted.pos, Some(drafted.brick));
+    if drafted.len() >= LONG {
+        return drafted.into_par_iter().map(changed).collect();
+    }
+    let mut bricks = Vec::with_capacity(drafted.len());
+    bricks.extend(drafted.into_iter().map(changed));
+    bricks
+}
+
+/// The cells that bricks which changed show in.
+fn cells_of(world: &World, bricks: &[DraftedBrick]) -> ByBrick {
+    dirty_cells(world.grid, bricks, |drafted| (drafted.pos, drafted.changed, drafted.is_extended))
+}
+
+/// All bricks that groups changed, as the last of them left them.
+fn merged(groups: &[Group]) -> Vec<DraftedBrick> {
+    let mut bricks = BTreeMap::new();
+    let drafted = groups.iter().flat_map(|group| &group.draft.bricks);
+    drafted.for_each(|drafted| merge(&mut bricks, drafted.clone()));
+    bricks.into_values().collect()
+}
+
+impl Transaction {
+    /// Applies edits, in order.
+    pub(super) fn edit(&self, submissions: &[Submission], backend: &dyn Compute) -> Commit {
+        let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
+        let mut drafting = Drafting::new(world, backend);
+        let (mut groups, mut effects) = (Vec::<Group>::new(), Vec::<Effects>::new());
+        let (mut dirty, mut newer) = (ByBrick::default(), Mask::default());
+        for own in submissions.chunk_by(Submission::goes_with) {
+            if let Some(before) = groups.last() {
+                drafting.lay(&before.draft);
+                newer.lay(&before.mask);
+            }
+            let Drafted { mut draft, pieces } = Stages::time(&mut stages.edit, || drafting.draft(own));
+            let find = || Stages::time(&mut stages.meshing, || cells_of(world, &draft.bricks));
+            let is_large = draft.bricks.len() >= PARALLEL_PLACES;
+            let (cells, latest) = side_by_side(is_large, find, || latest(&draft.bricks));
+            let view = WorldView {
+                samples: drafting.samples().under(&latest),
+                mask: MaskView::new(&world.mask).over(&newer),
+                grid: world.grid,
+            };
+            let mask = Stages::time(&mut stages.ring, || joined_mask(world, &view, &cells));
+            dirty = cells;
+            effects.push((std::mem::take(&mut draft.effects), pieces));
+            groups.push(Group { submissions: own, draft, mask });
+        }
+        let (bricks, mask) = match &groups[..] {
+            [only] => (Cow::Borrowed(&only.draft.bricks[..]), &only.mask),
+            several => {
+                several.iter().for_each(|group| newer.lay(&group.mask));
+                let bricks = merged(several);
+                dirty = Stages::time(&mut stages.meshing, || cells_of(world, &bricks));
+                (Cow::Owned(bricks), &newer)
+            }
+        };
+        let latest = latest(&bricks);
+        let view = WorldView {
+            samples: world.samples().under(&latest),
+            mask: MaskView::new(&world.mask).over(mask),
+            grid: world.grid,
+        };
+        let meshes = || redraw::updates(world, &view, backend, &dirty, mask, &mut stages);
+        let (meshes, entered) =
+            side_by_side(dirty.len() >= PARALLEL_BLOCKS, meshes, || enter(world, &groups, effects));
+
+        let sample_hash = groups.last().map_or(world.sample_hash, |group| group.draft.hash);
+        let mut uniform = UniformBricks::default();
+        let changes = groups.into_iter().zip(entered.groups).map(|(group, own)| {
+            let Draft { bricks, hash, uniform: kinds, .. } = group.draft;
+            uniform.extend(kinds);
+            let EnteredGroup { fields, mask, replaced_bytes, tags } = own;
+            let change = Change { bricks: changed_bricks(bricks), fields, mask, sample_hash: hash };
+            let number = group.submissions[0].terms.group;
+            GroupChange { change, replaced_bytes, group: number, tags }
+        });
+        let commit = self.commit(changes.collect(), sample_hash, meshes);
+        stages.whole = start.elapsed();
+        Commit {
+            uniform,
+            receipts: entered.receipts,
+            news: entered.news,
+            next_field: entered.next_field,
+            stages,
+            ..commit
+        }
+    }
+}
+
+/// Enters what edits did into fields and receipts, and what becomes of the mask.
+fn enter(world: &World, groups: &[Group], effects: Vec<Effects>) -> Entered {
+    let mut log = FieldLog::new(world);
+    let mut receipts = Vec::with_capacity(groups.iter().map(|group| group.submissions.len()).sum());
+    let mut newer: FxHashMap<BrickPos, &Brick> = FxHashMap::default();
+    let entered = groups.iter().zip(effects).enumerate().map(|(number, (group, (effects, mut pieces)))| {
+        let mut effects = effects.into_iter().enumerate();
+        let mut tags = Vec::new();
+        for submission in group.submissions {
+            let outcome = submission.edit.as_ref().map_err(Rejection::clone).and_then(|edit| {
+                let (number, effect) = effects.next().unwrap_or_default();
+                let applied = log.enter(edit, effect)?;
+                if !applied.chunks.is_empty() {
+                    tags.push(submission.tag);
+                }
+                let loose = pieces.remove(&number).unwrap_or_default();
+                Ok(Applied { loose, ..applied })
+            });
+            receipts.push(Receipt { tag: submission.tag, outcome });
+        }
+        let positions = group.draft.bricks.iter().map(|drafted| drafted.pos);
+        let (again, first): (Vec<_>, Vec<_>) = match newer.is_empty() {
+            true => (Vec::new(), positions.collect()),
+            false => positions.partition(|pos| newer.contains_key(pos)),
+        };
+        let again: usize = again.iter().map(|pos| brick_bytes(newer[pos])).sum();
+        let replaced_bytes = replaced_bytes(world, first.into_iter()) + again;
+        if number + 1 < groups.len() {
+            newer.extend(group.draft.bricks.iter().map(|drafted| (drafted.pos, &*drafted.brick)));
+        }
+        tags.shrink_to_fit();
+        let mask = group.mask.words().collect();
+        EnteredGroup { fields: log.take_changed(), mask, replaced_bytes, tags }
+    });
+    let groups = entered.collect();
+    Entered { groups, receipts, news: log.news(), next_field: log.next }
+}

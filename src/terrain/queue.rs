@@ -1,0 +1,233 @@
+//! What waits for its transaction: edits, with all that was settled when they were submitted, and steps through history.
+//!
+//! Rules, loose settings and the group of an edit are fixed when it is submitted, so that nothing of the result depends on
+//! when a transaction begins.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::history::HistoryStep;
+use super::loose::LooseSettings;
+use super::receipt::Rejection;
+use crate::brush::{Edit, Kind};
+use crate::lattice::{ChunkGrid, LatticeBox};
+use crate::volume::{DiggingRules, reach};
+
+/// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
+///
+/// A brick takes the processor a third of a microsecond where many edits meet, and some two where an edit of a few voxels
+/// comes alone.
+///
+/// [`Terrain::set_work_limits`]: super::Terrain::set_work_limits
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WorkLimits {
+    /// A transaction takes edits up to so much work, and at least one edit. More of them follow in the next one: smaller
+    /// transactions show sooner, larger ones take less time for each edit.
+    pub transaction: u64,
+    /// So much work may wait, the transaction under way included. An edit that would go beyond is
+    /// [rejected](Rejection::Overloaded) when it is submitted, unless nothing else waits.
+    pub waiting: u64,
+}
+
+impl Default for WorkLimits {
+    /// About a tenth of a second for a transaction and two seconds for what waits, on two cores.
+    fn default() -> Self {
+        Self { transaction: 300_000, waiting: 6_000_000 }
+    }
+}
+
+/// What an edit takes besides the bricks that it reaches, in bricks.
+const EDIT: u64 = 20;
+/// What a step through history is taken for, in bricks: how much it is, its turn will show.
+const STEP: u64 = 200;
+/// How many times as long an operation takes for each brick that looks around each sample.
+const LOOKS_AROUND: u64 = 4;
+
+/// The work of an edit, in bricks.
+fn work_of(grid: ChunkGrid, edit: &Edit) -> u64 {
+    let bricks_of = |reach: LatticeBox| LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }.volume();
+    let weight = if edit.kind() == Kind::Sculpt { LOOKS_AROUND } else { 1 };
+    EDIT + weight * reach(grid, edit).map_or(0, bricks_of)
+}
+
+/// What makes edits that follow each other one step of undo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Together {
+    /// They are of one stroke of the game's.
+    Stroke(u64),
+    /// They were submitted together, in the batch of this number.
+    Batch(u64),
+}
+
+/// What holds for an edit from when it was submitted.
+#[derive(Clone, Debug)]
+pub(super) struct Terms {
+    /// Edits of one number are one step of undo; later ones have greater numbers.
+    pub group: u64,
+    /// `None`: it may do everything.
+    pub rules: Option<Arc<DiggingRules>>,
+    /// Without them, nobody looks for loose pieces.
+    pub loose: Option<LooseSettings>,
+}
+
+impl Terms {
+    fn are(&self, other: &Self) -> bool {
+        let same_rules = match (&self.rules, &other.rules) {
+            (None, None) => true,
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        };
+        same_rules && self.group == other.group && self.loose == other.loose
+    }
+}
+
+/// An edit on its way into the world.
+#[derive(Clone, Debug)]
+pub(crate) struct Submission {
+    pub tag: u64,
+    pub edit: Result<Edit, Rejection>,
+    pub(super) terms: Terms,
+    work: u64,
+}
+
+impl Submission {
+    /// Is it of the same step, under the same rules and loose settings?
+    pub(super) fn goes_with(&self, other: &Self) -> bool {
+        self.terms.are(&other.terms)
+    }
+
+    /// May it change none of these samples?
+    pub(super) fn misses(&self, samples: LatticeBox) -> bool {
+        self.edit.as_ref().map_or(true, |edit| edit.reach().intersection(samples).is_none())
+    }
+}
+
+/// What waits for its transaction.
+pub(super) enum Request {
+    Edit(Submission),
+    Step(HistoryStep),
+}
+
+impl Request {
+    fn work(&self) -> u64 {
+        match self {
+            Self::Edit(submission) => submission.work,
+            Self::Step(_) => STEP,
+        }
+    }
+}
+
+/// Requests in order, and how much work they are together with the transaction under way.
+#[derive(Default)]
+pub(super) struct Queue {
+    requests: VecDeque<Request>,
+    pub limits: WorkLimits,
+    work: u64,
+    /// The group of the latest edit, as long as another one may join it.
+    open: Option<(Together, u64)>,
+    groups: u64,
+}
+
+impl Queue {
+    /// Queues an edit that is valid or not.
+    pub fn push_edit(
+        &mut self,
+        grid: ChunkGrid,
+        tag: u64,
+        edit: Result<Edit, Rejection>,
+        together: Together,
+        (rules, loose): (Option<Arc<DiggingRules>>, Option<LooseSettings>),
+    ) {
+        let group = match self.open {
+            Some((open, group)) if open == together => group,
+            _ => {
+                self.groups += 1;
+                self.groups
+            }
+        };
+        self.open = Some((together, group));
+        let work = edit.as_ref().map_or(EDIT, |edit| work_of(grid, edit));
+        self.work += work;
+        let terms = Terms { group, rules, loose };
+        self.requests.push_back(Request::Edit(Submission { tag, edit, terms, work }));
+    }
+
+    /// Queues a step. Edits after it are none of the groups before it.
+    pub fn push_step(&mut self, step: HistoryStep) {
+        self.open = None;
+        self.work += STEP;
+        self.requests.push_back(Request::Step(step));
+    }
+
+    /// Is there room for the work of an edit, or of a step?
+    pub fn has_room(&self, grid: ChunkGrid, edit: Option<&Edit>) -> bool {
+        let more = edit.map_or(STEP, |edit| work_of(grid, edit));
+        self.work == 0 || self.work.saturating_add(more) <= self.limits.waiting
+    }
+
+    /// The work of all that waits, the transaction under way included.
+    pub fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// What has been taken is done.
+    pub fn finish(&mut self, work: u64) {
+        self.work = self.work.saturating_sub(work);
+    }
+
+    /// Takes the next step, or edits up to the first step and to the limit of a transaction; and their work.
+    pub fn take(&mut self) -> Option<(Taken, u64)> {
+        if let &Request::Step(step) = self.requests.front()? {
+            self.requests.pop_front();
+            return Some((Taken::Step(step), STEP));
+        }
+        let mut work = 0;
+        let is_taken = |request: &&Request| {
+            let fits = work == 0 || work + request.work() <= self.limits.transaction;
+            work += if fits { request.work() } else { 0 };
+            fits && matches!(request, Request::Edit(_))
+        };
+        let count = self.requests.iter().take_while(is_taken).count();
+        let edits = self.requests.drain(..count).filter_map(|request| match request {
+            Request::Edit(submission) => Some(submission),
+            Request::Step(_) => None,
+        });
+        let edits: Arc<[Submission]> = edits.collect();
+        let work = edits.iter().map(|submission| submission.work).sum();
+        Some((Taken::Edits(edits), work))
+    }
+
+    /// Puts back in front what was taken and not done.
+    pub fn put_back(&mut self, requests: impl DoubleEndedIterator<Item = Request>) {
+        requests.rev().for_each(|request| self.requests.push_front(request));
+    }
+
+    /// Forgets all of it.
+    #[cfg(feature = "plugin")]
+    pub fn clear(&mut self) {
+        *self = Self { limits: self.limits, groups: self.groups, ..Self::default() };
+    }
+
+    pub fn len(&self) -> usize {
+        self.requests.len()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &Request> {
+        self.requests.iter()
+    }
+
+    /// The edits among them.
+    pub fn edits(&self) -> impl Iterator<Item = &Submission> {
+        self.requests.iter().filter_map(|request| match request {
+            Request::Edit(submission) => Some(submission),
+            Request::Step(_) => None,
+        })
+    }
+}
+
+/// What a transaction is made of.
+pub(super) enum Taken {
+    Edits(Arc<[Submission]>),
+    Step(HistoryStep),
+}

@@ -1,0 +1,163 @@
+//! What a game asks a terrain for: edits and steps, one after the other, and what became of them.
+
+use std::borrow::Borrow;
+use std::collections::VecDeque;
+
+use super::history::HistoryReceipt;
+use super::queue::{Together, WorkLimits};
+use super::receipt::{Receipt, Rejection};
+use super::{Terrain, unique};
+use crate::brush::{Brush, Edit};
+
+/// Answers that nobody takes are kept up to so many; then the oldest go.
+const KEPT_ANSWERS: usize = 1 << 16;
+
+/// Keeps one more answer.
+fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
+    if answers.len() == KEPT_ANSWERS {
+        answers.pop_front();
+    }
+    answers.push_back(answer);
+}
+
+impl Terrain {
+    /// Queues a brush, as a step of undo by itself unless it is part of a [stroke](Brush::stroke). One that is not valid is
+    /// queued too: its receipt says why it was rejected. One that the [limits](Self::set_work_limits) have no room for is
+    /// answered [at once](Self::take_answered).
+    pub fn submit(&mut self, brush: &Brush) {
+        self.submit_all([brush]);
+    }
+
+    /// Queues brushes that are one step of undo together, but for those that are part of strokes.
+    ///
+    /// ```
+    /// # use bevy_burrow::prelude::*;
+    /// # use glam::Vec3;
+    /// # let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
+    /// # let dig = |x| Brush::dig(Shape::sphere(Vec3::new(x, 10.0, 32.0), 4.0));
+    /// terrain.submit_all([dig(20.0), dig(30.0)]);
+    /// terrain.submit(&dig(40.0));
+    /// // Two strokes of a pen that come bit by bit.
+    /// for (x, stroke) in [(24.0, 1), (26.0, 1), (28.0, 2)] {
+    ///     terrain.submit(&dig(x).with_stroke(stroke));
+    /// }
+    /// # while let Some(transaction) = terrain.begin() {
+    /// #     terrain.commit(transaction.run())?;
+    /// # }
+    /// # assert_eq!(terrain.history().undos, 4);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn submit_all<B: Borrow<Brush>>(&mut self, brushes: impl IntoIterator<Item = B>) {
+        let together = Together::Batch(unique());
+        for brush in brushes {
+            let brush = brush.borrow();
+            self.queue_or_answer(brush.tag, Edit::quantize(brush).map_err(Into::into), brush.stroke, together);
+        }
+    }
+
+    /// Queues an edit, say from a file or the network. It is checked like a brush.
+    pub fn submit_edit(&mut self, edit: &Edit) {
+        let together = Together::Batch(unique());
+        let checked = edit.check().map(|()| edit.clone()).map_err(Into::into);
+        self.queue_or_answer(edit.tag(), checked, edit.stroke(), together);
+    }
+
+    fn queue_or_answer(
+        &mut self,
+        tag: u64,
+        edit: Result<Edit, Rejection>,
+        stroke: Option<u64>,
+        together: Together,
+    ) {
+        match self.admit(edit.as_ref().ok()) {
+            Ok(()) => self.queue_edit(tag, edit, stroke, together),
+            Err(rejection) => keep(&mut self.answered, Receipt { tag, outcome: Err(rejection) }),
+        }
+    }
+
+    /// Is there room for an edit? One that is not valid needs none.
+    pub(crate) fn admit(&self, edit: Option<&Edit>) -> Result<(), Rejection> {
+        let has_room = edit.is_none_or(|edit| self.queue.has_room(self.world.grid(), Some(edit)));
+        if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
+    }
+
+    /// Queues an edit for which there is room, or which may wait all the same.
+    pub(crate) fn queue_edit(
+        &mut self,
+        tag: u64,
+        edit: Result<Edit, Rejection>,
+        stroke: Option<u64>,
+        together: Together,
+    ) {
+        let together = stroke.map_or(together, Together::Stroke);
+        let terms = (self.rules.clone(), self.loose);
+        self.queue.push_edit(self.world.grid(), tag, edit, together, terms);
+    }
+
+    /// How much work a transaction takes, and how much may wait. Takes effect at once; what waits already stays.
+    pub fn set_work_limits(&mut self, limits: WorkLimits) {
+        self.queue.limits = limits;
+    }
+
+    /// How much work a transaction takes, and how much may wait.
+    pub fn work_limits(&self) -> WorkLimits {
+        self.queue.limits
+    }
+
+    /// The work of all that waits, the transaction under way included, in bricks as [`WorkLimits`] counts them.
+    pub fn waiting_work(&self) -> u64 {
+        self.queue.work()
+    }
+
+    /// Applies brushes at once, after everything that waits: queue, transactions and commits in one call, on this thread.
+    /// Returns the receipts of these brushes; those of brushes that waited are kept for
+    /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
+    ///
+    /// All of it is one step back, strokes aside; a game that replays a journal may want to
+    /// [forget](Self::clear_history) it. However many they are, none is rejected as too much.
+    ///
+    /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
+    pub fn apply<B: Borrow<Brush>>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
+        self.abandon();
+        let waiting = self.queue.edits().count();
+        let together = Together::Batch(unique());
+        for brush in brushes {
+            let brush = brush.borrow();
+            self.queue_edit(brush.tag, Edit::quantize(brush).map_err(Into::into), brush.stroke, together);
+        }
+        let mut receipts = self.finish();
+        let own = receipts.split_off(waiting.min(receipts.len()));
+        self.answer(receipts);
+        own
+    }
+
+    /// Runs and commits everything that waits.
+    pub(super) fn finish(&mut self) -> Vec<Receipt> {
+        let mut receipts = Vec::new();
+        while let Some(transaction) = self.begin() {
+            receipts.append(&mut self.commit(transaction.run()).unwrap_or_default());
+        }
+        receipts
+    }
+
+    /// Keeps what became of brushes for whoever asks.
+    pub(super) fn answer(&mut self, receipts: impl IntoIterator<Item = Receipt>) {
+        receipts.into_iter().for_each(|receipt| keep(&mut self.answered, receipt));
+    }
+
+    /// Keeps what became of a step for whoever asks.
+    pub(super) fn answer_step(&mut self, receipt: HistoryReceipt) {
+        keep(&mut self.moves, receipt);
+    }
+
+    /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for, in
+    /// order; each is handed out once. Where nobody takes them, the latest 65,536 are kept.
+    pub fn take_answered(&mut self) -> Vec<Receipt> {
+        std::mem::take(&mut self.answered).into()
+    }
+
+    /// Is there any receipt to [take](Self::take_answered)?
+    pub fn has_answered(&self) -> bool {
+        !self.answered.is_empty()
+    }
+}
