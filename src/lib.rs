@@ -112,12 +112,13 @@
 //! # #[cfg(feature = "plugin")] {
 //! # use bevy::prelude::*;
 //! # use bevy_burrow::prelude::*;
-//! fn toughen(mut terrains: Query<&mut Terrain, Added<Terrain>>) {
+//! fn toughen(mut terrains: Query<&mut Terrain, Added<Terrain>>) -> Result {
 //!     let (granite, adamant) = (MaterialId(2), MaterialId(9));
 //!     for mut terrain in &mut terrains {
 //!         let rules = DiggingRules::default().with_hardness(granite, 100).with_unbreakable(adamant);
-//!         terrain.set_rules(rules.with_bedrock(-20));
+//!         terrain.set_rules(rules.with_bedrock(-20))?;
 //!     }
+//!     Ok(())
 //! }
 //!
 //! fn drill(at: Vec3, mut brushes: MessageWriter<Brush>) {

@@ -67,7 +67,7 @@ impl HardScript {
     /// In one transaction.
     fn play(&self, chunk_size: u32) -> (Terrain, Vec<Receipt>) {
         let mut terrain = terrain(&self.ground, chunk_size);
-        terrain.set_rules(self.rules.clone());
+        terrain.set_rules(self.rules.clone()).expect("valid rules");
         terrain.set_loose(Some(LooseSettings { largest: 4000, crumbs: 9, debris: 4000 }));
         let receipts = terrain.apply(&self.brushes);
         (terrain, receipts)
@@ -514,7 +514,7 @@ fn worlds_meshes_and_loose_pieces_have_the_same_bits_on_every_machine() {
         .with_bedrock(4)
         .with_protected(protected.expect("not empty"));
     let mut ruled = terrain(&ground, 25);
-    ruled.set_rules(rules);
+    ruled.set_rules(rules).expect("valid rules");
     let script = golden_script(&ground).into_iter().chain(sculpting_script(&ground)).enumerate();
     let receipts = ruled.apply(script.map(|(i, brush)| brush.with_power([255, 180, 130, 60][i % 4])));
     assert!(refused_and_loose(&receipts).0 > 5, "little is refused");

@@ -401,7 +401,7 @@ fn what_falls_does_not_depend_on_how_edits_are_batched() {
                 if index % 2 == 1 { random_rules(&mut rng, &ground) } else { DiggingRules::default() };
             let mut terrain = terrain(ground, [8, 16, 61][batch % 3]);
             terrain.set_loose(Some(settings));
-            terrain.set_rules(rules);
+            terrain.set_rules(rules).expect("valid rules");
             let receipts: Vec<Receipt> =
                 brushes.chunks(batch).flat_map(|batch| terrain.apply(batch)).collect();
             let loose: Vec<Vec<LoosePiece>> = receipts
@@ -428,7 +428,7 @@ fn adds_that_run_after_each_other_keep_what_was_dug_before_them() {
     ];
     let hash = |batch: usize| {
         let mut terrain = terrain(Ground::flat(64, 64, 10.0).expect("valid"), 32);
-        terrain.set_rules(DiggingRules::default().with_unbreakable(MaterialId(9)));
+        terrain.set_rules(DiggingRules::default().with_unbreakable(MaterialId(9))).expect("valid rules");
         terrain.set_loose(Some(LooseSettings::default()));
         brushes.chunks(batch).for_each(|batch| drop(terrain.apply(batch)));
         assert!(!terrain.world().samples().is_solid(IVec3::new(18, 9, 20)), "in batches of {batch}");

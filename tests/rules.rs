@@ -34,7 +34,7 @@ fn script(seed: u64) -> (Arc<Ground>, u32, DiggingRules, Vec<Brush>) {
 fn terrain(ground: &Arc<Ground>, chunk_size: u32, rules: &DiggingRules) -> Terrain {
     let settings = TerrainSettings { chunk_size, ..Default::default() };
     let mut terrain = Terrain::new(Arc::clone(ground), &settings).expect("valid settings");
-    terrain.set_rules(rules.clone());
+    terrain.set_rules(rules.clone()).expect("valid rules");
     terrain
 }
 
@@ -188,7 +188,7 @@ fn what_falls_takes_nothing_along_that_is_protected() {
     let fall = |rules: DiggingRules, own: LatticeBox| {
         let mut terrain = terrain(&ground, 16, &DiggingRules::default());
         terrain.apply([&pillar, &slab]);
-        terrain.set_rules(rules);
+        terrain.set_rules(rules).expect("valid rules");
         terrain.set_loose(Some(LooseSettings { crumbs: 10_000, ..Default::default() }));
         let before = terrain.snapshot();
         let dig = Brush::dig(Shape::sphere(Vec3::new(32.0, 15.0, 32.0), 4.0));
@@ -327,7 +327,7 @@ fn rules_can_be_taken_back() {
     assert!(terrain.rules().is_some());
     terrain.apply([&dig]);
     let held = terrain.snapshot();
-    terrain.set_rules(DiggingRules::default());
+    terrain.set_rules(DiggingRules::default()).expect("valid rules");
     // Whoever reads the world meanwhile makes nobody copy it.
     assert!(terrain.rules().is_none() && std::ptr::eq(terrain.world(), &*held));
     terrain.apply([&dig]);

@@ -125,10 +125,10 @@ fn by_batch() {
 pub fn submit(terrain: &mut Terrain, count: usize, round: usize, is_spread: bool) {
     let places = Places::new(count).offset(round);
     let center = Places::new(1).offset(round).iter().next().unwrap_or_default();
-    for (i, place) in (0..).zip(places.iter()) {
+    terrain.submit_all((0..).zip(places.iter()).map(|(i, place)| {
         let near = Vec3::new((i * 7 % 13) as f32, (i * 5 % 7) as f32, (i * 3 % 11) as f32) * 0.3;
-        terrain.submit(&dig(if is_spread { place } else { center + near }, 4.0));
-    }
+        dig(if is_spread { place } else { center + near }, 4.0)
+    }));
 }
 
 /// How many seconds a transaction takes.

@@ -112,11 +112,11 @@ fn batches(pools: &[(usize, ThreadPool)]) {
 /// Digs in each of 8x8 chunks.
 fn ready(round: usize) -> Terrain {
     let (mut terrain, round) = (landscape(32), round as i32);
-    for i in 0..64 {
+    terrain.submit_all((0..64).map(|i| {
         let (x, z) = (round % 20 * 32 + i % 8 * 32 + 16, round % 17 * 32 + i / 8 * 32 + 16);
         let height = ground().height(Column::new(x, z)) as f32 / 256.0;
-        terrain.submit(&dig(Vec3::new(x as f32, height, z as f32), 7.0));
-    }
+        dig(Vec3::new(x as f32, height, z as f32), 7.0)
+    }));
     terrain
 }
 

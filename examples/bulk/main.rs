@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bevy_burrow::backend::{Backend, Engine, EngineState};
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::Commit;
+use bevy_burrow::terrain::{Commit, WorkLimits};
 use clap::Parser;
 use fastrand::Rng;
 use glam::{Quat, Vec2, Vec3};
@@ -235,7 +235,8 @@ fn main() {
         let mut terrain =
             Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
         terrain.apply((scene.before)(&ground, &mut Rng::with_seed(2)));
-        brushes.iter().for_each(|brush| terrain.submit(brush));
+        terrain.set_work_limits(WorkLimits::UNBOUNDED);
+        terrain.submit_all(&brushes);
         let mut times = [const { Vec::new() }; 3];
         let (mut hashes, mut vertices, mut on_card, mut expected) = (Vec::new(), 0, [0; 3], [0.0; 2]);
         let mut first: Option<Commit> = None;

@@ -1,15 +1,15 @@
 //! What was dug and not yet built: receipts fill it, and what is built is taken from it.
 //!
 //! A brush is answered some frames after it was sent. Until then what it may take is pledged, so that a fast hand
-//! can't spend the same ground twice; the receipt says what it really took. What each transaction did to the stock is
-//! kept, so that undo and redo do just the opposite: the ground's own history knows of pieces that fell and of paint,
-//! but not of what they were worth. They are answered later as well, and until then what they may take is not free.
+//! can't spend the same ground twice; the receipt says what it really took. What each brush did to the stock is kept under
+//! its tag: a step through history names the brushes that it takes back or does again, and the stock follows. What was
+//! dug, spent and then undone is owed.
 //!
 //! A shovel fills as well as it takes, and nobody knows how much of what before it did. What it fills is paid for like
 //! what is built: where there is too little, the rest is owed, and what is dug next pays that off first. So all ground
 //! and all stock together stay what they were, however often something is dug and smoothed over.
 
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 
 use bevy::prelude::*;
 use bevy_burrow::plugin::{HistoryMoved, Redo, Undo};
@@ -26,8 +26,8 @@ use crate::toughness;
 
 /// Tags from here on belong to the hand. Brushes of scripts have others, and cost nothing.
 pub const FIRST: u64 = 1 << 32;
-/// Transactions that can be undone at most; the ground's own history ends long before.
-const PAST: usize = 1 << 16;
+/// Brushes that can be undone at most; the ground's own history ends long before.
+const REMEMBERED: usize = 1 << 16;
 
 /// So many voxels of each material more, or less.
 type Change = [i64; MATERIALS.len()];
@@ -39,29 +39,15 @@ pub struct Inventory {
     stock: Change,
     pledges: Vec<(u64, MaterialId, i64)>,
     next: u64,
-    /// What the transaction that is being entered did, once it has changed some ground.
-    open: Option<Change>,
-    /// What transactions did, those that can be undone and those that can be done again; the nearest stand last.
-    past: VecDeque<Change>,
-    future: Vec<Change>,
-    /// Steps through history that are under way: back, and forth.
-    undos: usize,
-    redos: usize,
+    /// What brushes came to, by tag.
+    worth: BTreeMap<u64, Change>,
 }
 
 impl Default for Inventory {
     /// Nothing but some concrete, which no hill has.
     fn default() -> Self {
-        let mut inventory = Self {
-            stock: default(),
-            pledges: Vec::new(),
-            next: FIRST,
-            open: None,
-            past: VecDeque::new(),
-            future: Vec::new(),
-            undos: 0,
-            redos: 0,
-        };
+        let mut inventory =
+            Self { stock: default(), pledges: Vec::new(), next: FIRST, worth: BTreeMap::new() };
         inventory.gain(CONCRETE, 600);
         inventory
     }
@@ -79,19 +65,10 @@ impl Inventory {
         self.stock.get(usize::from(material.0)).copied().unwrap_or(0)
     }
 
-    /// Voxels of a material that neither brushes nor steps under way may take.
+    /// Voxels of a material that brushes under way do not take.
     pub fn free(&self, material: MaterialId) -> i64 {
         let pledged = self.pledges.iter().filter(|pledge| pledge.1 == material).map(|pledge| pledge.2);
-        self.stock(material) - pledged.sum::<i64>() - self.at_stake(material)
-    }
-
-    /// The most that steps under way take: what was dug and is undone, and what was built and is done again. What they
-    /// give counts once it is there: a step may be refused, and what an undo takes back may be a brush under way.
-    fn at_stake(&self, material: MaterialId) -> i64 {
-        let by = |change: &Change| change.get(usize::from(material.0)).copied().unwrap_or(0);
-        let undone = self.past.iter().rev().take(self.undos).map(|change| by(change).max(0));
-        let redone = self.future.iter().rev().take(self.redos).map(|change| (-by(change)).max(0));
-        undone.chain(redone).sum()
+        self.stock(material) - pledged.sum::<i64>()
     }
 
     /// Keeps some of a material for a brush that is under way.
@@ -111,9 +88,6 @@ impl Inventory {
     pub fn enter(&mut self, receipt: &Receipt, owes: bool) -> Vec<(MaterialId, i64)> {
         self.pledges.retain(|pledge| pledge.0 != receipt.tag);
         let Ok(applied) = &receipt.outcome else { return Vec::new() };
-        if applied.bounds.is_some() {
-            self.open.get_or_insert_default();
-        }
         if receipt.tag < FIRST {
             return Vec::new();
         }
@@ -133,58 +107,26 @@ impl Inventory {
                 *sum = (*sum).max(-(*stock).max(0));
             }
         }
-        let changes = self.change(&sums);
-        if let Some(open) = &mut self.open {
-            for &(MaterialId(material), by) in &changes {
-                open[usize::from(material)] += by;
+        if sums != Change::default() {
+            self.worth.insert(receipt.tag, sums);
+            while self.worth.len() > REMEMBERED {
+                self.worth.pop_first();
             }
         }
-        changes
+        self.change(&sums)
     }
 
-    /// All receipts of a transaction are entered.
-    pub fn close(&mut self) {
-        if let Some(change) = self.open.take() {
-            self.past.push_back(change);
-            self.future.clear();
-            if self.past.len() > PAST {
-                self.past.pop_front();
-            }
+    /// Enters a step through history that took back or did again the brushes of these tags; says what came and went.
+    pub fn step(&mut self, step: HistoryStep, tags: &[u64]) -> Vec<(MaterialId, i64)> {
+        let sign = match step {
+            HistoryStep::Undo => -1,
+            HistoryStep::Redo => 1,
+        };
+        let mut sums = Change::default();
+        for change in tags.iter().filter_map(|tag| self.worth.get(tag)) {
+            sums.iter_mut().zip(change).for_each(|(sum, by)| *sum += sign * by);
         }
-    }
-
-    /// A step through history was sent.
-    pub fn await_step(&mut self, step: HistoryStep) {
-        *self.under_way(step) += 1;
-    }
-
-    /// A step was answered, whatever the answer. In a new game nobody waits for those of the old one.
-    pub fn end_step(&mut self, step: HistoryStep) {
-        let under_way = self.under_way(step);
-        *under_way = under_way.saturating_sub(1);
-    }
-
-    fn under_way(&mut self, step: HistoryStep) -> &mut usize {
-        match step {
-            HistoryStep::Undo => &mut self.undos,
-            HistoryStep::Redo => &mut self.redos,
-        }
-    }
-
-    /// Enters a step through history that was taken; says what came and went.
-    pub fn step(&mut self, step: HistoryStep) -> Vec<(MaterialId, i64)> {
-        match step {
-            HistoryStep::Undo => {
-                let Some(change) = self.past.pop_back() else { return Vec::new() };
-                self.future.push(change);
-                self.change(&change.map(|by| -by))
-            }
-            HistoryStep::Redo => {
-                let Some(change) = self.future.pop() else { return Vec::new() };
-                self.past.push_back(change);
-                self.change(&change)
-            }
-        }
+        self.change(&sums)
     }
 
     /// As it was at first, for a new game; brushes that are under way are still the old ones.
@@ -212,10 +154,9 @@ fn enter_history(
     mut hints: MessageWriter<Hint>,
 ) {
     for HistoryMoved { receipt, .. } in steps.read() {
-        inventory.end_step(receipt.step);
         match &receipt.outcome {
-            Ok(_) => {
-                let entered = inventory.step(receipt.step);
+            Ok(restored) => {
+                let entered = inventory.step(receipt.step, &restored.tags);
                 changes.write_batch(entered.into_iter().map(|(material, by)| StockChanged { material, by }));
             }
             Err(nothing) => {
@@ -235,16 +176,6 @@ fn step_through_history(actions: Res<Actions>, mut undo: MessageWriter<Undo>, mu
     }
 }
 
-/// Whoever sent them, the keys or the panel.
-fn await_steps(
-    mut undos: MessageReader<Undo>,
-    mut redos: MessageReader<Redo>,
-    mut inventory: ResMut<Inventory>,
-) {
-    undos.read().for_each(|_| inventory.await_step(HistoryStep::Undo));
-    redos.read().for_each(|_| inventory.await_step(HistoryStep::Redo));
-}
-
 /// Some of a material came or went.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StockChanged {
@@ -262,8 +193,7 @@ impl Plugin for InventoryPlugin {
             .add_observer(empty)
             .add_systems(
                 Update,
-                // Steps that were collected in this frame may be answered in it.
-                (await_steps, enter_receipts, enter_history)
+                (enter_receipts, enter_history)
                     .chain()
                     .after(BurrowSystems::Commit)
                     .after(toughness::explain),
@@ -272,7 +202,7 @@ impl Plugin for InventoryPlugin {
     }
 }
 
-/// Receipts of a transaction come all in one frame.
+/// Each brush is answered once, in the frame in which it shows.
 fn enter_receipts(
     mut receipts: MessageReader<BrushApplied>,
     settings: Res<Settings>,
@@ -292,8 +222,6 @@ fn enter_receipts(
         }
         changes.write_batch(entered.into_iter().map(|(material, by)| StockChanged { material, by }));
     }
-    // A frame shows one transaction at most.
-    inventory.close();
 }
 
 #[cfg(test)]

@@ -76,6 +76,13 @@ fn paint_is_used_up() {
     assert!(inventory.stock(GOLD) > left && inventory.stock(GOLD) <= 200, "{}", inventory.stock(GOLD));
 }
 
+/// Enters a step as the game does.
+fn enter_step(inventory: &mut Inventory, receipt: &HistoryReceipt) {
+    if let Ok(restored) = &receipt.outcome {
+        inventory.step(receipt.step, &restored.tags);
+    }
+}
+
 #[test]
 fn undo_takes_what_the_dig_gave_and_not_more() {
     let (mut terrain, mut inventory) = (terrain(), Inventory::default());
@@ -94,7 +101,6 @@ fn undo_takes_what_the_dig_gave_and_not_more() {
     for (number, brush) in brushes.into_iter().enumerate() {
         let receipts = terrain.apply(&[brush.with_tag(inventory.tag())]);
         receipts.iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
-        inventory.close();
         stocks.push(inventory.stock);
         if number == 1 {
             let applied = receipts[0].outcome.as_ref().expect("a valid brush");
@@ -106,34 +112,46 @@ fn undo_takes_what_the_dig_gave_and_not_more() {
     for stock in stocks[..all - 1].iter().rev() {
         let receipt = terrain.undo();
         assert!(receipt.outcome.is_ok());
-        inventory.step(receipt.step);
+        enter_step(&mut inventory, &receipt);
         assert_eq!(inventory.stock, *stock);
     }
-    assert!(terrain.undo().outcome.is_err(), "the game and the ground count the same steps");
+    assert!(terrain.undo().outcome.is_err(), "each brush was a step");
     for stock in &stocks[1..] {
-        inventory.step(terrain.redo().step);
+        enter_step(&mut inventory, &terrain.redo());
         assert_eq!(inventory.stock, *stock);
     }
 }
 
 #[test]
-fn brushes_that_change_nothing_are_no_step_and_a_new_one_ends_redo() {
+fn a_stroke_is_undone_whole_and_of_the_hand_alone() {
     let (mut terrain, mut inventory) = (terrain(), Inventory::default());
-    let mut dig = |y: f32, inventory: &mut Inventory| {
-        let brush = Brush::dig(Shape::sphere(Vec3::new(30.0, y, 30.0), 2.0)).with_tag(inventory.tag());
-        terrain.apply(&[brush]).iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
-        inventory.close();
-    };
-    dig(24.0, &mut inventory);
+    let before = inventory.stock;
+    let dig = |x: f32, tag: u64| Brush::dig(Shape::sphere(Vec3::new(x, 24.0, 30.0), 3.0)).with_tag(tag);
+    // One that changes nothing, two of the hand's, and one of a script's.
+    let tags = [inventory.tag(), inventory.tag(), inventory.tag()];
+    let brushes = [dig(90.0, tags[0]), dig(20.0, tags[1]), dig(40.0, tags[2]), dig(55.0, 9)];
+    for brush in brushes {
+        let receipts = terrain.apply([brush.with_stroke(1)]);
+        receipts.iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
+    }
     let dug = inventory.stock;
-    dig(60.0, &mut inventory);
-    inventory.step(HistoryStep::Undo);
-    assert_eq!(inventory.stock, Inventory::default().stock);
-    inventory.step(HistoryStep::Redo);
+    assert_ne!(dug, before);
+    enter_step(&mut inventory, &terrain.undo());
+    assert_eq!((inventory.stock, terrain.history().undos), (before, 0));
+    enter_step(&mut inventory, &terrain.redo());
     assert_eq!(inventory.stock, dug);
-    inventory.step(HistoryStep::Undo);
-    dig(20.0, &mut inventory);
-    assert_eq!(inventory.step(HistoryStep::Redo), []);
+}
+
+#[test]
+fn what_was_dug_and_spent_is_owed_once_the_dig_is_undone() {
+    let (mut terrain, mut inventory) = (terrain(), Inventory::default());
+    let brush = Brush::dig(Shape::sphere(Vec3::new(30.0, 24.0, 30.0), 3.0)).with_tag(inventory.tag());
+    terrain.apply([brush]).iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
+    let dug = inventory.stock(ROCK);
+    assert!(dug > 0);
+    inventory.gain(ROCK, -dug);
+    enter_step(&mut inventory, &terrain.undo());
+    assert_eq!(inventory.stock(ROCK), -dug);
 }
 
 #[test]
@@ -142,13 +160,12 @@ fn what_was_dug_and_smoothed_over_again_and_again_makes_no_ground() {
     let ball = |y: f32, radius: f32| Shape::sphere(Vec3::new(30.0, y, 30.0), radius);
     // The walls of a pit are hollow everywhere: smoothed, they only grow.
     let (pit, floor) = (ball(24.0, 4.0), ball(20.0, 4.0));
-    let mut apply = |brush: Brush, inventory: &mut Inventory| {
+    let apply = |brush: Brush, terrain: &mut Terrain, inventory: &mut Inventory| {
         let receipts = terrain.apply(&[brush.with_tag(inventory.tag())]);
         receipts.iter().for_each(|receipt| drop(inventory.enter(receipt, true)));
-        inventory.close();
         receipts[0].outcome.clone().expect("a valid brush")
     };
-    apply(Brush::dig(pit), &mut inventory);
+    apply(Brush::dig(pit), &mut terrain, &mut inventory);
     // All of it is built elsewhere.
     inventory.stock = Change::default();
     let (mut change, mut owed) = (Change::default(), 0);
@@ -156,19 +173,19 @@ fn what_was_dug_and_smoothed_over_again_and_again_makes_no_ground() {
     for _ in 0..5 {
         let smooth = || Brush::smooth(floor, 1.0).with_falloff(0.0);
         for brush in [smooth(), smooth(), smooth(), smooth(), Brush::dig(pit)] {
-            let steps = inventory.past.len();
-            let applied = apply(brush, &mut inventory);
+            let steps = terrain.history().undos;
+            let applied = apply(brush, &mut terrain, &mut inventory);
             sums(&applied, &mut change);
             assert_eq!(inventory.stock, change);
             owed = inventory.stock.iter().copied().fold(owed, i64::min);
-            if inventory.past.len() > steps {
+            if terrain.history().undos > steps {
                 stocks.push(inventory.stock);
             }
         }
     }
     assert!(owed < 0, "nothing was filled");
     for stock in stocks.iter().rev().skip(1) {
-        inventory.step(terrain.undo().step);
+        enter_step(&mut inventory, &terrain.undo());
         assert_eq!(inventory.stock, *stock);
     }
 }
@@ -176,22 +193,21 @@ fn what_was_dug_and_smoothed_over_again_and_again_makes_no_ground() {
 #[test]
 fn what_is_owed_is_paid_off_first_and_where_building_is_free_nothing_is() {
     let (mut terrain, mut inventory) = (terrain(), Inventory::default());
-    let mut build = |x: f32, inventory: &mut Inventory, owes: bool| {
+    let build = |x: f32, terrain: &mut Terrain, inventory: &mut Inventory, owes: bool| {
         let brush = Brush::add(Shape::sphere(Vec3::new(x, 45.0, 30.0), 3.0), CLAY).with_tag(inventory.tag());
         terrain.apply(&[brush]).iter().for_each(|receipt| drop(inventory.enter(receipt, owes)));
-        inventory.close();
     };
     inventory.gain(CLAY, 10);
-    build(15.0, &mut inventory, false);
+    build(15.0, &mut terrain, &mut inventory, false);
     assert_eq!(inventory.stock(CLAY), 0);
-    inventory.step(HistoryStep::Undo);
+    enter_step(&mut inventory, &terrain.undo());
     assert_eq!(inventory.stock(CLAY), 10);
-    inventory.step(HistoryStep::Redo);
-    build(30.0, &mut inventory, true);
+    enter_step(&mut inventory, &terrain.redo());
+    build(30.0, &mut terrain, &mut inventory, true);
     let owed = -inventory.stock(CLAY);
     assert!(owed > 50, "{owed}");
     // A present does not pay it off.
-    build(45.0, &mut inventory, false);
+    build(45.0, &mut terrain, &mut inventory, false);
     assert_eq!(inventory.stock(CLAY), -owed);
     inventory.gain(CLAY, owed + 7);
     assert_eq!((inventory.stock(CLAY), inventory.free(CLAY)), (7, 7));
@@ -241,103 +257,4 @@ fn what_is_pledged_is_not_spent_twice() {
     let nothing = Receipt { tag: second, outcome: Ok(Applied::default()) };
     inventory.enter(&nothing, true);
     assert_eq!(inventory.free(ROCK), 100);
-}
-
-/// What transactions made of a stock of rock, those that can be undone and those that can be done again.
-fn after(past: &[i64], future: &[i64]) -> Inventory {
-    let change = |by: &i64| {
-        let mut change = Change::default();
-        change[usize::from(ROCK.0)] = *by;
-        change
-    };
-    let (past_sum, past) = (past.iter().sum(), past.iter().map(change).collect());
-    let mut inventory = Inventory { past, future: future.iter().map(change).collect(), ..default() };
-    inventory.gain(ROCK, past_sum);
-    inventory
-}
-
-#[test]
-fn what_steps_under_way_take_is_not_free_and_what_they_give_not_yet() {
-    use HistoryStep::{Redo, Undo};
-    let cases: [(&[i64], &[i64], &[HistoryStep], i64, i64); 11] = [
-        // What was dug is taken back, once.
-        (&[100], &[], &[Undo], 0, 0),
-        (&[100], &[], &[Undo, Undo], 0, 0),
-        (&[60, 40], &[], &[Undo], 60, 60),
-        (&[60, 40], &[], &[Undo, Undo], 0, 0),
-        // What was built comes back, and what was dug before it goes then.
-        (&[100, -70], &[], &[Undo], 30, 100),
-        (&[100, -70], &[], &[Undo, Undo], -70, 0),
-        // The other way round.
-        (&[100], &[-70], &[Redo], 30, 30),
-        (&[100], &[50], &[Redo], 100, 150),
-        (&[100], &[-20, 50], &[Redo, Redo], 80, 130),
-        // There and back.
-        (&[100], &[], &[Undo, Redo], 0, 100),
-        (&[100], &[-70], &[Redo, Undo], -70, 100),
-    ];
-    for (past, future, steps, free, left) in cases {
-        let mut inventory = after(past, future);
-        steps.iter().for_each(|step| inventory.await_step(*step));
-        assert_eq!(inventory.free(ROCK), free, "{past:?} {future:?} {steps:?}");
-        for step in steps {
-            inventory.end_step(*step);
-            inventory.step(*step);
-        }
-        assert_eq!(
-            (inventory.free(ROCK), inventory.stock(ROCK)),
-            (left, left),
-            "{past:?} {future:?} {steps:?}"
-        );
-    }
-}
-
-#[test]
-fn a_brush_before_an_undo_is_what_it_takes_back() {
-    let mut inventory = after(&[100], &[]);
-    let tag = inventory.tag();
-    inventory.pledge(tag, ROCK, 70);
-    inventory.await_step(HistoryStep::Undo);
-    // Nobody knows yet whether the brush will change anything.
-    assert_eq!(inventory.free(ROCK), -70);
-    // It does.
-    inventory.pledges.clear();
-    inventory.gain(ROCK, -70);
-    inventory.past.push_back(after(&[-70], &[]).past[0]);
-    assert_eq!(inventory.free(ROCK), 30);
-    inventory.end_step(HistoryStep::Undo);
-    inventory.step(HistoryStep::Undo);
-    assert_eq!(inventory.free(ROCK), 100);
-}
-
-#[test]
-fn a_step_is_awaited_until_it_is_answered() {
-    let mut app = app();
-    app.insert_resource(after(&[100], &[-70]));
-    let free = |app: &mut App| {
-        app.update();
-        app.world().resource::<Inventory>().free(ROCK)
-    };
-    let answer = |app: &mut App, step, outcome| {
-        let receipt = HistoryReceipt { step, outcome };
-        app.world_mut().write_message(HistoryMoved { terrain: None, receipt });
-    };
-    // One that is refused takes nothing.
-    app.world_mut().write_message(Redo::default());
-    assert_eq!(free(&mut app), 30);
-    assert_eq!(free(&mut app), 30);
-    answer(&mut app, HistoryStep::Redo, Err(HistoryRejection::NothingToRedo));
-    assert_eq!(free(&mut app), 100);
-    app.world_mut().write_message(Undo::default());
-    assert_eq!(free(&mut app), 0);
-    answer(&mut app, HistoryStep::Undo, Ok(Restored::default()));
-    assert_eq!(free(&mut app), 0);
-    assert_eq!(app.world().resource::<Inventory>().stock(ROCK), 0);
-    // Nobody waits for what was sent in another game.
-    app.world_mut().write_message(Undo::default());
-    app.update();
-    app.world_mut().trigger(NewGame);
-    answer(&mut app, HistoryStep::Undo, Err(HistoryRejection::TerrainGone));
-    app.world_mut().resource_mut::<Inventory>().gain(ROCK, 50);
-    assert_eq!(free(&mut app), 50);
 }

@@ -13,7 +13,6 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_burrow::ground::OVERLAY_DEPTH;
 use bevy_burrow::lattice::ONE;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::TerrainError;
 
 use crate::places::Places;
 use crate::toughness;
@@ -135,9 +134,9 @@ fn shape(survey: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
 }
 
 /// A terrain that nobody has dug yet.
-fn on(ground: &Arc<Ground>) -> Result<Terrain, TerrainError> {
+fn on(ground: &Arc<Ground>) -> Result<Terrain, BevyError> {
     let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings { chunk_size: 32, voxel_size: 1.0 })?;
-    terrain.set_rules(toughness::rules());
+    terrain.set_rules(toughness::rules())?;
     Ok(terrain)
 }
 

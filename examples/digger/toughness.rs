@@ -55,7 +55,7 @@ mod tests {
     fn ground(material: MaterialId, depth: f32) -> (Terrain, Shape) {
         let ground = Ground::flat(64, 64, 10.0).expect("a world");
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("default settings");
-        terrain.set_rules(rules());
+        terrain.set_rules(rules()).expect("valid rules");
         let place = Vec3::new(32.0, 10.0 - depth, 32.0);
         terrain.apply([Brush::paint(Shape::sphere(place, 6.0), material)]);
         (terrain, Shape::sphere(place, 2.0))

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use bevy_burrow::terrain::{Receipt, Terrain};
+use bevy_burrow::terrain::{Receipt, Terrain, WorkLimits};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::script::ScriptedEdit;
@@ -23,6 +23,8 @@ pub fn play(terrain: &mut Terrain, edits: &[ScriptedEdit], batch: usize) -> Play
     let bar = ProgressBar::new(edits.len() as u64)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let mut played = Played { receipts: Vec::with_capacity(edits.len()), transactions: Vec::new(), batch };
+    // However large a batch is, it is one transaction.
+    terrain.set_work_limits(WorkLimits::UNBOUNDED);
     for edits in edits.chunks(batch) {
         let start = Instant::now();
         let receipts = transact(terrain, edits);
@@ -36,9 +38,7 @@ pub fn play(terrain: &mut Terrain, edits: &[ScriptedEdit], batch: usize) -> Play
 
 /// One transaction; nobody else changes this terrain, so its commit is never stale.
 fn transact(terrain: &mut Terrain, edits: &[ScriptedEdit]) -> Vec<Receipt> {
-    for scripted in edits {
-        terrain.submit_edit(&scripted.edit);
-    }
+    terrain.submit_edits(edits.iter().map(|scripted| &scripted.edit));
     let commit = terrain.begin().map(|transaction| transaction.run());
     commit.and_then(|commit| terrain.commit(commit).ok()).unwrap_or_default()
 }

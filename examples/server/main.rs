@@ -13,7 +13,8 @@
 //!
 //! For each brush a line with what became of it, then fields, memory, and the hash of the world: a client that got the
 //! same brushes in the same order has the same one. With `--per-tick` brushes go in batches, as they would from players;
-//! the hash does not depend on that, but for scripts with steps: a step undoes a batch. From standard input each brush is a
+//! the hash does not depend on that, but for scripts with steps: a step undoes a batch, unless the brushes say of which
+//! `"stroke"` they are; then it undoes a stroke, however many ticks that took. From standard input each brush is a
 //! batch of its own.
 //!
 //! | file | subject |
@@ -36,6 +37,7 @@ use bevy::app::ScheduleRunnerPlugin;
 use bevy::prelude::*;
 use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::WorkLimits;
 use clap::Parser;
 
 /// The world without rendering: brushes in, receipts and a hash out.
@@ -100,42 +102,86 @@ fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
 fn terrain(options: &Options) -> Result<Terrain> {
     let noise = NoiseHeights { seed: 4, amplitude: 40.0, scale: 180.0, octaves: 5, ..default() };
     let ground = Ground::from_noise(options.side, options.side, &noise)?;
-    Ok(Terrain::new(ground, &TerrainSettings { chunk_size: options.chunk, voxel_size: 1.0 })?)
+    let settings = TerrainSettings { chunk_size: options.chunk, voxel_size: 1.0 };
+    let mut terrain = Terrain::new(ground, &settings)?;
+    // All of a tick is taken, or the world would depend on how much that is.
+    terrain.set_work_limits(WorkLimits { waiting: u64::MAX, ..default() });
+    Ok(terrain)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// The world after a script, with so many lines a tick.
+    fn play(script: &str, per_tick: &str) -> App {
+        let name = format!("bevy_burrow_server_{}_{per_tick}.jsonl", std::process::id());
+        let place = std::env::temp_dir().join(name);
+        std::fs::write(&place, script).unwrap();
+        let words = ["server", "--quiet", "--side", "64", "--per-tick", per_tick, "--script"];
+        let words = words.map(std::ffi::OsStr::new);
+        let options = Options::parse_from(words.into_iter().chain([place.as_os_str()]));
+        let source = script::open(&options).unwrap();
+        let mut app = app(&options, source, terrain(&options).unwrap());
+        app.finish();
+        app.cleanup();
+        while app.should_exit().is_none() {
+            app.update();
+        }
+        std::fs::remove_file(place).unwrap();
+        app
+    }
+
+    fn hash(mut app: App) -> u64 {
+        let world = app.world_mut();
+        world.query::<&Terrain>().single(world).unwrap().world().hash()
+    }
+
+    fn place(i: u32) -> [u32; 2] {
+        [8 + i % 4 * 12, 8 + i / 4 * 14]
+    }
+
+    fn line(i: u32, stroke: &str) -> String {
+        let [x, z] = place(i);
+        format!("{{\"shape\":\"sphere\",\"center\":[{x},0,{z}],\"radius\":16,\"op\":\"dig\"{stroke}}}\n")
+    }
+
+    fn dig(i: u32) -> Brush {
+        let [x, z] = place(i).map(|at| at as f32);
+        Brush::dig(Shape::sphere(Vec3::new(x, 0.0, z), 16.0))
+    }
+
+    fn untouched() -> Terrain {
+        terrain(&Options::parse_from(["server", "--side", "64"])).unwrap()
+    }
+
     #[test]
     fn a_step_undoes_the_batch_before_it_however_fast_that_was() {
-        let line = |i: u32| {
-            let (x, z) = (8 + i % 4 * 12, 8 + i / 4 * 14);
-            format!("{{\"shape\":\"sphere\",\"center\":[{x},0,{z}],\"radius\":16,\"op\":\"dig\"}}\n")
-        };
-        let place = std::env::temp_dir().join(format!("bevy_burrow_server_{}.jsonl", std::process::id()));
-        let script = (0..12).map(line).collect::<String>() + "{\"undo\":true}\n";
-        std::fs::write(&place, script).unwrap();
-        let words = ["server", "--quiet", "--side", "64", "--script"].map(std::ffi::OsStr::new);
-        let options = Options::parse_from(words.into_iter().chain([place.as_os_str()]));
-
-        let shapes = |i: u32| Vec3::new((8 + i % 4 * 12) as f32, 0.0, (8 + i / 4 * 14) as f32);
-        let mut expected = terrain(&options).unwrap();
-        let receipts = expected.apply((0..8).map(|i| Brush::dig(Shape::sphere(shapes(i), 16.0))));
+        let script = (0..12).map(|i| line(i, "")).collect::<String>() + "{\"undo\":true}\n";
+        let mut expected = untouched();
+        let receipts = expected.apply((0..8).map(dig));
         let dug = |receipt: &Receipt| receipt.outcome.as_ref().is_ok_and(|own| own.removed.total() > 0);
         assert!(receipts.iter().filter(|receipt| dug(receipt)).count() > 4);
         for _ in 0..3 {
-            let source = script::open(&options).unwrap();
-            let mut app = app(&options, source, terrain(&options).unwrap());
-            app.finish();
-            app.cleanup();
-            while app.should_exit().is_none() {
-                app.update();
-            }
-            let world = app.world_mut();
-            let played = world.query::<&Terrain>().single(world).unwrap();
-            assert_eq!(played.world().hash(), expected.world().hash());
+            assert_eq!(hash(play(&script, "4")), expected.world().hash());
         }
-        std::fs::remove_file(place).unwrap();
+    }
+
+    #[test]
+    fn with_strokes_the_world_is_the_same_however_many_lines_a_tick_has() {
+        let stroke = |i: u32| line(i, &format!(",\"stroke\":{}", i / 5));
+        let digs = |range: std::ops::Range<u32>| range.map(stroke).collect::<String>();
+        let undo = "{\"undo\":true}\n";
+        // The second stroke goes; the third is taken back and done again; its last part is a step of its own.
+        let script = digs(0..10) + undo + &digs(10..14) + undo + "{\"redo\":true}\n" + &digs(14..15);
+        let mut expected = untouched();
+        expected.apply((0..5).chain(10..15).map(dig));
+        for per_tick in ["1", "2", "3", "7", "100"] {
+            let mut app = play(&script, per_tick);
+            let world = app.world_mut();
+            let terrain = world.query::<&Terrain>().single(world).unwrap();
+            assert_eq!(terrain.world().hash(), expected.world().hash(), "{per_tick} lines a tick");
+            assert_eq!(terrain.history().undos, 3, "{per_tick} lines a tick");
+        }
     }
 }

@@ -112,7 +112,7 @@ fn send(
     mut exit: MessageWriter<AppExit>,
 ) {
     let source = &mut *source;
-    // A transaction is what goes in with one tick, or what a step undoes would depend on how fast the server is.
+    // One tick after the other: what waits does not grow, however long the script is.
     let is_idle = terrains.iter().all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
     if !is_idle || ledger.answered < source.sent {
         return;

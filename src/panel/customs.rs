@@ -1,6 +1,7 @@
 //! What the panel sets of a terrain.
 
 use bevy::ecs::system::Commands;
+use bevy::log::warn;
 use bevy::prelude::{Entity, EntityWorldMut};
 
 use crate::plugin::{LooseGround, free_later};
@@ -39,8 +40,9 @@ impl Customs {
         }
         if self.rules != before.rules {
             terrain.queue_silenced(move |mut terrain: EntityWorldMut| {
-                if let Some(mut terrain) = terrain.get_mut::<Terrain>() {
-                    terrain.set_rules(self.rules);
+                let Some(mut terrain) = terrain.get_mut::<Terrain>() else { return };
+                if let Err(error) = terrain.set_rules(self.rules) {
+                    warn!("{error}");
                 }
             });
         }

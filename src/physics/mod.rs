@@ -76,7 +76,7 @@ pub use shape::GroundShape;
 use std::time::Duration;
 
 use avian3d::physics_transform::PhysicsTransformSystems;
-use avian3d::prelude::{PhysicsSchedule, PhysicsSystems};
+use avian3d::prelude::{PhysicsSchedule, PhysicsStepSystems, PhysicsSystems};
 use bevy::prelude::*;
 
 use crate::plugin::{BurrowSystems, Companions};
@@ -187,7 +187,7 @@ impl Plugin for TerrainPhysicsPlugin {
                     (come_to_steps.before(PhysicsSystems::First), leave_steps.after(PhysicsSystems::Last)).chain(),
                 ),
             )
-            .add_systems(PhysicsSchedule, check_schedule);
+            .add_systems(PhysicsSchedule, check_schedule.before(PhysicsStepSystems::First));
     }
 }
 

@@ -188,7 +188,7 @@ mod tests {
         let mut terrain = terrain();
         let mut held = vec![terrain.snapshot()];
         let (is_copy, _) = dig_on(&mut terrain, |terrain| {
-            terrain.set_rules(DiggingRules::default().with_unbreakable(MaterialId(0)));
+            terrain.set_rules(DiggingRules::default().with_unbreakable(MaterialId(0))).expect("valid rules");
             held.push(terrain.snapshot());
         });
         assert!(is_copy);

@@ -62,8 +62,11 @@ impl<'a> FieldLog<'a> {
 
     /// All fields of each chunk that a field changed in since the last call, by chunk.
     pub fn take_changed(&mut self) -> Vec<(ChunkPos, Fields)> {
-        let changed = std::mem::take(&mut self.changed).into_iter();
-        changed.filter_map(|chunk| Some((chunk, self.fields.get(&chunk)?.clone()))).collect()
+        let changed = std::mem::take(&mut self.changed);
+        // History tells its bytes: no list has room to spare.
+        let mut fields = Vec::with_capacity(changed.len());
+        fields.extend(changed.into_iter().filter_map(|chunk| Some((chunk, self.fields.get(&chunk)?.clone()))));
+        fields
     }
 
     fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {

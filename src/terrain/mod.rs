@@ -24,6 +24,8 @@ mod groups;
 mod history;
 mod inspect;
 mod loose;
+#[cfg(test)]
+mod order;
 mod query;
 mod queue;
 mod ray;
@@ -70,7 +72,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::backend::Engine;
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
-use crate::volume::DiggingRules;
+use crate::volume::{DiggingRules, RulesError};
 use history::{Step, Timeline, Waste};
 use queue::{Queue, Request, Submission, Taken};
 
@@ -178,8 +180,14 @@ impl Terrain {
 
     /// Edits that are submitted from now on obey these rules; those that wait or are under way keep theirs, and what is there
     /// stays as it is. A journal is replayed exactly only if rules change at the same edits.
-    pub fn set_rules(&mut self, rules: DiggingRules) {
+    ///
+    /// # Errors
+    /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is changed
+    /// then.
+    pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
+        rules.check()?;
         self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
+        Ok(())
     }
 
     /// What edits may do; `None`: everything.

@@ -30,6 +30,11 @@ pub struct WorkLimits {
     pub waiting: u64,
 }
 
+impl WorkLimits {
+    /// All that waits goes into one transaction, and nothing is rejected: for tools and tests.
+    pub const UNBOUNDED: Self = Self { transaction: u64::MAX, waiting: u64::MAX };
+}
+
 impl Default for WorkLimits {
     /// About a tenth of a second for a transaction and two seconds for what waits, on two cores.
     fn default() -> Self {
@@ -182,9 +187,9 @@ impl Queue {
             self.requests.pop_front();
             return Some((Taken::Step(step), STEP));
         }
-        let mut work = 0;
+        let mut work = 0_u64;
         let is_taken = |request: &&Request| {
-            let fits = work == 0 || work + request.work() <= self.limits.transaction;
+            let fits = work == 0 || work.saturating_add(request.work()) <= self.limits.transaction;
             work += if fits { request.work() } else { 0 };
             fits && matches!(request, Request::Edit(_))
         };

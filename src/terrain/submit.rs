@@ -55,11 +55,19 @@ impl Terrain {
         }
     }
 
-    /// Queues an edit, say from a file or the network. It is checked like a brush.
+    /// Queues an edit, say from a file or the network. It is checked like a brush, and a step of undo as one would be.
     pub fn submit_edit(&mut self, edit: &Edit) {
+        self.submit_edits([edit]);
+    }
+
+    /// Queues edits that are one step of undo together, but for those that are part of strokes.
+    pub fn submit_edits<E: Borrow<Edit>>(&mut self, edits: impl IntoIterator<Item = E>) {
         let together = Together::Batch(unique());
-        let checked = edit.check().map(|()| edit.clone()).map_err(Into::into);
-        self.queue_or_answer(edit.tag(), checked, edit.stroke(), together);
+        for edit in edits {
+            let edit = edit.borrow();
+            let checked = edit.check().map(|()| edit.clone()).map_err(Into::into);
+            self.queue_or_answer(edit.tag(), checked, edit.stroke(), together);
+        }
     }
 
     fn queue_or_answer(

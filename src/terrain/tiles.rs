@@ -60,6 +60,7 @@ pub(super) struct TileWork<'a> {
     view: &'a WorldView<'a>,
     /// Words of the mask that change.
     newer: &'a Mask,
+    /// Set by whoever has made it; threads that work for rayon must not wait for each other in here.
     touched: OnceLock<(Vec<Patch>, Duration)>,
     drawn: OnceLock<(Vec<(TilePos, TileUpdate)>, Duration)>,
     /// Of what drawing waits for, what is there: `FOUND`, `CALLED`.
@@ -93,31 +94,37 @@ impl<'a> TileWork<'a> {
         }
     }
 
-    fn find(&self) -> &[Patch] {
-        &timed(&self.touched, || touched_patches(self.world, self.view.grid, self.newer)).0
+    fn find(&self) {
+        let found = timed(|| touched_patches(self.world, self.view.grid, self.newer));
+        // Nobody waits for it: who needs it and does not find it does it himself.
+        let _ = self.touched.set(found);
     }
 
     fn draw(&self) {
-        let touched = self.find();
-        timed(&self.drawn, || draw_tiles(self.world, self.view, touched));
+        if let Some((touched, _)) = self.touched.get() {
+            let _ = self.drawn.set(timed(|| draw_tiles(self.world, self.view, touched)));
+        }
     }
 
     /// The tiles, in order, and how long they took. Does what is not done yet.
     pub fn finish(self) -> (Vec<(TilePos, TileUpdate)>, Duration) {
-        self.draw();
+        if self.touched.get().is_none() {
+            self.find();
+        }
+        if self.drawn.get().is_none() {
+            self.draw();
+        }
         let took = self.touched.into_inner().map(|(_, took)| took).unwrap_or_default();
         let (drawn, also) = self.drawn.into_inner().unwrap_or_default();
         (drawn, took + also)
     }
 }
 
-/// Does something unless it is done, and keeps how long it took. Nobody else may do it at the same time.
-fn timed<T>(done: &OnceLock<(T, Duration)>, work: impl FnOnce() -> T) -> &(T, Duration) {
-    done.get_or_init(|| {
-        let mut took = Duration::ZERO;
-        let made = Stages::time(&mut took, work);
-        (made, took)
-    })
+/// What some work makes, and how long it took.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let mut took = Duration::ZERO;
+    let made = Stages::time(&mut took, work);
+    (made, took)
 }
 
 /// A tile, and 8x8 cells of it as (z, x), in units of 8 cells.

@@ -87,6 +87,8 @@ impl Transaction {
 
     fn compute(&self) -> Commit {
         let backend = self.engine.as_ref().map_or(&Cpu as &dyn Compute, Engine::compute);
+        #[cfg(test)]
+        super::order::panic_if_told(&self.work);
         let run = || match &self.work {
             Work::Edits(submissions) => self.edit(submissions, backend),
             Work::Step(step, target) => self.step(*step, target, backend),

@@ -35,7 +35,7 @@ pub(crate) use ledger::Fate;
 pub(crate) use ledger::Ledger;
 pub(crate) use removal::{TakenOut, pristine_layers, take_out};
 pub(crate) use restore::{Replaced, pristine_brick};
-pub use rules::{DiggingRules, Refused};
+pub use rules::{DiggingRules, Refused, RulesError};
 pub use tally::Tally;
 pub use view::{Bricks, SampleView};
 pub use work::{EditWork, reach};

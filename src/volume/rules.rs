@@ -17,7 +17,7 @@ use crate::lattice::{LatticeBox, ONE};
 /// use glam::Vec3;
 ///
 /// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
-/// terrain.set_rules(DiggingRules::default().with_hardness(MaterialId(0), 100).with_bedrock(4));
+/// terrain.set_rules(DiggingRules::default().with_hardness(MaterialId(0), 100).with_bedrock(4))?;
 /// let dig = Brush::dig(Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0));
 /// let receipts = terrain.apply([dig.clone().with_power(50), dig.clone().with_power(75), dig]);
 /// let outcomes = receipts.into_iter().filter_map(|receipt| receipt.outcome.ok());
@@ -71,6 +71,18 @@ impl DiggingRules {
         self
     }
 
+    /// Can every rule bind something?
+    ///
+    /// # Errors
+    /// When a rule is for [`MaterialId::GROUND`]: that stands for the ground's own materials, of which each has its number.
+    pub fn check(&self) -> Result<(), RulesError> {
+        let ground = MaterialId::GROUND;
+        if self.unbreakable.contains(&ground) || self.hardness.contains_key(&ground) {
+            return Err(RulesError::Ground);
+        }
+        Ok(())
+    }
+
     /// Is there no rule?
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -94,6 +106,15 @@ impl DiggingRules {
             part => (part, Some(Fate::Slowed)),
         }
     }
+}
+
+/// Why rules can't be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RulesError {
+    /// A rule is for a material that nothing has.
+    #[error("a rule is for `MaterialId::GROUND`, which nothing is made of: name the materials of the ground")]
+    Ground,
 }
 
 /// Voxels that an operation would have changed but for the rules, by the material that they have, or would have got.

@@ -58,9 +58,7 @@ impl Witness {
 
     /// One transaction of these brushes, and every check there is.
     pub fn apply(&mut self, brushes: &[Brush], what: &str) {
-        for brush in brushes {
-            self.terrain.submit(brush);
-        }
+        self.terrain.submit_all(brushes);
         let transaction = self.terrain.begin().expect("brushes wait");
         let mut commit = transaction.run();
         let news = commit.field_news().to_vec();

@@ -51,7 +51,7 @@ fn rules_hold_nothing_beyond_the_rim() {
     let spans = |x: f32| {
         let ground = Ground::flat(SIDE as u32, SIDE as u32, 20.0).expect("valid");
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
-        terrain.set_rules(rules.clone());
+        terrain.set_rules(rules.clone()).expect("valid rules");
         let middle = Vec3::new(x, 26.0, 32.0);
         let heap = Brush::add(Shape::cuboid(middle, Vec3::splat(8.0)), MaterialId(5));
         terrain.apply([heap, Brush::dig(Shape::sphere(middle, 2.5)).with_power(10)]);

@@ -133,7 +133,7 @@ fn five_hundred_edits_of_every_kind_are_undone_and_redone_to_the_bit() {
         assert!(steps > 400, "{steps} are not many");
         assert_eq!(walker.terrain.history().undos, steps, "the budget holds all of {steps}");
         // Whatever edits may do from now on, steps do.
-        walker.terrain.set_rules(DiggingRules::default().with_bedrock(i32::MAX));
+        walker.terrain.set_rules(DiggingRules::default().with_bedrock(i32::MAX)).expect("valid rules");
         assert_eq!(walker.walk(HistoryStep::Undo), steps);
         assert!(walker.now.is_pristine());
         assert_eq!(walker.walk(HistoryStep::Redo), steps);

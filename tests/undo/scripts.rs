@@ -32,7 +32,7 @@ pub fn terrain(rng: &mut Rng, ground: Ground, chunk_size: u32, index: u64) -> Te
     let mut terrain =
         Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
     if matches!(index % 4, 1 | 2) {
-        terrain.set_rules(rules);
+        terrain.set_rules(rules).expect("valid rules");
     }
     if matches!(index % 4, 2 | 3) {
         terrain.set_loose(Some(LooseSettings { largest: 3000, crumbs: 6, debris: 400 }));

@@ -257,7 +257,7 @@ pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
         Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
     if index / 4 % 4 == 3 {
         let rules = random_rules(rng, terrain.world().ground());
-        terrain.set_rules(rules);
+        terrain.set_rules(rules).expect("valid rules");
         brushes.iter_mut().for_each(|brush| brush.power = rng.u8(..) | rng.u8(..));
     }
     // Some at once, some in transactions of their own.

@@ -71,8 +71,8 @@ fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
     found.set_engine(engine.clone());
     if index % 4 == 3 {
         let rules = worlds::random_rules(rng, &ground);
-        expected.set_rules(rules.clone());
-        found.set_rules(rules);
+        expected.set_rules(rules.clone()).expect("valid rules");
+        found.set_rules(rules).expect("valid rules");
     }
     for _ in 0..rng.u32(1..5) {
         let brush = |rng: &mut Rng| match rng.u32(0..4) {
@@ -120,7 +120,9 @@ fn compare_under(
     let ground = Arc::new(ground);
     let [mut expected, mut found] =
         [0, 1].map(|_| Terrain::new(Arc::clone(&ground), &settings).expect("valid settings"));
-    [&mut expected, &mut found].into_iter().for_each(|terrain| terrain.set_rules(rules.clone()));
+    for terrain in [&mut expected, &mut found] {
+        terrain.set_rules(rules.clone()).expect("valid rules");
+    }
     for (number, brushes) in transactions.iter().enumerate() {
         found.set_engine(engines[number % engines.len()].clone());
         assert_eq!(expected.apply(brushes), found.apply(brushes), "transaction {number}");

@@ -251,8 +251,8 @@ fn what_is_under_rules_is_that_of_the_processor() {
         found.set_engine(engine.clone());
         for number in 0..4 {
             let rules = if number % 2 == 0 { rules.clone() } else { DiggingRules::default() };
-            expected.set_rules(rules.clone());
-            found.set_rules(rules);
+            expected.set_rules(rules.clone()).expect("valid rules");
+            found.set_rules(rules).expect("valid rules");
             let brush = |rng: &mut Rng| Brush { power: rng.u8(..), ..worlds::any_random_brush(rng, &ground) };
             let brushes: Vec<Brush> = (0..4).map(|_| brush(&mut rng)).collect();
             assert_eq!(expected.apply(&brushes), found.apply(&brushes), "world {index}");
