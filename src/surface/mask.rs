@@ -47,6 +47,11 @@ impl Mask {
         }
     }
 
+    /// How many words there are.
+    pub(crate) fn word_count(&self) -> usize {
+        self.0.len()
+    }
+
     /// Every word that is not empty, in no order.
     pub(crate) fn words(&self) -> impl Iterator<Item = ((i32, i32), u64)> {
         self.0.iter().map(|(&word, &cells)| (word, cells))

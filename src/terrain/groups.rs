@@ -62,6 +62,13 @@ struct EnteredGroup {
 /// From how many bricks on lists that are only copied are copied side by side.
 const LONG: usize = 1 << 13;
 
+/// A list of so many, without room to spare: history tells its bytes.
+fn exact<T>(count: usize, items: impl Iterator<Item = T>) -> Vec<T> {
+    let mut list = Vec::with_capacity(count);
+    list.extend(items);
+    list
+}
+
 /// What changes hold of bricks. Kept as long as history has it: no larger than it has to be.
 fn changed_bricks(drafted: Vec<DraftedBrick>) -> Vec<(BrickPos, Option<Arc<Brick>>)> {
     let changed = |drafted: DraftedBrick| (drafted.pos, Some(drafted.brick));
@@ -185,7 +192,7 @@ fn enter(world: &World, groups: &[Group], effects: Vec<Effects>) -> Entered {
             newer.extend(group.draft.bricks.iter().map(|drafted| (drafted.pos, &*drafted.brick)));
         }
         tags.shrink_to_fit();
-        let mask = group.mask.words().collect();
+        let mask = exact(group.mask.word_count(), group.mask.words());
         EnteredGroup { fields: log.take_changed(), mask, replaced_bytes, tags }
     });
     let groups = entered.collect();

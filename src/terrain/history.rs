@@ -246,17 +246,22 @@ impl Timeline {
 
     /// Lets go of what is farthest from now, back first, until the rest is within the budget.
     fn trim(&mut self, waste: &mut Waste) {
+        self.fit();
         while self.bytes() > self.budget {
             let Some(gone) = self.undo.pop_front().or_else(|| self.redo.pop_front()) else { break };
             self.held -= gone.bytes();
             self.lost = self.lost.max(gone.group);
             waste.steps.push(gone);
-            // A list without steps needs no room, nor does one that had many.
-            for list in [&mut self.undo, &mut self.redo] {
-                if list.len() * 4 <= list.capacity() {
-                    list.shrink_to(list.len() * 2);
-                }
-            }
+            self.fit();
+        }
+    }
+
+    /// Gives back the room of lists that they have for steps that are gone. What is left follows from how many steps there
+    /// are, or what is trimmed would depend on how many there were.
+    fn fit(&mut self) {
+        for list in [&mut self.undo, &mut self.redo] {
+            let room = if list.is_empty() { 0 } else { list.len().next_power_of_two().max(4) };
+            list.shrink_to(room);
         }
     }
 }
