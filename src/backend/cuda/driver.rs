@@ -1,6 +1,6 @@
 //! A CUDA card, through its driver.
 //!
-//! All of the crate's unsafe code is here, and in `interop` where that is built, but for what tests have (`mapped`). Addresses
+//! All of the crate's unsafe code is here, and in `interop` where that is built, but for what tests have (`zero_copy`). Addresses
 //! come from the driver and are handed back to it alone; what kernels do with them is bounded by the capacities they are given.
 #![allow(unsafe_code)]
 

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::device::{Device, Fault, HostMemory, Kernel};
 use super::layout::{COLUMNS, HeightsParams};
-use super::mail::Plan;
 use super::session::Session;
+use super::staging::Plan;
 use super::{Cuda, Place, guarded, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
@@ -73,12 +73,12 @@ impl Session {
     ) -> Result<(), Fault> {
         let mut plan = Plan::default();
         let tables = plan.section::<[u8; 256]>(terms.tables.len());
-        self.inbox.open(&mut *self.device, &plan)?;
+        self.input.open(&mut *self.device, &plan)?;
         // Where memory is short, that must show before anything is under way.
         let mut buffers = Buffers::new(&mut *self.device, heights.len().min(slice) * size_of::<i32>())?;
-        self.inbox.put(tables, &terms.tables);
-        let params = HeightsParams { heights: buffers.own, ..params(terms, self.inbox.address(tables)) };
-        let sent = self.inbox.send(&mut *self.device, &plan);
+        self.input.put(tables, &terms.tables);
+        let params = HeightsParams { heights: buffers.own, ..params(terms, self.input.address(tables)) };
+        let sent = self.input.send(&mut *self.device, &plan);
         let filled = sent.and_then(|()| fill(&mut *self.device, params, &mut buffers, heights, slice));
         // Whatever is under way goes to buffers that are freed now.
         let ended = self.device.wait();
@@ -252,7 +252,7 @@ mod tests {
             let cuda = Cuda::open_with(
                 is_auto,
                 Some(64 << 20),
-                super::super::trial::Sizes::few(&[(1, 2.0)], None),
+                super::super::self_test::Sizes::few(&[(1, 2.0)], None),
                 || Ok(device),
             );
             while cuda.state() == crate::backend::EngineState::Opening {

@@ -22,6 +22,7 @@
 //! processor, so nobody ever waits for the device but the task that uses it. It is held until surfaces are drawn, which lie
 //! in its memory.
 
+mod cache;
 mod device;
 mod driver;
 mod edit;
@@ -30,24 +31,23 @@ mod heights;
 pub mod interop;
 mod layout;
 mod lists;
-mod mail;
 mod mesh;
+mod self_test;
 mod session;
-mod slots;
+mod staging;
 mod surfaces;
-mod trial;
 mod windows;
 
+#[cfg(test)]
+mod async_copies;
 #[cfg(test)]
 mod emulator;
 #[cfg(test)]
 mod kernel_tests;
 #[cfg(test)]
-mod late;
-#[cfg(test)]
-mod mapped;
-#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod zero_copy;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -102,14 +102,14 @@ fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
 impl Cuda {
     /// Opens the first card, in the background.
     pub fn open(is_auto: bool) -> Self {
-        Self::open_with(is_auto, None, trial::FULL, || Ok(Box::new(driver::Card::open()?)))
+        Self::open_with(is_auto, None, self_test::FULL, || Ok(Box::new(driver::Card::open()?)))
     }
 
     /// Opens some device, in the background; bricks and ground may take so many bytes of it.
     fn open_with(
         is_auto: bool,
         budget: Option<usize>,
-        sizes: trial::Sizes,
+        sizes: self_test::Sizes,
         device: impl FnOnce() -> Result<Box<dyn Device>, Fault> + Send + 'static,
     ) -> Self {
         let own = Self {
@@ -126,7 +126,7 @@ impl Cuda {
                 let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
                 let mut session = Session::new(device, budget)?;
                 let start = Instant::now();
-                let costs = trial::run(&mut session, sizes)?;
+                let costs = self_test::run(&mut session, sizes)?;
                 took.get_or_init(|| start.elapsed());
                 session.forget();
                 Ok((session, costs))

@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 
+use super::cache::{RecordCache, reference};
 use super::device::{Device, Fault, Kernel};
 use super::edit::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
 use super::lists::{cut, fill, hand_out};
-use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
-use super::slots::{Slots, reference};
+use super::staging::{InputBuffer, Plan, Section};
 use super::windows::{KeptSlabs, Windows};
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
@@ -23,9 +23,9 @@ pub(super) struct Session {
     pub(super) device: Box<dyn Device>,
     /// How long the device took for the last launch: uploads and kernels, and the kernel alone.
     pub(super) times: [Duration; 2],
-    pub(super) bricks: Slots,
+    pub(super) bricks: RecordCache,
     pub(super) stacks: Stacks,
-    pub(super) inbox: Inbox,
+    pub(super) input: InputBuffer,
     pub(super) meshes: MeshOutput,
     pub(super) edits: EditOutput,
     /// Memory for the jobs and windows of the next launch.
@@ -37,7 +37,7 @@ pub(super) struct Session {
 
 /// Stacks of the ground on the device. They never change.
 pub(super) struct Stacks {
-    slots: Slots,
+    slots: RecordCache,
     /// Tags by place, in pages of each ground.
     pages: FxHashMap<(u64, i32, i32), Box<[u64; PAGE * PAGE]>>,
 }
@@ -57,7 +57,7 @@ fn page(ground: &Ground, (x, z): (i32, i32)) -> ((u64, i32, i32), usize) {
 
 impl Stacks {
     fn new(budget: usize) -> Self {
-        Self { slots: Slots::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
+        Self { slots: RecordCache::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
     }
 
     /// Where the first one is.
@@ -132,10 +132,10 @@ impl<'a> Uploads<'a> {
     }
 
     /// Writes the records of bricks and stacks.
-    fn write(&self, inbox: &mut Inbox) {
+    fn write(&self, input: &mut InputBuffer) {
         let groups = self.bricks.chunks(GROUP);
         let lengths = groups.clone().map(|group| group.iter().map(|upload| upload.bytes).sum::<usize>());
-        let places = cut(inbox.entries::<u8>(self.brick_list), lengths);
+        let places = cut(input.entries::<u8>(self.brick_list), lengths);
         hand_out(groups.zip(places).collect(), |(group, place)| {
             let before = group.first().map_or(0, |upload| upload.first);
             for Upload { brick, first, bytes, .. } in group {
@@ -143,7 +143,7 @@ impl<'a> Uploads<'a> {
             }
         });
         let record = |_, &(place, _): &((i32, i32), u32)| layout::stack_record(self.ground, place);
-        fill(&self.stacks, inbox.entries::<StackRecord>(self.stack_list), MANY_STACKS, record);
+        fill(&self.stacks, input.entries::<StackRecord>(self.stack_list), MANY_STACKS, record);
     }
 }
 
@@ -153,7 +153,7 @@ const GROUP: usize = 256;
 /// The bricks around these, which are at `pos` and sorted by stacks, and so many up and down. Those that have no slot are to be
 /// [completed](Session::complete).
 pub(super) fn windows<'a, T: Sync>(
-    slots: &Slots,
+    slots: &RecordCache,
     view: SampleView<'a>,
     bricks: &[T],
     pos: impl Fn(&T) -> BrickPos + Send + Sync,
@@ -176,25 +176,25 @@ const STACKS_SHARE: usize = 8;
 impl Session {
     /// A session that may keep so many bytes of bricks and ground on the device.
     pub fn new(mut device: Box<dyn Device>, budget: usize) -> Result<Self, Fault> {
-        let mut inbox = Inbox::new(&mut *device)?;
+        let mut input = InputBuffer::new(&mut *device)?;
         let meshes = MeshOutput::new(&mut *device)?;
         let edits = EditOutput::new(&mut *device)?;
         let table = layout::table();
         let mut plan = Plan::default();
         let section = plan.section::<[u16; 16]>(table.len());
-        inbox.open(&mut *device, &plan)?;
-        inbox.put(section, &table);
-        inbox.send(&mut *device, &plan)?;
+        input.open(&mut *device, &plan)?;
+        input.put(section, &table);
+        input.send(&mut *device, &plan)?;
         let address = device.alloc(size_of_val(&table))?;
-        device.copy(inbox.address(section), address, size_of_val(&table))?;
+        device.copy(input.address(section), address, size_of_val(&table))?;
         device.wait()?;
         let (stacks, bricks) = (budget / STACKS_SHARE, budget - budget / STACKS_SHARE);
         Ok(Self {
             device,
             times: [Duration::ZERO; 2],
-            bricks: Slots::new(BRICK_BYTES, bricks),
+            bricks: RecordCache::new(BRICK_BYTES, bricks),
             stacks: Stacks::new(stacks),
-            inbox,
+            input,
             meshes,
             edits,
             edit_jobs: Vec::new(),
@@ -293,20 +293,20 @@ impl Session {
     /// Sends everything that was planned, and puts uploads in their slots.
     pub(super) fn send(&mut self, plan: &Plan, uploads: &Uploads) -> Result<(), Fault> {
         if uploads.len() > 0 {
-            uploads.write(&mut self.inbox);
+            uploads.write(&mut self.input);
             self.direct(uploads);
         }
-        self.inbox.send(&mut *self.device, plan)?;
-        let params = ScatterParams { jobs: self.inbox.address(uploads.jobs) };
+        self.input.send(&mut *self.device, plan)?;
+        let params = ScatterParams { jobs: self.input.address(uploads.jobs) };
         self.device.launch(Kernel::Scatter, uploads.len() as u32, bytemuck::bytes_of(&params))
     }
 
     /// Writes where uploads go.
     fn direct(&mut self, uploads: &Uploads) {
-        let Self { inbox, bricks, stacks, .. } = self;
-        let (brick_list, stack_list) = (inbox.address(uploads.brick_list), inbox.address(uploads.stack_list));
+        let Self { input, bricks, stacks, .. } = self;
+        let (brick_list, stack_list) = (input.address(uploads.brick_list), input.address(uploads.stack_list));
         let job = |to: u64, from: u64, bytes: usize| ScatterJob { to, from, bytes: bytes as u32, pad: 0 };
-        let jobs = inbox.entries::<ScatterJob>(uploads.jobs);
+        let jobs = input.entries::<ScatterJob>(uploads.jobs);
         let (of_bricks, of_stacks) = jobs.split_at_mut(uploads.bricks.len());
         for (place, upload) in of_bricks.iter_mut().zip(&uploads.bricks) {
             *place = job(bricks.address(upload.slot), brick_list + upload.first as u64, upload.bytes);
@@ -365,7 +365,7 @@ mod tests {
             }
             let mut plan = Plan::default();
             uploads.plan(&mut plan);
-            session.inbox.open(&mut *session.device, &plan).expect("room for all");
+            session.input.open(&mut *session.device, &plan).expect("room for all");
             session.send(&plan, &uploads).expect("the device works");
             session.device.wait().expect("the device works");
             for brick in &bricks {

@@ -82,7 +82,7 @@ use cudarc::driver::CudaContext;
 use super::device::{Device, Fault};
 use super::driver::Card;
 use super::session::Session;
-use super::{MOST, SHARE, trial};
+use super::{MOST, SHARE, self_test};
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
 use imported::Imported;
@@ -152,7 +152,7 @@ impl SharedCard {
         let context = card.context();
         let budget = (card.free_memory() / SHARE).min(MOST);
         let mut session = Session::new(Box::new(card), budget)?;
-        trial::run(&mut session, trial::FULL).map_err(no_card)?;
+        self_test::run(&mut session, self_test::FULL).map_err(no_card)?;
         Ok(Self { session, context, device: device.clone(), queue: queue.clone() })
     }
 
@@ -371,7 +371,7 @@ mod tests {
         blocks.sort_unstable_by_key(|Block { brick, chunk }| (brick.0.x, brick.0.z, brick.0.y, *chunk));
         let view = world.view();
         let meshed = session.mesh(&view, &blocks, &|| {}).expect("the device works");
-        let expected = trial::collected(&blocks, &session.meshes.surfaces(&view, &blocks, meshed));
+        let expected = self_test::collected(&blocks, &session.meshes.surfaces(&view, &blocks, meshed));
         assert_eq!(expected.list.len(), blocks.len());
         let totals = session.mesh_there(&world.view(), &blocks).expect("the device works");
         let results = session.meshes.results(blocks.len()).to_vec();

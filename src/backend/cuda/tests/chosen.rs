@@ -117,7 +117,7 @@ fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
 
 #[test]
 fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
-    let Some(engine) = late() else { return };
+    let Some(engine) = async_copies() else { return };
     let half = glam::Vec3::new(40.0, 9.0, 40.0);
     let brush = Brush::dig(Shape::cuboid(glam::Vec3::new(60.0, 28.0, 60.0), half));
     let ground = Ground::from_fn(120, 120, |x, z| 30.0 + f64::from(x * z % 7)).expect("valid");
@@ -133,10 +133,10 @@ fn who_panics_while_surfaces_arrive_leaves_the_device_to_others() {
     let drawn = catch_unwind(AssertUnwindSafe(|| mesh(&mut |_| panic!("as planned"))));
     assert!(drawn.is_err());
     let mut found = Parts::default();
-    mesh(&mut |parts| found = trial::collected(&blocks, parts));
+    mesh(&mut |parts| found = self_test::collected(&blocks, parts));
     assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
     let mut expected = Parts::default();
-    Cpu.mesh(&view, &blocks, &|| {}, &mut |parts| expected = trial::collected(&blocks, parts));
+    Cpu.mesh(&view, &blocks, &|| {}, &mut |parts| expected = self_test::collected(&blocks, parts));
     assert!(found.vertices.len() > 10_000 && found.indices == expected.indices);
 }
 
@@ -157,7 +157,7 @@ fn whoever_comes_while_surfaces_are_drawn_goes_on_without_the_device() {
 #[test]
 fn auto_knows_from_its_trial_what_both_take_and_learns_from_what_they_do() {
     let Some(device) = device() else { return };
-    let (name, sizes) = (device.name(), trial::Sizes::few(&[(1, 2.0), (4, 3.0)], Some((5, 5.0))));
+    let (name, sizes) = (device.name(), self_test::Sizes::few(&[(1, 2.0), (4, 3.0)], Some((5, 5.0))));
     let auto = Cuda::open_with(true, Some(64 << 20), sizes, || Ok(device));
     let slot = Arc::clone(&auto.slot);
     let engine = Engine::from_cuda(auto);

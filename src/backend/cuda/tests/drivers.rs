@@ -14,7 +14,7 @@ fn a_device_that_can_not_be_opened_is_no_device() {
         Fault::Memory(1 << 30),
     ] {
         let text = fault.to_string();
-        let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, move || Err(fault)));
+        let engine = Engine::from_cuda(Cuda::open_with(false, None, self_test::FULL, move || Err(fault)));
         assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(text));
         assert!(engine.figures().trial.is_zero());
         compare(&mut Rng::with_seed(3), 3, &engine);
@@ -26,7 +26,7 @@ fn a_device_that_can_not_be_opened_is_no_device() {
 fn a_device_passes_the_whole_trial() {
     let Some(device) = device() else { return };
     let name = device.name();
-    let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, || Ok(device)));
+    let engine = Engine::from_cuda(Cuda::open_with(false, None, self_test::FULL, || Ok(device)));
     assert_eq!(engine.wait(Duration::from_secs(600)), EngineState::Cuda(name));
 }
 

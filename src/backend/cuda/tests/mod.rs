@@ -13,11 +13,11 @@ use std::time::Duration;
 
 use fastrand::Rng;
 
+use super::async_copies::AsyncCopies;
 use super::device::Device;
 use super::driver::Card;
 use super::emulator::Emulator;
-use super::late::Late;
-use super::mapped::Mapped;
+use super::zero_copy::ZeroCopy;
 use super::*;
 use crate::backend::Engine;
 use crate::prelude::*;
@@ -38,10 +38,12 @@ pub(super) fn device() -> Option<Box<dyn Device>> {
 
 /// An engine that does everything on a device, small as it may be.
 fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
-    let engine =
-        Engine::from_cuda(Cuda::open_with(false, Some(budget), trial::Sizes::few(&[(4, 3.0)], None), || {
-            Ok(device)
-        }));
+    let engine = Engine::from_cuda(Cuda::open_with(
+        false,
+        Some(budget),
+        self_test::Sizes::few(&[(4, 3.0)], None),
+        || Ok(device),
+    ));
     engine.wait(Duration::from_secs(60));
     engine
 }
@@ -97,7 +99,7 @@ fn assert_same(expected: &World, found: &World, index: u64) {
     });
     assert_eq!(own.len(), others.len(), "world {index}");
     for ((pos, own), (other_pos, other)) in own.into_iter().zip(others) {
-        assert!(pos == other_pos && trial::are_same_bricks(own, other), "world {index}, {pos:?}");
+        assert!(pos == other_pos && self_test::are_same_bricks(own, other), "world {index}, {pos:?}");
     }
     assert_eq!(expected.memory().samples, found.memory().samples, "world {index}");
     assert_eq!(expected.memory().materials, found.memory().materials, "world {index}");
@@ -132,11 +134,11 @@ fn compare_under(
 }
 
 /// An engine that panics where something is used while a copy is under way.
-fn late() -> Option<Engine> {
-    Some(engine(Box::new(Late::new(device()?)), 64 << 20))
+fn async_copies() -> Option<Engine> {
+    Some(engine(Box::new(AsyncCopies::new(device()?)), 64 << 20))
 }
 
 /// An engine whose kernels write short lists to the host's memory, as those of a card do.
-fn mapped() -> Option<Engine> {
-    Some(engine(Box::new(Mapped::new(Box::new(Emulator::start()?))), 64 << 20))
+fn zero_copy() -> Option<Engine> {
+    Some(engine(Box::new(ZeroCopy::new(Box::new(Emulator::start()?))), 64 << 20))
 }

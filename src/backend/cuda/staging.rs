@@ -7,20 +7,20 @@ use bytemuck::Pod;
 use super::device::{Device, Fault, HostMemory};
 
 /// Everything that a launch reads, packed into one piece, so that it takes one copy.
-pub(super) struct Inbox {
+pub(super) struct InputBuffer {
     host: Box<dyn HostMemory>,
     device: u64,
     len: usize,
 }
 
-/// Where something is in an [`Inbox`]: offset and length in bytes.
+/// Where something is in an [`InputBuffer`]: offset and length in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Section {
     start: usize,
     len: usize,
 }
 
-/// What an [`Inbox`] is to hold, in order.
+/// What an [`InputBuffer`] is to hold, in order.
 #[derive(Debug, Default)]
 pub(super) struct Plan(usize);
 
@@ -42,7 +42,7 @@ fn roomy(len: usize) -> usize {
     len.next_power_of_two().max(1 << 16)
 }
 
-impl Inbox {
+impl InputBuffer {
     pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
         let len = roomy(0);
         let host = device.alloc_host(len)?;
@@ -98,12 +98,12 @@ impl Inbox {
     }
 }
 
-/// What [`Outbox::wipe`] writes: to kernels and host, the number of no entry.
+/// What [`OutputList::wipe`] writes: to kernels and host, the number of no entry.
 const WIPED: u8 = 0xff;
 
 /// A list that kernels write. Short ones go straight into the host's memory, where the device can do that; long ones into
 /// its own, and what is used of them is copied afterwards.
-pub(super) struct Outbox {
+pub(super) struct OutputList {
     entry: usize,
     /// How many entries there was room for at the start.
     first: usize,
@@ -116,7 +116,7 @@ pub(super) struct Outbox {
     stale: usize,
 }
 
-impl Outbox {
+impl OutputList {
     /// A list of entries of so many bytes, with room for some.
     pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
         let host = device.alloc_host(entry * capacity)?;
