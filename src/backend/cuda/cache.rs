@@ -155,6 +155,14 @@ impl RecordCache {
         self.free.extend((0..self.slots.len() as u32).rev());
     }
 
+    /// Frees the memory of all slots; whatever was in them has to be uploaded again.
+    pub fn release(&mut self, device: &mut dyn Device) {
+        if !self.slots.is_empty() {
+            device.free(self.base);
+            *self = Self { base: 0, hand: 0, slots: Vec::new(), free: Vec::new(), ..*self };
+        }
+    }
+
     /// Gives a slot back.
     pub fn give_back(&mut self, slot: u32) {
         *self.slots[slot as usize].stamp.get_mut() = 0;
@@ -170,7 +178,7 @@ impl RecordCache {
         }
         let base = match device.alloc(new * self.record) {
             Ok(base) => base,
-            Err(Fault::Memory(_)) => return Ok(false),
+            Err(Fault::Memory(_) | Fault::Budget(_)) => return Ok(false),
             Err(fault) => return Err(fault),
         };
         if old > 0 {

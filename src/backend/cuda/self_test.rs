@@ -1,15 +1,12 @@
-//! A trial before a device is trusted: ground is made of noise, and a piece of ground is dug and sculpted, on it and on the
-//! processor. Every bit is compared, and the time it takes on both.
+//! What a device has to pass before it is trusted: ground is made of noise, and a piece of ground is dug and sculpted, on it
+//! and on the processor. Every bit is compared.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use glam::{IVec3, Vec2, Vec3};
-use web_time::Instant;
 
 use super::device::Fault;
 use super::session::Session;
-use crate::backend::costs::{Costs, Curve};
 use crate::backend::{Compute, Cpu};
 use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
 use crate::ground::{GreyImage, Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
@@ -26,199 +23,50 @@ use crate::volume::{
 /// Cells along a side of the ground.
 const SIDE: i32 = 256;
 
-/// How often each thing is timed once more in vain, and at all; the shortest time counts.
-const IN_VAIN: usize = 2;
-const MOST_REPEATS: usize = 9;
-/// And for how long, if that is often enough.
-const LONG_ENOUGH: Duration = Duration::from_millis(2);
+/// Brushes at once, and their radius, smallest first.
+pub(super) type Sizes = &'static [(i32, f32)];
 
-/// How thorough a trial is: brushes at once, and their radius, smallest first.
-#[derive(Clone, Copy)]
-pub(super) struct Sizes {
-    /// Of these, all that comes out is compared.
-    compared: &'static [(i32, f32)],
-    /// The largest, which is timed only. Transactions that are larger still are judged by it.
-    timed: Option<(i32, f32)>,
-}
+/// One brush, to some that fill the lists of all kernels.
+pub(super) const FULL: Sizes = &[(1, 1.0), (1, 4.0), (4, 6.0), (16, 6.0), (64, 6.0)];
 
-/// Enough to know how fast both are.
-pub(super) const FULL: Sizes =
-    Sizes { compared: &[(1, 1.0), (1, 4.0), (4, 6.0), (16, 6.0), (64, 6.0)], timed: Some((64, 12.0)) };
-
-impl Sizes {
-    /// To look whether all works.
-    #[cfg(test)]
-    pub const fn few(compared: &'static [(i32, f32)], timed: Option<(i32, f32)>) -> Self {
-        Self { compared, timed }
-    }
-}
-
-/// Tries a device out and measures it beside the processor.
+/// Compares a device with the processor.
 ///
 /// # Errors
-/// Where it fails, or differs from the processor in a single bit; or has too little memory for the smallest thing that is
-/// compared.
-pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<Costs, Fault> {
+/// Where it fails, or differs from the processor in a single bit; or has too little memory for the smallest size.
+pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<(), Fault> {
     compare_heights(session)?;
     let ground = ground()?;
-    let none = Bricks::default();
-    let (samples, grid) = (SampleView::new(&ground, &none), ChunkGrid::new(32, SIDE, SIDE));
-    let mut trial = Trial { session, ground: &ground, samples, grid, costs: Costs::default() };
-    for (number, &(count, radius)) in sizes.compared.iter().enumerate() {
-        match trial.compare(count, radius) {
+    for (number, &(count, radius)) in sizes.iter().enumerate() {
+        match compare(session, &ground, count, radius) {
             // It may be used for what is no more than that.
-            Err(fault) if fault.is_passing() && number > 0 => return Ok(trial.costs),
+            Err(fault) if fault.is_passing() && number > 0 => return Ok(()),
             other => other?,
         }
     }
-    if let Some((count, radius)) = sizes.timed {
-        match trial.time(count, radius) {
-            Err(fault) if fault.is_passing() && !sizes.compared.is_empty() => {}
-            other => other?,
-        }
-    }
-    Ok(trial.costs)
-}
-
-/// A trial under way.
-struct Trial<'a> {
-    session: &'a mut Session,
-    ground: &'a Ground,
-    samples: SampleView<'a>,
-    grid: ChunkGrid,
-    costs: Costs,
-}
-
-impl Trial<'_> {
-    /// Compares and times what so many brushes do.
-    fn compare(&mut self, count: i32, radius: f32) -> Result<(), Fault> {
-        let Self { session, ground, samples, grid, costs } = self;
-        let [smooth, rough] = [false, true].map(|is_rough| edits(ground, count, radius, is_rough));
-        let work = EditWork::new(*samples, *grid, &smooth.iter().collect::<Vec<_>>());
-        let jobs = work.jobs().len();
-        compare_edits(session, &work)?;
-        let (times, drafted) = time_edits(session, &work)?;
-        enter(&mut costs.edit, jobs, times);
-
-        let work = EditWork::new(*samples, *grid, &rough.iter().collect::<Vec<_>>());
-        compare_edits(session, &work)?;
-        let (times, _) = time_edits(session, &work)?;
-        let jobs = work.jobs().len();
-        // What it takes beyond as many smooth ones.
-        let smooth =
-            [0, 1].map(|on| Duration::try_from_secs_f64(costs.edit[on].at(jobs)).unwrap_or_default());
-        enter(&mut costs.rough, jobs, [0, 1].map(|on| times[on].saturating_sub(smooth[on])));
-        // Under rules: not timed, as it takes about as long as sculpting.
-        let rules = rules();
-        compare_edits(session, &work.under(Some(&rules)))?;
-
-        let latest = latest(&drafted);
-        let dug = samples.under(&latest);
-        let sculpting = sculpting_edits(ground, count, radius);
-        let work = EditWork::new(dug, *grid, &sculpting.iter().collect::<Vec<_>>());
-        compare_edits(session, &work)?;
-        enter(&mut costs.careful, work.jobs().len(), time_edits(session, &work)?.0);
-
-        let mask = Mask::default();
-        let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid: *grid };
-        let blocks = dirty(*grid, &drafted);
-        compare_meshes(session, &view, &blocks)?;
-        time_meshes(session, costs, &view, &blocks, &drafted)
-    }
-
-    /// Times what so many brushes do, and compares nothing.
-    fn time(&mut self, count: i32, radius: f32) -> Result<(), Fault> {
-        let Self { session, ground, samples, grid, costs } = self;
-        let sculpting = sculpting_edits(ground, count, radius);
-        let work = EditWork::new(*samples, *grid, &sculpting.iter().collect::<Vec<_>>());
-        enter(&mut costs.careful, work.jobs().len(), time_edits(session, &work)?.0);
-
-        let smooth = edits(ground, count, radius, false);
-        let work = EditWork::new(*samples, *grid, &smooth.iter().collect::<Vec<_>>());
-        let (times, drafted) = time_edits(session, &work)?;
-        enter(&mut costs.edit, work.jobs().len(), times);
-
-        let (mask, latest) = (Mask::default(), latest(&drafted));
-        let view = WorldView { samples: samples.under(&latest), mask: MaskView::new(&mask), grid: *grid };
-        time_meshes(session, costs, &view, &dirty(*grid, &drafted), &drafted)
-    }
-}
-
-/// Enters what an amount took on both.
-fn enter(curves: &mut [Curve; 2], amount: usize, times: [Duration; 2]) {
-    curves.iter_mut().zip(times).for_each(|(curve, time)| curve.push(amount, time));
-}
-
-/// Meshes blocks until all of their surfaces are on the host.
-fn mesh(session: &mut Session, view: &WorldView, blocks: &[Block]) -> Result<(), Fault> {
-    session.mesh(view, blocks, &|| {})?;
-    session.device.wait()
-}
-
-/// How long edits take on both, and the bricks that they change.
-fn time_edits(session: &mut Session, work: &EditWork) -> Result<([Duration; 2], Vec<DraftedBrick>), Fault> {
-    let (on_cpu, ledgers) = shortest(|| Ok(ledgers_of(work)))?;
-    let (on_card, _) = shortest(|| session.edit(work))?;
-    Ok(([on_cpu, on_card], ledgers.into_iter().flat_map(|ledger| ledger.bricks).collect()))
-}
-
-/// Enters how long blocks take on both, until their surfaces are there, wherever that is, as an engine does; and how much
-/// longer where the device has none of their bricks.
-fn time_meshes(
-    session: &mut Session,
-    costs: &mut Costs,
-    view: &WorldView,
-    blocks: &[Block],
-    drafted: &[DraftedBrick],
-) -> Result<(), Fault> {
-    let (on_cpu, ()) = shortest(|| {
-        Cpu.mesh(view, blocks, &|| {}, &mut |_| {});
-        Ok(())
-    })?;
-    let (on_card, ()) = shortest(|| mesh(session, view, blocks))?;
-    enter(&mut costs.mesh, blocks.len(), [on_cpu, on_card]);
-    costs.upload = upload(session, view, blocks, drafted, on_card)?;
     Ok(())
 }
 
-/// The shortest time that something takes, and what it makes. It is done until that makes the time a tenth shorter no
-/// more, or it was done for long enough: the first time makes room for it, and others on the machine disturb. All on a thread
-/// of the pool, as a large transaction runs, whose threads are awake.
-fn shortest<T: Send>(mut work: impl FnMut() -> Result<T, Fault> + Send) -> Result<(Duration, T), Fault> {
-    let mut timed = || {
-        let start = Instant::now();
-        let made = work()?;
-        Ok((start.elapsed(), made))
-    };
-    rayon::scope(|_| {
-        let start = Instant::now();
-        let (mut best, mut made) = timed()?;
-        let mut in_vain = 0;
-        for repeat in 1..MOST_REPEATS {
-            let (took, other) = timed()?;
-            in_vain = if took < best - best / 10 { 0 } else { in_vain + 1 };
-            (best, made) = (best.min(took), other);
-            if in_vain == IN_VAIN || repeat >= IN_VAIN && start.elapsed() > LONG_ENOUGH {
-                break;
-            }
-        }
-        Ok((best, made))
-    })
-}
+/// Compares what so many brushes do.
+fn compare(session: &mut Session, ground: &Ground, count: i32, radius: f32) -> Result<(), Fault> {
+    let none = Bricks::default();
+    let (samples, grid) = (SampleView::new(ground, &none), ChunkGrid::new(32, SIDE, SIDE));
+    let [smooth, rough] = [false, true].map(|is_rough| edits(ground, count, radius, is_rough));
+    let work = EditWork::new(samples, grid, &smooth.iter().collect::<Vec<_>>());
+    compare_edits(session, &work)?;
 
-/// Seconds to bring a brick to the device, by how much longer meshing takes when it has none of these.
-fn upload(
-    session: &mut Session,
-    view: &WorldView,
-    blocks: &[Block],
-    drafted: &[DraftedBrick],
-    without: Duration,
-) -> Result<f64, Fault> {
-    let (with, _) = shortest(|| {
-        drafted.iter().for_each(|drafted| drafted.brick.tag.set(0));
-        mesh(session, view, blocks)
-    })?;
-    Ok(with.saturating_sub(without).as_secs_f64() / drafted.len().max(1) as f64)
+    let work = EditWork::new(samples, grid, &rough.iter().collect::<Vec<_>>());
+    let drafted = compare_edits(session, &work)?;
+    let rules = rules();
+    compare_edits(session, &work.under(Some(&rules)))?;
+
+    let latest = latest(&drafted);
+    let dug = samples.under(&latest);
+    let sculpting = sculpting_edits(ground, count, radius);
+    compare_edits(session, &EditWork::new(dug, grid, &sculpting.iter().collect::<Vec<_>>()))?;
+
+    let mask = Mask::default();
+    let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid };
+    compare_meshes(session, &view, &dirty(grid, &drafted))
 }
 
 /// Ground of noise on both, larger than a block of threads and not of whole ones.
@@ -236,13 +84,14 @@ fn compare_heights(session: &mut Session) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Edits on both.
-fn compare_edits(session: &mut Session, work: &EditWork) -> Result<(), Fault> {
+/// Edits on both, and the bricks that they change.
+fn compare_edits(session: &mut Session, work: &EditWork) -> Result<Vec<DraftedBrick>, Fault> {
     let (expected, found) = (ledgers_of(work), session.edit(work)?);
     let mut effects = vec![EditEffect::default(); work.tools.len()];
     enter_effects(&expected, &mut effects);
     let is_same = effects == found.effects && are_same_ledgers(&expected, &found);
-    is_same.then_some(()).ok_or(Fault::SelfTest)
+    let bricks = expected.into_iter().flat_map(|ledger| ledger.bricks).collect();
+    is_same.then_some(bricks).ok_or(Fault::SelfTest)
 }
 
 /// Blocks meshed on both.
@@ -301,8 +150,7 @@ fn ground() -> Result<Ground, Fault> {
     made.map_err(|error| Fault::Failed(error.to_string()))
 }
 
-/// The middle of a brush at the surface; they lie side by side. A small first one reaches as few bricks as a stroke can:
-/// below the smallest amount that was measured nothing is known.
+/// The middle of a brush at the surface; they lie side by side.
 fn place(ground: &Ground, i: i32, radius: f32) -> Vec3 {
     let (x, z) = (12 + i % 8 * 31, 12 + i / 8 * 29);
     let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;

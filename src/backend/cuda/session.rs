@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use rustc_hash::FxHashMap;
+use web_time::Instant;
 
 use super::cache::{RecordCache, reference};
 use super::device::{Device, Fault, Kernel};
@@ -33,6 +34,11 @@ pub(super) struct Session {
     pub(super) kept: KeptSlabs,
     /// Where the table of cases is.
     pub(super) table: u64,
+    /// When it was trimmed last, and whether anything was launched since.
+    trimmed: Instant,
+    is_used: bool,
+    /// How long memory that is not needed stays.
+    pub(super) keep: Duration,
 }
 
 /// Stacks of the ground on the device. They never change.
@@ -170,6 +176,9 @@ const MANY_STACKS: usize = 64;
 /// How many bricks are looked at to see how many are missing.
 const LOOKS: usize = 128;
 
+/// How long memory stays that is not needed: long enough for a player who pauses, and to pay for allocating it again.
+const KEEP: Duration = Duration::from_secs(30);
+
 /// Of what a device may use, the part for stacks.
 const STACKS_SHARE: usize = 8;
 
@@ -200,6 +209,9 @@ impl Session {
             edit_jobs: Vec::new(),
             kept: KeptSlabs::default(),
             table: address,
+            trimmed: Instant::now(),
+            is_used: true,
+            keep: KEEP,
         })
     }
 
@@ -208,6 +220,29 @@ impl Session {
         self.bricks.clear();
         self.stacks.slots.clear();
         self.stacks.pages.clear();
+    }
+
+    /// Frees memory that was not needed for some time: lists shrink to what was, and bricks go if nothing was launched.
+    pub fn trim(&mut self, now: Instant) -> Result<(), Fault> {
+        if now.saturating_duration_since(self.trimmed) < self.keep {
+            return Ok(());
+        }
+        self.trimmed = now;
+        // After a fault something may be under way.
+        self.device.wait()?;
+        let device = &mut *self.device;
+        let trimmed = self
+            .input
+            .trim(device)
+            .and_then(|()| self.meshes.lists_mut().into_iter().try_for_each(|list| list.trim(device)))
+            .and_then(|()| self.edits.lists_mut().into_iter().try_for_each(|list| list.trim(device)));
+        if !std::mem::take(&mut self.is_used) {
+            self.bricks.release(device);
+            self.stacks.slots.release(device);
+            self.stacks.pages = FxHashMap::default();
+        }
+        // Without memory for shorter lists, long ones stay.
+        trimmed.or_else(|fault| if fault.is_passing() { Ok(()) } else { Err(fault) })
     }
 
     /// How long the device took for what was done last: uploads and kernels, and the kernel alone.
@@ -252,6 +287,7 @@ impl Session {
 
     /// Begins a launch: what it finds or takes stays where it is until the next one.
     pub(super) fn begin(&mut self) {
+        self.is_used = true;
         self.bricks.begin();
         self.stacks.slots.begin();
     }

@@ -54,6 +54,12 @@ impl EditOutput {
         })
     }
 
+    /// All lists whose length depends on what there is to do.
+    pub fn lists_mut(&mut self) -> [&mut OutputList; 5] {
+        let Self { results, records, materials, parts, counts, totals: _ } = self;
+        [results, records, materials, parts, counts]
+    }
+
     /// Room for all that; says whether there was too little.
     pub(super) fn reserve(
         &mut self,

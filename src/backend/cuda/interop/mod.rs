@@ -81,8 +81,9 @@ use cudarc::driver::CudaContext;
 
 use super::device::{Device, Fault};
 use super::driver::Card;
+use super::self_test;
 use super::session::Session;
-use super::{MOST, SHARE, self_test};
+use crate::backend::CardChoice;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
 use imported::Imported;
@@ -148,9 +149,9 @@ impl SharedCard {
     pub fn open(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Self, InteropError> {
         let uuid = vulkan::uuid(device)?;
         let no_card = |fault: Fault| InteropError::NoCard(fault.to_string());
-        let mut card = Card::open_uuid(uuid).map_err(no_card)?;
+        let mut card = Card::open(&CardChoice::Uuid(uuid), None).map_err(no_card)?;
         let context = card.context();
-        let budget = (card.free_memory() / SHARE).min(MOST);
+        let budget = (card.free_memory() / 4).min(1 << 30);
         let mut session = Session::new(Box::new(card), budget)?;
         self_test::run(&mut session, self_test::FULL).map_err(no_card)?;
         Ok(Self { session, context, device: device.clone(), queue: queue.clone() })

@@ -51,6 +51,12 @@ impl MeshOutput {
         })
     }
 
+    /// All lists.
+    pub fn lists_mut(&mut self) -> [&mut OutputList; 5] {
+        let Self { results, lists: MeshLists { positions, normals, mixes, indices } } = self;
+        [results, positions, normals, mixes, indices]
+    }
+
     /// What the kernel wanted to write for the blocks of each piece and all before it.
     pub(super) fn extents(&self, blocks: usize) -> Vec<Extent> {
         let of = |results: &&[MeshResult]| results.iter().fold(Extent::default(), Extent::with);

@@ -6,6 +6,8 @@
 mod chosen;
 mod drivers;
 mod faults;
+mod memory;
+mod opening;
 mod room;
 mod same;
 
@@ -29,21 +31,26 @@ pub(super) mod worlds;
 
 /// A device to test, if there is any. A card that is there is tested, or nothing is.
 pub(super) fn device() -> Option<Box<dyn Device>> {
-    match Card::open() {
+    match Card::open(&CardChoice::Default, None) {
         Ok(card) => Some(Box::new(card)),
         Err(Fault::NoDriver | Fault::NoDevice(_)) => Some(Box::new(Emulator::start()?)),
         Err(fault) => panic!("the card can't be tested: {fault}"),
     }
 }
 
-/// An engine that does everything on a device, small as it may be.
-fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
-    let engine = Engine::from_cuda(Cuda::open_with(
-        false,
-        Some(budget),
-        self_test::Sizes::few(&[(4, 3.0)], None),
-        || Ok(device),
-    ));
+/// Bricks and ground may take so many bytes, and all else as much as it wants.
+pub(super) fn limits(records: usize) -> Limits {
+    Limits { device: Some(usize::MAX), records: Some(records), host: usize::MAX }
+}
+
+/// A device that does everything, small as it may be.
+fn cuda(device: Box<dyn Device>, limits: Limits) -> Cuda {
+    Cuda::with_device(false, limits, &[(4, 3.0)], |_| Ok(device))
+}
+
+/// An engine that does everything on a device, which is open.
+fn engine(device: Box<dyn Device>, records: usize) -> Engine {
+    let engine = Engine::from_cuda(cuda(device, limits(records)));
     engine.wait(Duration::from_secs(60));
     engine
 }

@@ -16,7 +16,7 @@ fn worlds_of_a_device_are_those_of_the_processor() {
     let figures = engine.figures();
     assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
     assert!(figures.cuda > figures.cpu * 20, "{figures:?}");
-    assert!(!figures.trial.is_zero());
+    assert!(!figures.opening.is_zero());
     println!("{worlds} worlds, {} stages on the device", figures.cuda);
 }
 
