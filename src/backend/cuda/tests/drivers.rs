@@ -132,7 +132,10 @@ fn wait_for_a_slow_card() {
     let mark = card.mark().expect("a mark");
     mark.wait().expect("the card works");
     let (took, busy) = (start.elapsed(), processor_time().expect("as before") - before);
-    assert!(took > Duration::from_millis(120) && busy < took / 6, "{busy:?} busy of {took:?}");
+    assert!(
+        took > Duration::from_millis(120) && busy < Duration::from_millis(5),
+        "{busy:?} busy of {took:?}"
+    );
 }
 
 #[test]
