@@ -179,7 +179,7 @@ fn loads_are_of_the_kinds_that_take_their_own_time() {
         let (view, grid) = (terrain.world().samples(), terrain.world().grid());
         Load::of_edits(&EditWork::new(view, grid, &edits.iter().collect::<Vec<_>>()))
     };
-    let [one, two] = [load(&[dig.clone()]), load(&[dig.clone(), dig.clone()])];
+    let [one, two] = [load(std::slice::from_ref(&dig)), load(&[dig.clone(), dig.clone()])];
     assert_eq!([one.kind, two.kind], [Kind::Edit; 2]);
     assert_eq!(two.amount, 2 * one.amount);
     assert_eq!(load(&[dig.clone().with_roughness(Roughness::new(1.0, 4.0, 1))]).kind, Kind::Rough);
