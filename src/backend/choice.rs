@@ -11,7 +11,8 @@ pub enum Stage {
     Mesh,
 }
 
-/// How long a stage may take on either backend.
+/// How long a stage may take on either backend, by what such stages took lately. Where none was timed, no more is known than
+/// that it takes no less than this.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Estimate {
     /// On the processor.
@@ -30,8 +31,8 @@ pub struct Choice {
     /// Bricks and stacks of the ground that the card does not have yet, roughly; 0 where nobody looked, as it was the
     /// processor's even if the card had them all.
     pub missing: usize,
-    /// What was expected, for edits with the meshing that follows; `None` where the card is not there, busy, or
-    /// could not do it.
+    /// What was expected, for edits with the meshing that follows; `None` where nothing had to be chosen: the card is not
+    /// there, busy, could not do it, or does all.
     pub estimate: Option<Estimate>,
     /// Was it the card?
     pub is_cuda: bool,

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use web_time::Instant;
 
-use super::{Backend, Choice, Compute, Cpu, Stage, lock};
+use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, Stage, lock};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
@@ -19,8 +19,9 @@ use super::cuda::Cuda;
 
 /// What transactions run on; clones share it, and so may any number of terrains.
 ///
-/// A card is opened and measured in the background, which takes some tenths of a second. One that fails, then or later, is
-/// given up with one warning, and the processor goes on; no edit is lost.
+/// A new engine costs nothing. A card is opened when a transaction comes that it could be worth, in the background, and
+/// compared with the processor bit by bit before it is used, which takes some tenths of a second. One that fails, then or
+/// later, is given up with one warning, and the processor goes on; no edit is lost.
 #[derive(Clone)]
 pub struct Engine(Arc<Shared>);
 
@@ -44,6 +45,8 @@ const REMEMBERED: usize = 64;
 pub enum EngineState {
     /// The processor.
     Cpu,
+    /// The processor, as no transaction came yet that wants a card.
+    Unopened,
     /// The processor, while a card is being opened.
     Opening,
     /// A card of this name, beside the processor.
@@ -55,9 +58,13 @@ pub enum EngineState {
 /// What an engine did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EngineFigures {
-    /// How long a card was tried out, in the background before it was used: compared with the processor bit by bit, and
-    /// timed beside it. Zero until it has passed, and where there is no card that did.
-    pub trial: Duration,
+    /// How long it took to open a card and to compare it with the processor bit by bit, in the background before it was used.
+    /// Zero until it has passed, and where there is no card that did.
+    pub opening: Duration,
+    /// Bytes that are allocated on the card now.
+    pub device_memory: usize,
+    /// Bytes of pinned memory of the host, which the card copies from and to.
+    pub pinned_memory: usize,
     /// Stages of transactions done on the processor.
     pub cpu: u64,
     /// Stages of transactions done on a card.
@@ -76,13 +83,29 @@ impl Default for Engine {
 impl Engine {
     /// An engine. Without the feature `cuda` all of them run on the processor.
     pub fn new(backend: Backend) -> Self {
+        Self::with_settings(&EngineSettings { backend, ..EngineSettings::default() })
+    }
+
+    /// An engine with these settings.
+    pub fn with_settings(settings: &EngineSettings) -> Self {
         #[cfg(not(feature = "cuda"))]
-        let _ = backend;
+        let _ = settings;
         Self(Arc::new(Shared {
             #[cfg(feature = "cuda")]
-            cuda: (backend != Backend::Cpu).then(|| Cuda::open(backend == Backend::Auto)),
+            cuda: (settings.backend != Backend::Cpu).then(|| Cuda::new(settings)),
             figures: Mutex::default(),
         }))
+    }
+
+    /// Says which card to open where the settings leave it open ([`CardChoice::Default`]) and none is open yet: for games,
+    /// the renderer's own. If CUDA has no such card, the first one is opened.
+    pub fn suggest_card(&self, card: CardChoice) {
+        #[cfg(feature = "cuda")]
+        if let Some(cuda) = &self.0.cuda {
+            cuda.suggest(card);
+        }
+        #[cfg(not(feature = "cuda"))]
+        let _ = card;
     }
 
     #[cfg(all(test, feature = "cuda"))]
@@ -99,9 +122,14 @@ impl Engine {
         EngineState::Cpu
     }
 
-    /// Waits until it is known whether a card can be used, but no longer than that. Tools and benchmarks want this.
+    /// Opens the card now, and waits until it is known whether it can be used, but no longer than that. Tools and benchmarks
+    /// want this.
     pub fn wait(&self, longest: Duration) -> EngineState {
         let start = Instant::now();
+        #[cfg(feature = "cuda")]
+        if let Some(cuda) = &self.0.cuda {
+            cuda.open();
+        }
         while self.state() == EngineState::Opening && start.elapsed() < longest {
             std::thread::sleep(Duration::from_millis(2));
         }
@@ -112,16 +140,28 @@ impl Engine {
     pub fn figures(&self) -> EngineFigures {
         let figures = lock(&self.0.figures).clone();
         #[cfg(feature = "cuda")]
-        let figures =
-            EngineFigures { trial: self.0.cuda.as_ref().map_or(Duration::ZERO, Cuda::trial), ..figures };
+        if let Some(cuda) = &self.0.cuda {
+            let ([device_memory, pinned_memory], opening) = (cuda.memory(), cuda.opening());
+            return EngineFigures { opening, device_memory, pinned_memory, ..figures };
+        }
         figures
+    }
+
+    /// Frees memory of the card, and pinned memory, that was not needed in the last half minute; does nothing while the card is
+    /// in use. Every transaction does the same, so this is for games in which there may be none for long. May take some
+    /// milliseconds, so not on the main thread.
+    pub fn trim(&self) {
+        #[cfg(feature = "cuda")]
+        if let Some(cuda) = &self.0.cuda {
+            cuda.trim();
+        }
     }
 
     /// Ground of `width` x `depth` cells from noise: the same, bit by bit, as [`Ground::from_noise`] makes.
     ///
-    /// The card makes it if it is there and free; with [`Backend::Auto`] only from 2^18 columns on, as small worlds are made
-    /// faster than a card gets ready for them. In all other cases, and where the card fails, the processor makes it. Who
-    /// wants the card for the first world has to [`wait`](Self::wait) until it is open.
+    /// The card makes it if it is open and free; with [`Backend::Auto`] only from 2^18 columns on, as small worlds are made
+    /// faster than a card gets ready for them. In all other cases, and where the card fails, the processor makes it. To have
+    /// the card make the first world, [`wait`](Self::wait) until it is open.
     ///
     /// # Errors
     /// Those of [`Ground::from_noise`].
@@ -173,13 +213,13 @@ impl Compute for Shared {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let (ledger, load) = cuda.edit(work, &mut choice);
-            match ledger {
+            let mut offered = cuda.edit(work, &mut choice);
+            match offered.done.take() {
                 Some(ledger) => each(&mut [ledger]),
                 None => Cpu.edit(work, each),
             }
             choice.took = start.elapsed();
-            cuda.learn(&choice, load);
+            cuda.learn(&choice, &offered);
             return self.remember(choice);
         }
         Cpu.edit(work, each);
@@ -202,12 +242,12 @@ impl Compute for Shared {
         };
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let (waited, load) = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
-            if waited.is_none() {
+            let offered = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
+            if offered.done.is_none() {
                 Cpu.mesh(view, blocks, meanwhile, &mut then);
             }
-            choice.took = took + waited.unwrap_or_default();
-            cuda.learn(&choice, load);
+            choice.took = took + offered.done.unwrap_or_default();
+            cuda.learn(&choice, &offered);
             return self.remember(choice);
         }
         Cpu.mesh(view, blocks, meanwhile, &mut then);

@@ -18,6 +18,7 @@ mod cpu;
 #[cfg(feature = "cuda")]
 mod cuda;
 mod engine;
+mod settings;
 
 #[cfg(all(feature = "interop", target_os = "linux"))]
 pub use cuda::interop;
@@ -25,6 +26,7 @@ pub use cuda::interop;
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
 pub use engine::{Engine, EngineFigures, EngineState};
+pub use settings::{CardChoice, EngineSettings};
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -36,14 +38,14 @@ use crate::volume::{EditWork, Ledger};
 /// What an [`Engine`] may run on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Backend {
-    /// Whichever is faster, by measurement, for each stage of a transaction; now and then the other one, to see what it takes
-    /// by now. Until a card is found and measured, and where there is none, the processor.
+    /// Whichever was faster lately for such a stage of a transaction; occasionally the other one, to time it again. The card is
+    /// opened when transactions come that it could be worth; until then, and where there is none, the processor.
     #[default]
     Auto,
     /// The processor.
     Cpu,
-    /// A CUDA card for all transactions, small ones too, as soon as it is found and whenever no other terrain uses it. Where
-    /// there is none, the processor.
+    /// A CUDA card for all transactions, small ones too, unless another terrain uses it. The first transaction opens it; until
+    /// it is open, and where there is none, the processor.
     Cuda,
 }
 
@@ -66,7 +68,7 @@ pub(crate) trait Compute: Send + Sync {
     );
 }
 
-/// Takes a lock. Who panicked with it had what is in it to read, or had finished writing.
+/// Takes a lock. Poisoning is ignored: a panicking holder leaves the value valid.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -178,6 +178,7 @@ fn memory(ui: &mut Ui, counts: &Counts) {
 fn engine(ui: &mut Ui, state: &EngineState, [cpu, cuda]: [u64; 2], last: Option<&Choice>) {
     match state {
         EngineState::Cpu => figure(ui, "Backend", "processor"),
+        EngineState::Unopened => figure(ui, "Backend", "processor, no card opened yet"),
         EngineState::Opening => figure(ui, "Backend", "processor, opening a card"),
         EngineState::Cuda(name) => figure_in(ui, "Backend", name, GOOD),
         EngineState::Lost(why) => {

@@ -1,6 +1,6 @@
 //! A CUDA card, through its driver.
 //!
-//! All of the crate's unsafe code is here, and in `interop` where that is built, but for what tests have (`mapped`). Addresses
+//! All of the crate's unsafe code is here, and in `interop` where that is built, but for what tests have (`zero_copy`). Addresses
 //! come from the driver and are handed back to it alone; what kernels do with them is bounded by the capacities they are given.
 #![allow(unsafe_code)]
 
@@ -13,9 +13,11 @@ use cudarc::driver::sys::{self, CUfunction};
 use cudarc::driver::{CudaContext, CudaEvent, CudaStream, DriverError, result};
 
 use rustc_hash::FxHashSet;
+use web_time::Instant;
 
 use super::device::{Device, Fault, HostMemory, Kernel, Mark};
 use super::layout::THREADS;
+use crate::backend::CardChoice;
 
 /// The kernels, compiled ahead.
 const PTX: &str = include_str!("kernels.ptx");
@@ -58,37 +60,69 @@ fn no_memory(bytes: usize) -> impl Fn(DriverError) -> Fault {
     }
 }
 
+/// The same, while a card is looked for.
+fn no_device(error: DriverError) -> Fault {
+    match failed(error) {
+        Fault::Failed(name) => Fault::NoDevice(name),
+        fault => fault,
+    }
+}
+
+/// The number of a card; `None` where CUDA has no such card. Only to be called once the driver is known to be there.
+fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
+    // Where there is no card at all, that is what to say.
+    let count = CudaContext::device_count().map_err(no_device)?;
+    let find = |is: &dyn Fn(sys::CUdevice) -> Result<bool, Fault>| {
+        for number in 0..count {
+            if is(result::device::get(number).map_err(no_device)?)? {
+                return Ok(Some(number as usize));
+            }
+        }
+        Ok(None)
+    };
+    match card {
+        CardChoice::Default => Ok((count > 0).then_some(0)),
+        CardChoice::Ordinal(number) => {
+            Ok((i64::from(*number) < i64::from(count)).then_some(*number as usize))
+        }
+        CardChoice::Uuid(uuid) => find(&|device| {
+            let own = result::device::get_uuid(device).map_err(no_device)?;
+            Ok(own.bytes.map(|byte| byte as u8) == *uuid)
+        }),
+        CardChoice::PciBusId(id) => {
+            let Ok(id) = CString::new(id.as_str()) else { return Ok(None) };
+            let mut wanted = 0;
+            // SAFETY: the text ends with a zero byte, and `wanted` is written at most.
+            match unsafe { sys::cuDeviceGetByPCIBusId(&mut wanted, id.as_ptr()) }.result() {
+                Ok(()) => find(&|device| Ok(device == wanted)),
+                Err(DriverError(
+                    sys::CUresult::CUDA_ERROR_INVALID_DEVICE | sys::CUresult::CUDA_ERROR_INVALID_VALUE,
+                )) => Ok(None),
+                Err(error) => Err(no_device(error)),
+            }
+        }
+    }
+}
+
 impl Card {
-    /// Opens the first card.
-    pub fn open() -> Result<Self, Fault> {
-        Self::open_with(PTX)
+    /// Opens a card; of those that nobody chose, the one that is suggested, if CUDA has it.
+    pub fn open(card: &CardChoice, suggested: Option<&CardChoice>) -> Result<Self, Fault> {
+        Self::open_with(card, suggested, PTX)
     }
 
     /// The same with other kernels.
-    pub fn open_with(ptx: &str) -> Result<Self, Fault> {
-        Self::open_number(0, ptx)
-    }
-
-    /// Opens the card that has this UUID.
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub fn open_uuid(uuid: [u8; 16]) -> Result<Self, Fault> {
-        // SAFETY: as in `open_number`.
+    pub fn open_with(card: &CardChoice, suggested: Option<&CardChoice>, ptx: &str) -> Result<Self, Fault> {
+        // SAFETY: loads the driver's library to see whether it is there, as every later call does.
         if !unsafe { sys::is_culib_present() } {
             return Err(Fault::NoDriver);
         }
-        let no_device = |error: DriverError| match failed(error) {
-            Fault::Failed(name) => Fault::NoDevice(name),
-            fault => fault,
+        let suggested = suggested.filter(|_| *card == CardChoice::Default);
+        let number = match suggested.map(number_of).transpose()?.flatten() {
+            Some(number) => Some(number),
+            None => number_of(card)?,
         };
-        let count = CudaContext::device_count().map_err(no_device)?;
-        for number in 0..count {
-            let device = result::device::get(number).map_err(no_device)?;
-            let own = result::device::get_uuid(device).map_err(no_device)?;
-            if own.bytes.map(|byte| byte as u8) == uuid {
-                return Self::open_number(number as usize, PTX);
-            }
-        }
-        Err(Fault::NoDevice(format!("none of {count} is the one asked for")))
+        let number = number.ok_or_else(|| Fault::NoDevice(format!("{card:?} is none of CUDA's")))?;
+        Self::open_number(number, ptx)
     }
 
     /// What belongs to the card's context may be made in it.
@@ -97,15 +131,8 @@ impl Card {
         Arc::clone(&self.context)
     }
 
+    /// Opens the card of this number. Only to be called once the driver is known to be there.
     fn open_number(number: usize, ptx: &str) -> Result<Self, Fault> {
-        // SAFETY: loads the driver's library to see whether it is there, as every later call does.
-        if !unsafe { sys::is_culib_present() } {
-            return Err(Fault::NoDriver);
-        }
-        let no_device = |error: DriverError| match failed(error) {
-            Fault::Failed(name) => Fault::NoDevice(name),
-            fault => fault,
-        };
         let context = CudaContext::new(number).map_err(no_device)?;
         let (major, minor) = context.compute_capability().map_err(failed)?;
         if (major, minor) < (7, 5) {
@@ -125,8 +152,7 @@ impl Card {
             *function = unsafe { result::module::get_function(module, name) }.map_err(refused)?;
         }
         let stream = context.new_stream().map_err(failed)?;
-        let mark = || context.new_event(Some(sys::CUevent_flags::CU_EVENT_DEFAULT)).map_err(failed);
-        let (done, marks) = (mark()?, [mark()?, mark()?]);
+        let (done, marks) = (event(&context)?, [event(&context)?, event(&context)?]);
         Ok(Self {
             context,
             stream,
@@ -236,15 +262,25 @@ impl Mark for Passed {
     }
 }
 
-/// Waits until an event has happened. Small transactions take less time than a sleeping thread needs to wake.
+/// An event. Whoever waits for it sleeps, as it is made for that; without the flag the driver lets threads spin.
+fn event(context: &Arc<CudaContext>) -> Result<CudaEvent, Fault> {
+    context.new_event(Some(sys::CUevent_flags::CU_EVENT_BLOCKING_SYNC)).map_err(failed)
+}
+
+/// How long a thread asks again and again before it sleeps: about twice as long as it takes to wake it. Small transactions
+/// are done before.
+const SPIN: Duration = Duration::from_micros(100);
+
+/// Waits until an event has happened.
 fn wait_for(event: &CudaEvent) -> Result<(), Fault> {
-    for _ in 0..20_000 {
-        if event.try_is_complete().map_err(failed)? {
-            return Ok(());
+    let start = Instant::now();
+    while !event.try_is_complete().map_err(failed)? {
+        if start.elapsed() > SPIN {
+            return event.synchronize().map_err(failed);
         }
         std::hint::spin_loop();
     }
-    event.synchronize().map_err(failed)
+    Ok(())
 }
 
 impl Device for Card {
@@ -336,7 +372,7 @@ impl Device for Card {
 
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
         self.bind()?;
-        let event = self.context.new_event(None).map_err(failed)?;
+        let event = event(&self.context)?;
         event.record(&self.stream).map_err(failed)?;
         Ok(Box::new(Passed { context: Arc::clone(&self.context), event }))
     }

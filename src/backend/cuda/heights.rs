@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::device::{Device, Fault, HostMemory, Kernel};
 use super::layout::{COLUMNS, HeightsParams};
-use super::mail::Plan;
 use super::session::Session;
-use super::{Cuda, Place, guarded, try_lock};
+use super::staging::Plan;
+use super::{Cuda, guarded, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
 /// Columns from which on the device is taken to be the faster of both: so many take 16 threads 3.3 ms, and an H200 0.7 to 2.
@@ -28,9 +28,12 @@ impl Cuda {
         if self.is_auto && terms.columns() < LEAST {
             return None;
         }
+        if !self.is_auto {
+            self.open();
+        }
         let heights = {
-            let mut place = try_lock(&self.slot)?;
-            let Place::Open(session, _) = &mut *place else { return None };
+            let mut place = try_lock(&self.shared.session)?;
+            let session = place.as_mut()?;
             // Nobody touches this memory before the threads that fill it.
             let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
             // As transactions have it: a driver may do anything.
@@ -73,12 +76,12 @@ impl Session {
     ) -> Result<(), Fault> {
         let mut plan = Plan::default();
         let tables = plan.section::<[u8; 256]>(terms.tables.len());
-        self.inbox.open(&mut *self.device, &plan)?;
+        self.input.open(&mut *self.device, &plan)?;
         // Where memory is short, that must show before anything is under way.
         let mut buffers = Buffers::new(&mut *self.device, heights.len().min(slice) * size_of::<i32>())?;
-        self.inbox.put(tables, &terms.tables);
-        let params = HeightsParams { heights: buffers.own, ..params(terms, self.inbox.address(tables)) };
-        let sent = self.inbox.send(&mut *self.device, &plan);
+        self.input.put(tables, &terms.tables);
+        let params = HeightsParams { heights: buffers.own, ..params(terms, self.input.address(tables)) };
+        let sent = self.input.send(&mut *self.device, &plan);
         let filled = sent.and_then(|()| fill(&mut *self.device, params, &mut buffers, heights, slice));
         // Whatever is under way goes to buffers that are freed now.
         let ended = self.device.wait();
@@ -141,7 +144,7 @@ fn params(terms: &NoiseTerms, tables: u64) -> HeightsParams {
 mod tests {
     use fastrand::Rng;
 
-    use super::super::tests::{device, worlds};
+    use super::super::tests::{device, limits, worlds};
     use super::*;
     use crate::ground::{MAX_OCTAVES, MAX_SCALE, MAX_SIZE};
 
@@ -249,12 +252,8 @@ mod tests {
     fn a_card_makes_ground_where_that_pays_and_never_keeps_anyone_waiting() {
         let open = |is_auto| {
             let device = device()?;
-            let cuda = Cuda::open_with(
-                is_auto,
-                Some(64 << 20),
-                super::super::trial::Sizes::few(&[(1, 2.0)], None),
-                || Ok(device),
-            );
+            let cuda = Cuda::with_device(is_auto, limits(64 << 20), &[(1, 2.0)], |_| Ok(device));
+            cuda.open();
             while cuda.state() == crate::backend::EngineState::Opening {
                 std::thread::sleep(std::time::Duration::from_millis(2));
             }
@@ -265,7 +264,7 @@ mod tests {
         assert!(auto.ground(511, 510, &noise).is_none());
         assert_eq!(auto.ground(511, 511, &noise), Ground::from_noise(511, 511, &noise).ok());
         assert_eq!(always.ground(1, 1, &noise), Ground::from_noise(1, 1, &noise).ok());
-        let _taken = super::super::lock(&always.slot);
+        let _taken = super::super::lock(&always.shared.session);
         assert!(always.ground(1, 1, &noise).is_none());
     }
 }

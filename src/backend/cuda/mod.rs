@@ -12,16 +12,18 @@
 //! next one reads it. A fault in the middle leaves the runs that came back as they are, and the processor does the rest.
 //!
 //! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
-//! - [`session`](self::session) keeps bricks and heights on it, with a budget; `slots` says where, and which go first.
+//! - [`session`](self::session) keeps bricks and heights on it, with a budget; `cache` says where, and which go first.
 //! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
 //!   Surfaces are not unpacked: whoever draws them takes them from where they arrived, by `surfaces`.
 //! - `heights` makes new ground of noise.
-//! - `trial` compares the device with the processor, and measures both.
+//! - `self_test` compares the device with the processor, before anything that it makes is used.
+//! - `memory` keeps to the budgets of the settings.
 //!
-//! A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
+//! Nothing is opened until a stage wants the card; then a thread does that, and ends. A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
 //! processor, so nobody ever waits for the device but the task that uses it. It is held until surfaces are drawn, which lie
 //! in its memory.
 
+mod cache;
 mod device;
 mod driver;
 mod edit;
@@ -30,24 +32,24 @@ mod heights;
 pub mod interop;
 mod layout;
 mod lists;
-mod mail;
+mod memory;
 mod mesh;
+mod self_test;
 mod session;
-mod slots;
+mod staging;
 mod surfaces;
-mod trial;
 mod windows;
 
+#[cfg(test)]
+mod async_copies;
 #[cfg(test)]
 mod emulator;
 #[cfg(test)]
 mod kernel_tests;
 #[cfg(test)]
-mod late;
-#[cfg(test)]
-mod mapped;
-#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod zero_copy;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -57,40 +59,62 @@ use std::time::Duration;
 use web_time::Instant;
 
 use super::costs::{Costs, Load};
-use super::{Choice, EngineState, lock};
+use super::settings::{CardChoice, EngineSettings};
+use super::{Backend, Choice, EngineState, lock};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
 use crate::volume::{EditWork, Ledger};
 use device::{Device, Fault};
+use memory::{Limits, Usage};
 use session::Session;
 
-/// A card beside the processor.
+/// A card beside the processor. It is opened when it is first wanted.
 pub(super) struct Cuda {
     /// Is the faster of both taken? Else the card is, whenever it can be.
     is_auto: bool,
-    slot: Arc<Mutex<Place>>,
-    /// What became of opening it, to be asked at any time.
-    state: Arc<Mutex<EngineState>>,
-    /// How long the trial took, when it is over.
-    trial: Arc<OnceLock<Duration>>,
+    /// Opens the device; nothing once that has begun.
+    opener: Mutex<Option<Opener>>,
+    /// The card that the game suggests where the settings leave it open.
+    suggested: Mutex<Option<CardChoice>>,
+    shared: Arc<Shared>,
+    /// What both took, with [`Backend::Auto`].
+    costs: Mutex<Costs>,
     /// Was it said that something was too much for the card?
     has_passed: AtomicBool,
 }
 
-/// Where the session is.
-enum Place {
-    Opening,
-    Open(Box<Session>, Box<Costs>),
-    Lost,
+/// What the thread that opens a device has in common with those that use it.
+struct Shared {
+    /// Only who holds this uses the device. Nothing until it is open, and once it is lost.
+    session: Mutex<Option<Box<Session>>>,
+    /// What became of opening it, to be asked at any time.
+    state: Mutex<EngineState>,
+    /// How long opening and the self-test took, once it has passed.
+    opening: OnceLock<Duration>,
+    usage: Arc<Usage>,
 }
 
-/// Of a device's free memory, the part that bricks and ground may take.
-const SHARE: usize = 4;
-/// And the most of it.
-const MOST: usize = 1 << 30;
+/// How a device is opened.
+struct Opener {
+    device: Box<dyn FnOnce(Option<CardChoice>) -> Result<Box<dyn Device>, Fault> + Send>,
+    limits: Limits,
+    /// What is compared before it is used.
+    sizes: self_test::Sizes,
+}
 
-/// The same, unless somebody else has it now. Who panicked with it had what is in it to read, and changed nothing.
+/// What became of a stage that was offered to the card.
+pub(super) struct Offered<T> {
+    /// What the card made of it; else the processor has to do it.
+    pub done: Option<T>,
+    load: Load,
+    /// Did the card begin?
+    was_tried: bool,
+    /// Was memory of the host allocated for the card?
+    has_grown: bool,
+}
+
+/// The same, unless somebody else has it now. Poisoning is ignored, as in `lock`.
 fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
     match mutex.try_lock() {
         Ok(guard) => Some(guard),
@@ -100,62 +124,92 @@ fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
 }
 
 impl Cuda {
-    /// Opens the first card, in the background.
-    pub fn open(is_auto: bool) -> Self {
-        Self::open_with(is_auto, None, trial::FULL, || Ok(Box::new(driver::Card::open()?)))
+    /// The card of these settings, which is not opened yet.
+    pub fn new(settings: &EngineSettings) -> Self {
+        let card = settings.card.clone();
+        let device = move |suggested: Option<CardChoice>| -> Result<Box<dyn Device>, Fault> {
+            Ok(Box::new(driver::Card::open(&card, suggested.as_ref())?))
+        };
+        let limits = Limits::new(settings);
+        Self::with_device(settings.backend == Backend::Auto, limits, self_test::FULL, device)
     }
 
-    /// Opens some device, in the background; bricks and ground may take so many bytes of it.
-    fn open_with(
+    /// Some device, which is not opened yet.
+    fn with_device(
         is_auto: bool,
-        budget: Option<usize>,
-        sizes: trial::Sizes,
-        device: impl FnOnce() -> Result<Box<dyn Device>, Fault> + Send + 'static,
+        limits: Limits,
+        sizes: self_test::Sizes,
+        device: impl FnOnce(Option<CardChoice>) -> Result<Box<dyn Device>, Fault> + Send + 'static,
     ) -> Self {
-        let own = Self {
+        Self {
             is_auto,
-            slot: Arc::new(Mutex::new(Place::Opening)),
-            state: Arc::new(Mutex::new(EngineState::Opening)),
-            trial: Arc::default(),
+            opener: Mutex::new(Some(Opener { device: Box::new(device), limits, sizes })),
+            suggested: Mutex::default(),
+            shared: Arc::new(Shared {
+                session: Mutex::default(),
+                state: Mutex::new(EngineState::Unopened),
+                opening: OnceLock::new(),
+                usage: Arc::default(),
+            }),
+            costs: Mutex::default(),
             has_passed: AtomicBool::default(),
-        };
-        let (slot, state, took) = (Arc::clone(&own.slot), Arc::clone(&own.state), Arc::clone(&own.trial));
+        }
+    }
+
+    /// Opens the device in the background, unless that was begun before.
+    pub fn open(&self) {
+        let mut opener = lock(&self.opener);
+        let Some(own) = opener.take() else { return };
+        *lock(&self.shared.state) = EngineState::Opening;
+        drop(opener);
+        let (shared, suggested) = (Arc::clone(&self.shared), lock(&self.suggested).take());
         let open = move || {
-            let open = || {
-                let mut device = device()?;
-                let budget = budget.unwrap_or_else(|| (device.free_memory() / SHARE).min(MOST));
-                let mut session = Session::new(device, budget)?;
-                let start = Instant::now();
-                let costs = trial::run(&mut session, sizes)?;
-                took.get_or_init(|| start.elapsed());
-                session.forget();
-                Ok((session, costs))
-            };
-            match guarded(open) {
-                Ok((session, costs)) => {
+            let start = Instant::now();
+            match guarded(|| own.open(suggested, &shared.usage)) {
+                Ok(session) => {
                     let name = session.name();
+                    shared.opening.get_or_init(|| start.elapsed());
                     // Nobody may lose it before it is said to be there.
-                    let mut place = lock(&slot);
-                    *place = Place::Open(Box::new(session), Box::new(costs));
-                    *lock(&state) = EngineState::Cuda(name);
+                    let mut place = lock(&shared.session);
+                    *place = Some(Box::new(session));
+                    *lock(&shared.state) = EngineState::Cuda(name);
                 }
-                Err(fault) => lose(&mut lock(&slot), &state, &fault),
+                Err(fault) => shared.lose(&mut lock(&shared.session), &fault),
             }
         };
         let thread = std::thread::Builder::new().name("burrow-cuda".into()).spawn(open);
         if let Err(error) = thread {
-            lose(&mut lock(&own.slot), &own.state, &Fault::Failed(error.to_string()));
+            self.shared.lose(&mut lock(&self.shared.session), &Fault::Failed(error.to_string()));
         }
-        own
+    }
+
+    /// Says which card to open where the settings leave it open.
+    pub fn suggest(&self, card: CardChoice) {
+        *lock(&self.suggested) = Some(card);
     }
 
     pub fn state(&self) -> EngineState {
-        lock(&self.state).clone()
+        lock(&self.shared.state).clone()
     }
 
-    /// How long the card was tried out; zero until it has passed.
-    pub fn trial(&self) -> Duration {
-        self.trial.get().copied().unwrap_or_default()
+    /// How long opening the card and its self-test took; zero until it has passed.
+    pub fn opening(&self) -> Duration {
+        self.shared.opening.get().copied().unwrap_or_default()
+    }
+
+    /// Bytes on the device and of pinned memory.
+    pub fn memory(&self) -> [usize; 2] {
+        self.shared.usage.bytes()
+    }
+
+    /// Frees what was not needed lately, unless the card is in use.
+    pub fn trim(&self) {
+        if let Some(mut place) = try_lock(&self.shared.session)
+            && let Some(session) = &mut *place
+        {
+            let trimmed = guarded(|| session.trim(Instant::now()));
+            trimmed.unwrap_or_else(|fault| self.meet(&mut place, &fault));
+        }
     }
 
     /// Does a stage on the card if that is there, free and chosen; else the processor has to do it. `then` makes something
@@ -167,67 +221,94 @@ impl Cuda {
     fn offer<T, R>(
         &self,
         choice: &mut Choice,
-        mut load: Load,
+        load: Load,
         missing: impl FnOnce(&Session) -> usize,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
         then: impl FnOnce(&mut Session, T) -> Result<R, Fault>,
-    ) -> (Option<R>, Load) {
+    ) -> Offered<R> {
+        let mut offered = Offered { done: None, load, was_tried: false, has_grown: false };
+        if load.amount == 0 {
+            return offered;
+        }
+        if !self.is_auto {
+            self.open();
+        }
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
-        let Some(mut place) = try_lock(&self.slot) else { return (None, load) };
-        let Place::Open(session, costs) = &mut *place else { return (None, load) };
-        let mut is_chosen = |load: Load| {
-            let (estimate, is_chosen) = costs.choose(choice.stage, load);
-            (choice.missing, choice.estimate) = (load.missing, Some(estimate));
-            load.amount > 0 && (is_chosen || !self.is_auto)
-        };
-        // Whatever is missing only makes the card slower, so small transactions need not look for it.
-        if !is_chosen(load) {
-            return (None, load);
+        let Some(mut place) = try_lock(&self.shared.session) else { return offered };
+        let Some(session) = &mut *place else { return offered };
+        let trimmed = guarded(|| session.trim(Instant::now()));
+        if let Err(fault) = trimmed {
+            self.meet(&mut place, &fault);
+            return offered;
         }
-        load.missing = missing(session);
-        if !is_chosen(load) {
-            return (None, load);
+        // Uploads only make the card slower, so small transactions need not look for what is missing.
+        if !self.is_chosen(choice, load) {
+            return offered;
         }
+        choice.missing = missing(session);
+        offered.load.is_cold = choice.missing > load.amount / 2;
+        if !self.is_chosen(choice, offered.load) {
+            return offered;
+        }
+        offered.was_tried = true;
+        let allocated = self.shared.usage.host_allocations();
         let done = guarded(|| work(session));
+        offered.has_grown = self.shared.usage.host_allocations() != allocated;
         let times = session.times();
         // A panic in `then` is the caller's, and no fault of the device's.
         match done.and_then(|done| then(session, done)) {
             Ok(made) => {
                 choice.is_cuda = true;
                 [choice.device, choice.kernel] = times;
-                (Some(made), load)
+                offered.done = Some(made);
             }
             Err(fault) => {
-                // What was lost on trying is not the processor's time to be learnt from.
+                // What was lost on trying is not the processor's time.
                 choice.estimate = None;
-                costs.fail(choice.stage, load);
                 self.meet(&mut place, &fault);
-                (None, load)
             }
         }
+        offered
+    }
+
+    /// Is a stage the card's?
+    fn is_chosen(&self, choice: &mut Choice, load: Load) -> bool {
+        if !self.is_auto {
+            return true;
+        }
+        let (estimate, is_chosen) = lock(&self.costs).choose(load);
+        choice.estimate = Some(estimate);
+        is_chosen
     }
 
     /// Gives the card up, unless it is fine and only what was asked too much for it; either way with one warning.
-    fn meet(&self, place: &mut Place, fault: &Fault) {
+    fn meet(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         if !fault.is_passing() {
-            lose(place, &self.state, fault);
+            self.shared.lose(place, fault);
         } else if !self.has_passed.swap(true, Ordering::Relaxed) {
             log::warn!("bevy_burrow does without CUDA what is too much for the device: {fault}");
         }
     }
 
-    /// Takes in how long a stage took.
-    pub fn learn(&self, choice: &Choice, load: Load) {
-        if choice.estimate.is_some()
-            && let Some(mut place) = try_lock(&self.slot)
-            && let Place::Open(_, costs) = &mut *place
-        {
-            costs.learn(choice.stage, load, choice.is_cuda, choice.took);
+    /// Takes in how long a stage took, and opens the card where such stages could be worth it.
+    pub fn learn<T>(&self, choice: &Choice, offered: &Offered<T>) {
+        if !self.is_auto || choice.amount == 0 {
+            return;
+        }
+        let &Offered { load, was_tried, has_grown, .. } = offered;
+        let mut costs = lock(&self.costs);
+        // Where the card failed, all of the time is its own.
+        let is_chosen = choice.estimate.is_some() || was_tried;
+        costs.learn(load, was_tried, is_chosen, choice.took, has_grown && choice.is_cuda);
+        let is_wanted = !was_tried && costs.could_be_worth_a_card(load);
+        drop(costs);
+        if is_wanted {
+            self.open();
         }
     }
 
     /// Applies edits on the card, if that is chosen.
-    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> (Option<Ledger>, Load) {
+    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> Offered<Ledger> {
         let load = Load::of_edits(work);
         let missing = |session: &Session| session.missing_edits(work);
         self.offer(choice, load, missing, |session| session.edit(work), |_, ledger| Ok(ledger))
@@ -242,8 +323,8 @@ impl Cuda {
         choice: &mut Choice,
         meanwhile: &(dyn Fn() + Sync),
         then: &mut dyn FnMut(&dyn FreshParts),
-    ) -> (Option<Duration>, Load) {
-        let load = Load { amount: blocks.len(), ..Load::default() };
+    ) -> Offered<Duration> {
+        let load = Load::of_blocks(blocks.len());
         let missing = |session: &Session| session.missing_blocks(view, blocks);
         let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
         self.offer(choice, load, missing, work, |session, meshed| {
@@ -266,9 +347,23 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(failed)
 }
 
-/// Gives the card up, with the one warning.
-fn lose(place: &mut Place, state: &Mutex<EngineState>, fault: &Fault) {
-    *place = Place::Lost;
-    *lock(state) = EngineState::Lost(fault.to_string());
-    log::warn!("bevy_burrow goes on without CUDA: {fault}");
+impl Opener {
+    /// Opens the device and compares it with the processor.
+    fn open(self, suggested: Option<CardChoice>, usage: &Arc<Usage>) -> Result<Session, Fault> {
+        let device = (self.device)(suggested)?;
+        let (device, records) = self.limits.enforce(device, usage);
+        let mut session = Session::new(device, records)?;
+        self_test::run(&mut session, self.sizes)?;
+        session.forget();
+        Ok(session)
+    }
+}
+
+impl Shared {
+    /// Gives the card up, with the one warning.
+    fn lose(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
+        *place = None;
+        *lock(&self.state) = EngineState::Lost(fault.to_string());
+        log::warn!("bevy_burrow goes on without CUDA: {fault}");
+    }
 }

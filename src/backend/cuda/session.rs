@@ -3,14 +3,15 @@
 use std::time::Duration;
 
 use rustc_hash::FxHashMap;
+use web_time::Instant;
 
+use super::cache::{RecordCache, reference};
 use super::device::{Device, Fault, Kernel};
 use super::edit::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
 use super::lists::{cut, fill, hand_out};
-use super::mail::{Inbox, Plan, Section};
 use super::mesh::MeshOutput;
-use super::slots::{Slots, reference};
+use super::staging::{InputBuffer, Plan, Section};
 use super::windows::{KeptSlabs, Windows};
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
@@ -23,9 +24,9 @@ pub(super) struct Session {
     pub(super) device: Box<dyn Device>,
     /// How long the device took for the last launch: uploads and kernels, and the kernel alone.
     pub(super) times: [Duration; 2],
-    pub(super) bricks: Slots,
+    pub(super) bricks: RecordCache,
     pub(super) stacks: Stacks,
-    pub(super) inbox: Inbox,
+    pub(super) input: InputBuffer,
     pub(super) meshes: MeshOutput,
     pub(super) edits: EditOutput,
     /// Memory for the jobs and windows of the next launch.
@@ -33,11 +34,16 @@ pub(super) struct Session {
     pub(super) kept: KeptSlabs,
     /// Where the table of cases is.
     pub(super) table: u64,
+    /// When it was trimmed last, and whether anything was launched since.
+    trimmed: Instant,
+    is_used: bool,
+    /// How long memory that is not needed stays.
+    pub(super) keep: Duration,
 }
 
 /// Stacks of the ground on the device. They never change.
 pub(super) struct Stacks {
-    slots: Slots,
+    slots: RecordCache,
     /// Tags by place, in pages of each ground.
     pages: FxHashMap<(u64, i32, i32), Box<[u64; PAGE * PAGE]>>,
 }
@@ -57,7 +63,7 @@ fn page(ground: &Ground, (x, z): (i32, i32)) -> ((u64, i32, i32), usize) {
 
 impl Stacks {
     fn new(budget: usize) -> Self {
-        Self { slots: Slots::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
+        Self { slots: RecordCache::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
     }
 
     /// Where the first one is.
@@ -132,10 +138,10 @@ impl<'a> Uploads<'a> {
     }
 
     /// Writes the records of bricks and stacks.
-    fn write(&self, inbox: &mut Inbox) {
+    fn write(&self, input: &mut InputBuffer) {
         let groups = self.bricks.chunks(GROUP);
         let lengths = groups.clone().map(|group| group.iter().map(|upload| upload.bytes).sum::<usize>());
-        let places = cut(inbox.entries::<u8>(self.brick_list), lengths);
+        let places = cut(input.entries::<u8>(self.brick_list), lengths);
         hand_out(groups.zip(places).collect(), |(group, place)| {
             let before = group.first().map_or(0, |upload| upload.first);
             for Upload { brick, first, bytes, .. } in group {
@@ -143,7 +149,7 @@ impl<'a> Uploads<'a> {
             }
         });
         let record = |_, &(place, _): &((i32, i32), u32)| layout::stack_record(self.ground, place);
-        fill(&self.stacks, inbox.entries::<StackRecord>(self.stack_list), MANY_STACKS, record);
+        fill(&self.stacks, input.entries::<StackRecord>(self.stack_list), MANY_STACKS, record);
     }
 }
 
@@ -153,7 +159,7 @@ const GROUP: usize = 256;
 /// The bricks around these, which are at `pos` and sorted by stacks, and so many up and down. Those that have no slot are to be
 /// [completed](Session::complete).
 pub(super) fn windows<'a, T: Sync>(
-    slots: &Slots,
+    slots: &RecordCache,
     view: SampleView<'a>,
     bricks: &[T],
     pos: impl Fn(&T) -> BrickPos + Send + Sync,
@@ -170,36 +176,42 @@ const MANY_STACKS: usize = 64;
 /// How many bricks are looked at to see how many are missing.
 const LOOKS: usize = 128;
 
+/// How long memory stays that is not needed: long enough for a player who pauses, and to pay for allocating it again.
+const KEEP: Duration = Duration::from_secs(30);
+
 /// Of what a device may use, the part for stacks.
 const STACKS_SHARE: usize = 8;
 
 impl Session {
     /// A session that may keep so many bytes of bricks and ground on the device.
     pub fn new(mut device: Box<dyn Device>, budget: usize) -> Result<Self, Fault> {
-        let mut inbox = Inbox::new(&mut *device)?;
+        let mut input = InputBuffer::new(&mut *device)?;
         let meshes = MeshOutput::new(&mut *device)?;
         let edits = EditOutput::new(&mut *device)?;
         let table = layout::table();
         let mut plan = Plan::default();
         let section = plan.section::<[u16; 16]>(table.len());
-        inbox.open(&mut *device, &plan)?;
-        inbox.put(section, &table);
-        inbox.send(&mut *device, &plan)?;
+        input.open(&mut *device, &plan)?;
+        input.put(section, &table);
+        input.send(&mut *device, &plan)?;
         let address = device.alloc(size_of_val(&table))?;
-        device.copy(inbox.address(section), address, size_of_val(&table))?;
+        device.copy(input.address(section), address, size_of_val(&table))?;
         device.wait()?;
         let (stacks, bricks) = (budget / STACKS_SHARE, budget - budget / STACKS_SHARE);
         Ok(Self {
             device,
             times: [Duration::ZERO; 2],
-            bricks: Slots::new(BRICK_BYTES, bricks),
+            bricks: RecordCache::new(BRICK_BYTES, bricks),
             stacks: Stacks::new(stacks),
-            inbox,
+            input,
             meshes,
             edits,
             edit_jobs: Vec::new(),
             kept: KeptSlabs::default(),
             table: address,
+            trimmed: Instant::now(),
+            is_used: true,
+            keep: KEEP,
         })
     }
 
@@ -208,6 +220,29 @@ impl Session {
         self.bricks.clear();
         self.stacks.slots.clear();
         self.stacks.pages.clear();
+    }
+
+    /// Frees memory that was not needed for some time: lists shrink to what was, and bricks go if nothing was launched.
+    pub fn trim(&mut self, now: Instant) -> Result<(), Fault> {
+        if now.saturating_duration_since(self.trimmed) < self.keep {
+            return Ok(());
+        }
+        self.trimmed = now;
+        // After a fault something may be under way.
+        self.device.wait()?;
+        let device = &mut *self.device;
+        let trimmed = self
+            .input
+            .trim(device)
+            .and_then(|()| self.meshes.lists_mut().into_iter().try_for_each(|list| list.trim(device)))
+            .and_then(|()| self.edits.lists_mut().into_iter().try_for_each(|list| list.trim(device)));
+        if !std::mem::take(&mut self.is_used) {
+            self.bricks.release(device);
+            self.stacks.slots.release(device);
+            self.stacks.pages = FxHashMap::default();
+        }
+        // Without memory for shorter lists, long ones stay.
+        trimmed.or_else(|fault| if fault.is_passing() { Ok(()) } else { Err(fault) })
     }
 
     /// How long the device took for what was done last: uploads and kernels, and the kernel alone.
@@ -252,6 +287,7 @@ impl Session {
 
     /// Begins a launch: what it finds or takes stays where it is until the next one.
     pub(super) fn begin(&mut self) {
+        self.is_used = true;
         self.bricks.begin();
         self.stacks.slots.begin();
     }
@@ -293,20 +329,20 @@ impl Session {
     /// Sends everything that was planned, and puts uploads in their slots.
     pub(super) fn send(&mut self, plan: &Plan, uploads: &Uploads) -> Result<(), Fault> {
         if uploads.len() > 0 {
-            uploads.write(&mut self.inbox);
+            uploads.write(&mut self.input);
             self.direct(uploads);
         }
-        self.inbox.send(&mut *self.device, plan)?;
-        let params = ScatterParams { jobs: self.inbox.address(uploads.jobs) };
+        self.input.send(&mut *self.device, plan)?;
+        let params = ScatterParams { jobs: self.input.address(uploads.jobs) };
         self.device.launch(Kernel::Scatter, uploads.len() as u32, bytemuck::bytes_of(&params))
     }
 
     /// Writes where uploads go.
     fn direct(&mut self, uploads: &Uploads) {
-        let Self { inbox, bricks, stacks, .. } = self;
-        let (brick_list, stack_list) = (inbox.address(uploads.brick_list), inbox.address(uploads.stack_list));
+        let Self { input, bricks, stacks, .. } = self;
+        let (brick_list, stack_list) = (input.address(uploads.brick_list), input.address(uploads.stack_list));
         let job = |to: u64, from: u64, bytes: usize| ScatterJob { to, from, bytes: bytes as u32, pad: 0 };
-        let jobs = inbox.entries::<ScatterJob>(uploads.jobs);
+        let jobs = input.entries::<ScatterJob>(uploads.jobs);
         let (of_bricks, of_stacks) = jobs.split_at_mut(uploads.bricks.len());
         for (place, upload) in of_bricks.iter_mut().zip(&uploads.bricks) {
             *place = job(bricks.address(upload.slot), brick_list + upload.first as u64, upload.bytes);
@@ -365,7 +401,7 @@ mod tests {
             }
             let mut plan = Plan::default();
             uploads.plan(&mut plan);
-            session.inbox.open(&mut *session.device, &plan).expect("room for all");
+            session.input.open(&mut *session.device, &plan).expect("room for all");
             session.send(&plan, &uploads).expect("the device works");
             session.device.wait().expect("the device works");
             for brick in &bricks {

@@ -5,8 +5,8 @@ use rustc_hash::FxHashMap;
 use super::super::device::Fault;
 use super::super::layout::{self, CarefulParams, Chisel, EditJob, EditParams};
 use super::super::lists::in_pieces;
-use super::super::mail::{Inbox, Plan, Section};
 use super::super::session::{Session, Uploads, windows};
+use super::super::staging::{InputBuffer, Plan, Section};
 use super::super::windows::{KeptSlabs, Windows};
 use super::LONG;
 use super::jobs::pos;
@@ -84,22 +84,22 @@ impl<'a> Care<'a> {
     }
 
     /// Writes it, and gives the windows back.
-    pub fn put(&mut self, inbox: &mut Inbox, kept: &mut KeptSlabs) {
-        self.windows.write(inbox.entries(self.ref_list));
+    pub fn put(&mut self, input: &mut InputBuffer, kept: &mut KeptSlabs) {
+        self.windows.write(input.entries(self.ref_list));
         kept.put(std::mem::take(&mut self.windows));
-        inbox.put(self.chisel_list, &self.chisels);
-        inbox.put(self.image_list, &self.images);
-        inbox.put(self.rule_list, &self.rules);
+        input.put(self.chisel_list, &self.chisels);
+        input.put(self.image_list, &self.images);
+        input.put(self.rule_list, &self.rules);
     }
 
     /// The parameter of the kernel.
-    pub fn params(&self, edit: EditParams, inbox: &Inbox) -> CarefulParams {
+    pub fn params(&self, edit: EditParams, input: &InputBuffer) -> CarefulParams {
         CarefulParams {
             edit,
-            windows: inbox.address(self.ref_list),
-            chisels: inbox.address(self.chisel_list),
-            images: inbox.address(self.image_list),
-            rules: if self.rules.is_empty() { 0 } else { inbox.address(self.rule_list) },
+            windows: input.address(self.ref_list),
+            chisels: input.address(self.chisel_list),
+            images: input.address(self.image_list),
+            rules: if self.rules.is_empty() { 0 } else { input.address(self.rule_list) },
             look: self.look.bricks(),
             last: self.last,
             pad: 0,

@@ -2,11 +2,11 @@
 
 use glam::IVec3;
 
+use super::super::cache::reference;
 use super::super::device::Fault;
 use super::super::layout::{self, EditJob, MOST_JOBS, NONE};
 use super::super::lists::{cut, map, map_into};
 use super::super::session::{Session, Uploads};
-use super::super::slots::reference;
 use super::{LONG, PIECE};
 use crate::lattice::{BrickPos, ChunkGrid, pieces};
 use crate::volume::{Brick, EditWork, Job};

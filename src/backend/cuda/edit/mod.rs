@@ -7,12 +7,12 @@ mod careful;
 mod jobs;
 mod output;
 
+use super::cache::RecordCache;
 use super::device::{Fault, Kernel};
 use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::fill;
-use super::mail::Plan;
 use super::session::{Session, Uploads};
-use super::slots::Slots;
+use super::staging::Plan;
 use crate::lattice::side_by_side;
 use crate::volume::{EditEffect, EditWork, Ledger, Tool, enter_effects};
 use careful::Look;
@@ -114,8 +114,8 @@ impl Session {
         let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
         care.iter_mut().for_each(|care| care.plan(&mut plan));
-        self.inbox.open(&mut *self.device, &plan)?;
-        let (all_jobs, tools, list) = self.inbox.entries_of(job_list, tool_list, edits);
+        self.input.open(&mut *self.device, &plan)?;
+        let (all_jobs, tools, list) = self.input.entries_of(job_list, tool_list, edits);
         let are_many = jobs.len() >= LONG;
         let (bricks, device) = (&mut self.bricks, &mut self.device);
         let take = || {
@@ -126,8 +126,8 @@ impl Session {
             fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
         };
         side_by_side(are_many, take, write_lists).0?;
-        self.inbox.entries::<u32>(counters).fill(0);
-        care.iter_mut().for_each(|care| care.put(&mut self.inbox, &mut self.kept));
+        self.input.entries::<u32>(counters).fill(0);
+        care.iter_mut().for_each(|care| care.put(&mut self.input, &mut self.kept));
         let is_long = jobs.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
         self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
@@ -139,15 +139,15 @@ impl Session {
             let params = EditParams {
                 bricks: self.bricks.base(),
                 stacks: self.stacks.base(),
-                jobs: self.inbox.address(job_list),
-                list: self.inbox.address(edits),
-                tools: self.inbox.address(tool_list),
+                jobs: self.input.address(job_list),
+                list: self.input.address(edits),
+                tools: self.input.address(tool_list),
                 results: self.edits.results.address(),
                 records: self.edits.records.address(),
                 materials: self.edits.materials.address(),
                 parts: self.edits.parts.address(),
                 counts: self.edits.counts.address(),
-                counters: self.inbox.address(counters),
+                counters: self.input.address(counters),
                 record_capacity: self.edits.records.capacity(),
                 material_capacity: self.edits.materials.capacity(),
                 part_capacity: self.edits.parts.capacity(),
@@ -157,13 +157,13 @@ impl Session {
             match &care {
                 None => self.device.launch(Kernel::Edit, blocks, bytemuck::bytes_of(&params))?,
                 Some(care) => {
-                    let params = care.params(params, &self.inbox);
+                    let params = care.params(params, &self.input);
                     self.device.launch(Kernel::Careful, blocks, bytemuck::bytes_of(&params))?;
                 }
             }
             self.edits.results.fetch(&mut *self.device, jobs.len())?;
             if !self.edits.parts.is_mapped() {
-                self.edits.totals.read(&mut *self.device, self.inbox.address(counters), 4)?;
+                self.edits.totals.read(&mut *self.device, self.input.address(counters), 4)?;
             }
             self.device.wait()?;
             self.times = self.device.times();
@@ -215,7 +215,7 @@ impl Session {
 }
 
 /// Gives slots back that no brick of its own will be in: of bricks that did not change, or are all alike.
-fn free_targets(slots: &mut Slots, results: &[EditResult], targets: &[Target]) {
+fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Target]) {
     for (result, &(slot, _)) in results.iter().zip(targets) {
         if result.flags & EditResult::CHANGED == 0 || result.flags & EditResult::UNIFORM != 0 {
             slots.give_back(slot);

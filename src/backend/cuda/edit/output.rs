@@ -10,7 +10,7 @@ use super::super::layout::{
     self, BrickRecord, EditCount, EditJob, EditPart, EditResult, MATERIAL_BYTES, NONE, RECORD_BYTES,
 };
 use super::super::lists::{map, map_numbers};
-use super::super::mail::Outbox;
+use super::super::staging::OutputList;
 use super::jobs::pos;
 use super::{LONG, PIECE, Target};
 use crate::ground::MaterialId;
@@ -22,12 +22,12 @@ const ENTRIES: usize = 1024;
 
 /// What the edit kernel writes.
 pub(in super::super) struct EditOutput {
-    pub results: Outbox,
-    pub records: Outbox,
-    pub materials: Outbox,
-    pub parts: Outbox,
-    pub counts: Outbox,
-    pub totals: Outbox,
+    pub results: OutputList,
+    pub records: OutputList,
+    pub materials: OutputList,
+    pub parts: OutputList,
+    pub counts: OutputList,
+    pub totals: OutputList,
 }
 
 /// How many entries of each list the kernel wanted to write.
@@ -45,13 +45,19 @@ const FIRST: usize = 1 << 8;
 impl EditOutput {
     pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
         Ok(Self {
-            results: Outbox::new(device, size_of::<EditResult>(), FIRST)?,
-            records: Outbox::new(device, RECORD_BYTES, FIRST)?,
-            materials: Outbox::new(device, MATERIAL_BYTES, FIRST)?,
-            parts: Outbox::new(device, size_of::<EditPart>(), 4 * FIRST)?,
-            counts: Outbox::new(device, size_of::<EditCount>(), 4 * FIRST)?,
-            totals: Outbox::new(device, size_of::<u32>(), 4)?,
+            results: OutputList::new(device, size_of::<EditResult>(), FIRST)?,
+            records: OutputList::new(device, RECORD_BYTES, FIRST)?,
+            materials: OutputList::new(device, MATERIAL_BYTES, FIRST)?,
+            parts: OutputList::new(device, size_of::<EditPart>(), 4 * FIRST)?,
+            counts: OutputList::new(device, size_of::<EditCount>(), 4 * FIRST)?,
+            totals: OutputList::new(device, size_of::<u32>(), 4)?,
         })
+    }
+
+    /// All lists whose length depends on what there is to do.
+    pub fn lists_mut(&mut self) -> [&mut OutputList; 5] {
+        let Self { results, records, materials, parts, counts, totals: _ } = self;
+        [results, records, materials, parts, counts]
     }
 
     /// Room for all that; says whether there was too little.
@@ -98,7 +104,7 @@ impl EditOutput {
         self.parts.wrote(parts);
         self.counts.wrote(counts);
         // A list that is full may have been too short; nobody knows by how much.
-        let wanted = |count: usize, list: &Outbox| match list.capacity() as usize {
+        let wanted = |count: usize, list: &OutputList| match list.capacity() as usize {
             full if full == count => 2 * count,
             _ => count,
         };

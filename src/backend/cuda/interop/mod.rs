@@ -81,8 +81,9 @@ use cudarc::driver::CudaContext;
 
 use super::device::{Device, Fault};
 use super::driver::Card;
+use super::self_test;
 use super::session::Session;
-use super::{MOST, SHARE, trial};
+use crate::backend::CardChoice;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
 use imported::Imported;
@@ -148,11 +149,11 @@ impl SharedCard {
     pub fn open(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Self, InteropError> {
         let uuid = vulkan::uuid(device)?;
         let no_card = |fault: Fault| InteropError::NoCard(fault.to_string());
-        let mut card = Card::open_uuid(uuid).map_err(no_card)?;
+        let mut card = Card::open(&CardChoice::Uuid(uuid), None).map_err(no_card)?;
         let context = card.context();
-        let budget = (card.free_memory() / SHARE).min(MOST);
+        let budget = (card.free_memory() / 4).min(1 << 30);
         let mut session = Session::new(Box::new(card), budget)?;
-        trial::run(&mut session, trial::FULL).map_err(no_card)?;
+        self_test::run(&mut session, self_test::FULL).map_err(no_card)?;
         Ok(Self { session, context, device: device.clone(), queue: queue.clone() })
     }
 
@@ -371,7 +372,7 @@ mod tests {
         blocks.sort_unstable_by_key(|Block { brick, chunk }| (brick.0.x, brick.0.z, brick.0.y, *chunk));
         let view = world.view();
         let meshed = session.mesh(&view, &blocks, &|| {}).expect("the device works");
-        let expected = trial::collected(&blocks, &session.meshes.surfaces(&view, &blocks, meshed));
+        let expected = self_test::collected(&blocks, &session.meshes.surfaces(&view, &blocks, meshed));
         assert_eq!(expected.list.len(), blocks.len());
         let totals = session.mesh_there(&world.view(), &blocks).expect("the device works");
         let results = session.meshes.results(blocks.len()).to_vec();

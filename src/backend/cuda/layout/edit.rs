@@ -117,7 +117,7 @@ pub(crate) struct EditCount {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditParams {
-    /// Slots of bricks, of stacks.
+    /// Caches of bricks, of stacks.
     pub bricks: Address,
     pub stacks: Address,
     /// [`EditJob`]s, one for each block.

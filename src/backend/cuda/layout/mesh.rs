@@ -57,7 +57,7 @@ pub(crate) struct MeshResult {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MeshParams {
-    /// Slots of bricks, of stacks.
+    /// Caches of bricks, of stacks.
     pub bricks: Address,
     pub stacks: Address,
     /// References of bricks.

@@ -5,8 +5,8 @@ mod output;
 use super::device::{Fault, Kernel};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
 use super::lists::{cut, fill, hand_out, map};
-use super::mail::Plan;
 use super::session::{Session, Stacks, Uploads, windows};
+use super::staging::Plan;
 use super::windows::Windows;
 use crate::ground::Ground;
 use crate::lattice::{pieces, side_by_side};
@@ -98,15 +98,15 @@ impl Session {
         let column_list = plan.section::<ColumnJob>(columns.len());
         let job_list = plan.section::<MeshJob>(blocks.len());
         let counters = plan.section::<u32>(4);
-        self.inbox.open(&mut *self.device, &plan)?;
-        let (refs, column_jobs, jobs) = self.inbox.entries_of(window_list, column_list, job_list);
+        self.input.open(&mut *self.device, &plan)?;
+        let (refs, column_jobs, jobs) = self.input.entries_of(window_list, column_list, job_list);
         let column = |_, &(place, slot): &Column| layout::column_job(view, place, slot);
         let write_columns = || fill(&columns, column_jobs, LONG, column);
         let write_jobs = || write_jobs(view, &windows, &pieces, jobs);
         side_by_side(pieces.len() > 1, write_columns, || {
             side_by_side(pieces.len() > 1, write_jobs, || windows.write(refs))
         });
-        self.inbox.entries::<u32>(counters).fill(0);
+        self.input.entries::<u32>(counters).fill(0);
         self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
         self.meshes.lists.reserve(&mut *self.device, (0, 0), is_long)?;
 
@@ -115,16 +115,16 @@ impl Session {
             let params = MeshParams {
                 bricks: self.bricks.base(),
                 stacks: self.stacks.base(),
-                windows: self.inbox.address(window_list),
-                columns: self.inbox.address(column_list),
-                jobs: self.inbox.address(job_list),
+                windows: self.input.address(window_list),
+                columns: self.input.address(column_list),
+                jobs: self.input.address(job_list),
                 table: self.table,
                 results: self.meshes.results.address(),
                 positions: self.meshes.lists.positions.address(),
                 normals: self.meshes.lists.normals.address(),
                 mixes: if plain.is_some() { 0 } else { self.meshes.lists.mixes.address() },
                 indices: self.meshes.lists.indices.address(),
-                counters: self.inbox.address(counters),
+                counters: self.input.address(counters),
                 vertex_capacity: self.meshes.lists.vertex_capacity(),
                 index_capacity: self.meshes.lists.indices.capacity(),
                 width: view.grid.width(),

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::super::device::{Device, Fault, Mark};
 use super::super::layout::MeshResult;
 use super::super::lists::map;
-use super::super::mail::Outbox;
+use super::super::staging::OutputList;
 use super::super::surfaces::{Arrival, Surfaces};
 use crate::surface::MaterialMix;
 use crate::surface::block::Block;
@@ -13,16 +13,16 @@ use crate::surface::vertex::WorldView;
 
 /// What the mesh kernel writes.
 pub(in super::super) struct MeshOutput {
-    pub(super) results: Outbox,
+    pub(super) results: OutputList,
     pub(super) lists: MeshLists,
 }
 
 /// Surfaces of all blocks.
 pub(in super::super) struct MeshLists {
-    pub positions: Outbox,
-    pub normals: Outbox,
-    pub mixes: Outbox,
-    pub indices: Outbox,
+    pub positions: OutputList,
+    pub normals: OutputList,
+    pub mixes: OutputList,
+    pub indices: OutputList,
 }
 
 /// Positions, normals and indices.
@@ -41,14 +41,20 @@ pub(in super::super) const PIECE: usize = if cfg!(test) { 150 } else { 1 << 12 }
 impl MeshOutput {
     pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
         Ok(Self {
-            results: Outbox::new(device, size_of::<MeshResult>(), 1 << 10)?,
+            results: OutputList::new(device, size_of::<MeshResult>(), 1 << 10)?,
             lists: MeshLists {
-                positions: Outbox::new(device, size_of::<[u16; 4]>(), FIRST_VERTICES)?,
-                normals: Outbox::new(device, size_of::<[f32; 3]>(), FIRST_VERTICES)?,
-                mixes: Outbox::new(device, size_of::<[u8; 8]>(), FIRST_VERTICES)?,
-                indices: Outbox::new(device, size_of::<u16>(), FIRST_VERTICES * INDICES)?,
+                positions: OutputList::new(device, size_of::<[u16; 4]>(), FIRST_VERTICES)?,
+                normals: OutputList::new(device, size_of::<[f32; 3]>(), FIRST_VERTICES)?,
+                mixes: OutputList::new(device, size_of::<[u8; 8]>(), FIRST_VERTICES)?,
+                indices: OutputList::new(device, size_of::<u16>(), FIRST_VERTICES * INDICES)?,
             },
         })
+    }
+
+    /// All lists.
+    pub fn lists_mut(&mut self) -> [&mut OutputList; 5] {
+        let Self { results, lists: MeshLists { positions, normals, mixes, indices } } = self;
+        [results, positions, normals, mixes, indices]
     }
 
     /// What the kernel wanted to write for the blocks of each piece and all before it.
@@ -79,7 +85,7 @@ impl MeshOutput {
     /// Where positions, normals and indices are on the device.
     #[cfg(all(feature = "interop", target_os = "linux"))]
     pub fn there(&self) -> [u64; 3] {
-        [&self.lists.positions, &self.lists.normals, &self.lists.indices].map(Outbox::address)
+        [&self.lists.positions, &self.lists.normals, &self.lists.indices].map(OutputList::address)
     }
 
     /// Where the surfaces of so many blocks are in these lists.

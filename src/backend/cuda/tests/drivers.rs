@@ -14,19 +14,21 @@ fn a_device_that_can_not_be_opened_is_no_device() {
         Fault::Memory(1 << 30),
     ] {
         let text = fault.to_string();
-        let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, move || Err(fault)));
+        let engine =
+            Engine::from_cuda(Cuda::with_device(false, limits(0), self_test::FULL, move |_| Err(fault)));
         assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(text));
-        assert!(engine.figures().trial.is_zero());
+        assert!(engine.figures().opening.is_zero());
         compare(&mut Rng::with_seed(3), 3, &engine);
     }
 }
 
 #[test]
 #[ignore = "every engine does the same when it opens a card; the emulator takes 16 s"]
-fn a_device_passes_the_whole_trial() {
+fn a_device_passes_the_whole_self_test() {
     let Some(device) = device() else { return };
     let name = device.name();
-    let engine = Engine::from_cuda(Cuda::open_with(false, None, trial::FULL, || Ok(device)));
+    let engine =
+        Engine::from_cuda(Cuda::with_device(false, limits(256 << 20), self_test::FULL, |_| Ok(device)));
     assert_eq!(engine.wait(Duration::from_secs(600)), EngineState::Cuda(name));
 }
 
@@ -39,41 +41,106 @@ fn tell_what_the_driver_says() {
     compare(&mut Rng::with_seed(3), 3, &engine);
 }
 
-/// A driver's library that knows errors only, each with its code.
+/// Compiles a driver's library, and runs an ignored test of this file in a process that finds it: what that says, if there is
+/// a C compiler.
+fn with_driver(name: &str, source: &str, test: &str) -> Option<String> {
+    let folder = std::env::temp_dir().join(format!("burrow-driver-{}-{name}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder for the library");
+    std::fs::write(folder.join("driver.c"), source).expect("a source file");
+    let cc = std::process::Command::new("cc")
+        .args(["-shared", "-fPIC", "-o", "libcuda.so", "driver.c"])
+        .current_dir(&folder)
+        .status();
+    if !cc.is_ok_and(|status| status.success()) {
+        skip("there is no C compiler for a driver's library");
+        return None;
+    }
+    std::fs::copy(folder.join("libcuda.so"), folder.join("libcuda.so.1")).expect("a copy");
+    let test = format!("backend::cuda::tests::drivers::{test}");
+    let said = std::process::Command::new(std::env::current_exe().expect("this test"))
+        .args(["--exact", &test, "--ignored", "--nocapture"])
+        .env("LD_LIBRARY_PATH", &folder)
+        .output()
+        .expect("this test can be started again");
+    let text = String::from_utf8_lossy(&said.stdout).into_owned();
+    assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
+    std::fs::remove_dir_all(&folder).expect("the folder can go");
+    Some(text)
+}
+
 #[test]
 fn a_driver_without_a_device_is_no_device() {
-    let folder = std::env::temp_dir().join(format!("burrow-driver-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder for the library");
     for (code, name) in [(100, "CUDA_ERROR_NO_DEVICE"), (35, "CUDA_ERROR_INSUFFICIENT_DRIVER")] {
+        // A library that knows errors only, each with its code.
         let source = format!(
             "int cuInit(unsigned flags) {{ (void)flags; return {code}; }}\n\
              int cuGetErrorName(int code, const char** name) {{ (void)code; *name = \"{name}\"; return 0; }}\n"
         );
-        std::fs::write(folder.join("driver.c"), source).expect("a source file");
-        let cc = std::process::Command::new("cc")
-            .args(["-shared", "-fPIC", "-o", "libcuda.so", "driver.c"])
-            .current_dir(&folder)
-            .status();
-        if !cc.is_ok_and(|status| status.success()) {
-            skip("there is no C compiler for a driver's library");
-            break;
-        }
-        std::fs::copy(folder.join("libcuda.so"), folder.join("libcuda.so.1")).expect("a copy");
-        let said = std::process::Command::new(std::env::current_exe().expect("this test"))
-            .args([
-                "--exact",
-                "backend::cuda::tests::drivers::tell_what_the_driver_says",
-                "--ignored",
-                "--nocapture",
-            ])
-            .env("LD_LIBRARY_PATH", &folder)
-            .output()
-            .expect("this test can be started again");
-        let text = String::from_utf8_lossy(&said.stdout).into_owned();
-        assert!(said.status.success(), "{text}{}", String::from_utf8_lossy(&said.stderr));
+        let Some(text) = with_driver(name, &source, "tell_what_the_driver_says") else { return };
         assert!(text.contains(&format!("Lost(\"there is no CUDA device: {name}\")")), "{text}");
     }
-    std::fs::remove_dir_all(&folder).expect("the folder can go");
+}
+
+/// What the test below starts.
+#[test]
+#[ignore = "needs a driver with three cards"]
+fn open_each_of_three_cards() {
+    let open = |card: &CardChoice, suggested: Option<&CardChoice>| match Card::open(card, suggested) {
+        Ok(card) => Ok(card.name()),
+        Err(Fault::NoDevice(why)) => Err(why),
+        Err(fault) => panic!("{fault}"),
+    };
+    let bus = |id: &str| CardChoice::PciBusId(id.into());
+    let default = CardChoice::Default;
+    for number in 0..3u32 {
+        let name = Ok(format!("card {number}"));
+        let all = [CardChoice::Ordinal(number), CardChoice::Uuid([70 + number as u8; 16])];
+        for card in all.into_iter().chain([bus(&format!("0000:0{}:00.0", number + 1))]) {
+            assert_eq!(open(&card, None), name);
+            // Only where nobody chose one.
+            assert_eq!(open(&card, Some(&CardChoice::Ordinal(1))), name);
+            assert_eq!(open(&default, Some(&card)), name);
+        }
+    }
+    let others = [CardChoice::Ordinal(3), CardChoice::Ordinal(u32::MAX), CardChoice::Uuid([9; 16])];
+    for card in others.into_iter().chain(["0000:09:00.0", "", "anywhere", "0000:01:00.0\0"].map(bus)) {
+        assert!(open(&card, None).is_err_and(|why| why.contains("none of CUDA's")), "{card:?}");
+        assert_eq!(open(&default, Some(&card)), Ok("card 0".into()));
+    }
+    assert_eq!(open(&default, None), Ok("card 0".into()));
+}
+
+#[test]
+fn a_card_is_chosen_by_number_by_uuid_and_by_its_place_on_the_bus() {
+    with_driver("cards", include_str!("driver.c"), "open_each_of_three_cards");
+}
+
+/// How long this thread has had a processor, where the system tells.
+fn processor_time() -> Option<Duration> {
+    let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    stat.split(' ').next()?.parse().ok().map(Duration::from_nanos)
+}
+
+/// What the test below starts.
+#[test]
+#[ignore = "needs a driver that takes its time"]
+fn wait_for_a_slow_card() {
+    let Some(before) = processor_time() else { return };
+    let (start, mut card) =
+        (std::time::Instant::now(), Card::open(&CardChoice::Default, None).expect("a card"));
+    card.wait().expect("the card works");
+    let mark = card.mark().expect("a mark");
+    mark.wait().expect("the card works");
+    let (took, busy) = (start.elapsed(), processor_time().expect("as before") - before);
+    assert!(
+        took > Duration::from_millis(120) && busy < Duration::from_millis(5),
+        "{busy:?} busy of {took:?}"
+    );
+}
+
+#[test]
+fn a_thread_that_waits_for_a_slow_card_sleeps() {
+    with_driver("slow", include_str!("driver.c"), "wait_for_a_slow_card");
 }
 
 #[test]

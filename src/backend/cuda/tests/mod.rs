@@ -6,6 +6,8 @@
 mod chosen;
 mod drivers;
 mod faults;
+mod memory;
+mod opening;
 mod room;
 mod same;
 
@@ -13,11 +15,11 @@ use std::time::Duration;
 
 use fastrand::Rng;
 
+use super::async_copies::AsyncCopies;
 use super::device::Device;
 use super::driver::Card;
 use super::emulator::Emulator;
-use super::late::Late;
-use super::mapped::Mapped;
+use super::zero_copy::ZeroCopy;
 use super::*;
 use crate::backend::Engine;
 use crate::prelude::*;
@@ -29,19 +31,26 @@ pub(super) mod worlds;
 
 /// A device to test, if there is any. A card that is there is tested, or nothing is.
 pub(super) fn device() -> Option<Box<dyn Device>> {
-    match Card::open() {
+    match Card::open(&CardChoice::Default, None) {
         Ok(card) => Some(Box::new(card)),
         Err(Fault::NoDriver | Fault::NoDevice(_)) => Some(Box::new(Emulator::start()?)),
         Err(fault) => panic!("the card can't be tested: {fault}"),
     }
 }
 
-/// An engine that does everything on a device, small as it may be.
-fn engine(device: Box<dyn Device>, budget: usize) -> Engine {
-    let engine =
-        Engine::from_cuda(Cuda::open_with(false, Some(budget), trial::Sizes::few(&[(4, 3.0)], None), || {
-            Ok(device)
-        }));
+/// Bricks and ground may take so many bytes, and all else as much as it wants.
+pub(super) fn limits(records: usize) -> Limits {
+    Limits { device: Some(usize::MAX), records: Some(records), host: usize::MAX }
+}
+
+/// A device that does everything, small as it may be.
+fn cuda(device: Box<dyn Device>, limits: Limits) -> Cuda {
+    Cuda::with_device(false, limits, &[(4, 3.0)], |_| Ok(device))
+}
+
+/// An engine that does everything on a device, which is open.
+fn engine(device: Box<dyn Device>, records: usize) -> Engine {
+    let engine = Engine::from_cuda(cuda(device, limits(records)));
     engine.wait(Duration::from_secs(60));
     engine
 }
@@ -97,7 +106,7 @@ fn assert_same(expected: &World, found: &World, index: u64) {
     });
     assert_eq!(own.len(), others.len(), "world {index}");
     for ((pos, own), (other_pos, other)) in own.into_iter().zip(others) {
-        assert!(pos == other_pos && trial::are_same_bricks(own, other), "world {index}, {pos:?}");
+        assert!(pos == other_pos && self_test::are_same_bricks(own, other), "world {index}, {pos:?}");
     }
     assert_eq!(expected.memory().samples, found.memory().samples, "world {index}");
     assert_eq!(expected.memory().materials, found.memory().materials, "world {index}");
@@ -134,11 +143,11 @@ fn compare_under(
 }
 
 /// An engine that panics where something is used while a copy is under way.
-fn late() -> Option<Engine> {
-    Some(engine(Box::new(Late::new(device()?)), 64 << 20))
+fn async_copies() -> Option<Engine> {
+    Some(engine(Box::new(AsyncCopies::new(device()?)), 64 << 20))
 }
 
 /// An engine whose kernels write short lists to the host's memory, as those of a card do.
-fn mapped() -> Option<Engine> {
-    Some(engine(Box::new(Mapped::new(Box::new(Emulator::start()?))), 64 << 20))
+fn zero_copy() -> Option<Engine> {
+    Some(engine(Box::new(ZeroCopy::new(Box::new(Emulator::start()?))), 64 << 20))
 }

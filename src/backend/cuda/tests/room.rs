@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
-use super::super::mail::Outbox;
+use super::super::staging::OutputList;
 
 /// A device of so many bytes beside a host of so many more, whose memory its kernels reach.
 pub(super) struct Tight {
@@ -95,7 +95,7 @@ impl Device for Tight {
 #[test]
 fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_for() {
     let mut device = Tight::new(10_000, 1 << 20);
-    let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
+    let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 100_000, false), Ok(true));
     assert_eq!((list.capacity(), list.is_mapped(), device.asked.len()), (125_000, true, 0));
     // Not 125 000 of them.
@@ -111,7 +111,7 @@ fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_fo
 #[test]
 fn a_list_makes_room_for_itself_and_one_that_can_not_grow_does_not_ask_for_the_same_again() {
     let mut device = Tight::new(10_000, 1 << 20);
-    let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
+    let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
     // No room for both.
     assert_eq!(list.reserve(&mut device, 2000, true), Ok(true));
@@ -128,7 +128,7 @@ fn a_list_makes_room_for_itself_and_one_that_can_not_grow_does_not_ask_for_the_s
 #[test]
 fn a_list_is_not_longer_on_the_device_than_on_the_host() {
     let mut device = Tight::new(1 << 20, 1000);
-    let mut list = Outbox::new(&mut device, 4, 16).expect("room for 16");
+    let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 1000, true), Err(Fault::Memory(5000)));
     assert_eq!((list.capacity(), device.held()), (0, vec![]));
     assert_eq!(list.reserve(&mut device, 10, true), Ok(true));

@@ -16,7 +16,7 @@ fn worlds_of_a_device_are_those_of_the_processor() {
     let figures = engine.figures();
     assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
     assert!(figures.cuda > figures.cpu * 20, "{figures:?}");
-    assert!(!figures.trial.is_zero());
+    assert!(!figures.opening.is_zero());
     println!("{worlds} worlds, {} stages on the device", figures.cuda);
 }
 
@@ -74,7 +74,7 @@ fn a_small_budget_is_kept_and_nothing_is_lost() {
 
 #[test]
 fn kernels_that_reach_the_hosts_memory_make_the_same_worlds() {
-    let Some(engine) = mapped() else { return };
+    let Some(engine) = zero_copy() else { return };
     let mut rng = Rng::with_seed(12);
     (0..worlds::world_count(40) / 2).for_each(|index| compare(&mut rng, index, &engine));
     assert!(matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
@@ -120,7 +120,7 @@ fn short_and_long_transactions_take_turns() {
         vec![Brush::dig(Shape::sphere(glam::Vec3::splat(-900.0), 5.0))],
         small(3).to_vec(),
     ];
-    for engine in [mapped(), late(), device().map(|device| engine(device, 64 << 20))] {
+    for engine in [zero_copy(), async_copies(), device().map(|device| engine(device, 64 << 20))] {
         let Some(engine) = engine else { return };
         let ground = || Ground::from_fn(120, 120, |x, z| 30.0 + f64::from(x * z % 7)).expect("valid");
         compare_on(ground(), 32, &[&engine], &transactions);
@@ -133,7 +133,7 @@ fn short_and_long_transactions_take_turns() {
 
 #[test]
 fn engines_take_turns_with_the_same_bricks() {
-    let Some(first) = mapped() else { return };
+    let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 1 << 20);
     let mut rng = Rng::with_seed(21);
@@ -161,7 +161,7 @@ fn a_high_cliff_at_the_end_of_the_lattice_is_the_processors() {
 
 #[test]
 fn sculpting_of_any_kind_is_that_of_the_processor() {
-    let Some(first) = mapped() else { return };
+    let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
     let mut rng = Rng::with_seed(31);
@@ -188,7 +188,7 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
 
 #[test]
 fn new_ground_far_from_all_other_finds_its_material() {
-    let Some(first) = mapped() else { return };
+    let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
     let high = |x: i32, z: i32| if (x / 7 + z / 9) % 2 == 0 { 30.0 } else { -40.0 };
@@ -239,7 +239,7 @@ fn new_ground_far_from_all_other_finds_its_material() {
 
 #[test]
 fn what_is_under_rules_is_that_of_the_processor() {
-    let Some(engine) = mapped() else { return };
+    let Some(engine) = zero_copy() else { return };
     let mut rng = Rng::with_seed(32);
     for index in 0..worlds::world_count(40).div_ceil(4) {
         let (ground, chunk_size) = worlds::random_ground(&mut rng, index);

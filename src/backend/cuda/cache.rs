@@ -8,7 +8,7 @@ use super::device::{Device, Fault};
 use crate::volume::Brick;
 
 /// Records of one kind on the device.
-pub(super) struct Slots {
+pub(super) struct RecordCache {
     /// Bytes of a record.
     record: usize,
     /// Where the first one is.
@@ -34,7 +34,7 @@ struct Slot {
 /// How many slots are looked at for ones that can be given up before there may be enough.
 const PIECE: usize = 1 << 14;
 
-/// Slots at the start: growing takes half a millisecond of the transaction that needs more, so first digs should not.
+/// RecordCache at the start: growing takes half a millisecond of the transaction that needs more, so first digs should not.
 const FIRST: usize = 1 << 14;
 
 /// From how many slots on they are taken side by side.
@@ -49,7 +49,7 @@ fn stamps(count: usize) -> u64 {
 /// Bits of a tag that are the slot; the rest is its stamp.
 const SLOT_BITS: u32 = 24;
 
-impl Slots {
+impl RecordCache {
     /// No slots yet; all together may take `budget` bytes.
     pub fn new(record: usize, budget: usize) -> Self {
         Self {
@@ -101,7 +101,7 @@ impl Slots {
         Ok((slot, self.put(slot, stamps(1))))
     }
 
-    /// Slots for all entries of a list, or none: slots with their tags come into `taken`, and what `with` makes of entries and
+    /// RecordCache for all entries of a list, or none: slots with their tags come into `taken`, and what `with` makes of entries and
     /// their slots into `out`.
     pub fn take_many<T: Sync, R: Send>(
         &mut self,
@@ -155,6 +155,14 @@ impl Slots {
         self.free.extend((0..self.slots.len() as u32).rev());
     }
 
+    /// Frees the memory of all slots; whatever was in them has to be uploaded again.
+    pub fn release(&mut self, device: &mut dyn Device) {
+        if !self.slots.is_empty() {
+            device.free(self.base);
+            *self = Self { base: 0, hand: 0, slots: Vec::new(), free: Vec::new(), ..*self };
+        }
+    }
+
     /// Gives a slot back.
     pub fn give_back(&mut self, slot: u32) {
         *self.slots[slot as usize].stamp.get_mut() = 0;
@@ -170,7 +178,7 @@ impl Slots {
         }
         let base = match device.alloc(new * self.record) {
             Ok(base) => base,
-            Err(Fault::Memory(_)) => return Ok(false),
+            Err(Fault::Memory(_) | Fault::Budget(_)) => return Ok(false),
             Err(fault) => return Err(fault),
         };
         if old > 0 {
@@ -218,7 +226,7 @@ mod tests {
     use crate::backend::cuda::tests::device;
 
     /// So many slots at once.
-    fn take(slots: &mut Slots, device: &mut dyn Device, count: usize, out: &mut Vec<(u32, u64)>) {
+    fn take(slots: &mut RecordCache, device: &mut dyn Device, count: usize, out: &mut Vec<(u32, u64)>) {
         let (list, mut found) = (vec![7; count], vec![0; count]);
         let taken = slots.take_many(device, &list, &mut found, out, |entry, slot| slot + entry);
         taken.expect("room for all");
@@ -229,7 +237,7 @@ mod tests {
     fn what_was_not_used_lately_makes_room_and_the_rest_stays() {
         let Some(mut device) = device() else { return };
         let most = 3 * FIRST + 77;
-        let mut slots = Slots::new(16, most * 16);
+        let mut slots = RecordCache::new(16, most * 16);
         let mut rounds: Vec<Vec<(u32, u64)>> = Vec::new();
         for round in 0..40 {
             slots.begin();
@@ -253,7 +261,7 @@ mod tests {
         // One after the other, and side by side.
         for count in [100, LONG] {
             let Some(mut device) = device() else { return };
-            let mut slots = Slots::new(16, count * 16);
+            let mut slots = RecordCache::new(16, count * 16);
             let mut taken = Vec::new();
             slots.begin();
             take(&mut slots, &mut *device, count, &mut taken);

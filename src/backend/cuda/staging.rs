@@ -7,20 +7,22 @@ use bytemuck::Pod;
 use super::device::{Device, Fault, HostMemory};
 
 /// Everything that a launch reads, packed into one piece, so that it takes one copy.
-pub(super) struct Inbox {
+pub(super) struct InputBuffer {
     host: Box<dyn HostMemory>,
     device: u64,
     len: usize,
+    /// Bytes that were needed since it was trimmed.
+    needed: usize,
 }
 
-/// Where something is in an [`Inbox`]: offset and length in bytes.
+/// Where something is in an [`InputBuffer`]: offset and length in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Section {
     start: usize,
     len: usize,
 }
 
-/// What an [`Inbox`] is to hold, in order.
+/// What an [`InputBuffer`] is to hold, in order.
 #[derive(Debug, Default)]
 pub(super) struct Plan(usize);
 
@@ -37,27 +39,38 @@ impl Plan {
     }
 }
 
+/// Memory is shrunk where it is so many times as large as what was needed.
+const TRIMMED: usize = 4;
+
 /// Allocates with room to spare.
 fn roomy(len: usize) -> usize {
     len.next_power_of_two().max(1 << 16)
 }
 
-impl Inbox {
+impl InputBuffer {
     pub fn new(device: &mut dyn Device) -> Result<Self, Fault> {
         let len = roomy(0);
         let host = device.alloc_host(len)?;
-        Ok(Self { host, device: device.alloc(len)?, len })
+        Ok(Self { host, device: device.alloc(len)?, len, needed: 0 })
+    }
+
+    /// Shrinks it if it is much larger than what was needed since the last time. Nothing may be under way.
+    pub fn trim(&mut self, device: &mut dyn Device) -> Result<(), Fault> {
+        let len = roomy(std::mem::take(&mut self.needed));
+        if len <= self.len / TRIMMED { self.replace(device, len) } else { Ok(()) }
+    }
+
+    fn replace(&mut self, device: &mut dyn Device, len: usize) -> Result<(), Fault> {
+        let (host, address) = (device.alloc_host(len)?, device.alloc(len)?);
+        device.free(self.device);
+        (self.host, self.device, self.len) = (host, address, len);
+        Ok(())
     }
 
     /// Makes room for what was planned. What was in it is gone.
     pub fn open(&mut self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
-        if plan.0 > self.len {
-            let len = roomy(plan.0);
-            let (host, address) = (device.alloc_host(len)?, device.alloc(len)?);
-            device.free(self.device);
-            *self = Self { host, device: address, len };
-        }
-        Ok(())
+        self.needed = self.needed.max(plan.0);
+        if plan.0 > self.len { self.replace(device, roomy(plan.0)) } else { Ok(()) }
     }
 
     /// Where kernels find a section.
@@ -98,12 +111,12 @@ impl Inbox {
     }
 }
 
-/// What [`Outbox::wipe`] writes: to kernels and host, the number of no entry.
+/// What [`OutputList::wipe`] writes: to kernels and host, the number of no entry.
 const WIPED: u8 = 0xff;
 
 /// A list that kernels write. Short ones go straight into the host's memory, where the device can do that; long ones into
 /// its own, and what is used of them is copied afterwards.
-pub(super) struct Outbox {
+pub(super) struct OutputList {
     entry: usize,
     /// How many entries there was room for at the start.
     first: usize,
@@ -114,13 +127,50 @@ pub(super) struct Outbox {
     is_long: bool,
     /// Entries at the front of the host's memory that are not wiped.
     stale: usize,
+    /// Entries that were needed since it was trimmed: in all, and on the device.
+    needed: [usize; 2],
 }
 
-impl Outbox {
+/// So many entries and a fourth more; kernels count them in 32 bits.
+fn with_slack(entries: usize) -> usize {
+    entries.saturating_add(entries / 4).min(u32::MAX as usize)
+}
+
+impl OutputList {
     /// A list of entries of so many bytes, with room for some.
     pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
         let host = device.alloc_host(entry * capacity)?;
-        Ok(Self { entry, first: capacity, host, capacity, own: None, is_long: false, stale: capacity })
+        Ok(Self {
+            entry,
+            first: capacity,
+            host,
+            capacity,
+            own: None,
+            is_long: false,
+            stale: capacity,
+            needed: [0; 2],
+        })
+    }
+
+    /// Shrinks it if it is much longer than what was needed since the last time. Nothing may be under way, and what was in it
+    /// is gone then.
+    pub fn trim(&mut self, device: &mut dyn Device) -> Result<(), Fault> {
+        let [room, own] = std::mem::take(&mut self.needed).map(|needed| with_slack(needed).max(self.first));
+        if let Some((address, _)) =
+            self.own.take_if(|(_, capacity)| *capacity > self.first && own <= *capacity / TRIMMED)
+        {
+            device.free(address);
+        }
+        if room <= self.capacity / TRIMMED {
+            // Before memory of that length is there, the old one stays.
+            let host = device.alloc_host(room * self.entry)?;
+            (self.host, self.capacity, self.stale) = (host, room, room);
+            // It may not be longer than the host's.
+            if let Some((address, _)) = self.own.take_if(|(_, capacity)| *capacity > room) {
+                device.free(address);
+            }
+        }
+        Ok(())
     }
 
     /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
@@ -162,12 +212,14 @@ impl Outbox {
     /// gone then. Where memory ran out, it is as large as it was or, on the device, not there until there is some again.
     pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
         self.is_long = is_long;
+        let is_own = usize::from(self.is_own());
+        self.needed[..=is_own].iter_mut().for_each(|needed| *needed = entries.max(*needed));
         let is_short = entries > self.capacity() as usize;
         if !is_short && (!self.is_own() || self.own.is_some()) {
             return Ok(false);
         }
-        // Kernels count in 32 bits. What the host has room for says nothing of the device, which may have much less.
-        let room = (entries + entries / 4).clamp(self.first, u32::MAX as usize);
+        // What the host has room for says nothing of the device, which may have much less.
+        let room = with_slack(entries).max(self.first);
         let own = if self.is_own() { Some(self.alloc_own(device, room)?) } else { None };
         if room > self.capacity {
             match device.alloc_host(room * self.entry) {
@@ -191,7 +243,7 @@ impl Outbox {
     /// A list on the device. Where there is no room for it beside the one that it takes the place of, that one goes first.
     fn alloc_own(&mut self, device: &mut dyn Device, room: usize) -> Result<u64, Fault> {
         match device.alloc(room * self.entry) {
-            Err(Fault::Memory(_)) if self.own.is_some() => {
+            Err(Fault::Memory(_) | Fault::Budget(_)) if self.own.is_some() => {
                 if let Some((former, _)) = self.own.take() {
                     device.free(former);
                 }

@@ -66,14 +66,14 @@ impl HostMemory for Watched {
 type All = Vec<(usize, Weak<Copies>)>;
 
 /// The device.
-pub(super) struct Late {
+pub(super) struct AsyncCopies {
     own: Box<dyn Device>,
     all: Arc<Mutex<All>>,
     marks: usize,
 }
 
 /// A mark of that device, with its number.
-struct LateMark {
+struct AsyncMark {
     own: Box<dyn Mark>,
     all: Arc<Mutex<All>>,
     number: usize,
@@ -86,7 +86,7 @@ fn finish(all: &Mutex<All>, marks: usize) {
     }
 }
 
-impl Mark for LateMark {
+impl Mark for AsyncMark {
     fn wait(&self) -> Result<(), Fault> {
         self.own.wait()?;
         finish(&self.all, self.number);
@@ -94,7 +94,7 @@ impl Mark for LateMark {
     }
 }
 
-impl Late {
+impl AsyncCopies {
     pub fn new(own: Box<dyn Device>) -> Self {
         Self { own, all: Arc::default(), marks: 0 }
     }
@@ -112,7 +112,7 @@ fn start(memory: &dyn HostMemory) -> usize {
     memory.bytes_of(0..0).expect("a place").as_ptr() as usize
 }
 
-impl Device for Late {
+impl Device for AsyncCopies {
     fn name(&self) -> String {
         self.own.name()
     }
@@ -158,7 +158,7 @@ impl Device for Late {
     }
 
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
-        let mark = LateMark { own: self.own.mark()?, all: Arc::clone(&self.all), number: self.marks };
+        let mark = AsyncMark { own: self.own.mark()?, all: Arc::clone(&self.all), number: self.marks };
         self.marks += 1;
         Ok(Box::new(mark))
     }

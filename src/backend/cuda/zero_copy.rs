@@ -96,13 +96,13 @@ impl Drop for Owned {
 }
 
 /// A device that maps the host's memory.
-pub(super) struct Mapped {
+pub(super) struct ZeroCopy {
     own: Box<dyn Device>,
     all: Arc<Mutex<Pieces>>,
     is_running: bool,
 }
 
-impl Mapped {
+impl ZeroCopy {
     /// Another device that maps.
     pub fn new(own: Box<dyn Device>) -> Self {
         Self { own, all: Arc::default(), is_running: false }
@@ -120,7 +120,7 @@ impl Mapped {
     }
 }
 
-impl Device for Mapped {
+impl Device for ZeroCopy {
     fn name(&self) -> String {
         self.own.name()
     }

@@ -1,0 +1,179 @@
+//! Budgets: what an engine may allocate on its device, and of pinned memory.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use rustc_hash::FxHashMap;
+
+use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use crate::backend::EngineSettings;
+
+/// Of a device's free memory, the part that is used by default; and the most of it.
+const SHARE: usize = 4;
+const MOST: usize = 2 << 30;
+
+/// Of the budget, the part for bricks and ground; the rest is for what launches read and write.
+const RECORDS: usize = 2;
+
+/// What may be allocated, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// On the device; by default as much as suits it.
+    pub device: Option<usize>,
+    /// For bricks and ground on the device; by default the usual part of that.
+    pub records: Option<usize>,
+    /// Of the host, pinned.
+    pub host: usize,
+}
+
+impl Limits {
+    pub fn new(settings: &EngineSettings) -> Self {
+        Self { device: settings.device_memory, records: None, host: settings.pinned_memory }
+    }
+
+    /// A device that keeps to them, and the bytes for bricks and ground.
+    pub fn enforce(self, mut own: Box<dyn Device>, usage: &Arc<Usage>) -> (Box<dyn Device>, usize) {
+        let device = self.device.unwrap_or_else(|| (own.free_memory() / SHARE).min(MOST));
+        let (usage, sizes) = (Arc::clone(usage), FxHashMap::default());
+        let records = self.records.unwrap_or(device / RECORDS);
+        (Box::new(Budgeted { own, limits: [device, self.host], usage, sizes }), records)
+    }
+}
+
+/// What is allocated. Anybody may look at it.
+#[derive(Debug, Default)]
+pub(super) struct Usage {
+    device: AtomicUsize,
+    host: AtomicUsize,
+    host_allocations: AtomicU64,
+}
+
+impl Usage {
+    /// Bytes on the device and of the host.
+    pub fn bytes(&self) -> [usize; 2] {
+        [&self.device, &self.host].map(|bytes| bytes.load(Ordering::Relaxed))
+    }
+
+    /// How many times memory of the host was allocated, which takes a millisecond for some megabytes.
+    pub fn host_allocations(&self) -> u64 {
+        self.host_allocations.load(Ordering::Relaxed)
+    }
+}
+
+/// A device that allocates no more than it may.
+struct Budgeted {
+    own: Box<dyn Device>,
+    limits: [usize; 2],
+    usage: Arc<Usage>,
+    /// Bytes by address.
+    sizes: FxHashMap<u64, usize>,
+}
+
+/// Is there room for so many bytes more?
+fn check(used: &AtomicUsize, limit: usize, bytes: usize) -> Result<(), Fault> {
+    let used = used.load(Ordering::Relaxed).saturating_add(bytes);
+    if used > limit { Err(Fault::Budget(limit)) } else { Ok(()) }
+}
+
+/// Memory that is counted.
+struct Counted {
+    own: Box<dyn HostMemory>,
+    bytes: usize,
+    usage: Arc<Usage>,
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.usage.host.fetch_sub(self.bytes, Ordering::Relaxed);
+    }
+}
+
+impl HostMemory for Counted {
+    fn bytes(&self) -> &[u8] {
+        self.own.bytes()
+    }
+
+    fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
+        self.own.bytes_of(range)
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        self.own.bytes_mut()
+    }
+
+    fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
+        self.own.bytes_of_mut(range)
+    }
+
+    fn address(&self) -> Option<u64> {
+        self.own.address()
+    }
+}
+
+impl Device for Budgeted {
+    fn name(&self) -> String {
+        self.own.name()
+    }
+
+    fn free_memory(&mut self) -> usize {
+        self.own.free_memory()
+    }
+
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        check(&self.usage.device, self.limits[0], bytes)?;
+        let address = self.own.alloc(bytes)?;
+        self.sizes.insert(address, bytes);
+        self.usage.device.fetch_add(bytes, Ordering::Relaxed);
+        Ok(address)
+    }
+
+    fn free(&mut self, address: u64) {
+        self.usage.device.fetch_sub(self.sizes.remove(&address).unwrap_or_default(), Ordering::Relaxed);
+        self.own.free(address);
+    }
+
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        check(&self.usage.host, self.limits[1], bytes)?;
+        let own = self.own.alloc_host(bytes)?;
+        self.usage.host.fetch_add(bytes, Ordering::Relaxed);
+        self.usage.host_allocations.fetch_add(1, Ordering::Relaxed);
+        Ok(Box::new(Counted { own, bytes, usage: Arc::clone(&self.usage) }))
+    }
+
+    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+        self.own.upload(from, bytes, to)
+    }
+
+    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
+        self.own.download(from, to, bytes)
+    }
+
+    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+        self.own.copy(from, to, bytes)
+    }
+
+    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+        self.own.launch(kernel, blocks, params)
+    }
+
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        self.own.mark()
+    }
+
+    fn times(&mut self) -> [Duration; 2] {
+        self.own.times()
+    }
+
+    fn wait(&mut self) -> Result<(), Fault> {
+        self.own.wait()
+    }
+}
+
+impl Drop for Budgeted {
+    fn drop(&mut self) {
+        // The device frees what is left there.
+        self.usage.device.fetch_sub(self.sizes.values().sum(), Ordering::Relaxed);
+    }
+}

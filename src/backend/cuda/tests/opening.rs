@@ -1,0 +1,121 @@
+//! When a device is opened, and by whom.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::*;
+use crate::backend::{Backend, EngineSettings};
+
+/// A device that can't be opened; how often somebody tried is counted.
+fn counted(is_auto: bool) -> (Engine, Arc<AtomicUsize>) {
+    let opened = Arc::new(AtomicUsize::new(0));
+    let own = Arc::clone(&opened);
+    let device = move |_| {
+        own.fetch_add(1, Ordering::SeqCst);
+        Err(Fault::NoDriver)
+    };
+    (Engine::from_cuda(Cuda::with_device(is_auto, limits(0), &[], device)), opened)
+}
+
+fn terrain(engine: &Engine) -> Terrain {
+    let ground = Ground::flat(96, 96, 30.0).expect("valid");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    terrain.set_engine(engine.clone());
+    terrain
+}
+
+fn dig(radius: f32) -> [Brush; 1] {
+    [Brush::dig(Shape::sphere(glam::Vec3::new(48.0, 30.0, 48.0), radius))]
+}
+
+/// Threads of this process.
+fn threads() -> Option<usize> {
+    Some(std::fs::read_dir("/proc/self/task").ok()?.count())
+}
+
+#[test]
+fn an_engine_that_nobody_uses_opens_no_card() {
+    for backend in [Backend::Auto, Backend::Cuda] {
+        let engine = Engine::new(backend);
+        std::thread::sleep(Duration::from_millis(20));
+        assert_eq!(engine.state(), EngineState::Unopened);
+        assert_eq!(engine.figures(), Default::default());
+    }
+    assert_eq!(Engine::new(Backend::Cpu).state(), EngineState::Cpu);
+}
+
+/// What the next test starts in a process of its own, where nobody else starts threads.
+#[test]
+#[ignore = "counts the threads of its process"]
+fn count_threads_of_engines() {
+    let before = threads();
+    let engines: Vec<Engine> = (0..100).map(|_| Engine::with_settings(&EngineSettings::default())).collect();
+    assert_eq!(threads(), before);
+    drop(engines);
+}
+
+#[test]
+fn an_engine_that_nobody_uses_starts_no_thread() {
+    let test = "backend::cuda::tests::opening::count_threads_of_engines";
+    let own = std::env::current_exe().expect("this test");
+    let said =
+        std::process::Command::new(own).args(["--exact", test, "--ignored"]).output().expect("it runs");
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));
+}
+
+#[test]
+fn small_brushes_open_no_card() {
+    let (engine, opened) = counted(true);
+    let mut terrain = terrain(&engine);
+    (0..50).for_each(|_| drop(terrain.apply(dig(4.0))));
+    assert_eq!((engine.state(), opened.load(Ordering::SeqCst)), (EngineState::Unopened, 0));
+}
+
+#[test]
+fn a_large_transaction_opens_the_card_once_and_does_not_wait_for_it() {
+    let (engine, opened) = counted(true);
+    let mut terrain = terrain(&engine);
+    for _ in 0..3 {
+        let large = Brush::dig(Shape::sphere(glam::Vec3::new(48.0, 30.0, 48.0), 40.0));
+        terrain.apply([large.with_roughness(Roughness::new(2.0, 3.0, 5))]);
+        terrain.undo();
+    }
+    assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(Fault::NoDriver.to_string()));
+    assert_eq!(opened.load(Ordering::SeqCst), 1);
+    assert_eq!(engine.figures().cuda, 0);
+}
+
+#[test]
+fn an_engine_that_is_to_use_a_card_opens_it_for_its_first_transaction() {
+    let (engine, opened) = counted(false);
+    let mut terrain = terrain(&engine);
+    // Nothing to do is no transaction.
+    terrain.apply::<Brush>([]);
+    assert_eq!(engine.state(), EngineState::Unopened);
+    terrain.apply(dig(2.0));
+    assert_ne!(engine.state(), EngineState::Unopened);
+    engine.wait(Duration::from_secs(9));
+    assert_eq!(opened.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn who_waits_for_a_card_opens_it() {
+    for is_auto in [false, true] {
+        let (engine, opened) = counted(is_auto);
+        assert_eq!(engine.wait(Duration::from_secs(9)), EngineState::Lost(Fault::NoDriver.to_string()));
+        assert_eq!(opened.load(Ordering::SeqCst), 1);
+    }
+}
+
+#[test]
+fn the_card_that_a_game_suggests_is_asked_for() {
+    let (said, heard) = std::sync::mpsc::channel();
+    let device = move |card| {
+        said.send(card).expect("the test listens");
+        Err(Fault::NoDriver)
+    };
+    let engine = Engine::from_cuda(Cuda::with_device(true, limits(0), &[], device));
+    let card = CardChoice::PciBusId("0000:01:00.0".into());
+    engine.suggest_card(card.clone());
+    engine.wait(Duration::from_secs(9));
+    assert_eq!(heard.recv(), Ok(Some(card)));
+}
