@@ -1,6 +1,6 @@
 //! Lower and raise undo each other: what one took, the other gives back.
 
-use bevy_burrow::lattice::{Column, LatticeBox};
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
