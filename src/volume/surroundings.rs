@@ -23,6 +23,9 @@ pub(super) struct Surroundings {
 
 impl Surroundings {
     /// Of a brick, the samples of a view.
+    ///
+    /// Never in line: edits that look at nothing around pay for what is large in the function that they share.
+    #[inline(never)]
     pub fn new(view: &SampleView, pos: BrickPos) -> Self {
         let low = pos.origin() - 1;
         let heights = view.ground().heights::<SIDE>(Column::of(low));
