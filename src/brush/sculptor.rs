@@ -141,20 +141,18 @@ impl Around {
         }
         let own = self.own();
         // Where nobody edited, densities go on beyond, but no shift of them could be stored.
-        if own.abs() >= FARTHEST {
-            let is_nearer = by.signum() != own.signum();
-            let is_reached =
-                is_nearer && self.is_beside(|index| self.moved >> index & 1 == 1 && !self.is_cut(index));
-            return is_reached.then_some(own.signum() * ONE + by);
-        }
-        let middle = if self.is_cut(Self::MIDDLE) {
+        let middle = if own.abs() >= FARTHEST {
+            let is_moved = |index| self.moved >> index & 1 == 1 && !self.is_cut(index);
+            let is_reached = by.signum() != own.signum() && self.is_beside(is_moved);
+            is_reached.then_some(own.signum() * ONE)?
+        } else if self.is_cut(Self::MIDDLE) {
             let nearest = self.nearest().filter(|&nearest| nearest <= DEPTH)?;
             own.signum() * (nearest + ONE).max(DEPTH)
         } else {
             own
         };
         let after = middle + by;
-        // What is known must not come to say that it is cut off: the opposite shift would not find it.
+        // It must not come to say that it is cut off: the opposite shift would not know it again.
         Some(if after.abs() == DEPTH { after + by.signum() } else { after })
     }
 

@@ -108,16 +108,15 @@ __device__ inline bool shifted(const Marked* own, i32 by, i32& after) {
     if (by == 0) return false;
     // Where nobody edited, densities go on beyond, but no shift of them could be stored.
     if (magnitude(middle) >= FARTHEST) {
-        after = sign * ONE + by;
-        return sign_of(by) != sign && is_beside(own, true);
-    }
-    if (is_cut(*own)) {
+        if (sign_of(by) == sign || !is_beside(own, true)) return false;
+        middle = sign * ONE;
+    } else if (is_cut(*own)) {
         i32 nearest = nearest_of(own, sign);
         if (nearest > DEPTH) return false;
         middle = sign * largest(nearest + ONE, DEPTH);
     }
     after = middle + by;
-    // What is known must not come to say that it is cut off.
+    // It must not come to say that it is cut off.
     if (magnitude(after) == DEPTH) after += sign_of(by);
     return true;
 }
