@@ -114,7 +114,7 @@ pub use request::Brush;
 pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
 pub(crate) use sculptor::Stroke;
-pub(crate) use sculptor::{Around, Sculptor};
+pub(crate) use sculptor::{Around, FARTHEST, Sculptor, is_moved};
 pub use shape::Shape;
 pub use stamp::Stamp;
 

@@ -48,6 +48,16 @@ pub enum Operation {
     },
     /// Moves the surface outwards, which is up on ground that nobody dug. Where a dig or an add was, distances are known
     /// to [`DEPTH`] only, and one application moves the surface by about that at most.
+    ///
+    /// It gives back what a [`Lower`](Self::Lower) of the same brush took, and the other way round. Samples are the same
+    /// again, or 1/256 voxel off for each time that one would have come to lie exactly 4 voxels from the surface. Those
+    /// that a dig or an add cut off are on the same side again.
+    ///
+    /// Densities end 127.996 voxels from the surface, and what was moved beyond is forgotten: raise and lower leave it as it
+    /// is. So at most some 128 voxels come back. Natural ground that was lowered by more, and raised again, is lower than
+    /// before, but nowhere higher; ground that was raised by more, and lowered again, is higher, but nowhere lower. Once
+    /// the ground is higher than nature made it, further raising fills what is missing from the sides, by a voxel each
+    /// time at most.
     Raise {
         /// How far, in voxels: 0 to 64.
         amount: f32,

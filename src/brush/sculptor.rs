@@ -1,9 +1,21 @@
 //! What operations that sculpt make of a sample: integers throughout.
 //!
-//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], so exactly that number says
-//! "at least as far". Operations that move a surface have to know how far away it is, or the whole middle of a cave would
-//! turn solid at once. So a sample that was *cut off* counts as one voxel farther than its nearest face neighbour, and is
-//! left alone while all of those were cut off too. Beyond the world's rim all goes on as it is at the rim.
+//! Stored densities are known to a depth: a dig and an add cut distances off at [`DEPTH`], and what is stored ends at
+//! [`FARTHEST`], so exactly these numbers say "at least as far". Operations that move a surface have to know how far away
+//! it is, or the whole middle of a cave would turn solid at once. So a sample that was *cut off* at `DEPTH` counts as one
+//! voxel farther than its nearest face neighbour, and is left alone while all of those were cut off too. One that was cut off
+//! at `FARTHEST` is left alone unless it lies beside the surface, one voxel from which it counts as then. Beyond the world's
+//! rim all goes on as it is at the rim.
+//!
+//! Raise and lower have to give back what the other one took, and they change neighbours by different amounts where they
+//! fade. Any guess may leave crumbs and holes there, so they ask for more:
+//!
+//! - What was cut off at `DEPTH` is left alone if its neighbours lie deeper. They were moved away, and it was not.
+//! - What lies at `FARTHEST`, or beyond where nobody edited, is left alone even beside the surface, unless that surface is
+//!   known to be beyond what nature made: of ground that was built or raised, for a raise; of air that was dug or lowered, for
+//!   a lower. So natural ground that was lowered and raised again is never higher than before, however often; and raising on
+//!   fills the pit that is left of it.
+//! - Neither makes a sample `DEPTH` that was not cut off.
 
 use glam::IVec3;
 
@@ -15,6 +27,9 @@ use super::solid::Solid;
 use super::{deed::length, stamp::PressConstants};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
+
+/// Where stored densities end, in 1/256 voxel.
+pub(crate) const FARTHEST: i32 = i16::MAX as i32;
 
 /// How far neighbours count as denser or thinner at most, in 1/256 voxel: of the far side of a cliff nobody knows more.
 const CONTRAST: i32 = 2 * ONE;
@@ -45,8 +60,17 @@ const PAIRS: [([i32; 3], i32, i32); 13] = [
 pub(crate) struct Around {
     /// Densities in 1/256 voxel: x fastest, then z, then y.
     pub densities: [i32; 27],
-    /// A bit for each that was cut off.
+    /// A bit for each that was cut off, at [`DEPTH`] or [`FARTHEST`].
     pub cut: u32,
+    /// A bit for each that [`is_moved`].
+    pub moved: u32,
+}
+
+/// Is a sample farther from the surface, by a voxel or more, than it was before anybody edited it? Then it is solid that was
+/// built or raised, or air that was dug or lowered.
+pub(crate) fn is_moved(density: i32, pristine: i32) -> bool {
+    let by = density - pristine;
+    if density < 0 { by <= -ONE } else { by >= ONE }
 }
 
 impl Around {
@@ -76,22 +100,60 @@ impl Around {
         ways.filter(|way| self.density(*way) < 0)
     }
 
-    /// The six neighbours across faces.
-    fn faces(&self) -> impl Iterator<Item = (i32, bool)> {
-        [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], self.is_cut(index))).into_iter()
+    /// The six neighbours across faces: densities, and where those are.
+    fn faces(&self) -> impl Iterator<Item = (i32, usize)> {
+        [4, 10, 12, 14, 16, 22].map(|index| (self.densities[index], index)).into_iter()
     }
 
-    /// The density in the middle, as far as anyone knows; `None` where all was cut off.
+    /// Do any of the neighbours that these say lie on the other side of the surface?
+    fn is_beside(&self, which: impl Fn(usize) -> bool) -> bool {
+        self.faces().any(|(other, index)| (other < 0) != (self.own() < 0) && which(index))
+    }
+
+    /// How near the surface the known ones of the neighbours across faces lie, on the side of the middle.
+    fn nearest(&self) -> Option<i32> {
+        let known = self.faces().filter(|&(_, index)| !self.is_cut(index));
+        // Towards the surface, distances along the own sign get smaller.
+        known.map(|(other, _)| other * self.own().signum()).min()
+    }
+
+    /// The density in the middle, as far as anyone knows; `None` where nobody does.
     fn middle(&self) -> Option<i32> {
-        let own = self.densities[Self::MIDDLE];
+        let own = self.own();
         if !self.is_cut(Self::MIDDLE) {
             return Some(own);
         }
-        // Towards the surface, distances along the own sign get smaller.
-        let nearest =
-            self.faces().map(|(other, is_cut)| if is_cut { DEPTH } else { other * own.signum() }).min()?;
-        let is_known = self.faces().any(|(_, is_cut)| !is_cut);
-        is_known.then(|| own.signum() * (nearest.max(0) + ONE))
+        if own.abs() == FARTHEST {
+            return self.is_beside(|_| true).then_some(own.signum() * ONE);
+        }
+        let nearest = self.nearest()?;
+        let are_all_known = self.faces().all(|(_, index)| !self.is_cut(index));
+        let nearest = if are_all_known { nearest } else { nearest.min(DEPTH) };
+        Some(own.signum() * (nearest.max(0) + ONE))
+    }
+
+    /// The density in the middle with a part of `by` added, which an opposite shift takes away again: to the bit, or to 1/256
+    /// voxel where one of both would end at exactly [`DEPTH`].
+    fn shifted(&self, by: i32, weight: i32) -> Option<i32> {
+        let by = by.signum() * ((by.abs() * weight + ONE / 2) >> 8);
+        if by == 0 {
+            return None;
+        }
+        let own = self.own();
+        // Where nobody edited, densities go on beyond, but no shift of them could be stored.
+        let middle = if own.abs() >= FARTHEST {
+            let is_moved = |index| self.moved >> index & 1 == 1 && !self.is_cut(index);
+            let is_reached = by.signum() != own.signum() && self.is_beside(is_moved);
+            is_reached.then_some(own.signum() * ONE)?
+        } else if self.is_cut(Self::MIDDLE) {
+            let nearest = self.nearest().filter(|&nearest| nearest <= DEPTH)?;
+            own.signum() * (nearest + ONE).max(DEPTH)
+        } else {
+            own
+        };
+        let after = middle + by;
+        // It must not come to say that it is cut off: the opposite shift would not know it again.
+        Some(if after.abs() == DEPTH { after + by.signum() } else { after })
     }
 
     /// 64 times the way from the middle, which is `own`, to the average of all.
@@ -99,7 +161,7 @@ impl Around {
         let pair = |&(way, weight, length): &([i32; 3], i32, i32)| {
             let one = |way: [i32; 3]| {
                 let index = Self::index(way);
-                if self.is_cut(index) && own.abs() + length > DEPTH {
+                if self.is_cut(index) && own.abs() + length > self.densities[index].abs() {
                     return None;
                 }
                 Some((self.densities[index] - own).clamp(-CONTRAST, CONTRAST))
@@ -172,6 +234,11 @@ impl Sculptor {
         if let Some(target) = target {
             return Some(own + part(i64::from(target) - i64::from(own), weight));
         }
+        match &self.deed {
+            Deed::Raise { amount, .. } => return around.shifted(-amount, weight),
+            Deed::Lower { amount, .. } => return around.shifted(*amount, weight),
+            _ => {}
+        }
         let middle = around.middle()?;
         match &self.deed {
             Deed::Smooth { .. } => {
@@ -184,8 +251,6 @@ impl Sculptor {
                 let (low, high) = all.iter().fold((own, own), |(low, high), &d| (low.min(d), high.max(d)));
                 (by != 0).then(|| around.attached((middle - by).clamp(low, high)))
             }
-            Deed::Raise { amount, .. } => shifted(middle, -amount, weight),
-            Deed::Lower { amount, .. } => shifted(middle, *amount, weight),
             Deed::Terrace { step, base, .. } => {
                 let surface = at.y * ONE - middle;
                 let by = part(i64::from(surface) - i64::from(terraced(surface - base, *step) + base), weight);
@@ -248,12 +313,6 @@ fn part(whole: i64, weight: i32) -> i32 {
     (part * whole.signum()) as i32
 }
 
-/// The density with a part of `by` added, which an opposite shift takes away again to the bit.
-fn shifted(density: i32, by: i32, weight: i32) -> Option<i32> {
-    let by = by.signum() * ((by.abs() * weight + ONE / 2) >> 8);
-    (by != 0).then_some(density + by)
-}
-
 /// A height in steps, with a riser over the middle quarter of each.
 fn terraced(height: i32, step: i32) -> i32 {
     let tread = height.div_euclid(step) * step;
@@ -267,7 +326,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn around(density: impl Fn(i32, i32, i32) -> i32) -> Around {
-        let mut all = Around { densities: [0; 27], cut: 0 };
+        let mut all = Around { densities: [0; 27], cut: 0, moved: 0 };
         for way in (0..27).map(|i| [i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1]) {
             all.densities[Around::index(way)] = density(way[0], way[1], way[2]);
         }
@@ -328,6 +387,47 @@ mod tests {
         let mut wall = around(|x, _, _| (x * 256 + 900).min(DEPTH));
         wall.cut = (0..27).filter(|i| i % 3 == 2).fold(0, |cut, i| cut | 1 << i);
         assert_eq!(wall.way_to_average(900), 0);
+    }
+
+    #[test]
+    fn shifts_leave_alone_what_was_cut_off_unless_neighbours_tell_how_far_it_is() {
+        let below = Around::index([0, -1, 0]);
+        // Of a cave's air, with a neighbour that is known.
+        let cave = |below_is: i32| {
+            let mut cave = around(|_, _, _| DEPTH);
+            (cave.densities[below], cave.cut) = (below_is, ((1 << 27) - 1) & !(1 << below));
+            cave
+        };
+        assert_eq!(cave(900).shifted(-ONE, 256), Some(900));
+        assert_eq!(
+            cave(100).shifted(-ONE, 256),
+            Some(DEPTH - ONE),
+            "it is no nearer than where it was cut off"
+        );
+        assert_eq!(cave(900).shifted(-3, 128), Some(900 + ONE - 2));
+        assert_eq!(cave(DEPTH + 1).shifted(-ONE, 256), None, "that one was moved");
+        assert_eq!(around(|_, y, _| DEPTH - 1 + y * ONE).shifted(1, 256), Some(DEPTH + 1));
+        assert_eq!(around(|_, y, _| DEPTH + 1 + y * ONE).shifted(-1, 256), Some(DEPTH - 1));
+        for side in [1, -1] {
+            let far = |end: i32, other: i32, moved: u32| {
+                let mut far = around(|_, _, _| side * end);
+                far.densities[below] = side * other;
+                (far.cut, far.moved) =
+                    (if end == FARTHEST { !(1 << below) & ((1 << 27) - 1) } else { 0 }, moved);
+                far
+            };
+            let (away, nearer) = (side * 700, -side * 700);
+            for end in [FARTHEST, FARTHEST + 5000] {
+                let is_moved = 1 << below;
+                assert_eq!(far(end, FARTHEST - 9, is_moved).shifted(nearer, 256), None, "as far as it says");
+                assert_eq!(far(end, -40, 0).shifted(nearer, 256), None, "beside natural ground");
+                assert_eq!(far(end, -40, is_moved).shifted(away, 256), None, "farther is as far");
+                assert_eq!(far(end, -40, is_moved).shifted(nearer, 256), Some(side * ONE + nearer));
+            }
+            assert_eq!(far(FARTHEST, -40, 0).middle(), Some(side * ONE));
+            assert_eq!(far(FARTHEST, 40, 0).middle(), None);
+            assert_eq!(far(FARTHEST + 5000, 40, 0).middle(), Some(side * (FARTHEST + 5000)));
+        }
     }
 
     #[test]

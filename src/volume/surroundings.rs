@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use glam::{IVec3, USizeVec3};
 
 use super::{Brick, SampleView};
-use crate::brush::{Around, DEPTH};
+use crate::brush::{Around, DEPTH, FARTHEST, is_moved};
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
 
 /// Samples along a side: the brick's and one on each side.
@@ -14,16 +14,23 @@ const SIDE: usize = BRICK as usize + 2;
 /// The densities of a brick and of one sample more on all sides.
 pub(super) struct Surroundings {
     densities: [[[i32; SIDE]; SIDE]; SIDE],
-    /// Which were cut off where a dig or an add stops to tell distances apart: a bit for each x.
+    /// Which were cut off, where a dig or an add stops to tell distances apart or where stored densities end: a bit for
+    /// each x.
     cut: [[u16; SIDE]; SIDE],
+    /// Which lie farther from the surface than the ground has them, likewise.
+    moved: [[u16; SIDE]; SIDE],
 }
 
 impl Surroundings {
     /// Of a brick, the samples of a view.
+    ///
+    /// Never in line: edits that look at nothing around pay for what is large in the function that they share.
+    #[inline(never)]
     pub fn new(view: &SampleView, pos: BrickPos) -> Self {
         let low = pos.origin() - 1;
         let heights = view.ground().heights::<SIDE>(Column::of(low));
-        let mut own = Self { densities: [[[0; SIDE]; SIDE]; SIDE], cut: [[0; SIDE]; SIDE] };
+        let mut own =
+            Self { densities: [[[0; SIDE]; SIDE]; SIDE], cut: [[0; SIDE]; SIDE], moved: [[0; SIDE]; SIDE] };
         for (y, layer) in (low.y..).zip(&mut own.densities) {
             for (row, heights) in layer.iter_mut().zip(&heights) {
                 row.iter_mut().zip(heights).for_each(|(density, height)| *density = y * ONE - height);
@@ -44,17 +51,21 @@ impl Surroundings {
         if (xs.clone(), zs.clone()) == (0..=SIDE - 1, 0..=SIDE - 1) {
             return;
         }
-        for (layer, cut) in self.densities.iter_mut().zip(&mut self.cut) {
-            for (row, cut) in layer.iter_mut().zip(&mut *cut) {
+        let copy =
+            |bits: &mut u16, x: usize, from: usize| *bits = *bits & !(1 << x) | (*bits >> from & 1) << x;
+        let marks = self.cut.iter_mut().zip(&mut self.moved);
+        for (layer, (cut, moved)) in self.densities.iter_mut().zip(marks) {
+            for ((row, cut), moved) in layer.iter_mut().zip(&mut *cut).zip(&mut *moved) {
                 for x in (0..SIDE).filter(|x| !xs.contains(x)) {
                     let from = x.clamp(*xs.start(), *xs.end());
                     row[x] = row[from];
-                    *cut = *cut & !(1 << x) | (*cut >> from & 1) << x;
+                    copy(cut, x, from);
+                    copy(moved, x, from);
                 }
             }
             for z in (0..SIDE).filter(|z| !zs.contains(z)) {
                 let from = z.clamp(*zs.start(), *zs.end());
-                (layer[z], cut[z]) = (layer[from], cut[from]);
+                (layer[z], cut[z], moved[z]) = (layer[from], cut[from], moved[from]);
             }
         }
     }
@@ -73,9 +84,11 @@ impl Surroundings {
                 let row = super::row(brick.samples(), own_y * 64 + own_z * 8);
                 for (x, &sample) in xs.clone().zip(&row[dx..]) {
                     if sample != i16::MIN {
-                        self.densities[y][z][x] = sample.into();
-                        let is_cut = i32::from(sample).abs() == DEPTH;
+                        let density = i32::from(sample);
+                        let is_cut = density.abs() == DEPTH || density.abs() == FARTHEST;
                         self.cut[y][z] |= u16::from(is_cut) << x;
+                        self.moved[y][z] |= u16::from(is_moved(density, self.densities[y][z][x])) << x;
+                        self.densities[y][z][x] = density;
                     }
                 }
             }
@@ -89,11 +102,12 @@ impl Surroundings {
 
     /// One of the brick's own samples and what is around it.
     pub fn around(&self, [x, y, z]: [usize; 3]) -> Around {
-        let mut around = Around { densities: [0; 27], cut: 0 };
+        let mut around = Around { densities: [0; 27], cut: 0, moved: 0 };
         for (i, (dy, dz)) in (0..3).flat_map(|dy| (0..3).map(move |dz| (dy, dz))).enumerate() {
-            let (row, cut) = (&self.densities[y + dy][z + dz], self.cut[y + dy][z + dz]);
-            around.densities[i * 3..i * 3 + 3].copy_from_slice(&row[x..x + 3]);
-            around.cut |= u32::from(cut >> x & 7) << (i * 3);
+            let (y, z) = (y + dy, z + dz);
+            around.densities[i * 3..i * 3 + 3].copy_from_slice(&self.densities[y][z][x..x + 3]);
+            around.cut |= u32::from(self.cut[y][z] >> x & 7) << (i * 3);
+            around.moved |= u32::from(self.moved[y][z] >> x & 7) << (i * 3);
         }
         around
     }
@@ -119,7 +133,11 @@ mod tests {
         let pos = BrickPos(IVec3::new(1, 0, 2));
         let mut bricks = Bricks::default();
         for (i, step) in [IVec3::ZERO, IVec3::X, IVec3::NEG_Y, IVec3::new(-1, 1, 1)].into_iter().enumerate() {
-            let value = |at: usize| if at % 5 == i { DEPTH } else { at as i32 * 7 - 900 };
+            let value = |at: usize| match at % 5 {
+                kind if kind == i => DEPTH,
+                kind if kind == i + 1 => -FARTHEST,
+                _ => at as i32 * 7 - 900,
+            };
             let samples = std::array::from_fn(|at| value(at) as i16);
             bricks.insert(BrickPos(pos.0 + step), Arc::new(Brick::of_edited(&samples)));
         }
@@ -132,8 +150,12 @@ mod tests {
             for (i, step) in (0..27).map(|i| (i, IVec3::new(i % 3, i / 9, i / 3 % 3) - 1)) {
                 let distance = view.distance(at + step);
                 assert_eq!(around.densities[i as usize], distance, "{at} {step}");
-                let is_cut = view.is_edited(at + step) && distance == DEPTH;
+                let is_edited = view.is_edited(at + step);
+                let is_cut = is_edited && (distance == DEPTH || distance == -FARTHEST);
                 assert_eq!(around.cut >> i & 1 == 1, is_cut, "{at} {step}");
+                let pristine = (at + step).y * ONE - ground.height(Column::of(at + step));
+                let is_moved = is_edited && is_moved(distance, pristine);
+                assert_eq!(around.moved >> i & 1 == 1, is_moved, "{at} {step}");
             }
         }
     }

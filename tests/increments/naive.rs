@@ -7,6 +7,9 @@ use glam::{IVec2, IVec3, Quat, Vec3};
 
 use crate::witness::{Effect, Witness};
 
+/// Where stored densities end.
+const FARTHEST: i32 = 32_767;
+
 /// A length in 1/256 voxel.
 fn units(voxels: f32) -> i32 {
     (voxels * 256.0).round_ties_even() as i32
@@ -90,8 +93,8 @@ impl Witness {
         };
         let distance = |at: IVec3| self.distance(self.at_rim(at));
         let (own, depth) = (distance(point), bevy_burrow::brush::DEPTH);
-        let is_cut =
-            |at: IVec3| self.samples.get(&self.at_rim(at)).is_some_and(|&(own, _)| own.abs() == depth);
+        let stored = |at: IVec3| self.samples.get(&self.at_rim(at)).map(|&(own, _)| own);
+        let is_cut = |at: IVec3| stored(at).is_some_and(|own| own.abs() == depth || own.abs() == FARTHEST);
         let away = |whole: i64| (whole.signum() * ((whole.abs() * i64::from(weight) + 255) / 256)) as i32;
         let to = |target: i32| own + away(i64::from(target) - i64::from(own));
         let faces = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
@@ -102,9 +105,44 @@ impl Witness {
         if let Some(target) = target {
             return Some(to(target));
         }
+        let is_other = |at: &&IVec3| (distance(**at) < 0) != (own < 0);
+        if let Operation::Raise { amount } | Operation::Lower { amount } = brush.operation {
+            let by = (units(amount) * weight + 128) / 256;
+            let by = if matches!(brush.operation, Operation::Raise { .. }) { -by } else { by };
+            let ground = self.terrain.world().ground();
+            // Known, and by a voxel or more farther from the surface than nature made it.
+            let is_moved = |at: &&IVec3| {
+                let (now, nature) = (distance(**at), ground.distance(self.at_rim(**at)));
+                !is_cut(**at)
+                    && stored(**at).is_some()
+                    && (now - nature) * (if now < 0 { -1 } else { 1 }) >= 256
+            };
+            let middle = if own.abs() >= FARTHEST {
+                // Where densities end, nothing moves but towards a surface that was moved beyond nature's.
+                if (by < 0) == (own < 0) || !faces.iter().filter(is_other).any(|at| is_moved(&at)) {
+                    return None;
+                }
+                own.signum() * 256
+            } else if is_cut(point) {
+                let known = faces.iter().filter(|&&face| !is_cut(face));
+                let nearest = known.map(|&face| distance(face) * own.signum()).min()?;
+                if nearest > depth {
+                    return None;
+                }
+                own.signum() * (nearest + 256).max(depth)
+            } else {
+                own
+            };
+            let after = middle + by;
+            // Only digs and adds leave a sample that says it is cut off.
+            return (by != 0).then_some(if after.abs() == depth { after + by.signum() } else { after });
+        }
         // Of what was cut off, no more is known than that it is a voxel farther than what is not.
         let mut middle = own;
-        if is_cut(point) {
+        if is_cut(point) && own.abs() == FARTHEST {
+            faces.iter().find(is_other)?;
+            middle = own.signum() * 256;
+        } else if is_cut(point) {
             let sign = own.signum();
             let known = faces.iter().filter(|&&face| !is_cut(face));
             let nearest = known.map(|&face| distance(face) * sign).min()?;
@@ -118,7 +156,7 @@ impl Witness {
             for step in steps.filter(|&step| step != IVec3::ZERO) {
                 let length = (256.0 * step.as_dvec3().length()).round() as i32;
                 let weight = [8, 4, 2, 1][step.abs().element_sum() as usize];
-                let is_known = |at: IVec3| !is_cut(at) || middle.abs() + length <= depth;
+                let is_known = |at: IVec3| !is_cut(at) || middle.abs() + length <= distance(at).abs();
                 if is_known(point + step) && is_known(point - step) {
                     sum += weight * (distance(point + step) - middle).clamp(-512, 512);
                 }
@@ -129,7 +167,6 @@ impl Witness {
             let same = |at: &IVec3| (distance(*at) < 0) == (after < 0);
             if (own < 0) == (after < 0) || faces.iter().any(same) { after } else { -i32::from(own < 0) }
         };
-        let shift = |voxels: f32| (units(voxels) * weight + 128) / 256;
         match brush.operation {
             Operation::Smooth => match average() * weight / (64 * 256) {
                 0 => None,
@@ -144,8 +181,6 @@ impl Witness {
                     Some(attached((middle - by).clamp(*low, *high)))
                 }
             },
-            Operation::Raise { amount } => (shift(amount) != 0).then(|| middle - shift(amount)),
-            Operation::Lower { amount } => (shift(amount) != 0).then(|| middle + shift(amount)),
             Operation::Terrace { step, base } => {
                 let (step, base) = (units(step), units(base));
                 let surface = point.y * 256 - middle;

@@ -180,6 +180,37 @@ pub fn sculpting_brush(rng: &mut Rng, shape: Shape, place: Vec3) -> Brush {
     }
 }
 
+/// A lower and a raise by the same amount, by a brush of any shape near the surface.
+pub fn random_lower_and_raise(rng: &mut Rng, ground: &Ground) -> (Brush, Brush) {
+    let (x, z) = (rng.i32(0..=ground.width()), rng.i32(0..=ground.depth()));
+    let height = ground.height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
+    let jitter = Vec3::new(rng.f32() - 0.5, rng.f32() * 16.0 - 8.0, rng.f32() - 0.5);
+    let at = Vec3::new(x as f32, height, z as f32) + if rng.bool() { jitter } else { Vec3::ZERO };
+    let r = [1.5, 3.0, 4.3, 6.0, 7.7][rng.usize(0..5)];
+    let shape = match rng.u32(0..7) {
+        0 => Shape::cuboid(at, Vec3::new(r, r * 1.5, r)),
+        1 => Shape::cylinder(at - Vec3::Y * r, Vec3::Y * 2.0 * r, r),
+        2 => Shape::cone(at - Vec3::Y * 2.0, Vec3::new(1.0, 9.0, -2.0), r),
+        3 => Shape::capsule(at, at + Vec3::new(2.0, -5.0, 3.0), r.min(5.0)),
+        _ => Shape::sphere(at, r),
+    };
+    // Whole amounts on level ground are what games ask for.
+    let amount = match rng.u32(0..4) {
+        0 => 64.0,
+        1 => rng.u32(1..=64) as f32,
+        2 => rng.f32() * 4.0,
+        _ => rng.f32() * 64.0,
+    };
+    let brush = Brush::lower(shape, amount).with_falloff([0.0, 0.5, 2.0, 4.0, 64.0][rng.usize(0..5)]);
+    let brush = if rng.u32(0..4) == 0 { brush.with_strength(rng.f32()) } else { brush };
+    let lower = match rng.u32(0..5) {
+        0 => brush.with_roughness(Roughness::new(rng.f32() * 2.0, 1.0 + rng.f32() * 6.0, rng.u32(..))),
+        _ => brush,
+    };
+    let raise = Brush { operation: Operation::Raise { amount }, ..lower.clone() };
+    (lower, raise)
+}
+
 /// A random brush of any kind.
 pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) }

@@ -4,11 +4,15 @@
 
 #include "threads.cuh"
 
-// A sample with one bit more: twice the density, and one more if it was cut off.
+// A sample with two bits more: four times the density, one more if it was cut off, two more if it was moved away from the
+// surface.
 typedef i32 Marked;
 
 // Samples of a brick's surroundings along a side: its own and one on each side. x fastest, then z, then y.
 constexpr i32 AROUND = SIDE + 2;
+
+// Where stored densities end.
+constexpr i32 FARTHEST = 32767;
 
 // How far neighbours count as denser or thinner at most, and by how much sharpening changes a sample at most.
 constexpr i32 CONTRAST = 2 * ONE;
@@ -20,18 +24,26 @@ constexpr i64 FARTHEST_PLANE = 1 << 25;
 // The place of one of the brick's own samples, or of one beside them, in its surroundings.
 __device__ inline i32 around_at(i32 x, i32 y, i32 z) { return ((y + 1) * AROUND + z + 1) * AROUND + x + 1; }
 
-__device__ inline i32 density(Marked sample) { return sample >> 1; }
+__device__ inline i32 density(Marked sample) { return sample >> 2; }
 
 __device__ inline bool is_cut(Marked sample) { return sample & 1; }
+
+__device__ inline bool is_moved(Marked sample) { return sample & 2; }
 
 __device__ inline i32 clamped(i32 value, i32 low, i32 high) { return smallest(largest(value, low), high); }
 
 // As it is stored.
-__device__ inline i32 storable(i32 density) { return clamped(density, -32767, 32767); }
+__device__ inline i32 storable(i32 density) { return clamped(density, -FARTHEST, FARTHEST); }
 
 __device__ inline i32 sign_of(i32 value) { return (value > 0) - (value < 0); }
 
 __device__ inline i32 magnitude(i32 value) { return value < 0 ? -value : value; }
+
+// An edited sample, with what is to be known of it.
+__device__ inline Marked marked(i32 density, i32 pristine) {
+    i32 far = magnitude(density), by = density < 0 ? pristine - density : density - pristine;
+    return density * 4 + (far == DEPTH || far == FARTHEST) + (by >= ONE) * 2;
+}
 
 // Rounded down; the divisor is positive.
 __device__ inline i64 divided(i64 value, i64 by) {
@@ -49,20 +61,64 @@ __device__ inline i32 face(i32 number) {
     return number & 1 ? step : -step;
 }
 
+// Does any neighbour lie on the other side of the surface? Only those count that are known to be moved, if so asked.
+__device__ inline bool is_beside(const Marked* own, bool moved_only) {
+    bool is_any = false;
+#pragma unroll
+    for (i32 i = 0; i < 6; i++) {
+        Marked other = own[face(i)];
+        is_any |= (other < 0) != (*own < 0) && (!moved_only || (is_moved(other) && !is_cut(other)));
+    }
+    return is_any;
+}
+
+// How near the surface the known ones of the neighbours lie, on the side of the middle; UNKNOWN where none is.
+constexpr i32 UNKNOWN = 1 << 30;
+__device__ inline i32 nearest_of(const Marked* own, i32 sign) {
+    i32 nearest = UNKNOWN;
+#pragma unroll
+    for (i32 i = 0; i < 6; i++) {
+        Marked other = own[face(i)];
+        if (!is_cut(other)) nearest = smallest(nearest, density(other) * sign);
+    }
+    return nearest;
+}
+
 // The density, as far as anyone knows; says whether anyone does.
 __device__ inline bool middle_of(const Marked* own, i32& middle) {
     middle = density(*own);
     if (!is_cut(*own)) return true;
-    i32 sign = sign_of(middle), nearest = 1 << 30;
-    bool is_known = false;
+    i32 sign = sign_of(middle), nearest = nearest_of(own, sign);
+    if (magnitude(middle) == FARTHEST) {
+        middle = sign * ONE;
+        return is_beside(own, false);
+    }
+    bool is_known = nearest != UNKNOWN;
 #pragma unroll
     for (i32 i = 0; i < 6; i++) {
-        Marked other = own[face(i)];
-        is_known |= !is_cut(other);
-        nearest = smallest(nearest, is_cut(other) ? DEPTH : density(other) * sign);
+        if (is_cut(own[face(i)])) nearest = smallest(nearest, DEPTH);
     }
     middle = sign * (largest(nearest, 0) + ONE);
     return is_known;
+}
+
+// The density with an amount added, which an opposite shift takes away again; says whether there is another one.
+__device__ inline bool shifted(const Marked* own, i32 by, i32& after) {
+    i32 middle = density(*own), sign = sign_of(middle);
+    if (by == 0) return false;
+    // Where nobody edited, densities go on beyond, but no shift of them could be stored.
+    if (magnitude(middle) >= FARTHEST) {
+        if (sign_of(by) == sign || !is_beside(own, true)) return false;
+        middle = sign * ONE;
+    } else if (is_cut(*own)) {
+        i32 nearest = nearest_of(own, sign);
+        if (nearest > DEPTH) return false;
+        middle = sign * largest(nearest + ONE, DEPTH);
+    }
+    after = middle + by;
+    // It must not come to say that it is cut off.
+    if (magnitude(after) == DEPTH) after += sign_of(by);
+    return true;
 }
 
 // 64 times the way from the middle to the average of all.
@@ -78,7 +134,9 @@ __device__ inline i32 way_to_average(const Marked* own, i32 middle) {
         i32 step = (dy * AROUND + dz) * AROUND + dx;
         Marked there = own[step], opposite = own[-step];
         // Where one side is not known, the other one has nothing to be compared with.
-        if ((is_cut(there) || is_cut(opposite)) && magnitude(middle) + length > DEPTH) continue;
+        i32 far = magnitude(middle) + length;
+        if (is_cut(there) && far > magnitude(density(there))) continue;
+        if (is_cut(opposite) && far > magnitude(density(opposite))) continue;
         i32 way = clamped(density(there) - middle, -CONTRAST, CONTRAST);
         sum += weight * (way + clamped(density(opposite) - middle, -CONTRAST, CONTRAST));
     }
@@ -184,8 +242,12 @@ __device__ inline bool sculpted(
         after = before + part_of(target - before, weight);
         return true;
     }
-    if (!middle_of(own, middle)) return false;
     i32 by = 0;
+    if (chisel.stroke == SHIFT) {
+        by = chisel.amounts[0];
+        return shifted(own, sign_of(by) * ((magnitude(by) * weight + ONE / 2) >> 8), after);
+    }
+    if (!middle_of(own, middle)) return false;
     if (chisel.stroke == SMOOTH) {
         by = way_to_average(own, middle) * weight / (64 * ONE);
         after = attached(own, middle + by);
@@ -199,11 +261,6 @@ __device__ inline bool sculpted(
             high = largest(high, other);
         }
         after = attached(own, clamped(middle - by, low, high));
-    } else if (chisel.stroke == SHIFT) {
-        // An opposite shift takes it away again to the bit.
-        by = chisel.amounts[0];
-        by = sign_of(by) * ((magnitude(by) * weight + ONE / 2) >> 8);
-        after = middle + by;
     } else {
         i32 step = chisel.amounts[0], base = chisel.amounts[1], surface = at[1] * ONE - middle;
         by = part_of(surface - (terraced(surface - base, step) + base), weight);

@@ -64,8 +64,8 @@ struct Surroundings {
     __device__ Marked sample_around(i32 x, i32 y, i32 z, i32 low, i32 height) const {
         u32 ref = bench.refs[(((y + 7) >> 3) * 3 + ((z + 7) >> 3)) * 3 + ((x + 7) >> 3)];
         i32 raw = ref == NONE ? PRISTINE : params.edit.bricks[ref >> 1].samples[index_at(x - 1, y - 1, z - 1)];
-        if (raw == PRISTINE) return ((low + y - 1) * ONE - height) * 2;
-        return raw * 2 + (raw == DEPTH || raw == -DEPTH);
+        i32 pristine = (low + y - 1) * ONE - height;
+        return raw == PRISTINE ? pristine * 4 : marked(raw, pristine);
     }
 
     // The index of a sample in its brick.

@@ -187,6 +187,26 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
 }
 
 #[test]
+fn ground_lowered_and_raised_far_is_that_of_the_processor() {
+    let Some(first) = mapped() else { return };
+    let Some(second) = device() else { return };
+    let second = engine(second, 64 << 20);
+    let mut rng = Rng::with_seed(33);
+    for index in 0..worlds::world_count(40).div_ceil(2) {
+        let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
+        let (lower, raise) = worlds::random_lower_and_raise(&mut rng, &ground);
+        let brushes = if rng.bool() { [lower, raise] } else { [raise, lower] };
+        let count = rng.usize(1..6);
+        let mut transactions = vec![vec![worlds::any_random_brush(&mut rng, &ground)]];
+        transactions.extend(brushes.iter().flat_map(|brush| vec![vec![brush.clone()]; count]));
+        // What is left of it, sculpted.
+        transactions.push(vec![Brush { operation: Operation::Smooth, ..brushes[0].clone() }; 2]);
+        transactions.push(vec![worlds::sculpting_brush(&mut rng, brushes[0].shape, glam::Vec3::splat(20.0))]);
+        compare_on(ground, chunk_size, &[&first, &second], &transactions);
+    }
+}
+
+#[test]
 fn new_ground_far_from_all_other_finds_its_material() {
     let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };

@@ -163,6 +163,7 @@ fn noise_brick(rng: &mut Rng) -> Brick {
         0 => DEPTH as i16,
         1 => -DEPTH as i16,
         2 => rng.i16(..),
+        3 => [i16::MAX, -i16::MAX][rng.usize(0..2)],
         _ => rng.i16(-300..300),
     };
     let mut brick = Brick::of_edited(&std::array::from_fn(|_| sample()));
