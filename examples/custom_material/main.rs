@@ -31,8 +31,6 @@ mod map;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
-#[path = "../shared/pixels.rs"]
-mod pixels;
 
 use std::path::PathBuf;
 use std::process::{ExitCode, Termination};

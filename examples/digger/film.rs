@@ -11,8 +11,7 @@ use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_dis
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::prelude::*;
 
-use crate::pixels;
-use crate::studio::{Developed, PATIENCE, Studio};
+use crate::studio::{Developed, PATIENCE, Studio, pixels};
 
 /// Why a frame of the film is not on the disk.
 #[derive(Resource, Default)]

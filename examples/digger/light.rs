@@ -78,18 +78,16 @@ impl Plugin for LightPlugin {
     }
 }
 
-/// Without a graphics card there is no filter for textures seen at an angle, and a player begins with low quality.
+/// Without a graphics card a player begins with low quality.
 fn spare_software(
     adapter: Option<Res<RenderAdapterInfo>>,
     file: Res<SettingsFile>,
     mut made: ResMut<AsMade>,
     mut settings: ResMut<Settings>,
-    mut textures: ResMut<GroundTextures>,
 ) {
     if !draws_in_software(adapter.as_deref()) {
         return;
     }
-    *textures = GroundTextures::Baked { side: 512, anisotropy: 1 };
     made.0.quality = Quality::Low;
     if file.0.as_ref().is_some_and(|file| !file.exists()) {
         settings.quality = made.0.quality;

@@ -73,8 +73,6 @@ mod offscreen;
 mod panel;
 mod particles;
 mod phase;
-#[path = "../shared/pixels.rs"]
-mod pixels;
 mod places;
 mod player;
 mod preview;

@@ -19,7 +19,7 @@ use bevy_burrow::physics::{Character, CharacterMotion, CharacterSteering, HeldBy
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
 use photo::Photographer;
-pub use photo::{Developed, PATIENCE};
+pub use photo::{Developed, PATIENCE, pixels};
 
 use crate::Options;
 use crate::day::Clock;

@@ -24,8 +24,6 @@ mod headless;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
-#[path = "../shared/pixels.rs"]
-mod pixels;
 mod rain;
 mod scene;
 

@@ -38,8 +38,6 @@ mod journal;
 mod offscreen;
 #[path = "../shared/photo.rs"]
 mod photo;
-#[path = "../shared/pixels.rs"]
-mod pixels;
 mod scene;
 mod script;
 mod stamps;

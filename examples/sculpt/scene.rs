@@ -31,15 +31,8 @@ impl Plugin for ScenePlugin {
     }
 }
 
-fn landscape(
-    mut commands: Commands,
-    mut textures: ResMut<GroundTextures>,
-    adapter: Option<Res<RenderAdapterInfo>>,
-) -> Result {
+fn landscape(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>>) -> Result {
     let is_plain = draws_in_software(adapter.as_deref());
-    if is_plain {
-        *textures = GroundTextures::Baked { side: 256, anisotropy: 1 };
-    }
     let noise = NoiseHeights {
         seed: 4,
         kind: NoiseKind::Fractal,

@@ -1,6 +1,7 @@
-//! Pictures of what a camera sees, without a window. Examples have it in common; each takes it in by its path, and
-//! `pixels.rs` beside it.
+//! Pictures of what a camera sees, without a window. Examples have it in common; each takes it in by its path.
 
+#[path = "pixels.rs"]
+pub mod pixels;
 #[path = "shaders.rs"]
 mod shaders;
 
@@ -12,8 +13,6 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::RenderDevice;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
-
-use crate::pixels;
 
 /// Longest wait for anything.
 pub const PATIENCE: Duration = Duration::from_secs(300);

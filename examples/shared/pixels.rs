@@ -3,6 +3,8 @@
 use std::io;
 use std::path::Path;
 
+use image::Rgb;
+
 /// Differences of a channel up to this are noise of a renderer.
 const NOISE: u8 = 6;
 
@@ -13,6 +15,38 @@ pub fn show_something(path: &Path) -> bool {
     let mut pixels = picture.pixels();
     let Some(first) = pixels.next() else { return false };
     pixels.any(|pixel| pixel.0.iter().zip(first.0).any(|(a, b)| a.abs_diff(b) > NOISE))
+}
+
+/// What a picture shows: shares of its pixels that are 1 together.
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "for tests")]
+pub struct Shares {
+    /// Nothing at all: so dark is no ground that light falls on.
+    pub black: f32,
+    /// More blue than anything else.
+    pub sky: f32,
+    /// All the rest.
+    pub ground: f32,
+}
+
+#[allow(dead_code, reason = "for tests")]
+impl Shares {
+    /// Of a picture in a file.
+    ///
+    /// # Errors
+    /// When it can't be read; names the file.
+    pub fn of(path: &Path) -> io::Result<Self> {
+        let at = |error: image::ImageError| io::Error::other(format!("{}: {error}", path.display()));
+        let picture = image::open(path).map_err(at)?.into_rgb8();
+        let is_black = |pixel: &Rgb<u8>| pixel.0.iter().all(|channel| *channel < 16);
+        let is_sky = |&Rgb([red, green, blue]): &Rgb<u8>| blue > red.saturating_add(NOISE) && blue >= green;
+        let share = |is_so: &dyn Fn(&Rgb<u8>) -> bool| {
+            picture.pixels().filter(|pixel| is_so(pixel)).count() as f32 / picture.pixels().len() as f32
+        };
+        let black = share(&is_black);
+        let sky = share(&|pixel| !is_black(pixel) && is_sky(pixel));
+        Ok(Self { black, sky, ground: 1.0 - black - sky })
+    }
 }
 
 /// Was a PNG file written to its end? On a full disk it is there, but not all of it.
@@ -29,7 +63,7 @@ pub fn check_is_whole(path: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use image::{Rgb, RgbImage};
+    use image::RgbImage;
 
     use super::*;
 

@@ -106,6 +106,14 @@ pub(super) fn layers(
     Ok(count.unwrap_or(texture.array_layer_count().saturating_sub(first)))
 }
 
+/// Is the sampler of an image anisotropic? The app's default one may be.
+pub(super) fn is_anisotropic(image: &Image) -> bool {
+    match &image.sampler {
+        ImageSampler::Default => true,
+        ImageSampler::Descriptor(sampler) => sampler.anisotropy_clamp > 1,
+    }
+}
+
 /// Why arrays that can be drawn with are hardly what was meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Misfit {

@@ -225,11 +225,27 @@ fn is_fine() -> bool {
     return ground.quality > 0.5;
 }
 
+// A layer's colour and height.
+fn albedo_at(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> vec4<f32> {
+#ifdef WITHOUT_ANISOTROPY
+    // The sampler of the noise repeats and filters too, but alike in all directions.
+    return textureSampleGrad(albedo_texture, noise_sampler, uv, layer, dx, dy);
+#else
+    return textureSampleGrad(albedo_texture, albedo_sampler, uv, layer, dx, dy);
+#endif
+}
+
+// A layer's normal, occlusion and roughness.
+fn relief_at(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> vec4<f32> {
+#ifdef WITHOUT_ANISOTROPY
+    return textureSampleGrad(relief_texture, noise_sampler, uv, layer, dx, dy);
+#else
+    return textureSampleGrad(relief_texture, relief_sampler, uv, layer, dx, dy);
+#endif
+}
+
 fn fetch(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair {
-    return Pair(
-        textureSampleGrad(albedo_texture, albedo_sampler, uv, layer, dx, dy),
-        textureSampleGrad(relief_texture, relief_sampler, uv, layer, dx, dy),
-    );
+    return Pair(albedo_at(layer, uv, dx, dy), relief_at(layer, uv, dx, dy));
 }
 
 fn add(to: Pair, more: Pair, weight: f32) -> Pair {
@@ -292,8 +308,8 @@ fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32,
         let at_dy = scale * dy;
         // Colours from coarser levels: joints six times as large as they are would be seen as what they are.
         let large = Pair(
-            textureSampleGrad(albedo_texture, albedo_sampler, at, layer, FAR_BLUR * at_dx, FAR_BLUR * at_dy),
-            textureSampleGrad(relief_texture, relief_sampler, at, layer, at_dx, at_dy),
+            albedo_at(layer, at, FAR_BLUR * at_dx, FAR_BLUR * at_dy),
+            relief_at(layer, at, at_dx, at_dy),
         );
         // The relief is turned back; far away it is half of it.
         let lean = (large.relief.xy - 0.5) * turn * 0.6 + 0.5;

@@ -25,6 +25,7 @@ pub type GroundMaterial = ExtendedMaterial<StandardMaterial, GroundExtension>;
 
 /// The part of a [`GroundMaterial`] that is not Bevy's.
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug, PartialEq)]
+#[bind_group_data(GroundKey)]
 pub struct GroundExtension {
     #[uniform(100)]
     pub(super) uniform: GroundUniform,
@@ -40,6 +41,20 @@ pub struct GroundExtension {
     #[texture(105, dimension = "3d")]
     #[sampler(106)]
     pub(super) noise: Option<Handle<Image>>,
+    /// Are albedo and relief read with the sampler of the noise, which is not anisotropic?
+    pub(super) without_anisotropy: bool,
+}
+
+/// What of a [`GroundExtension`] its pipeline is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct GroundKey {
+    without_anisotropy: bool,
+}
+
+impl From<&GroundExtension> for GroundKey {
+    fn from(extension: &GroundExtension) -> Self {
+        Self { without_anisotropy: extension.without_anisotropy }
+    }
 }
 
 /// A layer, as `ground.wgsl` has it.
@@ -178,7 +193,7 @@ impl MaterialExtension for GroundExtension {
         _: &MaterialExtensionPipeline,
         descriptor: &mut RenderPipelineDescriptor,
         layout: &MeshVertexBufferLayoutRef,
-        _: MaterialExtensionKey<Self>,
+        key: MaterialExtensionKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
         let has = |name: &str| descriptor.vertex.shader_defs.contains(&ShaderDefVal::from(name));
         // Depth, shadows and motion are Bevy's own.
@@ -204,6 +219,11 @@ impl MaterialExtension for GroundExtension {
             if let Some(fragment) = &mut descriptor.fragment {
                 fragment.shader_defs.push(definition);
             }
+        }
+        if key.bind_group_data.without_anisotropy
+            && let Some(fragment) = &mut descriptor.fragment
+        {
+            fragment.shader_defs.push("WITHOUT_ANISOTROPY".into());
         }
         descriptor.vertex.buffers = vec![layout.0.get_layout(&attributes)?];
         Ok(())

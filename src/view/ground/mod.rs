@@ -106,8 +106,10 @@ fn dress(
     for (entity, look, place, material) in &looks {
         let current = material.and_then(|material| materials.get(&material.0));
         let fits = |current: &GroundMaterial| {
-            let GroundExtension { albedo, relief, .. } = &current.extension;
-            albedo.as_ref() == Some(&textures.albedo) && relief.as_ref() == Some(&textures.relief)
+            let GroundExtension { albedo, relief, without_anisotropy, .. } = &current.extension;
+            albedo.as_ref() == Some(&textures.albedo)
+                && relief.as_ref() == Some(&textures.relief)
+                && *without_anisotropy == textures.without_anisotropy
         };
         if current.is_some_and(fits) {
             continue;
@@ -118,6 +120,7 @@ fn dress(
             albedo: Some(textures.albedo.clone()),
             relief: Some(textures.relief.clone()),
             noise: Some(textures.noise.clone()),
+            without_anisotropy: textures.without_anisotropy,
         };
         let base = current.map_or(base, |current| current.base.clone());
         let own = materials.add(GroundMaterial { base, extension });

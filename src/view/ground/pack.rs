@@ -117,7 +117,7 @@ pub struct GroundArrays {
 impl GroundArrays {
     /// Packs the pictures of all layers, in the order of their numbers. Takes up to seconds, over all of rayon's threads:
     /// work for a task or a loading screen. Colours are averaged as light, normals keep their length. Samplers repeat,
-    /// with fourfold anisotropic filtering; both images can be given others.
+    /// with fourfold anisotropic filtering, without which software renderers go; both images can be given others.
     ///
     /// # Errors
     ///

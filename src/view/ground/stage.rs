@@ -12,7 +12,7 @@ use crate::terrain::{Terrain, TerrainSettings};
 pub(super) fn textures(app: &mut App) -> Textures {
     let mut images = app.world_mut().resource_mut::<Assets<Image>>();
     let [albedo, relief, noise] = [(); 3].map(|()| images.add(Image::default()));
-    Textures { albedo, relief, noise }
+    Textures { albedo, relief, noise, without_anisotropy: false }
 }
 
 /// An app that draws nothing, and has textures.

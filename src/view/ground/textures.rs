@@ -5,11 +5,11 @@ use std::fmt;
 use bevy::asset::LoadState;
 use bevy::prelude::*;
 use bevy::render::render_resource::WgpuFeatures;
-use bevy::render::renderer::RenderDevice;
+use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::bake::{Baked, Meter, bake};
-use super::fit::{GroundTexturesError, Misfit, layers};
+use super::fit::{GroundTexturesError, Misfit, is_anisotropic, layers};
 use super::look::GroundLook;
 
 /// Which textures the ground is drawn with. Insert it before the first [`GroundLook`](super::GroundLook), or change it
@@ -25,7 +25,7 @@ pub enum GroundTextures {
     Baked {
         /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
         side: u32,
-        /// Anisotropic filtering, 1 (none) to 16; dear on software renderers.
+        /// How much sharper than usual slanting ground is filtered, 1 (not at all) to 16. Software renderers go without.
         anisotropy: u16,
     },
     /// A game's own: two arrays with one layer for each material id, alike in number and size, with mip levels and
@@ -33,6 +33,9 @@ pub enum GroundTextures {
     /// a warning tells of arrays that differ, or have fewer layers than a look names.
     ///
     /// Images that can't be loaded, or are no arrays that can be filtered, are not used: see [`GroundLoading::failure`].
+    ///
+    /// A software renderer goes without anisotropic filtering, which would take it minutes for each frame: where one of
+    /// the samplers has it, or is the app's default one, both arrays are read with one that repeats and is linear.
     Images {
         /// sRGB colours, heights in alpha.
         albedo: Handle<Image>,
@@ -92,6 +95,26 @@ pub(super) struct Textures {
     pub albedo: Handle<Image>,
     pub relief: Handle<Image>,
     pub noise: Handle<Image>,
+    /// Are the samplers of albedo and relief unused?
+    pub without_anisotropy: bool,
+}
+
+/// What draws the ground.
+#[derive(Clone, Copy)]
+struct Renderer {
+    features: WgpuFeatures,
+    is_software: bool,
+}
+
+impl Renderer {
+    /// Without a device or an adapter nothing is drawn.
+    fn new(device: Option<&RenderDevice>, adapter: Option<&RenderAdapterInfo>) -> Self {
+        Self {
+            features: device.map_or(WgpuFeatures::empty(), RenderDevice::features),
+            // Bevy does not re-export wgpu's type of these.
+            is_software: adapter.is_some_and(|adapter| format!("{:?}", adapter.device_type) == "Cpu"),
+        }
+    }
 }
 
 impl GroundLoading {
@@ -146,10 +169,11 @@ pub(super) fn load_textures(
     mut images: ResMut<Assets<Image>>,
     server: Option<Res<AssetServer>>,
     device: Option<Res<RenderDevice>>,
+    adapter: Option<Res<RenderAdapterInfo>>,
 ) {
-    let features = device.map_or(WgpuFeatures::empty(), |device| device.features());
+    let renderer = Renderer::new(device.as_deref(), adapter.as_deref());
     let unseen = loading.bypass_change_detection();
-    unseen.proceed(&settings, &looks, &mut images, server.as_deref(), features);
+    unseen.proceed(&settings, &looks, &mut images, server.as_deref(), renderer);
     // Whoever watches it for changes is told of what can be asked.
     let answers = loading.answers();
     if loading.told != answers {
@@ -164,7 +188,7 @@ impl GroundLoading {
         looks: &Query<(Entity, &GroundLook)>,
         images: &mut ResMut<Assets<Image>>,
         server: Option<&AssetServer>,
-        features: WgpuFeatures,
+        renderer: Renderer,
     ) {
         if looks.is_empty() && self.wanted.is_none() {
             return;
@@ -177,16 +201,20 @@ impl GroundLoading {
             self.baked = Some([baked.albedo, baked.relief, baked.noise].map(|image| images.add(image)));
         }
         let Some([albedo, relief, noise]) = self.baked.clone() else { return };
-        let baked = Textures { albedo, relief, noise };
+        let read = |albedo: Handle<Image>, relief: Handle<Image>| {
+            let filters = [&albedo, &relief].map(|image| images.get(image).is_some_and(is_anisotropic));
+            // Lavapipe filters anisotropically by explicit gradients in minutes, if it ever comes to an end.
+            let without_anisotropy = renderer.is_software && filters.contains(&true);
+            Textures { albedo, relief, noise: noise.clone(), without_anisotropy }
+        };
+        let baked = read(albedo, relief);
         let textures = match settings {
             GroundTextures::Baked { .. } => baked.clone(),
-            GroundTextures::Images { albedo, relief } => {
-                Textures { albedo: albedo.clone(), relief: relief.clone(), noise: baked.noise.clone() }
-            }
+            GroundTextures::Images { albedo, relief } => read(albedo.clone(), relief.clone()),
         };
         // In every frame, since images may change: what is drawn with unfit ones would end the app.
         let find = |name, handle: &Handle<Image>| match (images.get(handle), server) {
-            (Some(image), _) => layers(name, image, features).map(Some),
+            (Some(image), _) => layers(name, image, renderer.features).map(Some),
             (None, Some(server)) => match server.load_state(handle) {
                 LoadState::Failed(source) => Err(GroundTexturesError::Load { image: name, source }),
                 _ => Ok(None),
@@ -249,6 +277,7 @@ impl GroundLoading {
 mod tests {
     use std::time::Duration;
 
+    use bevy::image::{ImageSampler, ImageSamplerDescriptor};
     use bevy::render::render_resource::{TextureViewDescriptor, TextureViewDimension};
 
     use super::GroundTexturesError::{Load, NoArray};
@@ -286,6 +315,59 @@ mod tests {
 
     fn add(app: &mut App, image: Image) -> Handle<Image> {
         app.world_mut().resource_mut::<Assets<Image>>().add(image)
+    }
+
+    /// The same as [`load_textures`], drawn by the processor.
+    fn load_in_software(
+        mut loading: ResMut<GroundLoading>,
+        settings: Res<GroundTextures>,
+        looks: Query<(Entity, &GroundLook)>,
+        mut images: ResMut<Assets<Image>>,
+    ) {
+        let renderer = Renderer { features: WgpuFeatures::empty(), is_software: true };
+        loading.proceed(&settings, &looks, &mut images, None, renderer);
+    }
+
+    #[test]
+    fn software_renderers_go_without_anisotropic_filtering() {
+        let filtered = |anisotropy_clamp| {
+            ImageSampler::Descriptor(ImageSamplerDescriptor {
+                anisotropy_clamp,
+                ..ImageSamplerDescriptor::linear()
+            })
+        };
+        let nearest = ImageSampler::nearest();
+        // Samplers of both arrays, and whether one that is not anisotropic takes their place.
+        let own = [
+            (filtered(1), filtered(1), false),
+            (nearest.clone(), nearest, false),
+            (filtered(1), filtered(2), true),
+            (filtered(16), filtered(1), true),
+            (ImageSampler::Default, filtered(1), true),
+        ];
+        for (albedo, relief, expected) in own {
+            for is_software in [true, false] {
+                let mut app = App::new();
+                app.add_plugins((MinimalPlugins, AssetPlugin::default())).init_asset::<Image>();
+                let images = [&albedo, &relief].map(|sampler| {
+                    let image = add(&mut app, Image { sampler: sampler.clone(), ..default() });
+                    see(&mut app, &image, TextureViewDimension::D2Array);
+                    image
+                });
+                let [albedo, relief] = images;
+                app.insert_resource(GroundTextures::Images { albedo, relief })
+                    .init_resource::<GroundLoading>();
+                app.world_mut().spawn(GroundLook::default());
+                if is_software {
+                    app.add_systems(Update, load_in_software);
+                } else {
+                    app.add_systems(Update, load_textures);
+                }
+                update_until(&mut app, "textures", GroundLoading::is_ready);
+                let ready = loading(&app).ready.as_ref().expect("they are there");
+                assert_eq!(ready.without_anisotropy, expected && is_software);
+            }
+        }
     }
 
     /// From now on it is seen as this.
