@@ -180,7 +180,9 @@ impl TryFrom<&Brush> for Edit {
 impl TryFrom<Unchecked> for Edit {
     type Error = BrushError;
 
-    fn try_from(Unchecked { shape, operation, roughness, tag, stroke }: Unchecked) -> Result<Self, BrushError> {
+    fn try_from(
+        Unchecked { shape, operation, roughness, tag, stroke }: Unchecked,
+    ) -> Result<Self, BrushError> {
         let (deed, power) = operation.unlimited()?;
         let edit = Self { shape, deed, power, roughness, tag, stroke };
         edit.check()?;

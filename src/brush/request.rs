@@ -31,7 +31,15 @@ pub struct Brush {
 
 impl Brush {
     fn new(shape: Shape, operation: Operation) -> Self {
-        Self { shape, operation, roughness: None, tag: 0, stroke: None, blend: Blend::default(), power: FULL_POWER }
+        Self {
+            shape,
+            operation,
+            roughness: None,
+            tag: 0,
+            stroke: None,
+            blend: Blend::default(),
+            power: FULL_POWER,
+        }
     }
 
     /// The brush of an operation, as the functions below make it.

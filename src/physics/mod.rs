@@ -184,7 +184,8 @@ impl Plugin for TerrainPhysicsPlugin {
                         .run_if(wake::is_last_step)
                         .after(PhysicsSystems::Last)
                         .in_set(TerrainPhysicsSystems::Wake),
-                    (come_to_steps.before(PhysicsSystems::First), leave_steps.after(PhysicsSystems::Last)).chain(),
+                    (come_to_steps.before(PhysicsSystems::First), leave_steps.after(PhysicsSystems::Last))
+                        .chain(),
                 ),
             )
             .add_systems(PhysicsSchedule, check_schedule.before(PhysicsStepSystems::First));

@@ -238,7 +238,8 @@ fn done_in_order(
     let mut done = Vec::new();
     for (entity, _, _, mut transaction) in terrains.iter_mut() {
         if transaction.done.is_none() {
-            transaction.done = transaction.task.check().map(|done| done.unwrap_or_else(|_| Prepared::nothing()));
+            transaction.done =
+                transaction.task.check().map(|done| done.unwrap_or_else(|_| Prepared::nothing()));
         }
         if transaction.done.is_some() {
             done.push((transaction.number, entity));

@@ -22,6 +22,7 @@
 mod commit;
 mod companion;
 mod components;
+mod engine;
 mod entities;
 mod hand_on;
 mod heightmap;
@@ -54,13 +55,14 @@ pub use messages::{
 };
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings, LooseGround};
+pub(crate) use threads::free_later;
 #[cfg(any(feature = "render", feature = "avian"))]
 pub(crate) use threads::{ThreadTask, Threads};
-pub(crate) use threads::free_later;
 pub use times::Times;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
+use bevy::time::common_conditions::on_timer;
 
 use crate::brush::Brush;
 use crate::terrain::Terrain;
@@ -160,6 +162,12 @@ impl Plugin for TerrainPlugin {
                     commit::begin_transactions.in_set(BurrowSystems::Begin),
                 ),
             );
+        app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
         hand_on::add(app);
+    }
+
+    #[cfg(feature = "render")]
+    fn finish(&self, app: &mut App) {
+        engine::suggest_renderers_card(app.world());
     }
 }

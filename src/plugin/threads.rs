@@ -33,12 +33,13 @@ impl Threads {
             Self::Transactions => (&TRANSACTIONS, "burrow transactions"),
             Self::Background => (&BACKGROUND, "burrow background"),
         };
-        let build = || ThreadPoolBuilder::new().thread_name(move |number| format!("{name} {number}")).build().ok();
+        let build =
+            || ThreadPoolBuilder::new().thread_name(move |number| format!("{name} {number}")).build().ok();
         pool.get_or_init(build).as_ref()
     }
 
     /// Does something there.
-    fn spawn(self, work: impl FnOnce() + Send + 'static) {
+    pub fn spawn(self, work: impl FnOnce() + Send + 'static) {
         match self.pool() {
             Some(pool) => pool.spawn_fifo(work),
             None => work(),

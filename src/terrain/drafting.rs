@@ -10,8 +10,8 @@ use crate::backend::Compute;
 use crate::brush::{Edit, Operation};
 use crate::ground::MaterialId;
 use crate::volume::{
-    Brick, Bricks, ChunkEffect, DiggingRules, Draft, DraftedBrick, EditEffect, EditWork, Ledger, Sample, SampleView,
-    TakenOut, UniformBricks,
+    Brick, Bricks, ChunkEffect, DiggingRules, Draft, DraftedBrick, EditEffect, EditWork, Ledger, Sample,
+    SampleView, TakenOut, UniformBricks,
 };
 
 /// Who drafts, over what: a world, and what was drafted over it so far.

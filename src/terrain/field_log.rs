@@ -65,7 +65,8 @@ impl<'a> FieldLog<'a> {
         let changed = std::mem::take(&mut self.changed);
         // History tells its bytes: no list has room to spare.
         let mut fields = Vec::with_capacity(changed.len());
-        fields.extend(changed.into_iter().filter_map(|chunk| Some((chunk, self.fields.get(&chunk)?.clone()))));
+        fields
+            .extend(changed.into_iter().filter_map(|chunk| Some((chunk, self.fields.get(&chunk)?.clone()))));
         fields
     }
 

@@ -16,7 +16,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::history::{HistoryReceipt, HistoryRejection, HistoryStep};
 use super::queue::Together;
-use super::{LooseSettings, Receipt, Rejection, Terrain, TerrainSettings, Transaction, Work, WorkLimits, unique};
+use super::{
+    LooseSettings, Receipt, Rejection, Terrain, TerrainSettings, Transaction, Work, WorkLimits, unique,
+};
 use crate::brush::{Brush, Edit};
 use crate::ground::Ground;
 use crate::volume::DiggingRules;
@@ -254,9 +256,9 @@ fn nothing_depends_on_when_transactions_begin() {
         let asked = script.iter().filter(|ask| matches!(ask, Ask::Brush(..))).count();
         assert_eq!(said.receipts.len(), asked, "script {index}: each brush is answered once");
         overloaded += asked - said.receipts.values().filter(|receipt| is_taken(receipt)).count();
-        let was_overloaded =
-            |receipt: &HistoryReceipt| receipt.outcome == Err(HistoryRejection::Overloaded);
-        let steps = |said: Said| said.steps.into_iter().filter(|step| !was_overloaded(step)).collect::<Vec<_>>();
+        let was_overloaded = |receipt: &HistoryReceipt| receipt.outcome == Err(HistoryRejection::Overloaded);
+        let steps =
+            |said: Said| said.steps.into_iter().filter(|step| !was_overloaded(step)).collect::<Vec<_>>();
 
         let (hash, history) = (said.hash, said.history);
         let unbounded = WorkLimits { transaction: rng.u64(1..1_000_000), waiting: u64::MAX };
@@ -270,8 +272,10 @@ fn nothing_depends_on_when_transactions_begin() {
 
         if budget == 1 << 30 {
             let (expected, groups, hash_by_the_book) = by_the_book(terrain(unbounded), &taken);
-            let tags: Vec<Option<Vec<u64>>> =
-                said.iter().map(|step| step.outcome.as_ref().ok().map(|restored| restored.tags.clone())).collect();
+            let tags: Vec<Option<Vec<u64>>> = said
+                .iter()
+                .map(|step| step.outcome.as_ref().ok().map(|restored| restored.tags.clone()))
+                .collect();
             assert_eq!(tags, groups, "script {index}: {}", in_short(&taken));
             assert_eq!(receipts, expected, "script {index}");
             assert_eq!(hash, hash_by_the_book, "script {index}: {}", in_short(&taken));

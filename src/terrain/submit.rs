@@ -51,7 +51,12 @@ impl Terrain {
         let together = Together::Batch(unique());
         for brush in brushes {
             let brush = brush.borrow();
-            self.queue_or_answer(brush.tag, Edit::quantize(brush).map_err(Into::into), brush.stroke, together);
+            self.queue_or_answer(
+                brush.tag,
+                Edit::quantize(brush).map_err(Into::into),
+                brush.stroke,
+                together,
+            );
         }
     }
 

@@ -6,11 +6,11 @@ use bevy::asset::LoadState;
 use bevy::prelude::*;
 use bevy::render::render_resource::WgpuFeatures;
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::bake::{Baked, Meter, bake};
 use super::fit::{GroundTexturesError, Misfit, is_anisotropic, layers};
 use super::look::GroundLook;
+use crate::plugin::{ThreadTask, Threads};
 
 /// Which textures the ground is drawn with. Insert it before the first [`GroundLook`](super::GroundLook), or change it
 /// at any time.
@@ -54,7 +54,7 @@ impl Default for GroundTextures {
 #[derive(Resource, Default)]
 pub struct GroundLoading {
     meter: Meter,
-    task: Option<Task<Baked>>,
+    task: Option<ThreadTask<Baked>>,
     /// What the current textures were made for.
     wanted: Option<GroundTextures>,
     baked: Option<[Handle<Image>; 3]>,
@@ -196,7 +196,7 @@ impl GroundLoading {
         if self.wanted.as_ref() != Some(settings) {
             self.begin(settings);
         }
-        if let Some(baked) = self.task.as_mut().and_then(check_ready) {
+        if let Some(baked) = self.task.as_mut().and_then(ThreadTask::finish) {
             self.task = None;
             self.baked = Some([baked.albedo, baked.relief, baked.noise].map(|image| images.add(image)));
         }
@@ -269,7 +269,7 @@ impl GroundLoading {
         (self.baked, self.is_current, self.was_sound) = (None, false, false);
         (self.failure, self.misfit) = (None, None);
         let meter = self.meter.clone();
-        self.task = Some(AsyncComputeTaskPool::get().spawn(async move { bake(side, anisotropy, &meter) }));
+        self.task = Some(ThreadTask::start(Threads::Background, move || bake(side, anisotropy, &meter)));
     }
 }
 

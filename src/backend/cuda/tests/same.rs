@@ -188,7 +188,7 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
 
 #[test]
 fn ground_lowered_and_raised_far_is_that_of_the_processor() {
-    let Some(first) = mapped() else { return };
+    let Some(first) = zero_copy() else { return };
     let Some(second) = device() else { return };
     let second = engine(second, 64 << 20);
     let mut rng = Rng::with_seed(33);

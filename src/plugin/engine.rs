@@ -1,0 +1,37 @@
+//! What the plugin does for the engines of its terrains.
+
+use std::time::Duration;
+
+use bevy::prelude::*;
+
+use super::BurrowEngine;
+use super::threads::Threads;
+use crate::backend::{Engine, EngineState};
+use crate::terrain::Terrain;
+
+/// How often engines are asked to give back what they have not used lately.
+pub(super) const TRIMMED_EVERY: Duration = Duration::from_secs(30);
+
+/// Cards give memory back by themselves when a transaction comes; here, when none does.
+pub(super) fn trim_engines(engine: Res<BurrowEngine>, terrains: Query<&Terrain>) {
+    let own = terrains.iter().filter_map(Terrain::engine);
+    let opened = own.chain([&engine.0]).filter(|engine| matches!(engine.state(), EngineState::Cuda(_)));
+    let opened: Vec<Engine> = opened.cloned().collect();
+    if !opened.is_empty() {
+        Threads::Background.spawn(move || opened.iter().for_each(Engine::trim));
+    }
+}
+
+/// Of several cards, the one that draws is the nearest to what is drawn.
+#[cfg(feature = "render")]
+pub(super) fn suggest_renderers_card(world: &World) {
+    use bevy::render::renderer::RenderAdapterInfo;
+
+    use crate::backend::CardChoice;
+
+    let place = world.get_resource::<RenderAdapterInfo>().map(|info| info.device_pci_bus_id.clone());
+    let place = place.filter(|place| !place.is_empty());
+    if let (Some(place), Some(engine)) = (place, world.get_resource::<BurrowEngine>()) {
+        engine.suggest_card(CardChoice::PciBusId(place));
+    }
+}
