@@ -109,7 +109,7 @@
 //! # }
 //! ```
 //!
-//! **Undo and redo**, by transaction and to the bit.
+//! **Undo and redo**, by stroke or by frame, and to the bit.
 //!
 //! ```
 //! # #[cfg(feature = "plugin")] {
@@ -258,7 +258,10 @@
 //!   -> commit in one frame, all or nothing: world, meshes, entities, receipts
 //! ```
 //!
-//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others.
+//! Edits apply in the order in which they were sent, those of one frame together, `TargetedBrush`es after the others. Rules and
+//! loose settings bind the edits that are sent after them. A [stroke](brush::Brush::stroke), or what was sent in one frame, is a
+//! step of undo. A transaction holds as many edits as its [limit](terrain::WorkLimits) of work allows, and more work than may
+//! wait is rejected when it is sent; an edit that panics is rejected, and the others are applied without it.
 //! Integers decide what is solid, and floats are only drawn, so the same edits give the same
 //! [`hash`](terrain::World::hash) on every machine.
 //!
@@ -290,8 +293,8 @@
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
-//! Without any feature the model alone is built, with no Bevy at all. Bevy's own `multi_threaded` feature, part of its
-//! default ones, lets transactions run beside the frame.
+//! Without any feature the model alone is built, with no Bevy at all. Where there are threads, transactions, loads and textures
+//! have their own, whatever features of Bevy's are on.
 //!
 //! # Limits
 //!

@@ -90,7 +90,7 @@ impl Engines {
         who: Who,
         times: &mut Times,
     ) -> f64 {
-        brushes.into_iter().for_each(|brush| terrain.submit(&brush));
+        terrain.submit_all(brushes);
         let commit = self.run(terrain.begin().expect("brushes wait"), who, times);
         let took = commit.stages.whole.as_secs_f64();
         terrain.commit(commit).expect("nothing else commits");
@@ -218,7 +218,7 @@ fn bulk(engines: &Engines, are_rough: bool) {
         for (who, times) in contenders {
             let mut terrain = level.terrain();
             for (pass, times) in times.iter_mut().enumerate() {
-                level.brushes(pass, are_rough).for_each(|brush| terrain.submit(&brush));
+                terrain.submit_all(level.brushes(pass, are_rough));
                 let mut discarded = Times::default();
                 let transaction = terrain.begin().expect("brushes wait");
                 let commit = engines.run(transaction, who, if round < 2 { &mut discarded } else { times });
@@ -253,7 +253,7 @@ fn moving() {
     let level = Level::new();
     for number in 0..10 {
         let mut terrain = level.terrain();
-        level.brushes(0, false).for_each(|brush| terrain.submit(&brush));
+        terrain.submit_all(level.brushes(0, false));
         let before = engine.figures();
         let commit = terrain.begin().expect("brushes wait").run_on(&engine);
         let figures = engine.figures();

@@ -1,6 +1,7 @@
 //! What else is made from surfaces: in the same task as the meshes, and shown in the same commit.
 
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use bevy::prelude::*;
@@ -52,7 +53,8 @@ pub type Attachment = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
 /// A companion is asked in the task that also makes the meshes, off the main thread, whenever a terrain loads and
 /// whenever a transaction changes a surface. What it hands back is done to the tile's or chunk's entity in the commit, in
 /// one frame with the meshes or not at all. That holds on a server without meshes too. Where there are many parts, several
-/// threads of rayon's ask at once: a companion that uses rayon itself should hold no lock meanwhile.
+/// threads of rayon's ask at once: a companion that uses rayon itself should hold no lock meanwhile. One that panics makes
+/// nothing for that part, and an error says so once.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -117,6 +119,15 @@ pub(super) struct Workshop {
     pub companions: Companions,
 }
 
+/// What a companion does must not take the ground along: one that panics makes nothing, and that is said once.
+fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
+    let done = catch_unwind(AssertUnwindSafe(work));
+    if done.is_err() {
+        error_once!("a companion panicked; the ground is shown without what it was to make");
+    }
+    done.ok()
+}
+
 /// A tile or chunk, ready to be swapped in.
 pub(super) struct Fresh {
     pub drawn: Drawn,
@@ -134,7 +145,8 @@ impl Workshop {
     /// Makes everything for a part whose surface `draft` gives. `is_empty` tells whether there are triangles, as far as
     /// that is known without it.
     pub fn make<'a>(&self, part: &Part, is_empty: bool, draft: impl FnOnce() -> SurfaceDraft<'a>) -> Fresh {
-        let takers: Vec<_> = self.companions.0.iter().filter(|companion| companion.wants(part)).collect();
+        let wants = |companion: &&Arc<dyn Companion>| guarded(|| companion.wants(part)).unwrap_or(false);
+        let takers: Vec<_> = self.companions.0.iter().filter(wants).collect();
         let mut fresh = Fresh {
             drawn: part.drawn,
             mesh: None,
@@ -149,7 +161,8 @@ impl Workshop {
         fresh.mesh = self.wardrobe.as_ref().and_then(|wardrobe| wardrobe.build(part.origin, &draft));
         if !takers.is_empty() {
             let surface = &draft.surface();
-            fresh.attachments = takers.into_iter().filter_map(|taker| taker.build(part, surface)).collect();
+            let build = |taker: &Arc<dyn Companion>| guarded(|| taker.build(part, surface)).flatten();
+            fresh.attachments = takers.into_iter().filter_map(build).collect();
         }
         fresh
     }

@@ -35,11 +35,13 @@ pub struct BrushApplied {
     pub receipt: Receipt,
 }
 
-/// A step back: the last transaction that changed the ground is undone. [`HistoryMoved`] says what came of it.
+/// A step back: the last stroke that changed the ground is undone, or where brushes are of no [stroke](Brush::stroke), what
+/// was sent in one frame. [`HistoryMoved`] says what came of it.
 ///
 /// Steps are queued with brushes, in one order. Bevy keeps messages of one type in theirs, and none between types: those
-/// of one frame are taken as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. A transaction takes
-/// the brushes of one frame together, and those of several frames where another one was under way; it is undone whole.
+/// of one frame are taken as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. What is a step does not
+/// depend on when transactions run. Frames come as fast as a machine draws them: where steps must be the same on all, give
+/// brushes a stroke.
 ///
 /// ```
 /// # use bevy::prelude::*;

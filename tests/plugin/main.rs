@@ -14,6 +14,7 @@ mod loading;
 mod loose;
 #[cfg(feature = "render")]
 mod materials;
+mod order;
 mod queries;
 mod receipts;
 mod replacing;
