@@ -16,11 +16,11 @@ use photo::pixels::Shares;
 /// Small: without a graphics card, a picture as large as the window takes fifteen times as long.
 const SIZE: (u32, u32) = (320, 180);
 
-/// Longest time to a picture. Two cores without a graphics card take 20 seconds while other things keep them busy.
-const LIMIT: Duration = Duration::from_secs(60);
+/// Longest time to a picture. Two cores without a graphics card take 10 seconds, and 40 while others keep them busy.
+const LIMIT: Duration = Duration::from_secs(120);
 
 #[test]
-fn within_a_minute_there_is_grass_under_a_sky() -> Result {
+fn grass_under_a_sky_is_drawn_in_time() -> Result {
     let start = Instant::now();
     let Some(renderer) = offscreen::find_renderer() else {
         let is_required = std::env::var_os("BURROW_REQUIRE").is_some_and(|value| !value.is_empty());
@@ -50,7 +50,7 @@ fn within_a_minute_there_is_grass_under_a_sky() -> Result {
         !dressed.is_empty() && dressed.iter().all(|is_dressed| *is_dressed)
     })?;
     let path = proof()?.join("ground.png");
-    photographer.shoot(&mut app, &path)?;
+    photographer.shoot_after(2, &mut app, &path, photo::draw)?;
     println!("minimal: a picture after {:.1} s", start.elapsed().as_secs_f32());
     let seen = Shares::of(&path)?;
     // The hills fill some 73 hundredths of it.
