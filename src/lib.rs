@@ -324,6 +324,9 @@ pub mod terrain;
 #[cfg(feature = "render")]
 pub mod view;
 pub mod volume;
+#[cfg(test)]
+#[path = "../tests/worlds/mod.rs"]
+mod worlds;
 
 /// What most games import.
 pub mod prelude {

@@ -113,10 +113,10 @@ fn fill_in<K: Copy, V, O: Ord>(
     added
 }
 
-/// Bytes of bricks that a world holds and that a change takes away from it. Bricks that are all alike count nothing: the
-/// world keeps the one of their kind for as long as history has it.
-pub(super) fn replaced_bytes(world: &World, bricks: impl Iterator<Item = BrickPos>) -> usize {
-    bricks.filter_map(|pos| world.bricks.get(&pos)).map(|brick| brick_bytes(brick)).sum()
+/// Bytes of the brick that a world holds there, if it holds one. Bricks that are all alike count nothing: the world keeps the
+/// one of their kind for as long as history has it.
+pub(super) fn replaced_bytes(world: &World, pos: BrickPos) -> usize {
+    world.bricks.get(&pos).map_or(0, |brick| brick_bytes(brick))
 }
 
 /// Bytes of a brick with the counters of its `Arc`; nothing where it is all alike.

@@ -33,8 +33,6 @@ struct Group<'a> {
     submissions: &'a [Submission],
     /// Its effects stand apart.
     draft: Draft,
-    /// Words of the mask that change.
-    mask: Mask,
 }
 
 /// What each edit of a group did, and what was cut off, by the number of the edit.
@@ -86,11 +84,14 @@ fn cells_of(world: &World, bricks: &[DraftedBrick]) -> ByBrick {
 }
 
 /// All bricks that groups changed, as the last of them left them.
-fn merged(groups: &[Group]) -> Vec<DraftedBrick> {
+fn merged<'a>(groups: &'a [Group], last: &'a [DraftedBrick]) -> Cow<'a, [DraftedBrick]> {
+    if groups.is_empty() {
+        return Cow::Borrowed(last);
+    }
     let mut bricks = BTreeMap::new();
-    let drafted = groups.iter().flat_map(|group| &group.draft.bricks);
+    let drafted = groups.iter().flat_map(|group| &group.draft.bricks).chain(last);
     drafted.for_each(|drafted| merge(&mut bricks, drafted.clone()));
-    bricks.into_values().collect()
+    Cow::Owned(bricks.into_values().collect())
 }
 
 impl Transaction {
@@ -98,54 +99,64 @@ impl Transaction {
     pub(super) fn edit(&self, submissions: &[Submission], backend: &dyn Compute) -> Commit {
         let (world, start, mut stages) = (&*self.world, Instant::now(), Stages::default());
         let mut drafting = Drafting::new(world, backend);
-        let (mut groups, mut effects) = (Vec::<Group>::new(), Vec::<Effects>::new());
-        let (mut dirty, mut newer) = (ByBrick::default(), Mask::default());
-        for own in submissions.chunk_by(Submission::goes_with) {
-            if let Some(before) = groups.last() {
-                drafting.lay(&before.draft);
-                newer.lay(&before.mask);
-            }
+        let (mut groups, mut masks) = (Vec::<Group>::new(), Vec::<Mask>::new());
+        let mut effects = Vec::<Effects>::new();
+        let mut rest = submissions.chunk_by(Submission::goes_with);
+        let last = rest.next_back().unwrap_or_default();
+        // Words of the mask that earlier groups change.
+        let mut newer = Mask::default();
+        for own in rest {
             let Drafted { mut draft, pieces } = Stages::time(&mut stages.edit, || drafting.draft(own));
-            let find = || Stages::time(&mut stages.meshing, || cells_of(world, &draft.bricks));
-            let is_large = draft.bricks.len() >= PARALLEL_PLACES;
-            let (cells, latest) = side_by_side(is_large, find, || latest(&draft.bricks));
+            let cells = Stages::time(&mut stages.meshing, || cells_of(world, &draft.bricks));
+            let latest = latest(&draft.bricks);
             let view = WorldView {
                 samples: drafting.samples().under(&latest),
                 mask: MaskView::new(&world.mask).over(&newer),
                 grid: world.grid,
             };
             let mask = Stages::time(&mut stages.ring, || joined_mask(world, &view, &cells));
-            dirty = cells;
+            drafting.lay(&draft);
+            newer.lay(&mask);
             effects.push((std::mem::take(&mut draft.effects), pieces));
-            groups.push(Group { submissions: own, draft, mask });
+            groups.push(Group { submissions: own, draft });
+            masks.push(mask);
         }
-        let (bricks, mask) = match &groups[..] {
-            [only] => (Cow::Borrowed(&only.draft.bricks[..]), &only.mask),
-            several => {
-                several.iter().for_each(|group| newer.lay(&group.mask));
-                let bricks = merged(several);
-                dirty = Stages::time(&mut stages.meshing, || cells_of(world, &bricks));
-                (Cow::Owned(bricks), &newer)
-            }
-        };
-        let latest = latest(&bricks);
-        let view = WorldView {
+
+        // The last group, which most often is the only one, and with it all that is drawn anew.
+        let Drafted { mut draft, pieces } = Stages::time(&mut stages.edit, || drafting.draft(last));
+        effects.push((std::mem::take(&mut draft.effects), pieces));
+        let last = Group { submissions: last, draft };
+        let bricks = merged(&groups, &last.draft.bricks);
+        let find = || Stages::time(&mut stages.meshing, || cells_of(world, &last.draft.bricks));
+        let (mut dirty, latest) = side_by_side(bricks.len() >= PARALLEL_PLACES, find, || latest(&bricks));
+        let before = WorldView {
             samples: world.samples().under(&latest),
-            mask: MaskView::new(&world.mask).over(mask),
+            mask: MaskView::new(&world.mask).over(&newer),
             grid: world.grid,
         };
+        let mut all_mask;
+        let own_mask = Stages::time(&mut stages.ring, || joined_mask(world, &before, &dirty));
+        let mask = if groups.is_empty() {
+            &own_mask
+        } else {
+            dirty = Stages::time(&mut stages.meshing, || cells_of(world, &bricks));
+            all_mask = newer.clone();
+            all_mask.lay(&own_mask);
+            &all_mask
+        };
+        let view = WorldView { mask: MaskView::new(&world.mask).over(mask), ..before };
         let meshes = || redraw::updates(world, &view, backend, &dirty, mask, &mut stages);
-        let (meshes, entered) =
-            side_by_side(dirty.len() >= PARALLEL_BLOCKS, meshes, || enter(world, &groups, effects));
+        let all = groups.iter().zip(&masks).chain([(&last, &own_mask)]);
+        let enter = || enter(world, all.zip(effects));
+        let (meshes, entered) = side_by_side(dirty.len() >= PARALLEL_BLOCKS, meshes, enter);
 
-        let sample_hash = groups.last().map_or(world.sample_hash, |group| group.draft.hash);
-        let mut uniform = UniformBricks::default();
-        let changes = groups.into_iter().zip(entered.groups).map(|(group, own)| {
+        let (sample_hash, mut uniform) = (last.draft.hash, UniformBricks::default());
+        let changes = groups.into_iter().chain([last]).zip(entered.groups).map(|(group, own)| {
             let Draft { bricks, hash, uniform: kinds, .. } = group.draft;
             uniform.extend(kinds);
             let EnteredGroup { fields, mask, replaced_bytes, tags } = own;
             let change = Change { bricks: changed_bricks(bricks), fields, mask, sample_hash: hash };
-            let number = group.submissions[0].terms.group;
+            let number = group.submissions.first().map_or(0, |first| first.terms.group);
             GroupChange { change, replaced_bytes, group: number, tags }
         });
         let commit = self.commit(changes.collect(), sample_hash, meshes);
@@ -162,13 +173,15 @@ impl Transaction {
 }
 
 /// Enters what edits did into fields and receipts, and what becomes of the mask.
-fn enter(world: &World, groups: &[Group], effects: Vec<Effects>) -> Entered {
-    let mut log = FieldLog::new(world);
-    let mut receipts = Vec::with_capacity(groups.iter().map(|group| group.submissions.len()).sum());
+fn enter<'a>(world: &World, groups: impl Iterator<Item = ((&'a Group<'a>, &'a Mask), Effects)>) -> Entered {
+    let (mut log, mut receipts) = (FieldLog::new(world), Vec::new());
     let mut newer: FxHashMap<BrickPos, &Brick> = FxHashMap::default();
-    let entered = groups.iter().zip(effects).enumerate().map(|(number, (group, (effects, mut pieces)))| {
+    let mut groups = groups.peekable();
+    let mut entered = Vec::with_capacity(1);
+    while let Some(((group, mask), (effects, mut pieces))) = groups.next() {
         let mut effects = effects.into_iter().enumerate();
         let mut tags = Vec::new();
+        receipts.reserve_exact(group.submissions.len());
         for submission in group.submissions {
             let outcome = submission.edit.as_ref().map_err(Rejection::clone).and_then(|edit| {
                 let (number, effect) = effects.next().unwrap_or_default();
@@ -181,20 +194,18 @@ fn enter(world: &World, groups: &[Group], effects: Vec<Effects>) -> Entered {
             });
             receipts.push(Receipt { tag: submission.tag, outcome });
         }
-        let positions = group.draft.bricks.iter().map(|drafted| drafted.pos);
-        let (again, first): (Vec<_>, Vec<_>) = match newer.is_empty() {
-            true => (Vec::new(), positions.collect()),
-            false => positions.partition(|pos| newer.contains_key(pos)),
+        tags.shrink_to_fit();
+        // What an earlier group made takes the place of what the world has.
+        let replaced = |drafted: &DraftedBrick| match newer.get(&drafted.pos) {
+            Some(brick) => brick_bytes(brick),
+            None => replaced_bytes(world, drafted.pos),
         };
-        let again: usize = again.iter().map(|pos| brick_bytes(newer[pos])).sum();
-        let replaced_bytes = replaced_bytes(world, first.into_iter()) + again;
-        if number + 1 < groups.len() {
+        let replaced_bytes = group.draft.bricks.iter().map(replaced).sum();
+        if groups.peek().is_some() {
             newer.extend(group.draft.bricks.iter().map(|drafted| (drafted.pos, &*drafted.brick)));
         }
-        tags.shrink_to_fit();
-        let mask = exact(group.mask.word_count(), group.mask.words());
-        EnteredGroup { fields: log.take_changed(), mask, replaced_bytes, tags }
-    });
-    let groups = entered.collect();
-    Entered { groups, receipts, news: log.news(), next_field: log.next }
+        let mask = exact(mask.word_count(), mask.words());
+        entered.push(EnteredGroup { fields: log.take_changed(), mask, replaced_bytes, tags });
+    }
+    Entered { groups: entered, receipts, news: log.news(), next_field: log.next }
 }

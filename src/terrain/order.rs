@@ -4,9 +4,6 @@
 //! A random script is played twice by terrains that are as irregular as can be, and once by a plain model that does one edit
 //! after the other, undoes by single edits, and groups by itself. `BURROW_WORLDS` says how many scripts.
 
-#[path = "../../tests/worlds/mod.rs"]
-mod worlds;
-
 use std::collections::BTreeMap;
 use std::panic::resume_unwind;
 use std::sync::Arc;
@@ -22,6 +19,7 @@ use super::{
 use crate::brush::{Brush, Edit};
 use crate::ground::Ground;
 use crate::volume::DiggingRules;
+use crate::worlds;
 
 /// The tag of an edit that panics has this bit.
 const PANICS: u64 = 1 << 63;

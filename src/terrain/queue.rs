@@ -199,6 +199,10 @@ impl Queue {
             Request::Step(_) => None,
         });
         let edits: Arc<[Submission]> = edits.collect();
+        // What a flood needed goes once it is over; a brush at a time needs no more room than this.
+        if self.requests.is_empty() {
+            self.requests.shrink_to(1);
+        }
         let work = edits.iter().map(|submission| submission.work).sum();
         Some((Taken::Edits(edits), work))
     }

@@ -152,7 +152,7 @@ impl Transaction {
         let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
         let Replaced { removed, added, painted } = replaced;
         let restored = Restored { tags: target.tags.clone(), bounds, removed, added, painted };
-        let replaced_bytes = replaced_bytes(world, change.bricks.iter().map(|(pos, _)| *pos));
+        let replaced_bytes = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
         let sample_hash = change.sample_hash;
         let change = GroupChange { change, replaced_bytes, group: target.group, tags: target.tags.clone() };
         stages.whole = start.elapsed();

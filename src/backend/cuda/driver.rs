@@ -267,9 +267,9 @@ fn event(context: &Arc<CudaContext>) -> Result<CudaEvent, Fault> {
     context.new_event(Some(sys::CUevent_flags::CU_EVENT_BLOCKING_SYNC)).map_err(failed)
 }
 
-/// How long a thread asks again and again before it sleeps: about twice as long as it takes to wake it. Small transactions
-/// are done before.
-const SPIN: Duration = Duration::from_micros(100);
+/// How long a thread asks again and again before it sleeps: as long as the kernels of 512 fields take. Small transactions are
+/// done before, and in large ones being woken costs less than that.
+const SPIN: Duration = Duration::from_micros(400);
 
 /// Waits until an event has happened.
 fn wait_for(event: &CudaEvent) -> Result<(), Fault> {

@@ -26,8 +26,7 @@ use crate::prelude::*;
 use crate::surface::Indices;
 use crate::terrain::{Drawn, World};
 
-#[path = "../../../../tests/worlds/mod.rs"]
-pub(super) mod worlds;
+pub(super) use crate::worlds;
 
 /// A device to test, if there is any. A card that is there is tested, or nothing is.
 pub(super) fn device() -> Option<Box<dyn Device>> {
