@@ -20,7 +20,8 @@ pub struct Brush {
     /// Any number of the game's own; the receipt carries it back.
     pub tag: u64,
     /// What one undo takes back: brushes of one stroke that follow each other are one step, over however many frames they
-    /// come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply).
+    /// come. `None`: the brushes of one frame are, or those of one [`apply`](crate::terrain::Terrain::apply). A brush of another
+    /// stroke in between, a second player's say, ends a step.
     pub stroke: Option<u64>,
     /// How operations that sculpt fade, and what they build of.
     pub blend: Blend,

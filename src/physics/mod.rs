@@ -207,8 +207,8 @@ fn leave_steps(mut is_around: ResMut<IsAroundSteps>) {
 fn check_schedule(is_around: Res<IsAroundSteps>) {
     if !is_around.0 {
         error_once!(
-            "avian runs outside `FixedPostUpdate`, so colliders of terrains follow late and bodies are not lifted out of \
-             the ground: add `PhysicsPlugins::default()`"
+            "avian took a step outside `FixedPostUpdate`: colliders of terrains may follow late, and bodies may not be lifted \
+             out of the ground. Unless the game takes such steps by itself, add `PhysicsPlugins::default()`"
         );
     }
 }

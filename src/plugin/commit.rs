@@ -30,9 +30,15 @@ use crate::terrain::{
 pub(super) struct InFlight {
     /// Counts them, over all terrains.
     number: u64,
+    /// Of the transaction, if it is one.
+    ticket: Option<u64>,
     task: ThreadTask<Prepared>,
-    done: Option<Prepared>,
+    /// The result, or that the task panicked.
+    done: Option<Result<Prepared, TaskPanicked>>,
 }
+
+/// A task panicked; the panic's message has been printed.
+struct TaskPanicked;
 
 /// Meshes and what goes with them, as they come from the task, and what they show.
 struct Prepared {
@@ -45,11 +51,9 @@ struct Prepared {
 /// What is shown.
 enum Shows {
     /// A commit, once it is settled.
-    Commit(Commit),
+    Commit(Box<Commit>),
     /// What the game committed itself.
     Unseen(Unseen),
-    /// Nothing: the task panicked.
-    Nothing,
 }
 
 /// From how many tiles and chunks on threads share them.
@@ -91,7 +95,7 @@ impl Job {
         if let Some(wardrobe) = &workshop.wardrobe {
             pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
         }
-        Prepared { what: Shows::Commit(commit), parts, pieces, took: start.elapsed() }
+        Prepared { what: Shows::Commit(Box::new(commit)), parts, pieces, took: start.elapsed() }
     }
 }
 
@@ -121,7 +125,7 @@ pub(super) fn begin_unseen(
         let parts = for_each_part(parts, |(part, recipe)| workshop.make(&part, false, || recipe.draft()));
         Prepared { what: Shows::Unseen(unseen), parts, pieces: Vec::new(), took: start.elapsed() }
     });
-    commands.entity(entity).try_insert(InFlight { number, task, done: None });
+    commands.entity(entity).try_insert(InFlight { number, ticket: None, task, done: None });
 }
 
 /// Counts transactions over all terrains, so that they are committed in the order in which they began.
@@ -163,6 +167,7 @@ pub(super) fn begin_transactions(
         let transaction = terrain.begin_for(true);
         tell_steps(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
+        let ticket = Some(transaction.ticket());
         let engine = terrain.engine().unwrap_or(&engine).clone();
         let wardrobe = draws.then(|| Wardrobe::new(terrain.world(), colors));
         let workshop = Workshop { wardrobe, companions: companions.clone() };
@@ -177,7 +182,7 @@ pub(super) fn begin_transactions(
         };
         let task = ThreadTask::start(Threads::Transactions, move || job.run());
         let number = numbers.next();
-        commands.entity(entity).try_insert(InFlight { number, task, done: None });
+        commands.entity(entity).try_insert(InFlight { number, ticket, task, done: None });
     }
     figures.main_thread += start.elapsed();
 }
@@ -214,13 +219,15 @@ pub(super) fn commit_transactions(
     let mut swapped = 0;
     for entity in done {
         let Ok((_, terrain, entities, mut transaction)) = terrains.get_mut(entity) else { continue };
-        let swaps = transaction.done.as_ref().map_or(0, |prepared| prepared.parts.len());
+        let done = transaction.done.as_ref().and_then(|done| done.as_ref().ok());
+        let swaps = done.map_or(0, |prepared| prepared.parts.len());
         if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
             continue;
         }
         let Some(prepared) = transaction.done.take() else { continue };
+        let ticket = transaction.ticket;
         screen.commands.entity(entity).try_remove::<InFlight>();
-        if commit(entity, terrain, entities, prepared, &mut screen, &mut news) {
+        if commit((entity, ticket), terrain, entities, prepared.ok(), &mut screen, &mut news) {
             swapped += swaps;
         }
     }
@@ -238,8 +245,7 @@ fn done_in_order(
     let mut done = Vec::new();
     for (entity, _, _, mut transaction) in terrains.iter_mut() {
         if transaction.done.is_none() {
-            transaction.done =
-                transaction.task.check().map(|done| done.unwrap_or_else(|_| Prepared::nothing()));
+            transaction.done = transaction.task.check().map(|done| done.map_err(|_| TaskPanicked));
         }
         if transaction.done.is_some() {
             done.push((transaction.number, entity));
@@ -250,33 +256,46 @@ fn done_in_order(
 }
 
 /// Commits one transaction, and says whether it did: one that the game gave up is refused, and its edits wait in the
-/// queue again.
+/// queue again. Where the task panicked, nothing is changed, and all that it was for is answered so.
 fn commit(
-    entity: Entity,
+    (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
     mut entities: Mut<TerrainEntities>,
-    prepared: Prepared,
+    prepared: Option<Prepared>,
     screen: &mut Screen,
     news: &mut News,
 ) -> bool {
     let start = Instant::now();
-    let Prepared { what, parts, pieces, took } = prepared;
+    let (what, parts, pieces, took) = match (prepared, ticket) {
+        (Some(Prepared { what, parts, pieces, took }), _) => (what, parts, pieces, took),
+        (None, ticket) => {
+            error_once!("a task of the plugin's panicked; this is a bug, please report it");
+            let refused = ticket.and_then(|ticket| terrain.refused(ticket));
+            let Some(refused) = refused else {
+                // What it was to show is shown by loading all of it.
+                terrain.bypass_change_detection().forget_unseen();
+                return false;
+            };
+            (Shows::Commit(Box::new(refused)), Vec::new(), Vec::new(), Duration::ZERO)
+        }
+    };
     let commit = match what {
         Shows::Unseen(unseen) => {
             let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
             if is_shown {
                 entities.shown = unseen.version();
                 screen.show(entity, &terrain, &mut entities, parts, unseen.fields(), true);
-                entities.tell_ready(&mut screen.commands, entity, terrain.world());
+                // Who changes the ground in each frame is always one step ahead; all of what was loaded is there.
+                entities.tell_ready(&mut screen.commands, entity);
                 screen.figures.main_thread += start.elapsed();
             }
             return is_shown;
         }
-        Shows::Commit(commit) => commit,
-        Shows::Nothing => match terrain.refused() {
-            Some(commit) => commit,
-            None => return false,
-        },
+        Shows::Commit(commit) if ticket.is_some_and(|ticket| terrain.waits_for(ticket)) => *commit,
+        Shows::Commit(commit) => {
+            free_later((commit, parts));
+            return false;
+        }
     };
     let fields = commit.field_news().to_vec();
     let Ok((receipts, waste)) = terrain.settle_shown(commit) else { return false };
@@ -294,12 +313,6 @@ fn commit(
     news.tell(entity, receipts, pieces);
     screen.figures.count(brushes, took, start.elapsed());
     true
-}
-
-impl Prepared {
-    fn nothing() -> Self {
-        Self { what: Shows::Nothing, parts: Vec::new(), pieces: Vec::new(), took: Duration::ZERO }
-    }
 }
 
 impl Screen<'_, '_> {
@@ -338,7 +351,13 @@ impl Screen<'_, '_> {
         let commands = &mut self.commands;
         let child = entities.get(commands, drawn);
         let is_new = child.is_none();
-        if is_new && fresh.as_ref().is_some_and(|fresh| fresh.shown.is_empty) {
+        let is_gone = match drawn {
+            Drawn::Chunk(chunk) => {
+                terrain.world().fields_of(chunk).is_none() && !terrain.world().draws(chunk)
+            }
+            Drawn::Tile(_) => false,
+        };
+        if is_new && (is_gone || fresh.as_ref().is_some_and(|fresh| fresh.shown.is_empty)) {
             return;
         }
         let child = child.unwrap_or_else(|| entities.spawn(commands, entity, terrain.world(), drawn));

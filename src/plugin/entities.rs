@@ -31,9 +31,9 @@ impl TerrainEntities {
         self.shown == world.version()
     }
 
-    /// Tells that a terrain is ready, once it shows all there is.
-    pub(super) fn tell_ready(&mut self, commands: &mut Commands, terrain: Entity, world: &World) {
-        if !self.is_told && self.show(world) {
+    /// Tells that a terrain is ready, once.
+    pub(super) fn tell_ready(&mut self, commands: &mut Commands, terrain: Entity) {
+        if !self.is_told {
             self.is_told = true;
             tell(commands, TerrainReady { entity: terrain });
         }

@@ -218,7 +218,7 @@ pub(super) fn answer_with_terrain(
     commands.queue(move |_: &mut World| free_later(world));
 }
 
-/// The history of a terrain that is despawned, and so can't be taken up again, is freed in a task, too.
+/// The history of a terrain that is despawned, and so can't be taken up again, is freed on another thread, too.
 pub(super) fn free_history(gone: On<Despawn, Terrain>, mut terrains: Query<&mut Terrain>) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         free_later(terrain.rebudget_undo(0));

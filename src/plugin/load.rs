@@ -24,7 +24,8 @@ use crate::terrain::{Drawn, Terrain, World};
 /// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
 /// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
 ///
-/// It comes again whenever a terrain has loaded anew, because another one took its place. Whoever spawns something then
+/// It comes again whenever a terrain has loaded anew, because another one took its place, or because the game changed more of
+/// it by itself than a frame [swaps](BurrowSettings::swaps_per_frame). Whoever spawns something then
 /// looks first whether it is there.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainReady {
@@ -95,6 +96,17 @@ pub(super) fn take_in(
     }
 }
 
+/// What is under way for a terrain whose entities are gone is for another one: whatever the game did in between, it must not
+/// wait for that.
+pub(super) fn drop_strays(
+    mut commands: Commands,
+    strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
+) {
+    for entity in &strays {
+        commands.entity(entity).try_remove::<InFlight>();
+    }
+}
+
 /// The same for a terrain that the game put in place of another one without inserting it, by `mem::swap` say.
 pub(super) fn drop_former(
     mut commands: Commands,
@@ -134,6 +146,7 @@ pub(super) fn start_loading(
     mut terrains: Query<(Entity, &mut Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
     assets: Option<Res<Assets<Mesh>>>,
     companions: Res<Companions>,
+    settings: Res<BurrowSettings>,
     mut numbers: ResMut<Numbers>,
 ) {
     for (entity, mut terrain, colors, entities) in &mut terrains {
@@ -146,7 +159,9 @@ pub(super) fn start_loading(
         };
         // Not a change that the game has to hear of.
         let model = terrain.bypass_change_detection();
-        if let Some(unseen) = entities.and_then(|entities| model.take_unseen(entities.shown)) {
+        let unseen = entities.and_then(|entities| model.take_unseen(entities.shown));
+        // More than a frame may swap is loaded anew, piece by piece.
+        if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
             begin_unseen(&mut commands, (entity, model), unseen, workshop, numbers.next());
             continue;
         }
@@ -228,7 +243,9 @@ pub(super) fn finish_loading(
         }
         let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
         // What the game changed meanwhile is shown next.
-        entities.tell_ready(&mut commands, entity, terrain.world());
+        if entities.show(terrain.world()) {
+            entities.tell_ready(&mut commands, entity);
+        }
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
     }
 }

@@ -150,6 +150,7 @@ impl Plugin for TerrainPlugin {
                 (
                     (
                         load::scale_terrains,
+                        load::drop_strays,
                         load::drop_former,
                         load::start_loading,
                         load::place_terrains,

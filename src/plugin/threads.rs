@@ -8,7 +8,7 @@
 //! Where there are no threads, work is done at once.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread;
 
@@ -24,6 +24,9 @@ pub(crate) enum Threads {
     Background,
 }
 
+/// Bytes of a thread's stack: who waits within one piece of work may do another one meanwhile, on top of it.
+const STACK: usize = 8 << 20;
+
 impl Threads {
     /// The pool, with as many threads as rayon's own has; `None` where there are none.
     fn pool(self) -> Option<&'static ThreadPool> {
@@ -33,8 +36,13 @@ impl Threads {
             Self::Transactions => (&TRANSACTIONS, "burrow transactions"),
             Self::Background => (&BACKGROUND, "burrow background"),
         };
-        let build =
-            || ThreadPoolBuilder::new().thread_name(move |number| format!("{name} {number}")).build().ok();
+        let build = || {
+            ThreadPoolBuilder::new()
+                .stack_size(STACK)
+                .thread_name(move |number| format!("{name} {number}"))
+                .build()
+                .ok()
+        };
         pool.get_or_init(build).as_ref()
     }
 
@@ -75,10 +83,7 @@ impl<T: Send + 'static> ThreadTask<T> {
 
     /// The result, once, if it is there: that the work panicked is one, too.
     pub fn check(&mut self) -> Option<thread::Result<T>> {
-        match self.result.get().try_recv() {
-            Ok(result) => Some(result),
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
-        }
+        self.result.get().try_recv().ok()
     }
 
     /// The same; panics as the work did.

@@ -6,12 +6,15 @@ use super::world::World;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, Fields};
 
+/// A brick, and what is in its place: `None` where nobody edited it.
+pub(super) type ChangedBrick = (BrickPos, Option<Arc<Brick>>);
+
 /// Pieces of a world at one revision: bricks, fields, words of the mask. The rest of the world is the same before and
 /// after, or is made from these.
 #[derive(Clone, Default)]
 pub(super) struct Change {
     /// By position (x, z, y); `None` is a brick that nobody edited.
-    pub bricks: Vec<(BrickPos, Option<Arc<Brick>>)>,
+    pub bricks: Vec<ChangedBrick>,
     /// All fields of each chunk that a field changed in.
     pub fields: Vec<(ChunkPos, Fields)>,
     /// Words of the mask.
@@ -56,18 +59,16 @@ impl Change {
         std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
     }
 
-    /// Puts back what was before two changes, of which `later` came second. Returns the bytes of its bricks that come in.
-    pub fn go_back_to_before(&mut self, mut later: Self) -> usize {
-        let bytes = fill_in(&mut self.bricks, later.bricks, brick_order, |brick| {
-            brick.iter().map(|brick| brick_bytes(brick)).sum()
-        });
+    /// Puts back what was before two changes, of which `later` came second. Returns the bytes of its bricks that come in, and
+    /// those that do not.
+    pub fn go_back_to_before(&mut self, later: Self) -> (usize, Vec<ChangedBrick>) {
+        let bytes = |brick: &Option<Arc<Brick>>| brick.iter().map(|brick| brick_bytes(brick)).sum();
+        let (bytes, left) = fill_in(&mut self.bricks, later.bricks, brick_order, bytes);
         fill_in(&mut self.fields, later.fields, |chunk| chunk, |_| 0);
-        // They come in no order.
-        for words in [&mut self.mask, &mut later.mask] {
-            words.sort_unstable_by_key(|own| own.0);
-        }
+        // It comes in no order.
+        self.mask.sort_unstable_by_key(|own| own.0);
         fill_in(&mut self.mask, later.mask, |word| word, |_| 0);
-        bytes
+        (bytes, left)
     }
 
     /// Bytes of the lists, and of the fields in them; bricks come on top.
@@ -95,22 +96,23 @@ pub(super) fn brick_order(pos: BrickPos) -> (i32, i32, i32) {
     (pos.0.x, pos.0.z, pos.0.y)
 }
 
-/// Adds to a sorted list what another one has at other places. Returns the sum of the `bytes` of what it adds.
+/// Adds to a sorted list what another one has at other places. Returns the sum of the `bytes` of what it adds, and what it
+/// does not add.
 fn fill_in<K: Copy, V, O: Ord>(
     list: &mut Vec<(K, V)>,
     other: Vec<(K, V)>,
     order: impl Fn(K) -> O,
     bytes: impl Fn(&V) -> usize,
-) -> usize {
+) -> (usize, Vec<(K, V)>) {
     let before = list.len();
     let is_new = |(key, _): &(K, V)| list.binary_search_by_key(&order(*key), |own| order(own.0)).is_err();
-    let mut new: Vec<(K, V)> = other.into_iter().filter(is_new).collect();
+    let (mut new, left): (Vec<_>, Vec<_>) = other.into_iter().partition(is_new);
     // History tells its bytes: no list has room to spare.
     list.reserve_exact(new.len());
     list.append(&mut new);
     let added = list[before..].iter().map(|(_, value)| bytes(value)).sum();
     list.sort_by_key(|own| order(own.0));
-    added
+    (added, left)
 }
 
 /// Bytes of the brick that a world holds there, if it holds one. Bricks that are all alike count nothing: the world keeps the

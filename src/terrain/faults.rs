@@ -1,7 +1,5 @@
 //! Transactions that panic: the edit that is to blame is found and rejected, and the others are applied without it.
 
-use std::sync::Arc;
-
 use super::Work;
 use super::commit::Commit;
 use super::history::{HistoryReceipt, HistoryRejection};
@@ -10,6 +8,10 @@ use super::receipt::{Receipt, Rejection};
 use super::redraw::MeshUpdates;
 use super::transaction::{Panicked, Transaction};
 
+/// So many edits are found to be to blame; what comes after the last of them is rejected with them, or the search for many
+/// would keep everybody waiting.
+const MOST_FAULTS: usize = 16;
+
 impl Transaction {
     /// Computes the commit of a transaction that panicked. Runs it once more, as what panicked may have been no edit, and
     /// then as often as halving takes for each edit that is to blame.
@@ -17,11 +19,20 @@ impl Transaction {
         if let Ok(commit) = self.attempt() {
             return commit;
         }
-        while let Work::Edits(submissions) = &self.work {
-            let Some(fault) = self.first_fault(submissions) else { break };
-            let mut submissions = submissions.to_vec();
-            submissions[fault].edit = Err(Rejection::Panicked);
-            self.work = Work::Edits(submissions.into());
+        let Work::Edits(all) = &self.work else { return self.refused() };
+        let mut submissions = all.to_vec();
+        // So many are known to run together.
+        let mut fine = 0;
+        for found in 1..=MOST_FAULTS {
+            let fault = self.first_fault(&submissions, fine);
+            let rejected = if found == MOST_FAULTS { fault..submissions.len() } else { fault..fault + 1 };
+            for own in submissions.iter_mut().take(rejected.end).skip(rejected.start) {
+                if own.edit.is_ok() {
+                    own.edit = Err(Rejection::Panicked);
+                }
+            }
+            fine = fault + 1;
+            self.work = Work::Edits(submissions.as_slice().into());
             if let Ok(commit) = self.attempt() {
                 return commit;
             }
@@ -29,24 +40,18 @@ impl Transaction {
         self.refused()
     }
 
-    /// The last of the fewest edits that panic together; `None` where not even all of them are to blame.
-    fn first_fault(&self, submissions: &[Submission]) -> Option<usize> {
-        // So many run, and so many panic.
-        let (mut fine, mut faulty) = (0, submissions.len());
-        while faulty - fine > 1 {
+    /// The last of the fewest edits that panic together, where so many are known not to and all do.
+    fn first_fault(&self, submissions: &[Submission], mut fine: usize) -> usize {
+        let mut faulty = submissions.len();
+        while faulty > fine + 1 {
             let middle = fine.midpoint(faulty);
-            match self.attempt_first(&submissions[..middle]) {
-                Ok(()) => fine = middle,
+            let work = Work::Edits(submissions[..middle].into());
+            match (Self { work, ..self.clone() }).attempt() {
+                Ok(_) => fine = middle,
                 Err(Panicked) => faulty = middle,
             }
         }
-        let last = faulty.checked_sub(1)?;
-        submissions[last].edit.is_ok().then_some(last)
-    }
-
-    fn attempt_first(&self, submissions: &[Submission]) -> Result<(), Panicked> {
-        let work = Work::Edits(Arc::from(submissions));
-        Self { work, ..self.clone() }.attempt().map(drop)
+        fine.min(submissions.len().saturating_sub(1))
     }
 
     /// The commit that changes nothing, and says so to everybody.

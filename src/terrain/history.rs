@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::{Change, GroupChange};
+use super::change::{Change, ChangedBrick, GroupChange};
 use super::world::World;
 use crate::lattice::LatticeBox;
 use crate::volume::Tally;
@@ -111,12 +111,14 @@ impl Step {
         Self { change, bounds, brick_bytes: replaced_bytes, group, tags }
     }
 
-    /// Takes in what later edits of the same group replaced.
-    fn go_on(&mut self, later: Self) {
-        self.brick_bytes += self.change.go_back_to_before(later.change);
+    /// Takes in what later edits of the same group replaced; returns what they did not replace first.
+    fn go_on(&mut self, later: Self) -> Vec<ChangedBrick> {
+        let (bytes, left) = self.change.go_back_to_before(later.change);
+        self.brick_bytes += bytes;
         self.bounds = self.bounds.into_iter().chain(later.bounds).reduce(LatticeBox::union);
         self.tags.reserve_exact(later.tags.len());
         self.tags.extend(later.tags);
+        left
     }
 
     /// Bytes that go with it, the counters of its `Arc` included.
@@ -131,6 +133,7 @@ impl Step {
 #[derive(Default)]
 pub(crate) struct Waste {
     steps: Vec<Arc<Step>>,
+    bricks: Vec<Vec<ChangedBrick>>,
     pub(super) copy: Option<Arc<World>>,
 }
 
@@ -138,7 +141,7 @@ impl Waste {
     /// Is there nothing to free?
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
-        self.steps.is_empty() && self.copy.is_none()
+        self.steps.is_empty() && self.bricks.is_empty() && self.copy.is_none()
     }
 }
 
@@ -204,6 +207,11 @@ impl Timeline {
         waste
     }
 
+    /// Forgets all steps.
+    pub fn clear(&mut self) {
+        (self.undo, self.redo, self.held) = Default::default();
+    }
+
     /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can be
     /// redone.
     pub fn record(&mut self, replaced: Step, waste: &mut Waste) {
@@ -214,7 +222,7 @@ impl Timeline {
         // A transaction that goes back holds a step that no edit can join any more.
         if let Some(latest) = latest.and_then(Arc::get_mut) {
             self.held -= latest.bytes();
-            latest.go_on(replaced);
+            waste.bricks.push(latest.go_on(replaced));
             self.held += latest.bytes();
         } else if replaced.group > self.lost {
             self.keep(HistoryStep::Undo, replaced);

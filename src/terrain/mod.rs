@@ -324,6 +324,7 @@ impl Terrain {
     #[cfg(feature = "plugin")]
     pub(crate) fn forget(&mut self) {
         self.in_flight = None;
+        self.unseen = None;
         self.queue.clear();
     }
 

@@ -16,7 +16,7 @@ use crate::volume::{DiggingRules, reach};
 /// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
 /// A brick takes the processor a third of a microsecond where many edits meet, and some two where an edit of a few voxels
-/// comes alone.
+/// comes alone. What a search for loose pieces takes, and a step through history, is not known before and hardly counts.
 ///
 /// [`Terrain::set_work_limits`]: super::Terrain::set_work_limits
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -36,9 +36,9 @@ impl WorkLimits {
 }
 
 impl Default for WorkLimits {
-    /// About a tenth of a second for a transaction and two seconds for what waits, on two cores.
+    /// About a thirtieth of a second for a transaction and two seconds for what waits, on two cores.
     fn default() -> Self {
-        Self { transaction: 300_000, waiting: 6_000_000 }
+        Self { transaction: 100_000, waiting: 6_000_000 }
     }
 }
 
@@ -160,14 +160,27 @@ impl Queue {
 
     /// Queues a step. Edits after it are none of the groups before it.
     pub fn push_step(&mut self, step: HistoryStep) {
-        self.open = None;
+        self.close_group();
         self.work += STEP;
         self.requests.push_back(Request::Step(step));
     }
 
-    /// Is there room for the work of an edit, or of a step?
+    /// Edits that come are none of the groups before.
+    pub fn close_group(&mut self) {
+        self.open = None;
+    }
+
+    /// Is there room for an edit, valid or not?
     pub fn has_room(&self, grid: ChunkGrid, edit: Option<&Edit>) -> bool {
-        let more = edit.map_or(STEP, |edit| work_of(grid, edit));
+        self.fits(edit.map_or(EDIT, |edit| work_of(grid, edit)))
+    }
+
+    /// Is there room for a step?
+    pub fn has_room_for_step(&self) -> bool {
+        self.fits(STEP)
+    }
+
+    fn fits(&self, more: u64) -> bool {
         self.work == 0 || self.work.saturating_add(more) <= self.limits.waiting
     }
 

@@ -31,7 +31,7 @@ impl Terrain {
     }
 
     fn submit_step(&mut self, step: HistoryStep) {
-        if self.queue.has_room(self.world.grid(), None) {
+        if self.queue.has_room_for_step() {
             self.queue.push_step(step);
         } else {
             self.answer_step(HistoryReceipt { step, outcome: Err(HistoryRejection::Overloaded) });
@@ -76,9 +76,9 @@ impl Terrain {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn clear_history(&mut self) {
-        let budget = self.undo_budget();
-        self.set_undo_budget(0);
-        self.set_undo_budget(budget);
+        self.timeline.clear();
+        // A stroke that goes on begins anew.
+        self.queue.close_group();
     }
 
     /// Bytes that the terrain takes: its world, and its history.
@@ -191,6 +191,18 @@ mod tests {
         assert_eq!((terrain.world().hash(), counts(&terrain)), (before, (0, 1)));
         assert!(terrain.redo().outcome.is_ok());
         assert_eq!(terrain.world().hash(), after);
+    }
+
+    #[test]
+    fn a_stroke_that_goes_on_after_history_was_forgotten_is_a_step_again() {
+        let mut terrain = terrain();
+        terrain.apply([dig(20.0).with_stroke(1)]);
+        terrain.clear_history();
+        let before = terrain.world().hash();
+        terrain.apply([dig(40.0).with_stroke(1)]);
+        assert_eq!(counts(&terrain), (1, 0));
+        assert!(terrain.undo().outcome.is_ok());
+        assert_eq!((terrain.world().hash(), counts(&terrain)), (before, (0, 1)));
     }
 
     #[test]

@@ -88,9 +88,9 @@ impl Terrain {
         }
     }
 
-    /// Is there room for an edit? One that is not valid needs none.
+    /// Is there room for an edit? `None`: for one that is not valid, and waits for its turn to be told so.
     pub(crate) fn admit(&self, edit: Option<&Edit>) -> Result<(), Rejection> {
-        let has_room = edit.is_none_or(|edit| self.queue.has_room(self.world.grid(), Some(edit)));
+        let has_room = self.queue.has_room(self.world.grid(), edit);
         if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
     }
 
@@ -126,7 +126,7 @@ impl Terrain {
     /// Returns the receipts of these brushes; those of brushes that waited are kept for
     /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
-    /// All of it is one step back, strokes aside; a game that replays a journal may want to
+    /// All of it is one step back, cut where strokes stand in between; a game that replays a journal may want to
     /// [forget](Self::clear_history) it. However many they are, none is rejected as too much.
     ///
     /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.

@@ -53,6 +53,12 @@ impl fmt::Debug for Transaction {
 pub(super) struct Panicked;
 
 impl Transaction {
+    /// Its number.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn ticket(&self) -> u64 {
+        self.ticket
+    }
+
     /// How many edits it holds; a step through history holds none.
     pub fn len(&self) -> usize {
         match &self.work {

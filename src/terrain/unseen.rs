@@ -1,5 +1,7 @@
 //! What a game committed by itself to a terrain that is shown, until that is shown as well.
 
+use std::collections::BTreeSet;
+
 use super::commit::Commit;
 use super::field_log::FieldNews;
 use super::world::{Drawn, Version, World};
@@ -10,14 +12,14 @@ use crate::lattice::ChunkPos;
 pub(crate) struct Unseen {
     from: Version,
     to: Version,
-    drawn: Vec<Drawn>,
+    drawn: BTreeSet<Drawn>,
     fields: Vec<(ChunkPos, FieldNews)>,
 }
 
 impl Unseen {
     /// Nothing, over what is shown.
     fn nothing(shown: Version) -> Self {
-        Self { from: shown, to: shown, drawn: Vec::new(), fields: Vec::new() }
+        Self { from: shown, to: shown, drawn: BTreeSet::new(), fields: Vec::new() }
     }
 
     /// The world that it comes to.
@@ -40,6 +42,11 @@ impl Unseen {
         self.drawn.iter().copied()
     }
 
+    /// How many they are.
+    pub fn len(&self) -> usize {
+        self.drawn.len()
+    }
+
     /// What happened to fields, in order.
     pub fn fields(&self) -> &[(ChunkPos, FieldNews)] {
         &self.fields
@@ -47,8 +54,6 @@ impl Unseen {
 
     fn add(&mut self, news: News, to: Version) {
         self.drawn.extend(news.drawn);
-        self.drawn.sort_unstable();
-        self.drawn.dedup();
         self.fields.extend(news.fields);
         self.to = to;
     }
@@ -77,8 +82,9 @@ impl Terrain {
     /// What a commit will change, if anybody wants to know.
     pub(super) fn note(&self, commit: &Commit) -> Option<News> {
         self.unseen.as_ref()?;
-        let tiles = commit.meshes.tiles.iter().map(|(tile, _)| Drawn::Tile(*tile));
-        let chunks = commit.meshes.chunks.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
+        // Its own lists: whoever committed it may have taken its meshes.
+        let tiles = commit.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
+        let chunks = commit.surfaces.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
         let drawn = tiles.chain(chunks).collect();
         Some(News { before: self.world.version(), drawn, fields: commit.news.clone() })
     }
@@ -93,11 +99,22 @@ impl Terrain {
         }
     }
 
-    /// The commit that answers what is under way without doing it, because that panicked; `None` where nothing is.
-    pub(crate) fn refused(&self) -> Option<Commit> {
-        let waiting = self.in_flight.as_ref()?;
-        let (ticket, work) = (waiting.ticket, waiting.work.clone());
+    /// The commit that answers the transaction of this ticket without doing it, because its task panicked; `None` unless that
+    /// is under way.
+    pub(crate) fn refused(&self, ticket: u64) -> Option<Commit> {
+        let waiting = self.in_flight.as_ref().filter(|waiting| waiting.ticket == ticket)?;
+        let work = waiting.work.clone();
         Some(super::Transaction { ticket, world: self.snapshot(), work, engine: None }.refused())
+    }
+
+    /// Is the transaction of this ticket under way?
+    pub(crate) fn waits_for(&self, ticket: u64) -> bool {
+        self.in_flight.as_ref().is_some_and(|waiting| waiting.ticket == ticket)
+    }
+
+    /// What was not shown is not known any more.
+    pub(crate) fn forget_unseen(&mut self) {
+        self.unseen = None;
     }
 
     /// Settles a commit of the plugin's, which shows it by itself.

@@ -53,7 +53,7 @@ fn steps_come_after_the_brushes_of_their_frame() {
         stage.send(dig(20.0, 8.0, 20.0, 4.0));
         stage.send_to(terrain, dig(40.0, 8.0, 20.0, 4.0));
         stage.settle();
-        assert_eq!(stage.hash(terrain), pristine, "both were one transaction");
+        assert_eq!(stage.hash(terrain), pristine, "both were one step");
         assert_eq!(stage.receipts().len(), 2);
         stage.tell(Redo::default());
         stage.tell(ALL);

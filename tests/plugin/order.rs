@@ -138,13 +138,20 @@ fn of_what_a_game_changes_by_itself_only_that_is_meshed_anew() {
     stage.send(dig(50.0, 8.0, 50.0, 4.0));
     stage.settle();
     let mut before = shown(&mut stage);
-    // A dig, a step back, and a burst with steps in it.
-    for turn in 0..3 {
+    // A dig, a step back, a commit without its meshes, and a burst with a step in it.
+    for turn in 0..4 {
         let swaps = stage.figures().swaps;
         let mut own = model(&mut stage, terrain);
         match turn {
             0 => drop(own.apply([dig(8.0, 8.0, 8.0, 4.0)])),
             1 => drop(own.undo()),
+            2 => {
+                own.submit(&dig(20.0, 8.0, 8.0, 3.0));
+                let mut commit = own.begin().expect("a brush waits").run();
+                // The game wants the meshes for itself.
+                drop(std::mem::take(&mut commit.meshes));
+                own.commit(commit).expect("nothing else commits");
+            }
             _ => {
                 own.apply([dig(9.0, 8.0, 8.0, 3.0)]);
                 own.apply([dig(10.0, 8.0, 9.0, 3.0)]);
