@@ -8,7 +8,7 @@ use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
-use bevy_burrow::volume::Tally;
+use bevy_burrow::volume::{RulesError, Tally};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use worlds::{any_random_brush, random_brush_at_a_face, random_ground, random_rules};
@@ -40,6 +40,19 @@ fn terrain(ground: &Arc<Ground>, chunk_size: u32, rules: &DiggingRules) -> Terra
 
 fn drawn(world: &World) -> Vec<(Drawn, SurfaceMesh)> {
     world.drawn().collect()
+}
+
+#[test]
+fn rules_for_what_nothing_is_made_of_are_refused() {
+    let ground = Ground::flat(32, 32, 10.0).expect("valid ground");
+    let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    let hard = DiggingRules::default().with_hardness(MaterialId(0), 100);
+    terrain.set_rules(hard.clone()).expect("valid rules");
+    let none = DiggingRules::default;
+    for rules in [none().with_unbreakable(MaterialId::GROUND), none().with_hardness(MaterialId::GROUND, 9)] {
+        assert_eq!(terrain.set_rules(rules), Err(RulesError::Ground));
+        assert_eq!(terrain.rules(), Some(&hard));
+    }
 }
 
 #[test]

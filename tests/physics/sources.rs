@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use avian3d::collider_tree::ColliderTreeOptimization;
 use avian3d::prelude::*;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
@@ -10,6 +11,13 @@ use bevy_burrow::plugin::ShownSurface;
 use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level, pit};
+
+#[test]
+fn the_settings_of_the_physics_engine_are_the_games_own() {
+    let stage = Stage::new();
+    let found = stage.app.world().resource::<ColliderTreeOptimization>();
+    assert_eq!(*found, ColliderTreeOptimization::default());
+}
 
 #[test]
 fn ground_has_colliders_near_sources_only_and_they_move_along() {

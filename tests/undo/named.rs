@@ -104,3 +104,14 @@ fn fields_come_back_under_their_names_and_new_ones_get_new_names() {
     let c = field(&mut terrain, ball(8.0, 10.0, 8.0, 2.0));
     assert!(c > b, "{c:?} was the name of another field");
 }
+
+#[test]
+fn answers_that_nobody_takes_do_not_pile_up() {
+    let mut terrain = level();
+    for _ in 0..70_000 {
+        terrain.submit_undo();
+        assert!(terrain.begin().is_none(), "there is nothing to undo");
+    }
+    assert_eq!(terrain.take_history_receipts().len(), 1 << 16);
+    assert!(terrain.take_history_receipts().is_empty());
+}
