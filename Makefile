@@ -13,7 +13,7 @@ export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 WITHOUT_BEVY := --no-default-features --features cuda
 comma := ,
 # What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
-SETS_WITHOUT_BEVY := '' cuda interop
+SETS_WITHOUT_BEVY := '' cuda
 SETS_WITH_BEVY := default plugin render avian egui debug examples,gamepad
 # Features besides: `make run MORE=gamepad` compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
@@ -62,7 +62,6 @@ setup: ## Install what is missing
 test-model:
 	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example paper
 	cargo test $(WITHOUT_BEVY) --doc
-	cargo test --no-default-features --features interop --lib -- interop::
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::

@@ -8,10 +8,10 @@
 use std::hint::black_box;
 use std::process::ExitCode;
 
+use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
 use bevy_burrow::ground::MaterialId;
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
-use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
 use glam::Vec3;
 
 // The fields of the bench `meshers`, of which this one takes but a few.

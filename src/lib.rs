@@ -229,8 +229,8 @@
 //! # Rooms
 //!
 //! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
-//! `panel`, `debug`.
+//! [`lattice`], [`ground`], [`brush`], [`volume`], [`edits`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
+//! `panel`, `debug`. Beside them stands [`dense`], which meshes plain arrays and serves no terrain.
 //!
 //! # How the seam closes
 //!
@@ -289,7 +289,6 @@
 //! | `avian` | colliders for avian3d, made with the meshes and swapped in the same frame; a walking body | |
 //! | `egui` | the panel: brush, settings, live figures | |
 //! | `debug` | debug views as gizmos | |
-//! | `interop` | experimental: surfaces that CUDA writes where Vulkan draws them, on Linux | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `examples` | what the examples need: window, UI, PNG | |
 //!
@@ -311,6 +310,8 @@ pub mod backend;
 pub mod brush;
 #[cfg(feature = "debug")]
 pub mod debug;
+pub mod dense;
+pub mod edits;
 pub mod ground;
 pub mod lattice;
 #[cfg(feature = "egui")]

@@ -3,10 +3,10 @@
 mod worlds;
 
 use allocation_counter::measure;
+use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Normals};
 use bevy_burrow::lattice::{BrickPos, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::block::{Block, Mesher, Parts};
-use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Normals};
 use bevy_burrow::terrain::World;
 use glam::{IVec3, Vec3};
 

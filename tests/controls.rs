@@ -11,7 +11,7 @@ use bevy_burrow::lattice::{Column, LatticeBox, ONE, SNAP};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::mask::{cell_sheet, sheet};
 use bevy_burrow::surface::vertex::{self, Lattice, WorldView};
-use bevy_burrow::surface::{Indices, SeamReport, SeamSoup, SurfaceMesh, Vertex, cases};
+use bevy_burrow::surface::{Indices, SeamChecker, SeamReport, SurfaceMesh, Vertex, cases};
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
@@ -233,7 +233,7 @@ impl<'a> Plain<'a> {
 fn check(world: &World, triangles: &[[Vertex; 3]]) -> SeamReport {
     let vertices = triangles.as_flattened().to_vec();
     let indices = Indices::new(vertices.len(), (0..vertices.len() as u32).collect());
-    let mut soup = SeamSoup::default();
+    let mut soup = SeamChecker::default();
     soup.add(&SurfaceMesh { vertices, indices }, IVec3::ZERO);
     soup.check(world.grid())
 }

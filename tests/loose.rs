@@ -9,7 +9,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::surface::vertex::crossing;
 use bevy_burrow::surface::{MaterialMix, cases};
 use bevy_burrow::terrain::World;
-use bevy_burrow::volume::Tally;
+use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 use glam::{DVec3, IVec3, Vec3};
 use worlds::{
@@ -335,7 +335,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
                 }
             }
             // What is solid, and of what; and where the surface lies.
-            let (world, mut tally) = (terrain.world(), Tally::default());
+            let (world, mut tally) = (terrain.world(), MaterialCounts::default());
             let columns = everything(world);
             let bricks = world.bricks().filter_map(|(pos, _)| pos.samples().intersection(columns));
             let bricks: Vec<LatticeBox> = bricks.collect();

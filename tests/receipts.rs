@@ -9,7 +9,7 @@ use bevy_burrow::ground::{Ground, MaterialControl};
 use bevy_burrow::lattice::{LIMIT, LatticeBox};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
-use bevy_burrow::volume::Tally;
+use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use worlds::{random_brush, random_brush_at_a_face, random_ground};
@@ -55,7 +55,7 @@ impl Difference {
     }
 }
 
-fn by_material(tally: &Tally) -> BTreeMap<MaterialId, u64> {
+fn by_material(tally: &MaterialCounts) -> BTreeMap<MaterialId, u64> {
     tally.iter().filter(|&(_, voxels)| voxels > 0).collect()
 }
 
@@ -164,7 +164,7 @@ fn the_sum_of_receipts_is_the_change_of_the_whole_world() {
         let high = IVec3::new(width, heights.1 / 256 + 70, depth);
         let whole = LatticeBox::new(low, high).expect("a world is not empty");
         let before = terrain.world().samples().solid_count(whole);
-        let (mut removed, mut added) = (Tally::default(), Tally::default());
+        let (mut removed, mut added) = (MaterialCounts::default(), MaterialCounts::default());
         // All in one transaction: each receipt counts from what the edits before it left.
         for receipt in terrain.apply(&brushes) {
             if let Ok(applied) = receipt.outcome {

@@ -8,7 +8,7 @@ use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
-use bevy_burrow::volume::{RulesError, Tally};
+use bevy_burrow::volume::{MaterialCounts, RulesError};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use worlds::{any_random_brush, random_brush_at_a_face, random_ground, random_rules};
@@ -184,7 +184,7 @@ fn a_box_of_all_numbers_protects_everything() {
         for receipt in terrain.apply(&brushes) {
             let applied = receipt.outcome.expect("a valid brush");
             assert!(applied.bounds.is_none() && applied.loose.is_empty(), "world {seed}");
-            let changed = [&applied.removed, &applied.added, &applied.painted].map(Tally::total);
+            let changed = [&applied.removed, &applied.added, &applied.painted].map(MaterialCounts::total);
             assert_eq!(changed, [0; 3], "world {seed}");
         }
         assert_eq!(terrain.world().hash(), before, "world {seed}");
@@ -312,7 +312,7 @@ fn receipts_tell_what_was_refused_and_why() {
     ]);
     let applied: Vec<&Applied> =
         receipts.iter().map(|receipt| receipt.outcome.as_ref().expect("valid brushes")).collect();
-    let list = |tally: &Tally| tally.iter().collect::<Vec<_>>();
+    let list = |tally: &MaterialCounts| tally.iter().collect::<Vec<_>>();
     // Of the ball below the surface, what is not taken away is refused.
     let solid = |points: &mut dyn Iterator<Item = IVec3>| points.count() as u64;
     let inside = |at: IVec3| at.y <= 20 && (at - IVec3::new(32, 20, 32)).length_squared() <= 36;

@@ -1,6 +1,6 @@
 //! The dense mesher of bevy_burrow.
 
-use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
+use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
 
 use crate::contender::{Class, Contender, Mesh, Part, Shading, Sharing};
 use crate::fields::Grid;

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
-use bevy_burrow::volume::Tally;
+use bevy_burrow::volume::MaterialCounts;
 
 use crate::hud::Hint;
 use crate::inventory::FIRST;
@@ -35,7 +35,9 @@ pub fn explain(mut receipts: MessageReader<BrushApplied>, mut hints: MessageWrit
         let Ok(applied) = &receipt.outcome else { continue };
         let refused = &applied.refused;
         let broken = applied.removed.total();
-        let most = |tally: &Tally| tally.iter().max_by_key(|part| part.1).map(|(id, _)| landscape::name(id));
+        let most = |tally: &MaterialCounts| {
+            tally.iter().max_by_key(|part| part.1).map(|(id, _)| landscape::name(id))
+        };
         if refused.unbreakable.total() > broken {
             hints.write(Hint::new("bedrock: nothing breaks it"));
         } else if let Some(name) = most(&refused.too_hard).filter(|_| refused.too_hard.total() > broken) {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use bevy_burrow::lattice::ONE;
 use bevy_burrow::surface::SeamReport;
 use bevy_burrow::terrain::{Memory, ScenarioCounts, World};
-use bevy_burrow::volume::Tally;
+use bevy_burrow::volume::MaterialCounts;
 use serde::Serialize;
 
 use crate::play::Played;
@@ -177,7 +177,8 @@ impl fmt::Display for Report {
 impl EditFigures {
     fn new(played: &Played) -> Self {
         let mut rejected = Vec::new();
-        let (mut removed, mut added, mut painted) = (Tally::default(), Tally::default(), Tally::default());
+        let (mut removed, mut added, mut painted) =
+            (MaterialCounts::default(), MaterialCounts::default(), MaterialCounts::default());
         for (line, receipt) in &played.receipts {
             match &receipt.outcome {
                 Ok(applied) => {
@@ -189,7 +190,7 @@ impl EditFigures {
             }
         }
         let by_material =
-            |tally: &Tally| tally.iter().map(|(material, voxels)| (material.0, voxels)).collect();
+            |tally: &MaterialCounts| tally.iter().map(|(material, voxels)| (material.0, voxels)).collect();
         Self {
             applied: played.receipts.len() - rejected.len(),
             rejected,

@@ -41,8 +41,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use bevy_burrow::brush::BrushError;
+use bevy_burrow::dense::DenseGridError;
 use bevy_burrow::ground::GroundError;
-use bevy_burrow::surface::dense::DenseGridError;
 use bevy_burrow::terrain::{StaleCommit, TerrainError};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};

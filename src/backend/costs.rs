@@ -10,7 +10,7 @@
 use std::time::Duration;
 
 use super::Estimate;
-use crate::volume::{EditWork, Job, Tool};
+use crate::edits::{Job, PreparedEdit, PreparedEdits};
 
 /// Of the time spent in a row, the part that may be lost on timing the slower backend: a fiftieth.
 const SHARE: f64 = 0.02;
@@ -50,11 +50,11 @@ impl Load {
     }
 
     /// What edits have to do.
-    pub fn of_edits(work: &EditWork) -> Self {
+    pub fn of_edits(work: &PreparedEdits) -> Self {
         let jobs = work.jobs();
         let kind = if work.looks_around() {
             Kind::Stencil
-        } else if work.tools.iter().any(|tool: &Tool| tool.evaluator.is_rough()) {
+        } else if work.tools.iter().any(|tool: &PreparedEdit| tool.evaluator.is_rough()) {
             Kind::Rough
         } else {
             Kind::Edit

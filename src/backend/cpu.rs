@@ -7,10 +7,10 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::{Compute, lock};
+use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::fresh::{FreshParts, Group, PartLists};
 use crate::surface::vertex::WorldView;
-use crate::volume::{EditWork, Ledger};
 
 /// From how many blocks on meshing is spread over threads; below, handing out costs more than it saves.
 pub(crate) const PARALLEL_BLOCKS: usize = 48;
@@ -40,7 +40,7 @@ static KEPT: Mutex<Vec<Parts>> = Mutex::new(Vec::new());
 pub(crate) struct Cpu;
 
 impl Compute for Cpu {
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])) {
+    fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])) {
         work.run(each);
     }
 

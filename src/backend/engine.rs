@@ -8,11 +8,11 @@ use std::time::Duration;
 use web_time::Instant;
 
 use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, Stage, lock};
+use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
-use crate::volume::{EditWork, Ledger};
 
 #[cfg(feature = "cuda")]
 use super::cuda::Cuda;
@@ -209,7 +209,7 @@ impl Shared {
 }
 
 impl Compute for Shared {
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])) {
+    fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {

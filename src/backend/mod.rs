@@ -20,9 +20,6 @@ mod cuda;
 mod engine;
 mod settings;
 
-#[cfg(all(feature = "interop", target_os = "linux"))]
-pub use cuda::interop;
-
 pub use choice::{Choice, Estimate, Stage};
 pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
 pub use engine::{Engine, EngineFigures, EngineState};
@@ -30,10 +27,10 @@ pub use settings::{CardChoice, EngineSettings};
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
-use crate::volume::{EditWork, Ledger};
 
 /// What an [`Engine`] may run on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -53,7 +50,7 @@ pub enum Backend {
 pub(crate) trait Compute: Send + Sync {
     /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one ledger or as
     /// several, once or more often; it may take out of them what it wants.
-    fn edit(&self, work: &EditWork, each: &mut dyn FnMut(&mut [Ledger]));
+    fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta]));
 
     /// Meshes blocks. `meanwhile` is called when there is time for other things, maybe more than once; it should only set them
     /// going. `then` gets the surfaces, by the numbers of the blocks, some of which may still be on their way; their memory is

@@ -33,13 +33,13 @@ const MOST: i32 = 64;
 /// A quantised [`Blend`]: strength in 1/256, falloff in 1/256 voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Fade {
+pub(super) struct QuantizedBlend {
     pub strength: i32,
     pub falloff: i32,
     pub material: Option<MaterialId>,
 }
 
-impl Fade {
+impl QuantizedBlend {
     pub fn quantize(blend: &Blend) -> Result<Self, BrushError> {
         let strength = in_range("strength", blend.strength, 0.0, 1.0)?;
         let falloff = in_range("falloff", blend.falloff, 0.0, MOST as f32)?;
@@ -86,7 +86,7 @@ mod tests {
     #[test]
     fn weights_rise_from_nothing_at_the_rim_to_the_strength() {
         for (strength, falloff) in [(256, 1024), (256, 0), (77, 300), (256, 1)] {
-            let fade = Fade { strength, falloff, material: None };
+            let fade = QuantizedBlend { strength, falloff, material: None };
             let weights: Vec<i32> = (-20_000..600).rev().map(|outside| fade.weight(outside, 9000)).collect();
             assert!(weights.is_sorted());
             assert_eq!((weights[0], weights.last()), (0, Some(&strength)));
@@ -94,7 +94,7 @@ mod tests {
             assert_eq!(fade.weight(0, 9000), if falloff == 0 { strength } else { 0 });
         }
         // As wide as the shape is deep: all of it in the middle, and no sudden step on the way.
-        let soft = Fade { strength: 256, falloff: 64 * ONE, material: None };
+        let soft = QuantizedBlend { strength: 256, falloff: 64 * ONE, material: None };
         assert_eq!((soft.weight(-5 * ONE, 5 * ONE), soft.weight(-5 * ONE / 2, 5 * ONE)), (256, 128));
         let all: Vec<i32> = (0..5 * ONE).map(|inside| soft.weight(-inside, 5 * ONE)).collect();
         assert!(all.windows(2).all(|pair| (0..=2).contains(&(pair[1] - pair[0]))));

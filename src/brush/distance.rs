@@ -4,7 +4,7 @@
 //! negative inside. All are exact distances to the shape's surface up to rounding, so none changes faster than the
 //! point moves. Sums are written `x + (y + z)`, so that along a row of samples the bracket is computed once.
 
-use super::solid::{Solid, difference, matrix};
+use super::quantized_shape::{QuantizedShape, difference, matrix};
 
 /// A shape's constants.
 #[derive(Clone, Debug)]
@@ -24,21 +24,21 @@ pub(super) trait Distance {
 
 impl Form {
     /// The constants of a checked shape.
-    pub(super) fn of(solid: &Solid) -> Self {
+    pub(super) fn of(solid: &QuantizedShape) -> Self {
         match *solid {
-            Solid::Sphere { radius, .. } => Self::Sphere(Sphere { radius: radius as f32 }),
-            Solid::Cuboid { half, rotation, .. } => {
+            QuantizedShape::Sphere { radius, .. } => Self::Sphere(Sphere { radius: radius as f32 }),
+            QuantizedShape::Cuboid { half, rotation, .. } => {
                 let (rows, squared) = matrix(rotation);
                 let columns = std::array::from_fn(|i| rows.map(|row| row[i] as f32 / squared as f32));
                 Self::Cuboid(Cuboid { columns, half: half.map(|v| v as f32) })
             }
-            Solid::Cylinder { axis, radius, .. } => {
+            QuantizedShape::Cylinder { axis, radius, .. } => {
                 Self::Cylinder(Cylinder { axis: Axis::of(axis), radius: radius as f32 })
             }
-            Solid::Capsule { from, to, radius } => {
+            QuantizedShape::Capsule { from, to, radius } => {
                 Self::Capsule(Capsule { axis: Axis::of(difference(to, from)), radius: radius as f32 })
             }
-            Solid::Cone { axis, radius, .. } => {
+            QuantizedShape::Cone { axis, radius, .. } => {
                 let (axis, radius) = (Axis::of(axis), radius as f32);
                 let slant = length(axis.length, radius, 0.0);
                 let (rise, run) = (axis.length / slant, radius / slant);

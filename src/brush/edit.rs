@@ -3,11 +3,11 @@
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
-use super::blend::Fade;
-use super::deed::{Deed, WrittenDeed};
-use super::roughness::Grain;
-use super::sculptor::Sculptor;
-use super::solid::Solid;
+use super::blend::QuantizedBlend;
+use super::quantized_operation::{QuantizedOperation, WrittenOperation};
+use super::quantized_shape::QuantizedShape;
+use super::roughness::QuantizedRoughness;
+use super::sculpt_kernel::SculptKernel;
 use super::{BAND, Blend, Brush, BrushError, Evaluator, Kind, Operation, Roughness, Shape};
 use crate::lattice::{LatticeBox, ONE};
 
@@ -35,10 +35,10 @@ use crate::lattice::{LatticeBox, ONE};
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked", into = "Unchecked")]
 pub struct Edit {
-    shape: Solid,
-    deed: Deed,
+    shape: QuantizedShape,
+    deed: QuantizedOperation,
     power: u8,
-    roughness: Option<Grain>,
+    roughness: Option<QuantizedRoughness>,
     tag: u64,
     stroke: Option<u64>,
 }
@@ -47,9 +47,9 @@ pub struct Edit {
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Edit", deny_unknown_fields)]
 struct Unchecked {
-    shape: Solid,
-    operation: WrittenDeed,
-    roughness: Option<Grain>,
+    shape: QuantizedShape,
+    operation: WrittenOperation,
+    roughness: Option<QuantizedRoughness>,
     tag: u64,
     #[serde(default)]
     stroke: Option<u64>,
@@ -64,10 +64,10 @@ impl Edit {
     ///
     /// A [`BrushError`] where a number is not finite or beyond the limits of [the room's table](super).
     pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
-        let roughness = brush.roughness.as_ref().map(Grain::quantize).transpose()?;
+        let roughness = brush.roughness.as_ref().map(QuantizedRoughness::quantize).transpose()?;
         Ok(Self {
-            shape: Solid::quantize(&brush.shape)?,
-            deed: Deed::quantize(brush)?,
+            shape: QuantizedShape::quantize(&brush.shape)?,
+            deed: QuantizedOperation::quantize(brush)?,
             power: brush.power,
             roughness: roughness.filter(|grain| grain.amplitude != 0),
             tag: brush.tag,
@@ -103,7 +103,7 @@ impl Edit {
 
     /// How the edit blends in, if it sculpts.
     pub fn blend(&self) -> Option<Blend> {
-        self.deed.fade().map(Fade::blend)
+        self.deed.fade().map(QuantizedBlend::blend)
     }
 
     /// How hard the material may be that it takes away.
@@ -114,16 +114,16 @@ impl Edit {
     /// Which way it is applied.
     pub(crate) fn kind(&self) -> Kind {
         match self.deed {
-            Deed::Dig => Kind::Dig,
-            Deed::Add { material } => Kind::Add { material },
-            Deed::Paint { material } => Kind::Paint { material },
+            QuantizedOperation::Dig => Kind::Dig,
+            QuantizedOperation::Add { material } => Kind::Add { material },
+            QuantizedOperation::Paint { material } => Kind::Paint { material },
             _ => Kind::Sculpt,
         }
     }
 
     /// What it makes of samples, if it sculpts.
-    pub(crate) fn sculptor(&self) -> Option<Sculptor> {
-        Sculptor::of(&self.deed, &self.shape)
+    pub(crate) fn sculptor(&self) -> Option<SculptKernel> {
+        SculptKernel::of(&self.deed, &self.shape)
     }
 
     /// The number that the brush carried.

@@ -7,8 +7,8 @@ use wide::{i16x8, i32x8};
 
 use super::BAND;
 use super::distance::{Distance, Form, larger, smaller};
-use super::roughness::Grain;
-use super::solid::Solid;
+use super::quantized_shape::QuantizedShape;
+use super::roughness::QuantizedRoughness;
 use crate::lattice::{LatticeBox, ONE};
 
 /// Samples evaluated together.
@@ -30,12 +30,12 @@ pub struct Evaluator {
     home: IVec3,
     rest: IVec3,
     form: Form,
-    grain: Option<Grain>,
+    grain: Option<QuantizedRoughness>,
 }
 
 impl Evaluator {
     /// The evaluator of a checked edit.
-    pub(super) fn new(solid: &Solid, grain: Option<Grain>) -> Self {
+    pub(super) fn new(solid: &QuantizedShape, grain: Option<QuantizedRoughness>) -> Self {
         let origin = solid.origin();
         Self { home: origin >> 8, rest: origin & 0xff, form: Form::of(solid), grain }
     }
@@ -190,7 +190,7 @@ impl Evaluator {
     /// All that distances are computed from.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();
-        let grain = self.grain.as_ref().map(Grain::constants);
+        let grain = self.grain.as_ref().map(QuantizedRoughness::constants);
         Constants { home: self.home, rest: self.rest, kind, shape, grain }
     }
 }
@@ -231,11 +231,15 @@ mod tests {
     #[test]
     fn rows_of_a_brick_are_rows() {
         for (seed, solid) in [
-            (None, Solid::Sphere { center: [900, 300, 700], radius: 600 }),
-            (Some(3), Solid::Cone { base: [1 << 10, 9, -7], axis: [-99, 5_000, 999], radius: 900 }),
-            (Some(9), Solid::Cuboid { center: [0, 0, 0], half: [900, 80, 700], rotation: [3, 5, 7, 90] }),
+            (None, QuantizedShape::Sphere { center: [900, 300, 700], radius: 600 }),
+            (Some(3), QuantizedShape::Cone { base: [1 << 10, 9, -7], axis: [-99, 5_000, 999], radius: 900 }),
+            (
+                Some(9),
+                QuantizedShape::Cuboid { center: [0, 0, 0], half: [900, 80, 700], rotation: [3, 5, 7, 90] },
+            ),
         ] {
-            let grain = seed.map(|seed| Grain::quantize(&Roughness::new(1.5, 3.0, seed)).unwrap());
+            let grain =
+                seed.map(|seed| QuantizedRoughness::quantize(&Roughness::new(1.5, 3.0, seed)).unwrap());
             let evaluator = Evaluator::new(&solid, grain);
             for origin in [IVec3::new(-3, -4, 0), IVec3::new(8, 0, -8), IVec3::new(1 << 14, 0, 0)] {
                 let mut rows = [i16x8::splat(i16::MIN); 64];
@@ -257,8 +261,8 @@ mod tests {
     #[test]
     fn beyond_the_horizon_all_distances_are_one() {
         for solid in [
-            Solid::Sphere { center: [-5, 300, 7], radius: 600 },
-            Solid::Cone { base: [1 << 23, 9, -7], axis: [-99, 55_000, 999], radius: 9_000 },
+            QuantizedShape::Sphere { center: [-5, 300, 7], radius: 600 },
+            QuantizedShape::Cone { base: [1 << 23, 9, -7], axis: [-99, 55_000, 999], radius: 9_000 },
         ] {
             let evaluator = Evaluator::new(&solid, None);
             let far = FARTHEST as i32;
@@ -274,7 +278,7 @@ mod tests {
 
     #[test]
     fn up_to_the_horizon_distances_are_exact() {
-        let evaluator = Evaluator::new(&Solid::Sphere { center: [0; 3], radius: 256 }, None);
+        let evaluator = Evaluator::new(&QuantizedShape::Sphere { center: [0; 3], radius: 256 }, None);
         let mut row = [0; 33_000];
         evaluator.row(IVec3::new(-16_500, 0, 0), &mut row);
         for (x, distance) in (-16_500i32..).zip(row) {

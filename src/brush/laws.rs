@@ -291,7 +291,7 @@ proptest! {
                 prop_assert_eq!(Edit::quantize(&again), Ok(edit.clone()));
                 if let Some(sculptor) = edit.sculptor() {
                     for (density, cut) in [(0, 0), (-1024, (1 << 27) - 1), (1 << 24, 5), (-(1 << 24), 0)] {
-                        let around = || Around { densities: [density; 27], cut, moved: cut };
+                        let around = || Stencil { densities: [density; 27], cut, moved: cut };
                         let near = (edit.reach().min + edit.reach().max) / 2;
                         for (at, outside) in [(near, -5000), (near + 3, -1), (near, i32::MIN + 1)] {
                             let _ = sculptor.density(at, outside, around);

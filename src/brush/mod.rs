@@ -18,11 +18,11 @@
 //! | a wish, in floats | its twin | ready to be applied |
 //! | --- | --- | --- |
 //! | [`Brush`] | [`Edit`] | |
-//! | [`Shape`] | `Solid` | `Form`, in the [`Evaluator`] |
-//! | [`Roughness`] | `Grain` | the same, in the [`Evaluator`] |
-//! | [`Operation`] | `Deed` | `Kind`, and a `Sculptor` for those that sculpt |
-//! | [`Blend`] | `Fade`, in the `Deed` | |
-//! | [`Stamp`] | `Press`, in the `Deed` | |
+//! | [`Shape`] | `QuantizedShape` | `Form`, in the [`Evaluator`] |
+//! | [`Roughness`] | `QuantizedRoughness` | the same, in the [`Evaluator`] |
+//! | [`Operation`] | `QuantizedOperation` | `Kind`, and a `SculptKernel` for those that sculpt |
+//! | [`Blend`] | `QuantizedBlend`, in the `QuantizedOperation` | |
+//! | [`Stamp`] | `QuantizedStamp`, in the `QuantizedOperation` | |
 //! | [`BrushRecord`], as it stands in a line of JSON | | |
 //!
 //! # Limits
@@ -87,7 +87,6 @@
 //! [`LIMIT`]: crate::lattice::LIMIT
 
 mod blend;
-mod deed;
 mod distance;
 mod edit;
 mod error;
@@ -95,12 +94,13 @@ mod evaluator;
 #[cfg(test)]
 mod laws;
 mod operation;
+mod quantized_operation;
+mod quantized_shape;
 mod record;
 mod request;
 mod roughness;
-mod sculptor;
+mod sculpt_kernel;
 mod shape;
-mod solid;
 mod stamp;
 
 pub use blend::Blend;
@@ -113,8 +113,8 @@ pub use record::{BrushRecord, ImageRecord, OperationName, RecordError, ShapeName
 pub use request::Brush;
 pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
-pub(crate) use sculptor::Stroke;
-pub(crate) use sculptor::{Around, FARTHEST, Sculptor, is_moved};
+pub(crate) use sculpt_kernel::Stroke;
+pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
 pub use shape::Shape;
 pub use stamp::Stamp;
 

@@ -30,7 +30,7 @@ impl Roughness {
 /// Quantised roughness. Lengths in 1/256 voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Grain {
+pub(super) struct QuantizedRoughness {
     pub(super) amplitude: i32,
     scale: i32,
     seed: u32,
@@ -42,7 +42,7 @@ const SCALES: (i32, i32) = (ONE, 256 * ONE);
 /// Noise is computed within this many voxels of the origin, far beyond every reach, and repeats its rim from there on.
 const RIM: i64 = 1 << 20;
 
-impl Grain {
+impl QuantizedRoughness {
     pub(super) fn quantize(roughness: &Roughness) -> Result<Self, BrushError> {
         Ok(Self {
             amplitude: units("amplitude", roughness.amplitude, AMPLITUDES)?,
@@ -140,7 +140,7 @@ fn out_of_range(what: &'static str, value: f32, (least, most): (i32, i32)) -> Br
 mod tests {
     use super::*;
 
-    fn noise(grain: &Grain, p: IVec3) -> f32 {
+    fn noise(grain: &QuantizedRoughness, p: IVec3) -> f32 {
         let mut out = [0.0];
         grain.add(i64::from(p.x), p, &mut out);
         out[0]
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn noise_fills_its_range_and_stays_in_it() {
-        let grain = Grain::quantize(&Roughness::new(2.0, 3.5, 11)).unwrap();
+        let grain = QuantizedRoughness::quantize(&Roughness::new(2.0, 3.5, 11)).unwrap();
         let (mut low, mut high, mut sum) = (0.0f32, 0.0f32, 0.0f64);
         for i in 0..20_000 {
             let value = noise(&grain, IVec3::new(i % 41 - 20, i / 41 % 37 - 15, i / 1517 - 7));
@@ -160,8 +160,8 @@ mod tests {
 
     #[test]
     fn noise_points_carry_their_hash_and_seeds_differ() {
-        let grain = Grain::quantize(&Roughness::new(1.0, 4.0, 1)).unwrap();
-        let other = Grain::quantize(&Roughness::new(1.0, 4.0, 2)).unwrap();
+        let grain = QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 1)).unwrap();
+        let other = QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 2)).unwrap();
         for (cell, point) in [(0, 0), (1, 4), (-1, -4)] {
             let p = IVec3::new(point, 0, point);
             assert_eq!(noise(&grain, p), grain.corner(cell, 0, cell) * 256.0);
@@ -178,10 +178,10 @@ mod tests {
             (1.0, 0.99, "scale"),
             (1.0, 256.5, "scale"),
         ] {
-            let error = Grain::quantize(&Roughness::new(amplitude, scale, 0)).unwrap_err();
+            let error = QuantizedRoughness::quantize(&Roughness::new(amplitude, scale, 0)).unwrap_err();
             assert!(matches!(error, BrushError::Roughness { what: found, .. } if found == what), "{error}");
         }
-        assert!(Grain::quantize(&Roughness::new(0.0, 1.0, 0)).is_ok());
-        assert!(Grain::quantize(&Roughness::new(8.0, 256.0, 0)).is_ok());
+        assert!(QuantizedRoughness::quantize(&Roughness::new(0.0, 1.0, 0)).is_ok());
+        assert!(QuantizedRoughness::quantize(&Roughness::new(8.0, 256.0, 0)).is_ok());
     }
 }

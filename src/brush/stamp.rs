@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::BrushError;
 use super::error::in_range;
-use super::solid::{check_point, check_size, check_turn, matrix, point, size, turn};
+use super::quantized_shape::{check_point, check_size, check_turn, matrix, point, size, turn};
 use crate::ground::GreyImage;
 use crate::lattice::ONE;
 
@@ -135,7 +135,7 @@ impl Relief {
 /// A [`Stamp`] in integers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Press {
+pub(super) struct QuantizedStamp {
     center: [i32; 3],
     rotation: [i16; 4],
     half: [i32; 2],
@@ -143,7 +143,7 @@ pub(super) struct Press {
     relief: Relief,
 }
 
-impl Press {
+impl QuantizedStamp {
     pub fn quantize(stamp: &Stamp) -> Result<Self, BrushError> {
         check_sides(stamp.image.width(), stamp.image.height())?;
         Ok(Self {
@@ -202,7 +202,7 @@ impl Press {
 
 /// A press as plain numbers, for other machines.
 #[cfg(feature = "cuda")]
-pub(crate) struct PressConstants<'a> {
+pub(crate) struct StampParams<'a> {
     pub center: [i32; 3],
     /// Rows of the rotation's matrix, and what to divide them by.
     pub rows: [[i64; 3]; 3],
@@ -213,12 +213,12 @@ pub(crate) struct PressConstants<'a> {
 }
 
 #[cfg(feature = "cuda")]
-impl Press {
-    /// All that [`Press::at`] looks at.
-    pub(super) fn constants(&self) -> PressConstants<'_> {
+impl QuantizedStamp {
+    /// All that [`QuantizedStamp::at`] looks at.
+    pub(super) fn constants(&self) -> StampParams<'_> {
         let &Self { center, rotation, half, height, .. } = self;
         let (rows, squared) = matrix(rotation);
-        PressConstants { center, rows, squared, half, height, image: &self.relief.0 }
+        StampParams { center, rows, squared, half, height, image: &self.relief.0 }
     }
 }
 
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_ramp_rises_along_its_columns() {
-        let press = Press::quantize(&ramp()).unwrap();
+        let press = QuantizedStamp::quantize(&ramp()).unwrap();
         for (x, height) in [(7, 0), (8, 128), (10, 384), (12, 640), (13, 768)] {
             for z in [16, 20, 24] {
                 let (beside, above) = press.at(IVec3::new(x, 5, z));
@@ -249,13 +249,13 @@ mod tests {
     fn a_stamp_is_as_deep_as_half_its_shorter_side() {
         for (size, deep) in [(Vec2::new(6.0, 8.0), 768), (Vec2::new(8.0, 6.0), 768), (Vec2::splat(5.0), 640)]
         {
-            assert_eq!(Press::quantize(&Stamp { size, ..ramp() }).unwrap().deep(), deep, "{size}");
+            assert_eq!(QuantizedStamp::quantize(&Stamp { size, ..ramp() }).unwrap().deep(), deep, "{size}");
         }
     }
 
     #[test]
     fn a_stamp_on_a_wall_looks_along_its_normal() {
-        let press = Press::quantize(&ramp().onto(Vec3::X)).unwrap();
+        let press = QuantizedStamp::quantize(&ramp().onto(Vec3::X)).unwrap();
         let middle = press.at(IVec3::new(10, 5, 20)).1;
         assert_eq!(press.at(IVec3::new(12, 5, 20)).1, middle + 512);
     }
@@ -263,39 +263,40 @@ mod tests {
     #[test]
     fn the_stamp_comes_back_from_its_integers() {
         let stamp = ramp();
-        assert_eq!(Press::quantize(&stamp).unwrap().stamp(), stamp);
+        assert_eq!(QuantizedStamp::quantize(&stamp).unwrap().stamp(), stamp);
         let turned = ramp().onto(Vec3::new(0.3, 0.9, -0.2));
-        let press = Press::quantize(&turned).unwrap();
-        assert_eq!(Press::quantize(&press.stamp()).unwrap(), press);
+        let press = QuantizedStamp::quantize(&turned).unwrap();
+        assert_eq!(QuantizedStamp::quantize(&press.stamp()).unwrap(), press);
     }
 
     #[test]
     fn stamps_that_are_too_small_or_too_large_are_refused_by_half_their_size() {
-        let error = |size| Press::quantize(&Stamp { size, ..ramp() }).unwrap_err();
+        let error = |size| QuantizedStamp::quantize(&Stamp { size, ..ramp() }).unwrap_err();
         let (what, least, most) = (HALF, 0.25, 1024.0);
         let small = BrushError::TooSmall { what, value: 0.125, least };
         assert_eq!([error(Vec2::new(0.25, 4.0)), error(Vec2::new(4.0, 0.25))], [small; 2]);
         assert_eq!(error(Vec2::new(4.0, 2050.0)), BrushError::TooLarge { what, value: 1025.0, most });
         assert!(matches!(error(Vec2::new(f32::NAN, 4.0)), BrushError::NotFinite { .. }));
-        assert!(Press::quantize(&Stamp { size: Vec2::new(0.5, 2048.0), ..ramp() }).is_ok());
+        assert!(QuantizedStamp::quantize(&Stamp { size: Vec2::new(0.5, 2048.0), ..ramp() }).is_ok());
     }
 
     #[test]
     fn images_of_other_sizes_are_refused() {
         for (width, height) in [(1, 9), (9, 1), (257, 2), (2, 257)] {
             let image = GreyImage::from_samples(width, height, vec![0; (width * height) as usize]).unwrap();
-            let error = Press::quantize(&Stamp { image: image.into(), ..ramp() }).unwrap_err();
+            let error = QuantizedStamp::quantize(&Stamp { image: image.into(), ..ramp() }).unwrap_err();
             assert!(matches!(error, BrushError::StampSize { .. }), "{error}");
         }
-        let press = Press::quantize(&ramp()).unwrap();
+        let press = QuantizedStamp::quantize(&ramp()).unwrap();
         let json = serde_json::to_string(&press).unwrap();
-        assert_eq!(serde_json::from_str::<Press>(&json).unwrap(), press);
+        assert_eq!(serde_json::from_str::<QuantizedStamp>(&json).unwrap(), press);
         for (from, to, message) in [
             (r#""width":4"#, r#""width":5"#, "takes 15 samples, but 12"),
             (r#""width":4"#, r#""width":4000000000"#, "2 to 256"),
             (r#""width":4"#, r#""width":0"#, "2 to 256"),
         ] {
-            let error = serde_json::from_str::<Press>(&json.replace(from, to)).unwrap_err().to_string();
+            let error =
+                serde_json::from_str::<QuantizedStamp>(&json.replace(from, to)).unwrap_err().to_string();
             assert!(error.contains(message), "{error}");
         }
     }

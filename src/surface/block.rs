@@ -13,12 +13,12 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use super::apron::{Apron, Neighbours};
 use super::cases::{self, Case};
 use super::corners::{self, Corners, Heights, X, Z};
 use super::crossings::{Crossings, Edge};
 use super::mask::sheet;
 use super::mesh::Vertex;
+use super::padded_samples::{Neighbours, PaddedSamples};
 use super::stack::{Stack, pristine_side, world_cells};
 use super::vertex::WorldView;
 use super::window::{self, Window};
@@ -98,7 +98,7 @@ impl Parts {
 /// Meshes blocks; keeps its working memory from one call to the next.
 #[derive(Default)]
 pub struct Mesher {
-    apron: Apron,
+    apron: PaddedSamples,
     crossings: Crossings,
     numbers: Numbers,
     window: Window<'static>,

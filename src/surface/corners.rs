@@ -5,7 +5,7 @@
 
 use wide::i32x8;
 
-use super::apron::SIDE;
+use super::padded_samples::SIDE;
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE, ceil};
 

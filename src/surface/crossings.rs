@@ -7,9 +7,9 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
 
-use super::apron::{AREA, Apron, Marked, Neighbours, SIDE};
 use super::corners::PLACES;
 use super::mesh::{MaterialMix, Vertex};
+use super::padded_samples::{AREA, Marked, Neighbours, PaddedSamples, SIDE};
 use super::stack::Stack;
 use super::vertex::lerp_normal;
 use crate::ground::{MaterialId, OVERLAY_DEPTH};
@@ -38,7 +38,7 @@ impl Crossings {
     /// then along y, then along z.
     pub fn make(
         &self,
-        apron: &Apron,
+        apron: &PaddedSamples,
         stack: &mut Stack,
         around: &Neighbours,
         low: IVec3,
@@ -57,7 +57,7 @@ impl Crossings {
 
 /// What the vertices of a block are made from.
 struct Site<'a, 'b> {
-    apron: &'a Apron,
+    apron: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
     /// The brick's lowest sample.
@@ -154,7 +154,7 @@ const NEAR: usize = 3 * AREA + 1;
 
 impl Batch {
     #[inline(always)]
-    fn new<const AXIS: usize>(apron: &Apron, edges: &[Edge]) -> Self {
+    fn new<const AXIS: usize>(apron: &PaddedSamples, edges: &[Edge]) -> Self {
         let [along, b, c] = STEPS[AXIS];
         let (p, q) = (AREA, AREA + along);
         // Lanes beyond the last edge repeat it.

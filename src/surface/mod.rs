@@ -1,7 +1,6 @@
 //! What is drawn: marching cubes where edits are, heightmap elsewhere, and the ring where they meet.
 //!
 //! - [`cases`]: the marching-cubes case table, derived from one rule about cube faces.
-//! - [`dense`]: marching cubes over a plain dense grid, for those who have one.
 //! - [`mask`]: which cells marching cubes draws (rule 2), as bits.
 //! - [`vertex`]: the one vertex function of cubes and ring (rule 4), with normals and materials.
 //! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk; [`plain`] is the same by the book.
@@ -9,18 +8,17 @@
 //! - [`mesh`]: vertex and index buffers, local to a chunk or tile; [`indices`] has 16 or 32 bits each.
 //! - [`seams`]: the validator: is everything drawn together closed?
 
-mod apron;
 pub mod block;
 pub mod cases;
 mod corners;
 mod crossings;
-pub mod dense;
 pub(crate) mod fresh;
 pub mod indices;
 pub mod mask;
 pub mod mesh;
 #[cfg(feature = "cuda")]
 mod packed;
+mod padded_samples;
 pub mod plain;
 pub mod seams;
 mod stack;
@@ -34,4 +32,4 @@ pub(crate) use stack::borders;
 pub use indices::Indices;
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};
-pub use seams::{SeamFault, SeamReport, SeamSoup};
+pub use seams::{SeamChecker, SeamFault, SeamReport};

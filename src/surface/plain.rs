@@ -20,14 +20,14 @@ const AREA: usize = (SIDE * SIDE) as usize;
 const VOLUME: usize = AREA * SIDE as usize;
 
 /// The samples around a block, copied out of their bricks.
-struct Apron<'a> {
+struct PaddedSamples<'a> {
     world: &'a WorldView<'a>,
     low: IVec3,
     distances: [i32; VOLUME],
     edited: [bool; VOLUME],
 }
 
-impl<'a> Apron<'a> {
+impl<'a> PaddedSamples<'a> {
     fn gather(world: &'a WorldView<'a>, brick: BrickPos) -> Self {
         let low = brick.origin() - 1;
         let mut apron = Self { world, low, distances: [0; VOLUME], edited: [false; VOLUME] };
@@ -74,7 +74,7 @@ impl<'a> Apron<'a> {
     }
 }
 
-impl Lattice for Apron<'_> {
+impl Lattice for PaddedSamples<'_> {
     fn distance(&self, point: IVec3) -> i32 {
         over_the_rim(self.world.grid, point, |point| self.distances[self.index(point)])
     }
@@ -105,7 +105,7 @@ impl VertexCache {
     const SIDE: i32 = BRICK + 1;
     const NONE: u32 = u32::MAX;
 
-    fn number(&mut self, apron: &Apron, cube: IVec3, edge: Edge) -> u32 {
+    fn number(&mut self, apron: &PaddedSamples, cube: IVec3, edge: Edge) -> u32 {
         let (corner, axis) = cases::edge_corners(edge);
         let p = cube + IVec3::from_array(cases::corner(corner));
         let at = p - self.low;
@@ -121,7 +121,7 @@ impl VertexCache {
 /// Meshes the cells `cells` of a brick, relative to the chunk's lowest lattice point `origin`.
 pub fn mesh(world: &WorldView, brick: BrickPos, cells: LatticeBox, origin: IVec3) -> SurfaceMesh {
     debug_assert!(brick.samples().encloses(cells));
-    let apron = Apron::gather(world, brick);
+    let apron = PaddedSamples::gather(world, brick);
     let side = VertexCache::SIDE as usize;
     let mut cache = VertexCache {
         vertices: Vec::new(),

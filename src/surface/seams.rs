@@ -96,7 +96,7 @@ impl fmt::Display for SeamReport {
 
 /// Triangles of many meshes, welded as they come in.
 #[derive(Default)]
-pub struct SeamSoup {
+pub struct SeamChecker {
     numbers: FxHashMap<I64Vec3, u32>,
     places: Vec<I64Vec3>,
     normals: Vec<Vec3>,
@@ -105,7 +105,7 @@ pub struct SeamSoup {
     degenerate: Vec<u32>,
 }
 
-impl SeamSoup {
+impl SeamChecker {
     /// Adds a mesh that is drawn at lattice point `origin`.
     pub fn add(&mut self, mesh: &SurfaceMesh, origin: IVec3) {
         let origin = origin.as_i64vec3() * i64::from(SNAP);
@@ -270,7 +270,7 @@ mod tests {
 
     /// In a world of 64 x 48 cells.
     fn report(meshes: &[(&SurfaceMesh, IVec3)]) -> SeamReport {
-        let mut soup = SeamSoup::default();
+        let mut soup = SeamChecker::default();
         meshes.iter().for_each(|&(mesh, origin)| soup.add(mesh, origin));
         soup.check(ChunkGrid::new(32, 64, 48))
     }

@@ -5,9 +5,9 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 
-use super::apron::SIDE;
 use super::corners::{self, CELLS, Corners, Heights, PLACES};
 use super::mesh::MaterialMix;
+use super::padded_samples::SIDE;
 use super::vertex::WorldView;
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE};

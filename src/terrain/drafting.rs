@@ -8,11 +8,9 @@ use super::queue::Submission;
 use super::world::World;
 use crate::backend::Compute;
 use crate::brush::{Edit, Operation};
+use crate::edits::{ChunkEffect, Draft, DraftedBrick, EditDelta, EditEffect, PreparedEdits, TakenOut};
 use crate::ground::MaterialId;
-use crate::volume::{
-    Brick, Bricks, ChunkEffect, DiggingRules, Draft, DraftedBrick, EditEffect, EditWork, Ledger, Sample,
-    SampleView, TakenOut, UniformBricks,
-};
+use crate::volume::{Brick, Bricks, DiggingRules, Sample, SampleView, UniformBricks};
 
 /// Who drafts, over what: a world, and what was drafted over it so far.
 pub(super) struct Drafting<'a> {
@@ -72,7 +70,8 @@ impl<'a> Drafting<'a> {
 
     /// All edits at once: each brick takes all of its edits.
     fn together(&self, edits: &[&Edit], rules: Option<&DiggingRules>) -> Draft {
-        let apply = |work: &EditWork, each: &mut dyn FnMut(&mut [Ledger])| self.backend.edit(work, each);
+        let apply =
+            |work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])| self.backend.edit(work, each);
         let known = self.known.as_ref().unwrap_or(&self.world.uniform);
         Draft::make(self.samples(), self.world.grid, edits, self.hash, known, rules, apply)
     }

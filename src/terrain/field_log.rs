@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::receipt::{Applied, ChunkScenario, Rejection};
 use super::world::World;
 use crate::brush::Edit;
+use crate::edits::{EditEffect, reach};
 use crate::lattice::{ChunkPos, LatticeBox};
-use crate::volume::{EditEffect, FieldId, Fields, reach};
+use crate::volume::{FieldId, Fields};
 
 /// Something that happened to a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

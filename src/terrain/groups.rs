@@ -23,10 +23,11 @@ use super::redraw;
 use super::transaction::Transaction;
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};
+use crate::edits::{Draft, DraftedBrick, EditEffect, latest};
 use crate::lattice::{BrickPos, ChunkPos, side_by_side};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Brick, Draft, DraftedBrick, EditEffect, Fields, UniformBricks, latest};
+use crate::volume::{Brick, Fields, UniformBricks};
 
 /// A group of edits, and what they come to.
 struct Group<'a> {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::change::{Change, ChangedBrick, GroupChange};
 use super::world::World;
 use crate::lattice::LatticeBox;
-use crate::volume::Tally;
+use crate::volume::MaterialCounts;
 
 /// One step through a terrain's history.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,11 +51,11 @@ pub struct Restored {
     /// Box around all samples that changed.
     pub bounds: Option<LatticeBox>,
     /// Voxels that are air now, by the material they had.
-    pub removed: Tally,
+    pub removed: MaterialCounts,
     /// Voxels that are solid now, by the material they have.
-    pub added: Tally,
+    pub added: MaterialCounts,
     /// Solid voxels whose material changed, by the new one.
-    pub painted: Tally,
+    pub painted: MaterialCounts,
 }
 
 /// Why a step changed nothing.
@@ -131,13 +131,13 @@ impl Step {
 /// What a terrain let go of: steps, and a copy of the world that was not needed. Freeing many bricks takes its time, so it
 /// is left to whoever has some.
 #[derive(Default)]
-pub(crate) struct Waste {
+pub(crate) struct DeferredDrop {
     steps: Vec<Arc<Step>>,
     bricks: Vec<Vec<ChangedBrick>>,
     pub(super) copy: Option<Arc<World>>,
 }
 
-impl Waste {
+impl DeferredDrop {
     /// Is there nothing to free?
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
@@ -146,7 +146,7 @@ impl Waste {
 }
 
 /// The steps of a terrain, back and forth.
-pub(super) struct Timeline {
+pub(super) struct UndoStack {
     /// The oldest first.
     undo: VecDeque<Arc<Step>>,
     /// The one that was undone last stands last.
@@ -158,7 +158,7 @@ pub(super) struct Timeline {
     lost: u64,
 }
 
-impl Timeline {
+impl UndoStack {
     /// An empty one with a budget of bytes.
     pub fn new(budget: usize) -> Self {
         Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, held: 0, lost: 0 }
@@ -200,9 +200,9 @@ impl Timeline {
     }
 
     /// A new budget; what it has no room for goes.
-    pub fn set_budget(&mut self, budget: usize) -> Waste {
+    pub fn set_budget(&mut self, budget: usize) -> DeferredDrop {
         self.budget = budget;
-        let mut waste = Waste::default();
+        let mut waste = DeferredDrop::default();
         self.trim(&mut waste);
         waste
     }
@@ -214,7 +214,7 @@ impl Timeline {
 
     /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can be
     /// redone.
-    pub fn record(&mut self, replaced: Step, waste: &mut Waste) {
+    pub fn record(&mut self, replaced: Step, waste: &mut DeferredDrop) {
         let first = waste.steps.len();
         waste.steps.extend(self.redo.drain(..));
         self.held -= waste.steps[first..].iter().map(|step| step.bytes()).sum::<usize>();
@@ -233,7 +233,7 @@ impl Timeline {
     }
 
     /// A step was committed that put `used` in place; what that replaced is the step in the other direction.
-    pub fn passed(&mut self, step: HistoryStep, used: &Arc<Step>, replaced: Step, waste: &mut Waste) {
+    pub fn passed(&mut self, step: HistoryStep, used: &Arc<Step>, replaced: Step, waste: &mut DeferredDrop) {
         // The budget may have let go of it meanwhile.
         if self.next(step).is_some_and(|next| Arc::ptr_eq(next, used)) {
             waste.steps.extend(self.list(step).pop_back());
@@ -253,7 +253,7 @@ impl Timeline {
     }
 
     /// Lets go of what is farthest from now, back first, until the rest is within the budget.
-    fn trim(&mut self, waste: &mut Waste) {
+    fn trim(&mut self, waste: &mut DeferredDrop) {
         self.fit();
         while self.bytes() > self.budget {
             let Some(gone) = self.undo.pop_front().or_else(|| self.redo.pop_front()) else { break };

@@ -73,7 +73,7 @@ use crate::backend::Engine;
 use crate::ground::Ground;
 use crate::lattice::LatticeBox;
 use crate::volume::{DiggingRules, RulesError};
-use history::{Step, Timeline, Waste};
+use history::{DeferredDrop, Step, UndoStack};
 use queue::{Queue, Request, Submission, Taken};
 
 /// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
@@ -84,7 +84,7 @@ use queue::{Queue, Request, Submission, Taken};
 pub struct StaleCommit;
 
 /// Receipts of a commit, and what history lets go of.
-pub(crate) type Settled = (Vec<Receipt>, Waste);
+pub(crate) type Settled = (Vec<Receipt>, DeferredDrop);
 
 /// A number that no other transaction, batch or world of this process has.
 pub(crate) fn unique() -> u64 {
@@ -119,7 +119,7 @@ pub struct Terrain {
     answered: VecDeque<Receipt>,
     rules: Option<Arc<DiggingRules>>,
     loose: Option<LooseSettings>,
-    timeline: Timeline,
+    timeline: UndoStack,
     moves: VecDeque<HistoryReceipt>,
     /// What the game committed itself since the plugin last showed the world; `None` while it shows none.
     #[cfg(feature = "plugin")]
@@ -165,7 +165,7 @@ impl Terrain {
             answered: VecDeque::new(),
             rules: None,
             loose: None,
-            timeline: Timeline::new(steps::UNDO_BUDGET),
+            timeline: UndoStack::new(steps::UNDO_BUDGET),
             moves: VecDeque::new(),
             #[cfg(feature = "plugin")]
             unseen: None,
@@ -294,7 +294,7 @@ impl Terrain {
         let installed = commit.install(Arc::make_mut(&mut self.world));
         self.queue.finish(done.estimate);
         installed.moved.into_iter().for_each(|moved| self.answer_step(moved));
-        let mut waste = Waste::default();
+        let mut waste = DeferredDrop::default();
         waste.copy = copy;
         for replaced in installed.replaced {
             match &done.work {

@@ -10,8 +10,9 @@ use super::history::HistoryStep;
 use super::loose::LooseSettings;
 use super::receipt::Rejection;
 use crate::brush::{Edit, Kind};
+use crate::edits::reach;
 use crate::lattice::{ChunkGrid, LatticeBox};
-use crate::volume::{DiggingRules, reach};
+use crate::volume::DiggingRules;
 
 /// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///

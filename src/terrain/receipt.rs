@@ -3,7 +3,7 @@
 use super::loose::LoosePiece;
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
-use crate::volume::{FieldId, Refused, Scenario, Tally};
+use crate::volume::{FieldId, MaterialCounts, Refused, Scenario};
 
 /// What became of a brush. Each one that was submitted gets exactly one receipt.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,11 +22,11 @@ pub struct Applied {
     /// Box around all samples that changed.
     pub bounds: Option<LatticeBox>,
     /// Voxels dug away, by material.
-    pub removed: Tally,
+    pub removed: MaterialCounts,
     /// Voxels filled, by material.
-    pub added: Tally,
+    pub added: MaterialCounts,
     /// Solid voxels whose material changed, by the new one.
-    pub painted: Tally,
+    pub painted: MaterialCounts,
     /// Voxels that the terrain's [`DiggingRules`](crate::volume::DiggingRules) kept from changing, by reason.
     pub refused: Refused,
     /// Pieces of ground that it cut off, where the terrain [looks for them](super::Terrain::set_loose). Those that are gone

@@ -1,7 +1,7 @@
 //! A terrain's steps through its history.
 
 use super::history::HistoryRejection;
-use super::{History, HistoryReceipt, HistoryStep, Memory, Terrain, Waste};
+use super::{DeferredDrop, History, HistoryReceipt, HistoryStep, Memory, Terrain};
 #[cfg(feature = "plugin")]
 use super::{Work, queue::Request};
 
@@ -51,7 +51,7 @@ impl Terrain {
     }
 
     /// The same; what history lets go of is left to the caller, who may free it elsewhere.
-    pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> Waste {
+    pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> DeferredDrop {
         self.timeline.set_budget(bytes)
     }
 

@@ -23,10 +23,12 @@ use super::history::{HistoryReceipt, HistoryStep, Restored, Step};
 use super::redraw::{self, MeshUpdates};
 use super::world::World;
 use crate::backend::{Compute, Cpu, Engine};
+use crate::edits::{Replaced, reach};
 use crate::lattice::LatticeBox;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
-use crate::volume::{Fields, Replaced, UniformBricks, pristine_brick, reach};
+use crate::volume::pristine_brick;
+use crate::volume::{Fields, UniformBricks};
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
 /// terrain takes one of them.

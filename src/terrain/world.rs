@@ -12,7 +12,7 @@ use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, give_back, hash, ta
 use crate::surface::block;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
-use crate::surface::{Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh};
+use crate::surface::{Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh};
 use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
 /// While there are fewer kinds of bricks that are all alike, none is let go of.
@@ -231,7 +231,7 @@ impl World {
 
     /// Is everything that is drawn one closed surface? Looks at each triangle of the world.
     pub fn check_seams(&self) -> SeamReport {
-        let mut soup = SeamSoup::default();
+        let mut soup = SeamChecker::default();
         for (drawn, mesh) in self.drawn() {
             soup.add(&mesh, self.origin(drawn));
         }

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
-use crate::ground::MaterialId;
-use crate::lattice::{BRICK, BrickPos, ceil};
+use crate::ground::{Ground, MaterialId};
+use crate::lattice::{BRICK, BrickPos, Column, ceil};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -65,6 +65,17 @@ pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
         layers[y] = above;
     }
     layers
+}
+
+/// Which samples of a brick are solid while nobody has edited it.
+pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
+    let low = pos.origin();
+    solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
+}
+
+/// A brick that nobody edited: what stands for a missing one where a table lies over another that has it.
+pub(crate) fn pristine_brick(ground: &Ground, pos: BrickPos) -> Brick {
+    Brick::pristine(pristine_layers(ground, pos))
 }
 
 /// A word that a backend keeps with a brick, to find its own copy of it. A clone starts without one.

@@ -2,8 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Tally;
-use super::ledger::Fate;
+use super::{MaterialCounts, VoxelOutcome};
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, ONE};
 
@@ -88,22 +87,22 @@ impl DiggingRules {
         *self == Self::default()
     }
 
-    pub(super) fn is_unbreakable(&self, material: MaterialId) -> bool {
+    pub(crate) fn is_unbreakable(&self, material: MaterialId) -> bool {
         self.unbreakable.contains(&material)
     }
 
     /// How much of a change a brush of this power makes that takes away what is solid, in 1/256, and why not all.
-    pub(super) fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<Fate>) {
+    pub(crate) fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<VoxelOutcome>) {
         if self.bedrock.is_some_and(|bedrock| y < bedrock) || self.is_unbreakable(material) {
-            return (0, Some(Fate::Unbreakable));
+            return (0, Some(VoxelOutcome::Unbreakable));
         }
         let (power, hardness) = (i32::from(power), i32::from(*self.hardness.get(&material).unwrap_or(&0)));
         if power >= hardness {
             return (ONE, None);
         }
         match ((2 * power - hardness) * ONE / hardness).max(0) {
-            0 => (0, Some(Fate::TooHard)),
-            part => (part, Some(Fate::Slowed)),
+            0 => (0, Some(VoxelOutcome::TooHard)),
+            part => (part, Some(VoxelOutcome::Slowed)),
         }
     }
 }
@@ -121,13 +120,13 @@ pub enum RulesError {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refused {
     /// Those in protected boxes: not taken away, not filled, not painted.
-    pub protected: Tally,
+    pub protected: MaterialCounts,
     /// Those of unbreakable materials, or below bedrock.
-    pub unbreakable: Tally,
+    pub unbreakable: MaterialCounts,
     /// Those too hard for the brush's power.
-    pub too_hard: Tally,
+    pub too_hard: MaterialCounts,
     /// Those so hard that the brush has to come again.
-    pub slowed: Tally,
+    pub slowed: MaterialCounts,
 }
 
 impl Refused {
@@ -138,7 +137,10 @@ impl Refused {
 
     /// All voxels that were refused.
     pub fn total(&self) -> u64 {
-        [&self.protected, &self.unbreakable, &self.too_hard, &self.slowed].map(Tally::total).iter().sum()
+        [&self.protected, &self.unbreakable, &self.too_hard, &self.slowed]
+            .map(MaterialCounts::total)
+            .iter()
+            .sum()
     }
 }
 

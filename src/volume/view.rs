@@ -64,7 +64,7 @@ impl<'a> SampleView<'a> {
     }
 
     /// The newer bricks that are laid over the others.
-    pub(super) fn newer(&self) -> Option<&'a Bricks> {
+    pub(crate) fn newer(&self) -> Option<&'a Bricks> {
         self.newer
     }
 
@@ -148,6 +148,6 @@ impl<'a> SampleView<'a> {
 }
 
 /// The material that a stored id stands for at a lattice point.
-pub(super) fn resolve(ground: &Ground, point: IVec3, stored: MaterialId) -> MaterialId {
+pub(crate) fn resolve(ground: &Ground, point: IVec3, stored: MaterialId) -> MaterialId {
     if stored == MaterialId::GROUND { ground.material(point) } else { stored }
 }

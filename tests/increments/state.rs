@@ -23,7 +23,7 @@ impl Witness {
             assert_eq!(expected, Effect::default(), "{what}: {receipt:?}");
             return;
         };
-        let tally = |tally: &bevy_burrow::volume::Tally| tally.iter().collect::<BTreeMap<_, _>>();
+        let tally = |tally: &bevy_burrow::volume::MaterialCounts| tally.iter().collect::<BTreeMap<_, _>>();
         let told = Effect {
             chunks: applied.chunks.iter().map(|part| part.chunk).collect(),
             bounds: applied.bounds,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::volume::Tally;
+use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 
 use crate::worlds::{any_random_brush, random_brush_at_a_face, random_rules};
@@ -59,8 +59,10 @@ impl Account {
         let voxels = [&refused.protected, &refused.unbreakable, &refused.too_hard, &refused.slowed];
         let fell =
             |fate| applied.loose.iter().filter(|piece| piece.fate == fate).map(|piece| piece.voxels).sum();
-        let counts =
-            voxels.map(Tally::total).into_iter().chain([fell(PieceFate::Removed), fell(PieceFate::BrokeOff)]);
+        let counts = voxels
+            .map(MaterialCounts::total)
+            .into_iter()
+            .chain([fell(PieceFate::Removed), fell(PieceFate::BrokeOff)]);
         for (effect, count) in EFFECTS.into_iter().zip(counts) {
             *self.effects.entry(effect).or_default() += count;
         }

@@ -2,7 +2,7 @@
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
-use bevy_burrow::volume::{SampleView, Tally};
+use bevy_burrow::volume::{MaterialCounts, SampleView};
 use fastrand::Rng;
 
 use crate::scripts::{Account, any_brush, terrain};
@@ -94,7 +94,7 @@ fn receipts_of_steps_count_what_changed() {
                 }
             }
             assert_eq!(restored.bounds, bounds, "world {index}");
-            let totals = [&restored.removed, &restored.added, &restored.painted].map(Tally::total);
+            let totals = [&restored.removed, &restored.added, &restored.painted].map(MaterialCounts::total);
             assert_eq!(totals, [removed, added, painted], "world {index}");
         }
     }

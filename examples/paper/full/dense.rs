@@ -1,9 +1,9 @@
 //! The whole terrain as one dense field: a cube of samples, and positions and normals of its whole surface.
 
 use bevy_burrow::brush::{BAND, Brush, Edit};
+use bevy_burrow::dense::{DenseGrid, DenseGridError, DenseMesh, DenseMesher, Normals};
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::LatticeBox;
-use bevy_burrow::surface::dense::{DenseGrid, DenseGridError, DenseMesh, DenseMesher, Normals};
 use glam::IVec3;
 
 use crate::PaperError;

@@ -5,7 +5,7 @@ use bevy_burrow::ground::MaterialId;
 use bevy_burrow::lattice::{BrickPos, LatticeBox, ONE, SNAP};
 use bevy_burrow::surface::block::{Block, Mesher, Parts};
 use bevy_burrow::surface::vertex::WorldView;
-use bevy_burrow::surface::{Indices, Mask, MaskView, SeamReport, SeamSoup, SurfaceMesh, Vertex};
+use bevy_burrow::surface::{Indices, Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Memory, Receipt, Terrain, World};
 use glam::{IVec3, Vec3};
 
@@ -102,7 +102,7 @@ impl FullWorld {
 
     /// Is the mesh one closed surface?
     pub fn check_seams(&self) -> SeamReport {
-        let mut soup = SeamSoup::default();
+        let mut soup = SeamChecker::default();
         soup.add(&self.mesh(), IVec3::ZERO);
         soup.check(self.world().grid())
     }

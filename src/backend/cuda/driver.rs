@@ -1,6 +1,6 @@
 //! A CUDA card, through its driver.
 //!
-//! All of the crate's unsafe code is here, and in `interop` where that is built, but for what tests have (`zero_copy`). Addresses
+//! All of the crate's unsafe code is here, but for what tests have (`zero_copy`). Addresses
 //! come from the driver and are handed back to it alone; what kernels do with them is bounded by the capacities they are given.
 #![allow(unsafe_code)]
 
@@ -123,12 +123,6 @@ impl Card {
         };
         let number = number.ok_or_else(|| Fault::NoDevice(format!("{card:?} is none of CUDA's")))?;
         Self::open_number(number, ptx)
-    }
-
-    /// What belongs to the card's context may be made in it.
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub fn context(&self) -> Arc<CudaContext> {
-        Arc::clone(&self.context)
     }
 
     /// Opens the card of this number. Only to be called once the driver is known to be there.

@@ -28,8 +28,6 @@ mod device;
 mod driver;
 mod edit;
 mod heights;
-#[cfg(all(feature = "interop", target_os = "linux"))]
-pub mod interop;
 mod layout;
 mod lists;
 mod memory;
@@ -61,10 +59,10 @@ use web_time::Instant;
 use super::costs::{Costs, Load};
 use super::settings::{CardChoice, EngineSettings};
 use super::{Backend, Choice, EngineState, lock};
+use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::Block;
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
-use crate::volume::{EditWork, Ledger};
 use device::{Device, Fault};
 use memory::{Limits, Usage};
 use session::Session;
@@ -308,7 +306,7 @@ impl Cuda {
     }
 
     /// Applies edits on the card, if that is chosen.
-    pub fn edit(&self, work: &EditWork, choice: &mut Choice) -> Offered<Ledger> {
+    pub fn edit(&self, work: &PreparedEdits, choice: &mut Choice) -> Offered<EditDelta> {
         let load = Load::of_edits(work);
         let missing = |session: &Session| session.missing_edits(work);
         self.offer(choice, load, missing, |session| session.edit(work), |_, ledger| Ok(ledger))

@@ -9,16 +9,14 @@ use super::device::Fault;
 use super::session::Session;
 use crate::backend::{Compute, Cpu};
 use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
+use crate::edits::{DraftedBrick, EditDelta, EditEffect, PreparedEdits, enter_effects, latest};
 use crate::ground::{GreyImage, Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE};
 use crate::surface::block::{Block, Part, Parts};
 use crate::surface::fresh::FreshParts;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, Vertex};
-use crate::volume::{
-    Brick, Bricks, DiggingRules, DraftedBrick, EditEffect, EditWork, Ledger, SampleView, enter_effects,
-    latest,
-};
+use crate::volume::{Brick, Bricks, DiggingRules, SampleView};
 
 /// Cells along a side of the ground.
 const SIDE: i32 = 256;
@@ -51,10 +49,10 @@ fn compare(session: &mut Session, ground: &Ground, count: i32, radius: f32) -> R
     let none = Bricks::default();
     let (samples, grid) = (SampleView::new(ground, &none), ChunkGrid::new(32, SIDE, SIDE));
     let [smooth, rough] = [false, true].map(|is_rough| edits(ground, count, radius, is_rough));
-    let work = EditWork::new(samples, grid, &smooth.iter().collect::<Vec<_>>());
+    let work = PreparedEdits::new(samples, grid, &smooth.iter().collect::<Vec<_>>());
     compare_edits(session, &work)?;
 
-    let work = EditWork::new(samples, grid, &rough.iter().collect::<Vec<_>>());
+    let work = PreparedEdits::new(samples, grid, &rough.iter().collect::<Vec<_>>());
     let drafted = compare_edits(session, &work)?;
     let rules = rules();
     compare_edits(session, &work.under(Some(&rules)))?;
@@ -62,7 +60,7 @@ fn compare(session: &mut Session, ground: &Ground, count: i32, radius: f32) -> R
     let latest = latest(&drafted);
     let dug = samples.under(&latest);
     let sculpting = sculpting_edits(ground, count, radius);
-    compare_edits(session, &EditWork::new(dug, grid, &sculpting.iter().collect::<Vec<_>>()))?;
+    compare_edits(session, &PreparedEdits::new(dug, grid, &sculpting.iter().collect::<Vec<_>>()))?;
 
     let mask = Mask::default();
     let view = WorldView { samples: dug, mask: MaskView::new(&mask), grid };
@@ -85,7 +83,7 @@ fn compare_heights(session: &mut Session) -> Result<(), Fault> {
 }
 
 /// Edits on both, and the bricks that they change.
-fn compare_edits(session: &mut Session, work: &EditWork) -> Result<Vec<DraftedBrick>, Fault> {
+fn compare_edits(session: &mut Session, work: &PreparedEdits) -> Result<Vec<DraftedBrick>, Fault> {
     let (expected, found) = (ledgers_of(work), session.edit(work)?);
     let mut effects = vec![EditEffect::default(); work.tools.len()];
     enter_effects(&expected, &mut effects);
@@ -118,7 +116,7 @@ pub(super) fn collected(blocks: &[Block], fresh: &dyn FreshParts) -> Parts {
 }
 
 /// What the processor makes of edits.
-fn ledgers_of(work: &EditWork) -> Vec<Ledger> {
+fn ledgers_of(work: &PreparedEdits) -> Vec<EditDelta> {
     let mut ledgers = Vec::new();
     Cpu.edit(work, &mut |own| ledgers.extend(own.iter_mut().map(std::mem::take)));
     ledgers
@@ -214,7 +212,7 @@ fn edits(ground: &Ground, count: i32, radius: f32, is_rough: bool) -> Vec<Edit> 
 }
 
 /// Do ledgers hold the same bricks, however many they are?
-fn are_same_ledgers(a: &[Ledger], b: &Ledger) -> bool {
+fn are_same_ledgers(a: &[EditDelta], b: &EditDelta) -> bool {
     let bricks = || a.iter().flat_map(|ledger| &ledger.bricks);
     let what = |drafted: &DraftedBrick| (drafted.pos, drafted.changed, drafted.is_extended);
     let mut pairs = bricks().zip(&b.bricks);

@@ -13,11 +13,12 @@ use super::lists::{cut, fill, hand_out};
 use super::mesh::MeshOutput;
 use super::staging::{InputBuffer, Plan, Section};
 use super::windows::{KeptSlabs, Windows};
+use crate::edits::PreparedEdits;
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
-use crate::volume::{Brick, EditWork, SampleView};
+use crate::volume::{Brick, SampleView};
 
 /// A device that works for terrains.
 pub(super) struct Session {
@@ -256,7 +257,7 @@ impl Session {
     }
 
     /// How much of what edits need is not here.
-    pub fn missing_edits(&self, work: &EditWork) -> usize {
+    pub fn missing_edits(&self, work: &PreparedEdits) -> usize {
         let jobs = work.jobs();
         self.missing(work.base, jobs.len(), |at| jobs[at].pos())
     }

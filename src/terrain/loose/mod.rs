@@ -22,9 +22,10 @@ use std::sync::Arc;
 use glam::IVec3;
 
 use super::world::World;
+use crate::edits::{DraftedBrick, TakenOut, take_out};
 use crate::lattice::{BrickPos, Column, LatticeBox};
 use crate::surface::SurfaceMesh;
-use crate::volume::{Bricks, DiggingRules, DraftedBrick, SampleView, TakenOut, Tally, take_out};
+use crate::volume::{Bricks, DiggingRules, MaterialCounts, SampleView};
 use bits::{NONE, SIDES, Samples};
 use search::{Component, Solid};
 
@@ -97,7 +98,7 @@ pub struct LoosePiece {
     /// How many samples it has.
     pub voxels: u64,
     /// These by material: times density and volume of a voxel, its mass.
-    pub materials: Tally,
+    pub materials: MaterialCounts,
     /// Its samples, by y, then z, then x.
     pub runs: Arc<[Run]>,
     /// Its surface as marching cubes draws it, closed, with positions counted from the lowest corner of `bounds`; for
@@ -232,7 +233,7 @@ fn air_around(solid: &Solid, pieces: &Samples) -> Samples {
 /// What there is to say about a piece.
 fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) -> LoosePiece {
     let mut runs: Vec<Run> = Vec::new();
-    let (mut voxels, mut materials) = (0, Tally::default());
+    let (mut voxels, mut materials) = (0, MaterialCounts::default());
     for (&key, layers) in piece {
         let low = search::brick(key).origin();
         for (row, y, z) in (0..8).flat_map(|y| (0..8).map(move |z| (layers[y] >> (z * 8) & 0xff, y, z))) {

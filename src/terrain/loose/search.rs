@@ -9,8 +9,10 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use super::bits::{self, NONE, SIDES, Samples};
+use crate::edits::DraftedBrick;
 use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
-use crate::volume::{DraftedBrick, Layers, SampleView, pristine_layers};
+use crate::volume::pristine_layers;
+use crate::volume::{Layers, SampleView};
 
 /// A world as the search sees it.
 pub(super) struct Solid<'a> {

@@ -10,8 +10,8 @@ use super::super::staging::{InputBuffer, Plan, Section};
 use super::super::windows::{KeptSlabs, Windows};
 use super::LONG;
 use super::jobs::pos;
+use crate::edits::PreparedEdits;
 use crate::ground::GreyImage;
-use crate::volume::EditWork;
 
 /// How far new ground looks for its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub(super) struct Care<'a> {
 }
 
 impl<'a> Care<'a> {
-    fn new(work: &EditWork<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
+    fn new(work: &PreparedEdits<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
         let mut images = Images::default();
         let chisel = |tool| layout::chisel(tool, |image| images.first(image));
         let chisels = work.tools.iter().map(chisel).collect();
@@ -146,7 +146,7 @@ impl Session {
     /// What jobs need whose edits look around; enters where their bricks are among those around, and what they are now.
     pub(super) fn care<'a>(
         &mut self,
-        work: &EditWork<'a>,
+        work: &PreparedEdits<'a>,
         look: Look,
         jobs: &mut [EditJob],
         uploads: &mut Uploads<'a>,

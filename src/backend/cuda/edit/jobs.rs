@@ -8,8 +8,9 @@ use super::super::layout::{self, EditJob, MOST_JOBS, NONE};
 use super::super::lists::{cut, map, map_into};
 use super::super::session::{Session, Uploads};
 use super::{LONG, PIECE};
+use crate::edits::{Job, PreparedEdits};
 use crate::lattice::{BrickPos, ChunkGrid, pieces};
-use crate::volume::{Brick, EditWork, Job};
+use crate::volume::Brick;
 
 /// Which brick a job is about.
 pub(super) fn pos(job: &EditJob) -> BrickPos {
@@ -29,7 +30,7 @@ fn place(job: &EditJob) -> (i32, i32) {
 /// # Errors
 /// More jobs than a launch may have.
 pub(super) fn list<R: Send>(
-    work: &EditWork,
+    work: &PreparedEdits,
     list: &mut Vec<EditJob>,
     complete: impl Fn(usize, &mut [EditJob]) -> R + Send + Sync,
 ) -> Result<Vec<R>, Fault> {
@@ -80,7 +81,7 @@ impl Session {
     /// Lists jobs with their stacks and, `with_bricks`, with what their bricks are now; what is missing is uploaded.
     pub(super) fn list_edits<'a>(
         &mut self,
-        work: &EditWork<'a>,
+        work: &PreparedEdits<'a>,
         jobs: &mut Vec<EditJob>,
         with_bricks: bool,
         uploads: &mut Uploads<'a>,
@@ -139,7 +140,7 @@ mod tests {
         };
         for edits in [0, 1, 90] {
             let edits: Vec<Edit> = (0..edits).map(edit).collect();
-            let work = EditWork::new(samples, grid, &edits.iter().collect::<Vec<_>>());
+            let work = PreparedEdits::new(samples, grid, &edits.iter().collect::<Vec<_>>());
             let mut jobs = vec![EditJob::default(); 7];
             let pieces = list(&work, &mut jobs, |first, jobs| (first, jobs.len())).expect("few enough");
             assert_eq!(

@@ -13,8 +13,8 @@ use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::fill;
 use super::session::{Session, Uploads};
 use super::staging::Plan;
+use crate::edits::{EditDelta, EditEffect, PreparedEdit, PreparedEdits, enter_effects};
 use crate::lattice::side_by_side;
-use crate::volume::{EditEffect, EditWork, Ledger, Tool, enter_effects};
 use careful::Look;
 pub(super) use output::EditOutput;
 use output::Totals;
@@ -48,7 +48,7 @@ type Target = (u32, u64);
 
 impl Session {
     /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
-    pub fn edit(&mut self, work: &EditWork) -> Result<Ledger, Fault> {
+    pub fn edit(&mut self, work: &PreparedEdits) -> Result<EditDelta, Fault> {
         // Edits that look around enter twice as many counts.
         let most = if work.looks_around() { MOST_LIST / 2 } else { MOST_LIST };
         if work.jobs().len() > most {
@@ -63,7 +63,7 @@ impl Session {
     }
 
     /// The same, in this memory for the jobs of all bricks.
-    fn edit_bricks(&mut self, work: &EditWork, jobs: &mut Vec<EditJob>) -> Result<Ledger, Fault> {
+    fn edit_bricks(&mut self, work: &PreparedEdits, jobs: &mut Vec<EditJob>) -> Result<EditDelta, Fault> {
         if !work.looks_around() {
             return self.try_edits(work, jobs, None).map(Option::unwrap_or_default);
         }
@@ -79,10 +79,10 @@ impl Session {
     /// The same, where edits look no farther than that; `None` where they did.
     fn try_edits(
         &mut self,
-        work: &EditWork,
+        work: &PreparedEdits,
         jobs: &mut Vec<EditJob>,
         look: Option<Look>,
-    ) -> Result<Option<Ledger>, Fault> {
+    ) -> Result<Option<EditDelta>, Fault> {
         self.begin();
         let mut uploads = Uploads::new(work.base.ground());
         let mut targets = Vec::new();
@@ -98,12 +98,12 @@ impl Session {
 
     fn run_edits<'a>(
         &mut self,
-        work: &EditWork<'a>,
+        work: &PreparedEdits<'a>,
         jobs: &mut Vec<EditJob>,
         look: Option<Look>,
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
-    ) -> Result<Option<Ledger>, Fault> {
+    ) -> Result<Option<EditDelta>, Fault> {
         // Who looks around finds bricks among those around.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
         let mut care = look.map(|look| self.care(work, look, jobs, uploads)).transpose()?;
@@ -185,11 +185,11 @@ impl Session {
     /// What came back, as a ledger. Bricks are on their way while all else is looked through.
     fn take_edits(
         &mut self,
-        work: &EditWork,
+        work: &PreparedEdits,
         jobs: &[EditJob],
         targets: &[Target],
         totals: Totals,
-    ) -> Result<Ledger, Fault> {
+    ) -> Result<EditDelta, Fault> {
         let are_many = jobs.len() >= LONG;
         self.edits.fetch_entries(&mut *self.device, totals)?;
         let are_coming = self.edits.begin_bricks(&mut *self.device, totals)?;
@@ -210,7 +210,7 @@ impl Session {
             effects
         };
         let (drafted, effects) = side_by_side(are_many, drafted, finish);
-        Ok(Ledger { effects, ..drafted? })
+        Ok(EditDelta { effects, ..drafted? })
     }
 }
 
@@ -223,6 +223,6 @@ fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Targ
     }
 }
 
-fn tool(tool: &Tool) -> layout::Tool {
+fn tool(tool: &PreparedEdit) -> layout::Tool {
     layout::tool(tool.reach, tool.operation, &tool.evaluator)
 }

@@ -13,9 +13,10 @@ use super::super::lists::{map, map_numbers};
 use super::super::staging::OutputList;
 use super::jobs::pos;
 use super::{LONG, PIECE, Target};
+use crate::edits::{DraftedBrick, EditDelta};
 use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
-use crate::volume::{Brick, DraftedBrick, Fate, Ledger};
+use crate::volume::{Brick, VoxelOutcome};
 
 /// Entries of each list that one ledger adds up.
 const ENTRIES: usize = 1024;
@@ -133,11 +134,11 @@ impl EditOutput {
     }
 
     /// What edits changed and counted, as ledgers: in each some entries, added up, whichever bricks those are of.
-    pub(super) fn entries(&self, grid: ChunkGrid, jobs: &[EditJob], totals: Totals) -> Vec<Ledger> {
+    pub(super) fn entries(&self, grid: ChunkGrid, jobs: &[EditJob], totals: Totals) -> Vec<EditDelta> {
         let parts = self.parts.entries::<EditPart>(totals.parts);
         let counts = self.counts.entries::<EditCount>(totals.counts);
         map_numbers(parts.len().max(counts.len()).div_ceil(ENTRIES), 2, |number| {
-            let mut ledger = Ledger::default();
+            let mut ledger = EditDelta::default();
             piece(parts, ENTRIES, number).iter().for_each(|part| add_part(grid, jobs, part, &mut ledger));
             piece(counts, ENTRIES, number).iter().for_each(|count| add_count(count, &mut ledger));
             ledger
@@ -182,7 +183,7 @@ impl EditOutput {
         jobs: &[EditJob],
         targets: &[Target],
         totals: Totals,
-    ) -> Ledger {
+    ) -> EditDelta {
         let results = self.results.entries::<EditResult>(jobs.len());
         let records = self.records.entries::<BrickRecord>(totals.records);
         let materials = self.materials.entries::<[u8; MATERIAL_BYTES]>(totals.materials);
@@ -205,7 +206,7 @@ impl EditOutput {
             DraftedBrick::new(pos(job), brick, bounds, result.flags & EditResult::EXTENDED != 0)
         };
         let bricks = map(&changed.numbers, LONG, drafted);
-        Ledger { bricks, hash: changed.hash, ..Ledger::default() }
+        EditDelta { bricks, hash: changed.hash, ..EditDelta::default() }
     }
 }
 
@@ -252,23 +253,23 @@ fn piece<T>(list: &[T], length: usize, number: usize) -> &[T] {
 }
 
 /// Adds what an edit changed in a chunk's part of a brick.
-fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, ledger: &mut Ledger) {
+fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, ledger: &mut EditDelta) {
     let Some(pos) = jobs.get(part.job as usize).map(pos) else { return };
     let bounds = layout::unpack_box(part.bounds, pos.origin());
     ledger.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
 }
 
 /// Adds what became of voxels.
-fn add_count(count: &EditCount, ledger: &mut Ledger) {
+fn add_count(count: &EditCount, ledger: &mut EditDelta) {
     let [fate, material, ..] = count.fate.to_le_bytes();
     let fate = match fate {
-        0 => Fate::Removed,
-        1 => Fate::Added,
-        2 => Fate::Painted,
-        3 => Fate::Protected,
-        4 => Fate::Unbreakable,
-        5 => Fate::TooHard,
-        _ => Fate::Slowed,
+        0 => VoxelOutcome::Removed,
+        1 => VoxelOutcome::Added,
+        2 => VoxelOutcome::Painted,
+        3 => VoxelOutcome::Protected,
+        4 => VoxelOutcome::Unbreakable,
+        5 => VoxelOutcome::TooHard,
+        _ => VoxelOutcome::Slowed,
     };
     ledger.counts(count.edit as usize).add(fate, MaterialId(material), count.voxels.into());
 }
@@ -288,7 +289,7 @@ mod tests {
         let (mut rng, grid) = (Rng::with_seed(4), ChunkGrid::new(20, 300, 300));
         let job = |x: i32| EditJob { brick: [x, x % 3, 2], ..EditJob::default() };
         let jobs: Vec<EditJob> = (0..30).map(job).collect();
-        let (mut ledger, mut expected) = (Ledger::default(), BTreeMap::new());
+        let (mut ledger, mut expected) = (EditDelta::default(), BTreeMap::new());
         for number in 0..600 {
             let (job, edit, part) = (number / 20, rng.u32(0..3), rng.u32(0..2));
             let pos = pos(&jobs[job as usize]);
@@ -310,7 +311,7 @@ mod tests {
 
     #[test]
     fn counts_beside_each_other_come_to_one_and_no_voxel_is_left_out() {
-        let (mut rng, mut ledger, mut expected) = (Rng::with_seed(5), Ledger::default(), BTreeMap::new());
+        let (mut rng, mut ledger, mut expected) = (Rng::with_seed(5), EditDelta::default(), BTreeMap::new());
         for number in 0..900 {
             let (edit, fate, voxels) = (number / 300, rng.u32(0..7) | rng.u32(0..2) << 8, rng.u32(1..500));
             add_count(&EditCount { edit, fate, voxels, pad: 0 }, &mut ledger);
@@ -318,7 +319,7 @@ mod tests {
         }
         let mut found = BTreeMap::new();
         for count in &ledger.counts {
-            let fate = count.fate as u32 | u32::from(count.material.0) << 8;
+            let fate = count.outcome as u32 | u32::from(count.material.0) << 8;
             *found.entry((count.edit, fate)).or_insert(0) += count.voxels;
         }
         assert_eq!(found, expected);

@@ -3,10 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{Address, EditParams, NONE};
-use crate::brush::{Sculptor, Stroke};
+use crate::brush::{SculptKernel, Stroke};
+use crate::edits::RunRules;
 use crate::ground::GreyImage;
 use crate::lattice::LatticeBox;
-use crate::volume::{self, RunRules};
 
 /// What a tool that looks around needs besides. See `layout.cuh`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -76,9 +76,12 @@ const _: () = assert!(size_of::<Chisel>() == 152 && size_of::<CarefulParams>() =
 const _: () = assert!(size_of::<Rules>() == 296 && size_of::<Protected>() == 24);
 
 /// What an edit that looks around needs besides; `image` says where the samples of an image begin.
-pub(crate) fn chisel<'a>(tool: &'a volume::Tool, image: impl FnOnce(&'a GreyImage) -> u32) -> Chisel {
+pub(crate) fn chisel<'a>(
+    tool: &'a crate::edits::PreparedEdit,
+    image: impl FnOnce(&'a GreyImage) -> u32,
+) -> Chisel {
     let power = if tool.is_bound { tool.power.into() } else { -1 };
-    let Some(of) = tool.sculptor.as_ref().and_then(Sculptor::constants) else {
+    let Some(of) = tool.sculptor.as_ref().and_then(SculptKernel::constants) else {
         return Chisel { power, ..Chisel::default() };
     };
     let chisel = |stroke| Chisel {

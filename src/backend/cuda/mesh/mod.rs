@@ -53,19 +53,6 @@ impl Session {
         meshed
     }
 
-    /// Meshes blocks and leaves their surfaces on the device, however few they are: how many vertices and indices there
-    /// are, in [`MeshOutput::there`].
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub fn mesh_there(&mut self, view: &WorldView, blocks: &[Block]) -> Result<(usize, usize), Fault> {
-        self.begin();
-        let mut uploads = Uploads::new(view.samples.ground());
-        let meshed = self.run_mesh(view, blocks, &mut uploads, false, &|| {});
-        if meshed.is_err() {
-            self.give_up(&uploads);
-        }
-        meshed.map(|meshed| meshed.totals)
-    }
-
     /// Has blocks meshed; their [`MeshResult`](layout::MeshResult)s are here then, and surfaces not yet. These stay on the device unless they are
     /// wanted `on_host`.
     fn run_mesh<'a>(
@@ -148,12 +135,7 @@ impl Session {
                 let extents = if on_host { &extents[..] } else { &[] };
                 let marks = lists.begin_fetch(&mut *self.device, extents, plain.is_none())?;
                 self.kept.put(windows);
-                return Ok(Meshed {
-                    #[cfg(all(feature = "interop", target_os = "linux"))]
-                    totals: all.totals(),
-                    plain,
-                    marks,
-                });
+                return Ok(Meshed { plain, marks });
             }
             // A second pass, with room for all.
         }

@@ -25,10 +25,6 @@ pub(in super::super) struct MeshLists {
     pub indices: OutputList,
 }
 
-/// Positions, normals and indices.
-#[cfg(all(feature = "interop", target_os = "linux"))]
-pub(in super::super) type Lists<'a> = (&'a [[u16; 4]], &'a [[f32; 3]], &'a [u16]);
-
 /// Vertices that there is room for at the start; indices are six times as many.
 const FIRST_VERTICES: usize = 1 << 14;
 
@@ -80,35 +76,6 @@ impl MeshOutput {
             plain: meshed.plain,
             arrival: Arrival::new(meshed.marks),
         }
-    }
-
-    /// Where positions, normals and indices are on the device.
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub fn there(&self) -> [u64; 3] {
-        [&self.lists.positions, &self.lists.normals, &self.lists.indices].map(OutputList::address)
-    }
-
-    /// Where the surfaces of so many blocks are in these lists.
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub fn results(&self, blocks: usize) -> &[MeshResult] {
-        self.results.entries(blocks)
-    }
-
-    /// Copies positions, normals and indices to the host.
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub fn download(
-        &mut self,
-        device: &mut dyn Device,
-        (vertices, indices): (usize, usize),
-    ) -> Result<Lists<'_>, Fault> {
-        let lists = &mut self.lists;
-        lists.fetch(device, 0..vertices, 0..indices, false)?;
-        device.wait()?;
-        Ok((
-            lists.positions.entries(vertices),
-            lists.normals.entries(vertices),
-            lists.indices.entries(indices),
-        ))
     }
 }
 
@@ -214,9 +181,6 @@ impl Extent {
 
 /// What a launch wrote.
 pub(in super::super) struct Meshed {
-    /// Vertices and indices.
-    #[cfg(all(feature = "interop", target_os = "linux"))]
-    pub(super) totals: (usize, usize),
     /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
     pub(super) plain: Option<MaterialMix>,
     /// Copies to the host that are under way, one for each [`PIECE`] of blocks.

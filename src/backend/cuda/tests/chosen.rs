@@ -177,7 +177,7 @@ fn loads_are_of_the_kinds_that_take_their_own_time() {
         let edits: Vec<_> =
             brushes.iter().map(|brush| crate::brush::Edit::quantize(brush).expect("valid")).collect();
         let (view, grid) = (terrain.world().samples(), terrain.world().grid());
-        Load::of_edits(&EditWork::new(view, grid, &edits.iter().collect::<Vec<_>>()))
+        Load::of_edits(&PreparedEdits::new(view, grid, &edits.iter().collect::<Vec<_>>()))
     };
     let [one, two] = [load(std::slice::from_ref(&dig)), load(&[dig.clone(), dig.clone()])];
     assert_eq!([one.kind, two.kind], [Kind::Edit; 2]);

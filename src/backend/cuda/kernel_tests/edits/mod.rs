@@ -10,10 +10,11 @@ use glam::{IVec3, Vec3};
 use super::super::layout::EditResult;
 use super::{Device, seeds, worlds};
 use crate::brush::{Brush, DEPTH, Edit, Roughness, Shape};
+use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::{ColumnMaterial, Ground, MaterialControl, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::terrain::{Terrain, TerrainSettings};
-use crate::volume::{Brick, Bricks, EditWork, Ledger, SampleView};
+use crate::volume::{Brick, Bricks, SampleView};
 use run::{EditRoom, EditRun};
 
 /// Edits of all kinds: those of the worlds, larger ones that leave bricks all alike, and such as give ground its look back.
@@ -61,8 +62,8 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
 }
 
 /// What the CPU makes of edits, brick by brick: nothing of two bricks is one entry.
-fn ledger_of(work: &EditWork) -> Ledger {
-    let mut all = Ledger::default();
+fn ledger_of(work: &PreparedEdits) -> EditDelta {
+    let mut all = EditDelta::default();
     work.run_each_brick(|mut ledger| {
         all.bricks.append(&mut ledger.bricks);
         all.parts.append(&mut ledger.parts);
@@ -81,7 +82,7 @@ fn compare_edits(
 ) -> usize {
     let edits: Vec<&Edit> = edits.iter().collect();
     let rules = worlds::random_rules(rng, samples.ground());
-    let work = EditWork::new(samples, grid, &edits);
+    let work = PreparedEdits::new(samples, grid, &edits);
     let work = work.under((rng.u32(0..3) == 0).then_some(&rules));
     let ledger = ledger_of(&work);
     let most = EditRoom {

@@ -7,9 +7,10 @@ use glam::IVec3;
 
 use super::super::super::layout::{self, *};
 use super::super::{Device, Kernel, Slots, assert_same};
+use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::volume::{Brick, EditWork, Ledger, SampleView};
+use crate::volume::{Brick, SampleView};
 
 /// What room there is for output.
 #[derive(Clone, Copy, Debug)]
@@ -35,12 +36,12 @@ pub(super) struct EditRun {
 }
 
 /// The bricks around jobs, as edits look at them.
-struct Around {
+struct Stencil {
     look: i32,
     refs: Vec<u32>,
 }
 
-impl Around {
+impl Stencil {
     /// The entry of a brick, and its strides. Each has a window of its own.
     fn around(&mut self, slots: &mut Slots, samples: SampleView, pos: BrickPos) -> (u32, u32) {
         let first = self.refs.len() as u32;
@@ -54,9 +55,9 @@ impl Around {
 }
 
 impl EditRun {
-    pub fn new(device: &mut Device, work: &EditWork, rng: &mut Rng, room: EditRoom, look: i32) -> Self {
+    pub fn new(device: &mut Device, work: &PreparedEdits, rng: &mut Rng, room: EditRoom, look: i32) -> Self {
         let (mut slots, mut jobs, mut list) = (Slots::default(), Vec::new(), Vec::new());
-        let mut windows = Around { look, refs: Vec::new() };
+        let mut windows = Stencil { look, refs: Vec::new() };
         for of_brick in work.bricks() {
             let Some(pos) = of_brick.first().map(|job| job.pos()) else { continue };
             let base = slots.reference(work.base, pos);
@@ -115,7 +116,7 @@ impl EditRun {
                 images.extend_from_slice(image.samples());
                 (images.len() - image.samples().len()) as u32
             };
-            let chisel = |tool: &crate::volume::Tool| layout::chisel(tool, &mut image);
+            let chisel = |tool: &crate::edits::PreparedEdit| layout::chisel(tool, &mut image);
             let chisels: Vec<Chisel> = work.tools.iter().map(chisel).collect();
             let rules = work.rules.as_ref().map_or(0, |rules| {
                 let (rules, boxes) = layout::rules(rules);
@@ -165,7 +166,7 @@ impl EditRun {
     }
 
     /// Bricks, results and hash are those of the CPU. Where room is short, some entries are missing.
-    pub fn check_bricks(&self, ledger: &Ledger, is_room: bool) {
+    pub fn check_bricks(&self, ledger: &EditDelta, is_room: bool) {
         let mut expected: HashMap<BrickPos, _> =
             ledger.bricks.iter().map(|brick| (brick.pos, brick)).collect();
         let (mut hash, mut records, mut materials) = (0u64, 0, 0);
@@ -208,7 +209,7 @@ impl EditRun {
     }
 
     /// What each edit changed and counted is what the CPU says.
-    pub fn check_effects(&self, ledger: &Ledger, work: &EditWork) {
+    pub fn check_effects(&self, ledger: &EditDelta, work: &PreparedEdits) {
         type Part = (usize, [i32; 3], ChunkPos, [i32; 6]);
         let ends = |of: LatticeBox| {
             let ([a, b, c], [d, e, f]) = (of.min.to_array(), of.max.to_array());
@@ -237,7 +238,8 @@ impl EditRun {
 
         let (mut expected, mut found) = (BTreeMap::new(), BTreeMap::new());
         for count in &ledger.counts {
-            *expected.entry((count.edit, count.fate as u32, count.material.0)).or_insert(0) += count.voxels;
+            *expected.entry((count.edit, count.outcome as u32, count.material.0)).or_insert(0) +=
+                count.voxels;
         }
         for count in &self.counts {
             let key = (count.edit as usize, count.fate & 0xff, (count.fate >> 8) as u8);

@@ -3,29 +3,28 @@
 use glam::IVec3;
 use wide::i16x8;
 
-use super::bearing::BrickRules;
-use super::ledger::{Counts, Fate};
-use super::surroundings::Surroundings;
-use super::view::resolve;
-use super::work::Tool;
-use super::workpiece::{Changed, Workpiece};
-use super::{Layers, Sample, SampleView};
-use crate::brush::{Around, BAND, Kind, Sculptor};
+use super::brick_editor::{BrickEditor, Changed};
+use super::delta::Counts;
+use super::padded_brick::PaddedBrick;
+use super::prepared::PreparedEdit;
+use super::rule_scope::BrickRules;
+use crate::brush::{BAND, Kind, SculptKernel, Stencil};
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
+use crate::volume::{Layers, Sample, SampleView, VoxelOutcome, resolve};
 
 /// How far below and above itself new ground looks for what it is to be made of, in voxels.
 const LOOK: i32 = 64;
 
-impl Workpiece<'_> {
+impl BrickEditor<'_> {
     /// Applies an edit that sculpts, or one that rules bear on, to some samples; returns those that changed.
     pub(super) fn carefully(
         &mut self,
-        tool: &Tool,
+        tool: &PreparedEdit,
         rules: Option<&BrickRules>,
         samples: LatticeBox,
         distances: &[i16x8; 64],
-        around: &Surroundings,
+        around: &PaddedBrick,
         counts: &mut Counts<'_>,
     ) -> Layers {
         let low = self.pos.origin();
@@ -103,7 +102,7 @@ impl Workpiece<'_> {
         index: usize,
         material: MaterialId,
         rules: Option<&BrickRules>,
-        around: &Surroundings,
+        around: &PaddedBrick,
         counts: &mut Counts<'_>,
     ) -> bool {
         let (ground, old) = (self.view.ground(), self.view.stored_material(point));
@@ -114,8 +113,8 @@ impl Workpiece<'_> {
         let (own, new) = (resolve(ground, point, old), resolve(ground, point, material));
         let fate = rules.and_then(|own_rules| {
             match (own_rules.is_protected(point), own_rules.rules.is_unbreakable(own)) {
-                (true, _) => Some(Fate::Protected),
-                (_, true) => Some(Fate::Unbreakable),
+                (true, _) => Some(VoxelOutcome::Protected),
+                (_, true) => Some(VoxelOutcome::Unbreakable),
                 _ => None,
             }
         });
@@ -126,7 +125,7 @@ impl Workpiece<'_> {
             return false;
         }
         if own != new {
-            counts.add(Fate::Painted, new, 1);
+            counts.add(VoxelOutcome::Painted, new, 1);
         }
         let local = [index & 7, index >> 6, index >> 3 & 7];
         self.brick().set_material(index, material);
@@ -158,7 +157,7 @@ struct Seen {
 
 impl Sights {
     /// What a point is made of that becomes solid: what lies straight below, else straight above, else beside it.
-    fn material(&mut self, view: &SampleView, point: IVec3, around: &Around) -> MaterialId {
+    fn material(&mut self, view: &SampleView, point: IVec3, around: &Stencil) -> MaterialId {
         let column = ((point.z & 7) * 8 + (point.x & 7)) as usize;
         let known = &mut self.below[column];
         let end = known.map_or(point.y - LOOK, |seen| seen.from);
@@ -183,7 +182,11 @@ impl Sights {
 }
 
 /// The samples that an edit reads which reaches these; `None` where it looks at none but those it changes.
-pub(super) fn reads(sculptor: Option<&Sculptor>, is_bound: bool, reach: LatticeBox) -> Option<LatticeBox> {
+pub(super) fn reads(
+    sculptor: Option<&SculptKernel>,
+    is_bound: bool,
+    reach: LatticeBox,
+) -> Option<LatticeBox> {
     let look = IVec3::Y * if sculptor.is_some_and(|own| own.material().is_none()) { LOOK } else { 0 };
     let all = reach.grown(1);
     (is_bound || sculptor.is_some()).then_some(LatticeBox { min: all.min - look, max: all.max + look })
@@ -229,7 +232,7 @@ mod tests {
                 bricks.insert(BrickPos(at), Arc::new(crumbs(&mut rng, share)));
             }
             let view = SampleView::new(&ground, &bricks);
-            let (around, mut sights) = (Surroundings::new(&view, pos), Sights::default());
+            let (around, mut sights) = (PaddedBrick::new(&view, pos), Sights::default());
             for point in pos.samples().points().filter(|_| rng.u32(..3) > 0) {
                 let local = (point - pos.origin()).as_usizevec3().to_array();
                 let material = sights.material(&view, point, &around.around(local));

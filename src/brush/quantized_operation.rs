@@ -3,10 +3,10 @@
 use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::blend::{Fade, is_full};
+use super::blend::{QuantizedBlend, is_full};
 use super::error::in_range;
-use super::solid::{check_point, point};
-use super::stamp::Press;
+use super::quantized_shape::{check_point, point};
+use super::stamp::QuantizedStamp;
 use super::{Brush, BrushError, FULL_POWER, Operation};
 use crate::ground::MaterialId;
 use crate::lattice::{LIMIT, ONE};
@@ -25,7 +25,7 @@ const STEP: (f32, f32) = (1.0, 256.0);
 /// Written, a deed may be limited in power, but only once: that is a variant which no edit holds.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Deed<L = Never> {
+pub(super) enum QuantizedOperation<L = Never> {
     Dig,
     Add {
         material: MaterialId,
@@ -34,79 +34,79 @@ pub(super) enum Deed<L = Never> {
         material: MaterialId,
     },
     Smooth {
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     Sharpen {
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     Flatten {
         point: [i32; 3],
         normal: [i16; 3],
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     Level {
         height: i32,
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     Raise {
         amount: i32,
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     Lower {
         amount: i32,
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     Stamp {
-        stamp: Press,
-        fade: Fade,
+        stamp: QuantizedStamp,
+        fade: QuantizedBlend,
     },
     Terrace {
         step: i32,
         base: i32,
-        fade: Fade,
+        fade: QuantizedBlend,
     },
     /// Only as edits are written: an operation of a brush with less than full power.
     Limited(L),
 }
 
 /// A deed as it is written.
-pub(super) type WrittenDeed = Deed<Limit>;
+pub(super) type WrittenOperation = QuantizedOperation<Limit>;
 
 /// A deed of a brush with less than full power.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Limit {
     power: u8,
-    operation: Box<Deed>,
+    operation: Box<QuantizedOperation>,
 }
 
 /// Of this there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub(super) enum Never {}
 
-impl<L> Deed<L> {
+impl<L> QuantizedOperation<L> {
     /// The same deed; the limit, if it has one, becomes another thing.
-    fn try_map<M, E>(self, limited: impl FnOnce(L) -> Result<M, E>) -> Result<Deed<M>, E> {
+    fn try_map<M, E>(self, limited: impl FnOnce(L) -> Result<M, E>) -> Result<QuantizedOperation<M>, E> {
         Ok(match self {
-            Self::Dig => Deed::Dig,
-            Self::Add { material } => Deed::Add { material },
-            Self::Paint { material } => Deed::Paint { material },
-            Self::Smooth { fade } => Deed::Smooth { fade },
-            Self::Sharpen { fade } => Deed::Sharpen { fade },
-            Self::Flatten { point, normal, fade } => Deed::Flatten { point, normal, fade },
-            Self::Level { height, fade } => Deed::Level { height, fade },
-            Self::Raise { amount, fade } => Deed::Raise { amount, fade },
-            Self::Lower { amount, fade } => Deed::Lower { amount, fade },
-            Self::Stamp { stamp, fade } => Deed::Stamp { stamp, fade },
-            Self::Terrace { step, base, fade } => Deed::Terrace { step, base, fade },
-            Self::Limited(limit) => Deed::Limited(limited(limit)?),
+            Self::Dig => QuantizedOperation::Dig,
+            Self::Add { material } => QuantizedOperation::Add { material },
+            Self::Paint { material } => QuantizedOperation::Paint { material },
+            Self::Smooth { fade } => QuantizedOperation::Smooth { fade },
+            Self::Sharpen { fade } => QuantizedOperation::Sharpen { fade },
+            Self::Flatten { point, normal, fade } => QuantizedOperation::Flatten { point, normal, fade },
+            Self::Level { height, fade } => QuantizedOperation::Level { height, fade },
+            Self::Raise { amount, fade } => QuantizedOperation::Raise { amount, fade },
+            Self::Lower { amount, fade } => QuantizedOperation::Lower { amount, fade },
+            Self::Stamp { stamp, fade } => QuantizedOperation::Stamp { stamp, fade },
+            Self::Terrace { step, base, fade } => QuantizedOperation::Terrace { step, base, fade },
+            Self::Limited(limit) => QuantizedOperation::Limited(limited(limit)?),
         })
     }
 }
 
-impl WrittenDeed {
+impl WrittenOperation {
     /// The operation and its power.
-    pub fn unlimited(self) -> Result<(Deed, u8), BrushError> {
+    pub fn unlimited(self) -> Result<(QuantizedOperation, u8), BrushError> {
         match self {
             Self::Limited(Limit { power: FULL_POWER, .. }) => Err(BrushError::Power),
             Self::Limited(Limit { power, operation }) => Ok((*operation, power)),
@@ -115,10 +115,10 @@ impl WrittenDeed {
     }
 }
 
-impl Deed {
+impl QuantizedOperation {
     /// Rounds an operation to integers and checks it.
     pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
-        let fade = || Fade::quantize(&brush.blend);
+        let fade = || QuantizedBlend::quantize(&brush.blend);
         let height = |what, height| in_range(what, height, -LIMIT as f32, LIMIT as f32);
         Ok(match &brush.operation {
             Operation::Dig => Self::Dig,
@@ -132,7 +132,7 @@ impl Deed {
             Operation::Level { height: at } => Self::Level { height: height("height", *at)?, fade: fade()? },
             Operation::Raise { amount: by } => Self::Raise { amount: amount(*by)?, fade: fade()? },
             Operation::Lower { amount: by } => Self::Lower { amount: amount(*by)?, fade: fade()? },
-            Operation::Stamp(stamp) => Self::Stamp { stamp: Press::quantize(stamp)?, fade: fade()? },
+            Operation::Stamp(stamp) => Self::Stamp { stamp: QuantizedStamp::quantize(stamp)?, fade: fade()? },
             Operation::Terrace { step, base } => Self::Terrace {
                 step: in_range("step", *step, STEP.0, STEP.1)?,
                 base: height("base", *base)?,
@@ -163,11 +163,11 @@ impl Deed {
             }
             _ => {}
         }
-        self.fade().map_or(Ok(()), Fade::check)
+        self.fade().map_or(Ok(()), QuantizedBlend::check)
     }
 
     /// How it fades, if it sculpts.
-    pub fn fade(&self) -> Option<Fade> {
+    pub fn fade(&self) -> Option<QuantizedBlend> {
         match self {
             Self::Dig | Self::Add { .. } | Self::Paint { .. } => None,
             Self::Smooth { fade }
@@ -205,8 +205,8 @@ impl Deed {
     }
 
     /// The operation and its power as one, for writing: full power is not written, so that it reads as it always did.
-    pub fn limited(self, power: u8) -> WrittenDeed {
-        let limit = |operation| Deed::Limited(Limit { power, operation: Box::new(operation) });
+    pub fn limited(self, power: u8) -> WrittenOperation {
+        let limit = |operation| QuantizedOperation::Limited(Limit { power, operation: Box::new(operation) });
         if !is_full(power) {
             return limit(self);
         }

@@ -3,11 +3,10 @@
 
 use glam::IVec3;
 
-use super::ledger::Fate;
-use super::work::Tool;
-use super::{DiggingRules, SampleView};
-use crate::brush::Around;
+use super::prepared::PreparedEdit;
+use crate::brush::Stencil;
 use crate::lattice::{BRICK, BrickPos, LatticeBox, ONE};
+use crate::volume::{DiggingRules, SampleView, VoxelOutcome};
 
 impl DiggingRules {
     /// May some rule be against an edit of this power that changes these samples? Where not, it is certain, and the edit
@@ -30,7 +29,7 @@ pub(crate) struct RunRules<'a> {
 
 impl<'a> RunRules<'a> {
     /// Those for the tools that are bound; `None` where none is.
-    pub(super) fn new(rules: &'a DiggingRules, tools: &[Tool]) -> Option<Self> {
+    pub(super) fn new(rules: &'a DiggingRules, tools: &[PreparedEdit]) -> Option<Self> {
         let bound = tools.iter().filter(|tool| tool.is_bound);
         let around: Vec<LatticeBox> = bound.filter_map(|tool| Some(tool.reach?.grown(1))).collect();
         let is_near = |own: &LatticeBox| around.iter().any(|around| own.intersection(*around).is_some());
@@ -82,12 +81,12 @@ impl<'a> BrickRules<'a> {
         view: &SampleView,
         at: IVec3,
         power: u8,
-        around: &Around,
+        around: &Stencil,
         proposed: i32,
-    ) -> (i32, Option<Fate>) {
+    ) -> (i32, Option<VoxelOutcome>) {
         let before = around.own();
         if self.is_protected(at) {
-            return (before, Some(Fate::Protected));
+            return (before, Some(VoxelOutcome::Protected));
         }
         if proposed <= before {
             return (proposed, None);
@@ -171,9 +170,10 @@ mod plain_edits {
 
     use super::*;
     use crate::brush::{Brush, Edit, Shape};
+    use crate::edits::{Draft, EditDelta, PreparedEdits};
     use crate::ground::Ground;
     use crate::lattice::ChunkGrid;
-    use crate::volume::{Bricks, Draft, EditWork, Ledger, UniformBricks};
+    use crate::volume::{Bricks, UniformBricks};
 
     #[test]
     fn edits_that_no_rule_bears_on_are_plain_and_run_together() {
@@ -183,7 +183,7 @@ mod plain_edits {
         let dig = |x| Edit::quantize(&Brush::dig(Shape::sphere(Vec3::new(x, 0.0, 30.0), 4.0))).unwrap();
         let runs = |edits: &[Edit], rules: DiggingRules| {
             let (edits, mut runs) = (edits.iter().collect::<Vec<_>>(), Vec::new());
-            let note = |work: &EditWork, _: &mut dyn FnMut(&mut [Ledger])| {
+            let note = |work: &PreparedEdits, _: &mut dyn FnMut(&mut [EditDelta])| {
                 runs.push((work.tools.len(), !work.looks_around()));
             };
             let view = SampleView::new(&ground, &bricks);

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::careful::reads;
 use super::jobs::bricks_around;
+use super::stencil_edit::reads;
 use crate::brush::Edit;
 use crate::lattice::LatticeBox;
 
@@ -14,7 +14,7 @@ const LONGEST: usize = 1 << 12;
 pub(super) const MOST_BRICKS: u64 = 1 << 20;
 
 /// Where an edit changes samples.
-pub(super) struct Scope {
+pub(super) struct EditScope {
     /// The part of its reach that lies in the world.
     pub reach: Option<LatticeBox>,
     /// May some rule be against it?
@@ -25,7 +25,7 @@ pub(super) struct Scope {
 /// it was before the run: digs, adds and paint look at nothing else, and one that sculpts begins a new run where it would
 /// read what an earlier edit of the run may change. So does every edit that rules bear on: those are bound. One with which
 /// there would be more than `most` bricks around the edits of a run begins a new one too.
-pub(super) fn runs(edits: &[&Edit], scopes: &[Scope], most: u64) -> Vec<Range<usize>> {
+pub(super) fn runs(edits: &[&Edit], scopes: &[EditScope], most: u64) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let (mut first, mut bricks) = (0, 0);
     for (number, (edit, scope)) in edits.iter().zip(scopes).enumerate() {
@@ -56,16 +56,16 @@ mod tests {
 
     use super::*;
     use crate::brush::{Brush, Shape};
+    use crate::edits::reach;
     use crate::ground::MaterialId;
     use crate::lattice::ChunkGrid;
-    use crate::volume::reach;
 
     /// Where runs begin of edits that no rule bears on.
     fn begins(brushes: &[Brush], most: u64) -> Vec<usize> {
         let grid = ChunkGrid::new(32, 400, 400);
         let edits: Vec<Edit> = brushes.iter().map(|brush| Edit::quantize(brush).unwrap()).collect();
-        let scope = |edit| Scope { reach: reach(grid, edit), is_bound: false };
-        let scopes: Vec<Scope> = edits.iter().map(scope).collect();
+        let scope = |edit| EditScope { reach: reach(grid, edit), is_bound: false };
+        let scopes: Vec<EditScope> = edits.iter().map(scope).collect();
         let runs = runs(&edits.iter().collect::<Vec<_>>(), &scopes, most);
         // Each ends where the next one begins.
         assert!(runs.windows(2).all(|pair| pair[0].end == pair[1].start));

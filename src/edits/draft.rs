@@ -12,14 +12,15 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::brick::UniformBricks;
-use super::ledger::{Fate, Ledger};
-use super::runs::{MOST_BRICKS, Scope, runs};
-use super::work::{EditWork, is_bound, reach};
-use super::{Brick, Bricks, DiggingRules, Refused, Sample, SampleView, Tally};
+use super::batches::{EditScope, MOST_BRICKS, runs};
+use super::delta::EditDelta;
+use super::prepared::{PreparedEdits, is_bound, reach};
 use crate::brush::Edit;
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
+use crate::volume::{
+    Brick, Bricks, DiggingRules, MaterialCounts, Refused, Sample, SampleView, UniformBricks, VoxelOutcome,
+};
 
 /// What one edit changed in one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,11 +37,11 @@ pub struct EditEffect {
     /// Each chunk whose samples changed, in order.
     pub chunks: Vec<ChunkEffect>,
     /// Voxels that were solid and are air now, by the material they had.
-    pub removed: Tally,
+    pub removed: MaterialCounts,
     /// Voxels that were air and are solid now, by the material they have.
-    pub added: Tally,
+    pub added: MaterialCounts,
     /// Solid voxels that changed their material, by the material they have now.
-    pub painted: Tally,
+    pub painted: MaterialCounts,
     /// Voxels that rules kept from changing.
     pub refused: Refused,
 }
@@ -159,17 +160,17 @@ impl Draft {
         hash: u64,
         uniform: &UniformBricks,
         rules: Option<&DiggingRules>,
-        mut apply: impl FnMut(&EditWork, &mut dyn FnMut(&mut [Ledger])),
+        mut apply: impl FnMut(&PreparedEdits, &mut dyn FnMut(&mut [EditDelta])),
     ) -> Self {
         let scope = |edit: &&Edit| {
             let reach = reach(grid, edit);
-            Scope { reach, is_bound: is_bound(rules, reach, edit.power()) }
+            EditScope { reach, is_bound: is_bound(rules, reach, edit.power()) }
         };
-        let scopes: Vec<Scope> = edits.iter().map(scope).collect();
+        let scopes: Vec<EditScope> = edits.iter().map(scope).collect();
         let runs = runs(edits, &scopes, MOST_BRICKS);
         Self::of_runs(base, edits.len(), &runs, hash, uniform, |base, run, each| {
             let bound = scopes[run.clone()].iter().map(|scope| scope.is_bound);
-            apply(&EditWork::new(base, grid, &edits[run.clone()]).bound(rules, bound), each);
+            apply(&PreparedEdits::new(base, grid, &edits[run.clone()]).bound(rules, bound), each);
         })
     }
 
@@ -180,7 +181,7 @@ impl Draft {
         runs: &[Range<usize>],
         hash: u64,
         uniform: &UniformBricks,
-        mut apply: impl FnMut(SampleView, &Range<usize>, &mut dyn FnMut(&mut [Ledger])),
+        mut apply: impl FnMut(SampleView, &Range<usize>, &mut dyn FnMut(&mut [EditDelta])),
     ) -> Self {
         let mut draft = Self { hash, ..Self::default() };
         draft.effects.resize_with(edits, EditEffect::default);
@@ -206,7 +207,7 @@ impl Draft {
     }
 
     /// Takes in what these edits did to some bricks; one that is all alike is replaced by the one of its kind.
-    fn add(&mut self, ledgers: &mut [Ledger], edits: &Range<usize>, uniform: &UniformBricks) {
+    fn add(&mut self, ledgers: &mut [EditDelta], edits: &Range<usize>, uniform: &UniformBricks) {
         let (effects, before) = (&mut self.effects[edits.clone()], self.bricks.len());
         enter_effects(ledgers, effects);
         for ledger in ledgers {
@@ -240,7 +241,7 @@ impl Draft {
 }
 
 /// Enters what ledgers say of edits.
-pub(crate) fn enter_effects(ledgers: &[Ledger], effects: &mut [EditEffect]) {
+pub(crate) fn enter_effects(ledgers: &[EditDelta], effects: &mut [EditEffect]) {
     let entries: usize = ledgers.iter().map(|ledger| ledger.parts.len() + ledger.counts.len()).sum();
     if entries < MANY_ENTRIES {
         return ledgers.iter().for_each(|ledger| enter_some(ledger, 0, effects));
@@ -253,7 +254,7 @@ pub(crate) fn enter_effects(ledgers: &[Ledger], effects: &mut [EditEffect]) {
 }
 
 /// Enters what a ledger says of edits, if it is of these; `first` is the number of the first of them.
-fn enter_some(ledger: &Ledger, first: usize, effects: &mut [EditEffect]) {
+fn enter_some(ledger: &EditDelta, first: usize, effects: &mut [EditEffect]) {
     for part in &ledger.parts {
         let own = part.edit.checked_sub(first).and_then(|number| effects.get_mut(number));
         if let Some(effect) = own {
@@ -263,14 +264,14 @@ fn enter_some(ledger: &Ledger, first: usize, effects: &mut [EditEffect]) {
     for count in &ledger.counts {
         let own = count.edit.checked_sub(first).and_then(|number| effects.get_mut(number));
         let Some(effect) = own else { continue };
-        let tally = match count.fate {
-            Fate::Removed => &mut effect.removed,
-            Fate::Added => &mut effect.added,
-            Fate::Painted => &mut effect.painted,
-            Fate::Protected => &mut effect.refused.protected,
-            Fate::Unbreakable => &mut effect.refused.unbreakable,
-            Fate::TooHard => &mut effect.refused.too_hard,
-            Fate::Slowed => &mut effect.refused.slowed,
+        let tally = match count.outcome {
+            VoxelOutcome::Removed => &mut effect.removed,
+            VoxelOutcome::Added => &mut effect.added,
+            VoxelOutcome::Painted => &mut effect.painted,
+            VoxelOutcome::Protected => &mut effect.refused.protected,
+            VoxelOutcome::Unbreakable => &mut effect.refused.unbreakable,
+            VoxelOutcome::TooHard => &mut effect.refused.too_hard,
+            VoxelOutcome::Slowed => &mut effect.refused.slowed,
         };
         tally.count_many(count.material, count.voxels);
     }
@@ -281,7 +282,7 @@ mod tests {
     use fastrand::Rng;
     use glam::{IVec3, Vec3};
 
-    use super::super::ledger::PartEffect;
+    use super::super::delta::PartEffect;
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
@@ -309,10 +310,17 @@ mod tests {
     #[test]
     fn what_threads_enter_is_what_one_does() {
         let mut rng = Rng::with_seed(3);
-        let fates = [Fate::Removed, Fate::Added, Fate::Painted, Fate::Protected, Fate::Slowed, Fate::TooHard];
+        let fates = [
+            VoxelOutcome::Removed,
+            VoxelOutcome::Added,
+            VoxelOutcome::Painted,
+            VoxelOutcome::Protected,
+            VoxelOutcome::Slowed,
+            VoxelOutcome::TooHard,
+        ];
         for edits in [1, 37] {
             let mut ledger = || {
-                let mut ledger = Ledger::default();
+                let mut ledger = EditDelta::default();
                 for _ in 0..MANY_ENTRIES / 3 {
                     let point = IVec3::new(rng.i32(-90..90), rng.i32(-9..9), rng.i32(-90..90));
                     ledger.parts.push(PartEffect {
@@ -343,7 +351,7 @@ mod tests {
             let runs: Vec<_> = begins.map(|from| from..(from + length).min(edits.len())).collect();
             let (base, none) = (SampleView::new(&ground, &bricks), UniformBricks::default());
             Draft::of_runs(base, edits.len(), &runs, 7, &none, |base, run, each| {
-                EditWork::new(base, grid, &edits[run.clone()]).run(each);
+                PreparedEdits::new(base, grid, &edits[run.clone()]).run(each);
             })
         };
         let bricks_of = |draft: &Draft| {

@@ -4,15 +4,15 @@ use std::ops::RangeInclusive;
 
 use glam::{IVec3, USizeVec3};
 
-use super::{Brick, SampleView};
-use crate::brush::{Around, DEPTH, FARTHEST, is_moved};
+use crate::brush::{DEPTH, FARTHEST, Stencil, is_moved};
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
+use crate::volume::{Brick, SampleView, row};
 
 /// Samples along a side: the brick's and one on each side.
 const SIDE: usize = BRICK as usize + 2;
 
 /// The densities of a brick and of one sample more on all sides.
-pub(super) struct Surroundings {
+pub(super) struct PaddedBrick {
     densities: [[[i32; SIDE]; SIDE]; SIDE],
     /// Which were cut off, where a dig or an add stops to tell distances apart or where stored densities end: a bit for
     /// each x.
@@ -21,7 +21,7 @@ pub(super) struct Surroundings {
     moved: [[u16; SIDE]; SIDE],
 }
 
-impl Surroundings {
+impl PaddedBrick {
     /// Of a brick, the samples of a view.
     ///
     /// Never in line: edits that look at nothing around pay for what is large in the function that they share.
@@ -81,7 +81,7 @@ impl Surroundings {
         let ((xs, dx), (ys, dy), (zs, dz)) = (range(step.x), range(step.y), range(step.z));
         for (y, own_y) in ys.zip(dy..) {
             for (z, own_z) in zs.clone().zip(dz..) {
-                let row = super::row(brick.samples(), own_y * 64 + own_z * 8);
+                let row = row(brick.samples(), own_y * 64 + own_z * 8);
                 for (x, &sample) in xs.clone().zip(&row[dx..]) {
                     if sample != i16::MIN {
                         let density = i32::from(sample);
@@ -101,8 +101,8 @@ impl Surroundings {
     }
 
     /// One of the brick's own samples and what is around it.
-    pub fn around(&self, [x, y, z]: [usize; 3]) -> Around {
-        let mut around = Around { densities: [0; 27], cut: 0, moved: 0 };
+    pub fn around(&self, [x, y, z]: [usize; 3]) -> Stencil {
+        let mut around = Stencil { densities: [0; 27], cut: 0, moved: 0 };
         for (i, (dy, dz)) in (0..3).flat_map(|dy| (0..3).map(move |dz| (dy, dz))).enumerate() {
             let (y, z) = (y + dy, z + dz);
             around.densities[i * 3..i * 3 + 3].copy_from_slice(&self.densities[y][z][x..x + 3]);
@@ -142,7 +142,7 @@ mod tests {
             bricks.insert(BrickPos(pos.0 + step), Arc::new(Brick::of_edited(&samples)));
         }
         let view = SampleView::new(&ground, &bricks);
-        let own = Surroundings::new(&view, pos);
+        let own = PaddedBrick::new(&view, pos);
         for at in pos.samples().points() {
             let local = (at - pos.origin()).as_usizevec3().to_array();
             assert_eq!(own.density(local), view.distance(at));

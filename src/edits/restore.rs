@@ -2,28 +2,20 @@
 
 use glam::IVec3;
 
-use super::brick::PRISTINE;
-use super::removal::pristine_layers;
-use super::view::resolve;
-use super::workpiece::{bounds, offset, ones};
-use super::{Brick, Layers, Tally};
+use super::brick_editor::{bounds, offset, ones};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, LatticeBox};
-
-/// A brick that nobody edited: what stands for a missing one where a table lies over another that has it.
-pub(crate) fn pristine_brick(ground: &Ground, pos: BrickPos) -> Brick {
-    Brick::pristine(pristine_layers(ground, pos))
-}
+use crate::volume::{Brick, Layers, MaterialCounts, PRISTINE, pristine_layers, resolve};
 
 /// What becomes of voxels when bricks are replaced.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Replaced {
     /// Voxels that were solid and are air now, by the material they had.
-    pub removed: Tally,
+    pub removed: MaterialCounts,
     /// Voxels that were air and are solid now, by the material they have.
-    pub added: Tally,
+    pub added: MaterialCounts,
     /// Solid voxels that changed their material, by the material they have now.
-    pub painted: Tally,
+    pub painted: MaterialCounts,
 }
 
 impl Replaced {
@@ -49,7 +41,7 @@ impl Replaced {
         let solid =
             |brick: Option<&Brick>| brick.map_or_else(|| pristine_layers(ground, pos), |b| *b.solid());
         let (was, is) = (solid(before), solid(after));
-        let kinds: [(&mut Tally, Option<&Brick>, fn(u64, u64) -> u64); 3] = [
+        let kinds: [(&mut MaterialCounts, Option<&Brick>, fn(u64, u64) -> u64); 3] = [
             (&mut self.removed, before, |was, is| was & !is),
             (&mut self.added, after, |was, is| is & !was),
             (&mut self.painted, after, |was, is| was & is),

@@ -5,13 +5,13 @@
 
 use rayon::prelude::*;
 
-use super::bearing::RunRules;
+use super::brick_editor::BrickEditor;
+use super::delta::EditDelta;
 use super::jobs::{Job, jobs};
-use super::ledger::Ledger;
-use super::workpiece::Workpiece;
-use super::{DiggingRules, SampleView};
-use crate::brush::{Edit, Evaluator, Kind, Sculptor};
+use super::rule_scope::RunRules;
+use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
 use crate::lattice::{ChunkGrid, LatticeBox, pieces};
+use crate::volume::{DiggingRules, SampleView};
 
 /// From how many jobs on they are spread over threads.
 const PARALLEL_JOBS: usize = 64;
@@ -28,18 +28,18 @@ const GROUP: [usize; 2] = [16, 64];
 const TURNS: usize = 8;
 
 /// An edit with what is derived from it once.
-pub(crate) struct Tool {
+pub(crate) struct PreparedEdit {
     /// The part of the edit's reach that lies in the world.
     pub reach: Option<LatticeBox>,
     pub operation: Kind,
     pub evaluator: Evaluator,
-    pub sculptor: Option<Sculptor>,
+    pub sculptor: Option<SculptKernel>,
     pub power: u8,
     /// May some rule be against it?
     pub is_bound: bool,
 }
 
-impl Tool {
+impl PreparedEdit {
     /// Does the edit look at other samples than those that it changes?
     pub fn looks_around(&self) -> bool {
         self.sculptor.is_some() || self.is_bound
@@ -63,20 +63,20 @@ pub(super) fn is_bound(rules: Option<&DiggingRules>, reach: Option<LatticeBox>, 
 }
 
 /// Edits, sorted by the bricks that they may reach.
-pub struct EditWork<'a> {
+pub struct PreparedEdits<'a> {
     /// What they apply to.
     pub base: SampleView<'a>,
     /// How the world is cut into chunks.
     pub grid: ChunkGrid,
-    pub(crate) tools: Vec<Tool>,
+    pub(crate) tools: Vec<PreparedEdit>,
     jobs: Vec<Job>,
     pub(crate) rules: Option<RunRules<'a>>,
 }
 
-impl<'a> EditWork<'a> {
+impl<'a> PreparedEdits<'a> {
     /// Sorts edits.
     pub fn new(base: SampleView<'a>, grid: ChunkGrid, edits: &[&Edit]) -> Self {
-        let tool = |edit: &&Edit| Tool {
+        let tool = |edit: &&Edit| PreparedEdit {
             reach: reach(grid, edit),
             operation: edit.kind(),
             evaluator: edit.evaluator(),
@@ -84,7 +84,7 @@ impl<'a> EditWork<'a> {
             power: edit.power(),
             is_bound: false,
         };
-        let tools: Vec<Tool> = edits.iter().map(tool).collect();
+        let tools: Vec<PreparedEdit> = edits.iter().map(tool).collect();
         let jobs = jobs(&tools);
         Self { base, grid, tools, jobs, rules: None }
     }
@@ -111,7 +111,7 @@ impl<'a> EditWork<'a> {
     /// Does any edit look at other samples than those that it changes?
     #[cfg(feature = "cuda")]
     pub(crate) fn looks_around(&self) -> bool {
-        self.tools.iter().any(Tool::looks_around)
+        self.tools.iter().any(PreparedEdit::looks_around)
     }
 
     /// The jobs of each brick, in order of the edits.
@@ -122,9 +122,9 @@ impl<'a> EditWork<'a> {
 
     /// Applies all edits on the CPU and hands out a ledger for each brick.
     #[cfg(all(test, feature = "cuda"))]
-    pub(crate) fn run_each_brick(&self, mut each: impl FnMut(Ledger)) {
+    pub(crate) fn run_each_brick(&self, mut each: impl FnMut(EditDelta)) {
         for jobs in self.bricks() {
-            let mut ledger = Ledger::default();
+            let mut ledger = EditDelta::default();
             finish(self, jobs, &mut ledger);
             each(ledger);
         }
@@ -137,9 +137,9 @@ impl<'a> EditWork<'a> {
 
     /// Applies all edits on the CPU and hands out what they changed, brick by brick. The result does not depend on how
     /// many threads there are.
-    pub(crate) fn run(&self, mut each: impl FnMut(&mut [Ledger])) {
+    pub(crate) fn run(&self, mut each: impl FnMut(&mut [EditDelta])) {
         let work = |jobs: &[Job]| {
-            let mut ledger = Ledger::with_room(jobs.len().min(GROUP[1]));
+            let mut ledger = EditDelta::with_room(jobs.len().min(GROUP[1]));
             jobs.chunk_by(Job::is_same_brick).for_each(|jobs| finish(self, jobs, &mut ledger));
             ledger
         };
@@ -152,7 +152,7 @@ impl<'a> EditWork<'a> {
             match &pieces(batch, group, Job::is_same_brick)[..] {
                 [own] => each(&mut [work(own)]),
                 groups => {
-                    let mut ledgers: Vec<Ledger> =
+                    let mut ledgers: Vec<EditDelta> =
                         groups.par_iter().with_max_len(1).map(|jobs| work(jobs)).collect();
                     each(&mut ledgers);
                 }
@@ -162,7 +162,7 @@ impl<'a> EditWork<'a> {
 }
 
 /// Applies all edits of one brick and enters what they changed.
-fn finish(work: &EditWork, jobs: &[Job], ledger: &mut Ledger) {
+fn finish(work: &PreparedEdits, jobs: &[Job], ledger: &mut EditDelta) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
-    Workpiece::new(work.base, work.grid, pos).take(&work.tools, work.rules.as_ref(), jobs, ledger);
+    BrickEditor::new(work.base, work.grid, pos).take(&work.tools, work.rules.as_ref(), jobs, ledger);
 }

@@ -1,13 +1,13 @@
 //! Marching cubes over a plain dense grid: shared vertices, and unit normals if they are wanted.
 //!
 //! Of use where a whole field is at hand as one array: imported volumes, simulations, chunks of a game that keeps its own
-//! samples. The terrain's own blocks are meshed by [`block`](super::block), which follows edits, materials and seams.
+//! samples. The terrain's own blocks are meshed by [`block`](crate::surface::block), which follows edits, materials and seams.
 //!
 //! Samples below zero are solid. Triangles are counter-clockwise seen from the air, and the case table is the one in
-//! [`cases`](super::cases): a surface that stays away from the grid's border is closed.
+//! [`cases`](crate::surface::cases): a surface that stays away from the grid's border is closed.
 //!
 //! ```
-//! use bevy_burrow::surface::dense::{DenseGrid, DenseMesh, DenseMesher, Normals};
+//! use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Normals};
 //!
 //! let size = [16; 3];
 //! let mut samples = Vec::new();
@@ -25,7 +25,7 @@
 //! // A sphere: vertices - edges + faces = 2, and each triangle has three halves of edges.
 //! let triangles = mesh.indices.len() / 3;
 //! assert_eq!(mesh.positions.len() + triangles - triangles * 3 / 2, 2);
-//! # Ok::<(), bevy_burrow::surface::dense::DenseGridError>(())
+//! # Ok::<(), bevy_burrow::dense::DenseGridError>(())
 //! ```
 //!
 //! # How it works

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{DraftedBrick, EditEffect};
+use super::draft::{DraftedBrick, EditEffect};
 use crate::ground::MaterialId;
 use crate::lattice::{ChunkPos, LatticeBox};
+use crate::volume::VoxelOutcome;
 
 /// What edits did to some bricks.
 #[derive(Default)]
-pub(crate) struct Ledger {
+pub(crate) struct EditDelta {
     pub bricks: Vec<DraftedBrick>,
     pub parts: Vec<PartEffect>,
     pub counts: Vec<Count>,
@@ -18,7 +19,7 @@ pub(crate) struct Ledger {
     pub hash: u64,
 }
 
-impl Ledger {
+impl EditDelta {
     /// An empty one, with room for so many bricks, and for what edits do to them as a rule.
     pub fn with_room(bricks: usize) -> Self {
         Self {
@@ -71,23 +72,10 @@ pub(crate) struct PartEffect {
     pub bounds: LatticeBox,
 }
 
-/// What became of voxels.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Fate {
-    Removed,
-    Added,
-    Painted,
-    /// Rules were against it.
-    Protected,
-    Unbreakable,
-    TooHard,
-    Slowed,
-}
-
 /// Voxels of one material that an edit dealt with, in one brick or in several.
 pub(crate) struct Count {
     pub edit: usize,
-    pub fate: Fate,
+    pub outcome: VoxelOutcome,
     pub material: MaterialId,
     pub voxels: u64,
 }
@@ -101,11 +89,11 @@ pub(crate) struct Counts<'l> {
 }
 
 impl Counts<'_> {
-    pub fn add(&mut self, fate: Fate, material: MaterialId, voxels: u64) {
+    pub fn add(&mut self, outcome: VoxelOutcome, material: MaterialId, voxels: u64) {
         let own = &mut self.list[self.first..];
-        match own.iter_mut().find(|count| count.fate == fate && count.material == material) {
+        match own.iter_mut().find(|count| count.outcome == outcome && count.material == material) {
             Some(count) => count.voxels += voxels,
-            None => self.list.push(Count { edit: self.edit, fate, material, voxels }),
+            None => self.list.push(Count { edit: self.edit, outcome, material, voxels }),
         }
     }
 }

@@ -20,11 +20,11 @@
 use glam::IVec3;
 
 use super::DEPTH;
-use super::blend::Fade;
-use super::deed::{Deed, above_plane};
-use super::solid::Solid;
+use super::blend::QuantizedBlend;
+use super::quantized_operation::{QuantizedOperation, above_plane};
+use super::quantized_shape::QuantizedShape;
 #[cfg(feature = "cuda")]
-use super::{deed::length, stamp::PressConstants};
+use super::{quantized_operation::length, stamp::StampParams};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
@@ -57,7 +57,7 @@ const PAIRS: [([i32; 3], i32, i32); 13] = [
 
 /// A sample with the 26 around it, as they were before the operation.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Around {
+pub(crate) struct Stencil {
     /// Densities in 1/256 voxel: x fastest, then z, then y.
     pub densities: [i32; 27],
     /// A bit for each that was cut off, at [`DEPTH`] or [`FARTHEST`].
@@ -73,7 +73,7 @@ pub(crate) fn is_moved(density: i32, pristine: i32) -> bool {
     if density < 0 { by <= -ONE } else { by >= ONE }
 }
 
-impl Around {
+impl Stencil {
     const MIDDLE: usize = 13;
 
     fn index([x, y, z]: [i32; 3]) -> usize {
@@ -185,19 +185,19 @@ impl Around {
 
 /// An edit that sculpts, ready to be applied.
 #[derive(Clone, Debug)]
-pub(crate) struct Sculptor {
-    deed: Deed,
-    fade: Fade,
+pub(crate) struct SculptKernel {
+    deed: QuantizedOperation,
+    fade: QuantizedBlend,
     /// How deep the shape is in its middle.
     deep: i32,
 }
 
-impl Sculptor {
+impl SculptKernel {
     /// The sculptor of a checked deed, if it sculpts.
-    pub(super) fn of(deed: &Deed, shape: &Solid) -> Option<Self> {
+    pub(super) fn of(deed: &QuantizedOperation, shape: &QuantizedShape) -> Option<Self> {
         let fade = deed.fade()?;
         let deep = match deed {
-            Deed::Stamp { stamp, .. } => shape.deepest().min(stamp.deep()),
+            QuantizedOperation::Stamp { stamp, .. } => shape.deepest().min(stamp.deep()),
             _ => shape.deepest(),
         };
         Some(Self { deed: deed.clone(), fade, deep })
@@ -210,15 +210,15 @@ impl Sculptor {
 
     /// The density at a lattice point after the operation, from its distance to the shape and from what is around; `None`
     /// where it stays as it is.
-    pub fn density(&self, at: IVec3, outside: i32, around: impl FnOnce() -> Around) -> Option<i32> {
+    pub fn density(&self, at: IVec3, outside: i32, around: impl FnOnce() -> Stencil) -> Option<i32> {
         if outside > 0 {
             return None;
         }
         let mut outside = outside;
         let target = match &self.deed {
-            Deed::Flatten { point, normal, .. } => Some(above_plane(at, *point, *normal)),
-            Deed::Level { height, .. } => Some(at.y * ONE - height),
-            Deed::Stamp { stamp, .. } => {
+            QuantizedOperation::Flatten { point, normal, .. } => Some(above_plane(at, *point, *normal)),
+            QuantizedOperation::Level { height, .. } => Some(at.y * ONE - height),
+            QuantizedOperation::Stamp { stamp, .. } => {
                 let (beside, above) = stamp.at(at);
                 outside = outside.max(beside);
                 Some(above)
@@ -230,28 +230,28 @@ impl Sculptor {
             return None;
         }
         let around = around();
-        let own = around.densities[Around::MIDDLE];
+        let own = around.densities[Stencil::MIDDLE];
         if let Some(target) = target {
             return Some(own + part(i64::from(target) - i64::from(own), weight));
         }
         match &self.deed {
-            Deed::Raise { amount, .. } => return around.shifted(-amount, weight),
-            Deed::Lower { amount, .. } => return around.shifted(*amount, weight),
+            QuantizedOperation::Raise { amount, .. } => return around.shifted(-amount, weight),
+            QuantizedOperation::Lower { amount, .. } => return around.shifted(*amount, weight),
             _ => {}
         }
         let middle = around.middle()?;
         match &self.deed {
-            Deed::Smooth { .. } => {
+            QuantizedOperation::Smooth { .. } => {
                 let by = around.way_to_average(middle) * weight / (64 * ONE);
                 (by != 0).then(|| around.attached(middle + by))
             }
-            Deed::Sharpen { .. } => {
+            QuantizedOperation::Sharpen { .. } => {
                 let by = (around.way_to_average(middle) * weight / (64 * ONE)).clamp(-SHARPER, SHARPER);
                 let all = &around.densities;
                 let (low, high) = all.iter().fold((own, own), |(low, high), &d| (low.min(d), high.max(d)));
                 (by != 0).then(|| around.attached((middle - by).clamp(low, high)))
             }
-            Deed::Terrace { step, base, .. } => {
+            QuantizedOperation::Terrace { step, base, .. } => {
                 let surface = at.y * ONE - middle;
                 let by = part(i64::from(surface) - i64::from(terraced(surface - base, *step) + base), weight);
                 (by != 0).then_some(middle + by)
@@ -263,7 +263,7 @@ impl Sculptor {
 
 /// A sculptor as plain numbers, for other machines.
 #[cfg(feature = "cuda")]
-pub(crate) struct SculptorConstants<'a> {
+pub(crate) struct SculptParams<'a> {
     pub strength: i32,
     /// Not wider than the shape is deep.
     pub falloff: i32,
@@ -281,29 +281,33 @@ pub(crate) enum Stroke<'a> {
     Level(i32),
     /// How much is added to densities.
     Shift(i32),
-    Stamp(PressConstants<'a>),
+    Stamp(StampParams<'a>),
     /// Step and base.
     Terrace(i32, i32),
 }
 
 #[cfg(feature = "cuda")]
-impl Sculptor {
+impl SculptKernel {
     /// All that densities are computed from; `None` for what is no sculptor's deed.
-    pub(crate) fn constants(&self) -> Option<SculptorConstants<'_>> {
+    pub(crate) fn constants(&self) -> Option<SculptParams<'_>> {
         let stroke = match &self.deed {
-            Deed::Smooth { .. } => Stroke::Smooth,
-            Deed::Sharpen { .. } => Stroke::Sharpen,
-            Deed::Flatten { point, normal, .. } => Stroke::Flatten(*point, *normal, length(*normal)),
-            Deed::Level { height, .. } => Stroke::Level(*height),
-            Deed::Raise { amount, .. } => Stroke::Shift(-amount),
-            Deed::Lower { amount, .. } => Stroke::Shift(*amount),
-            Deed::Stamp { stamp, .. } => Stroke::Stamp(stamp.constants()),
-            Deed::Terrace { step, base, .. } => Stroke::Terrace(*step, *base),
-            Deed::Dig | Deed::Add { .. } | Deed::Paint { .. } => return None,
-            Deed::Limited(never) => match *never {},
+            QuantizedOperation::Smooth { .. } => Stroke::Smooth,
+            QuantizedOperation::Sharpen { .. } => Stroke::Sharpen,
+            QuantizedOperation::Flatten { point, normal, .. } => {
+                Stroke::Flatten(*point, *normal, length(*normal))
+            }
+            QuantizedOperation::Level { height, .. } => Stroke::Level(*height),
+            QuantizedOperation::Raise { amount, .. } => Stroke::Shift(-amount),
+            QuantizedOperation::Lower { amount, .. } => Stroke::Shift(*amount),
+            QuantizedOperation::Stamp { stamp, .. } => Stroke::Stamp(stamp.constants()),
+            QuantizedOperation::Terrace { step, base, .. } => Stroke::Terrace(*step, *base),
+            QuantizedOperation::Dig | QuantizedOperation::Add { .. } | QuantizedOperation::Paint { .. } => {
+                return None;
+            }
+            QuantizedOperation::Limited(never) => match *never {},
         };
-        let Fade { strength, falloff, material } = self.fade;
-        Some(SculptorConstants { strength, falloff: falloff.min(self.deep), material, stroke })
+        let QuantizedBlend { strength, falloff, material } = self.fade;
+        Some(SculptParams { strength, falloff: falloff.min(self.deep), material, stroke })
     }
 }
 
@@ -325,10 +329,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn around(density: impl Fn(i32, i32, i32) -> i32) -> Around {
-        let mut all = Around { densities: [0; 27], cut: 0, moved: 0 };
+    fn around(density: impl Fn(i32, i32, i32) -> i32) -> Stencil {
+        let mut all = Stencil { densities: [0; 27], cut: 0, moved: 0 };
         for way in (0..27).map(|i| [i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1]) {
-            all.densities[Around::index(way)] = density(way[0], way[1], way[2]);
+            all.densities[Stencil::index(way)] = density(way[0], way[1], way[2]);
         }
         all
     }
@@ -376,7 +380,7 @@ mod tests {
         let mut cave = around(|_, _, _| DEPTH);
         cave.cut = (1 << 27) - 1;
         assert_eq!(cave.middle(), None);
-        let below = Around::index([0, -1, 0]);
+        let below = Stencil::index([0, -1, 0]);
         (cave.densities[below], cave.cut) = (500, cave.cut & !(1 << below));
         assert_eq!(cave.middle(), Some(756));
         cave.densities[below] = 1000;
@@ -391,7 +395,7 @@ mod tests {
 
     #[test]
     fn shifts_leave_alone_what_was_cut_off_unless_neighbours_tell_how_far_it_is() {
-        let below = Around::index([0, -1, 0]);
+        let below = Stencil::index([0, -1, 0]);
         // Of a cave's air, with a neighbour that is known.
         let cave = |below_is: i32| {
             let mut cave = around(|_, _, _| DEPTH);

@@ -5,20 +5,19 @@ use std::sync::Arc;
 use glam::IVec3;
 use wide::{i16x8, i32x8};
 
-use super::bearing::RunRules;
-use super::brick::{PRISTINE, row, solid_layers};
+use super::delta::{Counts, EditDelta};
+use super::draft::DraftedBrick;
 use super::jobs::Job;
-use super::ledger::{Counts, Fate, Ledger};
-use super::surroundings::Surroundings;
-use super::view::resolve;
-use super::work::Tool;
-use super::{Brick, DraftedBrick, Layers, Sample, SampleView};
+use super::padded_brick::PaddedBrick;
+use super::prepared::PreparedEdit;
+use super::rule_scope::RunRules;
 use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE, hash};
+use crate::volume::{Brick, Layers, PRISTINE, Sample, SampleView, VoxelOutcome, resolve, row, solid_layers};
 
 /// A brick under work.
-pub(super) struct Workpiece<'a> {
+pub(super) struct BrickEditor<'a> {
     pub(super) view: SampleView<'a>,
     grid: ChunkGrid,
     pub(super) pos: BrickPos,
@@ -42,7 +41,7 @@ pub(super) struct Changed {
     pub is: u64,
 }
 
-impl<'a> Workpiece<'a> {
+impl<'a> BrickEditor<'a> {
     /// A brick as it is.
     pub fn new(view: SampleView<'a>, grid: ChunkGrid, pos: BrickPos) -> Self {
         let heights = view.ground().heights::<8>(Column::of(pos.origin()));
@@ -50,7 +49,13 @@ impl<'a> Workpiece<'a> {
     }
 
     /// Applies all jobs.
-    pub fn take(&mut self, tools: &[Tool], rules: Option<&RunRules>, jobs: &[Job], ledger: &mut Ledger) {
+    pub fn take(
+        &mut self,
+        tools: &[PreparedEdit],
+        rules: Option<&RunRules>,
+        jobs: &[Job],
+        ledger: &mut EditDelta,
+    ) {
         let mut distances = [i16x8::ZERO; 64];
         let low = self.pos.origin();
         let rules = rules.map(|rules| rules.of_brick(self.pos));
@@ -62,7 +67,7 @@ impl<'a> Workpiece<'a> {
             let (from, to) = (reached.min - low, reached.max - low);
             tool.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
             let rules = rules.as_ref().filter(|_| tool.is_bound);
-            let around = tool.looks_around().then(|| Surroundings::new(&self.view, self.pos));
+            let around = tool.looks_around().then(|| PaddedBrick::new(&self.view, self.pos));
             for chunk in self.grid.chunks_of(reached) {
                 let Some(samples) = self.grid.chunk_samples(chunk).intersection(reached) else { continue };
                 let counts = &mut ledger.counts(edit);
@@ -176,7 +181,7 @@ impl<'a> Workpiece<'a> {
     ) {
         let (removed, added) = (changed.was & !changed.is, changed.is & !changed.was);
         if removed != 0 {
-            self.tally(Fate::Removed, y, removed, counts);
+            self.tally(VoxelOutcome::Removed, y, removed, counts);
             // Air is of no material.
             self.brick().set_materials(y, removed, MaterialId::GROUND);
         }
@@ -185,14 +190,14 @@ impl<'a> Workpiece<'a> {
                 self.brick().set_materials(y, added, material);
             }
             match material {
-                None | Some(MaterialId::GROUND) => self.tally(Fate::Added, y, added, counts),
-                Some(material) => counts.add(Fate::Added, material, added.count_ones().into()),
+                None | Some(MaterialId::GROUND) => self.tally(VoxelOutcome::Added, y, added, counts),
+                Some(material) => counts.add(VoxelOutcome::Added, material, added.count_ones().into()),
             }
         }
     }
 
     /// Counts voxels of a layer by the materials that they have now.
-    fn tally(&mut self, fate: Fate, y: usize, voxels: u64, counts: &mut Counts<'_>) {
+    fn tally(&mut self, fate: VoxelOutcome, y: usize, voxels: u64, counts: &mut Counts<'_>) {
         let (ground, low) = (self.view.ground(), self.pos.origin());
         let single = ground.single_material();
         let brick = &*self.brick();
@@ -240,7 +245,7 @@ impl<'a> Workpiece<'a> {
             }
             let (point, ground) = (low + offset(index), self.view.ground());
             if resolve(ground, point, material) != resolve(ground, point, old) {
-                counts.add(Fate::Painted, resolve(ground, point, material), 1);
+                counts.add(VoxelOutcome::Painted, resolve(ground, point, material), 1);
             }
             if is_pristine {
                 samples[x] = Sample::edited(before).distance().unwrap_or_default() as i16;

@@ -1,12 +1,12 @@
-//! Counts of voxels per material.
+//! Voxels per material, and what can become of them.
 
 use crate::ground::MaterialId;
 
 /// Solid voxels per material, in the order of material ids. A lattice point is one voxel.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tally(Vec<(MaterialId, u64)>);
+pub struct MaterialCounts(Vec<(MaterialId, u64)>);
 
-impl Tally {
+impl MaterialCounts {
     /// Counts more voxels of one material.
     pub(crate) fn count_many(&mut self, material: MaterialId, voxels: u64) {
         match self.0.binary_search_by_key(&material, |entry| entry.0) {
@@ -36,4 +36,17 @@ impl Tally {
     pub fn iter(&self) -> impl Iterator<Item = (MaterialId, u64)> {
         self.0.iter().copied()
     }
+}
+
+/// What an edit did to a voxel.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum VoxelOutcome {
+    Removed,
+    Added,
+    Painted,
+    /// Not changed: a rule protects it.
+    Protected,
+    Unbreakable,
+    TooHard,
+    Slowed,
 }

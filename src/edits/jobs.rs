@@ -7,7 +7,7 @@
 use glam::IVec3;
 use rayon::prelude::*;
 
-use super::work::Tool;
+use super::prepared::PreparedEdit;
 use crate::lattice::{BrickPos, LatticeBox, sort_by_place};
 
 /// One edit's work on one brick; sorted by brick, then by edit.
@@ -35,7 +35,7 @@ impl Job {
 const PARALLEL: u64 = 1024;
 
 /// Every brick that some edit may reach, once for each edit: by brick, and for each brick in order of the edits.
-pub(super) fn jobs(tools: &[Tool]) -> Vec<Job> {
+pub(super) fn jobs(tools: &[PreparedEdit]) -> Vec<Job> {
     let reaches = || (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, bricks_around(tool.reach?))));
     let around = reaches().fold(0, |sum: u64, (_, bricks)| sum.saturating_add(bricks.volume()));
     if around < PARALLEL {
@@ -71,7 +71,7 @@ pub(super) fn bricks_around(reach: LatticeBox) -> LatticeBox {
 }
 
 /// Adds jobs for those of some bricks that an edit may reach.
-fn add(tools: &[Tool], edit: u32, bricks: LatticeBox, jobs: &mut Vec<Job>) {
+fn add(tools: &[PreparedEdit], edit: u32, bricks: LatticeBox, jobs: &mut Vec<Job>) {
     let tool = &tools[edit as usize];
     let reaches =
         |bricks: LatticeBox| tool.reaches(LatticeBox { min: bricks.min << 3, max: (bricks.max << 3) + 7 });
@@ -89,14 +89,14 @@ mod tests {
     use fastrand::Rng;
     use glam::Vec3;
 
-    use super::super::work::reach;
+    use super::super::prepared::reach;
     use super::*;
     use crate::brush::{BAND, Brush, Edit, Shape};
     use crate::lattice::ChunkGrid;
 
-    fn tool(brush: &Brush) -> Tool {
+    fn tool(brush: &Brush) -> PreparedEdit {
         let edit = Edit::quantize(brush).unwrap();
-        Tool {
+        PreparedEdit {
             reach: reach(ChunkGrid::new(32, 1024, 1024), &edit),
             operation: edit.kind(),
             evaluator: edit.evaluator(),
@@ -118,7 +118,7 @@ mod tests {
                     false => Brush::dig(Shape::capsule(a, a.lerp(b, 0.3), size * 0.2)),
                 }
             };
-            let tools: Vec<Tool> = (0..count).map(|_| tool(&brush(&mut rng))).collect();
+            let tools: Vec<PreparedEdit> = (0..count).map(|_| tool(&brush(&mut rng))).collect();
             let jobs = jobs(&tools);
             assert!(jobs.is_sorted_by(|a, b| (a.brick, a.edit) < (b.brick, b.edit)), "{count} of {size}");
             // Bricks that are not among them have no sample in reach.

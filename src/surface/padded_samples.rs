@@ -63,15 +63,15 @@ const CORNER_STACKS: [usize; 4] = [4, 5, 7, 8];
 
 /// Samples from one before the brick's first to two after its last, x fastest, then z, then y. A layer of no meaning
 /// follows, so that what is near an edge can be read as one piece.
-pub(super) struct Apron(Box<[Marked; AREA * (SIDE + 1)]>);
+pub(super) struct PaddedSamples(Box<[Marked; AREA * (SIDE + 1)]>);
 
-impl Default for Apron {
+impl Default for PaddedSamples {
     fn default() -> Self {
         Self(Box::new([0; AREA * (SIDE + 1)]))
     }
 }
 
-impl Apron {
+impl PaddedSamples {
     /// All samples; those of layers that were not filled are old ones.
     pub fn samples(&self) -> &[Marked] {
         &*self.0

@@ -18,7 +18,7 @@ const UNIT: f64 = 32767.0;
 /// A [`Shape`] in integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum Solid {
+pub(super) enum QuantizedShape {
     Sphere { center: [i32; 3], radius: i32 },
     Cuboid { center: [i32; 3], half: [i32; 3], rotation: [i16; 4] },
     Cylinder { base: [i32; 3], axis: [i32; 3], radius: i32 },
@@ -26,7 +26,7 @@ pub(super) enum Solid {
     Cone { base: [i32; 3], axis: [i32; 3], radius: i32 },
 }
 
-impl Solid {
+impl QuantizedShape {
     /// Rounds a shape to integers, halves to even, and checks it.
     pub(super) fn quantize(shape: &Shape) -> Result<Self, BrushError> {
         let solid = match *shape {
@@ -333,7 +333,7 @@ mod tests {
     }
 
     /// The greatest depth, by trying places in a box that closes in on the best of them.
-    fn deepest_by_trying(solid: &Solid) -> f32 {
+    fn deepest_by_trying(solid: &QuantizedShape) -> f32 {
         let (form, origin, (low, high)) = (Form::of(solid), solid.origin(), solid.bounds());
         let mut middle = (low + high).as_vec3() / 2.0 - origin.as_vec3();
         let (mut half, mut best) = ((high - low).as_vec3() / 2.0, f32::MIN);
@@ -366,7 +366,7 @@ mod tests {
             Shape::cone(base, Vec3::new(5.0, -9.0, 7.0), 11.5),
             Shape::cone(base, Vec3::new(0.5, 2.0, 0.0), 12.0),
         ] {
-            let solid = Solid::quantize(&shape).unwrap();
+            let solid = QuantizedShape::quantize(&shape).unwrap();
             let (said, found) = (solid.deepest() as f32, deepest_by_trying(&solid));
             // Rounded down.
             assert!((-0.2..1.2).contains(&(found - said)), "{shape:?}: {said} said, {found} found");

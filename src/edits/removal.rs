@@ -2,18 +2,12 @@
 
 use std::sync::Arc;
 
-use super::brick::{row, solid_layers};
-use super::workpiece::{bounds, hash_of, offset, ones, place_hash};
-use super::{Brick, ChunkEffect, DraftedBrick, Layers, SampleView};
+use super::brick_editor::{bounds, hash_of, offset, ones, place_hash};
+use super::draft::{ChunkEffect, DraftedBrick};
 use crate::brush::DEPTH;
-use crate::ground::{Ground, MaterialId};
+use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column};
-
-/// Which samples of a brick are solid while nobody has edited it.
-pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
-    let low = pos.origin();
-    solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
-}
+use crate::volume::{Brick, Layers, SampleView, pristine_layers, row};
 
 /// A brick with samples taken out of it.
 pub(crate) struct TakenOut {
