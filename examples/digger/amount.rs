@@ -1,6 +1,7 @@
 //! How many voxels a shape holds: the lattice points within it, counted one by one, as the ground counts them.
 
 use bevy::prelude::*;
+use bevy_burrow::brush::shapes::{Capsule, Cuboid, Sphere};
 use bevy_burrow::prelude::*;
 
 use crate::tools::Tool;
@@ -46,9 +47,9 @@ pub fn largest(wish: f32, least: f32, most: i64, shape: impl Fn(f32) -> Shape) -
 /// A box around a shape that a hand can have.
 fn bounds(shape: &Shape) -> Option<(Vec3, Vec3)> {
     match *shape {
-        Shape::Sphere { center, radius } => Some((center - radius, center + radius)),
-        Shape::Cuboid { center, half, .. } => Some((center - half.length(), center + half.length())),
-        Shape::Capsule { from, to, radius } => Some((from.min(to) - radius, from.max(to) + radius)),
+        Shape::Sphere(Sphere { center, radius }) => Some((center - radius, center + radius)),
+        Shape::Cuboid(Cuboid { center, half, .. }) => Some((center - half.length(), center + half.length())),
+        Shape::Capsule(Capsule { from, to, radius }) => Some((from.min(to) - radius, from.max(to) + radius)),
         _ => None,
     }
 }
@@ -56,11 +57,11 @@ fn bounds(shape: &Shape) -> Option<(Vec3, Vec3)> {
 /// How far outside a place is; at most 0 within.
 fn outside(shape: &Shape, place: Vec3) -> f32 {
     match *shape {
-        Shape::Sphere { center, radius } => place.distance(center) - radius,
-        Shape::Cuboid { center, half, rotation } => {
+        Shape::Sphere(Sphere { center, radius }) => place.distance(center) - radius,
+        Shape::Cuboid(Cuboid { center, half, rotation }) => {
             ((rotation.inverse() * (place - center)).abs() - half).max_element()
         }
-        Shape::Capsule { from, to, radius } => {
+        Shape::Capsule(Capsule { from, to, radius }) => {
             let axis = to - from;
             let along = (place - from).dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE);
             place.distance(from + axis * along.clamp(0.0, 1.0)) - radius

@@ -1,5 +1,6 @@
 //! Facts about bombs.
 
+use bevy_burrow::brush::shapes::Sphere;
 use std::time::Duration;
 
 use bevy::time::TimeUpdateStrategy;
@@ -136,7 +137,7 @@ fn a_blast_is_as_large_and_as_strong_as_the_tool_in_hand() {
         .add_observer(explode);
     app.world_mut().trigger(Blast { place: Vec3::ZERO });
     let brushes: Vec<Brush> = app.world_mut().resource_mut::<Messages<Brush>>().drain().collect();
-    let [Brush { shape: Shape::Sphere { radius, .. }, power, .. }] = brushes[..] else {
+    let [Brush { shape: Shape::Sphere(Sphere { radius, .. }), power, .. }] = brushes[..] else {
         panic!("{brushes:?}");
     };
     assert_eq!((radius, power), (Hand::new(&Settings::default()).radius(Tool::Bomb), Tool::Bomb.power()));

@@ -3,6 +3,7 @@
 mod curtain;
 mod way;
 
+use bevy_burrow::brush::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -376,9 +377,11 @@ impl Tour {
 /// Roughly the middle of a shape.
 fn centre(shape: &Shape) -> Vec3 {
     match *shape {
-        Shape::Sphere { center, .. } | Shape::Cuboid { center, .. } => center,
-        Shape::Cylinder { base, axis, .. } | Shape::Cone { base, axis, .. } => base + axis / 2.0,
-        Shape::Capsule { from, to, .. } => from.midpoint(to),
+        Shape::Sphere(Sphere { center, .. }) | Shape::Cuboid(Cuboid { center, .. }) => center,
+        Shape::Cylinder(Cylinder { base, axis, .. }) | Shape::Cone(Cone { base, axis, .. }) => {
+            base + axis / 2.0
+        }
+        Shape::Capsule(Capsule { from, to, .. }) => from.midpoint(to),
         _ => panic!("no shape of the tour's: {shape:?}"),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::landscape::{CONCRETE, ROCK};
+use bevy_burrow::brush::shapes::Sphere;
 
 fn app() -> App {
     let mut app = App::new();
@@ -50,7 +51,9 @@ fn what_is_built_or_painted_is_as_large_as_the_stock_allows_and_is_pledged() {
         let mut free = app.world().resource::<Inventory>().free(CONCRETE);
         let mut radii = Vec::new();
         // All of it is on its way in the end, so there is none for another one.
-        while let [Brush { shape: shape @ Shape::Sphere { radius, .. }, .. }] = strike(&mut app, tool)[..] {
+        while let [Brush { shape: shape @ Shape::Sphere(Sphere { radius, .. }), .. }] =
+            strike(&mut app, tool)[..]
+        {
             free -= amount::voxels(&shape);
             assert_eq!(app.world().resource::<Inventory>().free(CONCRETE), free);
             radii.push(radius);

@@ -1,12 +1,12 @@
 //! Scripts of brushes, a JSON object a line. Examples read them in common; each takes this in by its path.
 //!
-//! A line is a brush as [`BrushRecord`] has it, in voxels, or a step through history: `{"undo":true}` or `{"redo":true}`.
+//! A line is a brush as [`Brush`] describes it, in voxels, or a step through history: `{"undo":true}` or `{"redo":true}`.
 //! Blank lines and lines that start with `#` count for nothing.
 
 use std::fmt;
 use std::io::{self, BufRead, Read};
 
-use bevy_burrow::brush::{Brush, BrushRecord};
+use bevy_burrow::brush::Brush;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
@@ -128,8 +128,7 @@ fn parse(line: &[u8]) -> Result<Option<Line>, String> {
             _ => Err("either `undo` or `redo` is to be true".into()),
         };
     }
-    let brush = Brush::try_from(read::<BrushRecord>(text)?).map_err(|error| error.to_string())?;
-    Ok(Some(Line::Brush(brush)))
+    Ok(Some(Line::Brush(read(text)?)))
 }
 
 /// Reads a JSON object; the line's number is for the caller to tell.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::in_range;
-use super::{BrushError, FULL_POWER};
+use super::BrushError;
+use super::quantize::{in_range, voxels};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
@@ -47,14 +47,13 @@ impl QuantizedBlend {
     }
 
     pub fn check(self) -> Result<(), BrushError> {
-        in_range("strength", self.strength as f32 / ONE as f32, 0.0, 1.0)?;
-        in_range("falloff", self.falloff as f32 / ONE as f32, 0.0, MOST as f32)?;
+        in_range("strength", voxels(self.strength), 0.0, 1.0)?;
+        in_range("falloff", voxels(self.falloff), 0.0, MOST as f32)?;
         Ok(())
     }
 
     pub fn blend(self) -> Blend {
-        let units = |value: i32| value as f32 / ONE as f32;
-        Blend { strength: units(self.strength), falloff: units(self.falloff), material: self.material }
+        Blend { strength: voxels(self.strength), falloff: voxels(self.falloff), material: self.material }
     }
 
     /// How much of the change is made at a distance from the shape, in 1/256; the falloff is at most `deep` wide.
@@ -74,11 +73,6 @@ impl QuantizedBlend {
     }
 }
 
-/// Is there any limit to this power?
-pub(super) fn is_full(power: u8) -> bool {
-    power == FULL_POWER
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,12 +80,12 @@ mod tests {
     #[test]
     fn weights_rise_from_nothing_at_the_rim_to_the_strength() {
         for (strength, falloff) in [(256, 1024), (256, 0), (77, 300), (256, 1)] {
-            let fade = QuantizedBlend { strength, falloff, material: None };
-            let weights: Vec<i32> = (-20_000..600).rev().map(|outside| fade.weight(outside, 9000)).collect();
+            let blend = QuantizedBlend { strength, falloff, material: None };
+            let weights: Vec<i32> = (-20_000..600).rev().map(|outside| blend.weight(outside, 9000)).collect();
             assert!(weights.is_sorted());
             assert_eq!((weights[0], weights.last()), (0, Some(&strength)));
-            assert_eq!(fade.weight(1, 9000), 0);
-            assert_eq!(fade.weight(0, 9000), if falloff == 0 { strength } else { 0 });
+            assert_eq!(blend.weight(1, 9000), 0);
+            assert_eq!(blend.weight(0, 9000), if falloff == 0 { strength } else { 0 });
         }
         // As wide as the shape is deep: all of it in the middle, and no sudden step on the way.
         let soft = QuantizedBlend { strength: 256, falloff: 64 * ONE, material: None };

@@ -4,10 +4,10 @@ use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
 use super::blend::QuantizedBlend;
-use super::quantized_operation::{QuantizedOperation, WrittenOperation};
-use super::quantized_shape::QuantizedShape;
+use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
+use super::shapes::QuantizedShape;
 use super::{BAND, Blend, Brush, BrushError, Evaluator, Kind, Operation, Roughness, Shape};
 use crate::lattice::{LatticeBox, ONE};
 
@@ -20,38 +20,35 @@ use crate::lattice::{LatticeBox, ONE};
 /// # Format
 ///
 /// Serialised edits are kept in journals and sent over networks, so their form is stable: names, order and meaning of
-/// fields and variants stay, and new variants come after the old. In JSON:
+/// fields and variants stay, and new variants come after the old. Any format of serde's will do. In JSON:
 ///
 /// ```json
-/// {"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},
-///  "roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0,"stroke":null}
-/// ```
-///
-/// The operation of a brush with less than full power stands in a wrapping of its own:
-///
-/// ```json
-/// {"limited":{"power":40,"operation":"dig"}}
+/// {"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"blend":null,
+///  "power":255,"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0,"stroke":null}
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked", into = "Unchecked")]
+#[serde(try_from = "Unchecked")]
 pub struct Edit {
     shape: QuantizedShape,
-    deed: QuantizedOperation,
+    operation: QuantizedOperation,
+    /// `None` unless the operation sculpts.
+    blend: Option<QuantizedBlend>,
     power: u8,
     roughness: Option<QuantizedRoughness>,
     tag: u64,
     stroke: Option<u64>,
 }
 
-/// An edit as it stands in a file or comes from a network.
-#[derive(Serialize, Deserialize)]
+/// An edit as it comes from a file or a network.
+#[derive(Deserialize)]
 #[serde(rename = "Edit", deny_unknown_fields)]
 struct Unchecked {
     shape: QuantizedShape,
-    operation: WrittenOperation,
+    operation: QuantizedOperation,
+    blend: Option<QuantizedBlend>,
+    power: u8,
     roughness: Option<QuantizedRoughness>,
     tag: u64,
-    #[serde(default)]
     stroke: Option<u64>,
 }
 
@@ -65,11 +62,13 @@ impl Edit {
     /// A [`BrushError`] where a number is not finite or beyond the limits of [the room's table](super).
     pub fn quantize(brush: &Brush) -> Result<Self, BrushError> {
         let roughness = brush.roughness.as_ref().map(QuantizedRoughness::quantize).transpose()?;
+        let sculpts = brush.operation.is_sculpting();
         Ok(Self {
             shape: QuantizedShape::quantize(&brush.shape)?,
-            deed: QuantizedOperation::quantize(brush)?,
+            operation: QuantizedOperation::quantize(&brush.operation)?,
+            blend: sculpts.then(|| QuantizedBlend::quantize(&brush.blend)).transpose()?,
             power: brush.power,
-            roughness: roughness.filter(|grain| grain.amplitude != 0),
+            roughness: roughness.filter(|roughness| roughness.amplitude != 0),
             tag: brush.tag,
             stroke: brush.stroke,
         })
@@ -82,8 +81,12 @@ impl Edit {
     /// A [`BrushError`] that says which limit is broken.
     pub fn check(&self) -> Result<(), BrushError> {
         self.shape.check()?;
-        self.deed.check()?;
-        self.roughness.map_or(Ok(()), |grain| grain.check())
+        self.operation.check()?;
+        if self.blend.is_some() != (self.kind() == Kind::Sculpt) {
+            return Err(BrushError::Blend);
+        }
+        self.blend.map_or(Ok(()), QuantizedBlend::check)?;
+        self.roughness.map_or(Ok(()), |roughness| roughness.check())
     }
 
     /// Where, in the brush's own numbers.
@@ -93,17 +96,17 @@ impl Edit {
 
     /// Bumps on the shape's surface, in the brush's own numbers.
     pub fn roughness(&self) -> Option<Roughness> {
-        self.roughness.map(|grain| grain.roughness())
+        self.roughness.map(|roughness| roughness.roughness())
     }
 
     /// What the edit does, in the brush's own numbers.
     pub fn operation(&self) -> Operation {
-        self.deed.operation()
+        self.operation.operation()
     }
 
     /// How the edit blends in, if it sculpts.
     pub fn blend(&self) -> Option<Blend> {
-        self.deed.fade().map(QuantizedBlend::blend)
+        self.blend.map(QuantizedBlend::blend)
     }
 
     /// How hard the material may be that it takes away.
@@ -113,17 +116,12 @@ impl Edit {
 
     /// Which way it is applied.
     pub(crate) fn kind(&self) -> Kind {
-        match self.deed {
-            QuantizedOperation::Dig => Kind::Dig,
-            QuantizedOperation::Add { material } => Kind::Add { material },
-            QuantizedOperation::Paint { material } => Kind::Paint { material },
-            _ => Kind::Sculpt,
-        }
+        self.operation.kind()
     }
 
     /// What it makes of samples, if it sculpts.
     pub(crate) fn sculptor(&self) -> Option<SculptKernel> {
-        SculptKernel::of(&self.deed, &self.shape)
+        self.blend.map(|blend| SculptKernel::new(&self.operation, blend, &self.shape))
     }
 
     /// The number that the brush carried.
@@ -142,7 +140,7 @@ impl Edit {
     /// voxels; the world cuts it.
     pub fn reach(&self) -> LatticeBox {
         // Two more units for the rounding of the distance.
-        let grow = BAND + self.roughness.map_or(0, |grain| grain.amplitude) + 2;
+        let grow = BAND + self.roughness.map_or(0, |roughness| roughness.amplitude) + 2;
         let (low, high) = self.shape.bounds();
         LatticeBox { min: (low - grow + (ONE - 1)).div_euclid(IVec3::splat(ONE)), max: (high + grow) >> 8 }
     }
@@ -180,19 +178,11 @@ impl TryFrom<&Brush> for Edit {
 impl TryFrom<Unchecked> for Edit {
     type Error = BrushError;
 
-    fn try_from(
-        Unchecked { shape, operation, roughness, tag, stroke }: Unchecked,
-    ) -> Result<Self, BrushError> {
-        let (deed, power) = operation.unlimited()?;
-        let edit = Self { shape, deed, power, roughness, tag, stroke };
+    fn try_from(of: Unchecked) -> Result<Self, BrushError> {
+        let Unchecked { shape, operation, blend, power, roughness, tag, stroke } = of;
+        let edit = Self { shape, operation, blend, power, roughness, tag, stroke };
         edit.check()?;
-        Ok(Self { roughness: roughness.filter(|grain| grain.amplitude != 0), ..edit })
-    }
-}
-
-impl From<Edit> for Unchecked {
-    fn from(Edit { shape, deed, power, roughness, tag, stroke }: Edit) -> Self {
-        Self { shape, operation: deed.limited(power), roughness, tag, stroke }
+        Ok(Self { roughness: roughness.filter(|roughness| roughness.amplitude != 0), ..edit })
     }
 }
 
@@ -268,7 +258,7 @@ mod tests {
     fn the_documented_form_is_the_form() {
         let brush = Brush::add(Shape::sphere(Vec3::new(1.0, 0.0, -2.0), 4.0), MaterialId(3));
         let edit = Edit::quantize(&brush.with_roughness(Roughness::new(0.5, 4.0, 7))).unwrap();
-        let json = r#"{"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0,"stroke":null}"#;
+        let json = r#"{"shape":{"sphere":{"center":[256,0,-512],"radius":1024}},"operation":{"add":{"material":3}},"blend":null,"power":255,"roughness":{"amplitude":128,"scale":1024,"seed":7},"tag":0,"stroke":null}"#;
         assert_eq!(serde_json::to_string(&edit).unwrap(), json);
         assert_eq!(serde_json::from_str::<Edit>(json).unwrap(), edit);
     }
@@ -278,41 +268,35 @@ mod tests {
         let image = GreyImage::from_samples(2, 2, vec![0, 1, 2, 65535]).unwrap();
         let shape = Shape::sphere(Vec3::ZERO, 2.0);
         let stamp = Stamp::new(image, Vec3::X, Vec2::new(4.0, 6.0), 3.0);
-        let fade = r#""fade":{"strength":256,"falloff":1024,"material":null}"#;
-        for (brush, form) in [
-            (Brush::dig(shape), r#""dig""#.to_string()),
-            (Brush::dig(shape).with_power(40), r#"{"limited":{"power":40,"operation":"dig"}}"#.into()),
-            (Brush::paint(shape, MaterialId(2)), r#"{"paint":{"material":2}}"#.into()),
-            (Brush::smooth(shape, 0.5), format!(r#"{{"smooth":{{{}}}}}"#, fade.replace("256", "128"))),
-            (Brush::sharpen(shape, 1.0), format!(r#"{{"sharpen":{{{fade}}}}}"#)),
+        let blend = r#"{"strength":256,"falloff":1024,"material":null}"#;
+        let stamped = r#"{"stamp":{"stamp":{"center":[256,0,0],"rotation":[0,0,0,32767],"half":[512,768],"height":768,"relief":{"width":2,"height":2,"samples":[0,1,2,65535]}}}}"#;
+        for (brush, operation, blend, power) in [
+            (Brush::dig(shape), r#""dig""#, "null", 255),
+            (Brush::dig(shape).with_power(40), r#""dig""#, "null", 40),
+            (Brush::paint(shape, MaterialId(2)), r#"{"paint":{"material":2}}"#, "null", 255),
+            (Brush::smooth(shape, 0.5), r#""smooth""#, &blend.replace("256", "128"), 255),
+            (Brush::sharpen(shape, 1.0), r#""sharpen""#, blend, 255),
             (
                 Brush::flatten(shape, Vec3::X, Vec3::Y * 5.0),
-                format!(r#"{{"flatten":{{"point":[256,0,0],"normal":[0,32767,0],{fade}}}}}"#),
+                r#"{"flatten":{"point":[256,0,0],"normal":[0,32767,0]}}"#,
+                blend,
+                255,
             ),
-            (Brush::level(shape, -2.0), format!(r#"{{"level":{{"height":-512,{fade}}}}}"#)),
+            (Brush::level(shape, -2.0), r#"{"level":{"height":-512}}"#, blend, 255),
             (
                 Brush::raise(shape, 0.5).with_material(MaterialId(9)),
-                format!(r#"{{"raise":{{"amount":128,{}}}}}"#, fade.replace("null", "9")),
+                r#"{"raise":{"amount":128}}"#,
+                &blend.replace("null", "9"),
+                255,
             ),
-            (Brush::lower(shape, 64.0), format!(r#"{{"lower":{{"amount":16384,{fade}}}}}"#)),
-            (
-                Brush::stamp(shape, stamp),
-                format!(
-                    r#"{{"stamp":{{"stamp":{{"center":[256,0,0],"rotation":[0,0,0,32767],"half":[512,768],"height":768,"relief":{{"width":2,"height":2,"samples":[0,1,2,65535]}}}},{}}}}}"#,
-                    fade.replace("1024", "256")
-                ),
-            ),
-            (
-                Brush::terrace(shape, 3.0).with_power(7),
-                format!(
-                    r#"{{"limited":{{"power":7,"operation":{{"terrace":{{"step":768,"base":0,{fade}}}}}}}}}"#
-                ),
-            ),
+            (Brush::lower(shape, 64.0), r#"{"lower":{"amount":16384}}"#, blend, 255),
+            (Brush::stamp(shape, stamp), stamped, &blend.replace("1024", "256"), 255),
+            (Brush::terrace(shape, 3.0).with_power(7), r#"{"terrace":{"step":768,"base":0}}"#, blend, 7),
         ] {
             let edit = Edit::quantize(&brush).unwrap();
             let json = serde_json::to_string(&edit).unwrap();
             let expected = format!(
-                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":512}}}},"operation":{form},"roughness":null,"tag":0,"stroke":null}}"#
+                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":512}}}},"operation":{operation},"blend":{blend},"power":{power},"roughness":null,"tag":0,"stroke":null}}"#
             );
             assert_eq!(json, expected);
             assert_eq!(serde_json::from_str::<Edit>(&json).unwrap(), edit);
@@ -341,30 +325,27 @@ mod tests {
 
     #[test]
     fn sculpting_from_outside_is_checked() {
-        let parse = |operation: &str| {
+        let parse = |operation: &str, blend: &str| {
             let json = format!(
-                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":64}}}},"operation":{operation},"roughness":null,"tag":1}}"#
+                r#"{{"shape":{{"sphere":{{"center":[0,0,0],"radius":64}}}},"operation":{operation},"blend":{blend},"power":1,"roughness":null,"tag":1,"stroke":null}}"#
             );
             serde_json::from_str::<Edit>(&json).map_err(|error| error.to_string())
         };
-        let fade = r#""fade":{"strength":256,"falloff":1024,"material":null}"#;
-        parse(&format!(r#"{{"smooth":{{{fade}}}}}"#)).unwrap();
-        for (operation, message) in [
-            (format!(r#"{{"smooth":{{{}}}}}"#, fade.replace("256", "257")), "`strength`"),
-            (format!(r#"{{"smooth":{{{}}}}}"#, fade.replace("1024", "-1")), "`falloff`"),
-            (format!(r#"{{"raise":{{"amount":-2147483648,{fade}}}}}"#), "`amount`"),
-            (format!(r#"{{"level":{{"height":2147483647,{fade}}}}}"#), "`height`"),
-            (format!(r#"{{"terrace":{{"step":0,"base":0,{fade}}}}}"#), "`step`"),
-            (format!(r#"{{"terrace":{{"step":256,"base":-2147483648,{fade}}}}}"#), "`base`"),
-            (format!(r#"{{"flatten":{{"point":[0,0,0],"normal":[0,0,0],{fade}}}}}"#), "`normal`"),
-            (format!(r#"{{"flatten":{{"point":[0,0,0],"normal":[-32768,-32768,9],{fade}}}}}"#), "`normal`"),
-            (r#"{"limited":{"power":255,"operation":"dig"}}"#.into(), "limit of power"),
-            (
-                r#"{"limited":{"power":1,"operation":{"limited":{"power":2,"operation":"dig"}}}}"#.into(),
-                "no variants",
-            ),
+        let blend = r#"{"strength":256,"falloff":1024,"material":null}"#;
+        parse(r#""smooth""#, blend).unwrap();
+        for (operation, blend, message) in [
+            (r#""smooth""#, &*blend.replace("256", "257"), "`strength`"),
+            (r#""smooth""#, &blend.replace("1024", "-1"), "`falloff`"),
+            (r#""smooth""#, "null", "a `blend` belongs"),
+            (r#""dig""#, blend, "a `blend` belongs"),
+            (r#"{"raise":{"amount":-2147483648}}"#, blend, "`amount`"),
+            (r#"{"level":{"height":2147483647}}"#, blend, "`height`"),
+            (r#"{"terrace":{"step":0,"base":0}}"#, blend, "`step`"),
+            (r#"{"terrace":{"step":256,"base":-2147483648}}"#, blend, "`base`"),
+            (r#"{"flatten":{"point":[0,0,0],"normal":[0,0,0]}}"#, blend, "`normal`"),
+            (r#"{"flatten":{"point":[0,0,0],"normal":[-32768,-32768,9]}}"#, blend, "`normal`"),
         ] {
-            let error = parse(&operation).unwrap_err();
+            let error = parse(operation, blend).unwrap_err();
             assert!(error.contains(message), "{operation}: {error}");
         }
     }
@@ -376,7 +357,10 @@ mod tests {
         let edit = Edit::quantize(&plain).unwrap();
         assert_eq!(Edit::quantize(&rough).unwrap(), edit);
         let json = serde_json::to_string(&edit).unwrap();
-        let read = |grain: &str| serde_json::from_str::<Edit>(&json.replacen("null", grain, 1));
+        let read = |roughness: &str| {
+            let field = format!(r#""roughness":{roughness}"#);
+            serde_json::from_str::<Edit>(&json.replacen(r#""roughness":null"#, &field, 1))
+        };
         assert_eq!(read(r#"{"amplitude":0,"scale":1024,"seed":7}"#).unwrap(), edit);
         assert!(read(r#"{"amplitude":0,"scale":0,"seed":7}"#).is_err());
     }
@@ -384,7 +368,9 @@ mod tests {
     #[test]
     fn edits_from_outside_are_checked() {
         let parse = |shape: &str| {
-            let json = format!(r#"{{"shape":{shape},"operation":"dig","roughness":null,"tag":1}}"#);
+            let json = format!(
+                r#"{{"shape":{shape},"operation":"dig","blend":null,"power":255,"roughness":null,"tag":1,"stroke":null}}"#
+            );
             serde_json::from_str::<Edit>(&json).map_err(|error| error.to_string())
         };
         parse(r#"{"sphere":{"center":[0,0,0],"radius":64}}"#).unwrap();

@@ -2,8 +2,6 @@
 
 use thiserror::Error;
 
-use crate::lattice::ONE;
-
 /// Why a [`Brush`](super::Brush) cannot become an [`Edit`](super::Edit). Lengths are in voxels, volumes in cubic voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -93,9 +91,11 @@ pub enum BrushError {
         /// The largest value.
         most: f32,
     },
-    /// The normal of a plane has no direction.
-    #[error("`normal` is {length} long, but it must have a direction")]
-    ZeroNormal {
+    /// A direction has no length.
+    #[error("`{what}` is {length} long, but it must have a direction")]
+    NoDirection {
+        /// The field.
+        what: &'static str,
         /// Its length.
         length: f32,
     },
@@ -121,18 +121,7 @@ pub enum BrushError {
         /// Samples given.
         actual: usize,
     },
-    /// A deserialised edit is limited to full power, which [`Edit::quantize`](super::Edit::quantize) never writes.
-    #[error("a limit of power that is none")]
-    Power,
-}
-
-/// A number rounded to 1/256, if it is within its range.
-pub(super) fn in_range(what: &'static str, value: f32, least: f32, most: f32) -> Result<i32, BrushError> {
-    if !value.is_finite() {
-        return Err(BrushError::NotFinite { what, value });
-    }
-    if value < least || value > most {
-        return Err(BrushError::OutOfBounds { what, value, least, most });
-    }
-    Ok((value * ONE as f32).round_ties_even() as i32)
+    /// The blend of a deserialised edit is missing where its operation sculpts, or given where it does not.
+    #[error("a `blend` belongs to operations that sculpt, and to no others")]
+    Blend,
 }

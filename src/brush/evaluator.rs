@@ -6,9 +6,8 @@ use glam::{I64Vec3, IVec3};
 use wide::{i16x8, i32x8};
 
 use super::BAND;
-use super::distance::{Distance, Form, larger, smaller};
-use super::quantized_shape::QuantizedShape;
 use super::roughness::QuantizedRoughness;
+use super::shapes::{Form, QuantizedShape, larger, smaller};
 use crate::lattice::{LatticeBox, ONE};
 
 /// Samples evaluated together.
@@ -30,14 +29,14 @@ pub struct Evaluator {
     home: IVec3,
     rest: IVec3,
     form: Form,
-    grain: Option<QuantizedRoughness>,
+    roughness: Option<QuantizedRoughness>,
 }
 
 impl Evaluator {
     /// The evaluator of a checked edit.
-    pub(super) fn new(solid: &QuantizedShape, grain: Option<QuantizedRoughness>) -> Self {
-        let origin = solid.origin();
-        Self { home: origin >> 8, rest: origin & 0xff, form: Form::of(solid), grain }
+    pub(super) fn new(shape: &QuantizedShape, roughness: Option<QuantizedRoughness>) -> Self {
+        let origin = shape.origin();
+        Self { home: origin >> 8, rest: origin & 0xff, form: shape.form(), roughness }
     }
 
     /// Signed distance from a lattice point to the edit's shape in 1/256 voxel: negative inside, roughness included,
@@ -57,8 +56,8 @@ impl Evaluator {
             let mut buffer = [0.0; RUN];
             let distances = &mut buffer[..run.len()];
             self.smooth(x, start, distances);
-            if let Some(grain) = &self.grain {
-                grain.add(x, start, distances);
+            if let Some(roughness) = &self.roughness {
+                roughness.add(x, start, distances);
             }
             for (out, &distance) in run.iter_mut().zip(&*distances) {
                 *out = round(distance);
@@ -71,45 +70,22 @@ impl Evaluator {
     /// tell distances apart: those with `y` and `z` in these ranges, counted from `origin`, go to `out[y * 8 + z]`;
     /// other rows stay as they are.
     pub(crate) fn rows(&self, origin: IVec3, y: Range<i32>, z: Range<i32>, out: &mut [i16x8; 64]) {
-        match &self.form {
-            Form::Sphere(sphere) => self.fill_rows(sphere, origin, y, z, out),
-            Form::Cuboid(cuboid) => self.fill_rows(cuboid, origin, y, z, out),
-            Form::Cylinder(cylinder) => self.fill_rows(cylinder, origin, y, z, out),
-            Form::Capsule(capsule) => self.fill_rows(capsule, origin, y, z, out),
-            Form::Cone(cone) => self.fill_rows(cone, origin, y, z, out),
-        }
-    }
-
-    /// Kept apart for each shape, so that the compiler vectorises its rows.
-    fn fill_rows(
-        &self,
-        shape: &impl Distance,
-        origin: IVec3,
-        y: Range<i32>,
-        z: Range<i32>,
-        out: &mut [i16x8; 64],
-    ) {
         let along = |start: i32, home: i32, rest: i32| -> [f32; 8] {
             std::array::from_fn(|i| units(i64::from(start) + i as i64, home, rest))
         };
         // Eight steps from beyond where coordinates stop count on from there, as in longer runs.
         let first = voxels(origin.x.into(), self.home.x);
-        let xs: [f32; 8] = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);
+        let xs = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);
         let ys = along(origin.y, self.home.y, self.rest.y);
         let zs = along(origin.z, self.home.z, self.rest.z);
-        for y in y {
-            for z in z.clone() {
-                let mut distances = [0.0; 8];
-                for (distance, &x) in distances.iter_mut().zip(&xs) {
-                    *distance = shape.at(x, ys[y as usize], zs[z as usize]);
-                }
-                if let Some(grain) = &self.grain {
-                    grain.add(i64::from(origin.x), origin + IVec3::new(0, y, z), &mut distances);
-                }
-                let rounded = i32x8::new(distances.map(round));
-                out[(y * 8 + z) as usize] = i16x8::from_i32x8_saturate(rounded);
+        let range = |range: Range<i32>| range.start as usize..range.end as usize;
+        self.form.rows(&[xs, ys, zs], range(y), range(z), |y, z, mut distances| {
+            if let Some(roughness) = &self.roughness {
+                let start = origin + IVec3::new(0, y as i32, z as i32);
+                roughness.add(i64::from(origin.x), start, &mut distances);
             }
-        }
+            out[y * 8 + z] = i16x8::from_i32x8_saturate(i32x8::new(distances.map(round)));
+        });
     }
 
     /// Is every sample of the box farther than [`BAND`] outside, so that the edit changes none of them (rule 6)?
@@ -127,30 +103,17 @@ impl Evaluator {
         let distance = round(distance[0]);
         // What rounding to f32 may have cost at this distance, generously.
         let rounding = 16 + (distance >> 14);
-        let amplitude = self.grain.map_or(0, |grain| grain.amplitude);
+        let amplitude = self.roughness.map_or(0, |roughness| roughness.amplitude);
         f64::from(distance - rounding) > f64::from(BAND + amplitude) + diagonal
     }
 
-    /// Distances without roughness, not rounded, for a run from (`x`, `start.y`, `start.z`) along +x.
+    /// Distances without roughness, not rounded, for a run of at most [`RUN`] from (`x`, `start.y`, `start.z`) along +x.
     fn smooth(&self, x: i64, start: IVec3, out: &mut [f32]) {
-        match &self.form {
-            Form::Sphere(sphere) => self.fill(sphere, x, start, out),
-            Form::Cuboid(cuboid) => self.fill(cuboid, x, start, out),
-            Form::Cylinder(cylinder) => self.fill(cylinder, x, start, out),
-            Form::Capsule(capsule) => self.fill(capsule, x, start, out),
-            Form::Cone(cone) => self.fill(cone, x, start, out),
-        }
-    }
-
-    /// The loop that the compiler vectorises, one for each shape. `out` holds at most [`RUN`] distances.
-    #[inline(always)]
-    fn fill(&self, shape: &impl Distance, x: i64, start: IVec3, out: &mut [f32]) {
         let first = voxels(x, self.home.x);
+        let xs: [f32; RUN] = std::array::from_fn(|i| ((first + i as i32) * ONE - self.rest.x) as f32);
         let y = units(start.y.into(), self.home.y, self.rest.y);
         let z = units(start.z.into(), self.home.z, self.rest.z);
-        for (i, out) in (0..).zip(out) {
-            *out = shape.at(((first + i) * ONE - self.rest.x) as f32, y, z);
-        }
+        self.form.run(&xs[..out.len().min(RUN)], y, z, out);
     }
 }
 
@@ -166,32 +129,32 @@ fn units(at: i64, home: i32, rest: i32) -> f32 {
     (voxels(at, home) * ONE - rest) as f32
 }
 
-/// An evaluator as plain numbers, for other machines.
+/// An evaluator as plain numbers, for the card.
 #[cfg(feature = "cuda")]
 pub(crate) struct Constants {
     /// The shape's origin in voxels, and 1/256 voxel from there.
     pub home: IVec3,
     pub rest: IVec3,
-    /// Sphere, cuboid, cylinder, capsule, cone.
+    /// Which of the shapes.
     pub kind: u32,
     /// What [`Form::constants`] says.
     pub shape: [f32; 12],
     /// Amplitude, scale and seed of roughness.
-    pub grain: Option<(i32, i32, u32)>,
+    pub roughness: Option<(i32, i32, u32)>,
 }
 
 #[cfg(feature = "cuda")]
 impl Evaluator {
     /// Is the shape rough?
     pub(crate) fn is_rough(&self) -> bool {
-        self.grain.is_some()
+        self.roughness.is_some()
     }
 
     /// All that distances are computed from.
     pub(crate) fn constants(&self) -> Constants {
         let (kind, shape) = self.form.constants();
-        let grain = self.grain.as_ref().map(QuantizedRoughness::constants);
-        Constants { home: self.home, rest: self.rest, kind, shape, grain }
+        let roughness = self.roughness.as_ref().map(QuantizedRoughness::constants);
+        Constants { home: self.home, rest: self.rest, kind, shape, roughness }
     }
 }
 
@@ -207,6 +170,15 @@ fn round(distance: f32) -> i32 {
 mod tests {
     use super::*;
     use crate::brush::Roughness;
+    use crate::brush::shapes::{Cone, Cuboid, Sphere};
+
+    fn sphere(center: [i32; 3], radius: i32) -> QuantizedShape {
+        QuantizedShape::Sphere(Sphere { center, radius })
+    }
+
+    fn cone(base: [i32; 3], axis: [i32; 3], radius: i32) -> QuantizedShape {
+        QuantizedShape::Cone(Cone { base, axis, radius })
+    }
 
     #[test]
     fn rounding_is_to_nearest_and_halves_to_even() {
@@ -230,17 +202,21 @@ mod tests {
 
     #[test]
     fn rows_of_a_brick_are_rows() {
-        for (seed, solid) in [
-            (None, QuantizedShape::Sphere { center: [900, 300, 700], radius: 600 }),
-            (Some(3), QuantizedShape::Cone { base: [1 << 10, 9, -7], axis: [-99, 5_000, 999], radius: 900 }),
+        for (seed, shape) in [
+            (None, sphere([900, 300, 700], 600)),
+            (Some(3), cone([1 << 10, 9, -7], [-99, 5_000, 999], 900)),
             (
                 Some(9),
-                QuantizedShape::Cuboid { center: [0, 0, 0], half: [900, 80, 700], rotation: [3, 5, 7, 90] },
+                QuantizedShape::Cuboid(Cuboid {
+                    center: [0, 0, 0],
+                    half: [900, 80, 700],
+                    rotation: [3, 5, 7, 90],
+                }),
             ),
         ] {
-            let grain =
+            let roughness =
                 seed.map(|seed| QuantizedRoughness::quantize(&Roughness::new(1.5, 3.0, seed)).unwrap());
-            let evaluator = Evaluator::new(&solid, grain);
+            let evaluator = Evaluator::new(&shape, roughness);
             for origin in [IVec3::new(-3, -4, 0), IVec3::new(8, 0, -8), IVec3::new(1 << 14, 0, 0)] {
                 let mut rows = [i16x8::splat(i16::MIN); 64];
                 evaluator.rows(origin, 1..7, 2..8, &mut rows);
@@ -252,7 +228,7 @@ mod tests {
                     }
                     let expected =
                         expected.map(|distance| distance.clamp(i16::MIN.into(), i16::MAX.into()) as i16);
-                    assert_eq!(row.to_array(), expected, "{solid:?} at {origin}, row {y} {z}");
+                    assert_eq!(row.to_array(), expected, "{shape:?} at {origin}, row {y} {z}");
                 }
             }
         }
@@ -260,11 +236,8 @@ mod tests {
 
     #[test]
     fn beyond_the_horizon_all_distances_are_one() {
-        for solid in [
-            QuantizedShape::Sphere { center: [-5, 300, 7], radius: 600 },
-            QuantizedShape::Cone { base: [1 << 23, 9, -7], axis: [-99, 55_000, 999], radius: 9_000 },
-        ] {
-            let evaluator = Evaluator::new(&solid, None);
+        for shape in [sphere([-5, 300, 7], 600), cone([1 << 23, 9, -7], [-99, 55_000, 999], 9_000)] {
+            let evaluator = Evaluator::new(&shape, None);
             let far = FARTHEST as i32;
             for x in [far - 40, far, -far - 40, -2 * far, i32::MIN, i32::MAX - 80] {
                 for start in [IVec3::new(x, 3, 0), IVec3::new(x, i32::MAX, i32::MIN)] {
@@ -278,7 +251,7 @@ mod tests {
 
     #[test]
     fn up_to_the_horizon_distances_are_exact() {
-        let evaluator = Evaluator::new(&QuantizedShape::Sphere { center: [0; 3], radius: 256 }, None);
+        let evaluator = Evaluator::new(&sphere([0; 3], 256), None);
         let mut row = [0; 33_000];
         evaluator.row(IVec3::new(-16_500, 0, 0), &mut row);
         for (x, distance) in (-16_500i32..).zip(row) {

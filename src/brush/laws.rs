@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3, IVec3, Quat, Vec2, Vec3};
 use proptest::prelude::*;
 use serde_json::json;
 
+use super::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere, Torus};
 use super::*;
 use crate::ground::{GreyImage, MaterialId};
 use crate::lattice::{LatticeBox, hash::mix};
@@ -32,6 +33,9 @@ fn shape(far: f32, size: f32) -> impl Strategy<Value = Shape> {
             radius
         )),
         (vector(far), axis(), radius()).prop_map(|(base, axis, radius)| Shape::cone(base, axis, radius)),
+        (vector(far), axis(), radius(), 0.0f32..1.0).prop_map(|(center, axis, radius, tube)| {
+            Shape::torus(center, axis, radius, (radius * tube).max(0.25))
+        }),
     ]
 }
 
@@ -61,12 +65,13 @@ fn wild() -> impl Strategy<Value = f32> {
 fn wild_brush() -> impl Strategy<Value = Brush> {
     let vector = || prop::array::uniform3(wild()).prop_map(Vec3::from_array);
     let turn = prop_oneof![rotation(), prop::array::uniform4(wild()).prop_map(Quat::from_array)];
-    let shape = (0..5, vector(), vector(), turn, wild()).prop_map(|(kind, a, b, turn, radius)| match kind {
+    let shape = (0..6, vector(), vector(), turn, wild()).prop_map(|(kind, a, b, turn, radius)| match kind {
         0 => Shape::sphere(a, radius),
         1 => Shape::turned_cuboid(a, b, turn),
         2 => Shape::cylinder(a, b, radius),
         3 => Shape::capsule(a, b, radius),
-        _ => Shape::cone(a, b, radius),
+        4 => Shape::cone(a, b, radius),
+        _ => Shape::torus(a, b, radius, turn.x),
     });
     let roughness = (wild(), wild(), any::<u32>()).prop_map(|(a, s, seed)| Roughness::new(a, s, seed));
     let blend = (wild(), wild(), prop::option::of(any::<u8>().prop_map(MaterialId)))
@@ -96,7 +101,8 @@ fn wild_operation() -> impl Strategy<Value = Operation> {
     let turn = prop_oneof![rotation(), prop::array::uniform4(wild()).prop_map(Quat::from_array)];
     let stamp =
         (image, vector(), turn, wild(), wild(), wild()).prop_map(|(image, center, turn, x, y, height)| {
-            Operation::Stamp(Stamp::new(image, center, Vec2::new(x, y), height).with_rotation(turn))
+            let stamp = Stamp::new(image, center, Vec2::new(x, y), height).with_rotation(turn);
+            Operation::Stamp { stamp }
         });
     prop_oneof![
         Just(Operation::Dig),
@@ -116,24 +122,30 @@ fn wild_operation() -> impl Strategy<Value = Operation> {
 /// Distance by another road: f64, polygons instead of formulas, the brush's own numbers instead of the edit's.
 fn plain_distance(shape: &Shape, p: DVec3) -> f64 {
     match *shape {
-        Shape::Sphere { center, radius } => p.distance(center.as_dvec3()) - f64::from(radius),
-        Shape::Capsule { from, to, radius } => {
+        Shape::Sphere(Sphere { center, radius }) => p.distance(center.as_dvec3()) - f64::from(radius),
+        Shape::Capsule(Capsule { from, to, radius }) => {
             to_segment(p, from.as_dvec3(), to.as_dvec3()) - f64::from(radius)
         }
-        Shape::Cuboid { center, half, rotation } => {
+        Shape::Cuboid(Cuboid { center, half, rotation }) => {
             let turn = DQuat::from_array(rotation.to_array().map(f64::from)).normalize();
             let (own, half) = (turn.inverse() * (p - center.as_dvec3()), half.as_dvec3());
             let nearest = own.clamp(-half, half);
             if nearest == own { -(half - own.abs()).min_element() } else { own.distance(nearest) }
         }
-        Shape::Cylinder { base, axis, radius } | Shape::Cone { base, axis, radius } => {
+        Shape::Torus(Torus { center, axis, radius, tube }) => {
+            // To the point of the circle that lies the way the point lies.
+            let (from, axis) = (p - center.as_dvec3(), axis.as_dvec3().normalize());
+            let way = (from - axis * from.dot(axis)).try_normalize().unwrap_or(axis.any_orthonormal_vector());
+            from.distance(way * f64::from(radius)) - f64::from(tube)
+        }
+        Shape::Cylinder(Cylinder { base, axis, radius }) | Shape::Cone(Cone { base, axis, radius }) => {
             let (base, axis, radius) = (base.as_dvec3(), axis.as_dvec3(), f64::from(radius));
             let (length, unit) = (axis.length(), axis.normalize());
             let along = (p - base).dot(unit);
             let off = (p - base).cross(unit).length();
             // The outline in the half-plane (off, along), as far as it is surface.
             let at = |x, y| DVec3::new(x, y, 0.0);
-            let is_cone = matches!(shape, Shape::Cone { .. });
+            let is_cone = matches!(shape, Shape::Cone(_));
             let outline: &[DVec3] = if is_cone {
                 &[at(0.0, 0.0), at(radius, 0.0), at(0.0, length)]
             } else {
@@ -176,11 +188,11 @@ proptest! {
         let brush = Brush { operation, roughness, ..Brush::dig(shape) }.with_tag(tag).with_power(power);
         let Ok(edit) = Edit::quantize(&brush) else { return Ok(()) };
         let again = Edit::quantize(&Brush::from(&edit)).unwrap();
-        let is_turned = matches!(edit.shape(), Shape::Cuboid { .. });
-        if !is_turned && !matches!(edit.operation(), Operation::Flatten { .. } | Operation::Stamp(_)) {
+        let is_turned = matches!(edit.shape(), Shape::Cuboid(_) | Shape::Torus(_));
+        if !is_turned && !matches!(edit.operation(), Operation::Flatten { .. } | Operation::Stamp { .. }) {
             prop_assert_eq!(&again, &edit);
         }
-        // A turned box may be rounded once more, and no further.
+        // A rotation or a direction may be rounded once more, and no further.
         let grown = |reach: LatticeBox, other: LatticeBox| {
             (reach.min - other.min).abs().max_element().max((reach.max - other.max).abs().max_element())
         };
@@ -253,16 +265,21 @@ proptest! {
         let p = IVec3::from_array(p);
         let distance = f64::from(edit(shape, None).evaluator().distance(p));
         let plain = plain_distance(&shape, p.as_dvec3()) * 256.0;
-        // Quantisation of position, axis and radius: about 1 unit each; of a rotation: 1/32767 of the box's size.
-        let turned = if let Shape::Cuboid { half, .. } = shape { f64::from(half.length()) * 256.0 / 32767.0 } else { 0.0 };
+        // Quantisation of position, axis and radius: about 1 unit each; of a rotation: 1/32767 of the shape's size.
+        let size = match shape {
+            Shape::Cuboid(Cuboid { half, .. }) => half.length(),
+            Shape::Torus(Torus { radius, .. }) => radius,
+            _ => 0.0,
+        };
+        let turned = f64::from(size) * 256.0 / 32767.0;
         prop_assert!((distance - plain).abs() < 4.0 + turned, "{} instead of {}", distance, plain);
     }
 
     #[test]
-    fn roughness_stays_in_its_amplitude(shape in shape(30.0, 20.0), grain in roughness(), p in prop::array::uniform3(-60..60)) {
+    fn roughness_stays_in_its_amplitude(shape in shape(30.0, 20.0), roughness in roughness(), p in prop::array::uniform3(-60..60)) {
         let p = IVec3::from_array(p);
-        let amplitude = grain.map_or(0.0, |grain| grain.amplitude * 256.0);
-        let change = edit(shape, grain).evaluator().distance(p) - edit(shape, None).evaluator().distance(p);
+        let amplitude = roughness.map_or(0.0, |roughness| roughness.amplitude * 256.0);
+        let change = edit(shape, roughness).evaluator().distance(p) - edit(shape, None).evaluator().distance(p);
         prop_assert!((change.abs() as f32) <= amplitude + 1.5);
     }
 
@@ -302,7 +319,7 @@ proptest! {
         }
         let _ = Edit::quantize(&brush.transformed(Quat::from_xyzw(0.6, 0.0, 0.0, 0.8), Vec3::ONE, 0.5));
         // What is written of it is the same wish, or just as bad a one.
-        let read = Brush::try_from(BrushRecord::from(&brush)).unwrap();
+        let read = Brush::try_from(line::Line::from(brush.clone())).unwrap();
         match (Edit::quantize(&read), Edit::quantize(&brush)) {
             (Ok(read), Ok(edit)) => prop_assert_eq!(read, edit),
             (read, edit) => prop_assert_eq!(format!("{read:?}"), format!("{edit:?}")),
@@ -324,12 +341,12 @@ proptest! {
             2 => (json!({"capsule": {"from": a, "to": b, "radius": 64}}), is_capsule(a, b, 64)),
             _ => (json!({"cone": {"base": a, "axis": b, "radius": 64}}), is_cone(a, b, 64)),
         };
-        let grain = json!({"amplitude": amplitude, "scale": scale, "seed": 0});
-        let edit = json!({"shape": shape, "operation": "dig", "roughness": grain, "tag": 0});
-        let is_grain = (0..=2048).contains(&amplitude) && (256..=65_536).contains(&scale);
+        let roughness = json!({"amplitude": amplitude, "scale": scale, "seed": 0});
+        let edit = json!({"shape": shape, "operation": "dig", "blend": null, "power": 255, "roughness": roughness, "tag": 0, "stroke": null});
+        let is_roughness = (0..=2048).contains(&amplitude) && (256..=65_536).contains(&scale);
         match serde_json::from_value::<Edit>(edit.clone()) {
             Ok(found) => {
-                prop_assert!(is_shape != Some(false) && is_grain, "{edit}");
+                prop_assert!(is_shape != Some(false) && is_roughness, "{edit}");
                 prop_assert_eq!(found.check(), Ok(()));
                 let [own, written] = [edit, serde_json::to_value(&found).unwrap()];
                 prop_assert_eq!(&own["shape"], &written["shape"]);
@@ -337,7 +354,7 @@ proptest! {
                 prop_assert_eq!(written["roughness"].is_null(), amplitude == 0);
             }
             Err(error) => {
-                prop_assert!(is_shape != Some(true) || !is_grain, "{edit}: {error}");
+                prop_assert!(is_shape != Some(true) || !is_roughness, "{edit}: {error}");
                 // For what they are, not for how they are written.
                 let message = error.to_string();
                 let form = ["field", "variant", "expected", "invalid"];
@@ -427,6 +444,7 @@ fn distances_derived_by_hand() {
     let (sphere, cube) = (Shape::sphere(o, 5.0), Shape::cuboid(o, Vec3::splat(2.0)));
     let (cylinder, capsule) = (Shape::cylinder(o, up, 3.0), Shape::capsule(o, up, 3.0));
     let (cone, turned) = (Shape::cone(o, up, 6.0), Shape::turned_cuboid(o, Vec3::splat(2.0), quarter));
+    let torus = Shape::torus(o, up, 6.0, 2.0);
     for (name, shape, at, distance) in [
         ("a sphere's centre is a radius deep", sphere, [0, 0, 0], -5 * 256),
         ("3-4-5 on the sphere", sphere, [3, 4, 0], 0),
@@ -451,6 +469,10 @@ fn distances_derived_by_hand() {
         ("outside the rim: 3-4-5", cone, [9, -4, 0], 5 * 256),
         ("on the axis, the base is nearer than the side", cone, [0, 3, 0], -3 * 256),
         ("off the side along its normal by 5", cone, [7, 7, 0], 5 * 256),
+        ("a ring's hole", torus, [0, 0, 0], 4 * 256),
+        ("the middle of its tube is a tube's radius deep", torus, [6, 0, 0], -2 * 256),
+        ("its inner rim", torus, [0, 0, -4], 0),
+        ("off its circle: 3-4-5", torus, [9, 4, 0], 3 * 256),
     ] {
         let at = IVec3::from_array(at);
         assert_eq!(edit(shape, None).evaluator().distance(at), distance, "{name}: {shape:?} at {at}");
@@ -473,26 +495,29 @@ fn overlapping_brushes_of_one_seed_fit_together() {
 fn distances_have_the_same_bits_everywhere() {
     let turn = Quat::from_xyzw(0.36, -0.48, 0.64, 0.48);
     let (base, axis) = (Vec3::new(-3.3, 100.7, 8.05), Vec3::new(5.5, -9.25, 17.125));
-    let mut hash = 0;
-    for (shape, amplitude) in [
+    let old = [
         Shape::sphere(base, 7.77),
         Shape::turned_cuboid(base, Vec3::new(3.0, 9.1, 5.6), turn),
         Shape::cylinder(base, axis, 4.4),
         Shape::capsule(base, base + axis, 3.9),
         Shape::cone(base, axis, 11.5),
-    ]
-    .into_iter()
-    .flat_map(|shape| [(shape, 0.0), (shape, 1.75)])
-    {
-        let edit = edit(shape, Some(Roughness::new(amplitude, 5.3, 1234)));
-        let evaluator = edit.evaluator();
-        for point in edit.reach().points() {
-            hash = mix(hash ^ u64::from(evaluator.distance(point) as u32));
+    ];
+    let hash = |shapes: &[Shape]| {
+        let mut hash = 0;
+        for (&shape, amplitude) in shapes.iter().flat_map(|shape| [(shape, 0.0), (shape, 1.75)]) {
+            let edit = edit(shape, Some(Roughness::new(amplitude, 5.3, 1234)));
+            let evaluator = edit.evaluator();
+            for point in edit.reach().points() {
+                hash = mix(hash ^ u64::from(evaluator.distance(point) as u32));
+            }
         }
-    }
+        hash
+    };
+    let hashes = [hash(&old), hash(&[Shape::torus(base, axis, 9.5, 3.3)])];
     assert_eq!(
-        hash, 0xbbb8_de26_8cf8_d229,
+        hashes,
+        [0xbbb8_de26_8cf8_d229, 0xab60_89b1_8a69_5501],
         "Distances changed. On one machine only: find what is not exactly rounded. On all: saved journals will replay \
-         to another world, so raise the format's version, then put the new hash here: {hash:#018x}"
+         to another world, so raise the format's version, then put the new hashes here: {hashes:#018x?}"
     );
 }

@@ -15,15 +15,13 @@
 //!
 //! Each wish has a twin in integers, which an [`Edit`] is made of; a game never meets those.
 //!
-//! | a wish, in floats | its twin | ready to be applied |
+//! | in a brush, floats | in an edit, integers | ready to be applied |
 //! | --- | --- | --- |
-//! | [`Brush`] | [`Edit`] | |
 //! | [`Shape`] | `QuantizedShape` | `Form`, in the [`Evaluator`] |
 //! | [`Roughness`] | `QuantizedRoughness` | the same, in the [`Evaluator`] |
 //! | [`Operation`] | `QuantizedOperation` | `Kind`, and a `SculptKernel` for those that sculpt |
-//! | [`Blend`] | `QuantizedBlend`, in the `QuantizedOperation` | |
-//! | [`Stamp`] | `QuantizedStamp`, in the `QuantizedOperation` | |
-//! | [`BrushRecord`], as it stands in a line of JSON | | |
+//! | [`Blend`] | `QuantizedBlend` | the same, in the `SculptKernel` |
+//! | [`Stamp`] | `QuantizedStamp` | the same, in the `SculptKernel` |
 //!
 //! # Limits
 //!
@@ -87,20 +85,19 @@
 //! [`LIMIT`]: crate::lattice::LIMIT
 
 mod blend;
-mod distance;
 mod edit;
 mod error;
 mod evaluator;
 #[cfg(test)]
 mod laws;
+mod line;
 mod operation;
+mod quantize;
 mod quantized_operation;
-mod quantized_shape;
-mod record;
 mod request;
 mod roughness;
 mod sculpt_kernel;
-mod shape;
+pub mod shapes;
 mod stamp;
 
 pub use blend::Blend;
@@ -109,13 +106,14 @@ pub use error::BrushError;
 pub use evaluator::Evaluator;
 pub(crate) use operation::Kind;
 pub use operation::Operation;
-pub use record::{BrushRecord, ImageRecord, OperationName, RecordError, ShapeName, StampRecord};
 pub use request::Brush;
 pub use roughness::Roughness;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::Stroke;
 pub(crate) use sculpt_kernel::{FARTHEST, SculptKernel, Stencil, is_moved};
-pub use shape::Shape;
+#[cfg(feature = "plugin")]
+pub(crate) use shapes::Extent;
+pub use shapes::Shape;
 pub use stamp::Stamp;
 
 use crate::lattice::ONE;

@@ -1,7 +1,9 @@
 //! What a brush does to the samples it reaches.
 
 use glam::{Quat, Vec3};
+use serde::{Deserialize, Serialize};
 
+use super::line::is_default;
 use super::{DEPTH, Stamp};
 use crate::ground::MaterialId;
 
@@ -10,7 +12,8 @@ use crate::ground::MaterialId;
 /// Dig, add and paint look at one sample at a time and reach [`BAND`](super::BAND) beyond their shape. All others
 /// *sculpt*: they read what lies around, fade by the brush's [`Blend`](super::Blend), and change nothing outside. Beyond the
 /// world's rim they take all to go on as it is at the rim.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "op", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Operation {
     /// Takes ground away.
@@ -68,34 +71,22 @@ pub enum Operation {
         amount: f32,
     },
     /// Gives the surface the relief of an image.
-    Stamp(Stamp),
+    Stamp {
+        /// The image, and where it lies.
+        stamp: Stamp,
+    },
     /// Cuts slopes into steps: treads at `base` and every `step` above and below it, with a riser of a quarter of the
     /// step's slope between them. More applications make risers steeper.
     Terrace {
         /// Height of a step in voxels: 1 to 256.
         step: f32,
         /// Height of one of the treads in voxels.
+        #[serde(rename = "height", default, skip_serializing_if = "is_default")]
         base: f32,
     },
 }
 
 impl Operation {
-    /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
-    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt look
-    /// at more than that: for them, it gives `before`.
-    ///
-    /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
-    /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds
-    /// ground nor an add removes it.
-    #[inline]
-    pub fn apply(&self, before: i32, outside: i32) -> i32 {
-        match self {
-            Self::Dig => Kind::Dig.apply(before, outside),
-            Self::Add { material } => Kind::Add { material: *material }.apply(before, outside),
-            _ => before,
-        }
-    }
-
     /// The material that an add or a paint brings along.
     pub fn material(&self) -> Option<MaterialId> {
         match self {
@@ -107,6 +98,18 @@ impl Operation {
     /// Does it sculpt? Only then the brush's [`Blend`](super::Blend) counts.
     pub fn is_sculpting(&self) -> bool {
         !matches!(self, Self::Dig | Self::Add { .. } | Self::Paint { .. })
+    }
+
+    /// The names of its fields in a line of JSON, beside those of the blend.
+    pub(super) fn fields(&self) -> &'static [&'static str] {
+        match self {
+            Self::Dig | Self::Add { .. } | Self::Paint { .. } | Self::Smooth | Self::Sharpen => &[],
+            Self::Flatten { .. } => &["point", "normal"],
+            Self::Level { .. } => &["height"],
+            Self::Raise { .. } | Self::Lower { .. } => &["amount"],
+            Self::Stamp { .. } => &["stamp"],
+            Self::Terrace { .. } => &["step", "height"],
+        }
     }
 
     /// The operation after every point p moved to `turn * (p * scale) + shift`. Heights follow along y.
@@ -121,13 +124,15 @@ impl Operation {
             Self::Raise { amount } => Self::Raise { amount: amount * scale },
             Self::Lower { amount } => Self::Lower { amount: amount * scale },
             Self::Terrace { step, base } => Self::Terrace { step: step * scale, base: height(*base) },
-            Self::Stamp(stamp) => Self::Stamp(Stamp {
-                center: point(stamp.center),
-                rotation: turn * stamp.rotation,
-                size: stamp.size * scale,
-                height: stamp.height * scale,
-                ..stamp.clone()
-            }),
+            Self::Stamp { stamp } => Self::Stamp {
+                stamp: Stamp {
+                    center: point(stamp.center),
+                    rotation: turn * stamp.rotation,
+                    size: stamp.size * scale,
+                    height: stamp.height * scale,
+                    ..stamp.clone()
+                },
+            },
             same => same.clone(),
         }
     }
@@ -143,7 +148,13 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// What [`Operation::apply`] gives.
+    /// The density of a sample after a dig, an add or a paint, from its density `before` and its signed distance to the
+    /// shape, `outside`. All in 1/256 voxel, negative is solid, and inside for the distance. Operations that sculpt look
+    /// at more than that: for them, it gives `before`.
+    ///
+    /// A shape counts as [`DEPTH`] deep at most: beyond, no surface shows the difference, and the middle of a large
+    /// cave or hill is all one number. Applying an operation twice is the same as once, and neither a dig ever adds
+    /// ground nor an add removes it.
     #[inline]
     pub fn apply(self, before: i32, outside: i32) -> i32 {
         let outside = outside.max(-DEPTH);
@@ -169,8 +180,8 @@ mod tests {
 
     #[test]
     fn dig_takes_away_add_fills_paint_leaves() {
-        let (add, paint) =
-            (Operation::Add { material: MaterialId(3) }, Operation::Paint { material: MaterialId(3) });
+        let (dig, add, paint) =
+            (Kind::Dig, Kind::Add { material: MaterialId(3) }, Kind::Paint { material: MaterialId(3) });
         // (before, outside, dig, add)
         for (before, outside, dug, added) in [
             (-300, -100, 100, -300), // solid, inside
@@ -181,10 +192,10 @@ mod tests {
             (0, i32::MIN, DEPTH, -DEPTH),
             (2 * DEPTH, -3 * DEPTH, 2 * DEPTH, -DEPTH), // deep inside: less than what was there
         ] {
-            assert_eq!(Operation::Dig.apply(before, outside), dug);
+            assert_eq!(dig.apply(before, outside), dug);
             assert_eq!(add.apply(before, outside), added);
             assert_eq!(paint.apply(before, outside), before);
-            for operation in [&Operation::Dig, &add, &paint] {
+            for operation in [dig, add, paint] {
                 let once = operation.apply(before, outside);
                 assert_eq!(operation.apply(once, outside), once);
             }

@@ -1,7 +1,9 @@
 //! The brush: what a game asks for.
 
 use glam::{Quat, Vec3};
+use serde::{Deserialize, Serialize};
 
+use super::line::Line;
 use super::{Blend, FULL_POWER, Operation, Roughness, Shape, Stamp};
 use crate::ground::MaterialId;
 
@@ -9,7 +11,25 @@ use crate::ground::MaterialId;
 /// and its units, metres: each terrain takes it into its own.
 ///
 /// Nothing is checked here: [`Edit::quantize`](super::Edit::quantize) does, and says what is wrong.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// # Lines of JSON
+///
+/// A brush is written as one flat object:
+///
+/// ```json
+/// {"shape":"sphere","center":[8,0,8],"radius":4,"op":"dig"}
+/// {"shape":"box","center":[8,0,8],"half":[2,3,2],"rotation":[0,0,0,1],"op":"add","material":3,"tag":7}
+/// {"shape":"cone","base":[0,0,0],"axis":[0,9,0],"radius":4,"op":"paint","material":1,
+///  "roughness":{"amplitude":1,"scale":6,"seed":5}}
+/// {"shape":"sphere","center":[8,0,8],"radius":6,"op":"flatten","point":[8,0,8],"normal":[0,1,0.2],"falloff":2}
+/// {"shape":"sphere","center":[8,0,8],"radius":6,"op":"smooth","strength":0.5}
+/// ```
+///
+/// The fields are those of its [`Shape`] (a cuboid is a `box`), those of its [`Operation`] (the base of a terrace is its
+/// `height`), and for operations that sculpt those of the [`Blend`]. Fields of the blend, `rotation`, `roughness`, `power`, `tag` and
+/// `stroke` may be left out; other fields are refused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Line", into = "Line")]
 pub struct Brush {
     /// Where.
     pub shape: Shape,
@@ -46,7 +66,7 @@ impl Brush {
     /// The brush of an operation, as the functions below make it.
     pub(super) fn plain(shape: Shape, operation: Operation) -> Self {
         match operation {
-            Operation::Stamp(stamp) => Self::stamp(shape, stamp),
+            Operation::Stamp { stamp } => Self::stamp(shape, stamp),
             operation => Self::new(shape, operation),
         }
     }
@@ -100,7 +120,7 @@ impl Brush {
     /// A brush that gives the ground in its shape the relief of an image. It fades over a single voxel at the rim of the
     /// image and of the shape, unless told otherwise.
     pub fn stamp(shape: Shape, stamp: Stamp) -> Self {
-        Self::new(shape, Operation::Stamp(stamp)).with_falloff(1.0)
+        Self::new(shape, Operation::Stamp { stamp }).with_falloff(1.0)
     }
 
     /// A brush that cuts slopes into steps of a height, with a tread at height 0.
@@ -177,6 +197,7 @@ impl Brush {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brush::shapes::Cone;
 
     #[test]
     fn a_brush_can_be_a_message() {
@@ -191,7 +212,7 @@ mod tests {
             .with_tag(7)
             .with_roughness(Roughness::new(1.0, 4.0, 9));
         let moved = brush.transformed(turn, Vec3::splat(10.0), 2.0);
-        let Shape::Cone { base, axis, radius } = moved.shape else { panic!("still a cone") };
+        let Shape::Cone(Cone { base, axis, radius }) = moved.shape else { panic!("still a cone") };
         assert!(base.abs_diff_eq(Vec3::new(10.0, 12.0, 10.0), 1e-5), "{base}");
         assert!(axis.abs_diff_eq(Vec3::new(0.0, 2.0, 0.0), 1e-5), "{axis}");
         assert_eq!((radius, moved.tag), (6.0, 7));

@@ -4,6 +4,7 @@ use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
 use super::BrushError;
+use super::quantize::voxels;
 use crate::lattice::{ONE, hash::mix};
 
 /// Bumps added to a shape's signed distance: smooth noise in +-`amplitude`.
@@ -53,7 +54,6 @@ impl QuantizedRoughness {
 
     /// As a brush has it.
     pub(super) fn roughness(&self) -> Roughness {
-        let voxels = |units: i32| units as f32 / ONE as f32;
         Roughness::new(voxels(self.amplitude), voxels(self.scale), self.seed)
     }
 
@@ -68,7 +68,7 @@ impl QuantizedRoughness {
             [("amplitude", self.amplitude, AMPLITUDES), ("scale", self.scale, SCALES)]
         {
             if value < least || value > most {
-                return Err(out_of_range(what, value as f32 / ONE as f32, (least, most)));
+                return Err(out_of_range(what, voxels(value), (least, most)));
             }
         }
         Ok(())
@@ -132,7 +132,6 @@ fn units(what: &'static str, value: f32, range: (i32, i32)) -> Result<i32, Brush
 }
 
 fn out_of_range(what: &'static str, value: f32, (least, most): (i32, i32)) -> BrushError {
-    let voxels = |units: i32| units as f32 / ONE as f32;
     BrushError::Roughness { what, value, least: voxels(least), most: voxels(most) }
 }
 
@@ -140,18 +139,18 @@ fn out_of_range(what: &'static str, value: f32, (least, most): (i32, i32)) -> Br
 mod tests {
     use super::*;
 
-    fn noise(grain: &QuantizedRoughness, p: IVec3) -> f32 {
+    fn noise(roughness: &QuantizedRoughness, p: IVec3) -> f32 {
         let mut out = [0.0];
-        grain.add(i64::from(p.x), p, &mut out);
+        roughness.add(i64::from(p.x), p, &mut out);
         out[0]
     }
 
     #[test]
     fn noise_fills_its_range_and_stays_in_it() {
-        let grain = QuantizedRoughness::quantize(&Roughness::new(2.0, 3.5, 11)).unwrap();
+        let roughness = QuantizedRoughness::quantize(&Roughness::new(2.0, 3.5, 11)).unwrap();
         let (mut low, mut high, mut sum) = (0.0f32, 0.0f32, 0.0f64);
         for i in 0..20_000 {
-            let value = noise(&grain, IVec3::new(i % 41 - 20, i / 41 % 37 - 15, i / 1517 - 7));
+            let value = noise(&roughness, IVec3::new(i % 41 - 20, i / 41 % 37 - 15, i / 1517 - 7));
             (low, high, sum) = (low.min(value), high.max(value), sum + f64::from(value));
         }
         assert!((-512.0..-400.0).contains(&low) && high > 400.0 && high <= 512.0, "{low} {high}");
@@ -160,12 +159,12 @@ mod tests {
 
     #[test]
     fn noise_points_carry_their_hash_and_seeds_differ() {
-        let grain = QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 1)).unwrap();
+        let roughness = QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 1)).unwrap();
         let other = QuantizedRoughness::quantize(&Roughness::new(1.0, 4.0, 2)).unwrap();
         for (cell, point) in [(0, 0), (1, 4), (-1, -4)] {
             let p = IVec3::new(point, 0, point);
-            assert_eq!(noise(&grain, p), grain.corner(cell, 0, cell) * 256.0);
-            assert_ne!(noise(&grain, p), noise(&other, p));
+            assert_eq!(noise(&roughness, p), roughness.corner(cell, 0, cell) * 256.0);
+            assert_ne!(noise(&roughness, p), noise(&other, p));
         }
     }
 

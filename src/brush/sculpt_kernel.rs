@@ -22,9 +22,9 @@ use glam::IVec3;
 use super::DEPTH;
 use super::blend::QuantizedBlend;
 use super::quantized_operation::{QuantizedOperation, above_plane};
-use super::quantized_shape::QuantizedShape;
+use super::shapes::QuantizedShape;
 #[cfg(feature = "cuda")]
-use super::{quantized_operation::length, stamp::StampParams};
+use super::{quantize::measure, stamp::StampParams};
 use crate::ground::MaterialId;
 use crate::lattice::ONE;
 
@@ -186,26 +186,25 @@ impl Stencil {
 /// An edit that sculpts, ready to be applied.
 #[derive(Clone, Debug)]
 pub(crate) struct SculptKernel {
-    deed: QuantizedOperation,
-    fade: QuantizedBlend,
+    operation: QuantizedOperation,
+    blend: QuantizedBlend,
     /// How deep the shape is in its middle.
     deep: i32,
 }
 
 impl SculptKernel {
-    /// The sculptor of a checked deed, if it sculpts.
-    pub(super) fn of(deed: &QuantizedOperation, shape: &QuantizedShape) -> Option<Self> {
-        let fade = deed.fade()?;
-        let deep = match deed {
-            QuantizedOperation::Stamp { stamp, .. } => shape.deepest().min(stamp.deep()),
+    /// The kernel of a checked operation.
+    pub(super) fn new(operation: &QuantizedOperation, blend: QuantizedBlend, shape: &QuantizedShape) -> Self {
+        let deep = match operation {
+            QuantizedOperation::Stamp { stamp } => shape.deepest().min(stamp.deep()),
             _ => shape.deepest(),
         };
-        Some(Self { deed: deed.clone(), fade, deep })
+        Self { operation: operation.clone(), blend, deep }
     }
 
     /// What new ground is made of, if the operation says so.
     pub fn material(&self) -> Option<MaterialId> {
-        self.fade.material
+        self.blend.material
     }
 
     /// The density at a lattice point after the operation, from its distance to the shape and from what is around; `None`
@@ -215,17 +214,17 @@ impl SculptKernel {
             return None;
         }
         let mut outside = outside;
-        let target = match &self.deed {
-            QuantizedOperation::Flatten { point, normal, .. } => Some(above_plane(at, *point, *normal)),
-            QuantizedOperation::Level { height, .. } => Some(at.y * ONE - height),
-            QuantizedOperation::Stamp { stamp, .. } => {
+        let target = match &self.operation {
+            QuantizedOperation::Flatten { point, normal } => Some(above_plane(at, *point, *normal)),
+            QuantizedOperation::Level { height } => Some(at.y * ONE - height),
+            QuantizedOperation::Stamp { stamp } => {
                 let (beside, above) = stamp.at(at);
                 outside = outside.max(beside);
                 Some(above)
             }
             _ => None,
         };
-        let weight = self.fade.weight(outside, self.deep);
+        let weight = self.blend.weight(outside, self.deep);
         if weight == 0 {
             return None;
         }
@@ -234,24 +233,24 @@ impl SculptKernel {
         if let Some(target) = target {
             return Some(own + part(i64::from(target) - i64::from(own), weight));
         }
-        match &self.deed {
-            QuantizedOperation::Raise { amount, .. } => return around.shifted(-amount, weight),
-            QuantizedOperation::Lower { amount, .. } => return around.shifted(*amount, weight),
+        match &self.operation {
+            QuantizedOperation::Raise { amount } => return around.shifted(-amount, weight),
+            QuantizedOperation::Lower { amount } => return around.shifted(*amount, weight),
             _ => {}
         }
         let middle = around.middle()?;
-        match &self.deed {
-            QuantizedOperation::Smooth { .. } => {
+        match &self.operation {
+            QuantizedOperation::Smooth => {
                 let by = around.way_to_average(middle) * weight / (64 * ONE);
                 (by != 0).then(|| around.attached(middle + by))
             }
-            QuantizedOperation::Sharpen { .. } => {
+            QuantizedOperation::Sharpen => {
                 let by = (around.way_to_average(middle) * weight / (64 * ONE)).clamp(-SHARPER, SHARPER);
                 let all = &around.densities;
                 let (low, high) = all.iter().fold((own, own), |(low, high), &d| (low.min(d), high.max(d)));
                 (by != 0).then(|| around.attached((middle - by).clamp(low, high)))
             }
-            QuantizedOperation::Terrace { step, base, .. } => {
+            QuantizedOperation::Terrace { step, base } => {
                 let surface = at.y * ONE - middle;
                 let by = part(i64::from(surface) - i64::from(terraced(surface - base, *step) + base), weight);
                 (by != 0).then_some(middle + by)
@@ -290,23 +289,22 @@ pub(crate) enum Stroke<'a> {
 impl SculptKernel {
     /// All that densities are computed from; `None` for what is no sculptor's deed.
     pub(crate) fn constants(&self) -> Option<SculptParams<'_>> {
-        let stroke = match &self.deed {
-            QuantizedOperation::Smooth { .. } => Stroke::Smooth,
-            QuantizedOperation::Sharpen { .. } => Stroke::Sharpen,
-            QuantizedOperation::Flatten { point, normal, .. } => {
-                Stroke::Flatten(*point, *normal, length(*normal))
+        let stroke = match &self.operation {
+            QuantizedOperation::Smooth => Stroke::Smooth,
+            QuantizedOperation::Sharpen => Stroke::Sharpen,
+            QuantizedOperation::Flatten { point, normal } => {
+                Stroke::Flatten(*point, *normal, measure(normal.map(i32::from)))
             }
-            QuantizedOperation::Level { height, .. } => Stroke::Level(*height),
-            QuantizedOperation::Raise { amount, .. } => Stroke::Shift(-amount),
-            QuantizedOperation::Lower { amount, .. } => Stroke::Shift(*amount),
-            QuantizedOperation::Stamp { stamp, .. } => Stroke::Stamp(stamp.constants()),
-            QuantizedOperation::Terrace { step, base, .. } => Stroke::Terrace(*step, *base),
+            QuantizedOperation::Level { height } => Stroke::Level(*height),
+            QuantizedOperation::Raise { amount } => Stroke::Shift(-amount),
+            QuantizedOperation::Lower { amount } => Stroke::Shift(*amount),
+            QuantizedOperation::Stamp { stamp } => Stroke::Stamp(stamp.constants()),
+            QuantizedOperation::Terrace { step, base } => Stroke::Terrace(*step, *base),
             QuantizedOperation::Dig | QuantizedOperation::Add { .. } | QuantizedOperation::Paint { .. } => {
                 return None;
             }
-            QuantizedOperation::Limited(never) => match *never {},
         };
-        let QuantizedBlend { strength, falloff, material } = self.fade;
+        let QuantizedBlend { strength, falloff, material } = self.blend;
         Some(SculptParams { strength, falloff: falloff.min(self.deep), material, stroke })
     }
 }

@@ -7,8 +7,11 @@ use glam::{IVec3, Quat, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::BrushError;
-use super::error::in_range;
-use super::quantized_shape::{check_point, check_size, check_turn, matrix, point, size, turn};
+use super::line::is_default;
+use super::quantize::{
+    check_point, check_size, check_turn, in_range, matrix, point, restored_point, restored_turn, size, turn,
+    voxels,
+};
 use crate::ground::GreyImage;
 use crate::lattice::ONE;
 
@@ -19,13 +22,16 @@ use crate::lattice::ONE;
 ///
 /// The surface is the image, interpolated linearly between its samples, to within 1/8 voxel in each lattice column that
 /// the brush covers with full weight: heights are rounded to 1/256 voxel, and the rest is marching cubes between voxels.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Stamp {
     /// The image, 2 to 256 samples a side.
+    #[serde(with = "image")]
     pub image: Arc<GreyImage>,
     /// Where the middle of the image lies.
     pub center: Vec3,
-    /// From the stamp's axes to those of the terrain; of length 1.
+    /// From the stamp's axes to those of the terrain; of length 1. It may be left out in a line of JSON.
+    #[serde(default, skip_serializing_if = "is_default")]
     pub rotation: Quat,
     /// The image's sides in voxels, along its columns and its rows. Nothing changes beside the image.
     pub size: Vec2,
@@ -66,33 +72,35 @@ const HALF: &str = "half the stamp size";
 
 /// The samples of an image of an allowed size.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(try_from = "Samples", into = "Samples")]
-pub(super) struct Relief(Arc<GreyImage>);
+#[serde(transparent)]
+pub(super) struct Relief(#[serde(with = "image")] Arc<GreyImage>);
 
-/// A relief as it comes from a file or a network.
-#[derive(Serialize, Deserialize)]
-#[serde(rename = "Relief", deny_unknown_fields)]
-struct Samples {
-    width: u32,
-    height: u32,
-    samples: Vec<u16>,
-}
+/// An image as an object: `width`, `height`, and `samples` from 0 to 65535, row by row.
+mod image {
+    use super::{Arc, BrushError, Deserialize, GreyImage, Serialize};
 
-impl TryFrom<Samples> for Relief {
-    type Error = BrushError;
-
-    fn try_from(Samples { width, height, samples }: Samples) -> Result<Self, BrushError> {
-        check_sides(width, height)?;
-        let actual = samples.len();
-        let image = GreyImage::from_samples(width, height, samples)
-            .map_err(|_| BrushError::StampSamples { width, height, actual })?;
-        Ok(Self(image.into()))
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename = "Image", deny_unknown_fields)]
+    struct Image {
+        width: u32,
+        height: u32,
+        samples: Vec<u16>,
     }
-}
 
-impl From<Relief> for Samples {
-    fn from(Relief(image): Relief) -> Self {
-        Self { width: image.width(), height: image.height(), samples: image.samples().to_vec() }
+    pub fn serialize<S: serde::Serializer>(image: &GreyImage, to: S) -> Result<S::Ok, S::Error> {
+        let (width, height) = (image.width(), image.height());
+        Image { width, height, samples: image.samples().to_vec() }.serialize(to)
+    }
+
+    pub fn deserialize<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Arc<GreyImage>, D::Error> {
+        let Image { width, height, samples } = Image::deserialize(from)?;
+        let actual = samples.len();
+        let image = GreyImage::from_samples(width, height, samples).map_err(|_| BrushError::StampSamples {
+            width,
+            height,
+            actual,
+        });
+        image.map(Arc::new).map_err(serde::de::Error::custom)
     }
 }
 
@@ -156,22 +164,22 @@ impl QuantizedStamp {
     }
 
     pub fn check(&self) -> Result<(), BrushError> {
+        check_sides(self.relief.0.width(), self.relief.0.height())?;
         check_point("stamp center", self.center)?;
         check_turn(self.rotation)?;
         self.half.into_iter().try_for_each(|half| check_size(HALF, half))?;
-        in_range("stamp height", self.height as f32 / ONE as f32, -HEIGHT, HEIGHT)?;
+        in_range("stamp height", voxels(self.height), -HEIGHT, HEIGHT)?;
         Ok(())
     }
 
     /// The brush's own numbers again.
     pub fn stamp(&self) -> Stamp {
-        let units = |value: i32| value as f32 / ONE as f32;
         Stamp {
             image: Arc::clone(&self.relief.0),
-            center: Vec3::from_array(self.center.map(units)),
-            rotation: Quat::from_array(self.rotation.map(f32::from)).normalize(),
-            size: 2.0 * Vec2::from_array(self.half.map(units)),
-            height: units(self.height),
+            center: restored_point(self.center),
+            rotation: restored_turn(self.rotation),
+            size: 2.0 * Vec2::from_array(self.half.map(voxels)),
+            height: voxels(self.height),
         }
     }
 
@@ -200,7 +208,7 @@ impl QuantizedStamp {
     }
 }
 
-/// A press as plain numbers, for other machines.
+/// A stamp as plain numbers, for the card.
 #[cfg(feature = "cuda")]
 pub(crate) struct StampParams<'a> {
     pub center: [i32; 3],
@@ -234,15 +242,15 @@ mod tests {
 
     #[test]
     fn a_ramp_rises_along_its_columns() {
-        let press = QuantizedStamp::quantize(&ramp()).unwrap();
+        let quantized = QuantizedStamp::quantize(&ramp()).unwrap();
         for (x, height) in [(7, 0), (8, 128), (10, 384), (12, 640), (13, 768)] {
             for z in [16, 20, 24] {
-                let (beside, above) = press.at(IVec3::new(x, 5, z));
+                let (beside, above) = quantized.at(IVec3::new(x, 5, z));
                 assert!(beside <= 0 && (above + height).abs() <= 1, "{x} {z}: {above}");
             }
         }
-        assert_eq!(press.at(IVec3::new(15, 5, 20)).0, 512);
-        assert_eq!(press.at(IVec3::new(10, 5, 25)).0, 256);
+        assert_eq!(quantized.at(IVec3::new(15, 5, 20)).0, 512);
+        assert_eq!(quantized.at(IVec3::new(10, 5, 25)).0, 256);
     }
 
     #[test]
@@ -255,9 +263,9 @@ mod tests {
 
     #[test]
     fn a_stamp_on_a_wall_looks_along_its_normal() {
-        let press = QuantizedStamp::quantize(&ramp().onto(Vec3::X)).unwrap();
-        let middle = press.at(IVec3::new(10, 5, 20)).1;
-        assert_eq!(press.at(IVec3::new(12, 5, 20)).1, middle + 512);
+        let quantized = QuantizedStamp::quantize(&ramp().onto(Vec3::X)).unwrap();
+        let middle = quantized.at(IVec3::new(10, 5, 20)).1;
+        assert_eq!(quantized.at(IVec3::new(12, 5, 20)).1, middle + 512);
     }
 
     #[test]
@@ -265,8 +273,8 @@ mod tests {
         let stamp = ramp();
         assert_eq!(QuantizedStamp::quantize(&stamp).unwrap().stamp(), stamp);
         let turned = ramp().onto(Vec3::new(0.3, 0.9, -0.2));
-        let press = QuantizedStamp::quantize(&turned).unwrap();
-        assert_eq!(QuantizedStamp::quantize(&press.stamp()).unwrap(), press);
+        let quantized = QuantizedStamp::quantize(&turned).unwrap();
+        assert_eq!(QuantizedStamp::quantize(&quantized.stamp()).unwrap(), quantized);
     }
 
     #[test]
@@ -287,13 +295,13 @@ mod tests {
             let error = QuantizedStamp::quantize(&Stamp { image: image.into(), ..ramp() }).unwrap_err();
             assert!(matches!(error, BrushError::StampSize { .. }), "{error}");
         }
-        let press = QuantizedStamp::quantize(&ramp()).unwrap();
-        let json = serde_json::to_string(&press).unwrap();
-        assert_eq!(serde_json::from_str::<QuantizedStamp>(&json).unwrap(), press);
+        let quantized = QuantizedStamp::quantize(&ramp()).unwrap();
+        let json = serde_json::to_string(&quantized).unwrap();
+        assert_eq!(serde_json::from_str::<QuantizedStamp>(&json).unwrap(), quantized);
         for (from, to, message) in [
             (r#""width":4"#, r#""width":5"#, "takes 15 samples, but 12"),
-            (r#""width":4"#, r#""width":4000000000"#, "2 to 256"),
-            (r#""width":4"#, r#""width":0"#, "2 to 256"),
+            (r#""width":4"#, r#""width":4000000000"#, "takes 12000000000 samples, but 12"),
+            (r#""width":4"#, r#""width":0"#, "takes 0 samples, but 12"),
         ] {
             let error =
                 serde_json::from_str::<QuantizedStamp>(&json.replace(from, to)).unwrap_err().to_string();

@@ -1,6 +1,7 @@
 //! The left column: operation, shape, sizes, material, surface of the brush.
 
-use bevy_egui::egui::{self, Color32, CornerRadius, Pos2, Rect, Shape, Stroke, StrokeKind, Ui, Vec2};
+use bevy::math::{EulerRot, Quat, Vec3};
+use bevy_egui::egui::{self, Color32, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
 use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP};
 use super::operations::{Need, OPERATIONS};
@@ -80,9 +81,10 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
 }
 
 fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
-    let names = ToolShape::ALL.map(ToolShape::name);
+    let names = ToolShape::ALL.map(|shape| format!("{shape:?}"));
+    let names = names.each_ref().map(String::as_str);
     let chosen = ToolShape::ALL.iter().position(|&shape| shape == tool.shape).unwrap_or_default();
-    let clicked = tiles(ui, 5, &names, chosen, |ui, at, rect, color| {
+    let clicked = tiles(ui, ToolShape::ALL.len(), &names, chosen, |ui, at, rect, color| {
         let color = if at == chosen { ACCENT } else { color };
         if let Some(&shape) = ToolShape::ALL.get(at) {
             draw_shape(ui, shape, rect, Stroke::new(1.5, color));
@@ -99,6 +101,9 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
         slider(ui, "Turn", &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
     } else {
         slider(ui, "Radius", &mut tool.radius, radii, length);
+    }
+    if tool.shape == ToolShape::Torus {
+        slider(ui, "Tube", &mut tool.tube, 0.05..=1.0, percent);
     }
     if tool.shape.is_long() {
         slider(ui, "Length", &mut tool.length, LENGTH.range(voxel), length);
@@ -137,44 +142,18 @@ fn surface(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     }
 }
 
-/// A drawing of a shape in the middle of a rectangle.
+/// Draws a shape in the middle of a rectangle: its outline, seen from the front and a little above.
 fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
-    let (painter, middle, r) = (ui.painter(), rect.center(), rect.height() / 2.0);
-    let at = |x: f32, y: f32| middle + Vec2::new(x, y) * r;
-    let ellipse = |y: f32, width: f32| {
-        let points = (0..24).map(|step| {
-            let (sin, cos) = (step as f32 / 24.0 * std::f32::consts::TAU).sin_cos();
-            at(width * cos, y + 0.3 * width * sin)
-        });
-        Shape::closed_line(points.collect(), stroke)
+    let tool = BrushTool { shape, radius: 0.8, half: Vec3::splat(0.7), length: 1.6, ..BrushTool::default() };
+    let tool =
+        if shape == ToolShape::Capsule { BrushTool { radius: 0.5, length: 0.9, ..tool } } else { tool };
+    let tilt = Quat::from_euler(EulerRot::XYZ, 0.4, 0.5, 0.0);
+    let at = |point: Vec3| {
+        let Vec3 { x, y, .. } = tilt * point;
+        rect.center() + Vec2::new(x, -y) * rect.height() / 2.0
     };
-    match shape {
-        ToolShape::Sphere => {
-            painter.circle_stroke(middle, r, stroke);
-            painter.add(ellipse(0.0, 1.0));
-        }
-        ToolShape::Box => {
-            let front = Rect::from_min_max(at(-0.9, -0.45), at(0.45, 0.95));
-            painter.rect_stroke(front, CornerRadius::ZERO, stroke, StrokeKind::Middle);
-            painter.line(vec![at(-0.9, -0.45), at(-0.45, -0.95), at(0.9, -0.95), at(0.45, -0.45)], stroke);
-            painter.line(vec![at(0.9, -0.95), at(0.9, 0.5), at(0.45, 0.95)], stroke);
-        }
-        ToolShape::Cylinder => {
-            painter.add(ellipse(-0.72, 0.8));
-            let half = (0..=12).map(|step| {
-                let (sin, cos) = (step as f32 / 12.0 * std::f32::consts::PI).sin_cos();
-                at(0.8 * cos, 0.72 + 0.24 * sin)
-            });
-            let sides = [at(0.8, -0.72)].into_iter().chain(half).chain([at(-0.8, -0.72)]);
-            painter.line(sides.collect(), stroke);
-        }
-        ToolShape::Capsule => {
-            let body = Rect::from_center_size(middle, Vec2::new(1.1, 2.0) * r);
-            painter.rect_stroke(body, CornerRadius::same((0.55 * r) as u8), stroke, StrokeKind::Middle);
-        }
-        ToolShape::Cone => {
-            painter.add(ellipse(0.7, 0.9));
-            painter.line(vec![at(-0.9, 0.7), at(0.0, -1.0), at(0.9, 0.7)], stroke);
-        }
-    }
+    let outline = |from, to| {
+        ui.painter().line_segment([at(from), at(to)], stroke);
+    };
+    tool.shape_around(Vec3::ZERO, Vec3::Y).outline(outline);
 }

@@ -118,9 +118,9 @@ fn stamp(tool: &BrushTool, hit: &TerrainHit) -> Operation {
     let (size, turn) = (Vec2::splat(2.0 * tool.width()), Quat::from_rotation_y(tool.turn.to_radians()));
     let tilt = Quat::from_rotation_arc(Vec3::Y, tool.axis(hit));
     match tool.stamp.image() {
-        Some(image) => {
-            Operation::Stamp(Stamp::new(image, hit.position, size, tool.amount).with_rotation(tilt * turn))
-        }
+        Some(image) => Operation::Stamp {
+            stamp: Stamp::new(image, hit.position, size, tool.amount).with_rotation(tilt * turn),
+        },
         None => Operation::Raise { amount: tool.amount },
     }
 }

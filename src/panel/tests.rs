@@ -156,7 +156,7 @@ fn tiles_and_sliders_set_the_brush() {
         assert_eq!(screen.tool.operation, operation);
     }
     for shape in ToolShape::ALL {
-        let at = screen.middle(shape.name());
+        let at = screen.middle(&format!("{shape:?}"));
         screen.click(at);
         assert_eq!(screen.tool.shape, shape);
     }

@@ -30,8 +30,10 @@ pub struct BrushTool {
     pub operation: ToolOperation,
     /// Its form.
     pub shape: ToolShape,
-    /// Of spheres, cylinders, capsules and cones.
+    /// Of all shapes but boxes; of a ring, from its middle to that of its tube.
     pub radius: f32,
+    /// Radius of a ring's tube, as a part of the ring's radius.
+    pub tube: f32,
     /// Half the sides of a box.
     pub half: Vec3,
     /// Of cylinders and cones; of capsules between the middles of their round ends.
@@ -79,6 +81,7 @@ impl Default for BrushTool {
             operation: ToolOperation::Dig,
             shape: ToolShape::Sphere,
             radius: 4.0,
+            tube: 0.3,
             half: Vec3::splat(4.0),
             length: 8.0,
             align: ToolAlign::Upright,
@@ -160,6 +163,8 @@ pub enum ToolShape {
     Capsule,
     /// A cone on its base.
     Cone,
+    /// A ring.
+    Torus,
 }
 
 /// Where the axis of a [`BrushTool`] points.
@@ -175,20 +180,10 @@ pub enum ToolAlign {
 
 impl ToolShape {
     /// All of them, in the panel's order.
-    pub const ALL: [Self; 5] = [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone];
+    pub const ALL: [Self; 6] =
+        [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone, Self::Torus];
 
-    /// Its name on the panel.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sphere => "Sphere",
-            Self::Box => "Box",
-            Self::Cylinder => "Cylinder",
-            Self::Capsule => "Capsule",
-            Self::Cone => "Cone",
-        }
-    }
-
-    /// Has it a length?
+    /// Does it have a length?
     pub fn is_long(self) -> bool {
         matches!(self, Self::Cylinder | Self::Capsule | Self::Cone)
     }
@@ -212,7 +207,11 @@ impl BrushTool {
     /// The shape of that brush alone: for a preview.
     pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
         let axis = self.axis(hit);
-        let middle = hit.position - axis * self.sink * self.reach();
+        self.shape_around(hit.position - axis * self.sink * self.reach(), axis)
+    }
+
+    /// The shape around its middle.
+    pub(super) fn shape_around(&self, middle: Vec3, axis: Vec3) -> Shape {
         let end = middle - axis * self.length / 2.0;
         match self.shape {
             ToolShape::Sphere => Shape::sphere(middle, self.radius),
@@ -223,6 +222,7 @@ impl BrushTool {
             ToolShape::Cylinder => Shape::cylinder(end, axis * self.length, self.radius),
             ToolShape::Capsule => Shape::capsule(end, end + axis * self.length, self.radius),
             ToolShape::Cone => Shape::cone(end, axis * self.length, self.radius),
+            ToolShape::Torus => Shape::torus(middle, axis, self.radius, self.radius * self.tube),
         }
     }
 
@@ -256,6 +256,7 @@ impl BrushTool {
             ToolShape::Box => self.half.y,
             ToolShape::Cylinder | ToolShape::Cone => self.length / 2.0,
             ToolShape::Capsule => self.length / 2.0 + self.radius,
+            ToolShape::Torus => self.radius * self.tube,
         }
     }
 
@@ -274,6 +275,7 @@ impl BrushTool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brush::shapes::Cylinder;
     use crate::brush::{Edit, Operation};
 
     fn hit() -> TerrainHit {
@@ -308,7 +310,7 @@ mod tests {
         };
         let brush = tool.brush_at(&hit());
         // All of it in the ground: its far end lies where the ray met the surface.
-        let Shape::Cylinder { base, axis, radius } = brush.shape else { panic!("a cylinder") };
+        let Shape::Cylinder(Cylinder { base, axis, radius }) = brush.shape else { panic!("a cylinder") };
         assert_eq!((base, axis, radius), (Vec3::new(4.0, 20.0, 30.0), Vec3::X * 6.0, 2.0));
         assert_eq!(brush.operation, Operation::Add { material: MaterialId(7) });
         assert_eq!(brush.roughness, Some(Roughness::new(0.25, 3.0, 9)));
@@ -330,14 +332,11 @@ mod tests {
                     BrushTool { shape, sink, radius: 3.0, half: Vec3::splat(3.0), ..BrushTool::default() };
                 let tool = match shape {
                     ToolShape::Capsule => BrushTool { radius: 1.0, length: 4.0, ..tool },
+                    ToolShape::Torus => BrushTool { tube: 1.0, ..tool },
                     _ => BrushTool { length: 6.0, ..tool },
                 };
-                let top = match tool.shape_at(&hit()) {
-                    Shape::Sphere { center, radius } => center.y + radius,
-                    Shape::Cuboid { center, half, .. } => center.y + half.y,
-                    Shape::Cylinder { base, axis, .. } | Shape::Cone { base, axis, .. } => (base + axis).y,
-                    Shape::Capsule { from, to, radius } => from.y.max(to.y) + radius,
-                };
+                let mut top = f32::MIN;
+                tool.shape_at(&hit()).outline(|from, to| top = top.max(from.y).max(to.y));
                 assert!((top - highest).abs() < 1e-4, "{shape:?} {sink}: {top}");
             }
         }

@@ -8,7 +8,7 @@ use super::{
     BrushApplied, BurrowFigures, HistoryMoved, LooseGround, LoosePieceFound, Redo, TargetedBrush, Undo,
     free_later,
 };
-use crate::brush::{Brush, BrushError, Edit, Operation, Shape};
+use crate::brush::{Brush, BrushError, Edit, Operation};
 use crate::lattice::ChunkGrid;
 use crate::terrain::{
     HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain, Together, unique,
@@ -253,12 +253,7 @@ fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) ->
     let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
     let stretch = |point: &mut Vec3| *point = rest * *point;
     let lift = |height: &mut f32| *height *= rest.y_axis.y;
-    match &mut brush.shape {
-        Shape::Sphere { center, .. } | Shape::Cuboid { center, .. } => stretch(center),
-        Shape::Cylinder { base: from, axis: to, .. }
-        | Shape::Capsule { from, to, .. }
-        | Shape::Cone { base: from, axis: to, .. } => [from, to].into_iter().for_each(stretch),
-    }
+    brush.shape = brush.shape.stretched(|arrow| rest * arrow);
     match &mut brush.operation {
         Operation::Flatten { point, normal } => {
             stretch(point);
@@ -266,7 +261,7 @@ fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) ->
         }
         Operation::Level { height } => lift(height),
         Operation::Terrace { step, base } => [step, base].into_iter().for_each(lift),
-        Operation::Stamp(stamp) => stretch(&mut stamp.center),
+        Operation::Stamp { stamp } => stretch(&mut stamp.center),
         // Nothing in them has a place or a height; amounts are scaled as sizes are.
         Operation::Dig
         | Operation::Add { .. }

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use crate::brush::{BAND, Shape};
+use crate::brush::{BAND, Extent, Shape};
 use crate::lattice::{ChunkGrid, ONE};
 
 /// Does a shape, in voxels, come near to a world's columns? `None` where its place is no number.
@@ -15,29 +15,13 @@ pub(super) fn reaches(shape: &Shape, grid: ChunkGrid) -> Option<bool> {
 
 /// A box around a shape, wider than need be where that is round. Sizes that are none count as 0.
 fn bounds(shape: &Shape) -> Option<(Vec3, Vec3)> {
-    let (from, to, size) = match *shape {
-        Shape::Sphere { center, radius } => (center, center, Vec3::splat(radius)),
-        Shape::Cuboid { center, half, rotation } => (center, center, turned(half, rotation)),
-        Shape::Capsule { from, to, radius } => (from, to, Vec3::splat(radius)),
-        Shape::Cylinder { base, axis, radius } | Shape::Cone { base, axis, radius } => {
-            (base, base + axis, Vec3::splat(radius))
-        }
-    };
+    let Extent { ends: [from, to], around } = shape.extent();
     if from.is_nan() || to.is_nan() {
         return None;
     }
-    let size = Vec3::select(size.cmpgt(Vec3::ZERO), size, Vec3::ZERO);
-    let (low, high) = (from.min(to) - size, from.max(to) + size);
+    let around = Vec3::select(around.cmpgt(Vec3::ZERO), around, Vec3::ZERO);
+    let (low, high) = (from.min(to) - around, from.max(to) + around);
     (!low.is_nan() && !high.is_nan()).then_some((low, high))
-}
-
-/// Half the sides of a box around a turned one.
-fn turned(half: Vec3, rotation: Quat) -> Vec3 {
-    if !half.is_finite() || !rotation.is_normalized() {
-        return Vec3::splat(half.length());
-    }
-    let turn = Mat3::from_quat(rotation);
-    turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z
 }
 
 #[cfg(test)]
@@ -60,6 +44,7 @@ mod tests {
                 Shape::cylinder(at, arrow + Vec3::Y * 20.0, half.x),
                 Shape::capsule(at, at + arrow, half.x),
                 Shape::cone(at, arrow + Vec3::Y * 20.0, half.x),
+                Shape::torus(at, arrow + Vec3::Y * 20.0, half.x + half.y, half.x),
             ] {
                 let edit = Edit::quantize(&Brush::dig(shape)).unwrap();
                 let is_near = reaches(&shape, grid).unwrap();

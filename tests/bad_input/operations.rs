@@ -34,7 +34,8 @@ pub fn sculpting() -> impl Strategy<Value = Brush> {
                     let stamp = Stamp::new(image(), a, Vec2::new(n[3], n[4]), n[5]);
                     let turned = Quat::from_xyzw(n[6], n[7], n[8], n[9]);
                     // Few four numbers are a rotation.
-                    Operation::Stamp(if n[6] > 0.0 { stamp.onto(b) } else { stamp.with_rotation(turned) })
+                    let stamp = if n[6] > 0.0 { stamp.onto(b) } else { stamp.with_rotation(turned) };
+                    Operation::Stamp { stamp }
                 }
             };
             let plain = Brush::smooth(shape, strength).with_falloff(falloff).with_power(power);

@@ -1,11 +1,13 @@
 //! Edits, sample by sample, straight from what the documentation says.
 
+use bevy_burrow::brush::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere};
 use bevy_burrow::brush::{BAND, Evaluator};
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use glam::{IVec2, IVec3, Quat, Vec3};
 
 use crate::witness::{Effect, Witness};
+use crate::worlds::plainly_applied;
 
 /// Where stored densities end.
 const FARTHEST: i32 = 32_767;
@@ -20,15 +22,16 @@ fn deepest(shape: &Shape) -> i32 {
     let length =
         |axis: Vec3| axis.to_array().map(|part| f64::from(units(part)).powi(2)).iter().sum::<f64>().sqrt();
     match *shape {
-        Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => units(radius),
-        Shape::Cuboid { half, .. } => units(half.min_element()),
-        Shape::Cylinder { axis, radius, .. } => units(radius).min((length(axis) / 2.0) as i32),
+        Shape::Sphere(Sphere { radius, .. }) | Shape::Capsule(Capsule { radius, .. }) => units(radius),
+        Shape::Cuboid(Cuboid { half, .. }) => units(half.min_element()),
+        Shape::Cylinder(Cylinder { axis, radius, .. }) => units(radius).min((length(axis) / 2.0) as i32),
         // The radius of the ball that touches base and side: the area of a section by half its outline.
-        Shape::Cone { axis, radius, .. } => {
+        Shape::Cone(Cone { axis, radius, .. }) => {
             let (height, radius) = (length(axis), f64::from(units(radius)));
             let slant = (height * height + radius * radius).sqrt();
             (radius * height / (radius + slant)) as i32
         }
+        Shape::Torus(torus) => units(torus.tube),
         _ => panic!("{shape:?}"),
     }
 }
@@ -74,7 +77,7 @@ impl Witness {
         let target = match &brush.operation {
             Operation::Level { height } => Some(point.y * 256 - units(*height)),
             Operation::Flatten { point: on, normal } => Some(above_plane(point, *on, *normal)),
-            Operation::Stamp(stamp) => {
+            Operation::Stamp { stamp } => {
                 let (beside, above) = from_relief(point, stamp);
                 // Nothing changes outside of the shape, nor of the image.
                 (outside, deepest) = (outside.max(beside), deepest.min(half(stamp).min_element()));
@@ -228,7 +231,7 @@ impl Witness {
                 let stored = self.samples.get(&point).copied();
                 let before = stored.map_or_else(|| ground.distance(point), |(distance, _)| distance);
                 let own = stored.map_or(MaterialId::GROUND, |(_, material)| material);
-                let after = edit.operation().apply(before, outside);
+                let after = plainly_applied(&edit.operation(), before, outside);
                 let number = after.clamp(-32767, 32767);
                 match edit.operation() {
                     operation if operation.is_sculpting() => {

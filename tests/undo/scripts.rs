@@ -11,7 +11,7 @@ use crate::worlds::{any_random_brush, random_brush_at_a_face, random_rules};
 const OPERATIONS: [&str; 11] =
     ["dig", "add", "paint", "smooth", "sharpen", "flatten", "level", "raise", "lower", "stamp", "terrace"];
 
-const SHAPES: [&str; 5] = ["sphere", "box", "cylinder", "capsule", "cone"];
+const SHAPES: [&str; 6] = ["sphere", "box", "cylinder", "capsule", "cone", "torus"];
 
 const EFFECTS: [&str; 6] =
     ["protected", "unbreakable", "too hard", "slowed", "crumbs removed", "debris broken off"];
@@ -93,7 +93,7 @@ fn operation(brush: &Brush) -> &'static str {
         Operation::Level { .. } => "level",
         Operation::Raise { .. } => "raise",
         Operation::Lower { .. } => "lower",
-        Operation::Stamp(_) => "stamp",
+        Operation::Stamp { .. } => "stamp",
         Operation::Terrace { .. } => "terrace",
         _ => panic!("{brush:?}"),
     }
@@ -101,11 +101,12 @@ fn operation(brush: &Brush) -> &'static str {
 
 fn shape(brush: &Brush) -> &'static str {
     match brush.shape {
-        Shape::Sphere { .. } => "sphere",
-        Shape::Cuboid { .. } => "box",
-        Shape::Cylinder { .. } => "cylinder",
-        Shape::Capsule { .. } => "capsule",
-        Shape::Cone { .. } => "cone",
+        Shape::Sphere(_) => "sphere",
+        Shape::Cuboid(_) => "box",
+        Shape::Cylinder(_) => "cylinder",
+        Shape::Capsule(_) => "capsule",
+        Shape::Cone(_) => "cone",
+        Shape::Torus(_) => "torus",
         _ => panic!("{brush:?}"),
     }
 }

@@ -1,6 +1,7 @@
 //! Random worlds and edits for the tests: steep, flat, at integer heights, and cut from real elevation data.
 #![allow(dead_code)] // each test file uses its own part of this
 
+use bevy_burrow::brush::shapes::Cuboid;
 use bevy_burrow::ground::{GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialRule};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
@@ -97,6 +98,17 @@ fn random_center(rng: &mut Rng, ground: &Ground, dig: bool, radius: f32) -> Vec3
     if rng.bool() { place.round() } else { place }
 }
 
+/// What a dig or an add makes of a sample, by the book; other operations leave densities alone or look at more than this.
+pub fn plainly_applied(operation: &Operation, before: i32, outside: i32) -> i32 {
+    // A shape counts as four voxels deep at most.
+    let outside = outside.max(-1024);
+    match operation {
+        Operation::Dig => before.max(-outside),
+        Operation::Add { .. } => before.min(outside),
+        _ => before,
+    }
+}
+
 /// A random brush of any shape and operation, at lattice points as often as between.
 pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let radius = [2.0, 3.0, 3.7, 5.0][rng.usize(0..4)];
@@ -107,7 +119,7 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let shape = match rng.u32(0..8) {
         0 => {
             let half = Vec3::new(radius, radius * 0.6, radius * 1.3);
-            Shape::Cuboid { center, half, rotation: random_rotation(rng) }
+            Shape::Cuboid(Cuboid { center, half, rotation: random_rotation(rng) })
         }
         1 => Shape::cylinder(center, direction * radius * 3.0, radius),
         2 => Shape::cone(center, direction * radius * 3.0, radius),
@@ -213,7 +225,14 @@ pub fn random_lower_and_raise(rng: &mut Rng, ground: &Ground) -> (Brush, Brush) 
 
 /// A random brush of any kind.
 pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
-    if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) }
+    let brush = if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) };
+    if rng.u32(0..8) > 0 {
+        return brush;
+    }
+    let (radius, axis) = (2.0 + rng.f32() * 5.0, random_rotation(rng) * Vec3::Y);
+    let dig = rng.bool();
+    let center = random_center(rng, ground, dig, radius / 2.0);
+    Brush { shape: Shape::torus(center, axis, radius, radius * (0.2 + 0.8 * rng.f32())), ..brush }
 }
 
 /// Rules of every kind, some of which will matter.

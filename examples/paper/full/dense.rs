@@ -1,6 +1,6 @@
 //! The whole terrain as one dense field: a cube of samples, and positions and normals of its whole surface.
 
-use bevy_burrow::brush::{BAND, Brush, Edit};
+use bevy_burrow::brush::{BAND, Brush, DEPTH, Edit, Operation};
 use bevy_burrow::dense::{DenseGrid, DenseGridError, DenseMesh, DenseMesher, Normals};
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::LatticeBox;
@@ -61,7 +61,12 @@ impl DenseField {
                 let at = self.index(start);
                 for (sample, &outside) in self.samples[at..].iter_mut().zip(&row) {
                     if outside <= BAND {
-                        let after = stored(operation.apply(i32::from(*sample), outside));
+                        let (before, outside) = (i32::from(*sample), outside.max(-DEPTH));
+                        let after = stored(match operation {
+                            Operation::Dig => before.max(-outside),
+                            Operation::Add { .. } => before.min(outside),
+                            _ => before,
+                        });
                         changed += usize::from(after != *sample);
                         *sample = after;
                     }

@@ -71,7 +71,6 @@ struct EditJob {
     u32 pad;
 };
 
-enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE };
 enum Operation { DIG, ADD, PAINT };
 
 struct Tool {

@@ -4,6 +4,9 @@
 
 #include "threads.cuh"
 
+// In the order of brush/shapes/mod.rs.
+enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE, TORUS };
+
 struct Vector {
     float x, y, z;
 };
@@ -67,13 +70,21 @@ __device__ inline float cone(Vector p, const float* constants) {
     return inside < 0.0f ? inside : outside;
 }
 
+__device__ inline float torus(Vector p, const float* constants) {
+    float radius = constants[4], tube = constants[5];
+    float along = dot(p, constants);
+    float beyond = off_axis(p, along, constants) - radius;
+    return length(beyond, along, 0.0f) - tube;
+}
+
 __device__ inline float smooth_distance(const Tool& tool, Vector p) {
     switch (tool.kind) {
         case SPHERE: return sphere(p, tool.constants);
         case CUBOID: return cuboid(p, tool.constants);
         case CYLINDER: return cylinder(p, tool.constants);
         case CAPSULE: return capsule(p, tool.constants);
-        default: return cone(p, tool.constants);
+        case CONE: return cone(p, tool.constants);
+        default: return torus(p, tool.constants);
     }
 }
 

@@ -153,7 +153,7 @@ pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evalu
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
     let LatticeBox { min, max } = reach.unwrap_or(nothing);
-    let (amplitude, scale, seed) = of.grain.unwrap_or((0, 1, 0));
+    let (amplitude, scale, seed) = of.roughness.unwrap_or((0, 1, 0));
     Tool {
         kind: of.kind,
         operation: match operation {
@@ -162,7 +162,7 @@ pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evalu
             Kind::Paint { .. } | Kind::Sculpt => 2,
         },
         material: operation.material().map_or(0, |material| material.0.into()),
-        is_rough: of.grain.is_some().into(),
+        is_rough: of.roughness.is_some().into(),
         home: of.home.to_array(),
         rest: of.rest.to_array(),
         min: min.to_array(),

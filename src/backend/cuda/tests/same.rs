@@ -1,5 +1,6 @@
 //! Worlds of a device are those of the processor.
 
+use crate::brush::shapes::Cuboid;
 use glam::IVec3;
 
 use super::*;
@@ -103,7 +104,7 @@ fn short_and_long_transactions_take_turns() {
     let large = |y: f32| {
         let half = glam::Vec3::new(44.0, 13.0, 40.0);
         let center = glam::Vec3::new(60.0, y, 60.0);
-        let cuboid = Shape::Cuboid { center, half, rotation: Default::default() };
+        let cuboid = Shape::Cuboid(Cuboid { center, half, rotation: Default::default() });
         Brush::dig(cuboid).with_roughness(Roughness::new(2.0, 3.0, 5))
     };
     // Many edits of few bricks: short lists that overflow, and such as are long for that alone.

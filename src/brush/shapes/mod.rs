@@ -1,0 +1,324 @@
+//! The shapes that a brush can have: a file for each, and here what they have in common.
+//!
+//! A shape is a struct over [`Numbers`]: floats in a [`Brush`](super::Brush), integers in an [`Edit`](super::Edit). To add one,
+//! write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
+//! `kernels/shapes.cuh`.
+
+mod capsule;
+mod cone;
+mod cuboid;
+mod cylinder;
+mod distance;
+mod numbers;
+mod outline;
+mod sphere;
+mod torus;
+
+use glam::{IVec3, Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+pub use capsule::Capsule;
+pub use cone::Cone;
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use numbers::{Numbers, Units, Voxels};
+pub use sphere::Sphere;
+pub use torus::Torus;
+
+use distance::Distance;
+pub(super) use distance::{larger, smaller};
+use numbers::{Check, Convert, Names, Quantize, Restore, Transform};
+use outline::Outline;
+
+use super::BrushError;
+use super::quantize::check_extent;
+use crate::lattice::ONE;
+
+/// What the world has to know of a shape in integers. All but `check` may rely on numbers that were checked.
+pub(super) trait Solid {
+    /// Its distance function.
+    type Distance: Distance;
+
+    /// The point that distances are computed relative to.
+    fn origin(&self) -> [i32; 3];
+
+    /// Is it within limits that no number has by itself?
+    fn check(&self) -> Result<(), BrushError> {
+        Ok(())
+    }
+
+    /// Lowest and highest corner of a box around it, at most 1 too wide on each side.
+    fn bounds(&self) -> (IVec3, IVec3);
+
+    /// How deep inside the shape its middle lies, rounded down.
+    fn deepest(&self) -> i32;
+
+    /// Volume in cubes of 1/256 voxel.
+    fn volume(&self) -> f64;
+
+    /// Its distance function.
+    fn distance(&self) -> Self::Distance;
+}
+
+/// Where a shape lies, roughly: between two points, and so far around them.
+#[cfg_attr(not(feature = "plugin"), expect(dead_code))]
+pub(crate) struct Extent {
+    pub ends: [Vec3; 2],
+    pub around: Vec3,
+}
+
+macro_rules! shapes {
+    ($($(#[$attribute:meta])* $name:ident,)*) => {
+        /// The shape of a brush, in voxels of terrain space; in a [`Brush`](super::Brush) that is a message of the plugin's, in
+        /// units of world space.
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "shape", rename_all = "snake_case")]
+        #[non_exhaustive]
+        #[allow(missing_docs, reason = "each variant is the struct of its name")]
+        pub enum Shape {
+            $($(#[$attribute])* $name($name),)*
+        }
+
+        /// A [`Shape`] in integers.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub(super) enum QuantizedShape {
+            $($name($name<Units>),)*
+        }
+
+        /// A shape's distance function.
+        #[derive(Clone, Debug)]
+        pub(super) enum Form {
+            $($name(<$name<Units> as Solid>::Distance),)*
+        }
+
+        /// The shapes' numbers, by which `kernels/shapes.cuh` knows them.
+        #[cfg(feature = "cuda")]
+        enum Kind {
+            $($name,)*
+        }
+
+        impl Shape {
+            fn quantize(&self) -> Result<QuantizedShape, BrushError> {
+                Ok(match self {
+                    $(Self::$name(shape) => QuantizedShape::$name(shape.convert(&mut Quantize)?),)*
+                })
+            }
+
+            fn convert(&self, to: &mut impl Convert<From = Voxels, To = Voxels>) -> Result<Self, BrushError> {
+                Ok(match self {
+                    $(Self::$name(shape) => Self::$name(shape.convert(to)?),)*
+                })
+            }
+
+            /// Where it lies, for shapes that may be invalid too.
+            #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
+            pub(crate) fn extent(&self) -> Extent {
+                match self {
+                    $(Self::$name(shape) => shape.extent(),)*
+                }
+            }
+
+            /// Hands out the ends of lines that show the shape.
+            pub fn outline(&self, mut line: impl FnMut(Vec3, Vec3)) {
+                let mut outline = Outline::new(&mut line);
+                match self {
+                    $(Self::$name(shape) => shape.outline(&mut outline),)*
+                }
+            }
+        }
+
+        impl QuantizedShape {
+            fn restore(&self) -> Result<Shape, BrushError> {
+                Ok(match self {
+                    $(Self::$name(shape) => Shape::$name(shape.convert(&mut Restore)?),)*
+                })
+            }
+
+            /// Is the shape within every limit? Any integers may be asked about; all else relies on it.
+            pub(super) fn check(&self) -> Result<(), BrushError> {
+                match self {
+                    $(Self::$name(shape) => {
+                        shape.convert(&mut Check)?;
+                        shape.check()?;
+                    })*
+                }
+                check_extent(self.bounds(), self.volume())
+            }
+
+            /// The point that distances are computed relative to.
+            pub(super) fn origin(&self) -> IVec3 {
+                IVec3::from_array(match self {
+                    $(Self::$name(shape) => shape.origin(),)*
+                })
+            }
+
+            /// Lowest and highest corner of a box around the shape, at most 1 too wide on each side.
+            pub(super) fn bounds(&self) -> (IVec3, IVec3) {
+                match self {
+                    $(Self::$name(shape) => shape.bounds(),)*
+                }
+            }
+
+            /// How deep inside the shape its middle lies, rounded down: at least 1.
+            pub(super) fn deepest(&self) -> i32 {
+                let deepest = match self {
+                    $(Self::$name(shape) => shape.deepest(),)*
+                };
+                deepest.max(1)
+            }
+
+            /// Volume in cubic voxels.
+            fn volume(&self) -> f64 {
+                let volume = match self {
+                    $(Self::$name(shape) => shape.volume(),)*
+                };
+                volume / f64::from(ONE * ONE * ONE)
+            }
+
+            /// Its distance function.
+            pub(super) fn form(&self) -> Form {
+                match self {
+                    $(Self::$name(shape) => Form::$name(shape.distance()),)*
+                }
+            }
+        }
+
+        impl Form {
+            /// Distances of a run of points along x.
+            pub(super) fn run(&self, xs: &[f32], y: f32, z: f32, out: &mut [f32]) {
+                match self {
+                    $(Self::$name(form) => form.run(xs, y, z, out),)*
+                }
+            }
+
+            /// Hands out the rows of eight points along x at these y and z.
+            pub(super) fn rows(
+                &self,
+                points: &[[f32; 8]; 3],
+                y: std::ops::Range<usize>,
+                z: std::ops::Range<usize>,
+                each: impl FnMut(usize, usize, [f32; 8]),
+            ) {
+                match self {
+                    $(Self::$name(form) => form.rows(points, y, z, each),)*
+                }
+            }
+
+            /// Which shape it is, and the numbers that its distance is computed from.
+            #[cfg(feature = "cuda")]
+            pub(super) fn constants(&self) -> (u32, [f32; 12]) {
+                let (kind, own) = match self {
+                    $(Self::$name(form) => (Kind::$name, form.constants()),)*
+                };
+                let mut all = [0.0; 12];
+                all.iter_mut().zip(own).for_each(|(place, value)| *place = value);
+                (kind as u32, all)
+            }
+        }
+    };
+}
+
+// In the order in which `kernels/shapes.cuh` has them.
+shapes! {
+    Sphere,
+    #[serde(rename = "box")]
+    Cuboid,
+    Cylinder,
+    Capsule,
+    Cone,
+    Torus,
+}
+
+impl Shape {
+    /// The shape after every point p moved to `turn * (p * scale) + shift`.
+    pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
+        self.moved(Transform { arrow: &|v| turn * (v * scale), shift, turn, scale })
+    }
+
+    /// The shape with its points and arrows stretched, and its sizes as they were.
+    #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
+    pub(crate) fn stretched(&self, stretch: impl Fn(Vec3) -> Vec3) -> Self {
+        self.moved(Transform { arrow: &stretch, shift: Vec3::ZERO, turn: Quat::IDENTITY, scale: 1.0 })
+    }
+
+    fn moved(&self, mut to: Transform) -> Self {
+        // Moving fails for no number.
+        self.convert(&mut to).unwrap_or(*self)
+    }
+
+    /// The names of its fields.
+    pub(super) fn fields(&self) -> Vec<&'static str> {
+        let mut names = Names::default();
+        let _ = self.convert(&mut names);
+        names.0
+    }
+}
+
+impl QuantizedShape {
+    /// Rounds a shape to integers, halves to even, and checks it.
+    pub(super) fn quantize(shape: &Shape) -> Result<Self, BrushError> {
+        let quantized = shape.quantize()?;
+        quantized.check()?;
+        Ok(quantized)
+    }
+
+    /// The shape as a brush has it.
+    pub(super) fn shape(&self) -> Shape {
+        // Restoring fails for no number.
+        self.restore().unwrap_or(Shape::sphere(Vec3::ZERO, 0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth(form: &Form, at: Vec3) -> f32 {
+        let mut distance = [0.0];
+        form.run(&[at.x], at.y, at.z, &mut distance);
+        -distance[0]
+    }
+
+    /// The greatest depth, by trying places in a box that closes in on the best of them.
+    fn deepest_by_trying(shape: &QuantizedShape) -> f32 {
+        let (form, origin, (low, high)) = (shape.form(), shape.origin(), shape.bounds());
+        let mut middle = (low + high).as_vec3() / 2.0 - origin.as_vec3();
+        let (mut half, mut best) = ((high - low).as_vec3() / 2.0, f32::MIN);
+        for _ in 0..60 {
+            let around = middle;
+            for i in 0..11 * 11 * 11 {
+                let step = IVec3::new(i % 11, i / 11 % 11, i / 121).as_vec3() / 5.0 - 1.0;
+                let at = around + step * half;
+                if depth(&form, at) > best {
+                    (middle, best) = (at, depth(&form, at));
+                }
+            }
+            half *= 0.8;
+        }
+        best
+    }
+
+    #[test]
+    fn the_middle_is_as_deep_as_it_is_said_to_be() {
+        let base = Vec3::new(-3.3, 100.7, 8.05);
+        for shape in [
+            Shape::sphere(base, 7.77),
+            Shape::turned_cuboid(base, Vec3::new(5.0, 9.1, 3.6), Quat::from_xyzw(0.36, -0.48, 0.64, 0.48)),
+            Shape::capsule(base, base + Vec3::new(9.0, 2.0, -3.0), 3.9),
+            // A pole and a disc.
+            Shape::cylinder(base, Vec3::new(5.5, -9.25, 17.125), 4.4),
+            Shape::cylinder(base, Vec3::new(1.0, 2.5, -0.5), 9.0),
+            // A needle, a tent and a lid.
+            Shape::cone(base, Vec3::new(1.0, 21.0, -3.0), 2.5),
+            Shape::cone(base, Vec3::new(5.0, -9.0, 7.0), 11.5),
+            Shape::cone(base, Vec3::new(0.5, 2.0, 0.0), 12.0),
+            Shape::torus(base, Vec3::new(0.5, 2.0, 0.3), 12.0, 4.4),
+        ] {
+            let quantized = QuantizedShape::quantize(&shape).unwrap();
+            let (said, found) = (quantized.deepest() as f32, deepest_by_trying(&quantized));
+            // Rounded down.
+            assert!((-0.2..1.2).contains(&(found - said)), "{shape:?}: {said} said, {found} found");
+        }
+    }
+}
