@@ -1,7 +1,10 @@
 //! What the ground is made of.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
+use super::error::GroundError;
 use crate::lattice::ONE;
 
 /// How deep the overlay reaches below the surface: 1.5 voxels, in 1/256 voxel.
@@ -17,8 +20,14 @@ impl MaterialId {
     /// Painting with it restores the ground's own look. No ground is made of it.
     pub const GROUND: Self = Self(u8::MAX);
 
-    /// What an id of the ground may be, in words.
-    pub(super) const ALLOWED: &str = "0 to 254, as 255 means whatever the ground has";
+    /// Checks a parameter of this name: ground cannot be made of [`Self::GROUND`].
+    pub(super) fn check(self, name: impl Into<Cow<'static, str>>) -> Result<(), GroundError> {
+        if self != Self::GROUND {
+            return Ok(());
+        }
+        let allowed = "0 to 254, as 255 means whatever the ground has";
+        Err(GroundError::Parameter { name: name.into(), value: self.0.into(), allowed })
+    }
 }
 
 /// The materials of one column: a base all the way down and an overlay as its skin.

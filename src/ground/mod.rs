@@ -30,8 +30,7 @@ mod world;
 
 pub use control::MaterialControl;
 pub use error::{GroundError, ImageError};
-pub use extent::MAX_SIZE;
-pub use grey_image::{BitDepth, GreyImage, ImageLimits, RawFormat};
+pub use grey_image::{GreyImage, ImageLimits, RawFormat};
 pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
 pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
@@ -39,3 +38,6 @@ pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
 pub use rules::MaterialRule;
 pub use world::Ground;
+
+/// Most cells along one side of a world.
+pub const MAX_SIZE: u32 = 16_384;

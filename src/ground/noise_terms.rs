@@ -6,7 +6,7 @@ use noise::{Fbm, Perlin, RidgedMulti};
 
 use super::error::GroundError;
 use super::extent::Extent;
-use super::noise_heights::{NoiseHeights, NoiseKind, ORIGIN, Octaves, check_voxels, seeds};
+use super::noise_heights::{NoiseHeights, NoiseKind, ORIGIN, Octaves, seeds};
 use super::world::Ground;
 use crate::lattice::{LIMIT, ONE};
 
@@ -47,8 +47,7 @@ impl NoiseHeights {
     /// Those of [`Ground::from_noise`] that show before any height is computed.
     pub(crate) fn terms(&self, width: u32, depth: u32) -> Result<NoiseTerms, GroundError> {
         let &Self { seed, kind, octaves, scale, amplitude, base } = self;
-        check_voxels("noise base", base)?;
-        let noise = Octaves::new(kind, seed, octaves, scale, amplitude)?;
+        let noise = Octaves::new(self)?;
         let extent = Extent::new(width, depth)?;
         let tables = seeds(seed, octaves).map(table).collect();
         let common = |frequency, lacunarity, persistence| NoiseNumbers {
@@ -84,8 +83,7 @@ impl NoiseHeights {
 impl NoiseHeights {
     /// The processor's noise over columns, before it becomes heights.
     pub(crate) fn by_column(&self) -> impl Fn(i32, i32) -> f64 {
-        let &Self { seed, kind, octaves, scale, amplitude, .. } = self;
-        super::noise_heights::generator(kind, seed, octaves, scale, amplitude).expect("parameters in range")
+        self.generator().expect("parameters in range")
     }
 }
 
