@@ -9,9 +9,9 @@ use bevy_burrow::terrain::Stages;
 use glam::Vec3;
 use rayon::ThreadPool;
 
-use crate::landscape::{dig, ground, landscape, threads};
+use crate::landscape::{dig, ground, landscape, submit, threads};
+use crate::stages::run;
 use crate::statistics::{Sample, header, row};
-use crate::{run, submit};
 
 pub fn section() {
     let all = std::thread::available_parallelism().map_or(2, std::num::NonZero::get);

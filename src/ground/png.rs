@@ -3,7 +3,7 @@
 use std::io::{Cursor, ErrorKind};
 
 use image::codecs::png::PngDecoder;
-use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
 
 use super::error::ImageError;
 use super::grey_image::{GreyImage, ImageLimits};
@@ -15,25 +15,25 @@ impl GreyImage {
     /// # Errors
     /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, or one that is no PNG.
     /// - [`ImageError::ColorType`] for colour, palettes, alpha or fewer than 8 bits.
+    /// - [`ImageError::Empty`] for an image without samples.
     /// - [`ImageError::FileSize`], [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before
     ///   memory is allocated for its samples.
     pub fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<Self, ImageError> {
         limits.check_file(bytes)?;
+        let (width, height, bits) = declared(bytes).unwrap_or((1, 1, 8));
+        // The finished samples take 2 bytes each; those of 8 bits are held as they were while they are widened.
+        limits.check_image(width, height, if bits == 8 { 3 } else { 2 })?;
         let mut decoder_limits = Limits::no_limits();
         decoder_limits.max_alloc = Some(limits.max_alloc_bytes);
         let failed = |error| decode_error(error, bytes.len() as u64);
-        // Reads the header only.
         let decoder = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits).map_err(failed)?;
-        // A transparent shade is stored beside plain grey, and decoded to an alpha channel.
-        let bytes_per_sample = match (decoder.original_color_type(), decoder.color_type()) {
-            // The finished samples take 2 bytes each; those of 8 bits are held as they were while they are widened.
-            (ExtendedColorType::L8, ColorType::L8) => 3,
-            (ExtendedColorType::L16, ColorType::L16) => 2,
-            (stored, ColorType::L8) => return Err(ImageError::ColorType { found: format!("{stored:?}") }),
-            (_, decoded) => return Err(ImageError::ColorType { found: format!("{decoded:?}") }),
-        };
-        let (width, height) = decoder.dimensions();
-        limits.check_image(width, height, bytes_per_sample)?;
+        match decoder.color_type() {
+            // The decoder widens fewer bits to 8.
+            ColorType::L8 if bits < 8 => return Err(ImageError::ColorType { found: format!("L{bits}") }),
+            ColorType::L8 | ColorType::L16 => (),
+            // A transparent shade of grey becomes an alpha channel.
+            other => return Err(ImageError::ColorType { found: format!("{other:?}") }),
+        }
         let samples = match DynamicImage::from_decoder(decoder).map_err(failed)? {
             DynamicImage::ImageLuma8(grey) => {
                 grey.into_raw().into_iter().map(|v| u16::from(v) * 257).collect()
@@ -42,6 +42,15 @@ impl GreyImage {
         };
         Self::from_samples(width, height, samples)
     }
+}
+
+/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder then
+/// reports. They are read here because the decoder reserves memory for them at once.
+fn declared(bytes: &[u8]) -> Option<(u32, u32, u8)> {
+    let is_png = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Png);
+    let (&width, rest) = bytes.get(16..).filter(|_| is_png)?.split_first_chunk()?;
+    let (&height, rest) = rest.split_first_chunk()?;
+    Some((u32::from_be_bytes(width), u32::from_be_bytes(height), *rest.first()?))
 }
 
 /// Our own error for the decoder's.
@@ -57,7 +66,7 @@ fn decode_error(error: image::ImageError, bytes: u64) -> ImageError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::ExtendedColorType::{L8, L16, La8, Rgb8, Rgba16};
+    use image::ExtendedColorType::{self, L8, L16, La8, Rgb8, Rgba16};
     use image::ImageEncoder;
     use image::codecs::png::PngEncoder;
     use proptest::prelude::*;
@@ -86,7 +95,7 @@ mod tests {
     fn header(width: u32, height: u32, bits: u8, color_type: u8) -> Vec<u8> {
         let sizes = [width.to_be_bytes(), height.to_be_bytes()].concat();
         let header = chunk(b"IHDR", &[&sizes, &[bits, color_type, 0, 0, 0][..]].concat());
-        [&SIGNATURE[..], &header, &chunk(b"IDAT", &[])].concat()
+        [&SIGNATURE[..], &header, &chunk(b"IDAT", &[0])].concat()
     }
 
     /// Where the compressed samples lie in [`noisy_png`]: after signature, header and a chunk's length and name.
@@ -195,10 +204,10 @@ mod tests {
 
     #[test]
     fn declared_dimensions_are_checked_before_decoding() {
-        assert!(matches!(decode(&header(0, 9, 8, 0)), Err(ImageError::Decode { .. })));
+        assert_eq!(decode(&header(0, 9, 8, 0)), Err(ImageError::Empty { width: 0, height: 9 }));
         let (max_width, max_height) = (16_385, 16_385);
-        let huge = ImageError::Dimensions { width: 1 << 30, height: 5, max_width, max_height };
-        assert_eq!(decode(&header(1 << 30, 5, 16, 0)), Err(huge));
+        let huge = ImageError::Dimensions { width: 1 << 31, height: 5, max_width, max_height };
+        assert_eq!(decode(&header(1 << 31, 5, 16, 0)), Err(huge));
         let limits = ImageLimits { max_alloc_bytes: 1000, ..ImageLimits::default() };
         let memory = ImageError::Memory { bytes: 4000 * 4000 * 3, limit: 1000 };
         assert_eq!(GreyImage::decode_png(&header(4000, 4000, 8, 0), &limits), Err(memory));
@@ -216,7 +225,7 @@ mod tests {
             max_height: u32::MAX,
             max_alloc_bytes: u64::MAX,
         };
-        let refused = GreyImage::decode_png(&header(1 << 20, 1 << 20, 16, 0), &limits);
+        let refused = GreyImage::decode_png(&header(u32::MAX, u32::MAX, 16, 0), &limits);
         assert!(matches!(refused, Err(ImageError::Dimensions { max_width: 16_385, .. })));
         assert!(GreyImage::decode_png(&noisy_png(), &limits).is_ok());
     }

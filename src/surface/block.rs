@@ -10,21 +10,18 @@
 //! 3. Edges are listed by axis; vertices are made from the lists, several at a time, and so each just once.
 //! 4. Triangles look their vertices' numbers up by lattice edge.
 
-use std::ops::Range;
 use std::sync::LazyLock;
 
 use super::cases::{self, Case};
-use super::corners::{self, Corners, Heights, X, Z};
+use super::corners::{self, Corners, X, Z};
 use super::crossings::{Crossings, Edge};
-use super::mask::sheet;
 use super::mesh::Vertex;
-use super::padded_samples::{Neighbours, PaddedSamples};
-use super::stack::{Stack, pristine_side, world_cells};
+use super::neighbours::Neighbours;
+use super::padded_samples::PaddedSamples;
+use super::stack::Stack;
 use super::vertex::WorldView;
 use super::window::{self, Window};
-use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
-use crate::volume::Brick;
 
 /// A block to be meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +95,7 @@ impl Parts {
 /// Meshes blocks; keeps its working memory from one call to the next.
 #[derive(Default)]
 pub struct Mesher {
-    apron: PaddedSamples,
+    samples: PaddedSamples,
     crossings: Crossings,
     numbers: Numbers,
     window: Window<'static>,
@@ -155,15 +152,15 @@ impl Mesher {
         let (Some(bottom), Some(top)) = ((0..8).find(filled), (0..8).rfind(filled)) else { return };
         let all = drawn.iter().fold(0, |all, layer| all | layer);
         let (near, far) = (all.trailing_zeros() / Z, all.ilog2() / Z);
-        // The apron starts one before the cells; the gradients at the corners beyond them look one further.
+        // The padded samples start one before the cells; the gradients at the corners beyond them look one further.
         let rows = near as usize..=far as usize + 3;
         let layers = bottom..=top + 3;
-        self.apron.fill(around, &stack.heights, layers.clone(), rows.clone());
+        self.samples.fill(around, &stack.pristine.heights, layers.clone(), rows.clone());
         if let Some(columns) = stack.rim() {
-            self.apron.go_on_beyond(&columns, layers, rows);
+            self.samples.go_on_beyond(&columns, layers, rows);
         }
         self.list_edges(&cubes.solid, &drawn, bottom, top);
-        self.crossings.make(&self.apron, stack, around, brick.origin(), origin, &mut out.vertices);
+        self.crossings.make(&self.samples, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
     }
 
@@ -304,17 +301,17 @@ impl Cubes {
     /// `None` where nothing is drawn.
     fn find(stack: &Stack, around: &Neighbours, brick: BrickPos) -> Option<Self> {
         let low = brick.origin().y;
-        let near = [around.corners(0), around.corners(1)];
-        if is_one_side(&near, stack.pristine_side(low)) {
+        let near = around.near();
+        if near.is_one_side(stack.pristine.side(low)) {
             return None;
         }
-        let solid = solid_layers(&near, || stack.pristine(low));
+        let solid = near.solid(|| stack.pristine.solid(low));
         let mut drawn = [0; 8];
         for (y, drawn) in drawn.iter_mut().enumerate() {
             // A cube without an edited corner that both signs meet in is one of the pristine sheet.
             *drawn = corners::mixed(solid[y], solid[y + 1]);
             if *drawn & !stack.mask != 0 {
-                *drawn &= corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1)) | stack.mask;
+                *drawn &= corners::any(near.edited(y) | near.edited(y + 1)) | stack.mask;
             }
         }
         (drawn != [0; 8]).then_some(Self { solid, drawn })
@@ -328,111 +325,7 @@ impl Cubes {
     }
 }
 
-/// Are all corners of a brick's cells solid, or all air?
-fn is_one_side(near: &Near, pristine: Option<bool>) -> bool {
-    let mut sides = near.iter().flatten().map(|brick| match brick {
-        None => pristine,
-        Some(brick) => match (brick.solid(), brick.solid().iter().all(|&layer| layer == u64::MAX)) {
-            (_, true) => Some(true),
-            (solid, _) => solid.iter().all(|&layer| layer == 0).then_some(false),
-        },
-    });
-    sides.next().flatten().is_some_and(|first| sides.all(|side| side == Some(first)))
-}
-
-/// The bricks that hold corners of a brick's cells: at its own height, and at the next.
-type Near<'a> = [[Option<&'a Brick>; 4]; 2];
-
-/// Solid corners, layer by layer; `pristine` tells those of bricks that are not there.
-fn solid_layers(near: &Near, pristine: impl Fn() -> [Corners; 9]) -> [Corners; 9] {
-    let mut layers = std::array::from_fn(|y| {
-        corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))
-    });
-    let missing =
-        near.map(|bricks| corners::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 })));
-    if missing != [0; 2] {
-        let pristine = pristine();
-        for (y, layer) in layers.iter_mut().enumerate() {
-            *layer |= pristine[y] & missing[y / 8];
-        }
-    }
-    layers
-}
-
-/// Edited corners of one layer.
-fn edited_layer(near: &Near, y: usize) -> Corners {
-    corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8])))
-}
-
 /// Derives the table of cases now, so that the first edit need not wait for it.
 pub(crate) fn prepare() {
     LazyLock::force(&SLOTS);
-}
-
-/// What is pristine over the 8x8 cells of a stack of bricks.
-pub(crate) struct Sheet {
-    /// Where the stack is.
-    pub stack: (i32, i32),
-    heights: Heights,
-    /// Lowest and highest of the corners.
-    range: (i32, i32),
-}
-
-impl Sheet {
-    /// Over the stack (x, z).
-    pub fn new(ground: &Ground, stack: (i32, i32)) -> Self {
-        let heights = corners::heights(ground, Column::new(stack.0 * 8, stack.1 * 8));
-        Self { stack, heights, range: corners::range(&heights) }
-    }
-
-    /// Lattice y of the cubes that the surface crosses.
-    pub fn rows(&self) -> Range<i32> {
-        sheet([self.range.0, self.range.1])
-    }
-}
-
-/// Cells of a stack that belong to the mask, those `before` and those that samples around some of its bricks put there
-/// (rule 2): a corner of a cube of their sheet is edited. As 8x8 cells, bit `z * 8 + x`. The window must reach one brick
-/// further.
-pub(crate) fn disturbed(
-    view: &WorldView,
-    window: &Window,
-    sheet: &Sheet,
-    bricks: &[BrickPos],
-    before: u64,
-) -> u64 {
-    let Sheet { stack, heights, range } = sheet;
-    let mut cells = corners::spread(before);
-    for &brick in bricks {
-        let low = brick.origin().y;
-        if pristine_side(*range, low).is_some() {
-            continue;
-        }
-        let around = Neighbours::corners_of(window, brick);
-        let near = [around.corners(0), around.corners(1)];
-        let pristine = corners::pristine(heights, *range, low);
-        // Above and below these layers, nothing of the sheet is.
-        for y in corners::between(*range, low) {
-            let sheet = corners::mixed(pristine[y], pristine[y + 1]);
-            if sheet & !cells != 0 {
-                cells |= sheet & corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1));
-            }
-        }
-    }
-    let cells = cells & world_cells(view, *stack);
-    (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))
-}
-
-/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.
-pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
-    let heights = ground.heights::<9>(low);
-    let cells = corners::spread(cells);
-    // The corners of these cells.
-    let along = cells | cells << X;
-    let mut range = (i32::MAX, i32::MIN);
-    corners::for_ones(along | along << Z, |corner| {
-        let height = heights.as_flattened()[corner];
-        range = (range.0.min(height), range.1.max(height));
-    });
-    sheet([range.0, range.1])
 }

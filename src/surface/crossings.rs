@@ -7,9 +7,10 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
 
-use super::corners::PLACES;
+use super::corners::{PLACES, SIDE};
 use super::mesh::{MaterialMix, Vertex};
-use super::padded_samples::{AREA, Marked, Neighbours, PaddedSamples, SIDE};
+use super::neighbours::{CornerBricks, Neighbours};
+use super::padded_samples::{AREA, Marked, PaddedSamples};
 use super::stack::Stack;
 use super::vertex::lerp_normal;
 use crate::ground::{MaterialId, OVERLAY_DEPTH};
@@ -38,7 +39,7 @@ impl Crossings {
     /// then along y, then along z.
     pub fn make(
         &self,
-        apron: &PaddedSamples,
+        samples: &PaddedSamples,
         stack: &mut Stack,
         around: &Neighbours,
         low: IVec3,
@@ -46,7 +47,7 @@ impl Crossings {
         out: &mut Vec<Vertex>,
     ) {
         let mut site =
-            Site { apron, stack, materials: StoredMaterials::new(around), low, base: low - origin };
+            Site { samples, stack, materials: StoredMaterials::new(around), low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
         site.make::<0>(x, out);
@@ -57,7 +58,7 @@ impl Crossings {
 
 /// What the vertices of a block are made from.
 struct Site<'a, 'b> {
-    apron: &'a PaddedSamples,
+    samples: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
     /// The brick's lowest sample.
@@ -78,7 +79,7 @@ const NEXT_CORNER: [usize; 3] = [1, 0, 9];
 impl Site<'_, '_> {
     fn make<const AXIS: usize>(&mut self, edges: &[Edge], out: &mut Vec<Vertex>) {
         for edges in edges.chunks(LANES) {
-            let batch = Batch::new::<AXIS>(self.apron, edges);
+            let batch = Batch::new::<AXIS>(self.samples, edges);
             let vertices = edges.iter().enumerate();
             out.extend(vertices.map(|(lane, &edge)| self.vertex::<AXIS>(&batch, lane, edge)));
         }
@@ -154,14 +155,14 @@ const NEAR: usize = 3 * AREA + 1;
 
 impl Batch {
     #[inline(always)]
-    fn new<const AXIS: usize>(apron: &PaddedSamples, edges: &[Edge]) -> Self {
+    fn new<const AXIS: usize>(samples: &PaddedSamples, edges: &[Edge]) -> Self {
         let [along, b, c] = STEPS[AXIS];
         let (p, q) = (AREA, AREA + along);
         // Lanes beyond the last edge repeat it.
         let near: [&[Marked; NEAR]; LANES] = std::array::from_fn(|lane| {
             let edge = edges[lane.min(edges.len() - 1)];
-            let first = usize::from(edge.y) * AREA + PLACES[usize::from(edge.corner)].apron;
-            apron.samples()[first..].first_chunk().unwrap_or(&[0; NEAR])
+            let first = usize::from(edge.y) * AREA + PLACES[usize::from(edge.corner)].padded;
+            samples.all()[first..].first_chunk().unwrap_or(&[0; NEAR])
         });
         let at = |place: usize| {
             let [a, b, c, d] = near;
@@ -227,16 +228,16 @@ fn linear_steps(p: i32x4, q: i32x4) -> i32x4 {
 
 /// The stored materials around a block's corners.
 struct StoredMaterials<'a> {
-    bricks: [[Option<&'a Brick>; 4]; 2],
+    bricks: CornerBricks<'a>,
     /// Does any brick store materials at all?
     is_any: bool,
 }
 
 impl<'a> StoredMaterials<'a> {
     fn new(around: &Neighbours<'a>) -> Self {
-        let bricks = [around.corners(0), around.corners(1)];
+        let bricks = around.near();
         let stores = |brick: &Option<&Brick>| brick.is_some_and(|brick| brick.material_bytes() > 0);
-        Self { bricks, is_any: bricks.iter().flatten().any(stores) }
+        Self { is_any: bricks.0.iter().flatten().any(stores), bricks }
     }
 
     /// What is stored at the solid end of an edge.
@@ -244,7 +245,7 @@ impl<'a> StoredMaterials<'a> {
         let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
         let y = usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower);
         let place = &PLACES[corner];
-        let brick = self.bricks[y / 8][place.brick];
+        let brick = self.bricks.0[y / 8][place.brick];
         brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + place.index))
     }
 }

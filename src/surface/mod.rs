@@ -16,10 +16,12 @@ pub(crate) mod fresh;
 pub mod indices;
 pub mod mask;
 pub mod mesh;
+mod neighbours;
 #[cfg(feature = "cuda")]
 mod packed;
 mod padded_samples;
 pub mod plain;
+pub(crate) mod pristine;
 pub mod seams;
 mod stack;
 pub mod tile;

@@ -5,22 +5,20 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 
-use super::corners::{self, CELLS, Corners, Heights, PLACES};
+use super::corners::{self, Corners, PLACES, SIDE};
 use super::mesh::MaterialMix;
-use super::padded_samples::SIDE;
+use super::pristine::PristineStack;
 use super::vertex::WorldView;
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE};
+use crate::lattice::Column;
 
 /// A stack of bricks, all with the same x and z, and the columns around it.
 pub(super) struct Stack<'a> {
     ground: &'a Ground,
     /// The lowest column.
     pub low: Column,
-    /// Heights from one column before on.
-    pub heights: Heights,
-    /// Lowest and highest of the own 9x9 corners.
-    range: (i32, i32),
+    /// The surface without edits.
+    pub pristine: PristineStack,
     /// Cells of the mask.
     pub mask: Corners,
     /// Lattice edges along x, y and z on the mask's border, once [`Self::is_border`] has been asked.
@@ -42,13 +40,11 @@ impl<'a> Stack<'a> {
     /// Looks at the stack of bricks (x, z).
     pub fn new(view: &WorldView<'a>, (x, z): (i32, i32)) -> Self {
         let (low, ground) = (Column::new(x * 8, z * 8), view.samples.ground());
-        let heights = corners::heights(ground, low);
         let own = view.mask.word((x, z));
         Self {
             ground,
             low,
-            heights,
-            range: corners::range(&heights),
+            pristine: PristineStack::new(ground, (x, z)),
             mask: corners::spread(own),
             borders: None,
             view: *view,
@@ -60,7 +56,7 @@ impl<'a> Stack<'a> {
         }
     }
 
-    /// The world's columns along x and along z among those of the apron; `None` where all are.
+    /// The world's columns along x and along z among those of the padded samples; `None` where all are.
     pub fn rim(&self) -> Option<[RangeInclusive<usize>; 2]> {
         let (grid, all) = (self.view.grid, 0..=SIDE - 1);
         let own = |low: i32, cells: i32| {
@@ -71,31 +67,17 @@ impl<'a> Stack<'a> {
         (columns != [all.clone(), all]).then_some(columns)
     }
 
-    /// Are the pristine samples of the nine layers from `y` on all solid (`Some(true)`), or all air?
-    pub fn pristine_side(&self, y: i32) -> Option<bool> {
-        pristine_side(self.range, y)
-    }
-
-    /// Which corners are solid in the pristine world, for the nine layers from `y` on.
-    pub fn pristine(&self, y: i32) -> [Corners; 9] {
-        match self.pristine_side(y) {
-            Some(true) => [corners::ALL; 9],
-            Some(false) => [0; 9],
-            None => corners::pristine(&self.heights, self.range, y),
-        }
-    }
-
     /// Does the lattice edge from a corner along an axis lie between a volumetric cell and one that stays heightmap?
     pub fn is_border(&mut self, corner: usize, axis: usize) -> bool {
         let place = &PLACES[corner];
-        let stack = (self.low.x >> 3, self.low.z >> 3);
+        let stack = self.pristine.stack;
         let own = self.borders.get_or_insert_with(|| borders(&self.view, stack, self.view.mask.word(stack)));
         own[axis] >> ((place.z + 1) * WINDOW + place.x + 1) & 1 == 1
     }
 
     /// The height over a corner.
     pub fn height(&self, corner: usize) -> i32 {
-        self.heights.as_flattened()[PLACES[corner].apron]
+        self.pristine.heights.as_flattened()[PLACES[corner].padded]
     }
 
     fn column(&self, corner: usize) -> Column {
@@ -111,8 +93,8 @@ impl<'a> Stack<'a> {
     pub fn normal(&mut self, corner: usize) -> Vec3 {
         if !self.has_normal[corner] {
             self.has_normal[corner] = true;
-            let (column, at) = (self.column(corner), PLACES[corner].apron);
-            let height = |at: usize| self.heights.as_flattened()[at];
+            let (column, at) = (self.column(corner), PLACES[corner].padded);
+            let height = |at: usize| self.pristine.heights.as_flattened()[at];
             let (x, z) = ([height(at - 1), height(at + 1)], [height(at - SIDE), height(at + SIDE)]);
             let inner = self.ground.inner_normal(column, x, z);
             self.normals[corner] = inner.unwrap_or_else(|| self.ground.normal(column));
@@ -128,17 +110,6 @@ impl<'a> Stack<'a> {
             self.mixes[corner] = [MaterialMix::column(material), MaterialMix::pure(material.base)];
         }
         self.mixes[corner]
-    }
-}
-
-/// Are pristine samples of the nine layers from `y` on, below heights of this range, all solid or all air?
-pub(super) fn pristine_side((lowest, highest): (i32, i32), y: i32) -> Option<bool> {
-    if highest <= y * ONE {
-        Some(false)
-    } else if lowest > (y + 8) * ONE {
-        Some(true)
-    } else {
-        None
     }
 }
 
@@ -172,11 +143,4 @@ pub(crate) fn borders(view: &WorldView, (x, z): (i32, i32), own: u64) -> [u128; 
         _ => cells | cells << 1,
     };
     std::array::from_fn(|axis| around(mask, axis) & around(world & !mask, axis))
-}
-
-/// The world's cells among those of a stack.
-pub(super) fn world_cells(view: &WorldView, (x, z): (i32, i32)) -> Corners {
-    let last = Column::new((view.grid.width() - 1 - x * 8).min(7), (view.grid.depth() - 1 - z * 8).min(7));
-    let first = Column::new((-x * 8).max(0), (-z * 8).max(0));
-    if last.x < first.x || last.z < first.z { 0 } else { corners::rectangle(first, last) & CELLS }
 }
