@@ -128,7 +128,7 @@ fn is_heightmap(world: &World, key: &Key) -> bool {
 pub fn all(scene: &Scene) -> Result<[(Ground, Surface); 2], PaperError> {
     let mut field = DenseField::new(&scene.ground)?;
     let mut full = FullWorld::new(scene)?;
-    let mut terrain = play::terrain(scene, CHUNK_SIZES[0])?;
+    let mut terrain = scene.terrain(CHUNK_SIZES[0])?;
     let mut found = [(Ground::default(), Surface::default()); 2];
     for (run, found) in Run::BOTH.into_iter().zip(&mut found) {
         let brushes = scene.brushes(run);

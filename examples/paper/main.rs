@@ -31,6 +31,7 @@ mod play;
 mod plots;
 mod published;
 mod report;
+mod setup;
 mod stats;
 #[cfg(test)]
 mod tests;
@@ -49,7 +50,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use alone::Alone;
 use machine::Machine;
-use measure::{Measurements, Setup, Subject, measure};
+use measure::{Measurements, measure};
+use setup::{Setup, Subject};
 
 /// Reproduces the paper's Tables 1 to 5 and writes them beside the paper's own figures.
 #[derive(Parser)]

@@ -6,7 +6,7 @@
 //!
 //! 1. Bricks keep the signs of their samples as bits. A few operations on 81-bit layers find the cubes to draw, and the
 //!    lattice edges that their vertices lie on.
-//! 2. Only then, samples are copied out of the bricks, and only the layers that those edges look at.
+//! 2. Samples are copied out of the bricks, and only the layers that those edges need.
 //! 3. Edges are listed by axis; vertices are made from the lists, several at a time, and so each just once.
 //! 4. Triangles look their vertices' numbers up by lattice edge.
 
@@ -192,7 +192,6 @@ impl Mesher {
         top: usize,
         out: &mut Vec<u16>,
     ) {
-        const MOST: usize = 15;
         let table = &*SLOTS;
         let cubes: u32 = drawn[bottom..=top].iter().map(|layer| layer.count_ones()).sum();
         let mut end = out.len();
@@ -202,16 +201,16 @@ impl Mesher {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
-                let entry = &table[case];
+                let (slots, count) = (&table[case], usize::from(table[case][MOST]));
                 let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
                 // Most cubes have two triangles at most. Those two are always written; what is too many is written over.
-                let (usual, others) = entry.slots.split_at(6);
+                let (usual, others) = slots.split_at(6);
                 let (first, rest) = room.split_at_mut(6);
                 let number = |slot: &u16| self.numbers.at(base + usize::from(*slot));
                 first.iter_mut().zip(usual).for_each(|(to, slot)| *to = number(slot));
-                let more = entry.len.saturating_sub(6);
+                let more = count.saturating_sub(6);
                 rest.iter_mut().zip(&others[..more]).for_each(|(to, slot)| *to = number(slot));
-                end += entry.len;
+                end += count;
             });
         }
         out.truncate(end);
@@ -256,38 +255,27 @@ impl Numbers {
     }
 }
 
-/// A case's triangles as places of edges in [`Numbers`], counted from the cube's lowest corner.
-struct Slots {
-    slots: [u16; 15],
-    len: usize,
-}
-
-static SLOTS: LazyLock<[Slots; 256]> = LazyLock::new(|| {
+/// For each case the places in [`Numbers`] of its triangles' edges, counted from the cube's lowest corner, three for a triangle;
+/// the last number is how many they are.
+pub(crate) static SLOTS: LazyLock<[[u16; MOST + 1]; 256]> = LazyLock::new(|| {
     let slot = |edge| {
         let (corner, axis) = cases::edge_corners(edge);
         let [x, y, z] = cases::corner(corner).map(|step| step as u16);
         axis as u16 * 729 + y * 81 + z * 9 + x
     };
     let of = |case: &Case| {
-        let mut slots = [0; 15];
-        let mut len = 0;
-        for (place, edge) in slots.iter_mut().zip(case.triangles().flatten()) {
-            *place = slot(edge);
-            len += 1;
+        let mut slots = [0; MOST + 1];
+        for (place, edge) in case.triangles().flatten().enumerate() {
+            slots[place] = slot(edge);
+            slots[MOST] += 1;
         }
-        Slots { slots, len }
+        slots
     };
     std::array::from_fn(|case| of(&cases::table()[case]))
 });
 
-/// For each case the places of its edges as [`Numbers`] has them, three for a triangle, and how many they are.
-#[cfg(feature = "cuda")]
-pub(crate) fn slot_table() -> [[u16; 16]; 256] {
-    std::array::from_fn(|case| {
-        let Slots { slots, len } = &SLOTS[case];
-        std::array::from_fn(|i| slots.get(i).copied().unwrap_or(*len as u16))
-    })
-}
+/// The most edges that the triangles of a case have, three for a triangle.
+const MOST: usize = 15;
 
 /// The cubes of a brick that marching cubes draws.
 struct Cubes {

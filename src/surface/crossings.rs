@@ -12,7 +12,7 @@ use super::mesh::{MaterialMix, Vertex};
 use super::neighbours::{CornerBricks, Neighbours};
 use super::padded_samples::{AREA, Marked, PaddedSamples};
 use super::stack::Stack;
-use super::vertex::lerp_normal;
+use super::vertex::{between, lerp_normal};
 use crate::ground::{MaterialId, OVERLAY_DEPTH};
 use crate::lattice::{ONE, SNAP};
 use crate::volume::Brick;
@@ -120,9 +120,7 @@ impl Site<'_, '_> {
 
     /// Materials where the ground shows its own, those of both columns blended as the tile does.
     fn own_materials<const AXIS: usize>(&mut self, corner: usize, y: i32, step: i32) -> MaterialMix {
-        let between = |low: i32, high: i32| {
-            low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
-        };
+        let between = |low, high| between(low, high, step);
         let other = corner + NEXT_CORNER[AXIS];
         let depth = match AXIS {
             1 => self.stack.height(corner) - between(y * ONE, (y + 1) * ONE),
@@ -254,31 +252,8 @@ impl<'a> StoredMaterials<'a> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::vertex::{Lattice, crossing};
+    use super::super::vertex::linear;
     use super::*;
-    use crate::ground::Ground;
-    use crate::lattice::Column;
-
-    /// An edited edge along x, by the densities at its ends.
-    struct Ends([i32; 2]);
-
-    impl Lattice for Ends {
-        fn distance(&self, point: IVec3) -> i32 {
-            self.0[point.x as usize]
-        }
-        fn is_edited(&self, _: IVec3) -> bool {
-            true
-        }
-        fn stored_material(&self, _: IVec3) -> MaterialId {
-            MaterialId::GROUND
-        }
-        fn ground(&self) -> &Ground {
-            unreachable!("an edited edge is crossed where its densities say")
-        }
-        fn is_volumetric(&self, _: Column) -> Option<bool> {
-            None
-        }
-    }
 
     /// The steps from air of one density to ground of another one, and the other way round, which are those of the vertex
     /// function.
@@ -286,7 +261,7 @@ mod tests {
         let [there, back] = [[air, -ground], [-ground, air]];
         let lanes = |end: usize| i32x4::new([there[end], back[end], there[end], back[end]]);
         let steps = linear_steps(lanes(0), lanes(1)).to_array();
-        let expected = [there, back].map(|ends| crossing(&Ends(ends), IVec3::ZERO, 0));
+        let expected = [there, back].map(|[p, q]| linear(p, q));
         assert_eq!(steps, [expected[0], expected[1], expected[0], expected[1]], "{air} and -{ground}");
         expected
     }

@@ -12,10 +12,10 @@ pub mod block;
 pub mod cases;
 mod corners;
 mod crossings;
-pub(crate) mod fresh;
 pub mod indices;
 pub mod mask;
 pub mod mesh;
+pub(crate) mod meshed_blocks;
 mod neighbours;
 #[cfg(feature = "cuda")]
 mod packed;

@@ -1,4 +1,7 @@
-//! The volumetric mask: cells whose sheet marching cubes draws (rule 2, which [`rule`] keeps).
+//! The volumetric mask: cells whose sheet marching cubes draws.
+//!
+//! Rule 2: a cell is in the mask when a corner of its [sheet](cell_sheet), the cubes that the pristine surface crosses over it,
+//! is edited. `rule::joined_cells` finds these cells.
 
 mod borders;
 mod rule;
@@ -26,12 +29,12 @@ impl Mask {
         self.0.get(&word).is_some_and(|bits| bits & bit != 0)
     }
 
-    /// Without cells, and with room for so many words.
+    /// An empty mask with room for so many words.
     pub(crate) fn with_room(words: usize) -> Self {
         Self(FxHashMap::with_capacity_and_hasher(words, Default::default()))
     }
 
-    /// Puts in 8x8 cells at once: bit `z * 8 + x` is the cell (8 `word.0` + x, 8 `word.1` + z).
+    /// Adds 8x8 cells at once: bit `z * 8 + x` is the cell (8 `word.0` + x, 8 `word.1` + z).
     pub(crate) fn insert_word(&mut self, word: (i32, i32), cells: u64) {
         if cells != 0 {
             *self.0.entry(word).or_default() |= cells;
@@ -48,28 +51,28 @@ impl Mask {
         self.0.iter().map(|(&word, &cells)| (word, cells))
     }
 
-    /// Stands the words of a newer mask in place of those that are here.
+    /// Replaces words by those of a newer mask.
     pub(crate) fn lay(&mut self, newer: &Self) {
         newer.words().for_each(|(word, cells)| self.lay_word(word, cells));
     }
 
-    /// Stands 8x8 cells in place of those of a word, even if that leaves it empty: for masks that lie over another one.
+    /// Replaces a word, and keeps it even if it is empty: for masks that lie over another one.
     pub(crate) fn lay_word(&mut self, word: (i32, i32), cells: u64) {
         self.0.insert(word, cells);
     }
 
-    /// Puts 8x8 cells in place of those of a word; returns what was there.
+    /// Replaces a word, and drops it if it is empty; returns the old one.
     pub(crate) fn replace_word(&mut self, word: (i32, i32), cells: u64) -> u64 {
         let before = if cells == 0 { self.0.remove(&word) } else { self.0.insert(word, cells) };
         before.unwrap_or_default()
     }
 
-    /// Gives back what words held that are gone.
+    /// Shrinks the table once most of it is unused.
     pub(crate) fn give_back(&mut self) {
         give_back(&mut self.0);
     }
 
-    /// The 8x8 cells of a word that was put in or laid.
+    /// The 8x8 cells of a word, if it is stored.
     pub(crate) fn get_word(&self, word: (i32, i32)) -> Option<u64> {
         self.0.get(&word).copied()
     }

@@ -125,5 +125,5 @@ pub(crate) fn single_mix(ground: &Ground) -> SingleMix {
 /// The triangles of all cases: for each up to 15 places of edges, counted from the cube's lowest corner, as
 /// `729 axis + 81 y + 9 z + x`; the last number is how many there are.
 pub(crate) fn table() -> [[u16; 16]; 256] {
-    block::slot_table()
+    *block::SLOTS
 }
