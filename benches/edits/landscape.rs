@@ -20,7 +20,7 @@ pub fn ground() -> Arc<Ground> {
     }))
 }
 
-/// A terrain that nobody has touched.
+/// A terrain without edits.
 pub fn landscape(chunk_size: u32) -> Terrain {
     Terrain::new(ground(), &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings")
 }
@@ -62,7 +62,7 @@ pub fn one_thread(work: impl FnOnce() + Send) {
     threads(1).install(work);
 }
 
-/// A pool of so many threads.
+/// A pool of this many threads.
 pub fn threads(count: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("threads can be started")
 }

@@ -52,7 +52,7 @@ fn main() {
     }
 }
 
-/// One brush a transaction, by its radius, on ground that nobody touched and beside what is dug already.
+/// One brush a transaction, by its radius, on untouched ground and on dug ground.
 fn by_radius() {
     stages::header("brush");
     one_thread(|| {

@@ -25,7 +25,7 @@ pub fn section() {
     batches(&pools);
 }
 
-/// Whose turn it is: everybody's in each round, and each time another one's first.
+/// The order of a round: each takes one turn, and every round begins with another one.
 fn turns(round: usize, count: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |at| (at + round) % count)
 }

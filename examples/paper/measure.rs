@@ -83,7 +83,7 @@ pub fn measure(
 
     let mut measured: Vec<Measured> = Vec::new();
     // Repeats outside: what else the machine does meanwhile falls on all subjects alike. So does what the one before
-    // leaves behind: nobody always follows the same one.
+    // leaves behind: none always follows the same one.
     let (mut rng, mut order) = (fastrand::Rng::with_seed(setup.seed), subjects.clone());
     for _ in 0..setup.repeats {
         for &subject in &order {

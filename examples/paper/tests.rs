@@ -281,7 +281,7 @@ fn everything_is_written_and_published() {
 }
 
 #[test]
-fn the_process_tells_what_it_takes() {
+fn the_process_knows_its_memory() {
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size: 25 };
     for subject in Output::BOTH.map(Subject::Full).into_iter().chain([hybrid]) {
         let alone = Alone::here(subject, &SMALL).expect("a small experiment");

@@ -18,7 +18,7 @@ pub enum RawFormat {
     BigEndian,
 }
 
-/// What an image may cost; checked against what the file declares, before memory is taken for it.
+/// What an image may cost; checked against what the file declares, before memory is allocated for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ImageLimits {
     /// Most bytes of the file.
@@ -50,7 +50,7 @@ impl ImageLimits {
         if bytes > limit { Err(ImageError::FileSize { bytes, limit }) } else { Ok(()) }
     }
 
-    /// Checks the dimensions that a file declares, and the memory for them at so many bytes a sample.
+    /// Checks the dimensions that a file declares, and the memory for them at `bytes_per_sample`.
     pub(super) fn check_image(
         &self,
         width: u32,

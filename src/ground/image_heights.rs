@@ -46,7 +46,7 @@ pub struct Detail {
     pub scale: f64,
     /// Layers of ever smaller features: 1 to [`MAX_OCTAVES`](super::MAX_OCTAVES).
     pub octaves: u32,
-    /// Which of the many patterns.
+    /// Another seed gives another pattern.
     pub seed: u32,
 }
 

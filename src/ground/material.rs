@@ -10,14 +10,14 @@ use crate::lattice::ONE;
 /// How deep the overlay reaches below the surface: 1.5 voxels, in 1/256 voxel.
 pub const OVERLAY_DEPTH: i32 = ONE + ONE / 2;
 
-/// Names a material; what it looks like is the renderer's business.
+/// Identifies a material; the renderer decides what it looks like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct MaterialId(pub u8);
 
 impl MaterialId {
-    /// Whatever the ground itself has there, computed and never stored: what samples have that nobody built or painted.
-    /// Painting with it restores the ground's own look. No ground is made of it.
+    /// The ground's own material at that place, computed and never stored: that of samples that were never built or painted.
+    /// Painting with it restores the ground's own look. No ground can be made of it.
     pub const GROUND: Self = Self(u8::MAX);
 
     /// Checks a parameter of this name: ground cannot be made of [`Self::GROUND`].

@@ -1,7 +1,7 @@
-//! The pristine world: heights, materials and normals of the ground before anybody digs.
+//! The pristine world: heights, materials and normals of the ground before any edit.
 //!
 //! A [`Ground`] is a heightmap on the integer lattice: one height for every [`Column`](crate::lattice::Column), in
-//! 1/256 voxel, and one [`ColumnMaterial`]. It never changes; edits live elsewhere and only ask it what was there.
+//! 1/256 voxel, and one [`ColumnMaterial`]. It never changes; edits are stored elsewhere.
 //!
 //! | from | how |
 //! | --- | --- |
@@ -12,7 +12,7 @@
 //!
 //! The same input gives the same bits on every machine: heights and materials are computed with additions,
 //! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
-//! Whatever comes from outside is checked, and what does not fit is refused with an error that names the value.
+//! All input is checked, and invalid input is refused with an error that names the value.
 
 mod control;
 mod error;

@@ -12,7 +12,7 @@ pub const MAX_OCTAVES: u32 = 16;
 /// Largest size of a noise's features, in voxels; the smallest is 1.
 pub const MAX_SCALE: f64 = 1_048_576.0;
 
-/// Which landscape the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
+/// The kind of landscape that the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
 /// from machine to machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -29,9 +29,9 @@ pub enum NoiseKind {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoiseHeights {
-    /// Which of the many worlds.
+    /// Another seed gives another world.
     pub seed: u32,
-    /// Which landscape.
+    /// The kind of landscape.
     pub kind: NoiseKind,
     /// Layers of ever smaller features: 1 to [`MAX_OCTAVES`].
     pub octaves: u32,

@@ -1,4 +1,4 @@
-//! Noise as its numbers, for those who compute the heights elsewhere, to the same bits.
+//! The parameters of noise as numbers, for computing the same heights, bit by bit, on a graphics card.
 
 use bytemuck::{Pod, Zeroable};
 use noise::permutationtable::{NoiseHasher, PermutationTable};
@@ -10,7 +10,7 @@ use super::noise_heights::{NoiseHeights, NoiseKind, ORIGIN, Octaves, seeds};
 use super::world::Ground;
 use crate::lattice::{LIMIT, ONE};
 
-/// [`NoiseHeights`] over a world, checked, with all that is derived from them.
+/// [`NoiseHeights`] over a world, checked, and all numbers derived from them.
 pub(crate) struct NoiseTerms {
     extent: Extent,
     pub kind: NoiseKind,
@@ -116,7 +116,7 @@ fn table(seed: u32) -> [u8; 256] {
     std::array::from_fn(|at| permutation.hash(&[at as isize]) as u8)
 }
 
-/// What the crate scales the sum of octaves with, which it does not tell: one by the sum of their strengths.
+/// The crate's factor for the sum of octaves, which is private there: one by the sum of their strengths.
 fn fractal_factor(noise: &Fbm<Perlin>) -> f64 {
     let strengths = (1..=noise.octaves).map(|octave| noise.persistence.powi(octave as i32));
     1.0 / strengths.fold(0.0, |sum, strength| sum + strength)

@@ -26,7 +26,7 @@ use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
 /// A block to be meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Whose cells.
+    /// The brick whose cells are meshed.
     pub brick: BrickPos,
     /// The chunk that draws them.
     pub chunk: ChunkPos,
@@ -35,7 +35,7 @@ pub struct Block {
 /// The surface of one block, as ranges of a [`Parts`]. It may be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Which block.
+    /// The block.
     pub block: Block,
     /// Where its vertices end; they begin where those of the part before end.
     pub vertices: usize,
@@ -43,8 +43,8 @@ pub struct Part {
     pub indices: usize,
 }
 
-/// Surfaces of blocks, one after the other. Vertices are shared by the triangles of a block; those on its faces stand in
-/// its neighbour as well, with the same bits.
+/// Surfaces of blocks, one after the other. Vertices are shared by the triangles of a block; those on its faces are
+/// repeated in its neighbour, with the same bits.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
     /// One for each block, in order.
@@ -56,7 +56,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// An empty list with room for about so many vertices and what comes with them.
+    /// An empty list with room for about this many vertices and their indices.
     pub fn with_room(vertices: usize) -> Self {
         Self {
             list: Vec::with_capacity(vertices / 32),
@@ -82,12 +82,9 @@ impl Parts {
 
     /// Each part with its vertices and its indices.
     pub fn iter(&self) -> impl Iterator<Item = (Block, &[Vertex], &[u16])> {
-        let (mut vertex, mut index) = (0, 0);
-        self.list.iter().map(move |part| {
-            let found =
-                (part.block, &self.vertices[vertex..part.vertices], &self.indices[index..part.indices]);
-            (vertex, index) = (part.vertices, part.indices);
-            found
+        self.list.iter().enumerate().filter_map(|(number, part)| {
+            let (vertices, indices) = self.get(number)?;
+            Some((part.block, vertices, indices))
         })
     }
 }
@@ -157,7 +154,7 @@ impl Mesher {
         let layers = bottom..=top + 3;
         self.samples.fill(around, &stack.pristine.heights, layers.clone(), rows.clone());
         if let Some(columns) = stack.rim() {
-            self.samples.go_on_beyond(&columns, layers, rows);
+            self.samples.extrapolate_beyond(&columns, layers, rows);
         }
         self.list_edges(&cubes.solid, &drawn, bottom, top);
         self.crossings.make(&self.samples, stack, around, brick.origin(), origin, &mut out.vertices);
@@ -203,7 +200,7 @@ impl Mesher {
                 let base = y * 81 + cell;
                 let (slots, count) = (&table[case], usize::from(table[case][MOST]));
                 let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
-                // Most cubes have two triangles at most. Those two are always written; what is too many is written over.
+                // Most cubes have two triangles at most. Those two are always written; the next cube overwrites the surplus.
                 let (usual, others) = slots.split_at(6);
                 let (first, rest) = room.split_at_mut(6);
                 let number = |slot: &u16| self.numbers.at(base + usize::from(*slot));

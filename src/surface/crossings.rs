@@ -284,7 +284,7 @@ mod tests {
         }
 
         #[test]
-        fn what_is_nearly_a_half_is_none(step in 1..SNAP - 1, sum in (1i32 << 24)..(1i32 << 25) - 1, by in -2i32..3) {
+        fn near_halves_are_rounded_to_the_nearest_step(step in 1..SNAP - 1, sum in (1i32 << 24)..(1i32 << 25) - 1, by in -2i32..3) {
             let half = (i64::from(2 * step + 1) * i64::from(sum) / (2 * i64::from(SNAP))) as i32;
             let from = (half + by).clamp(0, sum - 1);
             steps(from, sum - from);

@@ -28,9 +28,6 @@ pub mod tile;
 pub mod vertex;
 pub(crate) mod window;
 
-#[cfg(feature = "cuda")]
-pub(crate) use stack::borders;
-
 pub use indices::Indices;
 pub use mask::{Mask, MaskView};
 pub use mesh::{MaterialMix, SurfaceMesh, Vertex};

@@ -26,7 +26,7 @@ impl<'a> Neighbours<'a> {
         own
     }
 
-    /// Finds the others as well.
+    /// Finds the remaining bricks.
     #[inline]
     pub fn complete(&mut self, window: &Window<'a>) {
         let [x, y, z] = window.steps();
@@ -65,7 +65,7 @@ impl CornerBricks<'_> {
         sides.next().flatten().is_some_and(|first| sides.all(|side| side == Some(first)))
     }
 
-    /// Solid corners, layer by layer; `pristine` tells those of bricks that are not there.
+    /// Solid corners, layer by layer; `pristine` gives those of bricks that are not stored.
     pub fn solid(&self, pristine: impl Fn() -> [Corners; 9]) -> [Corners; 9] {
         let mut layers = std::array::from_fn(|y| {
             corners::join(self.0[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))

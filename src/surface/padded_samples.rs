@@ -13,11 +13,11 @@ use crate::volume::{self, Brick, PRISTINE, Sample};
 /// Samples in one layer.
 pub(super) const AREA: usize = SIDE * SIDE;
 
-/// A sample with its editedness in one number: twice the density in 1/256 voxel, and one more if it is edited.
+/// A sample and whether it is edited, in one number: twice the density in 1/256 voxel, plus one if it is edited.
 pub(super) type Marked = i32;
 
-/// Samples from one before the brick's first to two after its last, x fastest, then z, then y. A layer of no meaning
-/// follows, so that what is near an edge can be read as one piece.
+/// Samples from one before the brick's first to two after its last, x fastest, then z, then y. An unused
+/// layer follows, so that the samples near an edge can be read as one slice.
 pub(super) struct PaddedSamples(Box<[Marked; AREA * (SIDE + 1)]>);
 
 impl Default for PaddedSamples {
@@ -27,7 +27,7 @@ impl Default for PaddedSamples {
 }
 
 impl PaddedSamples {
-    /// All samples; those of layers that were not filled are old ones.
+    /// All samples; layers that were not filled hold older samples.
     pub fn all(&self) -> &[Marked] {
         &*self.0
     }
@@ -56,9 +56,9 @@ impl PaddedSamples {
         }
     }
 
-    /// Lets densities go on beyond the world's rim, one sample far, as gradients look no further. The rows and layers are
+    /// Extrapolates densities by one sample beyond the world's rim, which is as far as gradients look. The rows and layers are
     /// those that were filled, `columns` those of the world, along x and z.
-    pub fn go_on_beyond(
+    pub fn extrapolate_beyond(
         &mut self,
         [xs, zs]: &[RangeInclusive<usize>; 2],
         layers: RangeInclusive<usize>,
@@ -67,27 +67,27 @@ impl PaddedSamples {
         for layer in self.0.chunks_exact_mut(AREA).take(layers.end() + 1).skip(*layers.start()) {
             for (to, rim, inner) in beyond(zs).filter(|(to, ..)| rows.contains(to)) {
                 for x in 0..SIDE {
-                    layer[to * SIDE + x] = straight_on(layer[rim * SIDE + x], layer[inner * SIDE + x]);
+                    layer[to * SIDE + x] = extrapolated(layer[rim * SIDE + x], layer[inner * SIDE + x]);
                 }
             }
             for (to, rim, inner) in beyond(xs) {
                 for row in layer.chunks_exact_mut(SIDE).take(rows.end() + 1).skip(*rows.start()) {
-                    row[to] = straight_on(row[rim], row[inner]);
+                    row[to] = extrapolated(row[rim], row[inner]);
                 }
             }
         }
     }
 }
 
-/// The places one beyond the world's, each with the two before it.
+/// The indices one beyond the world's, each with the two before it.
 fn beyond(world: &RangeInclusive<usize>) -> impl Iterator<Item = (usize, usize, usize)> {
     let (first, last) = (*world.start(), *world.end());
     let before = (first > 0).then(|| (first - 1, first, first + 1));
     before.into_iter().chain((last + 1 < SIDE).then(|| (last + 1, last, last - 1)))
 }
 
-/// Of two samples in a row, what comes before the first if densities go on as they come.
-fn straight_on(rim: Marked, inner: Marked) -> Marked {
+/// The sample beyond `rim` on the straight line through `inner` and `rim`.
+fn extrapolated(rim: Marked, inner: Marked) -> Marked {
     ((rim >> 1) * 2 - (inner >> 1)) << 1
 }
 

@@ -94,7 +94,7 @@ impl fmt::Display for SeamReport {
     }
 }
 
-/// Triangles of many meshes, welded as they come in.
+/// Triangles of many meshes, welded as they are added.
 #[derive(Default)]
 pub struct SeamChecker {
     numbers: FxHashMap<I64Vec3, u32>,

@@ -1,8 +1,8 @@
 //! Tiles: the heightmap's triangles outside the mask, with rings along its border (rule 3).
 //!
 //! A tile's vertices are its columns, in rows along x; digging never moves them. The few vertices that rings need on the
-//! mask's border follow after the columns. What a transaction makes anew is the list of indices: whole cells first, then
-//! the rings, of which it computes those near its edits and copies the others.
+//! mask's border follow after the columns. A transaction rebuilds only the list of indices: whole cells first, then the
+//! rings, of which it computes those near its edits and copies the others.
 
 use std::cmp::Ordering;
 
@@ -45,7 +45,7 @@ pub fn vertices(ground: &Ground, grid: ChunkGrid, tile: TilePos, rings: &Rings) 
     vertices
 }
 
-/// None for a tile that the world does not have: its cells end before they begin.
+/// How many columns a tile has; none outside the world, where its cells end before they begin.
 fn column_count(low: Column, high: Column) -> u32 {
     let along = |low: i32, high: i32| if low < high { (high - low + 1) as u32 } else { 0 };
     along(low.x, high.x) * along(low.z, high.z)

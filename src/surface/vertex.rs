@@ -1,7 +1,7 @@
 //! The one vertex function of cubes and ring (rule 4).
 //!
-//! A vertex belongs to a lattice edge. Whoever asks, from whichever chunk, reads the same samples around that edge and so
-//! gets the same bits: position, normal and materials.
+//! A vertex belongs to a lattice edge. Every chunk and tile reads the same samples around that edge and so computes the
+//! same bits: position, normal and materials.
 
 use glam::{IVec3, Vec3};
 
@@ -17,7 +17,7 @@ pub trait Lattice {
     fn distance(&self, point: IVec3) -> i32;
     /// Was the sample at a lattice point edited?
     fn is_edited(&self, point: IVec3) -> bool;
-    /// The material stored there; [`MaterialId::GROUND`] where nobody changed it.
+    /// The material stored there; [`MaterialId::GROUND`] where it was never changed.
     fn stored_material(&self, point: IVec3) -> MaterialId;
     /// The pristine world.
     fn ground(&self) -> &Ground;
@@ -38,7 +38,7 @@ pub struct WorldView<'a> {
 
 impl Lattice for WorldView<'_> {
     fn distance(&self, point: IVec3) -> i32 {
-        over_the_rim(self.grid, point, |point| self.samples.distance(point))
+        extrapolated(self.grid, point, |point| self.samples.distance(point))
     }
     fn is_edited(&self, point: IVec3) -> bool {
         self.samples.is_edited(point)
@@ -54,9 +54,9 @@ impl Lattice for WorldView<'_> {
     }
 }
 
-/// Density at a point, from those of the world's own points. Nobody edits what lies beyond the rim; there densities go on as
-/// they come, in straight lines, so that ground dug at the rim isn't shaded as a wall.
-fn over_the_rim(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
+/// Density at a point, from those of the world's own points. Points beyond the rim are never edited; there densities are
+/// extrapolated linearly, so that ground dug at the rim isn't shaded as a wall.
+fn extrapolated(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
     let last = IVec3::new(grid.width(), point.y, grid.depth());
     let rim = point.clamp(IVec3::Y * point.y, last);
     if rim == point { own(point) } else { 2 * own(rim) - own(2 * rim - point) }

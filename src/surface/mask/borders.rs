@@ -3,7 +3,10 @@
 use std::ops::Range;
 
 use super::MaskView;
-use crate::lattice::Column;
+use crate::lattice::{ChunkGrid, Column};
+
+/// Cells along a side of a word and its neighbours in [`MaskView::border_edges`]: one more on each side.
+pub(crate) const WINDOW: i32 = 10;
 
 impl MaskView<'_> {
     /// Looks at every cell from `low` up to and without `high`, and at those beside them.
@@ -20,6 +23,37 @@ impl MaskView<'_> {
             patches.extend((0..across).map(|at| Patch::new(&around(at))));
         }
         Borders { low, high, first, across, patches }
+    }
+
+    /// Lattice edges along x, y and z between a cell of the mask and one that stays heightmap, in and around the word
+    /// (x, z): bit `(z + 1) * 10 + x + 1`.
+    pub(crate) fn border_edges(&self, grid: ChunkGrid, (x, z): (i32, i32)) -> [u128; 3] {
+        // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word after.
+        let row = |words: [u64; 3], z: i32| {
+            let [before, own, after] = words.map(|word| u128::from(word >> (z * 8) & 0xff));
+            before >> 7 | own << 1 | (after & 1) << 9
+        };
+        let words = |dz: i32| [-1, 0, 1].map(|dx| self.word((x + dx, z + dz)));
+        let (before, level, after) = (words(-1), words(0), words(1));
+        if [before, level, after].iter().flatten().all(|&word| word == 0) {
+            return [0; 3];
+        }
+        let mut mask = row(before, 7) | row(after, 0) << (9 * WINDOW);
+        for z in 0..8 {
+            mask |= row(level, z) << ((z + 1) * WINDOW);
+        }
+        let (mut world, inside) = (0u128, |at: i32, cells: i32| (0..cells).contains(&at));
+        let rim = (0..WINDOW).filter(|&dx| inside(x * 8 + dx - 1, grid.width()));
+        let row = rim.fold(0u128, |row, dx| row | 1 << dx);
+        for dz in (0..WINDOW).filter(|&dz| inside(z * 8 + dz - 1, grid.depth())) {
+            world |= row << (dz * WINDOW);
+        }
+        let around = |cells: u128, axis: usize| match axis {
+            0 => cells | cells << WINDOW,
+            1 => cells | cells << 1 | cells << WINDOW | cells << (WINDOW + 1),
+            _ => cells | cells << 1,
+        };
+        std::array::from_fn(|axis| around(mask, axis) & around(world & !mask, axis))
     }
 }
 

@@ -12,6 +12,7 @@ use crate::lattice::{Column, give_back, table_bytes};
 
 pub use super::pristine::{cell_sheet, sheet};
 pub use borders::Borders;
+pub(super) use borders::WINDOW;
 pub(crate) use rule::joined_cells;
 
 /// A set of cells, one 64-bit word for each 8x8 of them.
@@ -29,7 +30,7 @@ impl Mask {
         self.0.get(&word).is_some_and(|bits| bits & bit != 0)
     }
 
-    /// An empty mask with room for so many words.
+    /// An empty mask with room for this many words.
     pub(crate) fn with_room(words: usize) -> Self {
         Self(FxHashMap::with_capacity_and_hasher(words, Default::default()))
     }
