@@ -5,9 +5,9 @@ use std::process::{Command, Stdio};
 
 use serde::{Deserialize, Serialize};
 
-use crate::PaperError;
 use crate::clock::Lap;
 use crate::edits::Run;
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld, Output};
 use crate::play::{self, Played};
 use crate::setup::{Setup, Subject};

@@ -7,8 +7,8 @@ use bevy_burrow::surface::{SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Drawn, World};
 use glam::IVec3;
 
-use crate::PaperError;
 use crate::edits::{Run, Scene};
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld, stored};
 use crate::play;
 use crate::published::CHUNK_SIZES;

@@ -2,13 +2,13 @@
 
 use bevy_burrow::terrain::{ScenarioCounts, Terrain};
 
-use crate::PaperError;
 use crate::alone::{Alone, AloneRun};
 use crate::backend::{Backend, NoBackend};
 use crate::clock::Lap;
 use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
 use crate::ending::Ending;
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld, Output};
 use crate::play::{self, Played};
 use crate::published::CHUNK_SIZES;

@@ -6,9 +6,9 @@ use std::hint::black_box;
 use bevy_burrow::brush::Brush;
 use bevy_burrow::terrain::{Applied, Receipt, Terrain};
 
-use crate::PaperError;
 use crate::backend::Runner;
 use crate::clock::{self, Lap};
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld};
 
 /// What came of a run.

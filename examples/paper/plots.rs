@@ -7,9 +7,9 @@ use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use crate::PaperError;
 use crate::backend::Backend;
 use crate::edits::Run;
+use crate::error::PaperError;
 use crate::full::Output;
 use crate::measure::{Measured, Measurements};
 use crate::published::{self, CHUNK_SIZES};

@@ -1,8 +1,8 @@
 //! How large the experiment is, and what it tests.
 
-use crate::PaperError;
 use crate::backend::Backend;
 use crate::edits::{Run, Scene};
+use crate::error::PaperError;
 use crate::full::Output;
 use crate::published::CHUNK_SIZES;
 

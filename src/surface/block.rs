@@ -13,8 +13,8 @@
 use std::sync::LazyLock;
 
 use super::cases::{self, Case};
-use super::corners::{self, Corners, X, Z};
 use super::crossings::{Crossings, Edge};
+use super::layer_bits::{self, LayerBits, X, Z};
 use super::mesh::Vertex;
 use super::neighbours::Neighbours;
 use super::padded_samples::PaddedSamples;
@@ -162,7 +162,7 @@ impl Mesher {
     }
 
     /// Lists and numbers every lattice edge that a drawn cube's vertex lies on.
-    fn list_edges(&mut self, solid: &[Corners; 9], drawn: &[Corners; 8], bottom: usize, top: usize) {
+    fn list_edges(&mut self, solid: &[LayerBits; 9], drawn: &[LayerBits; 8], bottom: usize, top: usize) {
         let mut number = 0;
         for axis in 0..3 {
             let edges_of_axis = &mut self.crossings.lists[axis];
@@ -183,8 +183,8 @@ impl Mesher {
 
     fn triangulate(
         &self,
-        solid: &[Corners; 9],
-        drawn: &[Corners; 8],
+        solid: &[LayerBits; 9],
+        drawn: &[LayerBits; 8],
         bottom: usize,
         top: usize,
         out: &mut Vec<u16>,
@@ -194,7 +194,7 @@ impl Mesher {
         let mut end = out.len();
         out.resize(end + cubes as usize * MOST, 0);
         for y in bottom..=top {
-            corners::for_ones(drawn[y], |cell| {
+            layer_bits::for_ones(drawn[y], |cell| {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
@@ -219,7 +219,7 @@ fn stack_of(brick: BrickPos) -> (i32, i32) {
 }
 
 /// Cells, and those one step further.
-fn beside(cells: Corners, step: u32) -> Corners {
+fn beside(cells: LayerBits, step: u32) -> LayerBits {
     cells | cells << step
 }
 
@@ -235,10 +235,10 @@ impl Default for Numbers {
 impl Numbers {
     /// Numbers edges from `first` on and lists them; returns the next number.
     #[inline]
-    fn count(&mut self, axis: usize, y: usize, edges: Corners, first: u16, list: &mut Vec<Edge>) -> u16 {
+    fn count(&mut self, axis: usize, y: usize, edges: LayerBits, first: u16, list: &mut Vec<Edge>) -> u16 {
         let (mut number, base) = (first, axis * 729 + y * 81);
         let numbers = &mut self.0[base..base + 81];
-        corners::for_ones(edges, |corner| {
+        layer_bits::for_ones(edges, |corner| {
             numbers[corner] = number;
             number += 1;
             list.push(Edge { y: y as u8, corner: corner as u8 });
@@ -277,9 +277,9 @@ const MOST: usize = 15;
 /// The cubes of a brick that marching cubes draws.
 struct Cubes {
     /// Solid corners, layer by layer.
-    solid: [Corners; 9],
+    solid: [LayerBits; 9],
     /// Cells to draw between a layer and the next.
-    drawn: [Corners; 8],
+    drawn: [LayerBits; 8],
 }
 
 impl Cubes {
@@ -294,18 +294,18 @@ impl Cubes {
         let mut drawn = [0; 8];
         for (y, drawn) in drawn.iter_mut().enumerate() {
             // A cube without an edited corner that both signs meet in is one of the pristine sheet.
-            *drawn = corners::mixed(solid[y], solid[y + 1]);
+            *drawn = layer_bits::mixed(solid[y], solid[y + 1]);
             if *drawn & !stack.mask != 0 {
-                *drawn &= corners::any(near.edited(y) | near.edited(y + 1)) | stack.mask;
+                *drawn &= layer_bits::any(near.edited(y) | near.edited(y + 1)) | stack.mask;
             }
         }
         (drawn != [0; 8]).then_some(Self { solid, drawn })
     }
 
     /// The cubes among these cells of the brick.
-    fn within(&self, cells: LatticeBox, brick: BrickPos) -> [Corners; 8] {
+    fn within(&self, cells: LatticeBox, brick: BrickPos) -> [LayerBits; 8] {
         let (low, high) = (cells.min - brick.origin(), cells.max - brick.origin());
-        let area = corners::rectangle(Column::of(low), Column::of(high));
+        let area = layer_bits::rectangle(Column::of(low), Column::of(high));
         std::array::from_fn(|y| if (low.y..=high.y).contains(&(y as i32)) { self.drawn[y] & area } else { 0 })
     }
 }

@@ -7,7 +7,7 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
 
-use super::corners::{PLACES, SIDE};
+use super::layer_bits::{PLACES, SIDE};
 use super::mesh::{MaterialMix, Vertex};
 use super::neighbours::{CornerBricks, Neighbours};
 use super::padded_samples::{AREA, Marked, PaddedSamples};

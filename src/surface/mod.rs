@@ -10,9 +10,9 @@
 
 pub mod block;
 pub mod cases;
-mod corners;
 mod crossings;
 pub mod indices;
+mod layer_bits;
 pub mod mask;
 pub mod mesh;
 pub(crate) mod meshed_blocks;

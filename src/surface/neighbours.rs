@@ -1,6 +1,6 @@
 //! The bricks around a brick, found once.
 
-use super::corners::{self, Corners};
+use super::layer_bits::{self, LayerBits};
 use super::window::Window;
 use crate::lattice::BrickPos;
 use crate::volume::Brick;
@@ -66,13 +66,13 @@ impl CornerBricks<'_> {
     }
 
     /// Solid corners, layer by layer; `pristine` gives those of bricks that are not stored.
-    pub fn solid(&self, pristine: impl Fn() -> [Corners; 9]) -> [Corners; 9] {
+    pub fn solid(&self, pristine: impl Fn() -> [LayerBits; 9]) -> [LayerBits; 9] {
         let mut layers = std::array::from_fn(|y| {
-            corners::join(self.0[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))
+            layer_bits::join(self.0[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))
         });
         let missing = self
             .0
-            .map(|bricks| corners::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 })));
+            .map(|bricks| layer_bits::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 })));
         if missing != [0; 2] {
             let pristine = pristine();
             for (y, layer) in layers.iter_mut().enumerate() {
@@ -83,7 +83,7 @@ impl CornerBricks<'_> {
     }
 
     /// Edited corners of one layer.
-    pub fn edited(&self, y: usize) -> Corners {
-        corners::join(self.0[y / 8].map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8])))
+    pub fn edited(&self, y: usize) -> LayerBits {
+        layer_bits::join(self.0[y / 8].map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8])))
     }
 }

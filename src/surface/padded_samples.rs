@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use wide::{i16x8, i32x8};
 
-use super::corners::SIDE;
+use super::layer_bits::SIDE;
 use super::neighbours::Neighbours;
 use super::pristine::Heights;
 use crate::lattice::ONE;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use wide::i32x8;
 
-use super::corners::{self, ALL, Corners, SIDE, X, Z};
+use super::layer_bits::{self, ALL, LayerBits, SIDE, X, Z};
 use crate::ground::Ground;
 use crate::lattice::{Column, ONE, ceil};
 
@@ -24,11 +24,11 @@ pub fn cell_sheet(ground: &Ground, cell: Column) -> Range<i32> {
 /// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on, given as bits `z * 8 + x`.
 pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
     let heights = ground.heights::<9>(low);
-    let cells = corners::spread(cells);
+    let cells = layer_bits::spread(cells);
     // The corners of these cells.
     let along = cells | cells << X;
     let mut range = (i32::MAX, i32::MIN);
-    corners::for_ones(along | along << Z, |corner| {
+    layer_bits::for_ones(along | along << Z, |corner| {
         let height = heights.as_flattened()[corner];
         range = (range.0.min(height), range.1.max(height));
     });
@@ -70,7 +70,7 @@ impl PristineStack {
     }
 
     /// Which corners are solid, for the nine layers from `y` on.
-    pub fn solid(&self, y: i32) -> [Corners; 9] {
+    pub fn solid(&self, y: i32) -> [LayerBits; 9] {
         let [all, some] = self.filled(y);
         let mut layers = [0; 9];
         layers[..all].fill(ALL);
@@ -92,8 +92,8 @@ impl PristineStack {
     }
 }
 
-/// Corners whose columns are higher than this.
-fn below(heights: &Heights, y: i32) -> Corners {
+/// LayerBits whose columns are higher than this.
+fn below(heights: &Heights, y: i32) -> LayerBits {
     let mut words = [0u64; 2];
     for (z, row) in heights[1..10].iter().enumerate() {
         let Some(first) = row[1..].first_chunk::<8>() else { continue };

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 
-use super::corners::{self, Corners, PLACES, SIDE};
+use super::layer_bits::{self, LayerBits, PLACES, SIDE};
 use super::mask::WINDOW;
 use super::mesh::MaterialMix;
 use super::pristine::PristineStack;
@@ -21,7 +21,7 @@ pub(super) struct Stack<'a> {
     /// The surface without edits.
     pub pristine: PristineStack,
     /// Cells of the mask.
-    pub mask: Corners,
+    pub mask: LayerBits,
     /// Lattice edges along x, y and z on the mask's border, once [`Self::is_border`] has been asked.
     borders: Option<[u128; 3]>,
     view: WorldView<'a>,
@@ -42,7 +42,7 @@ impl<'a> Stack<'a> {
             ground,
             low,
             pristine: PristineStack::new(ground, (x, z)),
-            mask: corners::spread(own),
+            mask: layer_bits::spread(own),
             borders: None,
             view: *view,
             normals: [None; 81],

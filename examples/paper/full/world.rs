@@ -9,8 +9,8 @@ use bevy_burrow::surface::{Indices, Mask, MaskView, SeamChecker, SeamReport, Sur
 use bevy_burrow::terrain::{Memory, Receipt, Terrain, World};
 use glam::{IVec3, Vec3};
 
-use crate::PaperError;
 use crate::edits::Scene;
+use crate::error::PaperError;
 
 /// Cells along a chunk's side: whole bricks, so that no block is cut in two.
 const CHUNK_SIZE: u32 = 32;

@@ -2,7 +2,7 @@
 //! surface crosses over the cell.
 
 use crate::lattice::{BrickPos, ChunkGrid, Column};
-use crate::surface::corners::{self, CELLS, Corners};
+use crate::surface::layer_bits::{self, CELLS, LayerBits};
 use crate::surface::neighbours::Neighbours;
 use crate::surface::pristine::PristineStack;
 use crate::surface::window::Window;
@@ -17,7 +17,7 @@ pub(crate) fn joined_cells(
     bricks: &[BrickPos],
     before: u64,
 ) -> u64 {
-    let mut cells = corners::spread(before);
+    let mut cells = layer_bits::spread(before);
     for &brick in bricks {
         let low = brick.origin().y;
         if surface.side(low).is_some() {
@@ -27,9 +27,9 @@ pub(crate) fn joined_cells(
         let pristine = surface.solid(low);
         // No other layer holds a cube of the sheet.
         for y in surface.crossed(low) {
-            let sheet = corners::mixed(pristine[y], pristine[y + 1]);
+            let sheet = layer_bits::mixed(pristine[y], pristine[y + 1]);
             if sheet & !cells != 0 {
-                cells |= sheet & corners::any(near.edited(y) | near.edited(y + 1));
+                cells |= sheet & layer_bits::any(near.edited(y) | near.edited(y + 1));
             }
         }
     }
@@ -38,8 +38,8 @@ pub(crate) fn joined_cells(
 }
 
 /// The world's cells among those of a stack.
-fn world_cells(grid: ChunkGrid, (x, z): (i32, i32)) -> Corners {
+fn world_cells(grid: ChunkGrid, (x, z): (i32, i32)) -> LayerBits {
     let last = Column::new((grid.width() - 1 - x * 8).min(7), (grid.depth() - 1 - z * 8).min(7));
     let first = Column::new((-x * 8).max(0), (-z * 8).max(0));
-    if last.x < first.x || last.z < first.z { 0 } else { corners::rectangle(first, last) & CELLS }
+    if last.x < first.x || last.z < first.z { 0 } else { layer_bits::rectangle(first, last) & CELLS }
 }

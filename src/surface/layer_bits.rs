@@ -6,7 +6,7 @@
 use crate::lattice::Column;
 
 /// A bit for each of 9x9 corners, or of 8x8 cells.
-pub type Corners = u128;
+pub type LayerBits = u128;
 
 /// Bits from a corner to the next along x, to the next along z.
 pub const X: u32 = 1;
@@ -17,14 +17,14 @@ pub const Z: u32 = 9;
 pub const SIDE: usize = 11;
 
 /// The corners of a row along x.
-const ROW: Corners = 0x1ff;
+const ROW: LayerBits = 0x1ff;
 /// All 8x8 cells.
-pub const CELLS: Corners = spread(u64::MAX);
+pub const CELLS: LayerBits = spread(u64::MAX);
 /// All 9x9 corners.
-pub const ALL: Corners = (1 << 81) - 1;
+pub const ALL: LayerBits = (1 << 81) - 1;
 
 /// Puts the rows of an 8x8 word (bit `z * 8 + x`) where corners have them.
-pub const fn spread(word: u64) -> Corners {
+pub const fn spread(word: u64) -> LayerBits {
     // Row z moves up by z bits: by 4, 2 and 1, as the bits of z say.
     let bits = word as u128;
     let bits = bits & 0xffff_ffff | (bits & 0xffff_ffff << 32) << 4;
@@ -36,7 +36,7 @@ pub const fn spread(word: u64) -> Corners {
 
 /// The bits of 9x9 corners from the words of four bricks: the own one, the ones beyond x, beyond z and beyond both.
 #[inline]
-pub fn join([own, x, z, xz]: [u64; 4]) -> Corners {
+pub fn join([own, x, z, xz]: [u64; 4]) -> LayerBits {
     const FIRST_OF_ROWS: u64 = 0x0101_0101_0101_0101;
     // Most layers are all air or all solid.
     if own | x | z | xz == 0 {
@@ -50,33 +50,33 @@ pub fn join([own, x, z, xz]: [u64; 4]) -> Corners {
 
 /// Cells with a bit at some corner of their lower face.
 #[inline]
-pub fn any(corners: Corners) -> Corners {
+pub fn any(corners: LayerBits) -> LayerBits {
     let along = corners | corners >> X;
     (along | along >> Z) & CELLS
 }
 
 /// Cells with bits at all corners of their lower face.
 #[inline]
-pub fn all(corners: Corners) -> Corners {
+pub fn all(corners: LayerBits) -> LayerBits {
     let along = corners & corners >> X;
     along & along >> Z & CELLS
 }
 
 /// Cells between two layers of corners that have a solid corner and one of air.
 #[inline]
-pub fn mixed(below: Corners, above: Corners) -> Corners {
+pub fn mixed(below: LayerBits, above: LayerBits) -> LayerBits {
     (any(below) | any(above)) & !(all(below) & all(above))
 }
 
 /// The cells from `low` up to `high`, both included and counted from the brick's first cell.
-pub fn rectangle(low: Column, high: Column) -> Corners {
+pub fn rectangle(low: Column, high: Column) -> LayerBits {
     let row = ROW >> (8 - (high.x - low.x)) << low.x;
     (low.z..=high.z).fold(0, |bits, z| bits | row << (z * 9))
 }
 
 /// Calls `each` with the positions of the bits that are set, lowest first.
 #[inline(always)]
-pub fn for_ones(corners: Corners, mut each: impl FnMut(usize)) {
+pub fn for_ones(corners: LayerBits, mut each: impl FnMut(usize)) {
     for (mut bits, base) in [(corners as u64, 0), ((corners >> 64) as u64, 64)] {
         while bits != 0 {
             each(base + bits.trailing_zeros() as usize);
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use proptest::{prop_assert, prop_assert_eq, proptest};
 
-    fn at(bits: Corners, x: usize, z: usize) -> bool {
+    fn at(bits: LayerBits, x: usize, z: usize) -> bool {
         bits >> (z * 9 + x) & 1 == 1
     }
 
