@@ -113,7 +113,7 @@ fn spheres(terrain: &Terrain, radius: f32, offset: f32, count: i32) -> Vec<Brush
 
 /// What lies where the spheres of radius 4 dig.
 enum Digging {
-    /// Ground that nobody has touched.
+    /// Untouched ground.
     Fresh,
     /// Half a radius beside earlier spheres.
     Dug,

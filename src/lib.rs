@@ -234,13 +234,17 @@
 //!
 //! # How the seam closes
 //!
-//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never rounded.
+//! 1. **Sentinel samples.** Only edited samples are stored; a pristine one is computed, d = y - h(x, z), and never rounded:
+//!    [`SampleView::distance`](volume::SampleView::distance).
 //! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*, the cubes
-//!    that the pristine surface crosses over it, is edited. All samples of the sheet beside the mask are pristine then.
-//! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex.
-//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers.
-//! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes.
-//! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes.
+//!    that the pristine surface crosses over it, is edited. All samples of the sheet beside the mask are pristine then:
+//!    [`surface::mask`].
+//! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex: [`fan`](surface::tile::fan).
+//! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers: [`vertex`](surface::vertex::vertex).
+//! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes:
+//!    [`sheet`](surface::mask::sheet) gives it.
+//! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
+//!    [`Edit::reach`](brush::Edit::reach).
 //!
 //! What was not chosen, and why: *snapping* border vertices to the nearest point of the other surface tears on steep
 //! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep caves

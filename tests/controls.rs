@@ -233,9 +233,9 @@ impl<'a> Plain<'a> {
 fn check(world: &World, triangles: &[[Vertex; 3]]) -> SeamReport {
     let vertices = triangles.as_flattened().to_vec();
     let indices = Indices::new(vertices.len(), (0..vertices.len() as u32).collect());
-    let mut soup = SeamChecker::default();
-    soup.add(&SurfaceMesh { vertices, indices }, IVec3::ZERO);
-    soup.check(world.grid())
+    let mut checker = SeamChecker::default();
+    checker.add(&SurfaceMesh { vertices, indices }, IVec3::ZERO);
+    checker.check(world.grid())
 }
 
 /// One steep world, edited across chunk faces.

@@ -20,7 +20,7 @@ pub fn ground() -> Arc<Ground> {
     }))
 }
 
-/// A terrain that nobody has touched.
+/// A terrain without edits.
 pub fn landscape(chunk_size: u32) -> Terrain {
     Terrain::new(ground(), &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings")
 }
@@ -62,7 +62,17 @@ pub fn one_thread(work: impl FnOnce() + Send) {
     threads(1).install(work);
 }
 
-/// A pool of so many threads.
+/// A pool of this many threads.
 pub fn threads(count: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("threads can be started")
+}
+
+/// Submits digs of radius 4.
+pub fn submit(terrain: &mut Terrain, count: usize, round: usize, is_spread: bool) {
+    let places = Places::new(count).offset(round);
+    let center = Places::new(1).offset(round).iter().next().unwrap_or_default();
+    terrain.submit_all((0..).zip(places.iter()).map(|(i, place)| {
+        let near = Vec3::new((i * 7 % 13) as f32, (i * 5 % 7) as f32, (i * 3 % 11) as f32) * 0.3;
+        dig(if is_spread { place } else { center + near }, 4.0)
+    }));
 }

@@ -1,7 +1,7 @@
 //! What it costs to look for loose pieces, and to undo: digs of some 100 voxels, a transaction each.
 //!
 //! The same digs are done with every look in turns, each undone before the next, so that all of them find the world as it
-//! was built. What a look adds is the time of a dig less that of the same dig where nobody looks, pair by pair.
+//! was built. What a look adds is the time of a dig less that of the same dig without a search, pair by pair.
 //!
 //! A search ends at [`LooseSettings::largest`] voxels. A body just below that is searched whole, found and described; one
 //! just above it costs all that a search may take, and larger ones of its make cost no more. The make counts, for a search

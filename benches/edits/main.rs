@@ -16,8 +16,8 @@ use std::time::Instant;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::tile::{self, Rings};
 use glam::Vec3;
-use landscape::{Places, dig, landscape, one_thread};
-use stages::Played;
+use landscape::{Places, dig, landscape, one_thread, submit};
+use stages::{Played, run};
 use statistics::{Sample, header, row};
 
 const SECTIONS: [(&str, fn()); 7] = [
@@ -52,7 +52,7 @@ fn main() {
     }
 }
 
-/// One brush a transaction, by its radius, on ground that nobody touched and beside what is dug already.
+/// One brush a transaction, by its radius, on untouched ground and on dug ground.
 fn by_radius() {
     stages::header("brush");
     one_thread(|| {
@@ -119,26 +119,6 @@ fn by_batch() {
     for (((kind, _), count), each) in &all {
         row(&format!("{count} {kind}"), each);
     }
-}
-
-/// Submits digs of radius 4.
-pub fn submit(terrain: &mut Terrain, count: usize, round: usize, is_spread: bool) {
-    let places = Places::new(count).offset(round);
-    let center = Places::new(1).offset(round).iter().next().unwrap_or_default();
-    terrain.submit_all((0..).zip(places.iter()).map(|(i, place)| {
-        let near = Vec3::new((i * 7 % 13) as f32, (i * 5 % 7) as f32, (i * 3 % 11) as f32) * 0.3;
-        dig(if is_spread { place } else { center + near }, 4.0)
-    }));
-}
-
-/// How many seconds a transaction takes.
-pub fn run(terrain: &mut Terrain) -> f64 {
-    let transaction = terrain.begin().expect("brushes wait");
-    let start = Instant::now();
-    let commit = transaction.run();
-    let took = start.elapsed().as_secs_f64();
-    assert!(!commit.meshes.chunks.is_empty());
-    took
 }
 
 /// Hiding the heightmap: the list of indices of a tile, by its size.

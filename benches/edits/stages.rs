@@ -32,7 +32,17 @@ impl Played {
     }
 }
 
-/// Heads the lines that [`row`] prints.
+/// How many seconds a transaction takes.
+pub fn run(terrain: &mut Terrain) -> f64 {
+    let transaction = terrain.begin().expect("brushes wait");
+    let start = Instant::now();
+    let commit = transaction.run();
+    let took = start.elapsed().as_secs_f64();
+    assert!(!commit.meshes.chunks.is_empty());
+    took
+}
+
+/// Prints the header of the lines that [`row`] prints.
 pub fn header(what: &str) {
     let names = ["whole", "p99", "edit", "meshing", "assembly", "ring", "commit", "a second"];
     let names: String = names.iter().map(|name| format!("{name:>9}")).collect();

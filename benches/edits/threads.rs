@@ -9,9 +9,9 @@ use bevy_burrow::terrain::Stages;
 use glam::Vec3;
 use rayon::ThreadPool;
 
-use crate::landscape::{dig, ground, landscape, threads};
+use crate::landscape::{dig, ground, landscape, submit, threads};
+use crate::stages::run;
 use crate::statistics::{Sample, header, row};
-use crate::{run, submit};
 
 pub fn section() {
     let all = std::thread::available_parallelism().map_or(2, std::num::NonZero::get);
@@ -25,7 +25,7 @@ pub fn section() {
     batches(&pools);
 }
 
-/// Whose turn it is: everybody's in each round, and each time another one's first.
+/// The order of a round: each takes one turn, and every round begins with another one.
 fn turns(round: usize, count: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |at| (at + round) % count)
 }

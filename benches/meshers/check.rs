@@ -122,7 +122,7 @@ fn is_unit([x, y, z]: [f32; 3]) -> bool {
     (length - 1.0).abs() < 1e-3
 }
 
-/// The findings of one grid: what the first contender made, who agrees, and a line for whoever does not.
+/// The findings of one grid: what the first contender made, how many agree, and a line for each that does not.
 pub fn describe(findings: &[Finding]) -> String {
     let Some(first) = findings.first() else { return String::new() };
     let shape = first.topology.map_or_else(

@@ -1,14 +1,16 @@
 //! Dense meshing beside public crates: `cargo bench --no-default-features --bench meshers`.
 //!
-//! The same grids, in one process, on one thread, in turns: see [`timing`]. Before any is timed, the same fields are meshed
-//! as closed grids, and as the first chunks of the streams, and the meshes are checked: see [`check`]. First single grids again and again, which flatters everybody's branch predictor; then a stream of
-//! chunks that all differ, as a game meshes them. Ratios are paired: round by round, or chunk by chunk.
+//! The same grids, in one process, on one thread, in turns: see [`timing`]. Before any mesher is timed, the same fields are
+//! meshed as closed grids and as the first chunks of the streams, and the meshes are checked: see [`check`]. Then single grids
+//! are meshed again and again, which flatters every cache, and after them streams of chunks that all differ, as in a game.
+//! Ratios are paired: round by round, or chunk by chunk.
 //!
 //! | module | subject |
 //! | --- | --- |
 //! | [`fields`] | what is meshed |
-//! | [`contender`] | what meshes, and classes |
+//! | [`contender`] | what a contender is, and what its meshes hold |
 //! | [`ours`], [`fast_surface_nets`], [`transvoxel`], [`mcubes`], [`isosurface`] | the contenders |
+//! | [`registry`] | their lists |
 //! | [`topology`], [`check`] | are the meshes right, and the same? |
 //! | [`timing`], [`table`], [`targets`] | how long they take |
 //! | [`export`], [`serve`] | the same for programs in other languages |
@@ -22,6 +24,7 @@ mod fields;
 mod isosurface;
 mod mcubes;
 mod ours;
+mod registry;
 mod serve;
 mod table;
 mod targets;
@@ -130,7 +133,7 @@ fn check_all(args: &Args) -> Vec<Finding> {
     let mut all = Vec::new();
     for &field in &args.fields {
         for &size in &args.sizes {
-            let findings = check::closed_grid(&mut contender::all(), field, size);
+            let findings = check::closed_grid(&mut registry::all(), field, size);
             print!("{}", check::describe(&findings));
             all.extend(findings);
         }
@@ -145,7 +148,7 @@ fn check_streams(args: &Args) -> bool {
     let mut is_right = true;
     for &field in &args.fields {
         let chunks = timing::chunks(field, CHECKED);
-        let remarks = |chunk| check::chunk(&mut contender::of_streams(), chunk);
+        let remarks = |chunk| check::chunk(&mut registry::of_streams(), chunk);
         let remarks: Vec<String> = chunks.iter().flat_map(remarks).collect();
         println!("  {:<8} {CHECKED} chunks of the stream: {} faults", field.name(), remarks.len());
         remarks.iter().for_each(|remark| println!("      WRONG {remark}"));
@@ -164,7 +167,7 @@ fn time_grids(args: &Args) -> Vec<Row> {
     for &field in &args.fields {
         for &size in &args.sizes {
             let grid = field.grid(size, Border::Cut);
-            let times = timing::one_grid(&mut contender::all(), &grid, patience);
+            let times = timing::one_grid(&mut registry::all(), &grid, patience);
             let rows = table::rows(field, Input::Grid(size), grid.cells(), &times);
             print!("{}", table::print(&rows, grid.cells()));
             all.extend(rows);
@@ -182,7 +185,7 @@ fn time_streams(args: &Args) -> Vec<Row> {
     for &field in &args.fields {
         let chunks = timing::chunks(field, count);
         let megabytes = chunks.iter().map(fields::Grid::bytes).sum::<usize>() as f64 / 1e6;
-        let times = timing::stream(&mut contender::of_streams(), &chunks);
+        let times = timing::stream(&mut registry::of_streams(), &chunks);
         let cells = timing::CHUNK_CELLS.pow(3);
         let rows = table::rows(field, Input::Stream(count), cells, &times);
         print!("{}", table::print(&rows, cells));

@@ -8,10 +8,10 @@ use std::io::{self, BufRead, Write};
 use clap::ValueEnum;
 use serde::Serialize;
 
-use crate::contender::{self, Part};
+use crate::contender::Part;
 use crate::fields::{Border, Field, Grid};
-use crate::timing;
 use crate::topology::Topology;
+use crate::{registry, timing};
 
 #[derive(Serialize)]
 struct Answer {
@@ -43,7 +43,7 @@ impl<'a> Request<'a> {
 
 /// Answers until the input ends.
 pub fn run() -> io::Result<()> {
-    let mut contenders = contender::all();
+    let mut contenders = registry::all();
     let mut held: Option<(Field, usize, Border, Grid)> = None;
     let mut output = io::stdout().lock();
     for line in io::stdin().lock().lines() {

@@ -75,8 +75,8 @@ pub fn once(contender: &mut dyn Contender, grid: &Grid, part: Part) -> f64 {
     start.elapsed().as_nanos() as f64
 }
 
-/// Whose turn it is: everybody's once per round. Rounds begin with another contender each, and every other one runs
-/// backwards, so that nobody always comes after the same neighbour.
+/// The order of a round: each contender takes one turn. Every round begins with another contender, and every other round runs
+/// backwards, so that no contender always follows the same one.
 fn turns(contenders: usize, round: usize) -> impl Iterator<Item = usize> {
     (0..contenders).map(move |turn| {
         let turn = if round.is_multiple_of(2) { turn } else { contenders - 1 - turn };
@@ -84,7 +84,7 @@ fn turns(contenders: usize, round: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// One grid again and again. Each call is made twice and the second one is timed, so that nobody pays for a cache that
+/// One grid again and again. Each call is made twice and the second one is timed, so that none pays for a cache that
 /// another has filled.
 pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Patience) -> Vec<Times> {
     let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
@@ -106,9 +106,9 @@ pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Pa
     times
 }
 
-/// Many chunks, each once by everybody: times are in the order of chunks. In a round, everybody gets another chunk, so that
-/// nobody meshes what a relative's branches have just learnt. A chunk's samples are read before every call, as they would
-/// have been by whoever made it, so that nobody pays for the memory that another has fetched.
+/// Many chunks, each meshed once by every contender: times are in the order of chunks. In a round, each contender gets another
+/// chunk, so that none profits from branches that another has just trained. A chunk's samples are read before every call, as a
+/// game would have just made them, so that none pays for fetching the memory.
 pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Times> {
     let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
     // Buffers grow and tables are made before the clock runs.

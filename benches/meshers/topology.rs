@@ -1,4 +1,4 @@
-//! What a mesh is, whoever made it: is it closed, of how many pieces, with how many handles, which side is out.
+//! The topology of a mesh: is it closed, how many pieces and handles it has, which side is out.
 
 use std::collections::HashMap;
 

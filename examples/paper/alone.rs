@@ -5,12 +5,12 @@ use std::process::{Command, Stdio};
 
 use serde::{Deserialize, Serialize};
 
-use crate::PaperError;
 use crate::clock::Lap;
 use crate::edits::Run;
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld, Output};
-use crate::measure::{Setup, Subject};
 use crate::play::{self, Played};
+use crate::setup::{Setup, Subject};
 
 /// Both runs of a test that a process played, and nothing else.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ impl Alone {
         let ran = |played: Played| AloneRun { resident: resident(), laps: played.laps };
         let [first, second] = match subject {
             Subject::Hybrid { backend, chunk_size } => {
-                let (runner, mut terrain) = (backend.open()?, play::terrain(&scene, chunk_size)?);
+                let (runner, mut terrain) = (backend.open()?, scene.terrain(chunk_size)?);
                 let mut run = |brushes: &[_]| play::hybrid(&mut terrain, &runner, brushes).map(ran);
                 [run(&brushes[0])?, run(&brushes[1])?]
             }

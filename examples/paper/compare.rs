@@ -7,8 +7,8 @@ use bevy_burrow::surface::{SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Drawn, World};
 use glam::IVec3;
 
-use crate::PaperError;
 use crate::edits::{Run, Scene};
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld, stored};
 use crate::play;
 use crate::published::CHUNK_SIZES;
@@ -128,7 +128,7 @@ fn is_heightmap(world: &World, key: &Key) -> bool {
 pub fn all(scene: &Scene) -> Result<[(Ground, Surface); 2], PaperError> {
     let mut field = DenseField::new(&scene.ground)?;
     let mut full = FullWorld::new(scene)?;
-    let mut terrain = play::terrain(scene, CHUNK_SIZES[0])?;
+    let mut terrain = scene.terrain(CHUNK_SIZES[0])?;
     let mut found = [(Ground::default(), Surface::default()); 2];
     for (run, found) in Run::BOTH.into_iter().zip(&mut found) {
         let brushes = scene.brushes(run);

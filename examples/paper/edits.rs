@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bevy_burrow::ground::{Ground, GroundError, MaterialId, NoiseHeights};
 use bevy_burrow::lattice::{Column, ONE};
 use bevy_burrow::prelude::{Brush, Shape};
+use bevy_burrow::terrain::{Terrain, TerrainError, TerrainSettings};
 use glam::{Quat, Vec3, Vec4};
 
 /// What is built, so that it can be told from the ground.
@@ -66,6 +67,12 @@ impl Scene {
         let mut random = fastrand::Rng::with_seed(seed);
         let shapes = (0..count).map(|_| shape(&mut random, &ground)).collect();
         Ok(Self { ground: Arc::new(ground), shapes })
+    }
+
+    /// A terrain without edits.
+    pub fn terrain(&self, chunk_size: u32) -> Result<Terrain, TerrainError> {
+        let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
+        Terrain::new(self.ground.clone(), &settings)
     }
 
     /// The brushes of a run in order.

@@ -24,6 +24,7 @@ mod clock;
 mod compare;
 mod edits;
 mod ending;
+mod error;
 mod full;
 mod machine;
 mod measure;
@@ -31,25 +32,23 @@ mod play;
 mod plots;
 mod published;
 mod report;
+mod setup;
 mod stats;
 #[cfg(test)]
 mod tests;
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bevy_burrow::brush::BrushError;
-use bevy_burrow::dense::DenseGridError;
-use bevy_burrow::ground::GroundError;
-use bevy_burrow::terrain::{StaleCommit, TerrainError};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use alone::Alone;
+use error::PaperError;
 use machine::Machine;
-use measure::{Measurements, Setup, Subject, measure};
+use measure::{Measurements, measure};
+use setup::{Setup, Subject};
 
 /// Reproduces the paper's Tables 1 to 5 and writes them beside the paper's own figures.
 #[derive(Parser)]
@@ -85,39 +84,6 @@ impl Args {
             seed: 2012,
         }
     }
-}
-
-/// Why there are no results.
-#[derive(Debug, thiserror::Error)]
-enum PaperError {
-    #[error(transparent)]
-    Ground(#[from] GroundError),
-    #[error(transparent)]
-    Terrain(#[from] TerrainError),
-    #[error(transparent)]
-    Brush(#[from] BrushError),
-    #[error(transparent)]
-    Grid(#[from] DenseGridError),
-    #[error(transparent)]
-    Backend(#[from] backend::NoBackend),
-    #[error("{0} stages of a run on the card were done by the processor: it failed, or had no memory left")]
-    LeftTheCard(u64),
-    #[error(transparent)]
-    Stale(#[from] StaleCommit),
-    #[error("a terrain had no transaction to begin")]
-    Busy,
-    #[error("{0}: a repeat ended otherwise than the one before")]
-    Unrepeatable(String),
-    #[error(transparent)]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    #[error("a plot could not be drawn: {0}")]
-    Plot(String),
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
-    #[error("{0}")]
-    Faults(String),
-    #[error("{}: {reason}", path.display())]
-    Write { path: PathBuf, reason: io::Error },
 }
 
 fn main() -> ExitCode {

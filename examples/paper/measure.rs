@@ -2,87 +2,17 @@
 
 use bevy_burrow::terrain::{ScenarioCounts, Terrain};
 
-use crate::PaperError;
 use crate::alone::{Alone, AloneRun};
 use crate::backend::{Backend, NoBackend};
 use crate::clock::Lap;
 use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
 use crate::ending::Ending;
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld, Output};
 use crate::play::{self, Played};
 use crate::published::CHUNK_SIZES;
-
-/// How large the experiment is.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Setup {
-    /// Lattice points along each side of the terrain.
-    pub side: u32,
-    pub edits: usize,
-    pub repeats: usize,
-    /// Threads of the pool that edits may use.
-    pub threads: usize,
-    pub seed: u64,
-}
-
-impl Setup {
-    pub fn scene(&self) -> Result<Scene, PaperError> {
-        Ok(Scene::new(self.side, self.edits, self.seed)?)
-    }
-
-    /// The same setup as arguments of this program.
-    pub fn arguments(&self) -> Vec<String> {
-        vec!["--threads".into(), self.threads.to_string()]
-    }
-
-    /// Runs of a hundred edits that the experiment makes with the backends that are there.
-    pub fn tests(&self, backends: usize) -> usize {
-        (backends * CHUNK_SIZES.len() + Output::BOTH.len()) * Run::BOTH.len() * self.repeats
-    }
-}
-
-/// What is put to the test.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Subject {
-    /// Heightmap and marching cubes, in chunks.
-    Hybrid { backend: Backend, chunk_size: u32 },
-    /// One field of marching cubes.
-    Full(Output),
-}
-
-impl Subject {
-    /// Its name in files and arguments.
-    pub fn key(self) -> String {
-        match self {
-            Self::Hybrid { backend, chunk_size } => {
-                format!("{}_{chunk_size}", backend.title().to_lowercase())
-            }
-            Self::Full(output) => output.key().into(),
-        }
-    }
-
-    /// Its name on the page.
-    pub fn title(self) -> String {
-        match self {
-            Self::Hybrid { backend, chunk_size } => format!("{} {chunk_size}", backend.title()),
-            Self::Full(output) => format!("full field, {}", output.title()),
-        }
-    }
-
-    /// Every test of the paper.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let hybrid = |backend| CHUNK_SIZES.map(|chunk_size| Self::Hybrid { backend, chunk_size });
-        Backend::ALL.into_iter().flat_map(hybrid).chain(Output::BOTH.map(Self::Full))
-    }
-}
-
-impl std::str::FromStr for Subject {
-    type Err = String;
-
-    fn from_str(key: &str) -> Result<Self, Self::Err> {
-        Self::all().find(|subject| subject.key() == key).ok_or_else(|| format!("there is no test {key}"))
-    }
-}
+use crate::setup::{Setup, Subject};
 
 /// One run of one subject, all repeats.
 #[derive(Clone, Debug)]
@@ -153,7 +83,7 @@ pub fn measure(
 
     let mut measured: Vec<Measured> = Vec::new();
     // Repeats outside: what else the machine does meanwhile falls on all subjects alike. So does what the one before
-    // leaves behind: nobody always follows the same one.
+    // leaves behind: none always follows the same one.
     let (mut rng, mut order) = (fastrand::Rng::with_seed(setup.seed), subjects.clone());
     for _ in 0..setup.repeats {
         for &subject in &order {
@@ -164,7 +94,7 @@ pub fn measure(
             match subject {
                 Subject::Hybrid { backend, chunk_size } => {
                     let runner = backend.open()?;
-                    let mut terrain = play::terrain(&scene, chunk_size)?;
+                    let mut terrain = scene.terrain(chunk_size)?;
                     for run in Run::BOTH {
                         let played = play::hybrid(&mut terrain, &runner, &scene.brushes(run))?;
                         keep(run, played, Ending::of_terrain(&terrain))?;
@@ -254,7 +184,7 @@ pub fn both_clocks(laps: &[Lap], threads: usize) -> (Vec<f64>, Vec<f64>) {
 /// Which of the paper's scenarios the first run consists of.
 fn count_scenarios(scene: &Scene) -> Result<Vec<(u32, ScenarioCounts)>, PaperError> {
     let count = |chunk_size| {
-        let mut terrain: Terrain = play::terrain(scene, chunk_size)?;
+        let mut terrain: Terrain = scene.terrain(chunk_size)?;
         let mut counts = ScenarioCounts::default();
         for receipt in terrain.apply(scene.brushes(Run::First)) {
             counts.count(&receipt);

@@ -4,12 +4,11 @@
 use std::hint::black_box;
 
 use bevy_burrow::brush::Brush;
-use bevy_burrow::terrain::{Applied, Receipt, Terrain, TerrainSettings};
+use bevy_burrow::terrain::{Applied, Receipt, Terrain};
 
-use crate::PaperError;
 use crate::backend::Runner;
 use crate::clock::{self, Lap};
-use crate::edits::Scene;
+use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld};
 
 /// What came of a run.
@@ -33,12 +32,6 @@ impl Played {
         self.voxels.push(applied().map(voxels).sum());
         self.unchanged += usize::from(applied().all(|applied| applied.bounds.is_none()));
     }
-}
-
-/// A terrain that nobody has edited.
-pub fn terrain(scene: &Scene, chunk_size: u32) -> Result<Terrain, PaperError> {
-    let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
-    Ok(Terrain::new(scene.ground.clone(), &settings)?)
 }
 
 /// Plays edits on a terrain, one transaction each: brush in, world committed, vertex and index buffers of all changed

@@ -7,12 +7,13 @@ use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use crate::PaperError;
 use crate::backend::Backend;
 use crate::edits::Run;
+use crate::error::PaperError;
 use crate::full::Output;
-use crate::measure::{Measured, Measurements, Subject};
+use crate::measure::{Measured, Measurements};
 use crate::published::{self, CHUNK_SIZES};
+use crate::setup::Subject;
 use crate::stats::{self, Statistics};
 
 /// Every plot: its file and what it shows.

@@ -12,8 +12,9 @@ use crate::compare::{self, Ground, Surface};
 use crate::edits::{Run, Scene};
 use crate::full::{DenseField, FullWorld, Output};
 use crate::machine::Machine;
-use crate::measure::{Measurements, Setup, Subject, measure};
+use crate::measure::{Measurements, measure};
 use crate::published::{self, CHUNK_SIZES};
+use crate::setup::{Setup, Subject};
 use crate::stats::{self, Statistics};
 use crate::{Args, play, plots, publish, report, write};
 
@@ -140,7 +141,7 @@ fn every_run_changes_the_ground_and_ends_alike_in_all_chunk_sizes() {
 fn dense_field_and_hybrid_are_solid_at_the_same_points() {
     let scene = SMALL.scene().expect("valid hills");
     let mut field = DenseField::new(&scene.ground).expect("a cube");
-    let mut terrain = play::terrain(&scene, 25).expect("a valid chunk size");
+    let mut terrain = scene.terrain(25).expect("a valid chunk size");
     let same = Ground { points: 72 * 72 * 72, ..Ground::default() };
     for run in Run::BOTH {
         assert_eq!(Ground::compare(&field, terrain.world()), same);
@@ -156,7 +157,7 @@ fn dense_field_and_hybrid_are_solid_at_the_same_points() {
 fn the_full_field_draws_the_hybrids_triangles_and_is_closed() {
     let scene = SMALL.scene().expect("valid hills");
     let mut full = FullWorld::new(&scene).expect("valid hills");
-    let mut terrain = play::terrain(&scene, 25).expect("a valid chunk size");
+    let mut terrain = scene.terrain(25).expect("a valid chunk size");
     let untouched = full.indices().len() / 3;
     assert!(full.check_seams().is_flawless() && untouched > 71 * 71);
     for run in Run::BOTH {
@@ -280,7 +281,7 @@ fn everything_is_written_and_published() {
 }
 
 #[test]
-fn the_process_tells_what_it_takes() {
+fn the_process_knows_its_memory() {
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size: 25 };
     for subject in Output::BOTH.map(Subject::Full).into_iter().chain([hybrid]) {
         let alone = Alone::here(subject, &SMALL).expect("a small experiment");

@@ -71,8 +71,10 @@ fn a_broken_file_changes_nothing() {
     RgbImage::new(8, 8).save(&colors).expect("a file of its own");
     let cases: [(PathBuf, fn(&StampError) -> bool); 8] = [
         (folder.clone(), |why| matches!(why, StampError::File(_))),
-        (write("empty.png", &[]), |why| matches!(why, StampError::Image(ImageError::NotPng))),
-        (write("words.png", b"no picture"), |why| matches!(why, StampError::Image(ImageError::NotPng))),
+        (write("empty.png", &[]), |why| matches!(why, StampError::Image(ImageError::Truncated { .. }))),
+        (write("words.png", b"no picture"), |why| {
+            matches!(why, StampError::Image(ImageError::Decode { .. }))
+        }),
         (write("half.png", &CRATER[..CRATER.len() / 2]), |why| {
             matches!(why, StampError::Image(ImageError::Truncated { .. } | ImageError::Decode { .. }))
         }),

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{Compute, lock};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::{Block, Mesher, Parts};
-use crate::surface::fresh::{FreshParts, Group, PartLists};
+use crate::surface::meshed_blocks::{Group, MeshedBlocks, PartLists};
 use crate::surface::vertex::WorldView;
 
 /// From how many blocks on meshing is spread over threads; below, handing out costs more than it saves.
@@ -49,7 +49,7 @@ impl Compute for Cpu {
         view: &WorldView,
         blocks: &[Block],
         meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn FreshParts),
+        then: &mut dyn FnMut(&dyn MeshedBlocks),
     ) {
         meanwhile();
         if blocks.len() < PARALLEL_BLOCKS {

@@ -11,7 +11,7 @@ use super::{Backend, CardChoice, Choice, Compute, Cpu, EngineSettings, Stage, lo
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::{Ground, GroundError, NoiseHeights};
 use crate::surface::block::Block;
-use crate::surface::fresh::FreshParts;
+use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 
 #[cfg(feature = "cuda")]
@@ -232,11 +232,11 @@ impl Compute for Shared {
         view: &WorldView,
         blocks: &[Block],
         meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn FreshParts),
+        then: &mut dyn FnMut(&dyn MeshedBlocks),
     ) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Mesh, blocks.len()));
         let mut took = Duration::ZERO;
-        let mut then = |parts: &dyn FreshParts| {
+        let mut then = |parts: &dyn MeshedBlocks| {
             took = start.elapsed();
             then(parts);
         };

@@ -29,7 +29,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::Block;
-use crate::surface::fresh::FreshParts;
+use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 
 /// What an [`Engine`] may run on.
@@ -61,7 +61,7 @@ pub(crate) trait Compute: Send + Sync {
         view: &WorldView,
         blocks: &[Block],
         meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn FreshParts),
+        then: &mut dyn FnMut(&dyn MeshedBlocks),
     );
 }
 

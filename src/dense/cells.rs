@@ -77,7 +77,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Forgets all but its memory, and prepares for a grid.
+    /// Clears all lists, keeps their memory, and prepares for a grid.
     pub(super) fn start<S: Density>(&mut self, grid: &DenseGrid<S>) {
         self.cases.clear();
         self.points.clear();
@@ -100,14 +100,14 @@ impl Cells {
         }
     }
 
-    /// How many edges wait for their vertices.
-    pub(super) fn waiting(&self) -> usize {
+    /// How many edges have no vertex yet.
+    pub(super) fn pending(&self) -> usize {
         self.edges.iter().map(Stream::len).sum()
     }
 
     /// Must the edges get their vertices before the next layer is added?
     pub(super) fn is_full(&self) -> bool {
-        self.waiting() >= BATCH
+        self.pending() >= BATCH
     }
 
     /// Adds layer `z`: the cells between `low`, its signs, and `high`, those of the next layer. Behind the last layer, which
@@ -138,7 +138,7 @@ impl Cells {
             [start.x[1], _, start.z[1]] = lists(self);
             self.add_edges(first, row_1..self.cases.len());
         }
-        // What lies behind the last row and the last layer has told its edges, and is no cell.
+        // Edges behind the last row and the last layer are listed by now; there are no cells.
         self.cases.truncate(end);
         if z + 1 == depth {
             // Room that another grid with as many cells may need, if more of them lie in its last layers.

@@ -1,7 +1,6 @@
 //! Marching cubes over a plain dense grid: shared vertices, and unit normals if they are wanted.
 //!
-//! Of use where a whole field is at hand as one array: imported volumes, simulations, chunks of a game that keeps its own
-//! samples. The terrain's own blocks are meshed by [`block`](crate::surface::block), which follows edits, materials and seams.
+//! For fields that are stored as one array: imported volumes, simulations, chunks of a game that keeps its own samples. The terrain's own blocks are meshed by [`block`](crate::surface::block), which follows edits, materials and seams.
 //!
 //! Samples below zero are solid. Triangles are counter-clockwise seen from the air, and the case table is the one in
 //! [`cases`](crate::surface::cases): a surface that stays away from the grid's border is closed.
@@ -134,8 +133,8 @@ impl DenseMesher {
         triangles::mesh(&self.cells, &mut out.indices);
     }
 
-    /// Gives every listed edge its vertex, behind the `vertices` that are there, and tells the layers from `first_layer` on
-    /// where theirs begin.
+    /// Appends the vertex of every listed edge to the `vertices` that exist, and stores in the layers from `first_layer` on
+    /// where their vertices begin.
     fn add_vertices<S: Density, const NORMALS: bool>(
         &mut self,
         grid: &DenseGrid<S>,
@@ -143,7 +142,7 @@ impl DenseMesher {
         vertices: &mut usize,
         out: &mut DenseMesh,
     ) {
-        let room = *vertices + self.cells.waiting() + vertices::SLACK;
+        let room = *vertices + self.cells.pending() + vertices::SLACK;
         if out.positions.len() < room {
             out.positions.resize(room, [0.0; 3]);
         }

@@ -1,35 +1,28 @@
 //! The same mesh, cell by cell, as plainly as it can be said: what the fast mesher is tested against.
 
-use std::collections::HashMap;
+use glam::IVec3;
 
 use super::{DenseGrid, DenseMesh, Density, Normals};
 use crate::surface::cases;
+use crate::surface::plain::CubeMesh;
 
 /// Meshes a grid. Vertices are in another order than the fast mesher's.
 pub(super) fn mesh<S: Density>(grid: DenseGrid<S>, normals: Normals) -> DenseMesh {
-    let mut mesh = DenseMesh::default();
-    let mut numbers = HashMap::new();
+    let mut mesh = CubeMesh::new();
     let [width, height, depth] = grid.meshed().map(|samples| grid.first()..grid.first() + samples - 1);
+    let point = |at: IVec3| at.to_array().map(|coordinate| coordinate as usize);
     for z in depth {
         for y in height.clone() {
             for x in width.clone() {
-                let corner = |index| {
-                    let [i, j, k] = cases::corner(index).map(|step| step as usize);
-                    [x + i, y + j, z + k]
-                };
-                let case: usize = (0..8).map(|i| usize::from(sample(grid, corner(i)) < 0.0) << i).sum();
-                for edge in cases::table()[case].triangles().flatten() {
-                    let (low, axis) = cases::edge_corners(edge);
-                    let number = *numbers.entry((corner(low), axis)).or_insert_with(|| {
-                        add_vertex(grid, corner(low), axis, normals, &mut mesh);
-                        mesh.positions.len() as u32 - 1
-                    });
-                    mesh.indices.push(number);
-                }
+                let low = IVec3::new(x as i32, y as i32, z as i32);
+                let case = cases::case_of(low, |corner| sample(grid, point(corner)) < 0.0);
+                mesh.add(low, case, |start, axis| vertex(grid, point(start), axis));
             }
         }
     }
-    mesh
+    let (positions, all_normals): (_, Vec<_>) = mesh.vertices.into_iter().unzip();
+    let normals = if normals == Normals::None { Vec::new() } else { all_normals };
+    DenseMesh { positions, normals, indices: mesh.indices }
 }
 
 fn sample<S: Density>(grid: DenseGrid<S>, [x, y, z]: [usize; 3]) -> f32 {
@@ -37,13 +30,8 @@ fn sample<S: Density>(grid: DenseGrid<S>, [x, y, z]: [usize; 3]) -> f32 {
     grid.samples()[x + width * (y + height * z)].number()
 }
 
-fn add_vertex<S: Density>(
-    grid: DenseGrid<S>,
-    start: [usize; 3],
-    axis: usize,
-    normals: Normals,
-    mesh: &mut DenseMesh,
-) {
+/// Position and normal of the vertex on an edge.
+fn vertex<S: Density>(grid: DenseGrid<S>, start: [usize; 3], axis: usize) -> ([f32; 3], [f32; 3]) {
     let mut end = start;
     end[axis] += 1;
     let (low, high) = (sample(grid, start), sample(grid, end));
@@ -51,11 +39,8 @@ fn add_vertex<S: Density>(
     let crossing = if difference.is_finite() { low / difference } else { 0.5 };
     let mut position = start.map(|coordinate| coordinate as f32);
     position[axis] += crossing;
-    mesh.positions.push(position);
-    if normals == Normals::Gradient {
-        let (low, high) = (gradient(grid, start), gradient(grid, end));
-        mesh.normals.push(unit([0, 1, 2].map(|i| low[i] + (high[i] - low[i]) * crossing)));
-    }
+    let (low, high) = (gradient(grid, start), gradient(grid, end));
+    (position, unit([0, 1, 2].map(|i| low[i] + (high[i] - low[i]) * crossing)))
 }
 
 fn gradient<S: Density>(grid: DenseGrid<S>, point: [usize; 3]) -> [f32; 3] {

@@ -1,7 +1,7 @@
-//! Growing lists that are written ahead of their end.
+//! Growing lists that may be written beyond their end.
 
-/// A list with slots behind its end that hold nothing of worth: whoever appends an item only under some condition writes it
-/// in any case, and moves the end or not, without a branch.
+/// A list with writable slots behind its end. An item that is appended under a condition is always written there, and the
+/// condition moves the end: this needs no branch.
 #[derive(Debug, Default)]
 pub(super) struct Stream<T> {
     slots: Vec<T>,
@@ -9,7 +9,7 @@ pub(super) struct Stream<T> {
 }
 
 impl<T: Copy + Default> Stream<T> {
-    /// Forgets the items, keeps the memory.
+    /// Removes the items and keeps the memory.
     pub(super) fn clear(&mut self) {
         self.len = 0;
     }
@@ -22,7 +22,7 @@ impl<T: Copy + Default> Stream<T> {
         &self.slots[..self.len]
     }
 
-    /// Forgets all but the first `len` items.
+    /// Removes all but the first `len` items.
     pub(super) fn truncate(&mut self, len: usize) {
         self.len = self.len.min(len);
     }

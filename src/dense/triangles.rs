@@ -69,7 +69,7 @@ fn step(code: usize) -> Step {
 
 /// The most triangle corners of a cell.
 const MOST: usize = 15;
-/// Triangle corners that are written for every cell; few cells have more.
+/// Triangle corners that are written for every cell, as few cells have more.
 const USUAL: usize = 9;
 
 /// Replaces `indices` by the triangles of all cells.
@@ -83,7 +83,7 @@ pub(super) fn mesh(cells: &Cells, indices: &mut Vec<u32>) {
         if codes.is_empty() {
             continue;
         }
-        // The last cell writes up to MOST indices in vain.
+        // The last cell may write up to MOST surplus indices.
         if indices.len() < at + (codes.len() + 1) * MOST {
             let count =
                 codes.iter().map(|&code| usize::from(steps[usize::from(code & 511)].count)).sum::<usize>();
@@ -97,7 +97,7 @@ pub(super) fn mesh(cells: &Cells, indices: &mut Vec<u32>) {
     indices.truncate(at);
 }
 
-/// Writes the triangles of one layer of cells, and nothing of worth behind them. Returns how many indices count.
+/// Writes the triangles of one layer of cells, and surplus indices behind them. Returns how many indices are valid.
 fn mesh_layer(steps: &[Step; 512], codes: &[u16], mut counters: Counters, indices: &mut [u32]) -> usize {
     let mut at = 0;
     // As long as a byte can reach, so that no lookup is checked.

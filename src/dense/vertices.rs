@@ -9,20 +9,20 @@ use super::cells::{Point, point};
 use super::density::Density;
 use super::grid::DenseGrid;
 
-/// Edges that are worked on together.
+/// Edges that are processed together.
 pub(super) const LANES: usize = 4;
 
 /// A bit for each of them.
 const ALL_LANES: u32 = (1 << LANES) - 1;
 
-/// Slots behind the last vertex that may be written in vain.
+/// Slots behind the last vertex that may be overwritten.
 pub(super) const SLACK: usize = LANES + 1;
 
 /// Three numbers for each of four edges.
 type Vectors = [f32x4; 3];
 
 /// Writes the vertices of the edges along `AXIS` that start at `points`, whose number is a multiple of [`LANES`]. The slot
-/// behind them is written too, with nothing of worth. Without `NORMALS` no normal is written.
+/// behind them is overwritten too. Without `NORMALS` no normal is written.
 pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
     grid: &DenseGrid<S>,
     points: &[Point],
@@ -49,7 +49,7 @@ pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
             let (units, are_exact) = units(normal);
             write(units, normals);
             if are_exact != ALL_LANES {
-                write_careful_units(normal, are_exact, normals);
+                write_exact_units(normal, are_exact, normals);
             }
             normals = &mut normals[LANES * 3..];
         } else {
@@ -60,7 +60,7 @@ pub(super) fn mesh<S: Density, const AXIS: usize, const NORMALS: bool>(
     }
 }
 
-/// The bit above each coordinate of a point: what is left of it after a subtraction tells which one was greater.
+/// The bit above each coordinate of a point: whether a subtraction clears it shows which coordinate was greater.
 const TOP: Point = 0x8000_8000_8000;
 
 /// Where samples lie in the slice.
@@ -218,7 +218,7 @@ fn crossing([start, end]: [f32x4; 2]) -> f32x4 {
     difference.abs().simd_le(f32x4::splat(f32::MAX)).bitselect(start / difference, f32x4::HALF)
 }
 
-/// Scaled to length 1; and a bit for each lane where numbers did not fail.
+/// The vectors scaled to length 1, and a bit for each lane where `f32` was exact enough.
 #[inline(always)]
 fn units([x, y, z]: Vectors) -> (Vectors, u32) {
     let squared = x * x + y * y + z * z;
@@ -228,9 +228,9 @@ fn units([x, y, z]: Vectors) -> (Vectors, u32) {
     ([x * scale, y * scale, z * scale], is_exact.to_bitmask())
 }
 
-/// Calculates the unit vectors again whose bit is not set. Vectors that have no length point up.
+/// Computes the unit vectors whose bit is not set again, in `f64`. Vectors without length point up.
 #[cold]
-fn write_careful_units(vectors: Vectors, are_exact: u32, to: &mut [f32]) {
+fn write_exact_units(vectors: Vectors, are_exact: u32, to: &mut [f32]) {
     let vectors = vectors.map(f32x4::to_array);
     let failed = |&(lane, _): &(usize, &mut [f32])| are_exact >> lane & 1 == 0;
     for (lane, to) in to.chunks_exact_mut(3).take(LANES).enumerate().filter(failed) {

@@ -1,7 +1,7 @@
 //! Material control: which column is made of what.
 
 use super::error::GroundError;
-use super::grey_image::GreyImage;
+use super::grey_image::{GreyImage, LinePosition};
 use super::material::{ColumnMaterial, MaterialId};
 use super::rules::{MaterialRule, apply};
 use super::world::{Ground, Materials};
@@ -49,20 +49,13 @@ impl Default for MaterialControl {
 }
 
 impl MaterialControl {
-    /// Whether the ground can be made of all that.
+    /// Can ground be made of these materials?
     fn check(&self) -> Result<(), GroundError> {
-        let check = |name: &'static str, material: MaterialId| match material {
-            MaterialId::GROUND => {
-                let (value, allowed) = (material.0.into(), MaterialId::ALLOWED);
-                Err(GroundError::Parameter { name, value, allowed })
-            }
-            _ => Ok(()),
-        };
-        let check_base = |base: &MaterialId| check("the base material", *base);
+        let check_base = |base: &MaterialId| base.check("the base material");
         match self {
             Self::Uniform(ColumnMaterial { base, overlay, .. }) | Self::Blend { base, overlay, .. } => {
                 check_base(base)?;
-                check("the overlay material", *overlay)
+                overlay.check("the overlay material")
             }
             Self::Rules { base, rules } => {
                 check_base(base)?;
@@ -70,7 +63,7 @@ impl MaterialControl {
             }
             Self::Ids { map, base } => {
                 check_base(base)?;
-                map.samples().iter().try_for_each(|sample| check("an id of the material map", id(*sample)))
+                map.samples().iter().try_for_each(|sample| id(*sample).check("an id of the material map"))
             }
         }
     }
@@ -86,7 +79,7 @@ impl Ground {
     /// The same heights, with materials as `control` decides.
     ///
     /// # Errors
-    /// [`GroundError::Rule`] for a rule with a parameter out of its range; [`GroundError::Parameter`] if a material is
+    /// [`GroundError::Parameter`] for a rule with a parameter out of its range, and if a material is
     /// [`MaterialId::GROUND`]; [`GroundError::Memory`] if the machine has too little.
     pub fn with_materials(self, control: &MaterialControl) -> Result<Self, GroundError> {
         control.check()?;
@@ -125,10 +118,14 @@ impl Ground {
 
     /// Where a column of the world lies on an image stretched over it.
     fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
+        // Columns and samples are at most 16384 each, so their product fits.
+        let along = |column: i32, cells: i32, samples: u32| {
+            LinePosition::new(column.unsigned_abs() * (samples - 1), cells.unsigned_abs())
+        };
         ImagePoint {
             image,
-            x: AxisPoint::new(column.x, self.width(), image.width()),
-            z: AxisPoint::new(column.z, self.depth(), image.height()),
+            x: along(column.x, self.width(), image.width()),
+            z: along(column.z, self.depth(), image.height()),
         }
     }
 }
@@ -136,8 +133,8 @@ impl Ground {
 /// A point on an image.
 struct ImagePoint<'a> {
     image: &'a GreyImage,
-    x: AxisPoint,
-    z: AxisPoint,
+    x: LinePosition,
+    z: LinePosition,
 }
 
 impl ImagePoint<'_> {
@@ -150,28 +147,8 @@ impl ImagePoint<'_> {
 
     /// The sample nearest to here.
     fn nearest(&self) -> u16 {
-        self.image.grey(self.x.nearest(), self.z.nearest())
-    }
-}
-
-/// A point along one axis of an image: so far from one sample towards the next.
-struct AxisPoint {
-    sample: u32,
-    /// 0 at the sample, 1 at the next.
-    fraction: f64,
-}
-
-impl AxisPoint {
-    /// Column `position` of `0..=cells` on a line of `samples` samples whose ends lie on the world's rims.
-    fn new(position: i32, cells: i32, samples: u32) -> Self {
-        let cells = cells.unsigned_abs();
-        // Both at most 16384, so their product fits.
-        let along = position.unsigned_abs() * (samples - 1);
-        Self { sample: along / cells, fraction: f64::from(along % cells) / f64::from(cells) }
-    }
-
-    fn nearest(&self) -> u32 {
-        if self.fraction < 0.5 { self.sample } else { self.sample + 1 }
+        let nearest = |at: LinePosition| at.sample + u32::from(at.fraction >= 0.5);
+        self.image.grey(nearest(self.x), nearest(self.z))
     }
 }
 

@@ -1,8 +1,10 @@
 //! Why ground cannot be made, and why an image cannot be read.
 
+use std::borrow::Cow;
+
 use thiserror::Error;
 
-use super::extent::MAX_SIZE;
+use super::MAX_SIZE;
 use crate::lattice::LIMIT;
 
 /// Why ground cannot be made from what was given.
@@ -50,20 +52,8 @@ pub enum GroundError {
     /// A parameter is out of its range.
     #[error("{name} is {value}: it must be {allowed}")]
     Parameter {
-        /// The parameter's name.
-        name: &'static str,
-        /// The value given.
-        value: f64,
-        /// What it may be.
-        allowed: &'static str,
-    },
-    /// A parameter of a material rule is out of its range.
-    #[error("{name} of material rule {index} is {value}: it must be {allowed}")]
-    Rule {
-        /// Position of the rule in its list, from 0.
-        index: usize,
-        /// The parameter's name.
-        name: &'static str,
+        /// The parameter's name; for a parameter of a material rule, with the rule's position in its list, from 0.
+        name: Cow<'static, str>,
         /// The value given.
         value: f64,
         /// What it may be.
@@ -92,11 +82,8 @@ pub enum ImageError {
         /// Bytes allowed.
         limit: u64,
     },
-    /// The file does not begin as a PNG does.
-    #[error("the file is no PNG: its signature is missing")]
-    NotPng,
     /// The file ends too early.
-    #[error("the PNG is cut off: it ends after {bytes} bytes")]
+    #[error("the PNG is truncated: it ends after {bytes} bytes")]
     Truncated {
         /// Bytes that are there.
         bytes: u64,
@@ -130,12 +117,10 @@ pub enum ImageError {
         limit: u64,
     },
     /// The image is not plain grey of 8 or 16 bits.
-    #[error("the image is {found} with {bits} bits per channel: heights need plain grey with 8 or 16 bits")]
+    #[error("the image has the colour type {found}: heights need plain grey with 8 or 16 bits")]
     ColorType {
-        /// The colour type found, in words.
-        found: &'static str,
-        /// Bits per channel; for a palette, bits per index.
-        bits: u8,
+        /// The colour type found, as the decoder names it: `Rgb8`, or `La16` for grey with alpha.
+        found: String,
     },
     /// The data does not have as many bytes or samples as its dimensions say.
     #[error("an image of {width} x {height} samples takes {expected} {unit}, but {actual} were given")]
@@ -151,7 +136,7 @@ pub enum ImageError {
         /// How many there are.
         actual: u64,
     },
-    /// The file is damaged, or uses something that the decoder does not know.
+    /// The file is no PNG, is damaged, or uses something that the decoder does not know.
     #[error("the image cannot be decoded: {reason}")]
     Decode {
         /// The decoder's own words.

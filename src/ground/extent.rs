@@ -2,11 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::MAX_SIZE;
 use super::error::GroundError;
 use crate::lattice::Column;
-
-/// Most cells along one side of a world.
-pub const MAX_SIZE: u32 = 16_384;
 
 /// The columns (0, 0) to (width, depth), both included; arrays over them are row-major, x fastest.
 #[derive(Clone, Copy, PartialEq, Eq)]

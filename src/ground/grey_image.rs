@@ -2,20 +2,11 @@
 
 use std::fmt;
 
+use super::MAX_SIZE;
 use super::error::ImageError;
-use super::extent::MAX_SIZE;
 
 /// Most samples along one side of an image, whatever the limits say: one more than the largest world has cells.
 const MAX_SIDE: u32 = MAX_SIZE + 1;
-
-/// How finely the samples of an image were stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum BitDepth {
-    /// 256 levels.
-    Eight,
-    /// 65536 levels.
-    Sixteen,
-}
 
 /// Byte order of a headerless file of unsigned 16-bit samples, as terrain editors export it ("RAW16", `.r16`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -27,7 +18,7 @@ pub enum RawFormat {
     BigEndian,
 }
 
-/// What an image may cost; checked against what the file declares, before memory is taken for it.
+/// What an image may cost; checked against what the file declares, before memory is allocated for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ImageLimits {
     /// Most bytes of the file.
@@ -59,7 +50,7 @@ impl ImageLimits {
         if bytes > limit { Err(ImageError::FileSize { bytes, limit }) } else { Ok(()) }
     }
 
-    /// Checks the dimensions that a file declares, and the memory for them at so many bytes a sample.
+    /// Checks the dimensions that a file declares, and the memory for them at `bytes_per_sample`.
     pub(super) fn check_image(
         &self,
         width: u32,
@@ -85,7 +76,6 @@ impl ImageLimits {
 pub struct GreyImage {
     width: u32,
     height: u32,
-    depth: BitDepth,
     samples: Vec<u16>,
 }
 
@@ -96,7 +86,12 @@ impl GreyImage {
     /// [`ImageError::Empty`], [`ImageError::Dimensions`] (a side over 16385) or [`ImageError::Length`] if there are
     /// not `width * height` samples.
     pub fn from_samples(width: u32, height: u32, samples: Vec<u16>) -> Result<Self, ImageError> {
-        Self::checked(width, height, BitDepth::Sixteen, samples)
+        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(width, height, 2)?;
+        let (expected, actual) = (u64::from(width) * u64::from(height), samples.len() as u64);
+        if actual != expected {
+            return Err(ImageError::Length { width, height, unit: "samples", expected, actual });
+        }
+        Ok(Self { width, height, samples })
     }
 
     /// Reads headerless 16-bit samples, row by row from the top.
@@ -122,23 +117,7 @@ impl GreyImage {
             RawFormat::LittleEndian => u16::from_le_bytes,
             RawFormat::BigEndian => u16::from_be_bytes,
         };
-        let samples = pairs.iter().map(|&pair| sample(pair)).collect();
-        Self::checked(width, height, BitDepth::Sixteen, samples)
-    }
-
-    /// The image, if its parts belong together.
-    pub(super) fn checked(
-        width: u32,
-        height: u32,
-        depth: BitDepth,
-        samples: Vec<u16>,
-    ) -> Result<Self, ImageError> {
-        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(width, height, 2)?;
-        let (expected, actual) = (u64::from(width) * u64::from(height), samples.len() as u64);
-        if actual != expected {
-            return Err(ImageError::Length { width, height, unit: "samples", expected, actual });
-        }
-        Ok(Self { width, height, depth, samples })
+        Self::from_samples(width, height, pairs.iter().map(|&pair| sample(pair)).collect())
     }
 
     /// Samples in a row, at least 1.
@@ -149,11 +128,6 @@ impl GreyImage {
     /// Rows, at least 1.
     pub fn height(&self) -> u32 {
         self.height
-    }
-
-    /// How finely the samples were stored.
-    pub fn bit_depth(&self) -> BitDepth {
-        self.depth
     }
 
     /// All samples, row by row from the top, 0 to 65535.
@@ -173,8 +147,23 @@ impl fmt::Debug for GreyImage {
         f.debug_struct("GreyImage")
             .field("width", &self.width)
             .field("height", &self.height)
-            .field("depth", &self.depth)
             .finish_non_exhaustive()
+    }
+}
+
+/// A position on a line of samples: a fraction of the way from one sample to the next.
+#[derive(Clone, Copy)]
+pub(super) struct LinePosition {
+    pub sample: u32,
+    /// 0 at the sample, 1 at the next.
+    pub fraction: f64,
+}
+
+impl LinePosition {
+    /// `parts` of which `parts_per_sample` lie from one sample to the next.
+    pub fn new(parts: u32, parts_per_sample: u32) -> Self {
+        let fraction = f64::from(parts % parts_per_sample) / f64::from(parts_per_sample);
+        Self { sample: parts / parts_per_sample, fraction }
     }
 }
 

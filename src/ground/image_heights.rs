@@ -2,8 +2,8 @@
 
 use super::error::GroundError;
 use super::extent::Extent;
-use super::grey_image::GreyImage;
-use super::noise_heights::{NoiseKind, check_voxels, generator};
+use super::grey_image::{GreyImage, LinePosition};
+use super::noise_heights::{NoiseHeights, check_voxels};
 use super::sources::fill_row;
 use super::world::Ground;
 
@@ -46,7 +46,7 @@ pub struct Detail {
     pub scale: f64,
     /// Layers of ever smaller features: 1 to [`MAX_OCTAVES`](super::MAX_OCTAVES).
     pub octaves: u32,
-    /// Which of the many patterns.
+    /// Another seed gives another pattern.
     pub seed: u32,
 }
 
@@ -61,7 +61,8 @@ impl Detail {
     /// The noise in voxels over the column (x, z), from checked parameters.
     fn noise(self) -> Result<impl Fn(i32, i32) -> f64 + Sync, GroundError> {
         let Self { amplitude, scale, octaves, seed } = self;
-        let noise = generator(NoiseKind::Fractal, seed, octaves, scale, amplitude)?;
+        let noise =
+            NoiseHeights { seed, octaves, scale, amplitude, ..NoiseHeights::default() }.generator()?;
         Ok(move |x, z| amplitude * noise(x, z))
     }
 }
@@ -82,8 +83,12 @@ impl Ground {
             return Err(GroundError::ImageTooSmall { width, height });
         }
         if !(1..=MAX_VOXELS_PER_SAMPLE).contains(&voxels_per_sample) {
-            let (name, value) = ("voxels per sample", f64::from(voxels_per_sample));
-            return Err(GroundError::Parameter { name, value, allowed: "1 to 64" });
+            let value = f64::from(voxels_per_sample);
+            return Err(GroundError::Parameter {
+                name: "voxels per sample".into(),
+                value,
+                allowed: "1 to 64",
+            });
         }
         check_voxels("height of grey 0", low)?;
         check_voxels("height of full grey", high)?;
@@ -92,10 +97,10 @@ impl Ground {
 
         let voxels = |x, z| low + (high - low) * f64::from(image.grey(x, z)) / 65_535.0;
         let heights = extent.fill_rows(|z, row| {
-            let across = Place::new(z, voxels_per_sample);
+            let across = LinePosition::new(z.unsigned_abs(), voxels_per_sample);
             let line: Vec<f64> = (0..width).map(|x| across.interpolate(height, |z| voxels(x, z))).collect();
             fill_row(z, row, |x| {
-                let along = Place::new(x, voxels_per_sample);
+                let along = LinePosition::new(x.unsigned_abs(), voxels_per_sample);
                 let smooth = along.interpolate(width, |x| line[x as usize]);
                 detail.as_ref().map_or(smooth, |detail| smooth + detail(x, z))
             })
@@ -104,22 +109,7 @@ impl Ground {
     }
 }
 
-/// A place on a line of samples: so far from one sample towards the next.
-#[derive(Clone, Copy)]
-struct Place {
-    sample: u32,
-    /// 0 at the sample, 1 at the next.
-    fraction: f64,
-}
-
-impl Place {
-    /// The place of a voxel, which must not be negative.
-    fn new(voxel: i32, voxels_per_sample: u32) -> Self {
-        let voxel = voxel.unsigned_abs();
-        let fraction = f64::from(voxel % voxels_per_sample) / f64::from(voxels_per_sample);
-        Self { sample: voxel / voxels_per_sample, fraction }
-    }
-
+impl LinePosition {
     /// Value here of the Catmull-Rom spline through `count` samples, at least 2. At a sample exactly the sample.
     fn interpolate(self, count: u32, value: impl Fn(u32) -> f64) -> f64 {
         let t = self.fraction;
@@ -127,7 +117,7 @@ impl Place {
             return value(self.sample);
         }
         let here = i64::from(self.sample);
-        let [p, q, r, s] = [here - 1, here, here + 1, here + 2].map(|place| extended(place, count, &value));
+        let [p, q, r, s] = [here - 1, here, here + 1, here + 2].map(|at| extended(at, count, &value));
         let cubic = 3.0 * (q - r) + s - p;
         let square = 2.0 * p - 5.0 * q + 4.0 * r - s;
         q + 0.5 * t * (r - p + t * (square + t * cubic))
@@ -135,12 +125,12 @@ impl Place {
 }
 
 /// The value of a sample, beyond either end on the straight line through the last two.
-fn extended(place: i64, count: u32, value: impl Fn(u32) -> f64) -> f64 {
+fn extended(at: i64, count: u32, value: impl Fn(u32) -> f64) -> f64 {
     let last = count - 1;
-    match u32::try_from(place) {
-        Ok(place) if place <= last => value(place),
-        Ok(_) => value(last) + (place - i64::from(last)) as f64 * (value(last) - value(last - 1)),
-        Err(_) => value(0) + place as f64 * (value(1) - value(0)),
+    match u32::try_from(at) {
+        Ok(at) if at <= last => value(at),
+        Ok(_) => value(last) + (at - i64::from(last)) as f64 * (value(last) - value(last - 1)),
+        Err(_) => value(0) + at as f64 * (value(1) - value(0)),
     }
 }
 
@@ -201,7 +191,7 @@ mod tests {
 
         #[test]
         fn one_sided_slopes_agree_at_a_sample(values in prop::array::uniform5(-100.0..100.0)) {
-            let at = |sample, fraction| Place { sample, fraction }.interpolate(5, |i| values[i as usize]);
+            let at = |sample, fraction| LinePosition { sample, fraction }.interpolate(5, |i| values[i as usize]);
             let e = 1e-6;
             for sample in 1..4 {
                 let before = (values[sample as usize] - at(sample - 1, 1.0 - e)) / e;

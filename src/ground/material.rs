@@ -1,24 +1,33 @@
 //! What the ground is made of.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
+use super::error::GroundError;
 use crate::lattice::ONE;
 
 /// How deep the overlay reaches below the surface: 1.5 voxels, in 1/256 voxel.
 pub const OVERLAY_DEPTH: i32 = ONE + ONE / 2;
 
-/// Names a material; what it looks like is the renderer's business.
+/// Identifies a material; the renderer decides what it looks like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct MaterialId(pub u8);
 
 impl MaterialId {
-    /// Whatever the ground itself has there, computed and never stored: what samples have that nobody built or painted.
-    /// Painting with it restores the ground's own look. No ground is made of it.
+    /// The ground's own material at that place, computed and never stored: that of samples that were never built or painted.
+    /// Painting with it restores the ground's own look. No ground can be made of it.
     pub const GROUND: Self = Self(u8::MAX);
 
-    /// What an id of the ground may be, in words.
-    pub(super) const ALLOWED: &str = "0 to 254, as 255 means whatever the ground has";
+    /// Checks a parameter of this name: ground cannot be made of [`Self::GROUND`].
+    pub(super) fn check(self, name: impl Into<Cow<'static, str>>) -> Result<(), GroundError> {
+        if self != Self::GROUND {
+            return Ok(());
+        }
+        let allowed = "0 to 254, as 255 means whatever the ground has";
+        Err(GroundError::Parameter { name: name.into(), value: self.0.into(), allowed })
+    }
 }
 
 /// The materials of one column: a base all the way down and an overlay as its skin.

@@ -1,7 +1,7 @@
-//! The pristine world: heights, materials and normals of the ground before anybody digs.
+//! The pristine world: heights, materials and normals of the ground before any edit.
 //!
 //! A [`Ground`] is a heightmap on the integer lattice: one height for every [`Column`](crate::lattice::Column), in
-//! 1/256 voxel, and one [`ColumnMaterial`]. It never changes; edits live elsewhere and only ask it what was there.
+//! 1/256 voxel, and one [`ColumnMaterial`]. It never changes; edits are stored elsewhere.
 //!
 //! | from | how |
 //! | --- | --- |
@@ -12,7 +12,7 @@
 //!
 //! The same input gives the same bits on every machine: heights and materials are computed with additions,
 //! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
-//! Whatever comes from outside is checked, and what does not fit is refused with an error that names the value.
+//! All input is checked, and invalid input is refused with an error that names the value.
 
 mod control;
 mod error;
@@ -30,8 +30,7 @@ mod world;
 
 pub use control::MaterialControl;
 pub use error::{GroundError, ImageError};
-pub use extent::MAX_SIZE;
-pub use grey_image::{BitDepth, GreyImage, ImageLimits, RawFormat};
+pub use grey_image::{GreyImage, ImageLimits, RawFormat};
 pub use image_heights::{Detail, ImageScale, MAX_VOXELS_PER_SAMPLE};
 pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
@@ -39,3 +38,6 @@ pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
 pub use rules::MaterialRule;
 pub use world::Ground;
+
+/// Most cells along one side of a world.
+pub const MAX_SIZE: u32 = 16_384;

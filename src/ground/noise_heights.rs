@@ -12,7 +12,7 @@ pub const MAX_OCTAVES: u32 = 16;
 /// Largest size of a noise's features, in voxels; the smallest is 1.
 pub const MAX_SCALE: f64 = 1_048_576.0;
 
-/// Which landscape the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
+/// The kind of landscape that the noise makes. Both use Perlin's gradient noise, which needs no function whose last bits differ
 /// from machine to machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -29,9 +29,9 @@ pub enum NoiseKind {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoiseHeights {
-    /// Which of the many worlds.
+    /// Another seed gives another world.
     pub seed: u32,
-    /// Which landscape.
+    /// The kind of landscape.
     pub kind: NoiseKind,
     /// Layers of ever smaller features: 1 to [`MAX_OCTAVES`].
     pub octaves: u32,
@@ -59,9 +59,8 @@ impl Ground {
     /// - [`GroundError::Height`] if base and amplitude together leave the lattice's limit.
     /// - [`GroundError::Memory`] if the machine has too little.
     pub fn from_noise(width: u32, depth: u32, noise: &NoiseHeights) -> Result<Self, GroundError> {
-        let &NoiseHeights { seed, kind, octaves, scale, amplitude, base } = noise;
-        check_voxels("noise base", base)?;
-        let noise = generator(kind, seed, octaves, scale, amplitude)?;
+        let &NoiseHeights { amplitude, base, .. } = noise;
+        let noise = noise.generator()?;
         Self::from_fn(width, depth, |x, z| base + amplitude * noise(x, z))
     }
 }
@@ -82,22 +81,18 @@ pub(super) enum Octaves {
 }
 
 impl Octaves {
-    /// Checks parameters and makes noise of them. The amplitude is only checked; the noise stays within -1 to 1.
-    pub(super) fn new(
-        kind: NoiseKind,
-        seed: u32,
-        octaves: u32,
-        scale: f64,
-        amplitude: f64,
-    ) -> Result<Self, GroundError> {
+    /// Checks all parameters and makes noise of them, within -1 to 1.
+    pub(super) fn new(heights: &NoiseHeights) -> Result<Self, GroundError> {
+        let &NoiseHeights { seed, kind, octaves, scale, amplitude, base } = heights;
+        check_voxels("noise base", base)?;
         if !(1..=MAX_OCTAVES).contains(&octaves) {
             let value = f64::from(octaves);
-            return Err(GroundError::Parameter { name: "noise octaves", value, allowed: "1 to 16" });
+            return Err(GroundError::Parameter { name: "noise octaves".into(), value, allowed: "1 to 16" });
         }
         // Also keeps coordinates small enough for the noise crate, which panics on infinite ones.
         if !(1.0..=MAX_SCALE).contains(&scale) {
             return Err(GroundError::Parameter {
-                name: "noise scale",
+                name: "noise scale".into(),
                 value: scale,
                 allowed: "1 to 1048576 voxels",
             });
@@ -123,22 +118,18 @@ pub(super) fn seeds(seed: u32, octaves: u32) -> impl Iterator<Item = u32> {
     (0..octaves).map(move |octave| seed.wrapping_add(octave))
 }
 
-/// Noise over columns, of parameters that are checked. The amplitude is only checked.
-pub(super) fn generator(
-    kind: NoiseKind,
-    seed: u32,
-    octaves: u32,
-    scale: f64,
-    amplitude: f64,
-) -> Result<ColumnNoise, GroundError> {
-    let octaves = Octaves::new(kind, seed, octaves, scale, amplitude)?;
-    let point = move |x, z| [f64::from(x) / scale + ORIGIN[0], f64::from(z) / scale + ORIGIN[1]];
-    Ok(match octaves {
-        Octaves::Fractal(noise) => Box::new(move |x, z| noise.get(point(x, z))),
-        Octaves::Ridged(noise, peak) => {
-            Box::new(move |x, z| (noise.get(point(x, z)) + 1.0) / peak * 2.0 - 1.0)
-        }
-    })
+impl NoiseHeights {
+    /// Checks the parameters; returns the noise within -1 to 1 over the column (x, z), not yet scaled to heights.
+    pub(super) fn generator(&self) -> Result<ColumnNoise, GroundError> {
+        let scale = self.scale;
+        let point = move |x, z| [f64::from(x) / scale + ORIGIN[0], f64::from(z) / scale + ORIGIN[1]];
+        Ok(match Octaves::new(self)? {
+            Octaves::Fractal(noise) => Box::new(move |x, z| noise.get(point(x, z))),
+            Octaves::Ridged(noise, peak) => {
+                Box::new(move |x, z| (noise.get(point(x, z)) + 1.0) / peak * 2.0 - 1.0)
+            }
+        })
+    }
 }
 
 /// Checks that a length in voxels is a number within the lattice's limit.
@@ -146,7 +137,7 @@ pub(super) fn check_voxels(name: &'static str, value: f64) -> Result<(), GroundE
     if value.abs() <= f64::from(LIMIT) {
         Ok(())
     } else {
-        Err(GroundError::Parameter { name, value, allowed: "-32768 to 32768 voxels" })
+        Err(GroundError::Parameter { name: name.into(), value, allowed: "-32768 to 32768 voxels" })
     }
 }
 

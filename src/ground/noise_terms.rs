@@ -1,4 +1,4 @@
-//! Noise as its numbers, for those who compute the heights elsewhere, to the same bits.
+//! The parameters of noise as numbers, for computing the same heights, bit by bit, on a graphics card.
 
 use bytemuck::{Pod, Zeroable};
 use noise::permutationtable::{NoiseHasher, PermutationTable};
@@ -6,11 +6,11 @@ use noise::{Fbm, Perlin, RidgedMulti};
 
 use super::error::GroundError;
 use super::extent::Extent;
-use super::noise_heights::{NoiseHeights, NoiseKind, ORIGIN, Octaves, check_voxels, seeds};
+use super::noise_heights::{NoiseHeights, NoiseKind, ORIGIN, Octaves, seeds};
 use super::world::Ground;
 use crate::lattice::{LIMIT, ONE};
 
-/// [`NoiseHeights`] over a world, checked, with all that is derived from them.
+/// [`NoiseHeights`] over a world, checked, and all numbers derived from them.
 pub(crate) struct NoiseTerms {
     extent: Extent,
     pub kind: NoiseKind,
@@ -47,8 +47,7 @@ impl NoiseHeights {
     /// Those of [`Ground::from_noise`] that show before any height is computed.
     pub(crate) fn terms(&self, width: u32, depth: u32) -> Result<NoiseTerms, GroundError> {
         let &Self { seed, kind, octaves, scale, amplitude, base } = self;
-        check_voxels("noise base", base)?;
-        let noise = Octaves::new(kind, seed, octaves, scale, amplitude)?;
+        let noise = Octaves::new(self)?;
         let extent = Extent::new(width, depth)?;
         let tables = seeds(seed, octaves).map(table).collect();
         let common = |frequency, lacunarity, persistence| NoiseNumbers {
@@ -84,8 +83,7 @@ impl NoiseHeights {
 impl NoiseHeights {
     /// The processor's noise over columns, before it becomes heights.
     pub(crate) fn by_column(&self) -> impl Fn(i32, i32) -> f64 {
-        let &Self { seed, kind, octaves, scale, amplitude, .. } = self;
-        super::noise_heights::generator(kind, seed, octaves, scale, amplitude).expect("parameters in range")
+        self.generator().expect("parameters in range")
     }
 }
 
@@ -118,7 +116,7 @@ fn table(seed: u32) -> [u8; 256] {
     std::array::from_fn(|at| permutation.hash(&[at as isize]) as u8)
 }
 
-/// What the crate scales the sum of octaves with, which it does not tell: one by the sum of their strengths.
+/// The crate's factor for the sum of octaves, which is private there: one by the sum of their strengths.
 fn fractal_factor(noise: &Fbm<Perlin>) -> f64 {
     let strengths = (1..=noise.octaves).map(|octave| noise.persistence.powi(octave as i32));
     1.0 / strengths.fold(0.0, |sum, strength| sum + strength)

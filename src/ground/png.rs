@@ -1,108 +1,56 @@
-//! Reading grey images from PNG files.
-//!
-//! The `image` crate decodes. The header is read here first, so that errors can name what it declares and nothing is
-//! allocated for an image that will be refused.
+//! Reading grey images from PNG files, which the `image` crate decodes.
 
 use std::io::{Cursor, ErrorKind};
 
 use image::codecs::png::PngDecoder;
-use image::{ColorType, DynamicImage, ImageDecoder, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
 
 use super::error::ImageError;
-use super::grey_image::{BitDepth, GreyImage, ImageLimits};
-
-/// First bytes of every PNG.
-const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
-
-/// What a PNG says about itself in its first chunk, `IHDR`.
-struct Header {
-    width: u32,
-    height: u32,
-    bits: u8,
-    color_type: u8,
-}
-
-impl Header {
-    /// Reads the header: signature (8 bytes), chunk length and name (8), width (4), height (4), bits, colour type.
-    fn read(bytes: &[u8]) -> Result<Self, ImageError> {
-        let present = bytes.len().min(SIGNATURE.len());
-        if bytes.is_empty() || bytes[..present] != SIGNATURE[..present] {
-            return Err(ImageError::NotPng);
-        }
-        match bytes.get(12..26) {
-            None => Err(ImageError::Truncated { bytes: bytes.len() as u64 }),
-            Some(&[b'I', b'H', b'D', b'R', w0, w1, w2, w3, h0, h1, h2, h3, bits, color_type]) => Ok(Self {
-                width: u32::from_be_bytes([w0, w1, w2, w3]),
-                height: u32::from_be_bytes([h0, h1, h2, h3]),
-                bits,
-                color_type,
-            }),
-            Some(_) => Err(ImageError::Decode { reason: "its first chunk is not the header".into() }),
-        }
-    }
-
-    /// The bit depth, if the image is plain grey.
-    fn bit_depth(&self) -> Result<BitDepth, ImageError> {
-        match (self.color_type, self.bits) {
-            (0, 8) => Ok(BitDepth::Eight),
-            (0, 16) => Ok(BitDepth::Sixteen),
-            (color_type, bits) => {
-                let found = match color_type {
-                    0 => "grey",
-                    2 => "RGB colour",
-                    3 => "palette colour",
-                    4 => "grey with alpha",
-                    6 => "RGB colour with alpha",
-                    _ => "of an unknown colour type",
-                };
-                Err(ImageError::ColorType { found, bits })
-            }
-        }
-    }
-}
+use super::grey_image::{GreyImage, ImageLimits};
 
 impl GreyImage {
     /// Decodes a PNG of plain grey with 8 or 16 bits a sample. Gamma and colour profiles are ignored: samples are
     /// heights, not light.
     ///
     /// # Errors
-    /// - [`ImageError::NotPng`], [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file.
+    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, or one that is no PNG.
     /// - [`ImageError::ColorType`] for colour, palettes, alpha or fewer than 8 bits.
     /// - [`ImageError::Empty`] for an image without samples.
     /// - [`ImageError::FileSize`], [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before
-    ///   memory is taken for it.
+    ///   memory is allocated for its samples.
     pub fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<Self, ImageError> {
         limits.check_file(bytes)?;
-        let header = Header::read(bytes)?;
-        let depth = header.bit_depth()?;
+        let (width, height, bits) = declared(bytes).unwrap_or((1, 1, 8));
         // The finished samples take 2 bytes each; those of 8 bits are held as they were while they are widened.
-        let bytes_per_sample = match depth {
-            BitDepth::Eight => 3,
-            BitDepth::Sixteen => 2,
-        };
-        limits.check_image(header.width, header.height, bytes_per_sample)?;
-
+        limits.check_image(width, height, if bits == 8 { 3 } else { 2 })?;
         let mut decoder_limits = Limits::no_limits();
-        decoder_limits.max_image_width = Some(header.width);
-        decoder_limits.max_image_height = Some(header.height);
         decoder_limits.max_alloc = Some(limits.max_alloc_bytes);
         let failed = |error| decode_error(error, bytes.len() as u64);
         let decoder = PngDecoder::with_limits(Cursor::new(bytes), decoder_limits).map_err(failed)?;
-        let transparent =
-            || ImageError::ColorType { found: "grey with a transparent shade", bits: header.bits };
-        // A transparent shade makes samples twice as large; so it is refused before memory is taken for them.
-        if !matches!(decoder.color_type(), ColorType::L8 | ColorType::L16) {
-            return Err(transparent());
+        match decoder.color_type() {
+            // The decoder widens fewer bits to 8.
+            ColorType::L8 if bits < 8 => return Err(ImageError::ColorType { found: format!("L{bits}") }),
+            ColorType::L8 | ColorType::L16 => (),
+            // A transparent shade of grey becomes an alpha channel.
+            other => return Err(ImageError::ColorType { found: format!("{other:?}") }),
         }
         let samples = match DynamicImage::from_decoder(decoder).map_err(failed)? {
             DynamicImage::ImageLuma8(grey) => {
                 grey.into_raw().into_iter().map(|v| u16::from(v) * 257).collect()
             }
-            DynamicImage::ImageLuma16(grey) => grey.into_raw(),
-            _ => return Err(transparent()),
+            other => other.into_luma16().into_raw(),
         };
-        Self::checked(header.width, header.height, depth, samples)
+        Self::from_samples(width, height, samples)
     }
+}
+
+/// Width, height and bits per channel that a PNG declares in its header; `None` where there is none, which the decoder then
+/// reports. They are read here because the decoder reserves memory for them at once.
+fn declared(bytes: &[u8]) -> Option<(u32, u32, u8)> {
+    let is_png = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Png);
+    let (&width, rest) = bytes.get(16..).filter(|_| is_png)?.split_first_chunk()?;
+    let (&height, rest) = rest.split_first_chunk()?;
+    Some((u32::from_be_bytes(width), u32::from_be_bytes(height), *rest.first()?))
 }
 
 /// Our own error for the decoder's.
@@ -140,14 +88,14 @@ mod tests {
         GreyImage::decode_png(bytes, &ImageLimits::default())
     }
 
-    /// A PNG that declares these dimensions, bits and colour type and has nothing else.
+    /// First bytes of every PNG.
+    const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+    /// A PNG that declares these dimensions, bits and colour type and has no samples.
     fn header(width: u32, height: u32, bits: u8, color_type: u8) -> Vec<u8> {
-        let mut file = SIGNATURE.to_vec();
-        file.extend(b"\0\0\0\x0dIHDR");
-        file.extend(width.to_be_bytes());
-        file.extend(height.to_be_bytes());
-        file.extend([bits, color_type, 0, 0, 0]);
-        file
+        let sizes = [width.to_be_bytes(), height.to_be_bytes()].concat();
+        let header = chunk(b"IHDR", &[&sizes, &[bits, color_type, 0, 0, 0][..]].concat());
+        [&SIGNATURE[..], &header, &chunk(b"IDAT", &[0])].concat()
     }
 
     /// Where the compressed samples lie in [`noisy_png`]: after signature, header and a chunk's length and name.
@@ -207,7 +155,7 @@ mod tests {
         fn sixteen_bits_come_back(samples in prop::collection::vec(any::<u16>(), 6)) {
             let data: Vec<u8> = samples.iter().flat_map(|s| s.to_ne_bytes()).collect();
             let image = decode(&encode(&data, 2, 3, L16)).unwrap();
-            prop_assert_eq!((image.width(), image.height(), image.bit_depth()), (2, 3, BitDepth::Sixteen));
+            prop_assert_eq!((image.width(), image.height()), (2, 3));
             prop_assert_eq!(image.samples(), samples);
         }
     }
@@ -216,7 +164,6 @@ mod tests {
     fn eight_bits_are_widened_to_full_scale() {
         let data: Vec<u8> = (0..=255).collect();
         let image = decode(&encode(&data, 16, 16, L8)).unwrap();
-        assert_eq!(image.bit_depth(), BitDepth::Eight);
         for (v, &wide) in (0..).zip(image.samples()) {
             assert_eq!(u32::from(wide) * 255, v * 65_535);
         }
@@ -234,30 +181,25 @@ mod tests {
 
     #[test]
     fn other_files_are_no_png() {
-        for file in ["", "GIF89a", "PNG", "\u{89}PNG with the wrong line ends"] {
-            assert_eq!(decode(file.as_bytes()), Err(ImageError::NotPng));
+        for file in ["GIF89a and more", "PNG, but as text", "\u{89}PNG with the wrong line ends"] {
+            assert!(matches!(decode(file.as_bytes()), Err(ImageError::Decode { .. })), "{file}");
         }
+        assert_eq!(decode(b""), Err(ImageError::Truncated { bytes: 0 }));
     }
 
     #[test]
     fn other_color_types_are_refused_by_name() {
-        let refused = |found, bits| Err(ImageError::ColorType { found, bits });
-        assert_eq!(decode(&encode(&[0; 12], 2, 2, Rgb8)), refused("RGB colour", 8));
-        assert_eq!(decode(&encode(&[0; 8], 2, 2, La8)), refused("grey with alpha", 8));
-        assert_eq!(decode(&encode(&[0; 32], 2, 2, Rgba16)), refused("RGB colour with alpha", 16));
-        assert_eq!(decode(&header(2, 2, 8, 3)), refused("palette colour", 8));
-        assert_eq!(decode(&header(2, 2, 1, 0)), refused("grey", 1));
-        assert_eq!(decode(&header(2, 2, 8, 9)), refused("of an unknown colour type", 8));
-    }
-
-    #[test]
-    fn a_transparent_shade_is_refused() {
+        let refused = |file: &[u8], name: &str| {
+            assert_eq!(decode(file), Err(ImageError::ColorType { found: name.into() }));
+        };
+        refused(&encode(&[0; 12], 2, 2, Rgb8), "Rgb8");
+        refused(&encode(&[0; 8], 2, 2, La8), "La8");
+        refused(&encode(&[0; 32], 2, 2, Rgba16), "Rgba16");
+        refused(&header(2, 2, 1, 0), "L1");
         let file = noisy_png();
-        let file = [&file[..33], &chunk(b"tRNS", &[0, 0]), &file[33..]].concat();
-        assert_eq!(
-            decode(&file),
-            Err(ImageError::ColorType { found: "grey with a transparent shade", bits: 16 })
-        );
+        let transparent_shade = [&file[..33], &chunk(b"tRNS", &[0, 0]), &file[33..]].concat();
+        refused(&transparent_shade, "La16");
+        assert!(matches!(decode(&header(2, 2, 8, 9)), Err(ImageError::Decode { .. })));
     }
 
     #[test]

@@ -32,29 +32,24 @@ impl Default for MaterialRule {
 impl MaterialRule {
     /// Checks the rule at `index` of its list.
     pub(super) fn check(&self, index: usize) -> Result<(), GroundError> {
-        if self.overlay == MaterialId::GROUND {
-            let (name, value) = ("the overlay", self.overlay.0.into());
-            return Err(GroundError::Rule { index, name, value, allowed: MaterialId::ALLOWED });
-        }
-        for (name, (low, high)) in
+        let name = |parameter: &str| format!("{parameter} of material rule {index}");
+        let check = |is_right: bool, parameter: &str, value: f64, allowed: &'static str| {
+            let wrong = || GroundError::Parameter { name: name(parameter).into(), value, allowed };
+            is_right.then_some(()).ok_or_else(wrong)
+        };
+        self.overlay.check(name("the overlay"))?;
+        for (parameter, (low, high)) in
             [("the range of heights", self.height), ("the range of slopes", self.slope)]
         {
             for value in [low, high] {
-                if value.is_nan() {
-                    return Err(GroundError::Rule { index, name, value, allowed: "numbers or infinite" });
-                }
+                check(!value.is_nan(), parameter, value, "numbers or infinite")?;
             }
-            if low > high {
-                let allowed = "at most its upper end";
-                return Err(GroundError::Rule { index, name, value: low, allowed });
-            }
+            check(low <= high, parameter, low, "at most its upper end")?;
         }
-        for (name, value) in
+        for (parameter, value) in
             [("the fade of heights", self.height_fade), ("the fade of slopes", self.slope_fade)]
         {
-            if !(0.0..f64::INFINITY).contains(&value) {
-                return Err(GroundError::Rule { index, name, value, allowed: "finite and at least 0" });
-            }
+            check((0.0..f64::INFINITY).contains(&value), parameter, value, "finite and at least 0")?;
         }
         Ok(())
     }
@@ -147,7 +142,8 @@ mod tests {
             MaterialRule { slope_fade: f64::INFINITY, ..good },
             MaterialRule { overlay: MaterialId::GROUND, ..good },
         ] {
-            assert!(matches!(bad.check(4), Err(GroundError::Rule { index: 4, .. })), "{bad:?}");
+            let Err(GroundError::Parameter { name, .. }) = bad.check(4) else { panic!("{bad:?} is allowed") };
+            assert!(name.ends_with(" of material rule 4"), "{name}");
         }
     }
 

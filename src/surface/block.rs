@@ -6,30 +6,27 @@
 //!
 //! 1. Bricks keep the signs of their samples as bits. A few operations on 81-bit layers find the cubes to draw, and the
 //!    lattice edges that their vertices lie on.
-//! 2. Only then, samples are copied out of the bricks, and only the layers that those edges look at.
+//! 2. Samples are copied out of the bricks, and only the layers that those edges need.
 //! 3. Edges are listed by axis; vertices are made from the lists, several at a time, and so each just once.
 //! 4. Triangles look their vertices' numbers up by lattice edge.
 
-use std::ops::Range;
 use std::sync::LazyLock;
 
 use super::cases::{self, Case};
-use super::corners::{self, Corners, Heights, X, Z};
 use super::crossings::{Crossings, Edge};
-use super::mask::sheet;
+use super::layer_bits::{self, LayerBits, X, Z};
 use super::mesh::Vertex;
-use super::padded_samples::{Neighbours, PaddedSamples};
-use super::stack::{Stack, pristine_side, world_cells};
+use super::neighbours::Neighbours;
+use super::padded_samples::PaddedSamples;
+use super::stack::Stack;
 use super::vertex::WorldView;
 use super::window::{self, Window};
-use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox};
-use crate::volume::Brick;
 
 /// A block to be meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Whose cells.
+    /// The brick whose cells are meshed.
     pub brick: BrickPos,
     /// The chunk that draws them.
     pub chunk: ChunkPos,
@@ -38,7 +35,7 @@ pub struct Block {
 /// The surface of one block, as ranges of a [`Parts`]. It may be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Which block.
+    /// The block.
     pub block: Block,
     /// Where its vertices end; they begin where those of the part before end.
     pub vertices: usize,
@@ -46,8 +43,8 @@ pub struct Part {
     pub indices: usize,
 }
 
-/// Surfaces of blocks, one after the other. Vertices are shared by the triangles of a block; those on its faces stand in
-/// its neighbour as well, with the same bits.
+/// Surfaces of blocks, one after the other. Vertices are shared by the triangles of a block; those on its faces are
+/// repeated in its neighbour, with the same bits.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
     /// One for each block, in order.
@@ -59,7 +56,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// An empty list with room for about so many vertices and what comes with them.
+    /// An empty list with room for about this many vertices and their indices.
     pub fn with_room(vertices: usize) -> Self {
         Self {
             list: Vec::with_capacity(vertices / 32),
@@ -85,12 +82,9 @@ impl Parts {
 
     /// Each part with its vertices and its indices.
     pub fn iter(&self) -> impl Iterator<Item = (Block, &[Vertex], &[u16])> {
-        let (mut vertex, mut index) = (0, 0);
-        self.list.iter().map(move |part| {
-            let found =
-                (part.block, &self.vertices[vertex..part.vertices], &self.indices[index..part.indices]);
-            (vertex, index) = (part.vertices, part.indices);
-            found
+        self.list.iter().enumerate().filter_map(|(number, part)| {
+            let (vertices, indices) = self.get(number)?;
+            Some((part.block, vertices, indices))
         })
     }
 }
@@ -98,7 +92,7 @@ impl Parts {
 /// Meshes blocks; keeps its working memory from one call to the next.
 #[derive(Default)]
 pub struct Mesher {
-    apron: PaddedSamples,
+    samples: PaddedSamples,
     crossings: Crossings,
     numbers: Numbers,
     window: Window<'static>,
@@ -155,20 +149,20 @@ impl Mesher {
         let (Some(bottom), Some(top)) = ((0..8).find(filled), (0..8).rfind(filled)) else { return };
         let all = drawn.iter().fold(0, |all, layer| all | layer);
         let (near, far) = (all.trailing_zeros() / Z, all.ilog2() / Z);
-        // The apron starts one before the cells; the gradients at the corners beyond them look one further.
+        // The padded samples start one before the cells; the gradients at the corners beyond them look one further.
         let rows = near as usize..=far as usize + 3;
         let layers = bottom..=top + 3;
-        self.apron.fill(around, &stack.heights, layers.clone(), rows.clone());
+        self.samples.fill(around, &stack.pristine.heights, layers.clone(), rows.clone());
         if let Some(columns) = stack.rim() {
-            self.apron.go_on_beyond(&columns, layers, rows);
+            self.samples.extrapolate_beyond(&columns, layers, rows);
         }
         self.list_edges(&cubes.solid, &drawn, bottom, top);
-        self.crossings.make(&self.apron, stack, around, brick.origin(), origin, &mut out.vertices);
+        self.crossings.make(&self.samples, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
     }
 
     /// Lists and numbers every lattice edge that a drawn cube's vertex lies on.
-    fn list_edges(&mut self, solid: &[Corners; 9], drawn: &[Corners; 8], bottom: usize, top: usize) {
+    fn list_edges(&mut self, solid: &[LayerBits; 9], drawn: &[LayerBits; 8], bottom: usize, top: usize) {
         let mut number = 0;
         for axis in 0..3 {
             let edges_of_axis = &mut self.crossings.lists[axis];
@@ -189,32 +183,31 @@ impl Mesher {
 
     fn triangulate(
         &self,
-        solid: &[Corners; 9],
-        drawn: &[Corners; 8],
+        solid: &[LayerBits; 9],
+        drawn: &[LayerBits; 8],
         bottom: usize,
         top: usize,
         out: &mut Vec<u16>,
     ) {
-        const MOST: usize = 15;
         let table = &*SLOTS;
         let cubes: u32 = drawn[bottom..=top].iter().map(|layer| layer.count_ones()).sum();
         let mut end = out.len();
         out.resize(end + cubes as usize * MOST, 0);
         for y in bottom..=top {
-            corners::for_ones(drawn[y], |cell| {
+            layer_bits::for_ones(drawn[y], |cell| {
                 let (below, above) = ((solid[y] >> cell) as usize, (solid[y + 1] >> cell) as usize);
                 let case = below & 3 | (above & 3) << 2 | (below >> Z & 3) << 4 | (above >> Z & 3) << 6;
                 let base = y * 81 + cell;
-                let entry = &table[case];
+                let (slots, count) = (&table[case], usize::from(table[case][MOST]));
                 let Some(room) = out[end..].first_chunk_mut::<MOST>() else { return };
-                // Most cubes have two triangles at most. Those two are always written; what is too many is written over.
-                let (usual, others) = entry.slots.split_at(6);
+                // Most cubes have two triangles at most. Those two are always written; the next cube overwrites the surplus.
+                let (usual, others) = slots.split_at(6);
                 let (first, rest) = room.split_at_mut(6);
                 let number = |slot: &u16| self.numbers.at(base + usize::from(*slot));
                 first.iter_mut().zip(usual).for_each(|(to, slot)| *to = number(slot));
-                let more = entry.len.saturating_sub(6);
+                let more = count.saturating_sub(6);
                 rest.iter_mut().zip(&others[..more]).for_each(|(to, slot)| *to = number(slot));
-                end += entry.len;
+                end += count;
             });
         }
         out.truncate(end);
@@ -226,7 +219,7 @@ fn stack_of(brick: BrickPos) -> (i32, i32) {
 }
 
 /// Cells, and those one step further.
-fn beside(cells: Corners, step: u32) -> Corners {
+fn beside(cells: LayerBits, step: u32) -> LayerBits {
     cells | cells << step
 }
 
@@ -242,10 +235,10 @@ impl Default for Numbers {
 impl Numbers {
     /// Numbers edges from `first` on and lists them; returns the next number.
     #[inline]
-    fn count(&mut self, axis: usize, y: usize, edges: Corners, first: u16, list: &mut Vec<Edge>) -> u16 {
+    fn count(&mut self, axis: usize, y: usize, edges: LayerBits, first: u16, list: &mut Vec<Edge>) -> u16 {
         let (mut number, base) = (first, axis * 729 + y * 81);
         let numbers = &mut self.0[base..base + 81];
-        corners::for_ones(edges, |corner| {
+        layer_bits::for_ones(edges, |corner| {
             numbers[corner] = number;
             number += 1;
             list.push(Edge { y: y as u8, corner: corner as u8 });
@@ -259,180 +252,65 @@ impl Numbers {
     }
 }
 
-/// A case's triangles as places of edges in [`Numbers`], counted from the cube's lowest corner.
-struct Slots {
-    slots: [u16; 15],
-    len: usize,
-}
-
-static SLOTS: LazyLock<[Slots; 256]> = LazyLock::new(|| {
+/// For each case the places in [`Numbers`] of its triangles' edges, counted from the cube's lowest corner, three for a triangle;
+/// the last number is how many they are.
+pub(crate) static SLOTS: LazyLock<[[u16; MOST + 1]; 256]> = LazyLock::new(|| {
     let slot = |edge| {
         let (corner, axis) = cases::edge_corners(edge);
         let [x, y, z] = cases::corner(corner).map(|step| step as u16);
         axis as u16 * 729 + y * 81 + z * 9 + x
     };
     let of = |case: &Case| {
-        let mut slots = [0; 15];
-        let mut len = 0;
-        for (place, edge) in slots.iter_mut().zip(case.triangles().flatten()) {
-            *place = slot(edge);
-            len += 1;
+        let mut slots = [0; MOST + 1];
+        for (place, edge) in case.triangles().flatten().enumerate() {
+            slots[place] = slot(edge);
+            slots[MOST] += 1;
         }
-        Slots { slots, len }
+        slots
     };
     std::array::from_fn(|case| of(&cases::table()[case]))
 });
 
-/// For each case the places of its edges as [`Numbers`] has them, three for a triangle, and how many they are.
-#[cfg(feature = "cuda")]
-pub(crate) fn slot_table() -> [[u16; 16]; 256] {
-    std::array::from_fn(|case| {
-        let Slots { slots, len } = &SLOTS[case];
-        std::array::from_fn(|i| slots.get(i).copied().unwrap_or(*len as u16))
-    })
-}
+/// The most edges that the triangles of a case have, three for a triangle.
+const MOST: usize = 15;
 
 /// The cubes of a brick that marching cubes draws.
 struct Cubes {
     /// Solid corners, layer by layer.
-    solid: [Corners; 9],
+    solid: [LayerBits; 9],
     /// Cells to draw between a layer and the next.
-    drawn: [Corners; 8],
+    drawn: [LayerBits; 8],
 }
 
 impl Cubes {
     /// `None` where nothing is drawn.
     fn find(stack: &Stack, around: &Neighbours, brick: BrickPos) -> Option<Self> {
         let low = brick.origin().y;
-        let near = [around.corners(0), around.corners(1)];
-        if is_one_side(&near, stack.pristine_side(low)) {
+        let near = around.near();
+        if near.is_one_side(stack.pristine.side(low)) {
             return None;
         }
-        let solid = solid_layers(&near, || stack.pristine(low));
+        let solid = near.solid(|| stack.pristine.solid(low));
         let mut drawn = [0; 8];
         for (y, drawn) in drawn.iter_mut().enumerate() {
             // A cube without an edited corner that both signs meet in is one of the pristine sheet.
-            *drawn = corners::mixed(solid[y], solid[y + 1]);
+            *drawn = layer_bits::mixed(solid[y], solid[y + 1]);
             if *drawn & !stack.mask != 0 {
-                *drawn &= corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1)) | stack.mask;
+                *drawn &= layer_bits::any(near.edited(y) | near.edited(y + 1)) | stack.mask;
             }
         }
         (drawn != [0; 8]).then_some(Self { solid, drawn })
     }
 
     /// The cubes among these cells of the brick.
-    fn within(&self, cells: LatticeBox, brick: BrickPos) -> [Corners; 8] {
+    fn within(&self, cells: LatticeBox, brick: BrickPos) -> [LayerBits; 8] {
         let (low, high) = (cells.min - brick.origin(), cells.max - brick.origin());
-        let area = corners::rectangle(Column::of(low), Column::of(high));
+        let area = layer_bits::rectangle(Column::of(low), Column::of(high));
         std::array::from_fn(|y| if (low.y..=high.y).contains(&(y as i32)) { self.drawn[y] & area } else { 0 })
     }
-}
-
-/// Are all corners of a brick's cells solid, or all air?
-fn is_one_side(near: &Near, pristine: Option<bool>) -> bool {
-    let mut sides = near.iter().flatten().map(|brick| match brick {
-        None => pristine,
-        Some(brick) => match (brick.solid(), brick.solid().iter().all(|&layer| layer == u64::MAX)) {
-            (_, true) => Some(true),
-            (solid, _) => solid.iter().all(|&layer| layer == 0).then_some(false),
-        },
-    });
-    sides.next().flatten().is_some_and(|first| sides.all(|side| side == Some(first)))
-}
-
-/// The bricks that hold corners of a brick's cells: at its own height, and at the next.
-type Near<'a> = [[Option<&'a Brick>; 4]; 2];
-
-/// Solid corners, layer by layer; `pristine` tells those of bricks that are not there.
-fn solid_layers(near: &Near, pristine: impl Fn() -> [Corners; 9]) -> [Corners; 9] {
-    let mut layers = std::array::from_fn(|y| {
-        corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.solid()[y % 8])))
-    });
-    let missing =
-        near.map(|bricks| corners::join(bricks.map(|brick| if brick.is_none() { u64::MAX } else { 0 })));
-    if missing != [0; 2] {
-        let pristine = pristine();
-        for (y, layer) in layers.iter_mut().enumerate() {
-            *layer |= pristine[y] & missing[y / 8];
-        }
-    }
-    layers
-}
-
-/// Edited corners of one layer.
-fn edited_layer(near: &Near, y: usize) -> Corners {
-    corners::join(near[y / 8].map(|brick| brick.map_or(0, |brick| brick.edited()[y % 8])))
 }
 
 /// Derives the table of cases now, so that the first edit need not wait for it.
 pub(crate) fn prepare() {
     LazyLock::force(&SLOTS);
-}
-
-/// What is pristine over the 8x8 cells of a stack of bricks.
-pub(crate) struct Sheet {
-    /// Where the stack is.
-    pub stack: (i32, i32),
-    heights: Heights,
-    /// Lowest and highest of the corners.
-    range: (i32, i32),
-}
-
-impl Sheet {
-    /// Over the stack (x, z).
-    pub fn new(ground: &Ground, stack: (i32, i32)) -> Self {
-        let heights = corners::heights(ground, Column::new(stack.0 * 8, stack.1 * 8));
-        Self { stack, heights, range: corners::range(&heights) }
-    }
-
-    /// Lattice y of the cubes that the surface crosses.
-    pub fn rows(&self) -> Range<i32> {
-        sheet([self.range.0, self.range.1])
-    }
-}
-
-/// Cells of a stack that belong to the mask, those `before` and those that samples around some of its bricks put there
-/// (rule 2): a corner of a cube of their sheet is edited. As 8x8 cells, bit `z * 8 + x`. The window must reach one brick
-/// further.
-pub(crate) fn disturbed(
-    view: &WorldView,
-    window: &Window,
-    sheet: &Sheet,
-    bricks: &[BrickPos],
-    before: u64,
-) -> u64 {
-    let Sheet { stack, heights, range } = sheet;
-    let mut cells = corners::spread(before);
-    for &brick in bricks {
-        let low = brick.origin().y;
-        if pristine_side(*range, low).is_some() {
-            continue;
-        }
-        let around = Neighbours::corners_of(window, brick);
-        let near = [around.corners(0), around.corners(1)];
-        let pristine = corners::pristine(heights, *range, low);
-        // Above and below these layers, nothing of the sheet is.
-        for y in corners::between(*range, low) {
-            let sheet = corners::mixed(pristine[y], pristine[y + 1]);
-            if sheet & !cells != 0 {
-                cells |= sheet & corners::any(edited_layer(&near, y) | edited_layer(&near, y + 1));
-            }
-        }
-    }
-    let cells = cells & world_cells(view, *stack);
-    (0..8).fold(0, |word, z| word | ((cells >> (z * 9)) as u64 & 0xff) << (z * 8))
-}
-
-/// Lattice y of the cubes that the pristine surface crosses over some of the 8x8 cells from `low` on: bit `z * 8 + x`.
-pub(crate) fn sheet_rows(ground: &Ground, low: Column, cells: u64) -> Range<i32> {
-    let heights = ground.heights::<9>(low);
-    let cells = corners::spread(cells);
-    // The corners of these cells.
-    let along = cells | cells << X;
-    let mut range = (i32::MAX, i32::MIN);
-    corners::for_ones(along | along << Z, |corner| {
-        let height = heights.as_flattened()[corner];
-        range = (range.0.min(height), range.1.max(height));
-    });
-    sheet([range.0, range.1])
 }

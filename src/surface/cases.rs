@@ -10,6 +10,8 @@
 
 use std::sync::LazyLock;
 
+use glam::IVec3;
+
 /// A cube edge: 4 edges along x, then 4 along y, then 4 along z; see [`edge_corners`].
 pub type Edge = u8;
 
@@ -48,6 +50,17 @@ pub const fn edge_corners(edge: Edge) -> (usize, usize) {
     };
     let number = edge as usize % 4;
     ((number & 1) << u | (number >> 1) << v, axis)
+}
+
+/// The case of the cube whose lowest corner is `low`.
+pub fn case_of(low: IVec3, is_solid: impl Fn(IVec3) -> bool) -> usize {
+    (0..8).fold(0, |case, i| case | usize::from(is_solid(low + IVec3::from_array(corner(i)))) << i)
+}
+
+/// The lattice edge that a cube's edge lies on: its lower end and its axis.
+pub fn lattice_edge(low: IVec3, edge: Edge) -> (IVec3, usize) {
+    let (start, axis) = edge_corners(edge);
+    (low + IVec3::from_array(corner(start)), axis)
 }
 
 /// The edge between two corners that differ along one axis.

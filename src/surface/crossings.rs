@@ -7,11 +7,12 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
 
-use super::corners::PLACES;
+use super::layer_bits::{PLACES, SIDE};
 use super::mesh::{MaterialMix, Vertex};
-use super::padded_samples::{AREA, Marked, Neighbours, PaddedSamples, SIDE};
+use super::neighbours::{CornerBricks, Neighbours};
+use super::padded_samples::{AREA, Marked, PaddedSamples};
 use super::stack::Stack;
-use super::vertex::lerp_normal;
+use super::vertex::{between, lerp_normal};
 use crate::ground::{MaterialId, OVERLAY_DEPTH};
 use crate::lattice::{ONE, SNAP};
 use crate::volume::Brick;
@@ -38,7 +39,7 @@ impl Crossings {
     /// then along y, then along z.
     pub fn make(
         &self,
-        apron: &PaddedSamples,
+        samples: &PaddedSamples,
         stack: &mut Stack,
         around: &Neighbours,
         low: IVec3,
@@ -46,7 +47,7 @@ impl Crossings {
         out: &mut Vec<Vertex>,
     ) {
         let mut site =
-            Site { apron, stack, materials: StoredMaterials::new(around), low, base: low - origin };
+            Site { samples, stack, materials: StoredMaterials::new(around), low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
         site.make::<0>(x, out);
@@ -57,7 +58,7 @@ impl Crossings {
 
 /// What the vertices of a block are made from.
 struct Site<'a, 'b> {
-    apron: &'a PaddedSamples,
+    samples: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
     /// The brick's lowest sample.
@@ -78,7 +79,7 @@ const NEXT_CORNER: [usize; 3] = [1, 0, 9];
 impl Site<'_, '_> {
     fn make<const AXIS: usize>(&mut self, edges: &[Edge], out: &mut Vec<Vertex>) {
         for edges in edges.chunks(LANES) {
-            let batch = Batch::new::<AXIS>(self.apron, edges);
+            let batch = Batch::new::<AXIS>(self.samples, edges);
             let vertices = edges.iter().enumerate();
             out.extend(vertices.map(|(lane, &edge)| self.vertex::<AXIS>(&batch, lane, edge)));
         }
@@ -119,9 +120,7 @@ impl Site<'_, '_> {
 
     /// Materials where the ground shows its own, those of both columns blended as the tile does.
     fn own_materials<const AXIS: usize>(&mut self, corner: usize, y: i32, step: i32) -> MaterialMix {
-        let between = |low: i32, high: i32| {
-            low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
-        };
+        let between = |low, high| between(low, high, step);
         let other = corner + NEXT_CORNER[AXIS];
         let depth = match AXIS {
             1 => self.stack.height(corner) - between(y * ONE, (y + 1) * ONE),
@@ -154,14 +153,14 @@ const NEAR: usize = 3 * AREA + 1;
 
 impl Batch {
     #[inline(always)]
-    fn new<const AXIS: usize>(apron: &PaddedSamples, edges: &[Edge]) -> Self {
+    fn new<const AXIS: usize>(samples: &PaddedSamples, edges: &[Edge]) -> Self {
         let [along, b, c] = STEPS[AXIS];
         let (p, q) = (AREA, AREA + along);
         // Lanes beyond the last edge repeat it.
         let near: [&[Marked; NEAR]; LANES] = std::array::from_fn(|lane| {
             let edge = edges[lane.min(edges.len() - 1)];
-            let first = usize::from(edge.y) * AREA + PLACES[usize::from(edge.corner)].apron;
-            apron.samples()[first..].first_chunk().unwrap_or(&[0; NEAR])
+            let first = usize::from(edge.y) * AREA + PLACES[usize::from(edge.corner)].padded;
+            samples.all()[first..].first_chunk().unwrap_or(&[0; NEAR])
         });
         let at = |place: usize| {
             let [a, b, c, d] = near;
@@ -227,16 +226,16 @@ fn linear_steps(p: i32x4, q: i32x4) -> i32x4 {
 
 /// The stored materials around a block's corners.
 struct StoredMaterials<'a> {
-    bricks: [[Option<&'a Brick>; 4]; 2],
+    bricks: CornerBricks<'a>,
     /// Does any brick store materials at all?
     is_any: bool,
 }
 
 impl<'a> StoredMaterials<'a> {
     fn new(around: &Neighbours<'a>) -> Self {
-        let bricks = [around.corners(0), around.corners(1)];
+        let bricks = around.near();
         let stores = |brick: &Option<&Brick>| brick.is_some_and(|brick| brick.material_bytes() > 0);
-        Self { bricks, is_any: bricks.iter().flatten().any(stores) }
+        Self { is_any: bricks.0.iter().flatten().any(stores), bricks }
     }
 
     /// What is stored at the solid end of an edge.
@@ -244,7 +243,7 @@ impl<'a> StoredMaterials<'a> {
         let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
         let y = usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower);
         let place = &PLACES[corner];
-        let brick = self.bricks[y / 8][place.brick];
+        let brick = self.bricks.0[y / 8][place.brick];
         brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + place.index))
     }
 }
@@ -253,31 +252,8 @@ impl<'a> StoredMaterials<'a> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::vertex::{Lattice, crossing};
+    use super::super::vertex::linear;
     use super::*;
-    use crate::ground::Ground;
-    use crate::lattice::Column;
-
-    /// An edited edge along x, by the densities at its ends.
-    struct Ends([i32; 2]);
-
-    impl Lattice for Ends {
-        fn distance(&self, point: IVec3) -> i32 {
-            self.0[point.x as usize]
-        }
-        fn is_edited(&self, _: IVec3) -> bool {
-            true
-        }
-        fn stored_material(&self, _: IVec3) -> MaterialId {
-            MaterialId::GROUND
-        }
-        fn ground(&self) -> &Ground {
-            unreachable!("an edited edge is crossed where its densities say")
-        }
-        fn is_volumetric(&self, _: Column) -> Option<bool> {
-            None
-        }
-    }
 
     /// The steps from air of one density to ground of another one, and the other way round, which are those of the vertex
     /// function.
@@ -285,7 +261,7 @@ mod tests {
         let [there, back] = [[air, -ground], [-ground, air]];
         let lanes = |end: usize| i32x4::new([there[end], back[end], there[end], back[end]]);
         let steps = linear_steps(lanes(0), lanes(1)).to_array();
-        let expected = [there, back].map(|ends| crossing(&Ends(ends), IVec3::ZERO, 0));
+        let expected = [there, back].map(|[p, q]| linear(p, q));
         assert_eq!(steps, [expected[0], expected[1], expected[0], expected[1]], "{air} and -{ground}");
         expected
     }
@@ -308,7 +284,7 @@ mod tests {
         }
 
         #[test]
-        fn what_is_nearly_a_half_is_none(step in 1..SNAP - 1, sum in (1i32 << 24)..(1i32 << 25) - 1, by in -2i32..3) {
+        fn near_halves_are_rounded_to_the_nearest_step(step in 1..SNAP - 1, sum in (1i32 << 24)..(1i32 << 25) - 1, by in -2i32..3) {
             let half = (i64::from(2 * step + 1) * i64::from(sum) / (2 * i64::from(SNAP))) as i32;
             let from = (half + by).clamp(0, sum - 1);
             steps(from, sum - from);

@@ -8,9 +8,9 @@ use std::ops::Range;
 /// copy at each edit and to send to a graphics card. The same mesh always has the same ones.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Indices {
-    /// Of a mesh of up to [`Indices::MOST_SHORT`] vertices.
+    /// 16 bits each, for up to [`Indices::MOST_SHORT`] vertices.
     U16(Vec<u16>),
-    /// Of a larger one.
+    /// 32 bits each, for larger meshes.
     U32(Vec<u32>),
 }
 
@@ -21,10 +21,10 @@ impl Default for Indices {
 }
 
 impl Indices {
-    /// Vertices of a mesh that has indices of 16 bits at most. One index is left free: in strips it would mean a new start.
+    /// Vertices of a mesh that has indices of 16 bits at most. The largest index is left free, as it restarts triangle strips.
     pub const MOST_SHORT: usize = u16::MAX as usize;
 
-    /// These indices, for a mesh of so many vertices. One that no 16 bits hold stays as it is, though no vertex has it.
+    /// These indices, for a mesh of `vertices` vertices. Indices that do not fit 16 bits are kept in 32, even if they are invalid.
     pub fn new(vertices: usize, list: Vec<u32>) -> Self {
         let short = || list.iter().map(|&index| u16::try_from(index).ok()).collect();
         match (vertices <= Self::MOST_SHORT).then(short).flatten() {
@@ -33,7 +33,7 @@ impl Indices {
         }
     }
 
-    /// None yet, but room for so many, for a mesh of so many vertices.
+    /// An empty buffer with room for `indices` indices, for a mesh of `vertices` vertices.
     pub(crate) fn with_capacity(vertices: usize, indices: usize) -> Self {
         if vertices <= Self::MOST_SHORT {
             Self::U16(Vec::with_capacity(indices))
@@ -68,7 +68,7 @@ impl Indices {
         short.chain(long.chunks_exact(3).map(|t| [t[0], t[1], t[2]]))
     }
 
-    /// Bytes of the buffer, room that is not used included.
+    /// Bytes of the buffer, its spare capacity included.
     pub fn bytes(&self) -> usize {
         match self {
             Self::U16(list) => list.capacity() * size_of::<u16>(),
@@ -100,7 +100,7 @@ impl Indices {
         }
     }
 
-    /// Appends some of another list, whose vertices were after `from` others, and are after `to` others here.
+    /// Appends a range of another list whose vertices began at `from` there, and begin at `to` here.
     pub(crate) fn extend_moved(&mut self, other: &Self, range: Range<usize>, from: usize, to: usize) {
         let by = to.wrapping_sub(from) as u32;
         match (self, other) {
@@ -119,7 +119,7 @@ impl Indices {
         }
     }
 
-    /// Are some of them those of a part whose indices count from vertex `base`?
+    /// Does this range equal a part whose indices count from vertex `base`?
     pub(crate) fn is_part(&self, range: Range<usize>, part: &[u16], base: usize) -> bool {
         match self {
             Self::U16(list) => {

@@ -84,7 +84,7 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// Is it the other one, bit by bit? Normals of 0.0 and -0.0 are equal, but not the same.
+    /// Is it equal to the other one, bit by bit? Normals of 0.0 and -0.0 are equal, but not the same.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         self == other && self.normal.to_array().map(f32::to_bits) == other.normal.to_array().map(f32::to_bits)
     }
@@ -126,7 +126,7 @@ impl SurfaceMesh {
         Some((voxels(min), voxels(max)))
     }
 
-    /// Bytes of the buffers, room that is not used included.
+    /// Bytes of the buffers, their spare capacity included.
     pub fn bytes(&self) -> usize {
         self.vertices.capacity() * size_of::<Vertex>() + self.indices.bytes()
     }

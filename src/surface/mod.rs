@@ -10,24 +10,23 @@
 
 pub mod block;
 pub mod cases;
-mod corners;
 mod crossings;
-pub(crate) mod fresh;
 pub mod indices;
+mod layer_bits;
 pub mod mask;
 pub mod mesh;
+pub(crate) mod meshed_blocks;
+mod neighbours;
 #[cfg(feature = "cuda")]
 mod packed;
 mod padded_samples;
 pub mod plain;
+pub(crate) mod pristine;
 pub mod seams;
 mod stack;
 pub mod tile;
 pub mod vertex;
 pub(crate) mod window;
-
-#[cfg(feature = "cuda")]
-pub(crate) use stack::borders;
 
 pub use indices::Indices;
 pub use mask::{Mask, MaskView};

@@ -1,15 +1,15 @@
-//! Vertices as a card writes them: less to send than a mesh takes.
+//! Vertices as a graphics card writes them: smaller than those of a mesh, so that less is sent.
 
 use glam::IVec3;
 
 use super::mesh::{MaterialMix, Vertex};
 
-/// Vertices as a card writes them.
+/// Vertices as a graphics card writes them.
 #[derive(Clone, Copy)]
 pub(crate) struct PackedVertices<'a> {
     /// Where positions count from.
     pub origin: IVec3,
-    /// Position in 1/4096 voxel; the fourth number says nothing.
+    /// Position in 1/4096 voxel; the fourth number is unused.
     pub positions: &'a [[u16; 4]],
     /// As many.
     pub normals: &'a [[f32; 3]],
@@ -19,9 +19,9 @@ pub(crate) struct PackedVertices<'a> {
 /// What packed vertices are made of.
 #[derive(Clone, Copy)]
 pub(crate) enum PackedMixes<'a> {
-    /// All of the same.
+    /// One mix for all.
     One(MaterialMix),
-    /// Each of its own: four ids, four weights.
+    /// One for each vertex: four ids, four weights.
     Each(&'a [[u8; 8]]),
 }
 

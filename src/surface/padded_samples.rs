@@ -4,65 +4,20 @@ use std::ops::RangeInclusive;
 
 use wide::{i16x8, i32x8};
 
-use super::corners::Heights;
-use super::window::Window;
-use crate::lattice::{BrickPos, ONE};
+use super::layer_bits::SIDE;
+use super::neighbours::Neighbours;
+use super::pristine::Heights;
+use crate::lattice::ONE;
 use crate::volume::{self, Brick, PRISTINE, Sample};
 
-/// Samples along one side: 9 corners, one more before and after for gradients.
-pub(super) const SIDE: usize = 11;
 /// Samples in one layer.
 pub(super) const AREA: usize = SIDE * SIDE;
 
-/// A sample with its editedness in one number: twice the density in 1/256 voxel, and one more if it is edited.
+/// A sample and whether it is edited, in one number: twice the density in 1/256 voxel, plus one if it is edited.
 pub(super) type Marked = i32;
 
-/// The bricks around a brick and itself: `[y][z * 3 + x]`, each from one before to one after.
-pub(super) struct Neighbours<'a> {
-    bricks: [[Option<&'a Brick>; 9]; 3],
-    at: BrickPos,
-}
-
-impl<'a> Neighbours<'a> {
-    /// Finds the bricks that hold corners of a brick's cells.
-    #[inline]
-    pub fn corners_of(window: &Window<'a>, at: BrickPos) -> Self {
-        let mut own = Self { bricks: [[None; 9]; 3], at };
-        let [x, y, z] = window.steps();
-        let place = window.place(at);
-        for dy in 0..2 {
-            for (i, step) in CORNER_STACKS.into_iter().zip([0, x, z, x + z]) {
-                own.bricks[dy + 1][i] = window.at(place + dy * y + step);
-            }
-        }
-        own
-    }
-
-    /// Finds the others as well.
-    #[inline]
-    pub fn complete(&mut self, window: &Window<'a>) {
-        let [x, y, z] = window.steps();
-        let first = window.place(self.at) - x - y - z;
-        for (dy, level) in self.bricks.iter_mut().enumerate() {
-            for (i, brick) in level.iter_mut().enumerate() {
-                *brick = window.at(first + dy * y + i / 3 * z + i % 3 * x);
-            }
-        }
-    }
-
-    /// The bricks that hold corners of the own brick's cells at its own height (`up` = 0) or at the next (1): the own
-    /// one, those beyond x, beyond z and beyond both.
-    #[inline]
-    pub fn corners(&self, up: usize) -> [Option<&'a Brick>; 4] {
-        CORNER_STACKS.map(|i| self.bricks[up + 1][i])
-    }
-}
-
-/// Of nine stacks, those that hold corners of the middle one's cells: itself, beyond x, beyond z, beyond both.
-const CORNER_STACKS: [usize; 4] = [4, 5, 7, 8];
-
-/// Samples from one before the brick's first to two after its last, x fastest, then z, then y. A layer of no meaning
-/// follows, so that what is near an edge can be read as one piece.
+/// Samples from one before the brick's first to two after its last, x fastest, then z, then y. An unused
+/// layer follows, so that the samples near an edge can be read as one slice.
 pub(super) struct PaddedSamples(Box<[Marked; AREA * (SIDE + 1)]>);
 
 impl Default for PaddedSamples {
@@ -72,8 +27,8 @@ impl Default for PaddedSamples {
 }
 
 impl PaddedSamples {
-    /// All samples; those of layers that were not filled are old ones.
-    pub fn samples(&self) -> &[Marked] {
+    /// All samples; layers that were not filled hold older samples.
+    pub fn all(&self) -> &[Marked] {
         &*self.0
     }
 
@@ -101,9 +56,9 @@ impl PaddedSamples {
         }
     }
 
-    /// Lets densities go on beyond the world's rim, one sample far, as gradients look no further. The rows and layers are
+    /// Extrapolates densities by one sample beyond the world's rim, which is as far as gradients look. The rows and layers are
     /// those that were filled, `columns` those of the world, along x and z.
-    pub fn go_on_beyond(
+    pub fn extrapolate_beyond(
         &mut self,
         [xs, zs]: &[RangeInclusive<usize>; 2],
         layers: RangeInclusive<usize>,
@@ -112,27 +67,27 @@ impl PaddedSamples {
         for layer in self.0.chunks_exact_mut(AREA).take(layers.end() + 1).skip(*layers.start()) {
             for (to, rim, inner) in beyond(zs).filter(|(to, ..)| rows.contains(to)) {
                 for x in 0..SIDE {
-                    layer[to * SIDE + x] = straight_on(layer[rim * SIDE + x], layer[inner * SIDE + x]);
+                    layer[to * SIDE + x] = extrapolated(layer[rim * SIDE + x], layer[inner * SIDE + x]);
                 }
             }
             for (to, rim, inner) in beyond(xs) {
                 for row in layer.chunks_exact_mut(SIDE).take(rows.end() + 1).skip(*rows.start()) {
-                    row[to] = straight_on(row[rim], row[inner]);
+                    row[to] = extrapolated(row[rim], row[inner]);
                 }
             }
         }
     }
 }
 
-/// The places one beyond the world's, each with the two before it.
+/// The indices one beyond the world's, each with the two before it.
 fn beyond(world: &RangeInclusive<usize>) -> impl Iterator<Item = (usize, usize, usize)> {
     let (first, last) = (*world.start(), *world.end());
     let before = (first > 0).then(|| (first - 1, first, first + 1));
     before.into_iter().chain((last + 1 < SIDE).then(|| (last + 1, last, last - 1)))
 }
 
-/// Of two samples in a row, what comes before the first if densities go on as they come.
-fn straight_on(rim: Marked, inner: Marked) -> Marked {
+/// The sample beyond `rim` on the straight line through `inner` and `rim`.
+fn extrapolated(rim: Marked, inner: Marked) -> Marked {
     ((rim >> 1) * 2 - (inner >> 1)) << 1
 }
 

@@ -94,7 +94,7 @@ impl fmt::Display for SeamReport {
     }
 }
 
-/// Triangles of many meshes, welded as they come in.
+/// Triangles of many meshes, welded as they are added.
 #[derive(Default)]
 pub struct SeamChecker {
     numbers: FxHashMap<I64Vec3, u32>,
@@ -131,9 +131,9 @@ impl SeamChecker {
     }
 
     fn weld(&mut self, place: I64Vec3, normal: Vec3) -> u32 {
-        let fresh = self.places.len() as u32;
-        let number = *self.numbers.entry(place).or_insert(fresh);
-        if number == fresh {
+        let next = self.places.len() as u32;
+        let number = *self.numbers.entry(place).or_insert(next);
+        if number == next {
             self.places.push(place);
             self.normals.push(normal);
         } else if self.normals[number as usize] != normal {
@@ -270,9 +270,9 @@ mod tests {
 
     /// In a world of 64 x 48 cells.
     fn report(meshes: &[(&SurfaceMesh, IVec3)]) -> SeamReport {
-        let mut soup = SeamChecker::default();
-        meshes.iter().for_each(|&(mesh, origin)| soup.add(mesh, origin));
-        soup.check(ChunkGrid::new(32, 64, 48))
+        let mut checker = SeamChecker::default();
+        meshes.iter().for_each(|&(mesh, origin)| checker.add(mesh, origin));
+        checker.check(ChunkGrid::new(32, 64, 48))
     }
 
     /// How many faults of each kind there are; there is a place for those and no others.

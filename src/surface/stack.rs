@@ -5,62 +5,53 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 
-use super::corners::{self, CELLS, Corners, Heights, PLACES};
+use super::layer_bits::{self, LayerBits, PLACES, SIDE};
+use super::mask::WINDOW;
 use super::mesh::MaterialMix;
-use super::padded_samples::SIDE;
+use super::pristine::PristineStack;
 use super::vertex::WorldView;
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE};
+use crate::lattice::Column;
 
 /// A stack of bricks, all with the same x and z, and the columns around it.
 pub(super) struct Stack<'a> {
     ground: &'a Ground,
     /// The lowest column.
     pub low: Column,
-    /// Heights from one column before on.
-    pub heights: Heights,
-    /// Lowest and highest of the own 9x9 corners.
-    range: (i32, i32),
+    /// The surface without edits.
+    pub pristine: PristineStack,
     /// Cells of the mask.
-    pub mask: Corners,
+    pub mask: LayerBits,
     /// Lattice edges along x, y and z on the mask's border, once [`Self::is_border`] has been asked.
     borders: Option<[u128; 3]>,
     view: WorldView<'a>,
-    normals: [Vec3; 81],
-    has_normal: [bool; 81],
-    /// Near the surface, and deeper than the overlay.
-    mixes: [[MaterialMix; 2]; 81],
-    has_mix: [bool; 81],
-    /// Where all columns of the world are of one material.
+    /// What [`Self::normal`] has computed.
+    normals: [Option<Vec3>; 81],
+    /// What [`Self::mixes`] has computed.
+    mixes: [Option<[MaterialMix; 2]>; 81],
+    /// The material of all columns of the world, if they have only one.
     single: Option<MaterialMix>,
 }
-
-/// Cells along a side of the window in which the mask's border is found: one more on each side.
-const WINDOW: i32 = 10;
 
 impl<'a> Stack<'a> {
     /// Looks at the stack of bricks (x, z).
     pub fn new(view: &WorldView<'a>, (x, z): (i32, i32)) -> Self {
         let (low, ground) = (Column::new(x * 8, z * 8), view.samples.ground());
-        let heights = corners::heights(ground, low);
         let own = view.mask.word((x, z));
         Self {
             ground,
             low,
-            heights,
-            range: corners::range(&heights),
-            mask: corners::spread(own),
+            pristine: PristineStack::new(ground, (x, z)),
+            mask: layer_bits::spread(own),
             borders: None,
             view: *view,
-            normals: [Vec3::ZERO; 81],
-            has_normal: [false; 81],
-            mixes: [[MaterialMix::default(); 2]; 81],
-            has_mix: [false; 81],
+            normals: [None; 81],
+            mixes: [None; 81],
             single: ground.single_material().map(MaterialMix::pure),
         }
     }
 
-    /// The world's columns along x and along z among those of the apron; `None` where all are.
+    /// The world's columns along x and along z among those of the padded samples; `None` where all are.
     pub fn rim(&self) -> Option<[RangeInclusive<usize>; 2]> {
         let (grid, all) = (self.view.grid, 0..=SIDE - 1);
         let own = |low: i32, cells: i32| {
@@ -71,31 +62,18 @@ impl<'a> Stack<'a> {
         (columns != [all.clone(), all]).then_some(columns)
     }
 
-    /// Are the pristine samples of the nine layers from `y` on all solid (`Some(true)`), or all air?
-    pub fn pristine_side(&self, y: i32) -> Option<bool> {
-        pristine_side(self.range, y)
-    }
-
-    /// Which corners are solid in the pristine world, for the nine layers from `y` on.
-    pub fn pristine(&self, y: i32) -> [Corners; 9] {
-        match self.pristine_side(y) {
-            Some(true) => [corners::ALL; 9],
-            Some(false) => [0; 9],
-            None => corners::pristine(&self.heights, self.range, y),
-        }
-    }
-
     /// Does the lattice edge from a corner along an axis lie between a volumetric cell and one that stays heightmap?
     pub fn is_border(&mut self, corner: usize, axis: usize) -> bool {
         let place = &PLACES[corner];
-        let stack = (self.low.x >> 3, self.low.z >> 3);
-        let own = self.borders.get_or_insert_with(|| borders(&self.view, stack, self.view.mask.word(stack)));
-        own[axis] >> ((place.z + 1) * WINDOW + place.x + 1) & 1 == 1
+        let stack = self.pristine.stack;
+        let WorldView { mask, grid, .. } = self.view;
+        let edges = self.borders.get_or_insert_with(|| mask.border_edges(grid, stack));
+        edges[axis] >> ((place.z + 1) * WINDOW + place.x + 1) & 1 == 1
     }
 
     /// The height over a corner.
     pub fn height(&self, corner: usize) -> i32 {
-        self.heights.as_flattened()[PLACES[corner].apron]
+        self.pristine.heights.as_flattened()[PLACES[corner].padded]
     }
 
     fn column(&self, corner: usize) -> Column {
@@ -109,74 +87,20 @@ impl<'a> Stack<'a> {
 
     /// The tile's normal over a corner.
     pub fn normal(&mut self, corner: usize) -> Vec3 {
-        if !self.has_normal[corner] {
-            self.has_normal[corner] = true;
-            let (column, at) = (self.column(corner), PLACES[corner].apron);
-            let height = |at: usize| self.heights.as_flattened()[at];
+        let (column, at) = (self.column(corner), PLACES[corner].padded);
+        *self.normals[corner].get_or_insert_with(|| {
+            let height = |at: usize| self.pristine.heights.as_flattened()[at];
             let (x, z) = ([height(at - 1), height(at + 1)], [height(at - SIDE), height(at + SIDE)]);
-            let inner = self.ground.inner_normal(column, x, z);
-            self.normals[corner] = inner.unwrap_or_else(|| self.ground.normal(column));
-        }
-        self.normals[corner]
+            self.ground.inner_normal(column, x, z).unwrap_or_else(|| self.ground.normal(column))
+        })
     }
 
     /// What a corner's column is made of: near the surface, and deeper than the overlay.
     pub fn mixes(&mut self, corner: usize) -> [MaterialMix; 2] {
-        if !self.has_mix[corner] {
-            self.has_mix[corner] = true;
-            let material = self.ground.column_material(self.column(corner));
-            self.mixes[corner] = [MaterialMix::column(material), MaterialMix::pure(material.base)];
-        }
-        self.mixes[corner]
+        let column = self.column(corner);
+        *self.mixes[corner].get_or_insert_with(|| {
+            let material = self.ground.column_material(column);
+            [MaterialMix::column(material), MaterialMix::pure(material.base)]
+        })
     }
-}
-
-/// Are pristine samples of the nine layers from `y` on, below heights of this range, all solid or all air?
-pub(super) fn pristine_side((lowest, highest): (i32, i32), y: i32) -> Option<bool> {
-    if highest <= y * ONE {
-        Some(false)
-    } else if lowest > (y + 8) * ONE {
-        Some(true)
-    } else {
-        None
-    }
-}
-
-/// Edges along x, y, z between a cell of the mask and one of the heightmap, at bit `(z + 1) * 10 + x + 1`.
-pub(crate) fn borders(view: &WorldView, (x, z): (i32, i32), own: u64) -> [u128; 3] {
-    // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word after.
-    let row = |words: [u64; 3], z: i32| {
-        let [before, own, after] = words.map(|word| u128::from(word >> (z * 8) & 0xff));
-        before >> 7 | own << 1 | (after & 1) << 9
-    };
-    let words = |dz: i32| {
-        [-1, 0, 1].map(|dx| if (dx, dz) == (0, 0) { own } else { view.mask.word((x + dx, z + dz)) })
-    };
-    let (before, level, after) = (words(-1), words(0), words(1));
-    if [before, level, after].iter().flatten().all(|&word| word == 0) {
-        return [0; 3];
-    }
-    let mut mask = row(before, 7) | row(after, 0) << (9 * WINDOW);
-    for z in 0..8 {
-        mask |= row(level, z) << ((z + 1) * WINDOW);
-    }
-    let (mut world, inside) = (0u128, |at: i32, cells: i32| (0..cells).contains(&at));
-    let rim = (0..WINDOW).filter(|&dx| inside(x * 8 + dx - 1, view.grid.width()));
-    let row = rim.fold(0u128, |row, dx| row | 1 << dx);
-    for dz in (0..WINDOW).filter(|&dz| inside(z * 8 + dz - 1, view.grid.depth())) {
-        world |= row << (dz * WINDOW);
-    }
-    let around = |cells: u128, axis: usize| match axis {
-        0 => cells | cells << WINDOW,
-        1 => cells | cells << 1 | cells << WINDOW | cells << (WINDOW + 1),
-        _ => cells | cells << 1,
-    };
-    std::array::from_fn(|axis| around(mask, axis) & around(world & !mask, axis))
-}
-
-/// The world's cells among those of a stack.
-pub(super) fn world_cells(view: &WorldView, (x, z): (i32, i32)) -> Corners {
-    let last = Column::new((view.grid.width() - 1 - x * 8).min(7), (view.grid.depth() - 1 - z * 8).min(7));
-    let first = Column::new((-x * 8).max(0), (-z * 8).max(0));
-    if last.x < first.x || last.z < first.z { 0 } else { corners::rectangle(first, last) & CELLS }
 }

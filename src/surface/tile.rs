@@ -1,8 +1,8 @@
 //! Tiles: the heightmap's triangles outside the mask, with rings along its border (rule 3).
 //!
 //! A tile's vertices are its columns, in rows along x; digging never moves them. The few vertices that rings need on the
-//! mask's border follow after the columns. What a transaction makes anew is the list of indices: whole cells first, then
-//! the rings, of which it computes those near its edits and copies the others.
+//! mask's border follow after the columns. A transaction rebuilds only the list of indices: whole cells first, then the
+//! rings, of which it computes those near its edits and copies the others.
 
 use std::cmp::Ordering;
 
@@ -45,7 +45,7 @@ pub fn vertices(ground: &Ground, grid: ChunkGrid, tile: TilePos, rings: &Rings) 
     vertices
 }
 
-/// None for a tile that the world does not have: its cells end before they begin.
+/// How many columns a tile has; none outside the world, where its cells end before they begin.
 fn column_count(low: Column, high: Column) -> u32 {
     let along = |low: i32, high: i32| if low < high { (high - low + 1) as u32 } else { 0 };
     along(low.x, high.x) * along(low.z, high.z)
@@ -89,7 +89,7 @@ pub struct Rings {
     patches: Vec<Patch>,
 }
 
-/// Vertices for which updated rings have room at first.
+/// Vertices for which updated rings reserve room.
 const ROOM: usize = 64;
 
 /// The rings of 8x8 cells of the world.
@@ -117,7 +117,7 @@ impl Rings {
     }
 
     /// The same rings, but with those of some patches of 8x8 cells made again: `(z, x)` in units of 8 cells, ascending.
-    pub fn updated(
+    pub(crate) fn updated(
         &self,
         world: &WorldView,
         tile: TilePos,
@@ -128,9 +128,9 @@ impl Rings {
         drawing.rings.vertices.reserve(self.vertices.len() + ROOM);
         drawing.rings.fans.reserve(self.fans.len() + 3 * ROOM);
         drawing.rings.patches.reserve(self.patches.len() + patches.len());
-        let (mut own, mut fresh) = (0, 0);
+        let (mut own, mut next_patch) = (0, 0);
         loop {
-            let next = match (self.patches.get(own), patches.get(fresh)) {
+            let next = match (self.patches.get(own), patches.get(next_patch)) {
                 (None, None) => return drawing.finish(),
                 (Some(_), None) => Ordering::Less,
                 (None, Some(_)) => Ordering::Greater,
@@ -139,8 +139,8 @@ impl Rings {
             if next == Ordering::Less {
                 drawing.copy(self, own);
             } else {
-                drawing.patch(patches[fresh]);
-                fresh += 1;
+                drawing.patch(patches[next_patch]);
+                next_patch += 1;
             }
             own += usize::from(next != Ordering::Greater);
         }
@@ -170,7 +170,7 @@ impl Rings {
     }
 }
 
-/// Rings in the making.
+/// Rings under construction.
 struct Drawing<'a> {
     ground: &'a Ground,
     borders: &'a Borders,
@@ -199,7 +199,7 @@ impl<'a> Drawing<'a> {
         self.rings
     }
 
-    /// Takes a patch over as it was.
+    /// Copies a patch.
     fn copy(&mut self, from: &Rings, number: usize) {
         let end = &from.patches[number];
         let (vertex, fan) = match number.checked_sub(1) {
@@ -253,7 +253,7 @@ impl<'a> Drawing<'a> {
 
 /// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, in order: one for each
 /// lattice y that separates their heights, as lower end and axis.
-pub fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = (IVec3, usize)> {
+pub(crate) fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = (IVec3, usize)> {
     let (h_from, h_to) = (ground.height(from), ground.height(to));
     let axis = if from.x != to.x { 0 } else { 2 };
     let low = Column::new(from.x.min(to.x), from.z.min(to.z));
@@ -266,7 +266,7 @@ pub fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = 
         .map(move |y| (low.at(y), axis))
 }
 
-/// Rule 3: a triangle with legs P..R and R..Q, each straight or a polyline; Q-P is straight.
+/// Rule 3: fans a triangle with legs P..R and R..Q, each straight or a polyline; the side Q-P is straight.
 pub fn fan<T: Copy>(first: &[T], second: &[T], mut emit: impl FnMut([T; 3])) {
     // Q when the second leg is straight; else its first inner vertex, and P fans the rest of it.
     let apex = second[1];

@@ -1,7 +1,7 @@
 //! The one vertex function of cubes and ring (rule 4).
 //!
-//! A vertex belongs to a lattice edge. Whoever asks, from whichever chunk, reads the same samples around that edge and so
-//! gets the same bits: position, normal and materials.
+//! A vertex belongs to a lattice edge. Every chunk and tile reads the same samples around that edge and so computes the
+//! same bits: position, normal and materials.
 
 use glam::{IVec3, Vec3};
 
@@ -17,7 +17,7 @@ pub trait Lattice {
     fn distance(&self, point: IVec3) -> i32;
     /// Was the sample at a lattice point edited?
     fn is_edited(&self, point: IVec3) -> bool;
-    /// The material stored there; [`MaterialId::GROUND`] where nobody changed it.
+    /// The material stored there; [`MaterialId::GROUND`] where it was never changed.
     fn stored_material(&self, point: IVec3) -> MaterialId;
     /// The pristine world.
     fn ground(&self) -> &Ground;
@@ -38,7 +38,7 @@ pub struct WorldView<'a> {
 
 impl Lattice for WorldView<'_> {
     fn distance(&self, point: IVec3) -> i32 {
-        over_the_rim(self.grid, point, |point| self.samples.distance(point))
+        extrapolated(self.grid, point, |point| self.samples.distance(point))
     }
     fn is_edited(&self, point: IVec3) -> bool {
         self.samples.is_edited(point)
@@ -54,9 +54,9 @@ impl Lattice for WorldView<'_> {
     }
 }
 
-/// Density at a point, from those of the world's own points. Nobody edits what lies beyond the rim; there densities go on as
-/// they come, in straight lines, so that ground dug at the rim isn't shaded as a wall.
-pub(super) fn over_the_rim(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
+/// Density at a point, from those of the world's own points. Points beyond the rim are never edited; there densities are
+/// extrapolated linearly, so that ground dug at the rim isn't shaded as a wall.
+fn extrapolated(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i32 {
     let last = IVec3::new(grid.width(), point.y, grid.depth());
     let rim = point.clamp(IVec3::Y * point.y, last);
     if rim == point { own(point) } else { 2 * own(rim) - own(2 * rim - point) }
@@ -77,7 +77,7 @@ pub fn crossing(lattice: &impl Lattice, p: IVec3, axis: usize) -> i32 {
 }
 
 /// The crossing between densities `dp` and `dq`, in steps from the first.
-fn linear(dp: i32, dq: i32) -> i32 {
+pub(super) fn linear(dp: i32, dq: i32) -> i32 {
     let (dp, dq) = (i64::from(dp).abs(), i64::from(dq).abs());
     let sum = (dp + dq).max(1);
     let steps = (2 * i64::from(SNAP) * dp + sum) / (2 * sum);
@@ -168,14 +168,16 @@ pub(super) fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
     if length > 0.0 { Vec3::new(x / length, y / length, z / length) } else { Vec3::Y }
 }
 
+/// The integer at `step` of [`SNAP`] steps from `low` to `high`.
+pub(super) fn between(low: i32, high: i32, step: i32) -> i32 {
+    low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
+}
+
 /// Materials at a crossing where the ground shows its own: those of both columns, blended as the tile does. The overlay
 /// within its depth below the pristine surface, the base below.
 fn own_materials(ground: &Ground, p: IVec3, q: IVec3, step: i32) -> MaterialMix {
     let (a, b) = (Column::of(p), Column::of(q));
-    let between = |low: i32, high: i32| {
-        low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
-    };
-    let depth = between(ground.height(a), ground.height(b)) - between(p.y * ONE, q.y * ONE);
+    let depth = between(ground.height(a), ground.height(b), step) - between(p.y * ONE, q.y * ONE, step);
     let own = |column| {
         let material = ground.column_material(column);
         if depth <= OVERLAY_DEPTH { MaterialMix::column(material) } else { MaterialMix::pure(material.base) }

@@ -5,13 +5,13 @@ use glam::IVec3;
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::{Brick, SampleView};
 
-/// Most places of a window, so that it stays in a near cache.
+/// Most places of a window, so that it fits into the first caches.
 const MOST: u64 = 4096;
 
-/// Places that a window may have in any case.
+/// Places that a window may have for any number of bricks.
 const FREE: u64 = 64;
 
-/// Places that it may have for each brick that is asked for.
+/// Further places that it may have for each requested brick.
 const EACH: u64 = 12;
 
 /// A box of bricks; those that are not stored are `None`.
@@ -82,8 +82,8 @@ fn emptied<'b>(mut bricks: Vec<Option<&Brick>>) -> Vec<Option<&'b Brick>> {
     bricks.into_iter().map(|_| None).collect()
 }
 
-/// How many of the first bricks one window suits, and the box of that window: around them, one brick more on each side.
-/// Bricks should be sorted by stacks; `None` where there is none.
+/// How many of the first bricks share one window, and the box of that window: around them, one brick more on each side.
+/// Bricks should be sorted by stacks; `None` if there are no bricks.
 pub(crate) fn shared(bricks: impl IntoIterator<Item = BrickPos>) -> Option<(usize, LatticeBox)> {
     let mut bricks = bricks.into_iter();
     let around = |brick: BrickPos| LatticeBox::point(brick.0).grown(1);
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn so_it_does_under_a_long_list() {
+    fn a_window_under_a_long_list_shows_what_the_list_holds() {
         let (ground, none) = (Ground::flat(8, 8, 0.0).unwrap(), Bricks::default());
         let mut rng = fastrand::Rng::with_seed(4);
         let point = |rng: &mut fastrand::Rng| IVec3::new(rng.i32(-9..9), rng.i32(-30..30), rng.i32(-9..9));

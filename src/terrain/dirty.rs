@@ -7,7 +7,9 @@ use glam::IVec3;
 
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::surface::Mask;
-use crate::surface::block::{self, Block, Sheet};
+use crate::surface::block::Block;
+use crate::surface::mask;
+use crate::surface::pristine::{self, PristineStack};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 
@@ -36,7 +38,7 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
     let words = dirty.collect(|stacks, found| {
         let mut bricks = Vec::with_capacity(stacks.len());
         let at_sheet = stacks.chunk_by(is_same_stack).filter_map(|stack| at_sheet(world, stack, &mut bricks));
-        let sheets: Vec<Sheet> = at_sheet.collect();
+        let sheets: Vec<PristineStack> = at_sheet.collect();
         let (mut rest, mut sheets) = (&bricks[..], &sheets[..]);
         while let Some((count, places)) = window::shared(rest.iter().copied()) {
             let (near, others) = rest.split_at(count);
@@ -50,7 +52,7 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
                 }
                 let Some(sheet) = sheets.first() else { continue };
                 let before = view.mask.word(word);
-                let cells = block::disturbed(view, &window, sheet, stack, before);
+                let cells = mask::joined_cells(view.grid, &window, sheet, stack, before);
                 if cells != before {
                     found.push((word, cells));
                 }
@@ -65,12 +67,12 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
 
 /// Lists those bricks of a stack that the pristine surface passes through and that may have cells that join the mask; returns
 /// that surface. `None` where there are no such bricks.
-fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Option<Sheet> {
+fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Option<PristineStack> {
     let word = place(&stack[0]);
     if !stack.iter().any(|own| own.may_join) || world.mask.word(word) == u64::MAX {
         return None;
     }
-    let (sheet, before) = (Sheet::new(&world.ground, word), bricks.len());
+    let (sheet, before) = (PristineStack::new(&world.ground, word), bricks.len());
     let rows = sheet.rows();
     let is_there = |brick: &BrickPos| brick.origin().y < rows.end && rows.start < brick.origin().y + 8;
     bricks.extend(stack.iter().filter(|own| own.may_join).map(|own| own.brick).filter(is_there));
@@ -120,7 +122,7 @@ fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) 
         }
     }
     let (drawn, low) = (cells & all, Column::new(stack.0 * 8, stack.1 * 8));
-    let rows = (drawn != 0).then(|| block::sheet_rows(view.samples.ground(), low, drawn))?;
+    let rows = (drawn != 0).then(|| pristine::sheet_rows(view.samples.ground(), low, drawn))?;
     in_world(view.grid, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))
 }
 

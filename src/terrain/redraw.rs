@@ -15,7 +15,7 @@ use crate::backend::{Compute, PARALLEL_BLOCKS};
 use crate::lattice::{ChunkPos, TilePos, order_of_places, side_by_side};
 use crate::surface::Mask;
 use crate::surface::block::Block;
-use crate::surface::fresh::FreshParts;
+use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 
 /// Meshes that a commit puts in place of old ones. An empty one means that nothing is drawn there any more.
@@ -148,7 +148,7 @@ type Updated = (ChunkPos, Arc<ChunkSurface>);
 
 /// The surfaces of chunks with the parts of these blocks, in order, in place of old ones. Threads begin with those whose parts
 /// are here.
-fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn FreshParts) -> Vec<Updated> {
+fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn MeshedBlocks) -> Vec<Updated> {
     let fresh = |&number: &u32| {
         let number = number as usize;
         Some(Fresh { key: key(blocks[number].brick), part: parts.part(number)? })

@@ -1,7 +1,7 @@
 //! The surface of one chunk: the parts of its blocks, assembled to one mesh.
 
 use crate::lattice::BrickPos;
-use crate::surface::fresh::FreshPart;
+use crate::surface::meshed_blocks::MeshedBlock;
 use crate::surface::{Indices, SurfaceMesh};
 
 /// What marching cubes draws in one chunk: one mesh, which remembers where each block's part of it is.
@@ -34,7 +34,7 @@ pub(super) fn key(brick: BrickPos) -> Key {
 #[derive(Clone, Copy)]
 pub(super) struct Fresh<'a> {
     pub key: Key,
-    pub part: FreshPart<'a>,
+    pub part: MeshedBlock<'a>,
 }
 
 /// Where the data of a part begins: vertices, indices.

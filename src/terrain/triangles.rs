@@ -6,7 +6,7 @@ use glam::{DVec3, IVec3};
 
 use super::ray::Triangle;
 use super::world::World;
-use crate::lattice::{BRICK, Column, ONE, SNAP};
+use crate::lattice::{BRICK, Column, LatticeBox, ONE, SNAP};
 use crate::surface::cases;
 use crate::surface::mask::{Borders, cell_sheet};
 use crate::surface::tile;
@@ -85,15 +85,15 @@ fn edited_rows(world: &World, cell: Column) -> Vec<Range<i32>> {
 
 /// The triangles of one cube, where it is drawn by marching cubes.
 fn cube_triangles(view: &WorldView, cube: IVec3, in_sheet: bool, found: &mut impl FnMut(Triangle)) {
-    let corners: [IVec3; 8] = std::array::from_fn(|i| cube + IVec3::from_array(cases::corner(i)));
-    if !in_sheet && !corners.iter().any(|&corner| view.is_edited(corner)) {
+    let mut corners = LatticeBox { min: cube, max: cube + 1 }.points();
+    if !in_sheet && !corners.any(|corner| view.is_edited(corner)) {
         return;
     }
-    let case = (0..8).fold(0, |case, i| case | usize::from(view.distance(corners[i]) < 0) << i);
+    let case = cases::case_of(cube, |corner| view.distance(corner) < 0);
     for triangle in cases::table()[case].triangles() {
         found(triangle.map(|edge| {
-            let (corner, axis) = cases::edge_corners(edge);
-            let local = position(view, corners[corner], axis, cube);
+            let (start, axis) = cases::lattice_edge(cube, edge);
+            let local = position(view, start, axis, cube);
             cube.as_dvec3() + local.as_dvec3() / f64::from(SNAP)
         }));
     }

@@ -231,11 +231,11 @@ impl World {
 
     /// Is everything that is drawn one closed surface? Looks at each triangle of the world.
     pub fn check_seams(&self) -> SeamReport {
-        let mut soup = SeamChecker::default();
+        let mut checker = SeamChecker::default();
         for (drawn, mesh) in self.drawn() {
-            soup.add(&mesh, self.origin(drawn));
+            checker.add(&mesh, self.origin(drawn));
         }
-        soup.check(self.grid)
+        checker.check(self.grid)
     }
 
     /// Takes in kinds of bricks that are all alike. Once there are twice as many as were left the last time, those go that

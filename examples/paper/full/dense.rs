@@ -6,7 +6,7 @@ use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::LatticeBox;
 use glam::IVec3;
 
-use crate::PaperError;
+use crate::error::PaperError;
 
 /// A cube of samples and the one mesh over it.
 pub struct DenseField {

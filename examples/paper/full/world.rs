@@ -9,9 +9,8 @@ use bevy_burrow::surface::{Indices, Mask, MaskView, SeamChecker, SeamReport, Sur
 use bevy_burrow::terrain::{Memory, Receipt, Terrain, World};
 use glam::{IVec3, Vec3};
 
-use crate::PaperError;
 use crate::edits::Scene;
-use crate::play;
+use crate::error::PaperError;
 
 /// Cells along a chunk's side: whole bricks, so that no block is cut in two.
 const CHUNK_SIZE: u32 = 32;
@@ -32,7 +31,7 @@ pub struct FullWorld {
 impl FullWorld {
     /// The ground from y = 0 to the height of the cube, meshed once: all is allocated from the start.
     pub fn new(scene: &Scene) -> Result<Self, PaperError> {
-        let terrain = play::terrain(scene, CHUNK_SIZE)?;
+        let terrain = scene.terrain(CHUNK_SIZE)?;
         let mut full = Self {
             mask: whole_mask(scene)?,
             blocks: blocks(terrain.world()),
@@ -102,15 +101,15 @@ impl FullWorld {
 
     /// Is the mesh one closed surface?
     pub fn check_seams(&self) -> SeamReport {
-        let mut soup = SeamChecker::default();
-        soup.add(&self.mesh(), IVec3::ZERO);
-        soup.check(self.world().grid())
+        let mut checker = SeamChecker::default();
+        checker.add(&self.mesh(), IVec3::ZERO);
+        checker.check(self.world().grid())
     }
 }
 
 /// All cells of the world: the mask of one that is painted all over.
 fn whole_mask(scene: &Scene) -> Result<Mask, PaperError> {
-    let mut painted = play::terrain(scene, CHUNK_SIZE)?;
+    let mut painted = scene.terrain(CHUNK_SIZE)?;
     let (low, high) = scene.ground.height_range();
     let (low, high) = (low as f32 / ONE as f32, high as f32 / ONE as f32);
     let size = Vec3::new(scene.ground.width() as f32, high - low, scene.ground.depth() as f32);

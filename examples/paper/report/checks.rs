@@ -5,7 +5,8 @@ use std::fmt::Write;
 use super::markdown::{Table, thousands};
 use crate::edits::Run;
 use crate::full::Output;
-use crate::measure::{Measurements, Subject};
+use crate::measure::Measurements;
+use crate::setup::Subject;
 
 /// Seams, hashes and edits without effect of each run.
 pub fn checks(measurements: &Measurements) -> Table {

@@ -10,9 +10,10 @@ use crate::clock;
 use crate::edits::Run;
 use crate::full::Output;
 use crate::machine::Machine;
-use crate::measure::{Measurements, Subject};
+use crate::measure::Measurements;
 use crate::plots::PLOTS;
 use crate::published;
+use crate::setup::Subject;
 use crate::stats;
 
 /// The whole page.

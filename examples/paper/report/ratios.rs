@@ -5,8 +5,9 @@ use crate::backend::Backend;
 use crate::edits::Run;
 use crate::ending::Ending;
 use crate::full::Output;
-use crate::measure::{Measured, Measurements, Subject, both_clocks};
+use crate::measure::{Measured, Measurements, both_clocks};
 use crate::published::{self, CHUNK_SIZES};
+use crate::setup::Subject;
 use crate::stats::{self, Statistics};
 
 /// How many times faster an edit of the hybrid must be than one of the full field, in the median.

@@ -5,8 +5,9 @@ use super::ratios::by_edit;
 use crate::backend::Backend;
 use crate::edits::Run;
 use crate::full::Output;
-use crate::measure::{Measurements, Subject};
+use crate::measure::Measurements;
 use crate::published::CHUNK_SIZES;
+use crate::setup::Subject;
 use crate::stats;
 
 /// Into how many parts the edits are cut, from small to large.

@@ -6,8 +6,9 @@ use crate::backend::Backend;
 use crate::edits::Run;
 use crate::ending::Ending;
 use crate::full::Output;
-use crate::measure::{Measured, Measurements, Subject};
+use crate::measure::{Measured, Measurements};
 use crate::published::{self, CHUNK_SIZES, Column};
+use crate::setup::Subject;
 use crate::stats::{self, Statistics};
 
 /// Tables 1 to 5 in order.

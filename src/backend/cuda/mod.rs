@@ -61,7 +61,7 @@ use super::settings::{CardChoice, EngineSettings};
 use super::{Backend, Choice, EngineState, lock};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::surface::block::Block;
-use crate::surface::fresh::FreshParts;
+use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 use device::{Device, Fault};
 use memory::{Limits, Usage};
@@ -320,7 +320,7 @@ impl Cuda {
         blocks: &[Block],
         choice: &mut Choice,
         meanwhile: &(dyn Fn() + Sync),
-        then: &mut dyn FnMut(&dyn FreshParts),
+        then: &mut dyn FnMut(&dyn MeshedBlocks),
     ) -> Offered<Duration> {
         let load = Load::of_blocks(blocks.len());
         let missing = |session: &Session| session.missing_blocks(view, blocks);

@@ -13,7 +13,7 @@ use crate::edits::{DraftedBrick, EditDelta, EditEffect, PreparedEdits, enter_eff
 use crate::ground::{GreyImage, Ground, GroundError, MaterialId, NoiseHeights, NoiseKind};
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, ONE};
 use crate::surface::block::{Block, Part, Parts};
-use crate::surface::fresh::FreshParts;
+use crate::surface::meshed_blocks::MeshedBlocks;
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, Vertex};
 use crate::volume::{Brick, Bricks, DiggingRules, SampleView};
@@ -104,7 +104,7 @@ fn compare_meshes(session: &mut Session, view: &WorldView, blocks: &[Block]) -> 
 }
 
 /// The surfaces of blocks as parts.
-pub(super) fn collected(blocks: &[Block], fresh: &dyn FreshParts) -> Parts {
+pub(super) fn collected(blocks: &[Block], fresh: &dyn MeshedBlocks) -> Parts {
     let mut parts = Parts::default();
     for (number, &block) in blocks.iter().enumerate() {
         let Some(part) = fresh.part(number) else { continue };

@@ -15,7 +15,7 @@ use super::mesh::{MeshLists, PIECE};
 use crate::lattice::{ChunkGrid, SNAP};
 use crate::surface::MaterialMix;
 use crate::surface::block::Block;
-use crate::surface::fresh::{FreshPart, FreshParts, FreshVertices, PackedMixes, PackedVertices};
+use crate::surface::meshed_blocks::{BlockVertices, MeshedBlock, MeshedBlocks, PackedMixes, PackedVertices};
 
 /// What a launch wrote for some blocks.
 pub(super) struct Surfaces<'a> {
@@ -91,12 +91,12 @@ fn range(first: u32, count: u32) -> Range<usize> {
     first as usize..(first as usize).saturating_add(count as usize)
 }
 
-impl FreshParts for Surfaces<'_> {
+impl MeshedBlocks for Surfaces<'_> {
     fn wait_for(&self, blocks: usize) -> usize {
         self.arrival.wait_for(blocks)
     }
 
-    fn part(&self, number: usize) -> Option<FreshPart<'_>> {
+    fn part(&self, number: usize) -> Option<MeshedBlock<'_>> {
         let (block, result) = (self.blocks.get(number)?, self.results.get(number)?);
         // What is looked at has to be here.
         (number < self.wait_for(number + 1)).then_some(())?;
@@ -111,6 +111,6 @@ impl FreshParts for Surfaces<'_> {
             },
         };
         let indices = self.lists.indices.part(range(result.index, result.indices))?;
-        Some(FreshPart { vertices: FreshVertices::Packed(vertices), indices })
+        Some(MeshedBlock { vertices: BlockVertices::Packed(vertices), indices })
     }
 }

@@ -1,15 +1,14 @@
 //! The surface of a piece of ground, cut out of the world.
 
 use glam::IVec3;
-use rustc_hash::FxHashMap;
 
 use super::bits::Samples;
 use super::search::{self, Component};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, Column, ONE};
-use crate::surface::cases;
+use crate::surface::plain::CubeMesh;
 use crate::surface::vertex::{Lattice, vertex};
-use crate::surface::{Indices, SurfaceMesh};
+use crate::surface::{SurfaceMesh, cases};
 use crate::volume::SampleView;
 
 /// Density of what lies beyond the world's sides. The piece ends at its last sample there, not halfway to the next.
@@ -61,29 +60,18 @@ impl Lattice for Piece<'_> {
 pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origin: IVec3) -> SurfaceMesh {
     let samples = piece.iter().map(|(&key, &layers)| (search::brick(key), layers)).collect();
     let piece_view = Piece { view, grid, samples };
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    let mut numbers: FxHashMap<(IVec3, usize), u32> = FxHashMap::default();
+    let mut mesh = CubeMesh::new();
     for (&key, layers) in piece {
         let low = search::brick(key).origin();
         let own = (0..512usize).filter(|bit| layers[bit >> 6] >> (bit & 63) & 1 == 1);
         for bit in own {
             let point = low + IVec3::new((bit & 7) as i32, (bit >> 6) as i32, (bit >> 3 & 7) as i32);
             cubes_of(&piece_view, point, |cube, case| {
-                for triangle in cases::table()[case].triangles() {
-                    let triangle = triangle.map(|edge| {
-                        let (corner, axis) = cases::edge_corners(edge);
-                        let at = cube + IVec3::from_array(cases::corner(corner));
-                        *numbers.entry((at, axis)).or_insert_with(|| {
-                            vertices.push(vertex(&piece_view, at, axis, origin));
-                            vertices.len() as u32 - 1
-                        })
-                    });
-                    indices.extend_from_slice(&triangle);
-                }
+                mesh.add(cube, case, |start, axis| vertex(&piece_view, start, axis, origin));
             });
         }
     }
-    SurfaceMesh { indices: Indices::new(vertices.len(), indices), vertices }
+    mesh.into()
 }
 
 /// The cubes around a sample of the piece that hold surface, with their cases. Of the samples that are corners of a cube,

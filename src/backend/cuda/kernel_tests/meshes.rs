@@ -9,10 +9,10 @@ use super::{Device, Kernel, Slots, seeds, worlds};
 use crate::brush::{Brush, Roughness, Shape};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, Column, LatticeBox, SNAP};
-use crate::surface::MaterialMix;
-use crate::surface::block::{self, Block, Mesher, Parts};
+use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::mesh::Vertex;
 use crate::surface::vertex::WorldView;
+use crate::surface::{MaterialMix, pristine};
 use crate::terrain::{Terrain, TerrainSettings};
 
 /// Every block that could draw something, and some more.
@@ -23,7 +23,7 @@ fn blocks_around(view: &WorldView, world: &crate::terrain::World) -> Vec<Block> 
         .map(BrickPos)
         .collect();
     for ((x, z), cells) in world.mask().words() {
-        let rows = block::sheet_rows(world.ground(), Column::new(x * 8, z * 8), cells);
+        let rows = pristine::sheet_rows(world.ground(), Column::new(x * 8, z * 8), cells);
         bricks.extend((rows.start >> 3..=rows.end >> 3).map(|y| BrickPos(IVec3::new(x, y, z))));
     }
     bricks.sort_unstable_by_key(|pos| (pos.0.x, pos.0.z, pos.0.y));

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::Address;
 use crate::ground::Ground;
 use crate::surface::vertex::WorldView;
-use crate::surface::{MaterialMix, block, borders};
+use crate::surface::{MaterialMix, block};
 
 /// What blocks of one stack of bricks share.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -20,7 +20,7 @@ pub(crate) struct ColumnJob {
     /// Cells of the mask, bit `z * 8 + x`.
     pub mask: u64,
     pub pad2: u64,
-    /// Lattice edges on the mask's border, as [`borders`] has them: for each axis 128 bits.
+    /// Lattice edges on the mask's border, as [`border_edges`](crate::surface::MaskView::border_edges) has them: for each axis 128 bits.
     pub borders: [[u32; 4]; 3],
 }
 
@@ -109,7 +109,8 @@ const _: () = assert!(size_of::<MeshParams>() == 128);
 /// The stack of bricks (x, z) as blocks see it, whose record is in slot `stack`.
 pub(crate) fn column_job(view: &WorldView, (x, z): (i32, i32), stack: u32) -> ColumnJob {
     let mask = view.mask.word((x, z));
-    let borders = borders(view, (x, z), mask).map(|bits| [0, 32, 64, 96].map(|shift| (bits >> shift) as u32));
+    let borders = view.mask.border_edges(view.grid, (x, z));
+    let borders = borders.map(|bits| [0, 32, 64, 96].map(|shift| (bits >> shift) as u32));
     ColumnJob { stack, x, z, pad: 0, mask, pad2: 0, borders }
 }
 
@@ -125,5 +126,5 @@ pub(crate) fn single_mix(ground: &Ground) -> SingleMix {
 /// The triangles of all cases: for each up to 15 places of edges, counted from the cube's lowest corner, as
 /// `729 axis + 81 y + 9 z + x`; the last number is how many there are.
 pub(crate) fn table() -> [[u16; 16]; 256] {
-    block::slot_table()
+    *block::SLOTS
 }

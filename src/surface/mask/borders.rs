@@ -1,148 +1,14 @@
-//! The volumetric mask M: cells whose sheet marching cubes draws (rule 2).
+//! The border of the mask: which cells beside it stay heightmap.
 
 use std::ops::Range;
 
-use rustc_hash::FxHashMap;
+use super::MaskView;
+use crate::lattice::{ChunkGrid, Column};
 
-use crate::ground::Ground;
-use crate::lattice::{Column, ceil, give_back, table_bytes};
+/// Cells along a side of a word and its neighbours in [`MaskView::border_edges`]: one more on each side.
+pub(crate) const WINDOW: i32 = 10;
 
-/// Lattice y of the cubes that the pristine surface crosses over columns of these heights (1/256 voxel). A height on a
-/// lattice point counts below it.
-pub fn sheet(heights: impl IntoIterator<Item = i32>) -> Range<i32> {
-    let (low, high) =
-        heights.into_iter().fold((i32::MAX, i32::MIN), |(low, high), h| (low.min(h), high.max(h)));
-    ceil(low) - 1..ceil(high)
-}
-
-/// The sheet of a cell.
-pub fn cell_sheet(ground: &Ground, cell: Column) -> Range<i32> {
-    sheet(cell.corners().map(|column| ground.height(column)))
-}
-
-/// A set of cells, one 64-bit word for each 8x8 of them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Mask(FxHashMap<(i32, i32), u64>);
-
-impl Mask {
-    fn place(cell: Column) -> ((i32, i32), u64) {
-        ((cell.x >> 3, cell.z >> 3), 1 << ((cell.z & 7) << 3 | (cell.x & 7)))
-    }
-
-    /// Does marching cubes draw the sheet of this cell?
-    pub fn contains(&self, cell: Column) -> bool {
-        let (word, bit) = Self::place(cell);
-        self.0.get(&word).is_some_and(|bits| bits & bit != 0)
-    }
-
-    /// Without cells, and with room for so many words.
-    pub(crate) fn with_room(words: usize) -> Self {
-        Self(FxHashMap::with_capacity_and_hasher(words, Default::default()))
-    }
-
-    /// Puts in 8x8 cells at once: bit `z * 8 + x` is the cell (8 `word.0` + x, 8 `word.1` + z).
-    pub(crate) fn insert_word(&mut self, word: (i32, i32), cells: u64) {
-        if cells != 0 {
-            *self.0.entry(word).or_default() |= cells;
-        }
-    }
-
-    /// How many words there are.
-    pub(crate) fn word_count(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Every word that is not empty, in no order.
-    pub(crate) fn words(&self) -> impl Iterator<Item = ((i32, i32), u64)> {
-        self.0.iter().map(|(&word, &cells)| (word, cells))
-    }
-
-    /// Stands the words of a newer mask in place of those that are here.
-    pub(crate) fn lay(&mut self, newer: &Self) {
-        newer.words().for_each(|(word, cells)| self.lay_word(word, cells));
-    }
-
-    /// Stands 8x8 cells in place of those of a word, even if that leaves it empty: for masks that lie over another one.
-    pub(crate) fn lay_word(&mut self, word: (i32, i32), cells: u64) {
-        self.0.insert(word, cells);
-    }
-
-    /// Puts 8x8 cells in place of those of a word; returns what was there.
-    pub(crate) fn replace_word(&mut self, word: (i32, i32), cells: u64) -> u64 {
-        let before = if cells == 0 { self.0.remove(&word) } else { self.0.insert(word, cells) };
-        before.unwrap_or_default()
-    }
-
-    /// Gives back what words held that are gone.
-    pub(crate) fn give_back(&mut self) {
-        give_back(&mut self.0);
-    }
-
-    /// The 8x8 cells of a word that was put in or laid.
-    pub(crate) fn get_word(&self, word: (i32, i32)) -> Option<u64> {
-        self.0.get(&word).copied()
-    }
-
-    /// The 8x8 cells of a word.
-    pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
-        self.get_word(word).unwrap_or_default()
-    }
-
-    /// How many cells are in the mask.
-    pub fn len(&self) -> usize {
-        self.0.values().map(|bits| bits.count_ones() as usize).sum()
-    }
-
-    /// Is the whole world heightmap?
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// Every cell of the mask, in no order.
-    pub fn iter(&self) -> impl Iterator<Item = Column> {
-        self.0.iter().flat_map(|(&(x, z), &bits)| {
-            (0..64)
-                .filter(move |bit| bits >> bit & 1 == 1)
-                .map(move |bit| Column::new(x << 3 | bit & 7, z << 3 | bit >> 3))
-        })
-    }
-
-    /// Bytes of the mask.
-    pub fn bytes(&self) -> usize {
-        table_bytes(&self.0)
-    }
-}
-
-/// The mask of a world, and words of it that a running transaction changes.
-#[derive(Clone, Copy)]
-pub struct MaskView<'a> {
-    committed: &'a Mask,
-    newer: Option<&'a Mask>,
-}
-
-impl<'a> MaskView<'a> {
-    /// The committed mask alone.
-    pub fn new(committed: &'a Mask) -> Self {
-        Self { committed, newer: None }
-    }
-
-    /// The same mask with newer words in place of its own.
-    pub(crate) fn over(self, newer: &'a Mask) -> Self {
-        Self { newer: Some(newer), ..self }
-    }
-
-    /// Does marching cubes draw the sheet of this cell?
-    pub fn contains(&self, cell: Column) -> bool {
-        let (word, bit) = Mask::place(cell);
-        self.word(word) & bit != 0
-    }
-
-    /// The word of 8x8 cells that starts at (8 x, 8 z): bit `z * 8 + x`.
-    pub(crate) fn word(&self, word: (i32, i32)) -> u64 {
-        let newer = self.newer.and_then(|newer| newer.get_word(word));
-        newer.unwrap_or_else(|| self.committed.word(word))
-    }
-
+impl MaskView<'_> {
     /// Looks at every cell from `low` up to and without `high`, and at those beside them.
     pub fn borders(&self, low: Column, high: Column) -> Borders {
         let (first, last) = ((low.x >> 3, low.z >> 3), ((high.x - 1) >> 3, (high.z - 1) >> 3));
@@ -157,6 +23,37 @@ impl<'a> MaskView<'a> {
             patches.extend((0..across).map(|at| Patch::new(&around(at))));
         }
         Borders { low, high, first, across, patches }
+    }
+
+    /// Lattice edges along x, y and z between a cell of the mask and one that stays heightmap, in and around the word
+    /// (x, z): bit `(z + 1) * 10 + x + 1`.
+    pub(crate) fn border_edges(&self, grid: ChunkGrid, (x, z): (i32, i32)) -> [u128; 3] {
+        // Rows of a word are bytes. A window row is one bit of the word before, eight of the own, one of the word after.
+        let row = |words: [u64; 3], z: i32| {
+            let [before, own, after] = words.map(|word| u128::from(word >> (z * 8) & 0xff));
+            before >> 7 | own << 1 | (after & 1) << 9
+        };
+        let words = |dz: i32| [-1, 0, 1].map(|dx| self.word((x + dx, z + dz)));
+        let (before, level, after) = (words(-1), words(0), words(1));
+        if [before, level, after].iter().flatten().all(|&word| word == 0) {
+            return [0; 3];
+        }
+        let mut mask = row(before, 7) | row(after, 0) << (9 * WINDOW);
+        for z in 0..8 {
+            mask |= row(level, z) << ((z + 1) * WINDOW);
+        }
+        let (mut world, inside) = (0u128, |at: i32, cells: i32| (0..cells).contains(&at));
+        let rim = (0..WINDOW).filter(|&dx| inside(x * 8 + dx - 1, grid.width()));
+        let row = rim.fold(0u128, |row, dx| row | 1 << dx);
+        for dz in (0..WINDOW).filter(|&dz| inside(z * 8 + dz - 1, grid.depth())) {
+            world |= row << (dz * WINDOW);
+        }
+        let around = |cells: u128, axis: usize| match axis {
+            0 => cells | cells << WINDOW,
+            1 => cells | cells << 1 | cells << WINDOW | cells << (WINDOW + 1),
+            _ => cells | cells << 1,
+        };
+        std::array::from_fn(|axis| around(mask, axis) & around(world & !mask, axis))
     }
 }
 
@@ -253,22 +150,8 @@ impl Borders {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Mask;
     use super::*;
-    use crate::lattice::ONE;
-
-    #[test]
-    fn the_sheet_holds_every_cube_with_both_signs() {
-        let cases = [
-            ([0, 0], -1..0), // on a lattice point: the cube below
-            ([1, 1], 0..1),
-            ([ONE, ONE + 1], 0..2),
-            ([-ONE, 2 * ONE], -2..2),
-            ([-1, 1], -1..1),
-        ];
-        for (heights, expected) in cases {
-            assert_eq!(sheet(heights), expected, "{heights:?}");
-        }
-    }
 
     #[test]
     fn borders_are_beside_the_mask() {
@@ -307,32 +190,5 @@ mod tests {
             }
             assert!(flags.is_empty(), "cells outside: {flags:?}");
         }
-    }
-
-    #[test]
-    fn a_cell_goes_in_once() {
-        let mut mask = Mask::default();
-        let cell = Column::new(-3, 17);
-        mask.insert_word((-1, 2), 1 << 13);
-        mask.insert_word((-1, 2), 1 << 13);
-        mask.insert_word((4, 4), 0);
-        assert!(mask.contains(cell) && mask.len() == 1);
-        assert_eq!(mask.iter().collect::<Vec<_>>(), [cell]);
-        assert_eq!(mask.words().count(), 1);
-    }
-
-    #[test]
-    fn newer_words_stand_in_place_of_older_ones() {
-        let (mut mask, mut newer) = (Mask::default(), Mask::default());
-        mask.insert_word((0, 0), 0b111);
-        mask.insert_word((1, 0), 0b1);
-        newer.lay_word((0, 0), 0b100);
-        newer.lay_word((1, 0), 0);
-        newer.lay_word((2, 0), 0b10);
-        let view = MaskView::new(&mask).over(&newer);
-        let cells: Vec<i32> = (0..24).filter(|&x| view.contains(Column::new(x, 0))).collect();
-        assert_eq!(cells, [2, 17]);
-        assert_eq!([(0, 0), (1, 0), (2, 0)].map(|word| mask.replace_word(word, newer.word(word))), [7, 1, 0]);
-        assert_eq!(mask.words().count(), 2, "an empty word is no word");
     }
 }

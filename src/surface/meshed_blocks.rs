@@ -1,5 +1,5 @@
-//! Surfaces of blocks that were meshed just now, wherever they are: in [`Parts`], or packed as a card writes them. Whoever
-//! puts them into a chunk's mesh makes vertices of them on the way.
+//! The surfaces of the blocks that a transaction has meshed: in [`Parts`], or packed as a graphics card writes them. They are
+//! unpacked when they are copied into a chunk's mesh.
 
 use super::block::Parts;
 use super::mesh::Vertex;
@@ -7,34 +7,34 @@ use super::mesh::Vertex;
 pub(crate) use super::packed::{PackedMixes, PackedVertices};
 
 /// The surfaces of blocks, by the blocks' numbers.
-pub(crate) trait FreshParts: Sync {
-    /// Waits until the surfaces of the first so many blocks are here, and tells how many of the first ones are. Where that is
-    /// less, they will never be, and all that was made of others is to be forgotten.
+pub(crate) trait MeshedBlocks: Sync {
+    /// Waits until the surfaces of the first `blocks` blocks are ready; returns how many of them are. If these are fewer, the
+    /// others will never be ready, and what was made of any surface must be dropped.
     fn wait_for(&self, _blocks: usize) -> usize {
         usize::MAX
     }
 
-    /// The surface of a block, which is waited for; `None` where there is no such block, or it will never be here.
-    fn part(&self, number: usize) -> Option<FreshPart<'_>>;
+    /// Waits for the surface of a block; `None` if there is no such block, or its surface will never be ready.
+    fn part(&self, number: usize) -> Option<MeshedBlock<'_>>;
 }
 
 /// The surface of one block. It may be empty.
 #[derive(Clone, Copy)]
-pub(crate) struct FreshPart<'a> {
-    pub vertices: FreshVertices<'a>,
+pub(crate) struct MeshedBlock<'a> {
+    pub vertices: BlockVertices<'a>,
     /// Three for each triangle, counted within the part.
     pub indices: &'a [u16],
 }
 
 /// Vertices, local to a chunk.
 #[derive(Clone, Copy)]
-pub(crate) enum FreshVertices<'a> {
+pub(crate) enum BlockVertices<'a> {
     Made(&'a [Vertex]),
     #[cfg(feature = "cuda")]
     Packed(PackedVertices<'a>),
 }
 
-impl FreshVertices<'_> {
+impl BlockVertices<'_> {
     /// How many there are.
     pub fn len(&self) -> usize {
         match self {
@@ -44,7 +44,7 @@ impl FreshVertices<'_> {
         }
     }
 
-    /// Are they these, bit by bit?
+    /// Are they equal to these, bit by bit?
     pub fn are_same(&self, others: &[Vertex]) -> bool {
         self.len() == others.len()
             && match self {
@@ -64,14 +64,14 @@ impl FreshVertices<'_> {
     }
 }
 
-impl FreshParts for Parts {
-    fn part(&self, number: usize) -> Option<FreshPart<'_>> {
+impl MeshedBlocks for Parts {
+    fn part(&self, number: usize) -> Option<MeshedBlock<'_>> {
         let (vertices, indices) = self.get(number)?;
-        Some(FreshPart { vertices: FreshVertices::Made(vertices), indices })
+        Some(MeshedBlock { vertices: BlockVertices::Made(vertices), indices })
     }
 }
 
-/// Blocks that follow each other, and whose parts do in some list.
+/// Consecutive blocks whose parts are consecutive in one list.
 #[derive(Clone, Copy)]
 pub(crate) struct Group {
     /// How many.
@@ -86,7 +86,7 @@ pub(crate) struct Group {
 pub(crate) struct PartLists<'a> {
     lists: &'a [Parts],
     groups: &'a [Group],
-    /// Of each group, the number of the block that it begins with.
+    /// The number of the first block of each group.
     firsts: Vec<usize>,
 }
 
@@ -101,8 +101,8 @@ impl<'a> PartLists<'a> {
     }
 }
 
-impl FreshParts for PartLists<'_> {
-    fn part(&self, number: usize) -> Option<FreshPart<'_>> {
+impl MeshedBlocks for PartLists<'_> {
+    fn part(&self, number: usize) -> Option<MeshedBlock<'_>> {
         let at = self.firsts.partition_point(|&first| first <= number).checked_sub(1)?;
         let Group { count, list, first } = self.groups[at];
         let number = number - self.firsts[at];
