@@ -12,7 +12,7 @@ pub struct LatticeBox {
     pub max: IVec3,
 }
 
-/// A box as it stands in a file.
+/// The serialized form of a box.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(rename = "LatticeBox", deny_unknown_fields)]
 struct Corners {
@@ -68,7 +68,7 @@ impl LatticeBox {
         *own = Some(own.map_or(other, |own| own.union(other)));
     }
 
-    /// The box with `by` more points on every side, as far as there are numbers for them.
+    /// The box with `by` more points on every side; coordinates saturate.
     pub fn grown(self, by: i32) -> Self {
         let by = IVec3::splat(by);
         Self { min: self.min.saturating_sub(by), max: self.max.saturating_add(by) }
@@ -90,7 +90,7 @@ impl LatticeBox {
         size.x.saturating_mul(size.y).saturating_mul(size.z)
     }
 
-    /// Every point of the box, x fastest, then z, then y; none of one turned inside out.
+    /// Every point of the box, x fastest, then z, then y; none for an inverted box.
     pub fn points(self) -> impl Iterator<Item = IVec3> {
         let Self { min, max } = self;
         let mut next = Self::new(min, max).map(|own| own.min);
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(half.grown(i32::MAX).min, IVec3::new(i32::MIN, -i32::MAX, i32::MIN));
         let flat = LatticeBox { min: IVec3::MIN.with_y(3), max: IVec3::new(i32::MAX, 3, i32::MIN) };
         assert_eq!(flat.volume(), 1 << 32);
-        // Turned inside out.
+        // Inverted.
         let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
         assert_eq!((nothing.volume(), nothing.points().count()), (0, 0));
         assert_eq!(LatticeBox { min: IVec3::X, max: IVec3::new(0, 3, 3) }.points().count(), 0);

@@ -105,14 +105,9 @@ impl ByBrick {
     }
 }
 
-/// The place of the stack that a brick belongs to.
-pub(super) fn place(own: &OfBrick) -> (i32, i32) {
-    (own.brick.0.x, own.brick.0.z)
-}
-
 /// Do both bricks belong to the same stack?
 pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
-    place(a) == place(b)
+    a.brick.stack() == b.brick.stack()
 }
 
 /// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x, 8 to 15 along y,
@@ -145,7 +140,7 @@ impl Bits {
 /// Those of the bricks that hold cells of boxes whose x lies in a range.
 fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
     let bricks_of = |cells: LatticeBox| {
-        let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
+        let LatticeBox { min, max } = BrickPos::range(cells);
         LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
     };
     let boxes = || changes.iter().filter_map(|change| Some((change, bricks_of(change.cells?)?)));
@@ -160,7 +155,7 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
             }
         });
         let mut found: Vec<OfBrick> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
-        found.sort_unstable_by_key(|own| (own.brick.0.x, own.brick.0.z, own.brick.0.y));
+        found.sort_unstable_by_key(|own| own.brick);
         return found;
     }
     let mut table = vec![Bits::default(); all.volume() as usize];
@@ -205,7 +200,7 @@ fn enter_all<'r>(
 ) {
     for (change, LatticeBox { min, max }) in changes {
         let Some(cells) = change.cells else { continue };
-        let joining = change.joining.map(|cells| LatticeBox { min: cells.min >> 3, max: cells.max >> 3 });
+        let joining = change.joining.map(BrickPos::range);
         for x in min.x..=max.x {
             let of_x = Bits::side(x, cells.min.x, cells.max.x);
             for z in min.z..=max.z {
@@ -239,7 +234,7 @@ mod tests {
         assert!(found.collect(|stacks, all| all.extend_from_slice(stacks)) == all);
         // A stack is given to one thread.
         let mut places = found.collect(|stacks, all| {
-            let mut own: Vec<_> = stacks.iter().map(place).collect();
+            let mut own: Vec<_> = stacks.iter().map(|own| own.brick.stack()).collect();
             own.dedup();
             all.append(&mut own);
         });
@@ -257,8 +252,7 @@ mod tests {
                 let own = brick.samples().intersection(cells).expect("covered");
                 let may_join =
                     reached.joining.is_some_and(|joining| brick.samples().intersection(joining).is_some());
-                let place = (brick.0.x, brick.0.z, brick.0.y);
-                let all = all.entry(place).or_insert(OfBrick { brick, cells: own, may_join });
+                let all = all.entry(brick).or_insert(OfBrick { brick, cells: own, may_join });
                 all.cells = all.cells.union(own);
                 all.may_join |= may_join;
             }

@@ -11,7 +11,7 @@ use crate::surface::block::{self, Block, Sheet};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 
-use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack, place};
+use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack};
 use super::world::World;
 
 /// The cells that changed samples show in. `changed` tells the brick of each change, the box around its samples, and whether
@@ -41,8 +41,8 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
         while let Some((count, places)) = window::shared(rest.iter().copied()) {
             let (near, others) = rest.split_at(count);
             let window = Window::new(&view.samples, places);
-            for stack in near.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
-                let word = (stack[0].0.x, stack[0].0.z);
+            for stack in near.chunk_by(|a, b| a.stack() == b.stack()) {
+                let word = stack[0].stack();
                 while let [first, others @ ..] = sheets
                     && first.stack != word
                 {
@@ -66,7 +66,7 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
 /// Lists those bricks of a stack that the pristine surface passes through and that may have cells that join the mask; returns
 /// that surface. `None` where there are no such bricks.
 fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Option<Sheet> {
-    let word = place(&stack[0]);
+    let word = stack[0].brick.stack();
     if !stack.iter().any(|own| own.may_join) || world.mask.word(word) == u64::MAX {
         return None;
     }
@@ -85,7 +85,7 @@ pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty:
     };
     dirty.collect(|stacks, found| {
         for stack in stacks.chunk_by(is_same_stack) {
-            match sheet_near(world, view, newer, place(&stack[0])) {
+            match sheet_near(world, view, newer, stack[0].brick.stack()) {
                 Some(sheet) => found.extend(with_sheet(stack, sheet).iter().flat_map(blocks_of)),
                 None => found.extend(stack.iter().flat_map(blocks_of)),
             }

@@ -92,7 +92,7 @@ impl World {
     pub fn bricks_near(&self, samples: LatticeBox) -> impl Iterator<Item = BrickPos> + '_ {
         let inside = samples.intersection(self.grid.edit_bounds());
         inside.into_iter().flat_map(move |inside| {
-            let (low, high): (IVec3, IVec3) = (inside.min >> 3, inside.max >> 3);
+            let LatticeBox { min: low, max: high } = BrickPos::range(inside);
             let stack = move |(x, z): (i32, i32)| {
                 let stack = self.stacks.get(&(x, z)).map(Vec::as_slice).unwrap_or_default();
                 let from = stack.partition_point(|&y| y < low.y);

@@ -11,7 +11,7 @@ use super::loose::LooseSettings;
 use super::receipt::Rejection;
 use crate::brush::{Edit, Kind};
 use crate::edits::reach;
-use crate::lattice::{ChunkGrid, LatticeBox};
+use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
 /// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
@@ -52,9 +52,8 @@ const LOOKS_AROUND: u64 = 4;
 
 /// The work of an edit, in bricks.
 fn work_of(grid: ChunkGrid, edit: &Edit) -> u64 {
-    let bricks_of = |reach: LatticeBox| LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }.volume();
     let weight = if edit.kind() == Kind::Sculpt { LOOKS_AROUND } else { 1 };
-    EDIT + weight * reach(grid, edit).map_or(0, bricks_of)
+    EDIT + weight * reach(grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
 }
 
 /// What makes edits that follow each other one step of undo.

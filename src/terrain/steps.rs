@@ -1,12 +1,8 @@
 //! A terrain's steps through its history.
 
-use super::history::HistoryRejection;
-use super::{DeferredDrop, History, HistoryReceipt, HistoryStep, Memory, Terrain};
-#[cfg(feature = "plugin")]
-use super::{Work, queue::Request};
-
-/// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
-pub(super) const UNDO_BUDGET: usize = 64 << 20;
+use super::history::{DeferredDrop, History, HistoryReceipt, HistoryRejection, HistoryStep};
+use super::model::Terrain;
+use super::world::Memory;
 
 impl Terrain {
     /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of edits
@@ -40,24 +36,24 @@ impl Terrain {
 
     /// What can be undone and redone, and what it takes.
     pub fn history(&self) -> History {
-        self.timeline.figures()
+        self.undo_stack.figures()
     }
 
     /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
     /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
-    /// some thousand digs of radius 8. What goes is freed before this returns.
+    /// some thousand digs of radius 8. What exceeds the budget is dropped before this returns.
     pub fn set_undo_budget(&mut self, bytes: usize) {
         drop(self.rebudget_undo(bytes));
     }
 
-    /// The same; what history lets go of is left to the caller, who may free it elsewhere.
+    /// The same; the caller may drop what exceeds the budget elsewhere.
     pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> DeferredDrop {
-        self.timeline.set_budget(bytes)
+        self.undo_stack.set_budget(bytes)
     }
 
     /// The most bytes that history may take.
     pub fn undo_budget(&self) -> usize {
-        self.timeline.budget()
+        self.undo_stack.budget()
     }
 
     /// Forgets what can be undone and redone; the budget stays. What waits or is under way comes into history once it is
@@ -76,14 +72,14 @@ impl Terrain {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn clear_history(&mut self) {
-        self.timeline.clear();
+        self.undo_stack.clear();
         // A stroke that goes on begins anew.
         self.queue.close_group();
     }
 
     /// Bytes that the terrain takes: its world, and its history.
     pub fn memory(&self) -> Memory {
-        Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
+        Memory { undo: self.undo_stack.figures().bytes, ..self.world.memory() }
     }
 
     /// Undoes the last group of edits at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
@@ -100,34 +96,20 @@ impl Terrain {
         self.abandon();
         self.queue.push_step(step);
         let receipts = self.finish();
-        self.answer(receipts);
+        receipts.into_iter().for_each(|receipt| self.answer(receipt));
         // It was the last one.
-        self.moves.pop_back().unwrap_or_else(|| step.nothing())
+        self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
     }
 
     /// What became of steps through history that were submitted, in order; each is handed out once. Where nobody takes them,
     /// the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
-        std::mem::take(&mut self.moves).into()
+        std::mem::take(&mut self.step_receipts).into()
     }
 
     /// Is there any to [take](Self::take_history_receipts)?
     pub fn has_history_receipts(&self) -> bool {
-        !self.moves.is_empty()
-    }
-
-    /// All steps through history without a receipt, in order.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
-        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
-            Work::Step(step, _) => Some(step),
-            Work::Edits(_) => None,
-        });
-        let queued = self.queue.iter().filter_map(|request| match request {
-            Request::Step(step) => Some(*step),
-            Request::Edit(_) => None,
-        });
-        in_flight.chain(queued)
+        !self.step_receipts.is_empty()
     }
 }
 
@@ -138,7 +120,8 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
-    use crate::terrain::{HistoryRejection, TerrainSettings};
+    use crate::terrain::TerrainSettings;
+    use crate::terrain::model::UNDO_BUDGET;
 
     fn terrain() -> Terrain {
         let ground = Ground::flat(64, 64, 8.0).expect("valid");

@@ -1,24 +1,12 @@
 //! What a game asks a terrain for: edits and steps, one after the other, and what became of them.
 
 use std::borrow::Borrow;
-use std::collections::VecDeque;
 
-use super::history::HistoryReceipt;
+use super::model::Terrain;
 use super::queue::{Together, WorkLimits};
 use super::receipt::{Receipt, Rejection};
-use super::{Terrain, unique};
+use super::world::unique;
 use crate::brush::{Brush, Edit};
-
-/// Answers that nobody takes are kept up to so many; then the oldest go.
-const KEPT_ANSWERS: usize = 1 << 16;
-
-/// Keeps one more answer.
-fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
-    if answers.len() == KEPT_ANSWERS {
-        answers.pop_front();
-    }
-    answers.push_back(answer);
-}
 
 impl Terrain {
     /// Queues a brush, as a step of undo by itself unless it is part of a [stroke](Brush::stroke). One that is not valid is
@@ -84,7 +72,7 @@ impl Terrain {
     ) {
         match self.admit(edit.as_ref().ok()) {
             Ok(()) => self.queue_edit(tag, edit, stroke, together),
-            Err(rejection) => keep(&mut self.answered, Receipt { tag, outcome: Err(rejection) }),
+            Err(rejection) => self.answer(Receipt { tag, outcome: Err(rejection) }),
         }
     }
 
@@ -140,7 +128,7 @@ impl Terrain {
         }
         let mut receipts = self.finish();
         let own = receipts.split_off(waiting.min(receipts.len()));
-        self.answer(receipts);
+        receipts.into_iter().for_each(|receipt| self.answer(receipt));
         own
     }
 
@@ -151,16 +139,6 @@ impl Terrain {
             receipts.append(&mut self.commit(transaction.run()).unwrap_or_default());
         }
         receipts
-    }
-
-    /// Keeps what became of brushes for whoever asks.
-    pub(super) fn answer(&mut self, receipts: impl IntoIterator<Item = Receipt>) {
-        receipts.into_iter().for_each(|receipt| keep(&mut self.answered, receipt));
-    }
-
-    /// Keeps what became of a step for whoever asks.
-    pub(super) fn answer_step(&mut self, receipt: HistoryReceipt) {
-        keep(&mut self.moves, receipt);
     }
 
     /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for, in

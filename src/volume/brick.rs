@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use super::layers::{self, Layers};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BRICK, BrickPos, Column, ceil};
 
@@ -47,9 +48,6 @@ pub(crate) fn row(samples: &[Sample; LEN], at: usize) -> [i16; 8] {
     samples[at..].first_chunk::<8>().map_or([0; 8], |row| row.map(|sample| sample.0))
 }
 
-/// One bit for each sample of a brick: a word for each y, in it bit `z * 8 + x`.
-pub type Layers = [u64; BRICK as usize];
-
 /// Which pristine samples of a brick are solid, whose lowest samples lie at `y`, under columns of these heights.
 pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     // In each column the lowest samples are solid, as many as lie below its height.
@@ -73,12 +71,7 @@ pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
     solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
 }
 
-/// A brick that nobody edited: what stands for a missing one where a table lies over another that has it.
-pub(crate) fn pristine_brick(ground: &Ground, pos: BrickPos) -> Brick {
-    Brick::pristine(pristine_layers(ground, pos))
-}
-
-/// A word that a backend keeps with a brick, to find its own copy of it. A clone starts without one.
+/// A word that a backend stores in a brick to find its own copy of it. A clone starts at 0.
 #[derive(Debug, Default)]
 pub(crate) struct Tag(AtomicU64);
 
@@ -90,12 +83,12 @@ impl Clone for Tag {
 
 #[cfg_attr(not(feature = "cuda"), expect(dead_code))]
 impl Tag {
-    /// What was kept last; 0 to begin with.
+    /// The word stored last; 0 at first.
     pub fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Keeps a word. It says nothing about the brick, so nobody needs to see it in time.
+    /// Stores a word. Ordering is relaxed: it says nothing about the brick's samples.
     pub fn set(&self, word: u64) {
         self.0.store(word, Ordering::Relaxed);
     }
@@ -103,8 +96,8 @@ impl Tag {
 
 /// 8x8x8 samples with their materials.
 ///
-/// Beside them the brick keeps two bits a sample, so that whole rows are judged at once: is it solid, pristine samples
-/// included, and is it edited?
+/// The brick also stores two bits per sample, so that whole rows are tested at once: is it solid (pristine samples
+/// included), and is it edited?
 #[derive(Clone, Debug)]
 pub struct Brick {
     samples: [Sample; LEN],
@@ -130,9 +123,9 @@ impl Brick {
         let mut brick = Self::pristine([0; 8]);
         for (row, samples) in samples.as_chunks::<8>().0.iter().enumerate() {
             let samples = samples.map(|sample| sample.max(-i16::MAX));
-            let solid = (0..8).fold(0, |bits, x| bits | u64::from(samples[x] < 0) << x);
+            let solid = (0..8).fold(0, |bits, x| bits | u8::from(samples[x] < 0) << x);
             brick.set_row(row * 8, samples);
-            brick.set_bits(row / 8, 0xff << (row % 8 * 8), solid << (row % 8 * 8));
+            brick.set_bits(row / 8, layers::of_row(u8::MAX, row % 8), layers::of_row(solid, row % 8));
         }
         brick
     }
@@ -218,11 +211,7 @@ impl Brick {
             return;
         }
         let materials = self.materials.get_or_insert_with(|| Box::new([MaterialId::GROUND; LEN]));
-        let mut rest = samples;
-        while rest != 0 {
-            materials[y * 64 + rest.trailing_zeros() as usize] = material;
-            rest &= rest - 1;
-        }
+        layers::ones(samples).for_each(|bit| materials[y * 64 + bit] = material);
     }
 
     /// The material of the sample with this index.
@@ -252,7 +241,7 @@ impl Brick {
 
     /// How many samples are edited.
     pub fn edited_count(&self) -> u32 {
-        self.edited.iter().map(|layer| layer.count_ones()).sum()
+        layers::count(&self.edited) as u32
     }
 
     /// Every edited sample of the brick at `pos`: point, density, material.
@@ -263,8 +252,9 @@ impl Brick {
     }
 }
 
-/// Bricks all of whose samples are alike, one of each kind: the middle of every large cave is the same brick.
-pub type UniformBricks = FxHashMap<(Sample, MaterialId), Arc<Brick>>;
+/// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the same
+/// brick.
+pub(crate) type UniformBricks = FxHashMap<(Sample, MaterialId), Arc<Brick>>;
 
 #[cfg(test)]
 mod tests {

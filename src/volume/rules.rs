@@ -170,8 +170,8 @@ mod tests {
             .with_unbreakable(MaterialId(2))
             .with_bedrock(-5);
         let pace = |material, y, power| {
-            let (part, fate) = rules.pace(MaterialId(material), y, power);
-            (part, fate.is_some())
+            let (part, outcome) = rules.pace(MaterialId(material), y, power);
+            (part, outcome.is_some())
         };
         assert_eq!(pace(0, 0, 0), (256, false));
         assert_eq!(

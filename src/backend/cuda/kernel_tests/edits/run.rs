@@ -84,7 +84,7 @@ impl EditRun {
             });
         }
         let tools: Vec<Tool> =
-            work.tools.iter().map(|tool| layout::tool(tool.reach, tool.operation, &tool.evaluator)).collect();
+            work.edits.iter().map(|tool| layout::tool(tool.reach, tool.operation, &tool.evaluator)).collect();
 
         let bricks = device.upload(&slots.bricks);
         let results = device.output::<EditResult>(jobs.len());
@@ -117,7 +117,7 @@ impl EditRun {
                 (images.len() - image.samples().len()) as u32
             };
             let chisel = |tool: &crate::edits::PreparedEdit| layout::chisel(tool, &mut image);
-            let chisels: Vec<Chisel> = work.tools.iter().map(chisel).collect();
+            let chisels: Vec<Chisel> = work.edits.iter().map(chisel).collect();
             let rules = work.rules.as_ref().map_or(0, |rules| {
                 let (rules, boxes) = layout::rules(rules);
                 device.place(&[bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat())
