@@ -60,7 +60,10 @@ fn by_material(tally: &MaterialCounts) -> BTreeMap<MaterialId, u64> {
 }
 
 fn edited_samples(world: &World) -> u64 {
-    world.bricks().map(|(_, brick)| u64::from(brick.edited_count())).sum()
+    world
+        .bricks()
+        .map(|(_, brick)| brick.edited().iter().map(|layer| u64::from(layer.count_ones())).sum::<u64>())
+        .sum()
 }
 
 /// A ground with several materials: rock with patches of grass and sand as its skin.

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use super::delta::{Counts, EditDelta};
 use super::effect::DraftedBrick;
 use crate::ground::MaterialId;
-use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox, hash};
+use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::volume::layers::{self, Layers, offset, ones};
-use crate::volume::{Brick, PRISTINE, Sample, SampleView, VoxelOutcome, for_runs, resolve, solid_layers};
+use crate::volume::{
+    Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, resolve, solid_layers,
+};
 
 /// A brick that edits change one after the other.
 pub(super) struct BrickEditor<'a> {
@@ -146,32 +148,8 @@ impl<'a> BrickEditor<'a> {
         // Samples that were pristine counted nothing.
         let before = self.base.map_or(0, |base| {
             let stored = layers::and(&self.changed, base.edited());
-            hash_of(base, low.y, &stored, &columns)
+            base.hash(low.y, &stored, &columns)
         });
-        hash_of(brick, low.y, &self.changed, &columns).wrapping_sub(before)
+        brick.hash(low.y, &self.changed, &columns).wrapping_sub(before)
     }
-}
-
-/// What some edited samples of a brick add to the world's hash, by the hashes of their columns.
-fn hash_of(brick: &Brick, low: i32, layers: &Layers, columns: &[u64; 64]) -> u64 {
-    let of_layer = |(y, &layer): (usize, &u64)| {
-        let height = low + y as i32;
-        let of = |bit: usize| {
-            let index = y * 64 + bit;
-            sample_hash(columns[bit], height, brick.samples()[index], brick.material_at(index))
-        };
-        ones(layer).fold(0u64, |sum, bit| sum.wrapping_add(of(bit)))
-    };
-    layers.iter().enumerate().map(of_layer).fold(0, u64::wrapping_add)
-}
-
-/// The part of a hash that all samples of a column have in common.
-fn column_hash(column: Column) -> u64 {
-    hash::mix(column.x as u32 as u64 | (column.z as u32 as u64) << 32)
-}
-
-/// What a sample adds to the world's hash; a pristine one adds nothing.
-fn sample_hash(column: u64, y: i32, sample: Sample, material: MaterialId) -> u64 {
-    let Some(distance) = sample.distance() else { return 0 };
-    hash::mix(column ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))
 }

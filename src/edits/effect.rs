@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::volume::{Brick, Bricks, MaterialCounts, Refused, Sample, SampleView, VoxelOutcome};
+use crate::volume::{Brick, Bricks, MaterialCounts, Refused, SampleView, UniformKind, VoxelOutcome};
 
 /// What one edit changed in one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +65,7 @@ pub(crate) struct DraftedBrick {
     /// Is a sample among them that had never been edited?
     pub is_extended: bool,
     /// What all samples were edited to, if that is the same for all.
-    pub kind: Option<(Sample, MaterialId)>,
+    pub kind: Option<UniformKind>,
 }
 
 impl DraftedBrick {

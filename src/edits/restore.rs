@@ -4,7 +4,7 @@ use super::effect::EditEffect;
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::layers::{self, Layers, offset};
-use crate::volume::{Brick, MaterialCounts, PRISTINE, pristine_layers, resolve};
+use crate::volume::{Brick, MaterialCounts, pristine_layers, resolve};
 
 /// Counts the voxels that change when a brick is put in place of another; `None` stands for a pristine one. Returns the box
 /// around samples that differ.
@@ -14,18 +14,14 @@ pub(crate) fn count_replaced(
     [before, after]: [Option<&Brick>; 2],
     effect: &mut EditEffect,
 ) -> Option<LatticeBox> {
-    let stored = |brick: Option<&Brick>, index| brick.map_or(MaterialId::GROUND, |b| b.material_at(index));
-    let [old, new] = [before, after].map(|brick| brick.map_or(&PRISTINE, Brick::samples));
-    let mut differ: Layers = layers::NONE;
-    let has_materials = [before, after].iter().flatten().any(|brick| brick.material_bytes() > 0);
-    for (index, (a, b)) in old.iter().zip(new).enumerate() {
-        let is_same = a == b && (!has_materials || stored(before, index) == stored(after, index));
-        differ[index >> 6] |= u64::from(!is_same) << (index & 63);
-    }
+    let differ = Brick::differences([before, after]);
     let changed = layers::bounds(&differ, pos.origin())?;
     let solid = |brick: Option<&Brick>| brick.map_or_else(|| pristine_layers(ground, pos), |b| *b.solid());
     let (was, is) = (solid(before), solid(after));
-    let material = |brick, index| resolve(ground, pos.origin() + offset(index), stored(brick, index));
+    let material = |brick: Option<&Brick>, index| {
+        let stored = brick.map_or(MaterialId::GROUND, |brick| brick.material_at(index));
+        resolve(ground, pos.origin() + offset(index), stored)
+    };
     let count = |counts: &mut MaterialCounts, voxels: Layers, brick| {
         counts
             .count_each(layers::indices(&layers::and(&voxels, &differ)).map(|index| material(brick, index)));

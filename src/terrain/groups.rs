@@ -10,7 +10,7 @@ use web_time::Instant;
 
 use super::by_brick::{ByBrick, PARALLEL_PLACES};
 use super::change::{Change, ChangedBrick, brick_bytes, replaced_bytes};
-use super::commit::{Commit, Stages};
+use super::commit::Commit;
 use super::dirty::{dirty_cells, joined_mask};
 use super::draft_group::{LoosePieces, draft_group};
 use super::field_log::{FieldLog, FieldNews};
@@ -18,6 +18,7 @@ use super::history::UndoDelta;
 use super::queue::Submission;
 use super::receipt::{Applied, Receipt, Rejection};
 use super::redraw;
+use super::stages::Stages;
 use super::transaction::Transaction;
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};

@@ -36,6 +36,7 @@ mod redraw;
 mod restore;
 mod run;
 mod settings;
+mod stages;
 mod steps;
 mod submit;
 mod surface;
@@ -47,7 +48,7 @@ mod triangles;
 mod unseen;
 mod world;
 
-pub use commit::{Commit, Stages};
+pub use commit::Commit;
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
@@ -59,6 +60,7 @@ pub use queue::WorkLimits;
 pub use receipt::{Applied, ChunkScenario, Receipt, Rejection, ScenarioCounts};
 pub use redraw::MeshUpdates;
 pub use settings::{TerrainError, TerrainSettings};
+pub use stages::Stages;
 pub use surface::ChunkSurface;
 #[cfg(feature = "plugin")]
 pub(crate) use surface_draft::SurfaceDraft;

@@ -6,8 +6,8 @@ use std::time::Duration;
 use rayon::prelude::*;
 
 use super::by_brick::ByBrick;
-use super::commit::Stages;
 use super::dirty::dirty_blocks;
+use super::stages::Stages;
 use super::surface::{ChunkSurface, Fresh, Key};
 use super::surface_draft::TileUpdate;
 use super::tiles::TileWork;

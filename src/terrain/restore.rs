@@ -5,11 +5,12 @@ use std::sync::Arc;
 use web_time::Instant;
 
 use super::change::replaced_bytes;
-use super::commit::{Commit, Stages};
+use super::commit::Commit;
 use super::dirty::dirty_cells;
 use super::field_log::news_of_replaced;
 use super::history::{HistoryReceipt, HistoryStep, Restored, UndoDelta};
 use super::redraw;
+use super::stages::Stages;
 use super::transaction::Transaction;
 use crate::backend::Compute;
 use crate::edits::{EditEffect, count_replaced};

@@ -13,11 +13,12 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
 use super::by_brick::PARALLEL_PLACES;
-use super::commit::{Commit, Stages};
+use super::commit::Commit;
 use super::history::{HistoryReceipt, HistoryRejection};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
 use super::redraw::MeshUpdates;
+use super::stages::Stages;
 use super::transaction::{Transaction, Work};
 use super::world::World;
 use super::{groups, restore};

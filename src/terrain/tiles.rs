@@ -9,8 +9,8 @@ use rayon::Scope;
 use rayon::prelude::*;
 
 use super::by_brick::PARALLEL_PLACES;
-use super::commit::Stages;
 use super::dirty::grown_into;
+use super::stages::Stages;
 use super::surface_draft::TileUpdate;
 use super::world::World;
 use crate::lattice::{ChunkGrid, Column, LatticeBox, TilePos, sort_by_place};

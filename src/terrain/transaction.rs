@@ -3,10 +3,11 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::commit::{Commit, Stages};
+use super::commit::Commit;
 use super::history::{HistoryStep, UndoDelta};
 use super::queue::Submission;
 use super::redraw::MeshUpdates;
+use super::stages::Stages;
 use super::world::World;
 use crate::backend::Engine;
 

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::layers::{self, Layers};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BRICK, BrickPos, Column, ceil};
+use crate::lattice::{BRICK, BrickPos, Column, ceil, hash};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -230,18 +230,41 @@ impl Brick {
         self.materials.as_deref().map_or(0, size_of_val)
     }
 
-    /// The density and material that every sample of the brick was edited to, if it is the same for all.
-    pub(crate) fn uniform(&self) -> Option<(Sample, MaterialId)> {
+    /// What every sample of the brick was edited to, if it is the same for all.
+    pub(crate) fn uniform(&self) -> Option<UniformKind> {
         let (sample, material) = (self.samples[0], self.material_at(0));
         let is_uniform = self.edited == [u64::MAX; 8]
             && self.samples.iter().all(|&other| other == sample)
             && self.materials.iter().all(|all| all.iter().all(|&other| other == material));
-        is_uniform.then_some((sample, material))
+        is_uniform.then_some(UniformKind { sample, material })
     }
 
-    /// How many samples are edited.
-    pub fn edited_count(&self) -> u32 {
-        layers::count(&self.edited) as u32
+    /// What some edited samples add to the world's hash, where `y` is the height of the brick's lowest sample and `columns` are
+    /// the [hashes](column_hash) of its columns.
+    pub(crate) fn hash(&self, y: i32, samples: &Layers, columns: &[u64; 64]) -> u64 {
+        let of_layer = |(layer, &samples): (usize, &u64)| {
+            let height = y + layer as i32;
+            let of = |bit: usize| {
+                let index = layer * 64 + bit;
+                sample_hash(columns[bit], height, self.samples[index], self.material_at(index))
+            };
+            layers::ones(samples).fold(0u64, |sum, bit| sum.wrapping_add(of(bit)))
+        };
+        samples.iter().enumerate().map(of_layer).fold(0, u64::wrapping_add)
+    }
+
+    /// The samples in which two bricks differ; `None` stands for a pristine one.
+    pub(crate) fn differences([a, b]: [Option<&Self>; 2]) -> Layers {
+        let material =
+            |brick: Option<&Self>, index| brick.map_or(MaterialId::GROUND, |b| b.material_at(index));
+        let [old, new] = [a, b].map(|brick| brick.map_or(&PRISTINE, Self::samples));
+        let has_materials = [a, b].iter().flatten().any(|brick| brick.materials.is_some());
+        let mut differ = layers::NONE;
+        for (index, (old, new)) in old.iter().zip(new).enumerate() {
+            let is_same = old == new && (!has_materials || material(a, index) == material(b, index));
+            differ[index >> 6] |= u64::from(!is_same) << (index & 63);
+        }
+        differ
     }
 
     /// Every edited sample of the brick at `pos`: point, density, material.
@@ -254,7 +277,25 @@ impl Brick {
 
 /// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the same
 /// brick.
-pub(crate) type UniformBricks = FxHashMap<(Sample, MaterialId), Arc<Brick>>;
+pub(crate) type UniformBricks = FxHashMap<UniformKind, Arc<Brick>>;
+
+/// What all samples of a uniform brick were edited to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct UniformKind {
+    pub sample: Sample,
+    pub material: MaterialId,
+}
+
+/// The part of a hash that all samples of a column have in common.
+pub(crate) fn column_hash(column: Column) -> u64 {
+    hash::mix(column.x as u32 as u64 | (column.z as u32 as u64) << 32)
+}
+
+/// What a sample adds to the world's hash; a pristine one adds nothing.
+fn sample_hash(column: u64, y: i32, sample: Sample, material: MaterialId) -> u64 {
+    let Some(distance) = sample.distance() else { return 0 };
+    hash::mix(column ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))
+}
 
 #[cfg(test)]
 mod tests {
@@ -281,7 +322,7 @@ mod tests {
         brick.set_bits(5, 1 << 59, 0);
         brick.set_material(BrickPos::index(point), MaterialId(4));
         assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, 7, MaterialId(4))]);
-        assert_eq!(brick.edited_count(), 1);
+        assert_eq!(layers::count(brick.edited()), 1);
         assert_eq!(brick.solid()[5], !(1 << 59));
         assert_eq!(brick.uniform(), None);
     }
@@ -302,7 +343,7 @@ mod tests {
     fn a_brick_of_one_number_is_uniform() {
         let mut brick = Brick::of_edited(&[-5; 512]);
         assert_eq!((brick.solid(), brick.edited()), (&[u64::MAX; 8], &[u64::MAX; 8]));
-        assert_eq!(brick.uniform(), Some((Sample(-5), MaterialId::GROUND)));
+        assert_eq!(brick.uniform(), Some(UniformKind { sample: Sample(-5), material: MaterialId::GROUND }));
         brick.set_material(77, MaterialId(2));
         assert_eq!(brick.uniform(), None);
     }

@@ -13,7 +13,9 @@ mod rules;
 mod view;
 
 pub use brick::{Brick, Sample};
-pub(crate) use brick::{PRISTINE, UniformBricks, pristine_layers, row, solid_layers};
+pub(crate) use brick::{
+    PRISTINE, UniformBricks, UniformKind, column_hash, pristine_layers, row, solid_layers,
+};
 pub use counts::MaterialCounts;
 pub(crate) use counts::{VoxelOutcome, for_runs};
 pub(crate) use field::Absorbed;

@@ -10,7 +10,7 @@ use super::super::{Device, Kernel, Slots, assert_same};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::volume::{Brick, SampleView};
+use crate::volume::{Brick, SampleView, UniformKind};
 
 /// What room there is for output.
 #[derive(Clone, Copy, Debug)]
@@ -190,7 +190,7 @@ impl EditRun {
             let (record, stored) = slot.split_at(RECORD_BYTES);
             let stored = stored.first_chunk().filter(|_| has(EditResult::HAS_MATERIALS));
             assert_same(&brick_of(&bytemuck::pod_read_unaligned(record), stored), brick, pos);
-            if let Some((sample, material)) = brick.uniform() {
+            if let Some(UniformKind { sample, material }) = brick.uniform() {
                 let sample = sample.distance().unwrap_or_default() as u16;
                 assert_eq!(result.uniform, u32::from(sample) | u32::from(material.0) << 16);
                 assert_eq!((result.record, result.material), (NONE, NONE));
