@@ -4,32 +4,12 @@ use glam::{I64Vec3, IVec3};
 
 /// A non-empty box of lattice points; `min` and `max` belong to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(from = "Corners", into = "Corners")]
+#[serde(deny_unknown_fields)]
 pub struct LatticeBox {
     /// Lowest point of the box.
     pub min: IVec3,
     /// Highest point of the box.
     pub max: IVec3,
-}
-
-/// The serialized form of a box.
-#[derive(serde::Serialize, serde::Deserialize)]
-#[serde(rename = "LatticeBox", deny_unknown_fields)]
-struct Corners {
-    min: [i32; 3],
-    max: [i32; 3],
-}
-
-impl From<Corners> for LatticeBox {
-    fn from(Corners { min, max }: Corners) -> Self {
-        Self { min: min.into(), max: max.into() }
-    }
-}
-
-impl From<LatticeBox> for Corners {
-    fn from(LatticeBox { min, max }: LatticeBox) -> Self {
-        Self { min: min.into(), max: max.into() }
-    }
 }
 
 impl LatticeBox {

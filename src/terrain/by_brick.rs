@@ -1,8 +1,8 @@
 //! Boxes of cells, sorted into the bricks that hold them.
 //!
-//! What changes in a brick shows in cells of the bricks beside it too. Of many boxes, threads take a slab of bricks each, as
-//! thick as one brick along x: all cells that lie in it belong to boxes that are at home there or one brick beside it. What
-//! they find is shared out again in pieces, so that few long slabs are work for many threads as well.
+//! A change in a brick also shows in cells of the bricks next to it. Where there are many boxes, each thread takes a slab of
+//! bricks, one brick thick along x: all cells in it belong to boxes whose home is that slab or one next to it. The bricks that
+//! are found are split into pieces again, so that many threads share a few long slabs as well.
 //!
 //! ```text
 //! home_x           3         4         5         6
@@ -14,7 +14,7 @@
 //! slab 5                          |=========|             looks at homes 4, 5, 6
 //! ```
 //!
-//! Boxes come by `home_x`, so those of a slab stand together; and slabs one after the other are in the order of stacks.
+//! Boxes are sorted by `home_x`, so those of a slab are contiguous, and slabs in order are stacks in order.
 
 use std::ops::RangeInclusive;
 
@@ -24,14 +24,14 @@ use rustc_hash::FxHashMap;
 
 use crate::lattice::{BrickPos, LatticeBox, pieces};
 
-/// From how many bricks on what is cheap for each is spread over threads: waking these takes as long as some hundred of
-/// them.
+/// With at least this many bricks, threads share work that is cheap for each: waking threads takes as long as a few hundred
+/// bricks.
 pub(super) const PARALLEL_PLACES: usize = 512;
 
-/// How many places for bricks a table may have for each box.
+/// A dense table of bricks is used while it has at most this many places per box; otherwise a hash table.
 const PLACES: u64 = 64;
 
-/// From how many bricks on a piece ends with its stack.
+/// A piece ends with the first stack that ends after this many bricks.
 const PIECE: usize = 128;
 
 /// A brick and cells of it.
@@ -47,7 +47,7 @@ pub(super) struct OfBrick {
 /// Cells by the bricks that hold them: by stacks of bricks, each from below.
 #[derive(Debug, Default)]
 pub(super) struct ByBrick {
-    /// One after the other, cut between stacks.
+    /// In order, split between stacks.
     slabs: Vec<Vec<OfBrick>>,
 }
 
@@ -86,8 +86,8 @@ impl ByBrick {
         self.slabs.iter().map(Vec::len).sum()
     }
 
-    /// Collects what `work` makes of all stacks, in order; side by side where there are many. It gets several whole stacks
-    /// at a time.
+    /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole stacks at
+    /// a time.
     pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
         if self.len() < PARALLEL_PLACES {
             let mut found = Vec::with_capacity(self.len());
@@ -145,7 +145,6 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
     };
     let boxes = || changes.iter().filter_map(|change| Some((change, bricks_of(change.cells?)?)));
     let Some(all) = boxes().map(|(_, bricks)| bricks).reduce(LatticeBox::union) else { return Vec::new() };
-    // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
     let size = all.size();
     if all.volume() > PLACES * changes.len() as u64 {
         let mut index: FxHashMap<BrickPos, Bits> = FxHashMap::default();

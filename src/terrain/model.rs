@@ -12,7 +12,7 @@ use super::receipt::Receipt;
 use super::settings::{TerrainError, TerrainSettings};
 use super::transaction::{Transaction, Work};
 #[cfg(feature = "plugin")]
-use super::unseen::{News, Unseen};
+use super::unseen::Unseen;
 use super::world::{World, unique};
 use crate::backend::Engine;
 use crate::ground::Ground;
@@ -215,7 +215,7 @@ impl Terrain {
     /// When the commit is not that of the transaction under way; nothing is changed then.
     pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
         #[cfg(feature = "plugin")]
-        let news = self.unseen.is_some().then(|| News::of(&commit, self.world.version()));
+        let news = self.unseen.is_some().then(|| Unseen::of(&commit, self.world.version()));
         let (receipts, _) = self.install(commit)?;
         #[cfg(feature = "plugin")]
         if let (Some(unseen), Some(news)) = (&mut self.unseen, news) {

@@ -9,7 +9,7 @@ impl Terrain {
     /// that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no room](Self::set_work_limits)
     /// for it, it is answered at once.
     ///
-    /// A group is decided when edits are submitted, and not by when their transactions begin: brushes of one
+    /// Groups are decided when edits are submitted, not when their transactions begin: brushes of one
     /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
     /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
     ///
@@ -56,7 +56,7 @@ impl Terrain {
         self.undo_stack.budget()
     }
 
-    /// Forgets what can be undone and redone; the budget stays. What waits or is under way comes into history once it is
+    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they are
     /// committed, and steps that wait find nothing.
     ///
     /// ```
@@ -66,7 +66,7 @@ impl Terrain {
     /// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
     /// terrain.apply(&journal);
     /// assert_eq!(terrain.history().undos, 1);
-    /// // Nobody who loads a game takes back what was dug in it.
+    /// // A loaded game cannot be undone.
     /// terrain.clear_history();
     /// assert_eq!(terrain.history(), History::default());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -82,7 +82,7 @@ impl Terrain {
         Memory { undo: self.undo_stack.figures().bytes, ..self.world.memory() }
     }
 
-    /// Undoes the last group of edits at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
+    /// Undoes the last group of edits at once, after everything that waits; like [`apply`](Self::apply) for brushes.
     pub fn undo(&mut self) -> HistoryReceipt {
         self.step(HistoryStep::Undo)
     }

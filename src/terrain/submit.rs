@@ -1,4 +1,4 @@
-//! What a game asks a terrain for: edits and steps, one after the other, and what became of them.
+//! Submitting edits to a terrain, and the receipts for them.
 
 use std::borrow::Borrow;
 
@@ -9,14 +9,14 @@ use super::world::unique;
 use crate::brush::{Brush, Edit};
 
 impl Terrain {
-    /// Queues a brush, as a step of undo by itself unless it is part of a [stroke](Brush::stroke). One that is not valid is
-    /// queued too: its receipt says why it was rejected. One that the [limits](Self::set_work_limits) have no room for is
-    /// answered [at once](Self::take_answered).
+    /// Queues a brush as a step of undo of its own, unless it is part of a [stroke](Brush::stroke). An invalid brush is queued
+    /// too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is answered
+    /// [at once](Self::take_answered).
     pub fn submit(&mut self, brush: &Brush) {
         self.submit_all([brush]);
     }
 
-    /// Queues brushes that are one step of undo together, but for those that are part of strokes.
+    /// Queues brushes as one step of undo, except for those that are part of strokes.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -53,7 +53,7 @@ impl Terrain {
         self.submit_edits([edit]);
     }
 
-    /// Queues edits that are one step of undo together, but for those that are part of strokes.
+    /// Queues edits as one step of undo, except for those that are part of strokes.
     pub fn submit_edits<E: Borrow<Edit>>(&mut self, edits: impl IntoIterator<Item = E>) {
         let together = Together::Batch(unique());
         for edit in edits {
@@ -76,13 +76,13 @@ impl Terrain {
         }
     }
 
-    /// Is there room for an edit? `None`: for one that is not valid, and waits for its turn to be told so.
+    /// Is there room for an edit? `None` stands for an invalid one, which is queued too and gets its receipt in turn.
     pub(crate) fn admit(&self, edit: Option<&Edit>) -> Result<(), Rejection> {
         let has_room = self.queue.has_room(self.world.grid(), edit);
         if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
     }
 
-    /// Queues an edit for which there is room, or which may wait all the same.
+    /// Queues an edit, whether there is room for it or not.
     pub(crate) fn queue_edit(
         &mut self,
         tag: u64,
@@ -95,7 +95,7 @@ impl Terrain {
         self.queue.push_edit(self.world.grid(), tag, edit, together, terms);
     }
 
-    /// How much work a transaction takes, and how much may wait. Takes effect at once; what waits already stays.
+    /// Sets how much work a transaction takes, and how much may wait. Takes effect at once; what waits already stays.
     pub fn set_work_limits(&mut self, limits: WorkLimits) {
         self.queue.limits = limits;
     }
@@ -114,10 +114,10 @@ impl Terrain {
     /// Returns the receipts of these brushes; those of brushes that waited are kept for
     /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
-    /// All of it is one step back, cut where strokes stand in between; a game that replays a journal may want to
-    /// [forget](Self::clear_history) it. However many they are, none is rejected as too much.
+    /// All of them are one step of undo, except for strokes among them; a game that replays a journal may want to
+    /// [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
+    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as [stale](super::StaleCommit).
     pub fn apply<B: Borrow<Brush>>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
         self.abandon();
         let waiting = self.queue.edits().count();

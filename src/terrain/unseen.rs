@@ -51,29 +51,19 @@ impl Unseen {
         &self.fields
     }
 
-    /// Adds a commit that led to this version, unless another commit is missing in between.
-    pub(super) fn add(&mut self, news: News, to: Version) {
-        if self.to != news.before {
-            return;
-        }
-        self.drawn.extend(news.drawn);
-        self.fields.extend(news.fields);
-        self.to = to;
-    }
-}
-
-/// What a commit will change of what is shown.
-pub(super) struct News {
-    before: Version,
-    drawn: Vec<Drawn>,
-    fields: Vec<(ChunkPos, FieldNews)>,
-}
-
-impl News {
     /// What a commit will change of the world at this version. Read from its own lists: the game may have taken its meshes.
-    pub fn of(commit: &Commit, before: Version) -> Self {
+    pub(super) fn of(commit: &Commit, before: Version) -> Self {
         let tiles = commit.rings.iter().map(|(tile, _)| Drawn::Tile(*tile));
         let chunks = commit.surfaces.iter().map(|(chunk, _)| Drawn::Chunk(*chunk));
-        Self { before, drawn: tiles.chain(chunks).collect(), fields: commit.news.clone() }
+        Self { drawn: tiles.chain(chunks).collect(), fields: commit.news.clone(), ..Self::nothing(before) }
+    }
+
+    /// Adds what follows it directly and leads to this version; anything else is left out, and makes it useless.
+    pub(super) fn add(&mut self, next: Self, to: Version) {
+        if self.to == next.from {
+            self.drawn.extend(next.drawn);
+            self.fields.extend(next.fields);
+            self.to = to;
+        }
     }
 }

@@ -2,16 +2,16 @@
 //!
 //! **What is connected.** Two solid samples that are neighbours along an axis, six for each sample. That is what the
 //! surface connects as well: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples,
-//! and cuts solid corners off wherever they only meet across a diagonal. So two parts are one piece of ground exactly if a
-//! worm could get from one to the other without coming out of what is drawn.
+//! and separates solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a
+//! path inside the drawn surface connects them.
 //!
-//! **What is tied.** A piece that reaches the deep: ground below everything that was ever edited. The world's sides tie
-//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as tied without looking further; so a search has
-//! a bound, and its result does not depend on the order in which it looks.
+//! **What is anchored.** A piece that reaches ground below everything that was ever edited. The world's sides anchor
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further, which bounds
+//! the search; its result does not depend on the order of the search.
 //!
-//! **What is taken out.** The samples of a piece become the air that the middle of a dig is, and so does air that touches
-//! them and no other ground, so that nothing is left of the shape. What remains keeps its vertices to the bit. All of that
-//! belongs to the edit that cut the piece off: it is hashed, undone and replayed with it.
+//! **What is taken out.** The samples of a piece get the density of air in the middle of a dig, and so does air that touches
+//! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs to
+//! the edit that cut the piece off: it is hashed, undone and replayed with it.
 
 mod bits;
 mod mesh;
@@ -37,8 +37,7 @@ use search::{Component, Solid};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
-    /// The largest piece to look for, in voxels. Whatever is larger counts as tied; this bounds the time that a search
-    /// takes.
+    /// The largest piece to look for, in voxels. Larger ones count as anchored; this bounds the time of a search.
     pub largest: u32,
     /// Pieces up to so many voxels vanish.
     pub crumbs: u32,
@@ -70,7 +69,7 @@ impl LooseSettings {
 /// What became of a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PieceFate {
-    /// It is still there, tied to nothing. So are all that the terrain's [`DiggingRules`] keep a part of.
+    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`] protect a part.
     Left,
     /// It was taken out of the ground.
     Removed,
@@ -87,7 +86,7 @@ pub struct Run {
     pub len: u32,
 }
 
-/// A piece of ground that nothing ties to the world.
+/// A piece of ground that is not connected to the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoosePiece {
     /// What became of it.
@@ -96,7 +95,7 @@ pub struct LoosePiece {
     pub bounds: LatticeBox,
     /// How many samples it has.
     pub voxels: u64,
-    /// These by material: times density and volume of a voxel, its mass.
+    /// Its voxels by material: times the density and volume of a voxel, its mass.
     pub materials: MaterialCounts,
     /// Its samples, by y, then z, then x.
     pub runs: Arc<[Run]>,
@@ -115,7 +114,7 @@ impl World {
         let near = |(x, z): (i32, i32)| (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z);
         let mut seeds = Samples::default();
         for (&(x, z), ys) in self.stacks.iter().filter(|(stack, _)| near(**stack)) {
-            // Below what is stored the ground is whole; above it, nothing is solid but the ground.
+            // Below the stored bricks all ground is anchored; above them only pristine ground is solid.
             let (Some(&lowest), Some(&highest)) = (ys.first(), ys.last()) else { continue };
             let heights = self.ground.heights::<8>(Column::new(x * 8, z * 8));
             let top = heights.iter().flatten().max().map_or(highest, |&height| highest.max(height >> 11));

@@ -1,4 +1,4 @@
-//! The search for pieces that nothing ties to the deep.
+//! The search for pieces that are not anchored.
 //!
 //! From each seed a component of solid samples grows, brick by brick and the lowest brick first. Two things end it early:
 //! a brick without any stored one below it, whose solid samples stand on pristine ground all the way down; and a sample
