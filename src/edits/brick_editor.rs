@@ -102,8 +102,7 @@ impl<'a> BrickEditor<'a> {
         let (removed, added) = (changed.was & !changed.is, changed.is & !changed.was);
         if removed != 0 {
             self.count_by_material(VoxelOutcome::Removed, y, removed, counts);
-            // Air has no material.
-            self.brick().set_materials(y, removed, MaterialId::GROUND);
+            self.brick().clear_materials(y, removed);
         }
         if added != 0 {
             if let Some(material) = material {

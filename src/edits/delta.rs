@@ -37,7 +37,7 @@ impl EditDelta {
     /// freed when deltas are added up.
     pub fn change(&mut self, mut drafted: DraftedBrick) {
         // Materials may be stored though all of them are the ground's own.
-        let key = |of: &DraftedBrick| (of.kind, of.brick.material_bytes());
+        let key = |of: &DraftedBrick| (of.kind, of.brick.bytes());
         let mut latest = self.bricks.iter().rev().take(LATEST);
         if drafted.kind.is_some()
             && let Some(same) = latest.find(|other| key(other) == key(&drafted))

@@ -3,7 +3,6 @@
 use super::brick_editor::BrickEditor;
 use super::delta::EditDelta;
 use crate::brush::DEPTH;
-use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid};
 use crate::volume::layers::{self, Layers, offset, ones};
 use crate::volume::{SampleView, row};
@@ -41,8 +40,7 @@ impl BrickEditor<'_> {
                 brick.set_row(at, samples);
             }
             brick.set_bits(y, layer, 0);
-            // Air has no material.
-            brick.set_materials(y, layer, MaterialId::GROUND);
+            brick.clear_materials(y, layer);
         }
         changed
     }

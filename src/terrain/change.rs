@@ -104,5 +104,5 @@ pub(super) fn replaced_bytes(world: &World, pos: BrickPos) -> usize {
 
 /// Bytes of a brick with the counters of its `Arc`; 0 for a uniform one.
 pub(super) fn brick_bytes(brick: &Brick) -> usize {
-    if brick.uniform().is_some() { 0 } else { 2 * size_of::<usize>() + Brick::BYTES + brick.material_bytes() }
+    if brick.uniform().is_some() { 0 } else { 2 * size_of::<usize>() + brick.bytes() }
 }

@@ -56,7 +56,7 @@ impl Terrain {
     pub(crate) fn take_unseen(&mut self, shown: Version) -> Option<Unseen> {
         let now = self.world.version();
         let unseen = self.unseen.replace(Unseen::nothing(now))?;
-        (unseen.from == shown && unseen.to == now).then_some(unseen)
+        (unseen.follows(shown) && unseen.version() == now).then_some(unseen)
     }
 
     /// The commit that rejects all of the transaction with this ticket, because its task panicked; `None` if it is not under

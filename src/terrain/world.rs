@@ -274,7 +274,7 @@ impl World {
         let single = self.bricks.values().filter(|brick| brick.uniform().is_none());
         for brick in single.chain(self.uniform.values()) {
             memory.samples += Brick::BYTES;
-            memory.materials += brick.material_bytes();
+            memory.materials += brick.bytes() - Brick::BYTES;
         }
         for surface in self.surfaces.values() {
             let (mesh, parts) = surface.bytes();

@@ -225,6 +225,16 @@ impl Brick {
         self.materials.as_deref()
     }
 
+    /// Removes what samples of a layer that turned to air store besides their density: air has no material.
+    pub(crate) fn clear_materials(&mut self, y: usize, samples: u64) {
+        self.set_materials(y, samples, MaterialId::GROUND);
+    }
+
+    /// Bytes of the brick, and of all that it stores elsewhere.
+    pub(crate) fn bytes(&self) -> usize {
+        Self::BYTES + self.material_bytes()
+    }
+
     /// Bytes that materials take beside the brick itself.
     pub fn material_bytes(&self) -> usize {
         self.materials.as_deref().map_or(0, size_of_val)
