@@ -14,7 +14,9 @@ pub struct BrickPos(pub IVec3);
 impl Ord for BrickPos {
     /// By stacks (x, then z), and each stack from below.
     fn cmp(&self, other: &Self) -> Ordering {
-        self.stack_order().cmp(&other.stack_order())
+        // As tuples: arrays compare in a loop.
+        let order = |IVec3 { x, y, z }: IVec3| (x, z, y);
+        order(self.0).cmp(&order(other.0))
     }
 }
 
