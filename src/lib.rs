@@ -229,7 +229,7 @@
 //! # Rooms
 //!
 //! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], [`edits`], [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
+//! [`lattice`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
 //! `panel`, `debug`. Beside them stands [`dense`], which meshes plain arrays and serves no terrain.
 //!
 //! # How the seam closes
@@ -315,7 +315,7 @@ pub mod brush;
 #[cfg(feature = "debug")]
 pub mod debug;
 pub mod dense;
-pub mod edits;
+mod edits;
 pub mod ground;
 pub mod lattice;
 #[cfg(feature = "egui")]

@@ -349,7 +349,7 @@ fn the_news_of_a_commit_are_the_difference_of_its_fields() {
             let news = commit.field_news().to_vec();
             terrain.commit(commit).expect("nothing came in between");
             let after = fields(terrain.world());
-            let mut told = BTreeSet::new();
+            let mut named = BTreeSet::new();
             for (chunk, news) in news {
                 let id = match news {
                     FieldNews::Created(id) => {
@@ -372,12 +372,12 @@ fn the_news_of_a_commit_are_the_difference_of_its_fields() {
                     }
                     FieldNews::Removed(id) => panic!("seed {seed}: {id:?} is gone, but nothing was undone"),
                 };
-                assert!(told.insert(id), "seed {seed}: {id:?} is in the news twice");
+                assert!(named.insert(id), "seed {seed}: {id:?} is in the news twice");
             }
             let differs = |id: &&FieldId| before.get(id) != after.get(id);
             let expected: BTreeSet<FieldId> =
                 before.keys().chain(after.keys()).filter(differs).copied().collect();
-            assert_eq!(told, expected, "seed {seed}");
+            assert_eq!(named, expected, "seed {seed}");
         }
     }
 }

@@ -76,9 +76,9 @@ fn check_piece(world: &World, piece: &LoosePiece, what: &str) {
     let points = || samples.iter().map(|&point| IVec3::from_array(point));
     let bounds = points().map(LatticeBox::point).reduce(LatticeBox::union);
     assert_eq!(Some(piece.bounds), bounds, "{what}");
-    let mut tally: BTreeMap<MaterialId, u64> = BTreeMap::new();
-    points().for_each(|point| *tally.entry(world.samples().material(point)).or_default() += 1);
-    assert_eq!(piece.materials.iter().collect::<BTreeMap<_, _>>(), tally, "{what}");
+    let mut counts: BTreeMap<MaterialId, u64> = BTreeMap::new();
+    points().for_each(|point| *counts.entry(world.samples().material(point)).or_default() += 1);
+    assert_eq!(piece.materials.iter().collect::<BTreeMap<_, _>>(), counts, "{what}");
 }
 
 /// Edits that leave much hanging: rough digs, thin walls, balls in the air that are cut through, and sculpting of all that.
@@ -335,7 +335,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
                 }
             }
             // What is solid, and of what; and where the surface lies.
-            let (world, mut tally) = (terrain.world(), MaterialCounts::default());
+            let (world, mut counts) = (terrain.world(), MaterialCounts::default());
             let columns = everything(world);
             let bricks = world.bricks().filter_map(|(pos, _)| pos.samples().intersection(columns));
             let bricks: Vec<LatticeBox> = bricks.collect();
@@ -363,7 +363,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
                 }
             }
             assert_eq!(applied.bounds, bounds, "{what}");
-            applied.loose.iter().for_each(|piece| tally.add(&piece.materials));
+            applied.loose.iter().for_each(|piece| counts.add(&piece.materials));
             assert!(world.check_seams().is_flawless(), "{what}: {}", world.check_seams());
             if gone.is_empty() {
                 assert_eq!(world.hash(), plain.hash(), "{what}");

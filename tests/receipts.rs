@@ -43,24 +43,27 @@ impl Difference {
             found.newly_edited += u64::from(!old.is_edited(point));
             LatticeBox::include(&mut found.bounds, LatticeBox::point(point));
             let (was, is) = (old.material(point), new.material(point));
-            let (tally, material) = match solid {
+            let (counts, material) = match solid {
                 [true, false] => (&mut found.removed, was),
                 [false, true] => (&mut found.added, is),
                 [true, true] if was != is => (&mut found.painted, is),
                 _ => continue,
             };
-            *tally.entry(material).or_default() += 1;
+            *counts.entry(material).or_default() += 1;
         }
         found
     }
 }
 
-fn by_material(tally: &MaterialCounts) -> BTreeMap<MaterialId, u64> {
-    tally.iter().filter(|&(_, voxels)| voxels > 0).collect()
+fn by_material(counts: &MaterialCounts) -> BTreeMap<MaterialId, u64> {
+    counts.iter().filter(|&(_, voxels)| voxels > 0).collect()
 }
 
 fn edited_samples(world: &World) -> u64 {
-    world.bricks().map(|(_, brick)| u64::from(brick.edited_count())).sum()
+    world
+        .bricks()
+        .map(|(_, brick)| brick.edited().iter().map(|layer| u64::from(layer.count_ones())).sum::<u64>())
+        .sum()
 }
 
 /// A ground with several materials: rock with patches of grass and sand as its skin.
@@ -141,9 +144,9 @@ fn a_thousand_receipts_balance_with_the_world() {
             }
             edits += 1;
             split += usize::from(applied.is_split());
-            for (total, tally) in totals.iter_mut().zip([&applied.removed, &applied.added, &applied.painted])
+            for (total, counts) in totals.iter_mut().zip([&applied.removed, &applied.added, &applied.painted])
             {
-                *total += tally.total();
+                *total += counts.total();
             }
         }
     }

@@ -312,7 +312,7 @@ fn receipts_tell_what_was_refused_and_why() {
     ]);
     let applied: Vec<&Applied> =
         receipts.iter().map(|receipt| receipt.outcome.as_ref().expect("valid brushes")).collect();
-    let list = |tally: &MaterialCounts| tally.iter().collect::<Vec<_>>();
+    let list = |counts: &MaterialCounts| counts.iter().collect::<Vec<_>>();
     // Of the ball below the surface, what is not taken away is refused.
     let solid = |points: &mut dyn Iterator<Item = IVec3>| points.count() as u64;
     let inside = |at: IVec3| at.y <= 20 && (at - IVec3::new(32, 20, 32)).length_squared() <= 36;

@@ -2,52 +2,41 @@
 
 use std::ops::Range;
 
-use super::jobs::bricks_around;
-use super::stencil_edit::reads;
-use crate::brush::Edit;
-use crate::lattice::LatticeBox;
+use super::prepared_edit::PreparedEdit;
+use crate::lattice::BrickPos;
 
-/// Most edits of a run that has one which sculpts, so that comparing each with all others stays cheap.
+/// Most edits of a batch in which some edit reads its surroundings, so that comparing each with all others stays cheap.
 const LONGEST: usize = 1 << 12;
 
-/// Most bricks around all edits of a run, unless it is a single one: so many jobs take 16 MiB.
+/// Most bricks around all edits of a batch, unless it is a single edit: their jobs take 16 MiB.
 pub(super) const MOST_BRICKS: u64 = 1 << 20;
 
-/// Where an edit changes samples.
-pub(super) struct EditScope {
-    /// The part of its reach that lies in the world.
-    pub reach: Option<LatticeBox>,
-    /// May some rule be against it?
-    pub is_bound: bool,
-}
-
-/// Cuts edits of these scopes into runs, in order. In each, all that an edit reads but the samples it changes itself is as
-/// it was before the run: digs, adds and paint look at nothing else, and one that sculpts begins a new run where it would
-/// read what an earlier edit of the run may change. So does every edit that rules bear on: those are bound. One with which
-/// there would be more than `most` bricks around the edits of a run begins a new one too.
-pub(super) fn runs(edits: &[&Edit], scopes: &[EditScope], most: u64) -> Vec<Range<usize>> {
-    let mut runs = Vec::new();
+/// Splits edits into batches, in order, in which no edit reads what an earlier edit of the batch may write, except for the
+/// samples that it changes itself. Digs, adds and paint read nothing else; edits that sculpt, and edits that rules restrict,
+/// read what is [around](PreparedEdit::reads) them. A batch also ends before there would be more than `most` bricks around
+/// its edits.
+pub(super) fn batches(edits: &[PreparedEdit], most: u64) -> Vec<Range<usize>> {
+    let mut batches = Vec::new();
     let (mut first, mut bricks) = (0, 0);
-    for (number, (edit, scope)) in edits.iter().zip(scopes).enumerate() {
-        let Some(own) = scope.reach else { continue };
-        let own_bricks = bricks_around(own).volume();
+    for (number, edit) in edits.iter().enumerate() {
+        let Some(reach) = edit.reach else { continue };
+        let own_bricks = BrickPos::range(reach).volume();
         bricks += own_bricks;
-        let is_disturbed = || {
-            let around = reads(edit.sculptor().as_ref(), scope.is_bound, own);
-            let mut earlier = scopes[first..number].iter().filter_map(|scope| scope.reach);
-            around.is_some_and(|around| {
+        let reads_changes = || {
+            let mut earlier = edits[first..number].iter().filter_map(|edit| edit.reach);
+            edit.reads().is_some_and(|around| {
                 number - first >= LONGEST || earlier.any(|earlier| earlier.intersection(around).is_some())
             })
         };
-        if number > first && (bricks > most || is_disturbed()) {
-            runs.push(first..number);
+        if number > first && (bricks > most || reads_changes()) {
+            batches.push(first..number);
             (first, bricks) = (number, own_bricks);
         }
     }
     if first < edits.len() {
-        runs.push(first..edits.len());
+        batches.push(first..edits.len());
     }
-    runs
+    batches
 }
 
 #[cfg(test)]
@@ -55,22 +44,20 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::brush::{Brush, Shape};
-    use crate::edits::reach;
+    use crate::brush::{Brush, Edit, Shape};
     use crate::ground::MaterialId;
     use crate::lattice::ChunkGrid;
 
-    /// Where runs begin of edits that no rule bears on.
+    /// Where batches begin of edits that no rule restricts.
     fn begins(brushes: &[Brush], most: u64) -> Vec<usize> {
         let grid = ChunkGrid::new(32, 400, 400);
-        let edits: Vec<Edit> = brushes.iter().map(|brush| Edit::quantize(brush).unwrap()).collect();
-        let scope = |edit| EditScope { reach: reach(grid, edit), is_bound: false };
-        let scopes: Vec<EditScope> = edits.iter().map(scope).collect();
-        let runs = runs(&edits.iter().collect::<Vec<_>>(), &scopes, most);
+        let prepared = |brush| PreparedEdit::new(grid, &Edit::quantize(brush).unwrap(), None);
+        let edits: Vec<PreparedEdit> = brushes.iter().map(prepared).collect();
+        let batches = batches(&edits, most);
         // Each ends where the next one begins.
-        assert!(runs.windows(2).all(|pair| pair[0].end == pair[1].start));
-        assert_eq!(runs.last().map_or(0, |run| run.end), edits.len());
-        runs.into_iter().map(|run| run.start).collect()
+        assert!(batches.windows(2).all(|pair| pair[0].end == pair[1].start));
+        assert_eq!(batches.last().map_or(0, |batch| batch.end), edits.len());
+        batches.into_iter().map(|batch| batch.start).collect()
     }
 
     #[test]
@@ -93,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_ends_where_too_many_bricks_lie_around_its_edits() {
+    fn a_batch_ends_where_too_many_bricks_lie_around_its_edits() {
         // Six voxels around a point whose numbers are multiples of 8: two bricks along each side.
         let dig = |x: f32| Brush::dig(Shape::sphere(Vec3::new(x, 0.0, 48.0), 4.0));
         let eight = [16.0, 16.0, 48.0, 80.0, -90.0, 16.0, 16.0, 16.0].map(dig);

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::draft::{DraftedBrick, EditEffect};
+use rayon::prelude::*;
+
+use super::effect::{DraftedBrick, EditEffect};
 use crate::ground::MaterialId;
 use crate::lattice::{ChunkPos, LatticeBox};
 use crate::volume::VoxelOutcome;
@@ -13,14 +15,14 @@ pub(crate) struct EditDelta {
     pub bricks: Vec<DraftedBrick>,
     pub parts: Vec<PartEffect>,
     pub counts: Vec<Count>,
-    /// All that edits did, one after the other, where parts and counts are entered already; else none.
+    /// What each edit did, in order, if parts and counts have been added up already; otherwise empty.
     pub effects: Vec<EditEffect>,
     /// By how much the hash of the world's samples changes.
     pub hash: u64,
 }
 
 impl EditDelta {
-    /// An empty one, with room for so many bricks, and for what edits do to them as a rule.
+    /// An empty delta with room for so many bricks.
     pub fn with_room(bricks: usize) -> Self {
         Self {
             bricks: Vec::with_capacity(bricks),
@@ -31,11 +33,11 @@ impl EditDelta {
         }
     }
 
-    /// Enters a brick. One that is all alike is mostly alike with one of the latest, and shares that one's memory at once:
-    /// who adds ledgers up has fewer bricks to give up.
+    /// Enters a brick. Neighbouring uniform bricks are mostly equal and share memory at once, so fewer of them have to be
+    /// freed when deltas are added up.
     pub fn change(&mut self, mut drafted: DraftedBrick) {
         // Materials may be stored though all of them are the ground's own.
-        let key = |of: &DraftedBrick| (of.kind, of.brick.material_bytes());
+        let key = |of: &DraftedBrick| (of.kind, of.brick.bytes());
         let mut latest = self.bricks.iter().rev().take(LATEST);
         if drafted.kind.is_some()
             && let Some(same) = latest.find(|other| key(other) == key(&drafted))
@@ -45,7 +47,7 @@ impl EditDelta {
         self.bricks.push(drafted);
     }
 
-    /// Enters that an edit changed samples of a chunk. Bricks beside each other mostly come to the same entry.
+    /// Enters that an edit changed samples of a chunk. Neighbouring bricks mostly share an entry.
     pub fn reach(&mut self, edit: usize, chunk: ChunkPos, bounds: LatticeBox) {
         let mut latest = self.parts.iter_mut().rev().take(LATEST);
         match latest.find(|part| (part.edit, part.chunk) == (edit, chunk)) {
@@ -54,15 +56,15 @@ impl EditDelta {
         }
     }
 
-    /// Where an edit counts voxels: all of its own that stand at the end are looked at, however many materials those are, so
-    /// a brick has no two of a kind.
+    /// Where an edit counts voxels. All entries of the edit at the end of the list are searched, so one brick never gets two
+    /// entries for the same outcome and material.
     pub fn counts(&mut self, edit: usize) -> Counts<'_> {
         let own = self.counts.iter().rev().take_while(|count| count.edit == edit).count();
         Counts { edit, first: self.counts.len() - own, list: &mut self.counts }
     }
 }
 
-/// How many of the latest entries one more is compared with.
+/// How many of the latest entries a new one is compared with.
 const LATEST: usize = 8;
 
 /// What one edit changed in one chunk, in one brick or in several.
@@ -72,7 +74,7 @@ pub(crate) struct PartEffect {
     pub bounds: LatticeBox,
 }
 
-/// Voxels of one material that an edit dealt with, in one brick or in several.
+/// Voxels of one material and outcome that an edit dealt with, in one brick or in several.
 pub(crate) struct Count {
     pub edit: usize,
     pub outcome: VoxelOutcome,
@@ -80,7 +82,7 @@ pub(crate) struct Count {
     pub voxels: u64,
 }
 
-/// What one edit does to a brick is counted here, beside what it did to the one before.
+/// The counts of one edit at the end of a delta's list.
 pub(crate) struct Counts<'l> {
     edit: usize,
     list: &'l mut Vec<Count>,
@@ -94,6 +96,80 @@ impl Counts<'_> {
         match own.iter_mut().find(|count| count.outcome == outcome && count.material == material) {
             Some(count) => count.voxels += voxels,
             None => self.list.push(Count { edit: self.edit, outcome, material, voxels }),
+        }
+    }
+}
+
+/// With at least this many parts and counts, threads share the work of adding them up.
+const MANY_ENTRIES: usize = 1 << 11;
+
+/// Adds up the parts and counts of deltas, edit by edit.
+pub(crate) fn enter_effects(deltas: &[EditDelta], effects: &mut [EditEffect]) {
+    let entries: usize = deltas.iter().map(|delta| delta.parts.len() + delta.counts.len()).sum();
+    if entries < MANY_ENTRIES {
+        return deltas.iter().for_each(|delta| enter_some(delta, 0, effects));
+    }
+    // Each thread takes some of the edits.
+    let length = effects.len().div_ceil(rayon::current_num_threads()).max(1);
+    effects.par_chunks_mut(length).enumerate().for_each(|(number, effects)| {
+        deltas.iter().for_each(|delta| enter_some(delta, number * length, effects));
+    });
+}
+
+/// Adds up what a delta holds about those edits that `effects` are of; `first` is the number of the first of them.
+fn enter_some(delta: &EditDelta, first: usize, effects: &mut [EditEffect]) {
+    for part in &delta.parts {
+        let own = part.edit.checked_sub(first).and_then(|number| effects.get_mut(number));
+        if let Some(effect) = own {
+            effect.reach(part.chunk, part.bounds);
+        }
+    }
+    for count in &delta.counts {
+        let own = count.edit.checked_sub(first).and_then(|number| effects.get_mut(number));
+        if let Some(effect) = own {
+            effect.counts_mut(count.outcome).count_many(count.material, count.voxels);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+    use glam::IVec3;
+
+    use super::*;
+
+    #[test]
+    fn many_threads_enter_the_same_effects_as_one() {
+        let mut rng = Rng::with_seed(3);
+        let outcomes = [
+            VoxelOutcome::Removed,
+            VoxelOutcome::Added,
+            VoxelOutcome::Painted,
+            VoxelOutcome::Protected,
+            VoxelOutcome::Slowed,
+            VoxelOutcome::TooHard,
+        ];
+        for edits in [1, 37] {
+            let mut delta = || {
+                let mut delta = EditDelta::default();
+                for _ in 0..MANY_ENTRIES / 3 {
+                    let point = IVec3::new(rng.i32(-90..90), rng.i32(-9..9), rng.i32(-90..90));
+                    delta.parts.push(PartEffect {
+                        edit: rng.usize(..edits),
+                        chunk: ChunkPos::from_ivec3(IVec3::new(rng.i32(..4), 0, rng.i32(..3))),
+                        bounds: LatticeBox::point(point),
+                    });
+                    let (edit, outcome) = (rng.usize(..edits), outcomes[rng.usize(..outcomes.len())]);
+                    delta.counts(edit).add(outcome, MaterialId(rng.u8(..5)), rng.u64(1..9));
+                }
+                delta
+            };
+            let deltas = [delta(), delta(), delta()];
+            let [mut expected, mut found] = [(); 2].map(|()| vec![EditEffect::default(); edits]);
+            deltas.iter().for_each(|delta| enter_some(delta, 0, &mut expected));
+            enter_effects(&deltas, &mut found);
+            assert!(expected == found && expected.iter().all(|effect| effect.chunks.len() > 3));
         }
     }
 }

@@ -1,46 +1,43 @@
 //! Which edits may reach which bricks.
 //!
-//! Where there are many, bricks are looked through in slabs, one brick thick along x, which threads take; slabs one after the
-//! other are in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8 of them are looked at
-//! together before each by itself.
+//! Where there are many, threads share the bricks in slabs, one brick thick along x, whose results stand one after the other
+//! in order. Long thin brushes come near few bricks of the box around them, so up to 8x8x8 bricks are tested together before
+//! each is tested by itself.
 
-use glam::IVec3;
 use rayon::prelude::*;
 
-use super::prepared::PreparedEdit;
+use super::prepared_edit::PreparedEdit;
 use crate::lattice::{BrickPos, LatticeBox, sort_by_place};
 
 /// One edit's work on one brick; sorted by brick, then by edit.
 #[derive(Clone, Copy)]
 pub(crate) struct Job {
-    /// The brick's position as (x, z, y).
-    brick: [i32; 3],
+    pos: BrickPos,
     pub edit: u32,
 }
 
 impl Job {
     /// The brick's position.
     pub fn pos(self) -> BrickPos {
-        let [x, z, y] = self.brick;
-        BrickPos(IVec3::new(x, y, z))
+        self.pos
     }
 
     /// Are both about the same brick?
     pub fn is_same_brick(a: &Self, b: &Self) -> bool {
-        a.brick == b.brick
+        a.pos == b.pos
     }
 }
 
-/// From how many bricks on, those around each edit, threads take a slab each.
+/// With at least this many bricks around edits, each edit's counted by itself, threads take slabs.
 const PARALLEL: u64 = 1024;
 
 /// Every brick that some edit may reach, once for each edit: by brick, and for each brick in order of the edits.
-pub(super) fn jobs(tools: &[PreparedEdit]) -> Vec<Job> {
-    let reaches = || (0..).zip(tools).filter_map(|(edit, tool)| Some((edit, bricks_around(tool.reach?))));
+pub(super) fn jobs(edits: &[PreparedEdit]) -> Vec<Job> {
+    let reaches = || (0..).zip(edits).filter_map(|(edit, own)| Some((edit, BrickPos::range(own.reach?))));
     let around = reaches().fold(0, |sum: u64, (_, bricks)| sum.saturating_add(bricks.volume()));
     if around < PARALLEL {
         let mut jobs = Vec::with_capacity(around as usize);
-        reaches().for_each(|(edit, bricks)| add(tools, edit, bricks, &mut jobs));
+        reaches().for_each(|(edit, bricks)| add(edits, edit, bricks, &mut jobs));
         sort(&mut jobs);
         return jobs;
     }
@@ -53,34 +50,29 @@ pub(super) fn jobs(tools: &[PreparedEdit]) -> Vec<Job> {
     let slabs: Vec<&[(u32, LatticeBox)]> = parts.chunk_by(|a, b| a.1.min.x == b.1.min.x).collect();
     let of_slab = |parts: &&[(u32, LatticeBox)]| {
         let mut jobs = Vec::new();
-        parts.iter().for_each(|&(edit, bricks)| add(tools, edit, bricks, &mut jobs));
+        parts.iter().for_each(|&(edit, bricks)| add(edits, edit, bricks, &mut jobs));
         sort(&mut jobs);
         jobs
     };
     slabs.par_iter().with_max_len(1).map(of_slab).collect::<Vec<_>>().concat()
 }
 
-/// Those of one brick stay in their order.
+/// Jobs of one brick stay in order.
 fn sort(jobs: &mut Vec<Job>) {
-    sort_by_place(jobs, |job| job.brick);
-}
-
-/// The bricks around an edit's reach.
-pub(super) fn bricks_around(reach: LatticeBox) -> LatticeBox {
-    LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }
+    sort_by_place(jobs, |job| job.pos.stack_order());
 }
 
 /// Adds jobs for those of some bricks that an edit may reach.
-fn add(tools: &[PreparedEdit], edit: u32, bricks: LatticeBox, jobs: &mut Vec<Job>) {
-    let tool = &tools[edit as usize];
+fn add(edits: &[PreparedEdit], edit: u32, bricks: LatticeBox, jobs: &mut Vec<Job>) {
+    let own = &edits[edit as usize];
     let reaches =
-        |bricks: LatticeBox| tool.reaches(LatticeBox { min: bricks.min << 3, max: (bricks.max << 3) + 7 });
+        |bricks: LatticeBox| own.reaches(LatticeBox { min: bricks.min << 3, max: (bricks.max << 3) + 7 });
     let boxes = LatticeBox { min: bricks.min >> 3, max: bricks.max >> 3 };
     for at in boxes.points() {
         let own = bricks.intersection(LatticeBox { min: at << 3, max: (at << 3) + 7 });
         let Some(own) = own.filter(|&own| reaches(own)) else { continue };
         let near = own.points().filter(|&at| reaches(LatticeBox::point(at)));
-        jobs.extend(near.map(|at| Job { brick: [at.x, at.z, at.y], edit }));
+        jobs.extend(near.map(|at| Job { pos: BrickPos(at), edit }));
     }
 }
 
@@ -89,21 +81,13 @@ mod tests {
     use fastrand::Rng;
     use glam::Vec3;
 
-    use super::super::prepared::reach;
     use super::*;
     use crate::brush::{BAND, Brush, Edit, Shape};
     use crate::lattice::ChunkGrid;
 
-    fn tool(brush: &Brush) -> PreparedEdit {
+    fn prepared(brush: &Brush) -> PreparedEdit {
         let edit = Edit::quantize(brush).unwrap();
-        PreparedEdit {
-            reach: reach(ChunkGrid::new(32, 1024, 1024), &edit),
-            operation: edit.kind(),
-            evaluator: edit.evaluator(),
-            sculptor: None,
-            power: edit.power(),
-            is_bound: false,
-        }
+        PreparedEdit::new(ChunkGrid::new(32, 1024, 1024), &edit, None)
     }
 
     #[test]
@@ -118,23 +102,21 @@ mod tests {
                     false => Brush::dig(Shape::capsule(a, a.lerp(b, 0.3), size * 0.2)),
                 }
             };
-            let tools: Vec<PreparedEdit> = (0..count).map(|_| tool(&brush(&mut rng))).collect();
-            let jobs = jobs(&tools);
-            assert!(jobs.is_sorted_by(|a, b| (a.brick, a.edit) < (b.brick, b.edit)), "{count} of {size}");
+            let edits: Vec<PreparedEdit> = (0..count).map(|_| prepared(&brush(&mut rng))).collect();
+            let jobs = jobs(&edits);
+            assert!(jobs.is_sorted_by(|a, b| (a.pos, a.edit) < (b.pos, b.edit)), "{count} of {size}");
             // Bricks that are not among them have no sample in reach.
-            for (edit, tool) in (0..).zip(&tools) {
+            for (edit, own) in (0..).zip(&edits) {
                 let mut distances = [wide::i16x8::ZERO; 64];
-                for brick in tool.reach.into_iter().flat_map(BrickPos::covering) {
-                    let BrickPos(at) = brick;
-                    let key = ([at.x, at.z, at.y], edit);
-                    if jobs.binary_search_by_key(&key, |job| (job.brick, job.edit)).is_err() {
-                        tool.evaluator.rows(brick.origin(), 0..8, 0..8, &mut distances);
+                for brick in own.reach.into_iter().flat_map(BrickPos::covering) {
+                    if jobs.binary_search_by_key(&(brick, edit), |job| (job.pos, job.edit)).is_err() {
+                        own.evaluator.rows(brick.origin(), 0..8, 0..8, &mut distances);
                         let rows = distances.iter().flat_map(|row| row.to_array());
                         assert!(rows.into_iter().all(|distance| i32::from(distance) > BAND), "{brick:?}");
                     }
                 }
             }
-            let reached = |job: &Job| tools[job.edit as usize].reaches(job.pos().samples());
+            let reached = |job: &Job| edits[job.edit as usize].reaches(job.pos().samples());
             assert!(jobs.iter().all(reached), "{count} of {size}");
         }
     }
@@ -142,8 +124,8 @@ mod tests {
     #[test]
     fn a_long_thin_brush_comes_near_few_bricks() {
         let brush = Brush::dig(Shape::capsule(Vec3::ZERO, Vec3::splat(1000.0), 0.25));
-        let jobs = jobs(&[tool(&brush)]);
-        let has = |at: i32| jobs.iter().any(|job| job.brick == [at >> 3; 3]);
+        let jobs = jobs(&[prepared(&brush)]);
+        let has = |at: i32| jobs.iter().any(|job| job.pos.0.to_array() == [at >> 3; 3]);
         assert!((0..=1000).all(has));
         assert!(jobs.len() < 5000, "{}", jobs.len());
     }

@@ -1,20 +1,23 @@
-//! How edits change bricks: from edits in a queue to an [`EditDelta`].
+//! How edits change bricks: from edits in a queue to new bricks, with what each edit did.
 //!
 //! ```text
-//! edits --batches--> independent batches --prepared--> PreparedEdits, sorted by brick
-//!   --brick_editor, per brick--> EditDelta --draft--> newer bricks, effects, hash
+//! edits --batches--> batches of independent edits --jobs--> PreparedEdits, sorted by brick
+//!   --brick_editor, per brick--> EditDelta --drafter--> new bricks, effects, hash
 //! ```
 //!
-//! Edits that read samples around those they change, such as sculpting or those that [rules](crate::volume::DiggingRules) bear
-//! on, take the slower path of `stencil_edit`.
+//! Edits that read samples around those they change, such as sculpting or those that [rules](crate::volume::DiggingRules)
+//! restrict, take the slower path of `stencil_edit`; all others are applied row by row by `plain_edit`.
 
 mod batches;
 mod brick_editor;
 mod delta;
-mod draft;
+mod drafter;
+mod effect;
 mod jobs;
 mod padded_brick;
+mod plain_edit;
 mod prepared;
+mod prepared_edit;
 mod removal;
 mod restore;
 mod rule_scope;
@@ -22,13 +25,14 @@ mod stencil_edit;
 
 pub(crate) use delta::EditDelta;
 #[cfg(feature = "cuda")]
-pub(crate) use draft::enter_effects;
-pub(crate) use draft::latest;
-pub use draft::{ChunkEffect, Draft, DraftedBrick, EditEffect};
-pub use prepared::{PreparedEdits, reach};
-pub(crate) use removal::{TakenOut, take_out};
-pub(crate) use restore::Replaced;
+pub(crate) use delta::enter_effects;
+pub(crate) use drafter::{Draft, Drafter, latest};
+pub(crate) use effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
 #[cfg(feature = "cuda")]
-pub(crate) use rule_scope::RunRules;
+pub(crate) use jobs::Job;
+pub(crate) use prepared::PreparedEdits;
+pub(crate) use prepared_edit::reach;
+pub(crate) use removal::take_out;
+pub(crate) use restore::count_replaced;
 #[cfg(feature = "cuda")]
-pub(crate) use {jobs::Job, prepared::PreparedEdit};
+pub(crate) use {prepared_edit::PreparedEdit, rule_scope::BatchRules};

@@ -14,17 +14,16 @@ const SIDE: usize = BRICK as usize + 2;
 /// The densities of a brick and of one sample more on all sides.
 pub(super) struct PaddedBrick {
     densities: [[[i32; SIDE]; SIDE]; SIDE],
-    /// Which were cut off, where a dig or an add stops to tell distances apart or where stored densities end: a bit for
-    /// each x.
+    /// Which densities are cut off, at the depth of digs and adds or at the limit of storage: a bit for each x.
     cut: [[u16; SIDE]; SIDE],
-    /// Which lie farther from the surface than the ground has them, likewise.
+    /// Which densities are farther from zero than the pristine ones, likewise.
     moved: [[u16; SIDE]; SIDE],
 }
 
 impl PaddedBrick {
-    /// Of a brick, the samples of a view.
+    /// The samples of a brick and those around it.
     ///
-    /// Never in line: edits that look at nothing around pay for what is large in the function that they share.
+    /// Not inlined, or plain edits would pay for its large stack frame.
     #[inline(never)]
     pub fn new(view: &SampleView, pos: BrickPos) -> Self {
         let low = pos.origin() - 1;
@@ -42,12 +41,12 @@ impl PaddedBrick {
             }
         }
         let (width, depth) = (view.ground().width(), view.ground().depth());
-        own.go_on_beyond(inside(low.x, width), inside(low.z, depth));
+        own.repeat_rim(inside(low.x, width), inside(low.z, depth));
         own
     }
 
-    /// Beyond the world's rim, where nobody can edit anything, all goes on as it is at the rim.
-    fn go_on_beyond(&mut self, xs: RangeInclusive<usize>, zs: RangeInclusive<usize>) {
+    /// Beyond the world's rim, where nothing can be edited, samples repeat those at the rim.
+    fn repeat_rim(&mut self, xs: RangeInclusive<usize>, zs: RangeInclusive<usize>) {
         if (xs.clone(), zs.clone()) == (0..=SIDE - 1, 0..=SIDE - 1) {
             return;
         }
@@ -70,9 +69,9 @@ impl PaddedBrick {
         }
     }
 
-    /// Enters the samples of a brick so many steps from the lowest one.
+    /// Enters the samples of the brick at this step, 0 to 2 along each axis, of the 27 bricks.
     fn enter(&mut self, brick: &Brick, step: USizeVec3) {
-        // From where to where, and where that is in the brick.
+        // Where its samples go, and the first of them in the brick.
         let range = |step: usize| match step {
             0 => (0..1, 7),
             1 => (1..SIDE - 1, 0),
@@ -113,7 +112,7 @@ impl PaddedBrick {
     }
 }
 
-/// Which of the surroundings' samples along an axis lie in a world of so many cells; at least one is taken to.
+/// Which of the padded samples along an axis lie in a world of so many cells; at least one, even where none does.
 fn inside(low: i32, cells: i32) -> RangeInclusive<usize> {
     let local = |at: i32| (at.saturating_sub(low)).clamp(0, SIDE as i32 - 1) as usize;
     local(0)..=local(cells)
@@ -128,7 +127,7 @@ mod tests {
     use crate::volume::Bricks;
 
     #[test]
-    fn surroundings_are_what_the_view_says() {
+    fn padded_bricks_hold_the_samples_of_the_view() {
         let ground = Ground::from_fn(30, 30, |x, z| f64::from(x * 7 % 5) + f64::from(z) * 0.3).unwrap();
         let pos = BrickPos(IVec3::new(1, 0, 2));
         let mut bricks = Bricks::default();

@@ -1,160 +1,118 @@
 //! Edits, sorted by the bricks that they may reach: the work that a [`backend`](crate::backend) does.
 //!
-//! Each brick takes its edits in their order, on its own: bricks share no samples, so threads share no work, and whatever an
-//! edit changed is added up afterwards.
+//! Each brick takes its edits in order and by itself: bricks share no samples, so threads share no work, and what an edit
+//! changed is added up afterwards.
 
 use rayon::prelude::*;
+use wide::i16x8;
 
 use super::brick_editor::BrickEditor;
 use super::delta::EditDelta;
 use super::jobs::{Job, jobs};
-use super::rule_scope::RunRules;
-use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
-use crate::lattice::{ChunkGrid, LatticeBox, pieces};
+use super::padded_brick::PaddedBrick;
+use super::prepared_edit::PreparedEdit;
+use super::rule_scope::{BatchRules, BrickRules};
+use crate::lattice::{ChunkGrid, pieces};
 use crate::volume::{DiggingRules, SampleView};
 
-/// From how many jobs on they are spread over threads.
+/// With at least this many jobs, threads share them.
 const PARALLEL_JOBS: usize = 64;
 
-/// How many jobs are done before what edits did to bricks is added up: that takes more memory than the bricks when there are
-/// many edits, and most bricks of a large cave are given up for a shared one.
-const BATCH: usize = 8192;
+/// How many jobs are done before their deltas are added up. With many edits deltas take more memory than bricks, and most
+/// bricks of a large cave are replaced by a shared one.
+const JOBS_AT_ONCE: usize = 8192;
 
-/// How many jobs a thread takes at a time, at least and at most: few, so that all threads end together; and many, so that
-/// there are few ledgers to add up.
+/// Least and most jobs of a delta: few, so that all threads end together, but not so few that there are many deltas to add up.
 const GROUP: [usize; 2] = [16, 64];
 
-/// How often threads should come for more.
-const TURNS: usize = 8;
+/// How many groups there should be for each thread.
+const GROUPS_PER_THREAD: usize = 8;
 
-/// An edit with what is derived from it once.
-pub(crate) struct PreparedEdit {
-    /// The part of the edit's reach that lies in the world.
-    pub reach: Option<LatticeBox>,
-    pub operation: Kind,
-    pub evaluator: Evaluator,
-    pub sculptor: Option<SculptKernel>,
-    pub power: u8,
-    /// May some rule be against it?
-    pub is_bound: bool,
-}
-
-impl PreparedEdit {
-    /// Does the edit look at other samples than those that it changes?
-    pub fn looks_around(&self) -> bool {
-        self.sculptor.is_some() || self.is_bound
-    }
-
-    /// May the edit change some of these samples? Where not, it is certain.
-    pub(super) fn reaches(&self, samples: LatticeBox) -> bool {
-        let reached = self.reach.and_then(|reach| reach.intersection(samples));
-        reached.is_some_and(|samples| !self.evaluator.is_out_of_reach(samples))
-    }
-}
-
-/// The part of an edit's reach that lies in the world; `None` when it lies outside.
-pub fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
-    edit.reach().intersection(grid.edit_bounds())
-}
-
-/// May some rule be against an edit of this reach and power?
-pub(super) fn is_bound(rules: Option<&DiggingRules>, reach: Option<LatticeBox>, power: u8) -> bool {
-    rules.zip(reach).is_some_and(|(rules, own)| rules.bear_on(own, power))
-}
-
-/// Edits, sorted by the bricks that they may reach.
-pub struct PreparedEdits<'a> {
+/// A batch of edits, sorted by the bricks that they may reach.
+pub(crate) struct PreparedEdits<'a> {
     /// What they apply to.
     pub base: SampleView<'a>,
     /// How the world is cut into chunks.
     pub grid: ChunkGrid,
-    pub(crate) tools: Vec<PreparedEdit>,
+    pub edits: Vec<PreparedEdit>,
     jobs: Vec<Job>,
-    pub(crate) rules: Option<RunRules<'a>>,
+    pub rules: Option<BatchRules<'a>>,
 }
 
 impl<'a> PreparedEdits<'a> {
-    /// Sorts edits.
-    pub fn new(base: SampleView<'a>, grid: ChunkGrid, edits: &[&Edit]) -> Self {
-        let tool = |edit: &&Edit| PreparedEdit {
-            reach: reach(grid, edit),
-            operation: edit.kind(),
-            evaluator: edit.evaluator(),
-            sculptor: edit.sculptor(),
-            power: edit.power(),
-            is_bound: false,
-        };
-        let tools: Vec<PreparedEdit> = edits.iter().map(tool).collect();
-        let jobs = jobs(&tools);
-        Self { base, grid, tools, jobs, rules: None }
-    }
-
-    /// The same under rules.
-    #[cfg(feature = "cuda")]
-    pub(crate) fn under(self, rules: Option<&'a DiggingRules>) -> Self {
-        let bound: Vec<bool> =
-            self.tools.iter().map(|tool| is_bound(rules, tool.reach, tool.power)).collect();
-        self.bound(rules, bound)
-    }
-
-    /// The same under rules, which bear on these of the edits.
-    pub(super) fn bound(
-        mut self,
+    /// Sorts edits, which were prepared under these rules.
+    pub(super) fn of(
+        base: SampleView<'a>,
+        grid: ChunkGrid,
+        edits: Vec<PreparedEdit>,
         rules: Option<&'a DiggingRules>,
-        bound: impl IntoIterator<Item = bool>,
     ) -> Self {
-        self.tools.iter_mut().zip(bound).for_each(|(tool, is_bound)| tool.is_bound = is_bound);
-        self.rules = rules.and_then(|rules| RunRules::new(rules, &self.tools));
-        self
+        let (jobs, rules) = (jobs(&edits), rules.and_then(|rules| BatchRules::new(rules, &edits)));
+        Self { base, grid, edits, jobs, rules }
     }
 
-    /// Does any edit look at other samples than those that it changes?
+    /// Sorts edits that no rules restrict.
     #[cfg(feature = "cuda")]
-    pub(crate) fn looks_around(&self) -> bool {
-        self.tools.iter().any(PreparedEdit::looks_around)
+    pub fn new(base: SampleView<'a>, grid: ChunkGrid, edits: &[&crate::brush::Edit]) -> Self {
+        let edits = edits.iter().map(|edit| PreparedEdit::new(grid, edit, None)).collect();
+        Self::of(base, grid, edits, None)
+    }
+
+    /// The same edits under rules.
+    #[cfg(feature = "cuda")]
+    pub fn under(mut self, rules: Option<&'a DiggingRules>) -> Self {
+        self.edits.iter_mut().for_each(|edit| edit.set_rules(rules));
+        Self::of(self.base, self.grid, self.edits, rules)
+    }
+
+    /// Does any edit read other samples than those that it changes?
+    #[cfg(feature = "cuda")]
+    pub fn looks_around(&self) -> bool {
+        self.edits.iter().any(PreparedEdit::looks_around)
     }
 
     /// The jobs of each brick, in order of the edits.
     #[cfg(all(test, feature = "cuda"))]
-    pub(crate) fn bricks(&self) -> Vec<&[Job]> {
+    pub fn bricks(&self) -> Vec<&[Job]> {
         self.jobs.chunk_by(Job::is_same_brick).collect()
     }
 
-    /// Applies all edits on the CPU and hands out a ledger for each brick.
+    /// Applies all edits on the CPU and calls `each` with a delta for each brick.
     #[cfg(all(test, feature = "cuda"))]
-    pub(crate) fn run_each_brick(&self, mut each: impl FnMut(EditDelta)) {
+    pub fn run_each_brick(&self, mut each: impl FnMut(EditDelta)) {
         for jobs in self.bricks() {
-            let mut ledger = EditDelta::default();
-            finish(self, jobs, &mut ledger);
-            each(ledger);
+            let mut delta = EditDelta::default();
+            apply_jobs(self, jobs, &mut delta);
+            each(delta);
         }
     }
 
     /// Every brick that some edit may reach, once for each edit.
-    pub(crate) fn jobs(&self) -> &[Job] {
+    pub fn jobs(&self) -> &[Job] {
         &self.jobs
     }
 
-    /// Applies all edits on the CPU and hands out what they changed, brick by brick. The result does not depend on how
+    /// Applies all edits on the CPU and calls `each` with what they changed, brick by brick. The result does not depend on how
     /// many threads there are.
-    pub(crate) fn run(&self, mut each: impl FnMut(&mut [EditDelta])) {
+    pub fn run(&self, mut each: impl FnMut(&mut [EditDelta])) {
         let work = |jobs: &[Job]| {
-            let mut ledger = EditDelta::with_room(jobs.len().min(GROUP[1]));
-            jobs.chunk_by(Job::is_same_brick).for_each(|jobs| finish(self, jobs, &mut ledger));
-            ledger
+            let mut delta = EditDelta::with_room(jobs.len().min(GROUP[1]));
+            jobs.chunk_by(Job::is_same_brick).for_each(|jobs| apply_jobs(self, jobs, &mut delta));
+            delta
         };
         if self.jobs.len() < PARALLEL_JOBS {
             each(&mut [work(&self.jobs)]);
             return;
         }
-        for batch in pieces(&self.jobs, BATCH, Job::is_same_brick) {
-            let group = (batch.len() / (TURNS * rayon::current_num_threads())).clamp(GROUP[0], GROUP[1]);
+        for batch in pieces(&self.jobs, JOBS_AT_ONCE, Job::is_same_brick) {
+            let group =
+                (batch.len() / (GROUPS_PER_THREAD * rayon::current_num_threads())).clamp(GROUP[0], GROUP[1]);
             match &pieces(batch, group, Job::is_same_brick)[..] {
                 [own] => each(&mut [work(own)]),
                 groups => {
-                    let mut ledgers: Vec<EditDelta> =
+                    let mut deltas: Vec<EditDelta> =
                         groups.par_iter().with_max_len(1).map(|jobs| work(jobs)).collect();
-                    each(&mut ledgers);
+                    each(&mut deltas);
                 }
             }
         }
@@ -162,7 +120,28 @@ impl<'a> PreparedEdits<'a> {
 }
 
 /// Applies all edits of one brick and enters what they changed.
-fn finish(work: &PreparedEdits, jobs: &[Job], ledger: &mut EditDelta) {
+fn apply_jobs(work: &PreparedEdits, jobs: &[Job], delta: &mut EditDelta) {
     let Some(pos) = jobs.first().map(|job| job.pos()) else { return };
-    BrickEditor::new(work.base, work.grid, pos).take(&work.tools, work.rules.as_ref(), jobs, ledger);
+    let mut editor = BrickEditor::new(work.base, pos);
+    let mut distances = [i16x8::ZERO; 64];
+    let low = pos.origin();
+    let rules = work.rules.as_ref().map(|rules| BrickRules::new(rules, pos));
+    for job in jobs {
+        let (number, edit) = (job.edit as usize, &work.edits[job.edit as usize]);
+        let Some(reached) = edit.reach.and_then(|reach| reach.intersection(pos.samples())) else { continue };
+        let (from, to) = (reached.min - low, reached.max - low);
+        edit.evaluator.rows(low, from.y..to.y + 1, from.z..to.z + 1, &mut distances);
+        if edit.looks_around() {
+            let rules = rules.as_ref().filter(|_| edit.is_ruled);
+            let around = PaddedBrick::new(&editor.view, pos);
+            editor.change(work.grid, reached, number, delta, |editor, samples, counts| {
+                editor.apply_stencil(edit, rules, samples, &distances, &around, counts)
+            });
+        } else {
+            editor.change(work.grid, reached, number, delta, |editor, samples, counts| {
+                editor.apply_plain(edit.operation, samples, &distances, counts)
+            });
+        }
+    }
+    editor.finish(delta);
 }

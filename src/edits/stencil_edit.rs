@@ -1,4 +1,4 @@
-//! Edits that look around: those that sculpt, and all that rules bear on. Sample by sample.
+//! Edits that read a stencil of samples around each one: edits that sculpt, and edits that rules restrict.
 
 use glam::IVec3;
 use wide::i16x8;
@@ -6,21 +6,18 @@ use wide::i16x8;
 use super::brick_editor::{BrickEditor, Changed};
 use super::delta::Counts;
 use super::padded_brick::PaddedBrick;
-use super::prepared::PreparedEdit;
+use super::prepared_edit::{LOOK, PreparedEdit};
 use super::rule_scope::BrickRules;
-use crate::brush::{BAND, Kind, SculptKernel, Stencil};
+use crate::brush::{BAND, Kind, Stencil};
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 use crate::volume::{Layers, Sample, SampleView, VoxelOutcome, resolve};
 
-/// How far below and above itself new ground looks for what it is to be made of, in voxels.
-const LOOK: i32 = 64;
-
 impl BrickEditor<'_> {
-    /// Applies an edit that sculpts, or one that rules bear on, to some samples; returns those that changed.
-    pub(super) fn carefully(
+    /// Applies an edit that sculpts, or one that rules restrict, to some samples; returns those that changed.
+    pub fn apply_stencil(
         &mut self,
-        tool: &PreparedEdit,
+        edit: &PreparedEdit,
         rules: Option<&BrickRules>,
         samples: LatticeBox,
         distances: &[i16x8; 64],
@@ -29,52 +26,51 @@ impl BrickEditor<'_> {
     ) -> Layers {
         let low = self.pos.origin();
         let (from, to) = ((samples.min - low).as_usizevec3(), (samples.max - low).as_usizevec3());
-        let (mut layers, mut sights) = ([0; 8], Sights::default());
+        let (mut layers, mut nearest) = ([0; 8], NearestGround::default());
         for y in from.y..=to.y {
             let mut changed = Changed::default();
             for (z, x) in (from.z..=to.z).flat_map(|z| (from.x..=to.x).map(move |x| (z, x))) {
-                let (index, local) = (y * 64 + z * 8 + x, [x, y, z]);
+                let (index, local, bit) = (y * 64 + z * 8 + x, [x, y, z], 1 << (z * 8 + x));
                 let outside = distances[y * 8 + z].as_array()[x].into();
                 let point = low + IVec3::new(x as i32, y as i32, z as i32);
-                if let Kind::Paint { material } = tool.operation {
+                if let Kind::Paint { material } = edit.operation {
                     let is_painted = outside <= 0 && around.density(local) < 0;
-                    if is_painted && self.paint_carefully(point, index, material, rules, around, counts) {
-                        self.brick().set_bits(y, 1 << (index & 63), 1 << (index & 63));
-                        layers[y] |= 1 << (index & 63);
+                    if is_painted && self.paint_sample(point, index, material, rules, around, counts) {
+                        self.brick().set_bits(y, bit, bit);
+                        layers[y] |= bit;
                     }
                     continue;
                 }
                 let before = around.density(local);
-                let proposed = match &tool.sculptor {
+                let proposed = match &edit.sculptor {
                     Some(sculptor) => sculptor.density(point, outside, || around.around(local)),
-                    None => (outside <= BAND).then(|| tool.operation.apply(before, outside)),
+                    None => (outside <= BAND).then(|| edit.operation.apply(before, outside)),
                 };
                 let Some(proposed) =
                     proposed.filter(|&after| Sample::edited(after) != Sample::edited(before))
                 else {
                     continue;
                 };
-                let mut new = || match &tool.sculptor {
+                let mut new = || match &edit.sculptor {
                     Some(sculptor) => sculptor
                         .material()
-                        .unwrap_or_else(|| sights.material(&self.view, point, &around.around(local))),
-                    None => tool.operation.material().unwrap_or(MaterialId::GROUND),
+                        .unwrap_or_else(|| nearest.material(&self.view, point, &around.around(local))),
+                    None => edit.operation.material().unwrap_or(MaterialId::GROUND),
                 };
                 let mut after = Sample::edited(proposed);
                 if let Some(rules) = rules {
-                    let (allowed, fate) =
-                        rules.judge(&self.view, point, tool.power, &around.around(local), proposed);
+                    let (allowed, outcome) =
+                        rules.judge(&self.view, point, edit.power, &around.around(local), proposed);
                     let is_refused = (proposed < 0) != (before < 0) && (allowed < 0) == (before < 0);
-                    if let Some(fate) = fate.filter(|_| is_refused) {
+                    if let Some(outcome) = outcome.filter(|_| is_refused) {
                         let own = if before < 0 { self.view.stored_material(point) } else { new() };
-                        counts.add(fate, resolve(self.view.ground(), point, own), 1);
+                        counts.add(outcome, resolve(self.view.ground(), point, own), 1);
                     }
                     after = Sample::edited(allowed);
                     if after == Sample::edited(before) {
                         continue;
                     }
                 }
-                let bit = 1 << (index & 63);
                 changed.all |= bit;
                 changed.was |= if before < 0 { bit } else { 0 };
                 if after.bits() < 0 {
@@ -95,8 +91,8 @@ impl BrickEditor<'_> {
         layers
     }
 
-    /// Paints a solid sample unless a rule is against it; says whether it changed.
-    fn paint_carefully(
+    /// Paints a solid sample unless a rule forbids it; returns whether it changed.
+    fn paint_sample(
         &mut self,
         point: IVec3,
         index: usize,
@@ -111,16 +107,16 @@ impl BrickEditor<'_> {
             return false;
         }
         let (own, new) = (resolve(ground, point, old), resolve(ground, point, material));
-        let fate = rules.and_then(|own_rules| {
+        let outcome = rules.and_then(|own_rules| {
             match (own_rules.is_protected(point), own_rules.rules.is_unbreakable(own)) {
                 (true, _) => Some(VoxelOutcome::Protected),
                 (_, true) => Some(VoxelOutcome::Unbreakable),
                 _ => None,
             }
         });
-        if let Some(fate) = fate {
+        if let Some(outcome) = outcome {
             if own != new {
-                counts.add(fate, own, 1);
+                counts.add(outcome, own, 1);
             }
             return false;
         }
@@ -134,39 +130,39 @@ impl BrickEditor<'_> {
     }
 }
 
-/// What lies straight below and above the samples of a brick, for edits that build without a material of their own. Each
-/// column is asked from below.
-struct Sights {
-    below: [Option<Seen>; 64],
-    /// Up to where nothing is solid above the last sample that looked up.
+/// The nearest ground straight below and above the samples of a brick, for edits that build without a material of their own.
+/// Each column must be asked from below upwards, so that every sample of it is looked at once.
+struct NearestGround {
+    below: [Option<Below>; 64],
+    /// The y up to which there is only air above the last sample that looked up.
     clear: [i32; 64],
 }
 
-impl Default for Sights {
+impl Default for NearestGround {
     fn default() -> Self {
         Self { below: [None; 64], clear: [i32::MIN; 64] }
     }
 }
 
-/// What was seen below a point.
+/// The first solid sample below a y.
 #[derive(Clone, Copy)]
-struct Seen {
-    from: i32,
+struct Below {
+    y: i32,
     solid: Option<(i32, MaterialId)>,
 }
 
-impl Sights {
-    /// What a point is made of that becomes solid: what lies straight below, else straight above, else beside it.
+impl NearestGround {
+    /// The material for a point that becomes solid: of the ground straight below, else straight above, else beside it.
     fn material(&mut self, view: &SampleView, point: IVec3, around: &Stencil) -> MaterialId {
         let column = ((point.z & 7) * 8 + (point.x & 7)) as usize;
         let known = &mut self.below[column];
-        let end = known.map_or(point.y - LOOK, |seen| seen.from);
+        let end = known.map_or(point.y - LOOK, |known| known.y);
         let fresh = (end..point.y).rev().map(|y| point.with_y(y)).find(|&at| view.is_solid(at));
         let solid = match fresh {
             Some(at) => Some((at.y, view.stored_material(at))),
-            None => known.and_then(|seen| seen.solid),
+            None => known.and_then(|known| known.solid),
         };
-        *known = Some(Seen { from: point.y, solid });
+        *known = Some(Below { y: point.y, solid });
         if let Some((_, material)) = solid.filter(|(y, _)| point.y - y <= LOOK) {
             return material;
         }
@@ -181,17 +177,6 @@ impl Sights {
     }
 }
 
-/// The samples that an edit reads which reaches these; `None` where it looks at none but those it changes.
-pub(super) fn reads(
-    sculptor: Option<&SculptKernel>,
-    is_bound: bool,
-    reach: LatticeBox,
-) -> Option<LatticeBox> {
-    let look = IVec3::Y * if sculptor.is_some_and(|own| own.material().is_none()) { LOOK } else { 0 };
-    let all = reach.grown(1);
-    (is_bound || sculptor.is_some()).then_some(LatticeBox { min: all.min - look, max: all.max + look })
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -203,7 +188,7 @@ mod tests {
     use crate::lattice::BrickPos;
     use crate::volume::{Brick, Bricks};
 
-    /// The material of new ground, straight from what is said about it.
+    /// The material of new ground by its definition.
     fn plainly(view: &SampleView, point: IVec3) -> MaterialId {
         let along = |way: IVec3| (1..=LOOK).map(move |step| point + way * step);
         let beside = [IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z].map(|way| point + way);
@@ -232,10 +217,10 @@ mod tests {
                 bricks.insert(BrickPos(at), Arc::new(crumbs(&mut rng, share)));
             }
             let view = SampleView::new(&ground, &bricks);
-            let (around, mut sights) = (PaddedBrick::new(&view, pos), Sights::default());
+            let (around, mut nearest) = (PaddedBrick::new(&view, pos), NearestGround::default());
             for point in pos.samples().points().filter(|_| rng.u32(..3) > 0) {
                 let local = (point - pos.origin()).as_usizevec3().to_array();
-                let material = sights.material(&view, point, &around.around(local));
+                let material = nearest.material(&view, point, &around.around(local));
                 assert_eq!(material, plainly(&view, point), "world {seed} at {point}");
                 found[usize::from(material == MaterialId::GROUND)] += 1;
             }

@@ -4,32 +4,12 @@ use glam::{I64Vec3, IVec3};
 
 /// A non-empty box of lattice points; `min` and `max` belong to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(from = "Corners", into = "Corners")]
+#[serde(deny_unknown_fields)]
 pub struct LatticeBox {
     /// Lowest point of the box.
     pub min: IVec3,
     /// Highest point of the box.
     pub max: IVec3,
-}
-
-/// A box as it stands in a file.
-#[derive(serde::Serialize, serde::Deserialize)]
-#[serde(rename = "LatticeBox", deny_unknown_fields)]
-struct Corners {
-    min: [i32; 3],
-    max: [i32; 3],
-}
-
-impl From<Corners> for LatticeBox {
-    fn from(Corners { min, max }: Corners) -> Self {
-        Self { min: min.into(), max: max.into() }
-    }
-}
-
-impl From<LatticeBox> for Corners {
-    fn from(LatticeBox { min, max }: LatticeBox) -> Self {
-        Self { min: min.into(), max: max.into() }
-    }
 }
 
 impl LatticeBox {
@@ -68,7 +48,7 @@ impl LatticeBox {
         *own = Some(own.map_or(other, |own| own.union(other)));
     }
 
-    /// The box with `by` more points on every side, as far as there are numbers for them.
+    /// The box with `by` more points on every side; coordinates saturate.
     pub fn grown(self, by: i32) -> Self {
         let by = IVec3::splat(by);
         Self { min: self.min.saturating_sub(by), max: self.max.saturating_add(by) }
@@ -90,7 +70,7 @@ impl LatticeBox {
         size.x.saturating_mul(size.y).saturating_mul(size.z)
     }
 
-    /// Every point of the box, x fastest, then z, then y; none of one turned inside out.
+    /// Every point of the box, x fastest, then z, then y; none for an inverted box.
     pub fn points(self) -> impl Iterator<Item = IVec3> {
         let Self { min, max } = self;
         let mut next = Self::new(min, max).map(|own| own.min);
@@ -140,7 +120,7 @@ mod tests {
         assert_eq!(half.grown(i32::MAX).min, IVec3::new(i32::MIN, -i32::MAX, i32::MIN));
         let flat = LatticeBox { min: IVec3::MIN.with_y(3), max: IVec3::new(i32::MAX, 3, i32::MIN) };
         assert_eq!(flat.volume(), 1 << 32);
-        // Turned inside out.
+        // Inverted.
         let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
         assert_eq!((nothing.volume(), nothing.points().count()), (0, 0));
         assert_eq!(LatticeBox { min: IVec3::X, max: IVec3::new(0, 3, 3) }.points().count(), 0);

@@ -1,5 +1,6 @@
 //! The grids that lie over the lattice: bricks, chunks, tiles.
 
+use std::cmp::Ordering;
 use std::hash::{Hash, Hasher};
 
 use glam::IVec3;
@@ -10,8 +11,23 @@ use super::{BRICK, Column, LIMIT, LatticeBox};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BrickPos(pub IVec3);
 
+impl Ord for BrickPos {
+    /// By stacks (x, then z), and each stack from below.
+    fn cmp(&self, other: &Self) -> Ordering {
+        // As tuples: arrays compare in a loop.
+        let order = |IVec3 { x, y, z }: IVec3| (x, z, y);
+        order(self.0).cmp(&order(other.0))
+    }
+}
+
+impl PartialOrd for BrickPos {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
 impl Hash for BrickPos {
-    /// As one word: tables of bricks are asked more often than anything else.
+    /// As one word: lookups of bricks dominate all other hash lookups.
     fn hash<H: Hasher>(&self, state: &mut H) {
         let IVec3 { x, y, z } = self.0;
         state.write_u64(x as u32 as u64 ^ (z as u32 as u64) << 21 ^ (y as u32 as u64) << 42);
@@ -36,7 +52,32 @@ impl BrickPos {
 
     /// The bricks that store some sample of `samples`.
     pub fn covering(samples: LatticeBox) -> impl Iterator<Item = Self> {
-        LatticeBox { min: samples.min >> 3, max: samples.max >> 3 }.points().map(Self)
+        Self::range(samples).points().map(Self)
+    }
+
+    /// The positions of the bricks that store some sample of `samples`.
+    pub(crate) fn range(samples: LatticeBox) -> LatticeBox {
+        LatticeBox { min: samples.min >> 3, max: samples.max >> 3 }
+    }
+
+    /// The stack of bricks that it belongs to, as (x, z).
+    pub(crate) fn stack(self) -> (i32, i32) {
+        (self.0.x, self.0.z)
+    }
+
+    /// The position as (x, z, y): its order among other bricks.
+    pub(crate) fn stack_order(self) -> [i32; 3] {
+        [self.0.x, self.0.z, self.0.y]
+    }
+
+    /// The position as (y, z, x): its order from the lowest layer up.
+    pub(crate) fn layer_order(self) -> [i32; 3] {
+        [self.0.y, self.0.z, self.0.x]
+    }
+
+    /// The brick with this [`Self::layer_order`].
+    pub(crate) fn from_layer_order([y, z, x]: [i32; 3]) -> Self {
+        Self(IVec3::new(x, y, z))
     }
 
     /// Position of a sample inside its brick's arrays: x fastest, then z, then y.
@@ -177,7 +218,7 @@ impl ChunkGrid {
     /// The chunks that hold some sample of a box.
     pub fn chunks_of(self, samples: LatticeBox) -> impl Iterator<Item = ChunkPos> {
         let low = self.chunk_of(samples.min);
-        // Mostly it is one, and divisions are dear.
+        // Usually it is one chunk; this saves divisions.
         let is_one = self.chunk_samples(low).contains(samples.max);
         let high = if is_one { low } else { self.chunk_of(samples.max) };
         LatticeBox { min: low.as_ivec3(), max: high.as_ivec3() }.points().map(ChunkPos::from_ivec3)

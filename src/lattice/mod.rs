@@ -69,7 +69,7 @@ impl Column {
         IVec3::new(self.x, y, self.z)
     }
 
-    /// The column `dx`, `dz` voxels away, or the last one that numbers reach.
+    /// The column `dx`, `dz` voxels away; coordinates saturate.
     pub const fn offset(self, dx: i32, dz: i32) -> Self {
         Self::new(self.x.saturating_add(dx), self.z.saturating_add(dz))
     }

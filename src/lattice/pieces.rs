@@ -1,6 +1,6 @@
-//! Work for threads: lists cut into pieces, and two things at once.
+//! Work for threads: lists cut into pieces, and two tasks side by side.
 
-/// Two things, at once where that is worth it.
+/// Runs both tasks, in parallel where that is worth it.
 pub(crate) fn side_by_side<A: Send, B: Send>(
     is_worth_it: bool,
     a: impl FnOnce() -> A + Send,
@@ -9,7 +9,7 @@ pub(crate) fn side_by_side<A: Send, B: Send>(
     if is_worth_it { rayon::join(a, b) } else { (a(), b()) }
 }
 
-/// A list in pieces of about this length. Entries beside each other that belong together are in the same one.
+/// Cuts a list into pieces of about this length, never between neighbours that belong together.
 pub(crate) fn pieces<T>(
     mut list: &[T],
     length: usize,

@@ -1,9 +1,9 @@
-//! Sorting by place, on one thread: what lies in a box of grid positions is counted into order, without comparing.
+//! Sorting by grid position on one thread: a counting sort where positions are dense, a comparison sort elsewhere.
 
-/// How many places the box around all items may have for each of them.
+/// The counting sort is used while the box around all items has at most this many positions per item.
 const PLACES: u64 = 16;
 
-/// Sorts items by their positions, by the first number, then the second, then the third; equal ones stay in order.
+/// Sorts items by their positions, compared number by number; the sort is stable.
 pub(crate) fn sort_by_place<T: Copy>(items: &mut Vec<T>, place: impl Fn(&T) -> [i32; 3]) {
     if !items.is_sorted_by_key(&place) {
         *items = order_of_places(items, place).into_iter().map(|item| items[item as usize]).collect();
@@ -30,7 +30,7 @@ pub(crate) fn order_of_places<T>(items: &[T], place: impl Fn(&T) -> [i32; 3]) ->
     order
 }
 
-/// The order of items by small numbers, all below `end`.
+/// A counting sort: the order of items by numbers below `end`.
 fn counted<T>(items: &[T], end: usize, number: impl Fn(&T) -> usize) -> Vec<u32> {
     let mut next = vec![0u32; end];
     items.iter().for_each(|item| next[number(item)] += 1);

@@ -12,7 +12,7 @@ use super::colliders::{Grounds, PreparedCollider, detach};
 use super::columns::{Columns, Look, Parts};
 use super::near::Neighbourhood;
 use crate::plugin::{Part, TerrainEntities, ThreadTask, Threads};
-use crate::terrain::{SurfaceRecipe, Terrain};
+use crate::terrain::{SurfaceDraft, Terrain};
 
 /// Parts that one task makes colliders for: few, so that the nearest come soon.
 const BATCH: usize = 16;
@@ -125,17 +125,17 @@ fn begin(
     missing.sort_unstable_by(nearer);
     let (model, _) = terrains.get(terrain).ok()?;
     let (world, voxel_size) = (model.world(), model.voxel_size());
-    let batch: Vec<(Entity, Part, SurfaceRecipe)> = missing
+    let batch: Vec<(Entity, Part, SurfaceDraft)> = missing
         .into_iter()
         .map(|(.., entity, drawn)| {
             let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
-            (entity, part, world.recipe(drawn))
+            (entity, part, world.draft(drawn))
         })
         .collect();
     let grounds = grounds.clone();
     Some(ThreadTask::start(Threads::Background, move || {
-        let prepare = |(entity, part, recipe): &(Entity, Part, SurfaceRecipe)| {
-            (*entity, grounds.prepare(part, &recipe.draft().surface()))
+        let prepare = |(entity, part, recipe): &(Entity, Part, SurfaceDraft)| {
+            (*entity, grounds.prepare(part, &recipe.surface()))
         };
         batch.par_iter().map(prepare).collect()
     }))

@@ -1,6 +1,5 @@
 //! Transactions: started in tasks, committed whole in one frame.
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use bevy::camera::visibility::NoAutoAabb;
@@ -22,7 +21,7 @@ use super::{
 use crate::backend::Engine;
 use crate::lattice::{ChunkGrid, ChunkPos};
 use crate::terrain::{
-    Commit, Drawn, FieldNews, Receipt, Rejection, SurfaceDraft, SurfaceRecipe, Terrain, Transaction, Unseen,
+    Commit, Drawn, FieldNews, Receipt, Rejection, SurfaceDraft, Terrain, Transaction, Unseen,
 };
 
 /// The transaction, or what is shown of what the game committed itself, that a terrain waits for.
@@ -82,11 +81,10 @@ impl Job {
         let part = |drawn| Part::new(terrain, voxel_size, grid, revision, drawn);
         // Taken out, so that they are dropped here and not on the main thread.
         let updates = std::mem::take(&mut commit.meshes);
-        let tiles = updates.tiles.iter().map(|(tile, update)| (Drawn::Tile(*tile), update.draft()));
-        let chunks = updates
-            .chunks
-            .iter()
-            .map(|(at, chunk)| (Drawn::Chunk(*at), SurfaceDraft::Mesh(Cow::Borrowed(chunk.mesh()))));
+        let tiles =
+            updates.tiles.into_iter().map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
+        let chunks = updates.chunks.into_iter();
+        let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
         let drafts: Vec<_> = tiles.chain(chunks).collect();
         let make =
             |(drawn, draft): (Drawn, SurfaceDraft)| workshop.make(&part(drawn), draft.is_empty(), || draft);
@@ -118,11 +116,11 @@ pub(super) fn begin_unseen(
 ) {
     let (world, voxel_size) = (terrain.world(), terrain.voxel_size());
     let part = |drawn| Part::new(entity, voxel_size, world.grid(), world.revision(), drawn);
-    let parts: Vec<(Part, SurfaceRecipe)> =
-        unseen.drawn().map(|drawn| (part(drawn), world.recipe(drawn))).collect();
+    let parts: Vec<(Part, SurfaceDraft)> =
+        unseen.drawn().map(|drawn| (part(drawn), world.draft(drawn))).collect();
     let task = ThreadTask::start(Threads::Transactions, move || {
         let start = Instant::now();
-        let parts = for_each_part(parts, |(part, recipe)| workshop.make(&part, false, || recipe.draft()));
+        let parts = for_each_part(parts, |(part, draft)| workshop.make(&part, false, || draft));
         Prepared { what: Shows::Unseen(unseen), parts, pieces: Vec::new(), took: start.elapsed() }
     });
     commands.entity(entity).try_insert(InFlight { number, ticket: None, task, done: None });
@@ -270,7 +268,7 @@ fn commit(
         (Some(Prepared { what, parts, pieces, took }), _) => (what, parts, pieces, took),
         (None, ticket) => {
             error_once!("a task of the plugin's panicked; this is a bug, please report it");
-            let refused = ticket.and_then(|ticket| terrain.refused(ticket));
+            let refused = ticket.and_then(|ticket| terrain.rejected(ticket));
             let Some(refused) = refused else {
                 // What it was to show is shown by loading all of it.
                 terrain.bypass_change_detection().forget_unseen();
@@ -298,7 +296,7 @@ fn commit(
         }
     };
     let fields = commit.field_news().to_vec();
-    let Ok((receipts, waste)) = terrain.settle_shown(commit) else { return false };
+    let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
         free_later(waste);
     }

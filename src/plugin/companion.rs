@@ -144,7 +144,7 @@ impl Workshop {
 
     /// Makes everything for a part whose surface `draft` gives. `is_empty` tells whether there are triangles, as far as
     /// that is known without it.
-    pub fn make<'a>(&self, part: &Part, is_empty: bool, draft: impl FnOnce() -> SurfaceDraft<'a>) -> Fresh {
+    pub fn make(&self, part: &Part, is_empty: bool, draft: impl FnOnce() -> SurfaceDraft) -> Fresh {
         let wants = |companion: &&Arc<dyn Companion>| guarded(|| companion.wants(part)).unwrap_or(false);
         let takers: Vec<_> = self.companions.0.iter().filter(wants).collect();
         let mut fresh = Fresh {

@@ -207,8 +207,7 @@ fn make_all(world: &World, workshop: &Workshop, (terrain, voxel_size): (Entity, 
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
     let make = |&drawn: &Drawn| {
         let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
-        let recipe = world.recipe(drawn);
-        workshop.make(&part, false, || recipe.draft())
+        workshop.make(&part, false, || world.draft(drawn))
     };
     all.par_iter().map(make).collect()
 }

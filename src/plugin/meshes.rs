@@ -14,7 +14,7 @@ use super::MaterialColors;
 use crate::ground::{ColumnMaterial, Ground, OVERLAY_DEPTH};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
-use crate::terrain::{SurfaceDraft, TileDraft, World};
+use crate::terrain::{SurfaceDraft, TileUpdate, World};
 
 /// Up to four material ids of a vertex, for materials that look them up.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
@@ -53,8 +53,9 @@ impl Wardrobe {
     /// Builds the Bevy mesh of a surface whose positions count from this point, in the task.
     pub(crate) fn build(&self, origin: IVec3, draft: &SurfaceDraft) -> Ready {
         match draft {
-            SurfaceDraft::Mesh(surface) => self.build_whole(origin, surface),
-            SurfaceDraft::Tile(draft) => self.build_tile(origin, draft),
+            SurfaceDraft::Nothing => None,
+            SurfaceDraft::Tile(tile) => self.build_tile(origin, tile),
+            SurfaceDraft::Chunk(chunk) => self.build_whole(origin, chunk.mesh()),
         }
     }
 
@@ -69,8 +70,8 @@ impl Wardrobe {
     }
 
     /// The same of a tile, straight from the ground: nothing but its rings and indices depends on what was dug.
-    fn build_tile(&self, origin: IVec3, draft: &TileDraft) -> Ready {
-        if draft.indices.is_empty() {
+    fn build_tile(&self, origin: IVec3, draft: &TileUpdate) -> Ready {
+        if draft.indices().is_empty() {
             return None;
         }
         let (low, high) = draft.grid.tile_cells(draft.tile);
@@ -82,7 +83,7 @@ impl Wardrobe {
             arrays.push_columns(z - low.z, draft.ground.row(Column::new(low.x, z), width, &mut normals));
         }
         arrays.push(rings, origin);
-        arrays.finish(&draft.indices)
+        arrays.finish(draft.indices())
     }
 }
 
@@ -375,7 +376,7 @@ mod tests {
                 for (tile, update) in &commit.meshes.tiles {
                     let origin = terrain.world().origin(Drawn::Tile(*tile));
                     for dresser in &dressers {
-                        let found = bytes_of(dresser.build(origin, &update.draft()));
+                        let found = bytes_of(dresser.build(origin, &SurfaceDraft::Tile(update.clone())));
                         assert!(found == bytes_of(dresser.build_whole(origin, &update.mesh())), "{tile:?}");
                         compared += usize::from(found.is_some());
                     }

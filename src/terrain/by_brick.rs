@@ -1,8 +1,8 @@
 //! Boxes of cells, sorted into the bricks that hold them.
 //!
-//! What changes in a brick shows in cells of the bricks beside it too. Of many boxes, threads take a slab of bricks each, as
-//! thick as one brick along x: all cells that lie in it belong to boxes that are at home there or one brick beside it. What
-//! they find is shared out again in pieces, so that few long slabs are work for many threads as well.
+//! A change in a brick also shows in cells of the bricks next to it. Where there are many boxes, each thread takes a slab of
+//! bricks, one brick thick along x: all cells in it belong to boxes whose home is that slab or one next to it. The bricks that
+//! are found are split into pieces again, so that many threads share a few long slabs as well.
 //!
 //! ```text
 //! home_x           3         4         5         6
@@ -14,7 +14,7 @@
 //! slab 5                          |=========|             looks at homes 4, 5, 6
 //! ```
 //!
-//! Boxes come by `home_x`, so those of a slab stand together; and slabs one after the other are in the order of stacks.
+//! Boxes are sorted by `home_x`, so those of a slab are contiguous, and slabs in order are stacks in order.
 
 use std::ops::RangeInclusive;
 
@@ -24,14 +24,14 @@ use rustc_hash::FxHashMap;
 
 use crate::lattice::{BrickPos, LatticeBox, pieces};
 
-/// From how many bricks on what is cheap for each is spread over threads: waking these takes as long as some hundred of
-/// them.
+/// With at least this many bricks, threads share work that is cheap for each: waking threads takes as long as a few hundred
+/// bricks.
 pub(super) const PARALLEL_PLACES: usize = 512;
 
-/// How many places for bricks a table may have for each box.
+/// A dense table of bricks is used while it has at most this many places per box; otherwise a hash table.
 const PLACES: u64 = 64;
 
-/// From how many bricks on a piece ends with its stack.
+/// A piece ends with the first stack that ends after this many bricks.
 const PIECE: usize = 128;
 
 /// A brick and cells of it.
@@ -47,7 +47,7 @@ pub(super) struct OfBrick {
 /// Cells by the bricks that hold them: by stacks of bricks, each from below.
 #[derive(Debug, Default)]
 pub(super) struct ByBrick {
-    /// One after the other, cut between stacks.
+    /// In order, split between stacks.
     slabs: Vec<Vec<OfBrick>>,
 }
 
@@ -86,8 +86,8 @@ impl ByBrick {
         self.slabs.iter().map(Vec::len).sum()
     }
 
-    /// Collects what `work` makes of all stacks, in order; side by side where there are many. It gets several whole stacks
-    /// at a time.
+    /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole stacks at
+    /// a time.
     pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
         if self.len() < PARALLEL_PLACES {
             let mut found = Vec::with_capacity(self.len());
@@ -105,14 +105,9 @@ impl ByBrick {
     }
 }
 
-/// The place of the stack that a brick belongs to.
-pub(super) fn place(own: &OfBrick) -> (i32, i32) {
-    (own.brick.0.x, own.brick.0.z)
-}
-
 /// Do both bricks belong to the same stack?
 pub(super) fn is_same_stack(a: &OfBrick, b: &OfBrick) -> bool {
-    place(a) == place(b)
+    a.brick.stack() == b.brick.stack()
 }
 
 /// The box around some cells of a brick, as the sides of it that lie in the brick: bits 0 to 7 those along x, 8 to 15 along y,
@@ -145,12 +140,11 @@ impl Bits {
 /// Those of the bricks that hold cells of boxes whose x lies in a range.
 fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
     let bricks_of = |cells: LatticeBox| {
-        let (min, max): (IVec3, IVec3) = (cells.min >> 3, cells.max >> 3);
+        let LatticeBox { min, max } = BrickPos::range(cells);
         LatticeBox::new(min.with_x(min.x.max(*xs.start())), max.with_x(max.x.min(*xs.end())))
     };
     let boxes = || changes.iter().filter_map(|change| Some((change, bricks_of(change.cells?)?)));
     let Some(all) = boxes().map(|(_, bricks)| bricks).reduce(LatticeBox::union) else { return Vec::new() };
-    // Where bricks lie close together, a table of all of them finds them at once; else they are looked up by position.
     let size = all.size();
     if all.volume() > PLACES * changes.len() as u64 {
         let mut index: FxHashMap<BrickPos, Bits> = FxHashMap::default();
@@ -160,7 +154,7 @@ fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<OfBrick> {
             }
         });
         let mut found: Vec<OfBrick> = index.into_iter().map(|(brick, bits)| bits.of(brick.0)).collect();
-        found.sort_unstable_by_key(|own| (own.brick.0.x, own.brick.0.z, own.brick.0.y));
+        found.sort_unstable_by_key(|own| own.brick);
         return found;
     }
     let mut table = vec![Bits::default(); all.volume() as usize];
@@ -205,7 +199,7 @@ fn enter_all<'r>(
 ) {
     for (change, LatticeBox { min, max }) in changes {
         let Some(cells) = change.cells else { continue };
-        let joining = change.joining.map(|cells| LatticeBox { min: cells.min >> 3, max: cells.max >> 3 });
+        let joining = change.joining.map(BrickPos::range);
         for x in min.x..=max.x {
             let of_x = Bits::side(x, cells.min.x, cells.max.x);
             for z in min.z..=max.z {
@@ -239,7 +233,7 @@ mod tests {
         assert!(found.collect(|stacks, all| all.extend_from_slice(stacks)) == all);
         // A stack is given to one thread.
         let mut places = found.collect(|stacks, all| {
-            let mut own: Vec<_> = stacks.iter().map(place).collect();
+            let mut own: Vec<_> = stacks.iter().map(|own| own.brick.stack()).collect();
             own.dedup();
             all.append(&mut own);
         });
@@ -257,8 +251,7 @@ mod tests {
                 let own = brick.samples().intersection(cells).expect("covered");
                 let may_join =
                     reached.joining.is_some_and(|joining| brick.samples().intersection(joining).is_some());
-                let place = (brick.0.x, brick.0.z, brick.0.y);
-                let all = all.entry(place).or_insert(OfBrick { brick, cells: own, may_join });
+                let all = all.entry(brick).or_insert(OfBrick { brick, cells: own, may_join });
                 all.cells = all.cells.union(own);
                 all.may_join |= may_join;
             }

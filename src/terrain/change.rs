@@ -6,14 +6,13 @@ use super::world::World;
 use crate::lattice::{BrickPos, ChunkPos};
 use crate::volume::{Brick, Fields};
 
-/// A brick, and what is in its place: `None` where nobody edited it.
+/// A brick by its position; `None` is a pristine one.
 pub(super) type ChangedBrick = (BrickPos, Option<Arc<Brick>>);
 
-/// Pieces of a world at one revision: bricks, fields, words of the mask. The rest of the world is the same before and
-/// after, or is made from these.
+/// Parts of a world at one revision: bricks, fields, words of the mask. Everything else is unchanged or made from these.
 #[derive(Clone, Default)]
 pub(super) struct Change {
-    /// By position (x, z, y); `None` is a brick that nobody edited.
+    /// In order; `None` is a pristine brick.
     pub bricks: Vec<ChangedBrick>,
     /// All fields of each chunk that a field changed in.
     pub fields: Vec<(ChunkPos, Fields)>,
@@ -24,11 +23,10 @@ pub(super) struct Change {
 }
 
 impl Change {
-    /// Makes all this part of the world. What stood there before takes its place here, so that swapping again gives the
-    /// former world.
+    /// Swaps these parts with those of the world; a second swap restores it.
     pub fn swap(&mut self, world: &mut World) {
         for (pos, brick) in &mut self.bricks {
-            let (key, y) = ((pos.0.x, pos.0.z), pos.0.y);
+            let (key, y) = (pos.stack(), pos.0.y);
             let is_there = brick.is_some();
             let before = match brick.take() {
                 Some(brick) => world.bricks.insert(*pos, brick),
@@ -59,15 +57,15 @@ impl Change {
         std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
     }
 
-    /// Puts back what was before two changes, of which `later` came second. Returns the bytes of its bricks that come in, and
-    /// those that do not.
-    pub fn go_back_to_before(&mut self, later: Self) -> (usize, Vec<ChangedBrick>) {
+    /// Adds what a later change replaced first, so that swapping restores the state before both. Returns the bytes of the
+    /// bricks that are added, and the bricks that are not.
+    pub fn absorb(&mut self, later: Self) -> (usize, Vec<ChangedBrick>) {
         let bytes = |brick: &Option<Arc<Brick>>| brick.iter().map(|brick| brick_bytes(brick)).sum();
-        let (bytes, left) = fill_in(&mut self.bricks, later.bricks, brick_order, bytes);
-        fill_in(&mut self.fields, later.fields, |chunk| chunk, |_| 0);
-        // It comes in no order.
+        let (bytes, left) = fill_in(&mut self.bricks, later.bricks, bytes);
+        fill_in(&mut self.fields, later.fields, |_| 0);
+        // The words of a mask come in no order.
         self.mask.sort_unstable_by_key(|own| own.0);
-        fill_in(&mut self.mask, later.mask, |word| word, |_| 0);
+        fill_in(&mut self.mask, later.mask, |_| 0);
         (bytes, left)
     }
 
@@ -80,48 +78,31 @@ impl Change {
     }
 }
 
-/// What one group of edits, or one step through history, puts in place.
-pub(super) struct GroupChange {
-    pub change: Change,
-    /// Bytes of bricks that the change takes away from the world.
-    pub replaced_bytes: usize,
-    /// The number of the group.
-    pub group: u64,
-    /// The tags of its edits that changed something.
-    pub tags: Vec<u64>,
-}
-
-/// What bricks are sorted by.
-pub(super) fn brick_order(pos: BrickPos) -> (i32, i32, i32) {
-    (pos.0.x, pos.0.z, pos.0.y)
-}
-
 /// Adds to a sorted list what another one has at other places. Returns the sum of the `bytes` of what it adds, and what it
 /// does not add.
-fn fill_in<K: Copy, V, O: Ord>(
+fn fill_in<K: Copy + Ord, V>(
     list: &mut Vec<(K, V)>,
     other: Vec<(K, V)>,
-    order: impl Fn(K) -> O,
     bytes: impl Fn(&V) -> usize,
 ) -> (usize, Vec<(K, V)>) {
     let before = list.len();
-    let is_new = |(key, _): &(K, V)| list.binary_search_by_key(&order(*key), |own| order(own.0)).is_err();
+    let is_new = |(key, _): &(K, V)| list.binary_search_by_key(key, |own| own.0).is_err();
     let (mut new, left): (Vec<_>, Vec<_>) = other.into_iter().partition(is_new);
-    // History tells its bytes: no list has room to spare.
+    // Exactly: capacity counts as history's bytes.
     list.reserve_exact(new.len());
     list.append(&mut new);
     let added = list[before..].iter().map(|(_, value)| bytes(value)).sum();
-    list.sort_by_key(|own| order(own.0));
+    list.sort_by_key(|own| own.0);
     (added, left)
 }
 
-/// Bytes of the brick that a world holds there, if it holds one. Bricks that are all alike count nothing: the world keeps the
-/// one of their kind for as long as history has it.
+/// Bytes of the brick that a world holds there, if it holds one. Uniform bricks count nothing: the world keeps the one of
+/// their kind for as long as history has it.
 pub(super) fn replaced_bytes(world: &World, pos: BrickPos) -> usize {
     world.bricks.get(&pos).map_or(0, |brick| brick_bytes(brick))
 }
 
-/// Bytes of a brick with the counters of its `Arc`; nothing where it is all alike.
+/// Bytes of a brick with the counters of its `Arc`; 0 for a uniform one.
 pub(super) fn brick_bytes(brick: &Brick) -> usize {
-    if brick.uniform().is_some() { 0 } else { 2 * size_of::<usize>() + Brick::BYTES + brick.material_bytes() }
+    if brick.uniform().is_some() { 0 } else { 2 * size_of::<usize>() + brick.bytes() }
 }

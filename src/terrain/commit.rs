@@ -2,15 +2,12 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::Duration;
 
-use web_time::Instant;
-
-use super::change::GroupChange;
 use super::field_log::FieldNews;
-use super::history::{HistoryReceipt, Step};
+use super::history::{HistoryReceipt, UndoDelta};
 use super::receipt::Receipt;
 use super::redraw::MeshUpdates;
+use super::stages::Stages;
 use super::surface::ChunkSurface;
 use super::world::World;
 use crate::lattice::{ChunkPos, TilePos};
@@ -22,12 +19,13 @@ use crate::volume::UniformBricks;
 pub struct Commit {
     pub(super) ticket: u64,
     /// What groups of edits put in place one after the other, or a step through history.
-    pub(super) changes: Vec<GroupChange>,
+    pub(super) changes: Vec<UndoDelta>,
     pub(super) sample_hash: u64,
-    pub(super) uniform: UniformBricks,
+    /// The pool of uniform bricks, if it has grown.
+    pub(super) uniform: Option<UniformBricks>,
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
-    pub(super) moved: Option<HistoryReceipt>,
+    pub(super) step: Option<HistoryReceipt>,
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
     pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
@@ -50,39 +48,13 @@ impl fmt::Debug for Commit {
     }
 }
 
-/// How long the stages of a transaction took. In large ones tiles and chunks are made side by side, so stages may take
-/// longer than the whole.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Stages {
-    /// Edits, from distances to new bricks.
-    pub edit: Duration,
-    /// Marching cubes over dirty blocks, and finding these.
-    pub meshing: Duration,
-    /// Putting parts among those that stay, the first ones while others are still on their way from a card.
-    pub assembly: Duration,
-    /// The mask, rings and index lists.
-    pub ring: Duration,
-    /// The whole transaction: the above, fields and receipts, and a copy of the world's index where others hold the world.
-    pub whole: Duration,
-}
-
-impl Stages {
-    /// Calls `work`, and adds the time it takes to what `stage` names.
-    pub(super) fn time<T>(stage: &mut Duration, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
-        let result = work();
-        *stage += start.elapsed();
-        result
-    }
-}
-
-/// What a commit leaves behind.
+/// What a commit returns once it is installed.
 pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
     /// What became of a step through history, if the commit was one.
-    pub moved: Option<HistoryReceipt>,
-    /// What was replaced, by each group that replaced something.
-    pub replaced: Vec<Step>,
+    pub step: Option<HistoryReceipt>,
+    /// What each group replaced that replaced something.
+    pub replaced: Vec<UndoDelta>,
 }
 
 impl Commit {
@@ -104,14 +76,12 @@ impl Commit {
 
     /// Makes this the world.
     pub(super) fn install(self, world: &mut World) -> Installed {
-        let mut replaced = Vec::with_capacity(self.changes.len());
-        for mut own in self.changes {
-            own.change.swap(world);
-            if !own.change.bricks.is_empty() {
-                replaced.push(Step::new(own));
-            }
+        let mut replaced = self.changes;
+        replaced.iter_mut().for_each(|own| own.change.swap(world));
+        replaced.retain(|own| !own.change.bricks.is_empty());
+        if let Some(uniform) = self.uniform {
+            world.set_uniform(uniform);
         }
-        world.enter_kinds(self.uniform);
         for (chunk, surface) in self.surfaces {
             if surface.is_empty() {
                 world.surfaces.remove(&chunk);
@@ -126,10 +96,10 @@ impl Commit {
                 world.rings.insert(tile, rings);
             }
         }
-        world.give_back();
+        world.shrink();
         world.next_field = self.next_field;
         world.revision += 1;
-        Installed { receipts: self.receipts, moved: self.moved, replaced }
+        Installed { receipts: self.receipts, step: self.step, replaced }
     }
 }
 
@@ -159,27 +129,27 @@ mod tests {
         let commit = terrain.begin().expect("something waits").run();
         let copy = commit.copy.as_ref().map(Arc::as_ptr);
         meanwhile(terrain);
-        let (_, waste) = terrain.settle(commit).expect("the one under way");
-        (copy == Some(Arc::as_ptr(&terrain.world)), waste.copy)
+        let (_, dropped) = terrain.install(commit).expect("the one under way");
+        (copy == Some(Arc::as_ptr(&terrain.world)), dropped.copy)
     }
 
     #[test]
     fn a_world_that_others_hold_is_copied_in_the_task() {
         let mut alone = terrain();
-        let (is_copy, waste) = dig_on(&mut alone, |_| {});
-        assert!(!is_copy && waste.is_none());
+        let (is_copy, dropped) = dig_on(&mut alone, |_| {});
+        assert!(!is_copy && dropped.is_none());
 
         let mut held = terrain();
         let snapshot = held.snapshot();
         let before = snapshot.hash();
-        let (is_copy, waste) = dig_on(&mut held, |_| {});
-        assert!(is_copy && waste.is_none());
+        let (is_copy, dropped) = dig_on(&mut held, |_| {});
+        assert!(is_copy && dropped.is_none());
         assert_eq!((held.world().hash(), snapshot.hash()), (alone.world().hash(), before));
 
         let mut let_go = terrain();
         let mut snapshot = Some(let_go.snapshot());
-        let (is_copy, waste) = dig_on(&mut let_go, |_| snapshot = None);
-        assert!(!is_copy && waste.is_some());
+        let (is_copy, dropped) = dig_on(&mut let_go, |_| snapshot = None);
+        assert!(!is_copy && dropped.is_some());
         assert_eq!(let_go.world().hash(), alone.world().hash());
     }
 

@@ -1,7 +1,6 @@
-//! Where changed samples show: the cells that join the mask, and the blocks that may draw something else than before.
+//! Where changed samples show: the cells that join the mask, and the blocks that have to be drawn again.
 //!
-//! Bricks come in order of their stacks all along, so every step goes stack by stack and needs no other, and threads share
-//! them.
+//! Bricks are in order of their stacks throughout, so each step works stack by stack and threads share the stacks.
 
 use glam::IVec3;
 
@@ -13,11 +12,12 @@ use crate::surface::pristine::{self, PristineStack};
 use crate::surface::vertex::WorldView;
 use crate::surface::window::{self, Window};
 
-use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack, place};
+use super::by_brick::{ByBrick, OfBrick, Reached, is_same_stack};
 use super::world::World;
+use crate::volume::layers::FIRST_X;
 
-/// The cells that changed samples show in. `changed` tells the brick of each change, the box around its samples, and whether
-/// one of them is edited for the first time: then cells that it is a corner of may join the mask.
+/// The cells that changed samples show in. `changed` gives the brick of each change, the box around its samples, and whether
+/// one of them is edited for the first time: only then may cells join the mask.
 pub(super) fn dirty_cells<T: Sync>(
     grid: ChunkGrid,
     changes: &[T],
@@ -43,8 +43,8 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
         while let Some((count, places)) = window::shared(rest.iter().copied()) {
             let (near, others) = rest.split_at(count);
             let window = Window::new(&view.samples, places);
-            for stack in near.chunk_by(|a, b| (a.0.x, a.0.z) == (b.0.x, b.0.z)) {
-                let word = (stack[0].0.x, stack[0].0.z);
+            for stack in near.chunk_by(|a, b| a.stack() == b.stack()) {
+                let word = stack[0].stack();
                 while let [first, others @ ..] = sheets
                     && first.stack != word
                 {
@@ -65,10 +65,10 @@ pub(super) fn joined_mask(world: &World, view: &WorldView, dirty: &ByBrick) -> M
     mask
 }
 
-/// Lists those bricks of a stack that the pristine surface passes through and that may have cells that join the mask; returns
-/// that surface. `None` where there are no such bricks.
+/// Adds to `bricks` those of a stack that the pristine surface crosses and that may have cells that join the mask. Returns that
+/// surface, or `None` where there are no such bricks.
 fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Option<PristineStack> {
-    let word = place(&stack[0]);
+    let word = stack[0].brick.stack();
     if !stack.iter().any(|own| own.may_join) || world.mask.word(word) == u64::MAX {
         return None;
     }
@@ -79,15 +79,15 @@ fn at_sheet(world: &World, stack: &[OfBrick], bricks: &mut Vec<BrickPos>) -> Opt
     (bricks.len() > before).then_some(sheet)
 }
 
-/// Every block that may draw something else than before, by stacks of bricks, each from below. A word of the mask turns
-/// only where samples change, so its cells lie in stacks that have `dirty` cells.
+/// Every block that has to be drawn again, by stacks of bricks, each from below. A word of the mask changes only where samples
+/// do, so its cells lie in stacks that have `dirty` cells.
 pub(super) fn dirty_blocks(world: &World, view: &WorldView, newer: &Mask, dirty: &ByBrick) -> Vec<Block> {
     let blocks_of = |&OfBrick { brick, cells, .. }: &OfBrick| {
         view.grid.chunks_of(cells).map(move |chunk| Block { brick, chunk })
     };
     dirty.collect(|stacks, found| {
         for stack in stacks.chunk_by(is_same_stack) {
-            match sheet_near(world, view, newer, place(&stack[0])) {
+            match sheet_near(world, view, newer, stack[0].brick.stack()) {
                 Some(sheet) => found.extend(with_sheet(stack, sheet).iter().flat_map(blocks_of)),
                 None => found.extend(stack.iter().flat_map(blocks_of)),
             }
@@ -101,18 +101,17 @@ fn in_world(grid: ChunkGrid, low: IVec3, high: IVec3) -> Option<LatticeBox> {
     LatticeBox::new(low.max(IVec3::new(0, i32::MIN, 0)), high.min(last))
 }
 
-/// A cell that joins the mask draws its sheet, and one that leaves it draws it no longer; beside it, vertices leave the
-/// mask's border or come to it. The box around all of these in a stack of bricks.
+/// The box in a stack of bricks around the sheets of cells that join or leave the mask, and of the cells next to them, whose
+/// vertices may come to lie on the mask's border or leave it.
 fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) -> Option<LatticeBox> {
     if newer.is_empty() {
         return None;
     }
     let (own, before) = (newer.get_word(stack), world.mask.word(stack));
-    // A word that does not change is the one from before.
     let all = own.unwrap_or(before) | before;
     let mut cells = own.map_or(0, |own| grown_into(own ^ before, 0, 0));
     for (dx, dz) in BESIDE {
-        // Of stacks in the midst of what changed, all cells are near already.
+        // Often all cells are near already.
         if all & !cells == 0 {
             break;
         }
@@ -126,10 +125,10 @@ fn sheet_near(world: &World, view: &WorldView, newer: &Mask, stack: (i32, i32)) 
     in_world(view.grid, low.at(rows.start), low.offset(7, 7).at(rows.end - 1))
 }
 
-/// Where the stacks beside and diagonally beside one are.
+/// The eight stacks around one.
 const BESIDE: [(i32, i32); 8] = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
 
-/// The cells of a stack, and those of a box in it.
+/// The cells of a stack with those of a box added.
 fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
     let mut all = stack.to_vec();
     for brick in BrickPos::covering(sheet) {
@@ -142,13 +141,12 @@ fn with_sheet(stack: &[OfBrick], sheet: LatticeBox) -> Vec<OfBrick> {
     all
 }
 
-/// 8x8 cells and the cells beside and diagonally beside them, as far as they lie in the word (dx, dz) further.
+/// 8x8 cells and the eight cells around each, as far as they lie in the word that is (dx, dz) away.
 pub(super) fn grown_into(cells: u64, dx: i32, dz: i32) -> u64 {
-    const FIRST: u64 = 0x0101_0101_0101_0101;
     let along = match dx {
-        -1 => (cells & FIRST) << 7,
-        0 => cells | (cells & !(FIRST << 7)) << 1 | (cells & !FIRST) >> 1,
-        _ => (cells & FIRST << 7) >> 7,
+        -1 => (cells & FIRST_X) << 7,
+        0 => cells | (cells & !(FIRST_X << 7)) << 1 | (cells & !FIRST_X) >> 1,
+        _ => (cells & FIRST_X << 7) >> 7,
     };
     match dz {
         -1 => along << 56,

@@ -7,7 +7,7 @@ use super::world::World;
 use crate::brush::Edit;
 use crate::edits::{EditEffect, reach};
 use crate::lattice::{ChunkPos, LatticeBox};
-use crate::volume::{FieldId, Fields};
+use crate::volume::{Absorbed, FieldId, Fields};
 
 /// Something that happened to a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,17 +33,18 @@ pub(super) struct FieldLog<'a> {
     fields: BTreeMap<ChunkPos, Fields>,
     /// Chunks whose fields changed since they were last taken.
     changed: BTreeSet<ChunkPos>,
-    merged: Vec<(ChunkPos, FieldNews)>,
-    /// Where those of each chunk stand among them.
-    merged_in: BTreeMap<ChunkPos, Vec<usize>>,
-    pub next: u64,
+    /// Fields that were merged, in order, and the fields that they went into.
+    merged: Vec<(ChunkPos, FieldId)>,
+    merged_into: BTreeMap<FieldId, FieldId>,
+    /// The greatest name of a field so far.
+    pub next_field: u64,
 }
 
 impl<'a> FieldLog<'a> {
     pub fn new(world: &'a World) -> Self {
-        let (fields, merged_in) = (BTreeMap::new(), BTreeMap::new());
-        let (changed, merged) = (BTreeSet::new(), Vec::new());
-        Self { world, fields, changed, merged, merged_in, next: world.next_field }
+        let (fields, changed) = (BTreeMap::new(), BTreeSet::new());
+        let (merged, merged_into) = (Vec::new(), BTreeMap::new());
+        Self { world, fields, changed, merged, merged_into, next_field: world.next_field }
     }
 
     /// Enters what an edit changed; returns what its receipt says.
@@ -64,7 +65,7 @@ impl<'a> FieldLog<'a> {
     /// All fields of each chunk that a field changed in since the last call, by chunk.
     pub fn take_changed(&mut self) -> Vec<(ChunkPos, Fields)> {
         let changed = std::mem::take(&mut self.changed);
-        // History tells its bytes: no list has room to spare.
+        // Exactly: capacity counts as history's bytes.
         let mut fields = Vec::with_capacity(changed.len());
         fields
             .extend(changed.into_iter().filter_map(|chunk| Some((chunk, self.fields.get(&chunk)?.clone()))));
@@ -72,61 +73,46 @@ impl<'a> FieldLog<'a> {
     }
 
     fn absorb(&mut self, chunk: ChunkPos, bounds: LatticeBox) -> ChunkScenario {
-        let committed = self.world.fields.get(&chunk);
         self.changed.insert(chunk);
-        let fields = self.fields.entry(chunk).or_insert_with(|| committed.cloned().unwrap_or_default());
-        let absorbed = fields.absorb(bounds, || {
-            self.next += 1;
-            FieldId(self.next)
+        let committed = || self.world.fields.get(&chunk).cloned().unwrap_or_default();
+        let fields = self.fields.entry(chunk).or_insert_with(committed);
+        let Absorbed { scenario, field, gone } = fields.absorb(bounds, || {
+            self.next_field += 1;
+            FieldId(self.next_field)
         });
-        let existed = |id| committed.is_some_and(|fields| fields.get(id).is_some());
-        let into = absorbed.field;
-        if !absorbed.gone.is_empty() {
-            let own = self.merged_in.entry(chunk).or_default();
-            // What went into a field that goes now as well is in the last one.
-            for &at in &*own {
-                if let (_, FieldNews::Merged { into: earlier, .. }) = &mut self.merged[at]
-                    && absorbed.gone.contains(earlier)
-                {
-                    *earlier = into;
-                }
-            }
-            let gone = absorbed.gone.iter().filter(|&&id| existed(id));
-            let before = self.merged.len();
-            self.merged.extend(gone.map(|&gone| (chunk, FieldNews::Merged { gone, into })));
-            own.extend(before..self.merged.len());
-        }
-        ChunkScenario { chunk, scenario: absorbed.scenario, field: absorbed.field }
+        self.merged.extend(gone.iter().map(|&gone| (chunk, gone)));
+        self.merged_into.extend(gone.into_iter().map(|gone| (gone, field)));
+        ChunkScenario { chunk, scenario, field }
     }
 
     /// One line for each field that differs from the snapshot.
     pub fn news(&self) -> Vec<(ChunkPos, FieldNews)> {
-        let mut news = Vec::new();
-        for (&chunk, fields) in &self.fields {
-            let committed = self.world.fields.get(&chunk);
-            for field in fields.iter() {
-                match committed.and_then(|fields| fields.get(field.id)) {
-                    None => news.push((chunk, FieldNews::Created(field.id))),
-                    Some(before) if before != field => news.push((chunk, FieldNews::Changed(field.id))),
-                    Some(_) => {}
-                }
-            }
+        let (mut news, nothing) = (Vec::new(), Fields::default());
+        let before = |chunk| self.world.fields.get(chunk).unwrap_or(&nothing);
+        for (chunk, fields) in &self.fields {
+            news.extend(changes(before(chunk), fields).map(|own| (*chunk, own)));
         }
-        news.extend_from_slice(&self.merged);
+        for &(chunk, gone) in self.merged.iter().filter(|(chunk, gone)| before(chunk).get(*gone).is_some()) {
+            let next = |field: &FieldId| self.merged_into.get(field).copied();
+            let into = std::iter::successors(Some(gone), next).last().unwrap_or(gone);
+            news.push((chunk, FieldNews::Merged { gone, into }));
+        }
         news
     }
 }
 
+/// The fields of a chunk that are new or changed.
+fn changes(before: &Fields, after: &Fields) -> impl Iterator<Item = FieldNews> {
+    after.iter().filter_map(|field| match before.get(field.id) {
+        None => Some(FieldNews::Created(field.id)),
+        Some(old) if old != field => Some(FieldNews::Changed(field.id)),
+        Some(_) => None,
+    })
+}
+
 /// One line for each field that differs, when the fields of a chunk are replaced by those of another time.
 pub(super) fn news_of_replaced(before: &Fields, after: &Fields) -> Vec<FieldNews> {
-    let mut news = Vec::new();
-    for field in after.iter() {
-        match before.get(field.id) {
-            None => news.push(FieldNews::Created(field.id)),
-            Some(old) if old != field => news.push(FieldNews::Changed(field.id)),
-            Some(_) => {}
-        }
-    }
+    let mut news: Vec<FieldNews> = changes(before, after).collect();
     for gone in before.iter().filter(|field| after.get(field.id).is_none()) {
         let into = after.iter().find(|field| field.bounds.encloses(gone.bounds));
         news.push(match into {

@@ -1,14 +1,14 @@
 //! Undo and redo: what edits replaced, kept as far back as a budget of bytes allows.
 //!
-//! A step holds the bricks, fields and words of the mask that the edits of one group replaced: those of a stroke, or those
-//! that were submitted together. Transactions know nothing of groups: one may hold many, and a stroke may take many. Bricks
-//! are shared with whoever holds them, so a step takes as many bytes as there are bricks in it that nobody else holds. Going
-//! back puts the old ones in place of the new, which in turn are what redo needs.
+//! A step holds the bricks, fields and words of the mask that one group of edits replaced: a stroke, or edits that were
+//! submitted together. Groups are independent of transactions: one transaction may hold many groups, and a stroke may take
+//! many transactions. Bricks are shared, so a step costs the bytes of those bricks that nobody else holds. Undo puts the old
+//! parts in place of the new ones, which are then what redo needs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::change::{Change, ChangedBrick, GroupChange};
+use super::change::{Change, ChangedBrick};
 use super::world::World;
 use crate::lattice::LatticeBox;
 use crate::volume::MaterialCounts;
@@ -90,30 +90,29 @@ impl HistoryStep {
     }
 }
 
-/// What a group of edits replaced.
-pub(super) struct Step {
+/// What a group of edits, or a step through history, puts in place; once it is committed, what that replaced.
+pub(super) struct UndoDelta {
     pub change: Change,
-    /// A box around everything in it.
+    /// A box around all of its bricks.
     pub bounds: Option<LatticeBox>,
-    /// Bytes of its bricks that nobody else holds.
+    /// Bytes of the bricks that are in history only, once this is committed.
     pub brick_bytes: usize,
-    /// Whose edits they were.
+    /// The number of the group.
     pub group: u64,
-    /// The tags of those that changed something.
+    /// The tags of its edits that changed something.
     pub tags: Vec<u64>,
 }
 
-impl Step {
-    /// A step of what a change replaced, which was put in its place.
-    pub fn new(GroupChange { change, replaced_bytes, group, tags }: GroupChange) -> Self {
-        let boxes = change.bricks.iter().map(|(pos, _)| pos.samples());
-        let bounds = boxes.reduce(LatticeBox::union);
+impl UndoDelta {
+    /// A change by a group of edits, which replaces bricks of so many bytes.
+    pub fn new(change: Change, replaced_bytes: usize, group: u64, tags: Vec<u64>) -> Self {
+        let bounds = change.bricks.iter().map(|(pos, _)| pos.samples()).reduce(LatticeBox::union);
         Self { change, bounds, brick_bytes: replaced_bytes, group, tags }
     }
 
-    /// Takes in what later edits of the same group replaced; returns what they did not replace first.
-    fn go_on(&mut self, later: Self) -> Vec<ChangedBrick> {
-        let (bytes, left) = self.change.go_back_to_before(later.change);
+    /// Adds what later edits of the same group replaced; returns those bricks that earlier ones had replaced already.
+    fn extend(&mut self, later: Self) -> Vec<ChangedBrick> {
+        let (bytes, left) = self.change.absorb(later.change);
         self.brick_bytes += bytes;
         self.bounds = self.bounds.into_iter().chain(later.bounds).reduce(LatticeBox::union);
         self.tags.reserve_exact(later.tags.len());
@@ -121,50 +120,49 @@ impl Step {
         left
     }
 
-    /// Bytes that go with it, the counters of its `Arc` included.
+    /// Bytes that dropping it frees, the counters of its `Arc` included.
     fn bytes(&self) -> usize {
         let own = 2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&self.tags[..]);
         own + self.change.bytes() + self.brick_bytes
     }
 }
 
-/// What a terrain let go of: steps, and a copy of the world that was not needed. Freeing many bricks takes its time, so it
-/// is left to whoever has some.
+/// What a terrain no longer needs: steps, bricks, and a copy of the world. Dropping these is slow; do it off the main thread.
 #[derive(Default)]
 pub(crate) struct DeferredDrop {
-    steps: Vec<Arc<Step>>,
+    steps: Vec<Arc<UndoDelta>>,
     bricks: Vec<Vec<ChangedBrick>>,
     pub(super) copy: Option<Arc<World>>,
 }
 
 impl DeferredDrop {
-    /// Is there nothing to free?
+    /// Is there nothing to drop?
     #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty() && self.bricks.is_empty() && self.copy.is_none()
     }
 }
 
-/// The steps of a terrain, back and forth.
+/// The steps of a terrain, back and forth, within a budget of bytes.
 pub(super) struct UndoStack {
     /// The oldest first.
-    undo: VecDeque<Arc<Step>>,
-    /// The one that was undone last stands last.
-    redo: VecDeque<Arc<Step>>,
+    undo: VecDeque<Arc<UndoDelta>>,
+    /// The one that was undone last comes last.
+    redo: VecDeque<Arc<UndoDelta>>,
     budget: usize,
     /// Bytes of all steps.
-    held: usize,
-    /// The greatest number of a group whose step the budget had no room for: what is left of it is no step either.
-    lost: u64,
+    step_bytes: usize,
+    /// The greatest number of a group whose step was dropped for the budget: later edits of it are no step either.
+    last_dropped: u64,
 }
 
 impl UndoStack {
     /// An empty one with a budget of bytes.
     pub fn new(budget: usize) -> Self {
-        Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, held: 0, lost: 0 }
+        Self { undo: VecDeque::new(), redo: VecDeque::new(), budget, step_bytes: 0, last_dropped: 0 }
     }
 
-    fn list(&mut self, step: HistoryStep) -> &mut VecDeque<Arc<Step>> {
+    fn list(&mut self, step: HistoryStep) -> &mut VecDeque<Arc<UndoDelta>> {
         match step {
             HistoryStep::Undo => &mut self.undo,
             HistoryStep::Redo => &mut self.redo,
@@ -172,25 +170,26 @@ impl UndoStack {
     }
 
     /// What the next step back or forth puts in place.
-    pub fn next(&self, step: HistoryStep) -> Option<&Arc<Step>> {
+    pub fn next(&self, step: HistoryStep) -> Option<&Arc<UndoDelta>> {
         match step {
             HistoryStep::Undo => self.undo.back(),
             HistoryStep::Redo => self.redo.back(),
         }
     }
 
-    /// What there is.
+    /// Steps and bytes.
     pub fn figures(&self) -> History {
         History { undos: self.undo.len(), redos: self.redo.len(), bytes: self.bytes() }
     }
 
     fn bytes(&self) -> usize {
-        self.held + (self.undo.capacity() + self.redo.capacity()) * size_of::<Arc<Step>>()
+        self.step_bytes + (self.undo.capacity() + self.redo.capacity()) * size_of::<Arc<UndoDelta>>()
     }
 
     /// Does some step reach these samples?
     pub fn reaches(&self, samples: LatticeBox) -> bool {
-        let meets = |step: &Arc<Step>| step.bounds.is_some_and(|own| own.intersection(samples).is_some());
+        let meets =
+            |step: &Arc<UndoDelta>| step.bounds.is_some_and(|own| own.intersection(samples).is_some());
         self.undo.iter().chain(&self.redo).any(meets)
     }
 
@@ -199,74 +198,80 @@ impl UndoStack {
         self.budget
     }
 
-    /// A new budget; what it has no room for goes.
+    /// Sets the budget and drops what exceeds it.
     pub fn set_budget(&mut self, budget: usize) -> DeferredDrop {
         self.budget = budget;
-        let mut waste = DeferredDrop::default();
-        self.trim(&mut waste);
-        waste
+        let mut dropped = DeferredDrop::default();
+        self.trim(&mut dropped);
+        dropped
     }
 
     /// Forgets all steps.
     pub fn clear(&mut self) {
-        (self.undo, self.redo, self.held) = Default::default();
+        (self.undo, self.redo, self.step_bytes) = Default::default();
     }
 
     /// Edits of a group were committed: they can be undone now, with those of their group before them, and nothing can be
     /// redone.
-    pub fn record(&mut self, replaced: Step, waste: &mut DeferredDrop) {
-        let first = waste.steps.len();
-        waste.steps.extend(self.redo.drain(..));
-        self.held -= waste.steps[first..].iter().map(|step| step.bytes()).sum::<usize>();
+    pub fn record(&mut self, replaced: UndoDelta, dropped: &mut DeferredDrop) {
+        let first = dropped.steps.len();
+        dropped.steps.extend(self.redo.drain(..));
+        self.step_bytes -= dropped.steps[first..].iter().map(|step| step.bytes()).sum::<usize>();
         let latest = self.undo.back_mut().filter(|latest| latest.group == replaced.group);
-        // A transaction that goes back holds a step that no edit can join any more.
+        // A transaction that undoes this step holds it too; then no edit can join it any more.
         if let Some(latest) = latest.and_then(Arc::get_mut) {
-            self.held -= latest.bytes();
-            waste.bricks.push(latest.go_on(replaced));
-            self.held += latest.bytes();
-        } else if replaced.group > self.lost {
+            self.step_bytes -= latest.bytes();
+            dropped.bricks.push(latest.extend(replaced));
+            self.step_bytes += latest.bytes();
+        } else if replaced.group > self.last_dropped {
             self.keep(HistoryStep::Undo, replaced);
         } else {
-            waste.steps.push(Arc::new(replaced));
+            dropped.steps.push(Arc::new(replaced));
         }
-        self.trim(waste);
+        self.trim(dropped);
     }
 
-    /// A step was committed that put `used` in place; what that replaced is the step in the other direction.
-    pub fn passed(&mut self, step: HistoryStep, used: &Arc<Step>, replaced: Step, waste: &mut DeferredDrop) {
-        // The budget may have let go of it meanwhile.
+    /// A step was committed that put `used` in place; what it replaced is the step in the other direction.
+    pub fn record_step(
+        &mut self,
+        step: HistoryStep,
+        used: &Arc<UndoDelta>,
+        replaced: UndoDelta,
+        dropped: &mut DeferredDrop,
+    ) {
+        // The budget may have dropped it meanwhile.
         if self.next(step).is_some_and(|next| Arc::ptr_eq(next, used)) {
-            waste.steps.extend(self.list(step).pop_back());
-            self.held -= used.bytes();
+            dropped.steps.extend(self.list(step).pop_back());
+            self.step_bytes -= used.bytes();
         }
         let other = match step {
             HistoryStep::Undo => HistoryStep::Redo,
             HistoryStep::Redo => HistoryStep::Undo,
         };
         self.keep(other, replaced);
-        self.trim(waste);
+        self.trim(dropped);
     }
 
-    fn keep(&mut self, step: HistoryStep, replaced: Step) {
-        self.held += replaced.bytes();
+    fn keep(&mut self, step: HistoryStep, replaced: UndoDelta) {
+        self.step_bytes += replaced.bytes();
         self.list(step).push_back(Arc::new(replaced));
     }
 
-    /// Lets go of what is farthest from now, back first, until the rest is within the budget.
-    fn trim(&mut self, waste: &mut DeferredDrop) {
-        self.fit();
+    /// Drops the steps farthest from now, undo first, until the rest is within the budget.
+    fn trim(&mut self, dropped: &mut DeferredDrop) {
+        self.shrink();
         while self.bytes() > self.budget {
             let Some(gone) = self.undo.pop_front().or_else(|| self.redo.pop_front()) else { break };
-            self.held -= gone.bytes();
-            self.lost = self.lost.max(gone.group);
-            waste.steps.push(gone);
-            self.fit();
+            self.step_bytes -= gone.bytes();
+            self.last_dropped = self.last_dropped.max(gone.group);
+            dropped.steps.push(gone);
+            self.shrink();
         }
     }
 
-    /// Gives back the room of lists that they have for steps that are gone. What is left follows from how many steps there
-    /// are, or what is trimmed would depend on how many there were.
-    fn fit(&mut self) {
+    /// Shrinks the lists. Their capacity depends only on how many steps there are; otherwise what is trimmed would depend on how
+    /// many there were before.
+    fn shrink(&mut self) {
         for list in [&mut self.undo, &mut self.redo] {
             let room = if list.is_empty() { 0 } else { list.len().next_power_of_two().max(4) };
             list.shrink_to(room);

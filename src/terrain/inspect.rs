@@ -1,4 +1,4 @@
-//! What a debug view asks of a world: parts of it near a place, without a copy of the rest.
+//! Queries of debug views: the parts of a world near a place, without a copy of the rest.
 
 use glam::{IVec3, Vec3};
 use rustc_hash::FxHashMap;
@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use super::world::{Drawn, World};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP, TilePos};
 use crate::surface::{MaskView, SurfaceMesh};
-use crate::volume::Field;
+use crate::volume::{Field, layers::ones};
 
 impl World {
     /// The cells of the mask from `low` to `high`, both included, in no order.
@@ -19,9 +19,7 @@ impl World {
             (low.z >> 3..=high.z >> 3).flat_map(move |z| (low.x >> 3..=high.x >> 3).map(move |x| (x, z)));
         let cells = words.flat_map(move |(x, z)| {
             let cells = view.word((x, z));
-            (0..64)
-                .filter(move |bit| cells >> bit & 1 == 1)
-                .map(move |bit| Column::new(x << 3 | bit & 7, z << 3 | bit >> 3))
+            ones(cells).map(move |bit| Column::new(x << 3 | bit as i32 & 7, z << 3 | bit as i32 >> 3))
         });
         cells.filter(move |cell| (low.x..=high.x).contains(&cell.x) && (low.z..=high.z).contains(&cell.z))
     }
@@ -92,7 +90,7 @@ impl World {
     pub fn bricks_near(&self, samples: LatticeBox) -> impl Iterator<Item = BrickPos> + '_ {
         let inside = samples.intersection(self.grid.edit_bounds());
         inside.into_iter().flat_map(move |inside| {
-            let (low, high): (IVec3, IVec3) = (inside.min >> 3, inside.max >> 3);
+            let LatticeBox { min: low, max: high } = BrickPos::range(inside);
             let stack = move |(x, z): (i32, i32)| {
                 let stack = self.stacks.get(&(x, z)).map(Vec::as_slice).unwrap_or_default();
                 let from = stack.partition_point(|&y| y < low.y);
@@ -103,8 +101,8 @@ impl World {
         })
     }
 
-    /// The columns of bricks in a box that is one high, as far as they are looked at: all of them, or where the world has
-    /// fewer, those with bricks in them.
+    /// The stacks of bricks in a box of height one: all positions of the box, or those with bricks where the world has fewer
+    /// stacks than the box has positions.
     fn stacks_in(&self, columns: LatticeBox) -> Box<dyn Iterator<Item = (i32, i32)> + '_> {
         if columns.volume() <= self.stacks.len() as u64 {
             return Box::new(columns.points().map(|column| (column.x, column.z)));
@@ -119,8 +117,8 @@ impl World {
     }
 }
 
-/// The chunks of a table whose positions lie in a box, in no order. Each position of the box is asked for, or where the table
-/// has fewer of them, each of the table: the rest of a large world costs nothing.
+/// The chunks of a table whose positions lie in a box, in no order. Looks up each position of the box, or goes through the
+/// table where that is shorter.
 fn found_in<T>(table: &FxHashMap<ChunkPos, T>, places: LatticeBox) -> Vec<ChunkPos> {
     if places.volume() <= table.len() as u64 {
         places.points().map(ChunkPos::from_ivec3).filter(|chunk| table.contains_key(chunk)).collect()

@@ -5,7 +5,6 @@
 //! after the other, undoes by single edits, and groups by itself. `BURROW_WORLDS` says how many scripts.
 
 use std::collections::BTreeMap;
-use std::panic::resume_unwind;
 use std::sync::Arc;
 
 use fastrand::Rng;
@@ -13,26 +12,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::history::{HistoryReceipt, HistoryRejection, HistoryStep};
 use super::queue::Together;
-use super::{
-    LooseSettings, Receipt, Rejection, Terrain, TerrainSettings, Transaction, Work, WorkLimits, unique,
-};
+use super::run::PANICS;
+use super::{LooseSettings, Receipt, Rejection, Terrain, TerrainSettings, Transaction, WorkLimits, unique};
 use crate::brush::{Brush, Edit};
 use crate::ground::Ground;
 use crate::volume::DiggingRules;
 use crate::worlds;
-
-/// The tag of an edit that panics has this bit.
-const PANICS: u64 = 1 << 63;
-
-/// Panics for an edit that is told to, but not once it is rejected for that.
-pub(super) fn panic_if_told(work: &Work) {
-    if let Work::Edits(submissions) = work
-        && submissions.iter().any(|own| own.tag & PANICS != 0 && own.edit.is_ok())
-    {
-        // Without a word: thousands do.
-        resume_unwind(Box::new("as it was told"));
-    }
-}
 
 /// What a terrain is asked for.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
-//! What waits for its transaction: edits, with all that was settled when they were submitted, and steps through history.
+//! The queue: edits and steps through history that wait for their transaction.
 //!
-//! Rules, loose settings and the group of an edit are fixed when it is submitted, so that nothing of the result depends on
-//! when a transaction begins.
+//! Rules, loose settings and the group of an edit are fixed when it is submitted, so the result does not depend on when
+//! transactions begin.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,22 +11,22 @@ use super::loose::LooseSettings;
 use super::receipt::Rejection;
 use crate::brush::{Edit, Kind};
 use crate::edits::reach;
-use crate::lattice::{ChunkGrid, LatticeBox};
+use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
 use crate::volume::DiggingRules;
 
 /// How much work a terrain takes on, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
 ///
-/// A brick takes the processor a third of a microsecond where many edits meet, and some two where an edit of a few voxels
-/// comes alone. What a search for loose pieces takes, and a step through history, is not known before and hardly counts.
+/// A brick takes the processor about 0.3 us in large edits and 2 us in an edit of a few voxels. Searches for loose pieces are
+/// not counted, because their cost is not known before, and a step through history counts as a fixed amount.
 ///
 /// [`Terrain::set_work_limits`]: super::Terrain::set_work_limits
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkLimits {
-    /// A transaction takes edits up to so much work, and at least one edit. More of them follow in the next one: smaller
-    /// transactions show sooner, larger ones take less time for each edit.
+    /// Most work of a transaction, which takes at least one edit in any case; other edits wait for the next. Smaller
+    /// transactions show sooner, larger ones take less time per edit.
     pub transaction: u64,
-    /// So much work may wait, the transaction under way included. An edit that would go beyond is
+    /// Most work that may wait, the transaction under way included. An edit that would exceed it is
     /// [rejected](Rejection::Overloaded) when it is submitted, unless nothing else waits.
     pub waiting: u64,
 }
@@ -43,42 +43,41 @@ impl Default for WorkLimits {
     }
 }
 
-/// What an edit takes besides the bricks that it reaches, in bricks.
+/// The fixed work of an edit, in bricks.
 const EDIT: u64 = 20;
-/// What a step through history is taken for, in bricks: how much it is, its turn will show.
+/// The work that a step through history counts as, in bricks.
 const STEP: u64 = 200;
-/// How many times as long an operation takes for each brick that looks around each sample.
+/// How many times as much work a brick is for an operation that reads a stencil around each sample.
 const LOOKS_AROUND: u64 = 4;
 
 /// The work of an edit, in bricks.
 fn work_of(grid: ChunkGrid, edit: &Edit) -> u64 {
-    let bricks_of = |reach: LatticeBox| LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }.volume();
     let weight = if edit.kind() == Kind::Sculpt { LOOKS_AROUND } else { 1 };
-    EDIT + weight * reach(grid, edit).map_or(0, bricks_of)
+    EDIT + weight * reach(grid, edit).map_or(0, |reach| BrickPos::range(reach).volume())
 }
 
 /// What makes edits that follow each other one step of undo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Together {
-    /// They are of one stroke of the game's.
+    /// They belong to one stroke.
     Stroke(u64),
-    /// They were submitted together, in the batch of this number.
+    /// They were submitted together, in the batch with this number.
     Batch(u64),
 }
 
-/// What holds for an edit from when it was submitted.
+/// What is fixed for an edit when it is submitted.
 #[derive(Clone, Debug)]
 pub(super) struct Terms {
-    /// Edits of one number are one step of undo; later ones have greater numbers.
+    /// Edits with the same number are one step of undo; later ones have greater numbers.
     pub group: u64,
-    /// `None`: it may do everything.
+    /// `None`: no restrictions.
     pub rules: Option<Arc<DiggingRules>>,
-    /// Without them, nobody looks for loose pieces.
+    /// `None`: loose pieces are not searched for.
     pub loose: Option<LooseSettings>,
 }
 
 impl Terms {
-    fn are(&self, other: &Self) -> bool {
+    fn is_same(&self, other: &Self) -> bool {
         let same_rules = match (&self.rules, &other.rules) {
             (None, None) => true,
             (Some(own), Some(other)) => Arc::ptr_eq(own, other),
@@ -88,7 +87,7 @@ impl Terms {
     }
 }
 
-/// An edit on its way into the world.
+/// An edit that was submitted.
 #[derive(Clone, Debug)]
 pub(crate) struct Submission {
     pub tag: u64,
@@ -98,12 +97,12 @@ pub(crate) struct Submission {
 }
 
 impl Submission {
-    /// Is it of the same step, under the same rules and loose settings?
+    /// Does it belong to the same group, under the same rules and loose settings?
     pub(super) fn goes_with(&self, other: &Self) -> bool {
-        self.terms.are(&other.terms)
+        self.terms.is_same(&other.terms)
     }
 
-    /// May it change none of these samples?
+    /// Does it certainly change none of these samples?
     pub(super) fn misses(&self, samples: LatticeBox) -> bool {
         self.edit.as_ref().map_or(true, |edit| edit.reach().intersection(samples).is_none())
     }
@@ -124,13 +123,13 @@ impl Request {
     }
 }
 
-/// Requests in order, and how much work they are together with the transaction under way.
+/// Requests in order, and the work of these and of the transaction under way.
 #[derive(Default)]
 pub(super) struct Queue {
     requests: VecDeque<Request>,
     pub limits: WorkLimits,
     work: u64,
-    /// The group of the latest edit, as long as another one may join it.
+    /// The group of the latest edit, while another edit may join it.
     open: Option<(Together, u64)>,
     groups: u64,
 }
@@ -159,14 +158,14 @@ impl Queue {
         self.requests.push_back(Request::Edit(Submission { tag, edit, terms, work }));
     }
 
-    /// Queues a step. Edits after it are none of the groups before it.
+    /// Queues a step. Edits after it begin a new group.
     pub fn push_step(&mut self, step: HistoryStep) {
         self.close_group();
         self.work += STEP;
         self.requests.push_back(Request::Step(step));
     }
 
-    /// Edits that come are none of the groups before.
+    /// Lets the next edit begin a new group.
     pub fn close_group(&mut self) {
         self.open = None;
     }
@@ -190,7 +189,7 @@ impl Queue {
         self.work
     }
 
-    /// What has been taken is done.
+    /// Enters that work which was taken is done.
     pub fn finish(&mut self, work: u64) {
         self.work = self.work.saturating_sub(work);
     }
@@ -213,7 +212,7 @@ impl Queue {
             Request::Step(_) => None,
         });
         let edits: Arc<[Submission]> = edits.collect();
-        // What a flood needed goes once it is over; a brush at a time needs no more room than this.
+        // Frees what a flood of edits needed.
         if self.requests.is_empty() {
             self.requests.shrink_to(1);
         }
@@ -221,12 +220,12 @@ impl Queue {
         Some((Taken::Edits(edits), work))
     }
 
-    /// Puts back in front what was taken and not done.
+    /// Puts requests that were taken and not done back in front.
     pub fn put_back(&mut self, requests: impl DoubleEndedIterator<Item = Request>) {
         requests.rev().for_each(|request| self.requests.push_front(request));
     }
 
-    /// Forgets all of it.
+    /// Drops all requests.
     #[cfg(feature = "plugin")]
     pub fn clear(&mut self) {
         *self = Self { limits: self.limits, groups: self.groups, ..Self::default() };

@@ -6,10 +6,11 @@ use std::time::Duration;
 use rayon::prelude::*;
 
 use super::by_brick::ByBrick;
-use super::commit::Stages;
 use super::dirty::dirty_blocks;
-use super::surface::{ChunkSurface, Fresh, Key, key};
-use super::tiles::{TileUpdate, TileWork};
+use super::stages::Stages;
+use super::surface::{ChunkSurface, Fresh, Key};
+use super::surface_draft::TileUpdate;
+use super::tiles::TileWork;
 use super::world::World;
 use crate::backend::{Compute, PARALLEL_BLOCKS};
 use crate::lattice::{ChunkPos, TilePos, order_of_places, side_by_side};
@@ -27,7 +28,7 @@ pub struct MeshUpdates {
     pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
 }
 
-/// From how many parts on chunks are put together side by side.
+/// With at least this many parts, threads share the chunks.
 const PARALLEL_PARTS: usize = 256;
 
 /// Every mesh that these cells change, and `newer` words of the mask.
@@ -45,14 +46,14 @@ pub(super) fn updates(
         let blocks = Stages::time(meshing, || dirty_blocks(world, view, newer, dirty));
         mesh_blocks(world, view, backend, &blocks, meanwhile, meshing, assembly)
     };
-    // Tiles and chunks do not depend on each other. What either leaves threads idle for is time for the other.
+    // Tiles and chunks do not depend on each other: each is made while the other leaves threads idle.
     let chunks = if dirty.len() < PARALLEL_BLOCKS {
         chunks(&|| {})
     } else {
         rayon::scope(|scope| {
             tiles.begin(scope);
-            let chunks = chunks(&|| tiles.go_on(scope));
-            tiles.go_on(scope);
+            let chunks = chunks(&|| tiles.allow(scope));
+            tiles.allow(scope);
             chunks
         })
     };
@@ -108,7 +109,7 @@ struct OfChunk {
 }
 
 impl ByChunk {
-    /// No other thread helps: who waits for this must not do so while this one does something else.
+    /// On one thread: with rayon's help, a thread that waits for this could be given other work first.
     fn new(blocks: &[Block]) -> Self {
         let of = |number: u32| &blocks[number as usize];
         let mut order = order_of_places(blocks, |block| block.chunk.as_ivec3().to_array());
@@ -117,7 +118,7 @@ impl ByChunk {
             let end = numbers.iter().max().map_or(0, |&last| last as usize + 1);
             // By the keys of their parts, each of which is looked up once and compared as one number.
             keyed.clear();
-            keyed.extend(numbers.iter().map(|&number| as_number(key(of(number).brick), number)));
+            keyed.extend(numbers.iter().map(|&number| as_number(of(number).brick.layer_order(), number)));
             keyed.sort_unstable();
             numbers.iter_mut().zip(&keyed).for_each(|(number, &own)| *number = own as u32);
             OfChunk { chunk: of(numbers[0]).chunk, count: numbers.len(), end }
@@ -151,7 +152,7 @@ type Updated = (ChunkPos, Arc<ChunkSurface>);
 fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn MeshedBlocks) -> Vec<Updated> {
     let fresh = |&number: &u32| {
         let number = number as usize;
-        Some(Fresh { key: key(blocks[number].brick), part: parts.part(number)? })
+        Some(Fresh { key: blocks[number].brick.layer_order(), part: parts.part(number)? })
     };
     let update = |chunk: ChunkPos, numbers: &[u32]| {
         let nothing = ChunkSurface::default();

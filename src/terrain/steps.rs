@@ -1,19 +1,15 @@
 //! A terrain's steps through its history.
 
-use super::history::HistoryRejection;
-use super::{DeferredDrop, History, HistoryReceipt, HistoryStep, Memory, Terrain};
-#[cfg(feature = "plugin")]
-use super::{Work, queue::Request};
-
-/// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
-pub(super) const UNDO_BUDGET: usize = 64 << 20;
+use super::history::{DeferredDrop, History, HistoryReceipt, HistoryRejection, HistoryStep};
+use super::model::Terrain;
+use super::world::Memory;
 
 impl Terrain {
     /// Queues a step back: once its turn comes, after everything that was submitted before, it undoes the last group of edits
     /// that changed the world. Its [`HistoryReceipt`] says what came of it. Where there is [no room](Self::set_work_limits)
     /// for it, it is answered at once.
     ///
-    /// A group is decided when edits are submitted, and not by when their transactions begin: brushes of one
+    /// Groups are decided when edits are submitted, not when their transactions begin: brushes of one
     /// [stroke](crate::brush::Brush::stroke) that follow each other, those that one call of [`apply`](Self::apply) or
     /// [`submit_all`](Self::submit_all) was given, or a single brush. One that changed nothing is no step.
     ///
@@ -40,27 +36,27 @@ impl Terrain {
 
     /// What can be undone and redone, and what it takes.
     pub fn history(&self) -> History {
-        self.timeline.figures()
+        self.undo_stack.figures()
     }
 
     /// From now on, history takes at most so many bytes; 64 MiB unless set, and with 0 there is none. Where they do not
     /// suffice, the oldest steps go first. A dug brick of 8x8x8 samples takes about 1.2 KB, so 64 MiB are the surface of
-    /// some thousand digs of radius 8. What goes is freed before this returns.
+    /// some thousand digs of radius 8. What exceeds the budget is dropped before this returns.
     pub fn set_undo_budget(&mut self, bytes: usize) {
         drop(self.rebudget_undo(bytes));
     }
 
-    /// The same; what history lets go of is left to the caller, who may free it elsewhere.
+    /// The same; the caller may drop what exceeds the budget elsewhere.
     pub(crate) fn rebudget_undo(&mut self, bytes: usize) -> DeferredDrop {
-        self.timeline.set_budget(bytes)
+        self.undo_stack.set_budget(bytes)
     }
 
     /// The most bytes that history may take.
     pub fn undo_budget(&self) -> usize {
-        self.timeline.budget()
+        self.undo_stack.budget()
     }
 
-    /// Forgets what can be undone and redone; the budget stays. What waits or is under way comes into history once it is
+    /// Clears what can be undone and redone; the budget stays. Edits that wait or are under way enter history once they are
     /// committed, and steps that wait find nothing.
     ///
     /// ```
@@ -70,23 +66,23 @@ impl Terrain {
     /// let mut terrain = Terrain::new(Ground::flat(64, 64, 10.0)?, &TerrainSettings::default())?;
     /// terrain.apply(&journal);
     /// assert_eq!(terrain.history().undos, 1);
-    /// // Nobody who loads a game takes back what was dug in it.
+    /// // A loaded game cannot be undone.
     /// terrain.clear_history();
     /// assert_eq!(terrain.history(), History::default());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn clear_history(&mut self) {
-        self.timeline.clear();
+        self.undo_stack.clear();
         // A stroke that goes on begins anew.
         self.queue.close_group();
     }
 
     /// Bytes that the terrain takes: its world, and its history.
     pub fn memory(&self) -> Memory {
-        Memory { undo: self.timeline.figures().bytes, ..self.world.memory() }
+        Memory { undo: self.undo_stack.figures().bytes, ..self.world.memory() }
     }
 
-    /// Undoes the last group of edits at once, after everything that waits, as [`apply`](Self::apply) does with brushes.
+    /// Undoes the last group of edits at once, after everything that waits; like [`apply`](Self::apply) for brushes.
     pub fn undo(&mut self) -> HistoryReceipt {
         self.step(HistoryStep::Undo)
     }
@@ -100,34 +96,20 @@ impl Terrain {
         self.abandon();
         self.queue.push_step(step);
         let receipts = self.finish();
-        self.answer(receipts);
+        receipts.into_iter().for_each(|receipt| self.answer(receipt));
         // It was the last one.
-        self.moves.pop_back().unwrap_or_else(|| step.nothing())
+        self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
     }
 
     /// What became of steps through history that were submitted, in order; each is handed out once. Where nobody takes them,
     /// the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
-        std::mem::take(&mut self.moves).into()
+        std::mem::take(&mut self.step_receipts).into()
     }
 
     /// Is there any to [take](Self::take_history_receipts)?
     pub fn has_history_receipts(&self) -> bool {
-        !self.moves.is_empty()
-    }
-
-    /// All steps through history without a receipt, in order.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
-        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
-            Work::Step(step, _) => Some(step),
-            Work::Edits(_) => None,
-        });
-        let queued = self.queue.iter().filter_map(|request| match request {
-            Request::Step(step) => Some(*step),
-            Request::Edit(_) => None,
-        });
-        in_flight.chain(queued)
+        !self.step_receipts.is_empty()
     }
 }
 
@@ -138,7 +120,8 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
-    use crate::terrain::{HistoryRejection, TerrainSettings};
+    use crate::terrain::TerrainSettings;
+    use crate::terrain::model::UNDO_BUDGET;
 
     fn terrain() -> Terrain {
         let ground = Ground::flat(64, 64, 8.0).expect("valid");

@@ -1,34 +1,22 @@
-//! What a game asks a terrain for: edits and steps, one after the other, and what became of them.
+//! Submitting edits to a terrain, and the receipts for them.
 
 use std::borrow::Borrow;
-use std::collections::VecDeque;
 
-use super::history::HistoryReceipt;
+use super::model::Terrain;
 use super::queue::{Together, WorkLimits};
 use super::receipt::{Receipt, Rejection};
-use super::{Terrain, unique};
+use super::world::unique;
 use crate::brush::{Brush, Edit};
 
-/// Answers that nobody takes are kept up to so many; then the oldest go.
-const KEPT_ANSWERS: usize = 1 << 16;
-
-/// Keeps one more answer.
-fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
-    if answers.len() == KEPT_ANSWERS {
-        answers.pop_front();
-    }
-    answers.push_back(answer);
-}
-
 impl Terrain {
-    /// Queues a brush, as a step of undo by itself unless it is part of a [stroke](Brush::stroke). One that is not valid is
-    /// queued too: its receipt says why it was rejected. One that the [limits](Self::set_work_limits) have no room for is
-    /// answered [at once](Self::take_answered).
+    /// Queues a brush as a step of undo of its own, unless it is part of a [stroke](Brush::stroke). An invalid brush is queued
+    /// too: its receipt says why it was rejected. A brush that exceeds the [limits](Self::set_work_limits) is answered
+    /// [at once](Self::take_answered).
     pub fn submit(&mut self, brush: &Brush) {
         self.submit_all([brush]);
     }
 
-    /// Queues brushes that are one step of undo together, but for those that are part of strokes.
+    /// Queues brushes as one step of undo, except for those that are part of strokes.
     ///
     /// ```
     /// # use bevy_burrow::prelude::*;
@@ -65,7 +53,7 @@ impl Terrain {
         self.submit_edits([edit]);
     }
 
-    /// Queues edits that are one step of undo together, but for those that are part of strokes.
+    /// Queues edits as one step of undo, except for those that are part of strokes.
     pub fn submit_edits<E: Borrow<Edit>>(&mut self, edits: impl IntoIterator<Item = E>) {
         let together = Together::Batch(unique());
         for edit in edits {
@@ -84,17 +72,17 @@ impl Terrain {
     ) {
         match self.admit(edit.as_ref().ok()) {
             Ok(()) => self.queue_edit(tag, edit, stroke, together),
-            Err(rejection) => keep(&mut self.answered, Receipt { tag, outcome: Err(rejection) }),
+            Err(rejection) => self.answer(Receipt { tag, outcome: Err(rejection) }),
         }
     }
 
-    /// Is there room for an edit? `None`: for one that is not valid, and waits for its turn to be told so.
+    /// Is there room for an edit? `None` stands for an invalid one, which is queued too and gets its receipt in turn.
     pub(crate) fn admit(&self, edit: Option<&Edit>) -> Result<(), Rejection> {
         let has_room = self.queue.has_room(self.world.grid(), edit);
         if has_room { Ok(()) } else { Err(Rejection::Overloaded) }
     }
 
-    /// Queues an edit for which there is room, or which may wait all the same.
+    /// Queues an edit, whether there is room for it or not.
     pub(crate) fn queue_edit(
         &mut self,
         tag: u64,
@@ -107,7 +95,7 @@ impl Terrain {
         self.queue.push_edit(self.world.grid(), tag, edit, together, terms);
     }
 
-    /// How much work a transaction takes, and how much may wait. Takes effect at once; what waits already stays.
+    /// Sets how much work a transaction takes, and how much may wait. Takes effect at once; what waits already stays.
     pub fn set_work_limits(&mut self, limits: WorkLimits) {
         self.queue.limits = limits;
     }
@@ -126,10 +114,10 @@ impl Terrain {
     /// Returns the receipts of these brushes; those of brushes that waited are kept for
     /// [`take_answered`](Self::take_answered). Tools and tests want this; a game lets the plugin do it.
     ///
-    /// All of it is one step back, cut where strokes stand in between; a game that replays a journal may want to
-    /// [forget](Self::clear_history) it. However many they are, none is rejected as too much.
+    /// All of them are one step of undo, except for strokes among them; a game that replays a journal may want to
+    /// [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.
     ///
-    /// A transaction that is under way elsewhere is given up first; its commit will be refused as stale.
+    /// A transaction that is under way elsewhere is given up first; its commit will be rejected as [stale](super::StaleCommit).
     pub fn apply<B: Borrow<Brush>>(&mut self, brushes: impl IntoIterator<Item = B>) -> Vec<Receipt> {
         self.abandon();
         let waiting = self.queue.edits().count();
@@ -140,7 +128,7 @@ impl Terrain {
         }
         let mut receipts = self.finish();
         let own = receipts.split_off(waiting.min(receipts.len()));
-        self.answer(receipts);
+        receipts.into_iter().for_each(|receipt| self.answer(receipt));
         own
     }
 
@@ -151,16 +139,6 @@ impl Terrain {
             receipts.append(&mut self.commit(transaction.run()).unwrap_or_default());
         }
         receipts
-    }
-
-    /// Keeps what became of brushes for whoever asks.
-    pub(super) fn answer(&mut self, receipts: impl IntoIterator<Item = Receipt>) {
-        receipts.into_iter().for_each(|receipt| keep(&mut self.answered, receipt));
-    }
-
-    /// Keeps what became of a step for whoever asks.
-    pub(super) fn answer_step(&mut self, receipt: HistoryReceipt) {
-        keep(&mut self.moves, receipt);
     }
 
     /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for, in

@@ -1,6 +1,5 @@
 //! The surface of one chunk: the parts of its blocks, assembled to one mesh.
 
-use crate::lattice::BrickPos;
 use crate::surface::meshed_blocks::MeshedBlock;
 use crate::surface::{Indices, SurfaceMesh};
 
@@ -22,13 +21,8 @@ struct Part {
     indices: usize,
 }
 
-/// A brick's position as (y, z, x): the order of parts.
+/// A brick's position in [layer order](crate::lattice::BrickPos::layer_order): the order of parts.
 pub(super) type Key = [i32; 3];
-
-/// A brick's place in the order of parts.
-pub(super) fn key(brick: BrickPos) -> Key {
-    [brick.0.y, brick.0.z, brick.0.x]
-}
 
 /// A part that was meshed anew. Without indices it is no part.
 #[derive(Clone, Copy)]

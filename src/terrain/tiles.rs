@@ -9,94 +9,65 @@ use rayon::Scope;
 use rayon::prelude::*;
 
 use super::by_brick::PARALLEL_PLACES;
-use super::commit::Stages;
 use super::dirty::grown_into;
-#[cfg(feature = "plugin")]
-use super::recipe::{SurfaceDraft, TileDraft};
+use super::stages::Stages;
+use super::surface_draft::TileUpdate;
 use super::world::World;
-use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, Column, LatticeBox, TilePos, sort_by_place};
-use crate::surface::tile::{self, Rings};
+use crate::surface::Mask;
+use crate::surface::mask::Borders;
+use crate::surface::tile::Rings;
 use crate::surface::vertex::WorldView;
-use crate::surface::{Indices, Mask, SurfaceMesh};
 
-/// What changes in a tile's mesh. Its columns stay as they are.
-#[derive(Clone, Debug)]
-pub struct TileUpdate {
-    /// The whole list of indices.
-    pub indices: Indices,
-    /// The rings; their vertices follow after those of the columns.
-    pub rings: Arc<Rings>,
-    tile: TilePos,
-    ground: Arc<Ground>,
-    grid: ChunkGrid,
-}
-
-impl TileUpdate {
-    /// The tile's whole mesh, its columns included.
-    pub fn mesh(&self) -> SurfaceMesh {
-        let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
-        SurfaceMesh { vertices, indices: self.indices.clone() }
-    }
-
-    /// The same without its columns, as long as nobody asks for them.
-    #[cfg(feature = "plugin")]
-    pub(crate) fn draft(&self) -> SurfaceDraft<'_> {
-        let Self { indices, rings, tile, ground, grid } = self;
-        let indices = std::borrow::Cow::Borrowed(indices);
-        SurfaceDraft::Tile(TileDraft { tile: *tile, grid: *grid, ground, rings, indices })
-    }
-}
-
-/// It is known which tiles are touched.
+/// Set when the touched tiles are known.
 const FOUND: u8 = 1;
-/// Somebody said that there is time.
-const CALLED: u8 = 2;
+/// Set when the caller allows drawing to start.
+const ALLOWED: u8 = 2;
 
-/// The tiles of a transaction in the making. Which they are can be found early; they are drawn when that is known and somebody
-/// says that there is time.
+/// The tiles that a transaction draws. The touched ones can be found early; drawing starts once they are known and the caller
+/// allows it.
 pub(super) struct TileWork<'a> {
     world: &'a World,
     view: &'a WorldView<'a>,
     /// Words of the mask that change.
     newer: &'a Mask,
-    /// Set by whoever has made it; threads that work for rayon must not wait for each other in here.
+    /// Set by the thread that made it; rayon's threads must not wait for each other here.
     touched: OnceLock<(Vec<Patch>, Duration)>,
     drawn: OnceLock<(Vec<(TilePos, TileUpdate)>, Duration)>,
-    /// Of what drawing waits for, what is there: `FOUND`, `CALLED`.
-    there: AtomicU8,
+    /// Which of `FOUND` and `ALLOWED` are set.
+    state: AtomicU8,
 }
 
 impl<'a> TileWork<'a> {
     pub fn new(world: &'a World, view: &'a WorldView<'a>, newer: &'a Mask) -> Self {
-        let (touched, drawn, there) = (OnceLock::new(), OnceLock::new(), AtomicU8::new(0));
-        Self { world, view, newer, touched, drawn, there }
+        let (touched, drawn, state) = (OnceLock::new(), OnceLock::new(), AtomicU8::new(0));
+        Self { world, view, newer, touched, drawn, state }
     }
 
-    /// Begins to find out which tiles are touched.
+    /// Starts to find the touched tiles.
     pub fn begin<'s>(&'s self, scope: &Scope<'s>) {
         scope.spawn(|scope| {
             self.find();
-            self.arrive(FOUND, scope);
+            self.set(FOUND, scope);
         });
     }
 
-    /// Says that there is time to draw them; once is enough.
-    pub fn go_on<'s>(&'s self, scope: &Scope<'s>) {
-        self.arrive(CALLED, scope);
+    /// Allows drawing to start; more calls have no effect.
+    pub fn allow<'s>(&'s self, scope: &Scope<'s>) {
+        self.set(ALLOWED, scope);
     }
 
-    /// What comes second has tiles drawn.
-    fn arrive<'s>(&'s self, what: u8, scope: &Scope<'s>) {
-        let before = self.there.fetch_or(what, Ordering::AcqRel);
-        if before | what == FOUND | CALLED && before & what == 0 {
+    /// Sets a flag, and starts drawing once both are set.
+    fn set<'s>(&'s self, flag: u8, scope: &Scope<'s>) {
+        let before = self.state.fetch_or(flag, Ordering::AcqRel);
+        if before | flag == FOUND | ALLOWED && before & flag == 0 {
             scope.spawn(|_| self.draw());
         }
     }
 
     fn find(&self) {
         let found = timed(|| touched_patches(self.world, self.view.grid, self.newer));
-        // Nobody waits for it: who needs it and does not find it does it himself.
+        // `finish` calls this again if it has not run yet.
         let _ = self.touched.set(found);
     }
 
@@ -106,7 +77,7 @@ impl<'a> TileWork<'a> {
         }
     }
 
-    /// The tiles, in order, and how long they took. Does what is not done yet.
+    /// The tiles, in order, and how long they took. Does what has not been done yet.
     pub fn finish(self) -> (Vec<(TilePos, TileUpdate)>, Duration) {
         if self.touched.get().is_none() {
             self.find();
@@ -120,7 +91,7 @@ impl<'a> TileWork<'a> {
     }
 }
 
-/// What some work makes, and how long it took.
+/// The result of some work, and how long it took.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let mut took = Duration::ZERO;
     let made = Stages::time(&mut took, work);
@@ -165,12 +136,13 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
         let tile = touched[0].0;
         let mut patches: Vec<(i32, i32)> = touched.iter().map(|&(_, patch)| patch).collect();
         patches.sort_unstable();
-        let borders = tile::borders(view, tile);
         let nothing = Rings::default();
         let old = world.rings.get(&tile).map_or(&nothing, Arc::as_ref);
-        let rings = Arc::new(old.updated(view, tile, &borders, &patches));
-        let indices = tile::indices(view.grid, tile, &borders, &rings);
-        (tile, TileUpdate { indices, rings, tile, ground: Arc::clone(&world.ground), grid: view.grid })
+        let rings = |borders: &Borders| Arc::new(old.updated(view, tile, borders, &patches));
+        let update = TileUpdate::new(world, view, tile, rings);
+        // Here, and not on the thread that asks for them.
+        update.indices();
+        (tile, update)
     };
     if tiles.len() < 8 {
         tiles.iter().map(update).collect()

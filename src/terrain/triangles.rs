@@ -12,7 +12,7 @@ use crate::surface::mask::{Borders, cell_sheet};
 use crate::surface::tile;
 use crate::surface::vertex::{Lattice, WorldView, position};
 
-/// Hands out the drawn triangles of a cell whose cubes may reach into `low..=high`.
+/// Calls `found` with the drawn triangles of a cell whose cubes may reach into `low..=high`.
 pub(super) fn for_triangles(
     world: &World,
     view: &WorldView,

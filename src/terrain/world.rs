@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::IVec3;
 use rustc_hash::FxHashMap;
@@ -15,7 +16,7 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh};
 use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 
-/// While there are fewer kinds of bricks that are all alike, none is let go of.
+/// The pool of uniform bricks is not cleaned up while it holds fewer kinds.
 const FEW_KINDS: usize = 64;
 
 /// Something that is drawn.
@@ -32,7 +33,7 @@ pub enum Drawn {
 pub struct Memory {
     /// Heights and material control.
     pub ground: usize,
-    /// Samples of bricks, with their bits; bricks that are all alike count once.
+    /// Samples of bricks, with their bits; uniform bricks of one kind count once.
     pub samples: usize,
     /// Materials of bricks.
     pub materials: usize,
@@ -59,6 +60,12 @@ impl Memory {
     }
 }
 
+/// A number that no other transaction, batch or world of this process has.
+pub(crate) fn unique() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
 /// A world at one revision.
 #[derive(Clone)]
 pub struct World {
@@ -73,7 +80,7 @@ pub struct World {
     /// Of tiles that bordered on the mask when they were last drawn; some may have none.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
-    /// How many kinds there will be when those are looked for that nobody holds.
+    /// With so many kinds, the pool is searched for those that nobody else holds.
     many_kinds: usize,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,
@@ -125,7 +132,7 @@ impl World {
             many_kinds: FEW_KINDS,
             sample_hash: 0,
             next_field: 0,
-            lineage: super::unique(),
+            lineage: unique(),
             revision: 0,
         }
     }
@@ -238,10 +245,10 @@ impl World {
         checker.check(self.grid)
     }
 
-    /// Takes in kinds of bricks that are all alike. Once there are twice as many as were left the last time, those go that
+    /// Sets the pool of uniform bricks. Once it holds twice as many kinds as were left the last time, those are dropped that
     /// nobody else holds: neither a brick of this world, nor its history, nor another world.
-    pub(super) fn enter_kinds(&mut self, kinds: UniformBricks) {
-        self.uniform.extend(kinds);
+    pub(super) fn set_uniform(&mut self, uniform: UniformBricks) {
+        self.uniform = uniform;
         if self.uniform.len() >= self.many_kinds {
             self.uniform.retain(|_, brick| Arc::strong_count(brick) > 1);
             give_back(&mut self.uniform);
@@ -249,8 +256,8 @@ impl World {
         }
     }
 
-    /// Gives back what the index held of bricks, fields and surfaces that are gone.
-    pub(super) fn give_back(&mut self) {
+    /// Shrinks the tables of bricks, fields and surfaces where many entries are gone.
+    pub(super) fn shrink(&mut self) {
         give_back(&mut self.bricks);
         give_back(&mut self.stacks);
         give_back(&mut self.fields);
@@ -263,11 +270,11 @@ impl World {
     pub fn memory(&self) -> Memory {
         let mut memory =
             Memory { ground: self.ground.bytes(), index: self.mask.bytes(), ..Memory::default() };
-        // Bricks that are all alike are one brick.
+        // Uniform bricks of one kind are one brick.
         let single = self.bricks.values().filter(|brick| brick.uniform().is_none());
         for brick in single.chain(self.uniform.values()) {
             memory.samples += Brick::BYTES;
-            memory.materials += brick.material_bytes();
+            memory.materials += brick.bytes() - Brick::BYTES;
         }
         for surface in self.surfaces.values() {
             let (mesh, parts) = surface.bytes();
@@ -297,7 +304,7 @@ mod tests {
         Shape::cuboid(Vec3::new(11.5, 27.5, 11.5), Vec3::splat(4.0 + more))
     }
 
-    /// A block over the ground, so thick that its middle is a brick all alike.
+    /// A block over the ground, so thick that its middle is a uniform brick.
     fn block() -> Terrain {
         let ground = Ground::flat(32, 32, 0.0).unwrap();
         let mut terrain = Terrain::new(ground, &TerrainSettings::default()).unwrap();

@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use super::layers::{self, Layers};
 use crate::ground::{Ground, MaterialId};
-use crate::lattice::{BRICK, BrickPos, Column, ceil};
+use crate::lattice::{BRICK, BrickPos, Column, ceil, hash};
 
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
@@ -47,9 +48,6 @@ pub(crate) fn row(samples: &[Sample; LEN], at: usize) -> [i16; 8] {
     samples[at..].first_chunk::<8>().map_or([0; 8], |row| row.map(|sample| sample.0))
 }
 
-/// One bit for each sample of a brick: a word for each y, in it bit `z * 8 + x`.
-pub type Layers = [u64; BRICK as usize];
-
 /// Which pristine samples of a brick are solid, whose lowest samples lie at `y`, under columns of these heights.
 pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     // In each column the lowest samples are solid, as many as lie below its height.
@@ -73,12 +71,7 @@ pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
     solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
 }
 
-/// A brick that nobody edited: what stands for a missing one where a table lies over another that has it.
-pub(crate) fn pristine_brick(ground: &Ground, pos: BrickPos) -> Brick {
-    Brick::pristine(pristine_layers(ground, pos))
-}
-
-/// A word that a backend keeps with a brick, to find its own copy of it. A clone starts without one.
+/// A word that a backend stores in a brick to find its own copy of it. A clone starts at 0.
 #[derive(Debug, Default)]
 pub(crate) struct Tag(AtomicU64);
 
@@ -90,12 +83,12 @@ impl Clone for Tag {
 
 #[cfg_attr(not(feature = "cuda"), expect(dead_code))]
 impl Tag {
-    /// What was kept last; 0 to begin with.
+    /// The word stored last; 0 at first.
     pub fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Keeps a word. It says nothing about the brick, so nobody needs to see it in time.
+    /// Stores a word. Ordering is relaxed: it says nothing about the brick's samples.
     pub fn set(&self, word: u64) {
         self.0.store(word, Ordering::Relaxed);
     }
@@ -103,8 +96,8 @@ impl Tag {
 
 /// 8x8x8 samples with their materials.
 ///
-/// Beside them the brick keeps two bits a sample, so that whole rows are judged at once: is it solid, pristine samples
-/// included, and is it edited?
+/// The brick also stores two bits per sample, so that whole rows are tested at once: is it solid (pristine samples
+/// included), and is it edited?
 #[derive(Clone, Debug)]
 pub struct Brick {
     samples: [Sample; LEN],
@@ -130,9 +123,9 @@ impl Brick {
         let mut brick = Self::pristine([0; 8]);
         for (row, samples) in samples.as_chunks::<8>().0.iter().enumerate() {
             let samples = samples.map(|sample| sample.max(-i16::MAX));
-            let solid = (0..8).fold(0, |bits, x| bits | u64::from(samples[x] < 0) << x);
+            let solid = (0..8).fold(0, |bits, x| bits | u8::from(samples[x] < 0) << x);
             brick.set_row(row * 8, samples);
-            brick.set_bits(row / 8, 0xff << (row % 8 * 8), solid << (row % 8 * 8));
+            brick.set_bits(row / 8, layers::of_row(u8::MAX, row % 8), layers::of_row(solid, row % 8));
         }
         brick
     }
@@ -218,11 +211,7 @@ impl Brick {
             return;
         }
         let materials = self.materials.get_or_insert_with(|| Box::new([MaterialId::GROUND; LEN]));
-        let mut rest = samples;
-        while rest != 0 {
-            materials[y * 64 + rest.trailing_zeros() as usize] = material;
-            rest &= rest - 1;
-        }
+        layers::ones(samples).for_each(|bit| materials[y * 64 + bit] = material);
     }
 
     /// The material of the sample with this index.
@@ -236,23 +225,56 @@ impl Brick {
         self.materials.as_deref()
     }
 
+    /// Removes what samples of a layer that turned to air store besides their density: air has no material.
+    pub(crate) fn clear_materials(&mut self, y: usize, samples: u64) {
+        self.set_materials(y, samples, MaterialId::GROUND);
+    }
+
+    /// Bytes of the brick, and of all that it stores elsewhere.
+    pub(crate) fn bytes(&self) -> usize {
+        Self::BYTES + self.material_bytes()
+    }
+
     /// Bytes that materials take beside the brick itself.
     pub fn material_bytes(&self) -> usize {
         self.materials.as_deref().map_or(0, size_of_val)
     }
 
-    /// The density and material that every sample of the brick was edited to, if it is the same for all.
-    pub(crate) fn uniform(&self) -> Option<(Sample, MaterialId)> {
+    /// What every sample of the brick was edited to, if it is the same for all.
+    pub(crate) fn uniform(&self) -> Option<UniformKind> {
         let (sample, material) = (self.samples[0], self.material_at(0));
         let is_uniform = self.edited == [u64::MAX; 8]
             && self.samples.iter().all(|&other| other == sample)
             && self.materials.iter().all(|all| all.iter().all(|&other| other == material));
-        is_uniform.then_some((sample, material))
+        is_uniform.then_some(UniformKind { sample, material })
     }
 
-    /// How many samples are edited.
-    pub fn edited_count(&self) -> u32 {
-        self.edited.iter().map(|layer| layer.count_ones()).sum()
+    /// What some edited samples add to the world's hash, where `y` is the height of the brick's lowest sample and `columns` are
+    /// the [hashes](column_hash) of its columns.
+    pub(crate) fn hash(&self, y: i32, samples: &Layers, columns: &[u64; 64]) -> u64 {
+        let of_layer = |(layer, &samples): (usize, &u64)| {
+            let height = y + layer as i32;
+            let of = |bit: usize| {
+                let index = layer * 64 + bit;
+                sample_hash(columns[bit], height, self.samples[index], self.material_at(index))
+            };
+            layers::ones(samples).fold(0u64, |sum, bit| sum.wrapping_add(of(bit)))
+        };
+        samples.iter().enumerate().map(of_layer).fold(0, u64::wrapping_add)
+    }
+
+    /// The samples in which two bricks differ; `None` stands for a pristine one.
+    pub(crate) fn differences([a, b]: [Option<&Self>; 2]) -> Layers {
+        let material =
+            |brick: Option<&Self>, index| brick.map_or(MaterialId::GROUND, |b| b.material_at(index));
+        let [old, new] = [a, b].map(|brick| brick.map_or(&PRISTINE, Self::samples));
+        let has_materials = [a, b].iter().flatten().any(|brick| brick.materials.is_some());
+        let mut differ = layers::NONE;
+        for (index, (old, new)) in old.iter().zip(new).enumerate() {
+            let is_same = old == new && (!has_materials || material(a, index) == material(b, index));
+            differ[index >> 6] |= u64::from(!is_same) << (index & 63);
+        }
+        differ
     }
 
     /// Every edited sample of the brick at `pos`: point, density, material.
@@ -263,8 +285,27 @@ impl Brick {
     }
 }
 
-/// Bricks all of whose samples are alike, one of each kind: the middle of every large cave is the same brick.
-pub type UniformBricks = FxHashMap<(Sample, MaterialId), Arc<Brick>>;
+/// The pool of uniform bricks, all of whose samples are alike, one of each kind: the middle of every large cave is the same
+/// brick.
+pub(crate) type UniformBricks = FxHashMap<UniformKind, Arc<Brick>>;
+
+/// What all samples of a uniform brick were edited to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct UniformKind {
+    pub sample: Sample,
+    pub material: MaterialId,
+}
+
+/// The part of a hash that all samples of a column have in common.
+pub(crate) fn column_hash(column: Column) -> u64 {
+    hash::mix(column.x as u32 as u64 | (column.z as u32 as u64) << 32)
+}
+
+/// What a sample adds to the world's hash; a pristine one adds nothing.
+fn sample_hash(column: u64, y: i32, sample: Sample, material: MaterialId) -> u64 {
+    let Some(distance) = sample.distance() else { return 0 };
+    hash::mix(column ^ (y as u32 as u64) << 32 ^ (distance as u16 as u64) << 8 ^ u64::from(material.0))
+}
 
 #[cfg(test)]
 mod tests {
@@ -291,7 +332,7 @@ mod tests {
         brick.set_bits(5, 1 << 59, 0);
         brick.set_material(BrickPos::index(point), MaterialId(4));
         assert_eq!(brick.edited_samples(pos).collect::<Vec<_>>(), [(point, 7, MaterialId(4))]);
-        assert_eq!(brick.edited_count(), 1);
+        assert_eq!(layers::count(brick.edited()), 1);
         assert_eq!(brick.solid()[5], !(1 << 59));
         assert_eq!(brick.uniform(), None);
     }
@@ -312,7 +353,7 @@ mod tests {
     fn a_brick_of_one_number_is_uniform() {
         let mut brick = Brick::of_edited(&[-5; 512]);
         assert_eq!((brick.solid(), brick.edited()), (&[u64::MAX; 8], &[u64::MAX; 8]));
-        assert_eq!(brick.uniform(), Some((Sample(-5), MaterialId::GROUND)));
+        assert_eq!(brick.uniform(), Some(UniformKind { sample: Sample(-5), material: MaterialId::GROUND }));
         brick.set_material(77, MaterialId(2));
         assert_eq!(brick.uniform(), None);
     }

@@ -1,4 +1,4 @@
-//! Voxels per material, and what can become of them.
+//! Voxels per material, and what an edit can do to one.
 
 use crate::ground::MaterialId;
 
@@ -13,6 +13,11 @@ impl MaterialCounts {
             Ok(at) => self.0[at].1 += voxels,
             Err(at) => self.0.insert(at, (material, voxels)),
         }
+    }
+
+    /// Counts voxels of these materials.
+    pub(crate) fn count_each(&mut self, materials: impl IntoIterator<Item = MaterialId>) {
+        for_runs(materials, |material, voxels| self.count_many(material, voxels));
     }
 
     /// Adds all of `other`.
@@ -36,6 +41,24 @@ impl MaterialCounts {
     pub fn iter(&self) -> impl Iterator<Item = (MaterialId, u64)> {
         self.0.iter().copied()
     }
+}
+
+/// Calls `each` with every run of equal materials and its length. Neighbours mostly are of one material.
+pub(crate) fn for_runs(
+    materials: impl IntoIterator<Item = MaterialId>,
+    mut each: impl FnMut(MaterialId, u64),
+) {
+    let mut materials = materials.into_iter();
+    let Some(mut last) = materials.next() else { return };
+    let mut voxels = 1;
+    for material in materials {
+        if material != last {
+            each(last, voxels);
+            (last, voxels) = (material, 0);
+        }
+        voxels += 1;
+    }
+    each(last, voxels);
 }
 
 /// What an edit did to a voxel.

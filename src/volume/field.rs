@@ -9,7 +9,7 @@ pub struct FieldId(pub u64);
 /// A region of edits inside one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Who it is.
+    /// Its name.
     pub id: FieldId,
     /// Box around its edited samples.
     pub bounds: LatticeBox,
@@ -35,8 +35,7 @@ pub enum Scenario {
 }
 
 /// What became of the fields of a chunk.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Absorbed {
+pub(crate) struct Absorbed {
     /// The scenario that took place.
     pub scenario: Scenario,
     /// The field that now holds the edit.

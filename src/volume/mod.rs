@@ -8,14 +8,19 @@
 mod brick;
 mod counts;
 mod field;
+pub(crate) mod layers;
 mod rules;
 mod view;
 
-pub use brick::{Brick, Layers, Sample, UniformBricks};
-pub(crate) use brick::{PRISTINE, pristine_brick, pristine_layers, row, solid_layers};
+pub use brick::{Brick, Sample};
+pub(crate) use brick::{
+    PRISTINE, UniformBricks, UniformKind, column_hash, pristine_layers, row, solid_layers,
+};
 pub use counts::MaterialCounts;
-pub(crate) use counts::VoxelOutcome;
-pub use field::{Absorbed, Field, FieldId, Fields, Scenario};
+pub(crate) use counts::{VoxelOutcome, for_runs};
+pub(crate) use field::Absorbed;
+pub use field::{Field, FieldId, Fields, Scenario};
+pub use layers::Layers;
 pub use rules::{DiggingRules, Refused, RulesError};
 pub(crate) use view::resolve;
 pub use view::{Bricks, SampleView};

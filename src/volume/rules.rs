@@ -6,10 +6,10 @@ use super::{MaterialCounts, VoxelOutcome};
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, ONE};
 
-/// What brushes may do to a world. Without any rule, everything.
+/// What brushes may do to a world. Without rules, everything.
 ///
-/// Rules are part of a world's snapshot: the same edits under the same rules make the same world, bit for bit. They bind
-/// every operation, whatever it is: an operation *takes away* where it makes a sample's density higher, solid or not.
+/// The same edits under the same rules make the same world, bit for bit. Rules restrict every operation: it *takes away*
+/// wherever it makes a sample's density higher, whether the sample is solid or not.
 ///
 /// ```
 /// use bevy_burrow::prelude::*;
@@ -29,16 +29,16 @@ use crate::lattice::{LatticeBox, ONE};
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DiggingRules {
-    /// How hard materials are; the others are soft. A brush whose power is at least that digs as ever; with half of it or
-    /// less it takes nothing away; between them, it goes a part of the way that grows from nothing to all of it. Painting
-    /// is not held up: ground that is painted with a softer material is softer from then on.
+    /// How hard materials are; others have hardness 0. A brush with at least that power digs at full speed, one with half of
+    /// it or less takes nothing away, and in between its speed grows linearly. Painting is not restricted: ground that is
+    /// painted with a softer material is softer from then on.
     pub hardness: BTreeMap<MaterialId, u8>,
     /// Materials that no brush takes away, nor paints over.
     pub unbreakable: BTreeSet<MaterialId>,
     /// Nothing solid below this height, in voxels, is taken away.
     pub bedrock: Option<i32>,
-    /// Samples that no operation changes at all, paint included. An edit looks through all boxes, its bricks
-    /// only through those near the edits of its run.
+    /// Samples that no operation changes at all, paint included. Each edit searches all boxes, each brick only those near
+    /// the edits of its batch.
     pub protected: Vec<LatticeBox>,
 }
 
@@ -70,10 +70,10 @@ impl DiggingRules {
         self
     }
 
-    /// Can every rule bind something?
+    /// Checks that every rule can apply to something.
     ///
     /// # Errors
-    /// When a rule is for [`MaterialId::GROUND`]: that stands for the ground's own materials, of which each has its number.
+    /// When a rule is for [`MaterialId::GROUND`], which stands for the ground's own materials; name these instead.
     pub fn check(&self) -> Result<(), RulesError> {
         let ground = MaterialId::GROUND;
         if self.unbreakable.contains(&ground) || self.hardness.contains_key(&ground) {
@@ -91,7 +91,7 @@ impl DiggingRules {
         self.unbreakable.contains(&material)
     }
 
-    /// How much of a change a brush of this power makes that takes away what is solid, in 1/256, and why not all.
+    /// Which part of a change that takes away solid ground a brush of this power makes, in 1/256, and why not all of it.
     pub(crate) fn pace(&self, material: MaterialId, y: i32, power: u8) -> (i32, Option<VoxelOutcome>) {
         if self.bedrock.is_some_and(|bedrock| y < bedrock) || self.is_unbreakable(material) {
             return (0, Some(VoxelOutcome::Unbreakable));
@@ -125,7 +125,7 @@ pub struct Refused {
     pub unbreakable: MaterialCounts,
     /// Those too hard for the brush's power.
     pub too_hard: MaterialCounts,
-    /// Those so hard that the brush has to come again.
+    /// Those so hard that one pass of the brush was not enough.
     pub slowed: MaterialCounts,
 }
 
@@ -170,8 +170,8 @@ mod tests {
             .with_unbreakable(MaterialId(2))
             .with_bedrock(-5);
         let pace = |material, y, power| {
-            let (part, fate) = rules.pace(MaterialId(material), y, power);
-            (part, fate.is_some())
+            let (part, outcome) = rules.pace(MaterialId(material), y, power);
+            (part, outcome.is_some())
         };
         assert_eq!(pace(0, 0, 0), (256, false));
         assert_eq!(

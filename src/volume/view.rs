@@ -12,7 +12,7 @@ use crate::lattice::{BrickPos, LatticeBox};
 /// Bricks by position; a missing brick is all pristine.
 pub type Bricks = FxHashMap<BrickPos, Arc<Brick>>;
 
-/// Bricks sorted by stacks, each stack from below: by x, then z, then y.
+/// Bricks in order of their positions.
 pub(crate) type BrickList<'a> = [(BrickPos, &'a Brick)];
 
 /// The samples of a world: its ground, its bricks, and newer bricks that a running transaction lays over them.
@@ -21,24 +21,19 @@ pub struct SampleView<'a> {
     ground: &'a Ground,
     bricks: &'a Bricks,
     newer: Option<&'a Bricks>,
-    /// They stand over all others.
+    /// Bricks that take the place of all others.
     latest: &'a BrickList<'a>,
 }
 
-/// A list without the bricks before a place. Looks near its begin first.
-fn from<'l, 'a>(list: &'l BrickList<'a>, next: (i32, i32, i32)) -> &'l BrickList<'a> {
-    let is_before = |&(pos, _): &(BrickPos, &Brick)| place(pos) < next;
+/// A list without the bricks before a position. Looks near its begin first.
+fn from<'l, 'a>(list: &'l BrickList<'a>, next: BrickPos) -> &'l BrickList<'a> {
+    let is_before = |&(pos, _): &(BrickPos, &Brick)| pos < next;
     let mut end = 1;
     while list.get(end).is_some_and(is_before) {
         end *= 2;
     }
     let begin = end / 2;
     &list[begin + list[begin..list.len().min(end + 1)].partition_point(is_before)..]
-}
-
-/// What bricks of a list are sorted by.
-fn place(pos: BrickPos) -> (i32, i32, i32) {
-    (pos.0.x, pos.0.z, pos.0.y)
 }
 
 impl<'a> SampleView<'a> {
@@ -54,7 +49,7 @@ impl<'a> SampleView<'a> {
 
     /// The same view with bricks of a list in place of all others.
     pub(crate) fn under(self, latest: &'a BrickList<'a>) -> Self {
-        debug_assert!(latest.is_sorted_by(|a, b| place(a.0) < place(b.0)));
+        debug_assert!(latest.is_sorted_by(|a, b| a.0 < b.0));
         Self { latest, ..self }
     }
 
@@ -63,12 +58,7 @@ impl<'a> SampleView<'a> {
         self.ground
     }
 
-    /// The newer bricks that are laid over the others.
-    pub(crate) fn newer(&self) -> Option<&'a Bricks> {
-        self.newer
-    }
-
-    /// Hands out the bricks at all positions of a box; of those at the same one, the one that stands comes last.
+    /// Calls `each` with the bricks at all positions of a box. Where several lie over each other, the topmost comes last.
     pub(crate) fn for_bricks(&self, places: LatticeBox, mut each: impl FnMut(BrickPos, &'a Brick)) {
         for table in std::iter::once(self.bricks).chain(self.newer) {
             if (table.len() as u64) < places.volume() {
@@ -80,32 +70,32 @@ impl<'a> SampleView<'a> {
             }
         }
         let (min, max) = (places.min, places.max);
-        let first = self.latest.partition_point(|&(pos, _)| place(pos) < (min.x, min.z, min.y));
+        let first = self.latest.partition_point(|&(pos, _)| pos < BrickPos(min));
         let mut latest = &self.latest[first..];
         while let Some(&(pos, brick)) = latest.first() {
             let BrickPos(IVec3 { x, y, z }) = pos;
             if x > max.x {
                 break;
             }
-            // The next place of the box that is not before this one.
-            let next = match (z < min.z, z > max.z, y < min.y, y > max.y) {
-                (true, ..) => (x, min.z, min.y),
-                (_, true, ..) => (x + 1, min.z, min.y),
-                (_, _, true, _) => (x, z, min.y),
-                (_, _, _, true) => (x, z + 1, min.y),
+            // The next position of the box that is not before this one.
+            let [x, z, y] = match (z < min.z, z > max.z, y < min.y, y > max.y) {
+                (true, ..) => [x, min.z, min.y],
+                (_, true, ..) => [x + 1, min.z, min.y],
+                (_, _, true, _) => [x, z, min.y],
+                (_, _, _, true) => [x, z + 1, min.y],
                 _ => {
                     each(pos, brick);
                     latest = &latest[1..];
                     continue;
                 }
             };
-            latest = from(latest, next);
+            latest = from(latest, BrickPos(IVec3::new(x, y, z)));
         }
     }
 
     /// A brick, `None` where all samples are pristine.
     pub fn brick(&self, pos: BrickPos) -> Option<&'a Brick> {
-        if let Ok(at) = self.latest.binary_search_by_key(&place(pos), |&(pos, _)| place(pos)) {
+        if let Ok(at) = self.latest.binary_search_by_key(&pos, |&(pos, _)| pos) {
             return Some(self.latest[at].1);
         }
         self.newer.and_then(|newer| newer.get(&pos)).or_else(|| self.bricks.get(&pos)).map(Arc::as_ref)

@@ -85,7 +85,7 @@ fn compare_heights(session: &mut Session) -> Result<(), Fault> {
 /// Edits on both, and the bricks that they change.
 fn compare_edits(session: &mut Session, work: &PreparedEdits) -> Result<Vec<DraftedBrick>, Fault> {
     let (expected, found) = (ledgers_of(work), session.edit(work)?);
-    let mut effects = vec![EditEffect::default(); work.tools.len()];
+    let mut effects = vec![EditEffect::default(); work.edits.len()];
     enter_effects(&expected, &mut effects);
     let is_same = effects == found.effects && are_same_ledgers(&expected, &found);
     let bricks = expected.into_iter().flat_map(|ledger| ledger.bricks).collect();

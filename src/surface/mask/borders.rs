@@ -58,6 +58,7 @@ impl MaskView<'_> {
 }
 
 /// For each cell of a rectangle: is it in the mask, and which of its sides border on a cell that is?
+#[derive(Clone, Debug)]
 pub struct Borders {
     low: Column,
     high: Column,
@@ -68,7 +69,7 @@ pub struct Borders {
 }
 
 /// 8x8 cells: bit `z * 8 + x`.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Patch {
     /// Those in the mask.
     own: u64,

@@ -1,52 +1,16 @@
-//! Sets of samples, brick by brick, a bit each, and how they spread to neighbours.
+//! Sets of samples over many bricks, and how they spread to neighbours.
 
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
-use crate::lattice::{BrickPos, LatticeBox};
-use crate::volume::Layers;
+use crate::lattice::BrickPos;
+use crate::volume::layers::{ALL, FIRST_X, Layers, NONE, and, or};
 
 /// Some samples of some bricks.
 pub(super) type Samples = FxHashMap<BrickPos, Layers>;
 
-/// No sample of a brick.
-pub(super) const NONE: Layers = [0; 8];
-/// All samples of a brick.
-pub(super) const ALL: Layers = [u64::MAX; 8];
-
-/// The samples of a layer with the lowest x.
-const FIRST: u64 = 0x0101_0101_0101_0101;
-
 /// The six neighbours of a brick.
 pub(super) const SIDES: [IVec3; 6] = [IVec3::NEG_Y, IVec3::NEG_X, IVec3::X, IVec3::NEG_Z, IVec3::Z, IVec3::Y];
-
-pub(super) fn and(a: &Layers, b: &Layers) -> Layers {
-    std::array::from_fn(|y| a[y] & b[y])
-}
-
-pub(super) fn or(a: &Layers, b: &Layers) -> Layers {
-    std::array::from_fn(|y| a[y] | b[y])
-}
-
-pub(super) fn without(a: &Layers, b: &Layers) -> Layers {
-    std::array::from_fn(|y| a[y] & !b[y])
-}
-
-pub(super) fn count(layers: &Layers) -> u64 {
-    layers.iter().map(|layer| u64::from(layer.count_ones())).sum()
-}
-
-/// The samples of a brick that lie in a box.
-pub(super) fn within(pos: BrickPos, samples: LatticeBox) -> Layers {
-    let Some(own) = pos.samples().intersection(samples) else { return NONE };
-    if own == pos.samples() {
-        return ALL;
-    }
-    let (from, to) = (own.min - pos.origin(), own.max - pos.origin());
-    let row = 0xffu64 >> (7 - (to.x - from.x)) << from.x;
-    let layer = (from.z..=to.z).fold(0, |layer, z| layer | row << (z * 8));
-    std::array::from_fn(|y| if (from.y..=to.y).contains(&(y as i32)) { layer } else { 0 })
-}
 
 /// The samples of the brick at this side that touch those of a brick.
 pub(super) fn beyond(layers: &Layers, side: IVec3) -> Layers {
@@ -54,8 +18,8 @@ pub(super) fn beyond(layers: &Layers, side: IVec3) -> Layers {
     match side {
         IVec3::Y => beyond[0] = layers[7],
         IVec3::NEG_Y => beyond[7] = layers[0],
-        IVec3::X => beyond = layers.map(|layer| layer >> 7 & FIRST),
-        IVec3::NEG_X => beyond = layers.map(|layer| (layer & FIRST) << 7),
+        IVec3::X => beyond = layers.map(|layer| layer >> 7 & FIRST_X),
+        IVec3::NEG_X => beyond = layers.map(|layer| (layer & FIRST_X) << 7),
         IVec3::Z => beyond = layers.map(|layer| layer >> 56),
         _ => beyond = layers.map(|layer| layer << 56),
     }
@@ -64,7 +28,7 @@ pub(super) fn beyond(layers: &Layers, side: IVec3) -> Layers {
 
 /// Samples of a layer and their neighbours in it.
 fn beside(layer: u64) -> u64 {
-    layer | (layer & !(FIRST << 7)) << 1 | (layer & !FIRST) >> 1 | layer << 8 | layer >> 8
+    layer | (layer & !(FIRST_X << 7)) << 1 | (layer & !FIRST_X) >> 1 | layer << 8 | layer >> 8
 }
 
 /// Samples and their six neighbours, as far as these lie in the same brick.
@@ -143,13 +107,11 @@ pub(super) fn grown_set(set: &Samples) -> Samples {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::volume::layers;
     use proptest::prelude::*;
 
     fn points(pos: BrickPos, layers: &Layers) -> Vec<IVec3> {
-        pos.samples()
-            .points()
-            .filter(|&p| layers[(p.y & 7) as usize] >> (BrickPos::index(p) & 63) & 1 == 1)
-            .collect()
+        layers::indices(layers).map(|index| pos.origin() + layers::offset(index)).collect()
     }
 
     proptest! {
@@ -184,14 +146,5 @@ mod tests {
             }
             prop_assert_eq!(found, reached);
         }
-    }
-
-    #[test]
-    fn boxes_are_cut_out_of_bricks() {
-        let pos = BrickPos(IVec3::new(0, -1, 3));
-        let cut = LatticeBox { min: IVec3::new(-5, -7, 26), max: IVec3::new(3, -2, 90) };
-        let expected: Vec<IVec3> = pos.samples().points().filter(|&p| cut.contains(p)).collect();
-        assert_eq!(points(pos, &within(pos, cut)), expected);
-        assert_eq!(within(pos, LatticeBox::point(IVec3::ZERO)), NONE);
     }
 }

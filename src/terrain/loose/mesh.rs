@@ -6,10 +6,11 @@ use super::bits::Samples;
 use super::search::{self, Component};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, ChunkGrid, Column, ONE};
+use crate::surface::SurfaceMesh;
+use crate::surface::cases;
 use crate::surface::plain::CubeMesh;
 use crate::surface::vertex::{Lattice, vertex};
-use crate::surface::{SurfaceMesh, cases};
-use crate::volume::SampleView;
+use crate::volume::{SampleView, layers};
 
 /// Density of what lies beyond the world's sides. The piece ends at its last sample there, not halfway to the next.
 const BEYOND: i32 = i32::MAX / 4;
@@ -23,8 +24,8 @@ struct Piece<'a> {
 
 impl Piece<'_> {
     fn contains(&self, point: IVec3) -> bool {
-        let bit = BrickPos::index(point);
-        self.samples.get(&BrickPos::of(point)).is_some_and(|layers| layers[bit >> 6] >> (bit & 63) & 1 == 1)
+        let own = self.samples.get(&BrickPos::of(point));
+        own.is_some_and(|own| layers::contains(own, BrickPos::index(point)))
     }
 
     fn is_in_world(&self, point: IVec3) -> bool {
@@ -38,7 +39,7 @@ impl Lattice for Piece<'_> {
             return BEYOND;
         }
         let own = self.view.distance(point);
-        // Other ground touches the piece nowhere; it would only turn normals.
+        // Other ground does not touch the piece; it would only affect normals.
         if own < 0 && !self.contains(point) { ONE } else { own }
     }
     fn is_edited(&self, point: IVec3) -> bool {
@@ -58,14 +59,12 @@ impl Lattice for Piece<'_> {
 
 /// What marching cubes draws of a piece alone: closed, with its vertices where the world has them.
 pub(super) fn closed(view: SampleView, grid: ChunkGrid, piece: &Component, origin: IVec3) -> SurfaceMesh {
-    let samples = piece.iter().map(|(&key, &layers)| (search::brick(key), layers)).collect();
+    let samples = search::bricks(piece).map(|(pos, layers)| (pos, *layers)).collect();
     let piece_view = Piece { view, grid, samples };
     let mut mesh = CubeMesh::new();
-    for (&key, layers) in piece {
-        let low = search::brick(key).origin();
-        let own = (0..512usize).filter(|bit| layers[bit >> 6] >> (bit & 63) & 1 == 1);
-        for bit in own {
-            let point = low + IVec3::new((bit & 7) as i32, (bit >> 6) as i32, (bit >> 3 & 7) as i32);
+    for (pos, layers) in search::bricks(piece) {
+        for index in layers::indices(layers) {
+            let point = pos.origin() + layers::offset(index);
             cubes_of(&piece_view, point, |cube, case| {
                 mesh.add(cube, case, |start, axis| vertex(&piece_view, start, axis, origin));
             });

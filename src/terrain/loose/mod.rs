@@ -2,16 +2,16 @@
 //!
 //! **What is connected.** Two solid samples that are neighbours along an axis, six for each sample. That is what the
 //! surface connects as well: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples,
-//! and cuts solid corners off wherever they only meet across a diagonal. So two parts are one piece of ground exactly if a
-//! worm could get from one to the other without coming out of what is drawn.
+//! and separates solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a
+//! path inside the drawn surface connects them.
 //!
-//! **What is tied.** A piece that reaches the deep: ground below everything that was ever edited. The world's sides tie
-//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as tied without looking further; so a search has
-//! a bound, and its result does not depend on the order in which it looks.
+//! **What is anchored.** A piece that reaches ground below everything that was ever edited. The world's sides anchor
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further, which bounds
+//! the search; its result does not depend on the order of the search.
 //!
-//! **What is taken out.** The samples of a piece become the air that the middle of a dig is, and so does air that touches
-//! them and no other ground, so that nothing is left of the shape. What remains keeps its vertices to the bit. All of that
-//! belongs to the edit that cut the piece off: it is hashed, undone and replayed with it.
+//! **What is taken out.** The samples of a piece get the density of air in the middle of a dig, and so does air that touches
+//! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs to
+//! the edit that cut the piece off: it is hashed, undone and replayed with it.
 
 mod bits;
 mod mesh;
@@ -22,14 +22,13 @@ use std::sync::Arc;
 use glam::IVec3;
 
 use super::world::World;
-use crate::edits::{DraftedBrick, TakenOut, take_out};
+use crate::edits::{DraftedBrick, EditDelta, Overlay, take_out};
 use crate::lattice::{BrickPos, Column, LatticeBox};
 use crate::surface::SurfaceMesh;
-use crate::volume::{Bricks, DiggingRules, MaterialCounts, SampleView};
-use bits::{NONE, SIDES, Samples};
+use crate::volume::layers::{self, Layers, NONE};
+use crate::volume::{DiggingRules, MaterialCounts, SampleView};
+use bits::{SIDES, Samples};
 use search::{Component, Solid};
-
-pub(super) use search::Lowest;
 
 /// What to look for after a dig, and what to do with it.
 ///
@@ -38,8 +37,7 @@ pub(super) use search::Lowest;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
-    /// The largest piece to look for, in voxels. Whatever is larger counts as tied; this bounds the time that a search
-    /// takes.
+    /// The largest piece to look for, in voxels. Larger ones count as anchored; this bounds the time of a search.
     pub largest: u32,
     /// Pieces up to so many voxels vanish.
     pub crumbs: u32,
@@ -71,7 +69,7 @@ impl LooseSettings {
 /// What became of a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PieceFate {
-    /// It is still there, tied to nothing. So are all that the terrain's [`DiggingRules`] keep a part of.
+    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`] protect a part.
     Left,
     /// It was taken out of the ground.
     Removed,
@@ -88,7 +86,7 @@ pub struct Run {
     pub len: u32,
 }
 
-/// A piece of ground that nothing ties to the world.
+/// A piece of ground that is not connected to the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoosePiece {
     /// What became of it.
@@ -97,7 +95,7 @@ pub struct LoosePiece {
     pub bounds: LatticeBox,
     /// How many samples it has.
     pub voxels: u64,
-    /// These by material: times density and volume of a voxel, its mass.
+    /// Its voxels by material: times the density and volume of a voxel, its mass.
     pub materials: MaterialCounts,
     /// Its samples, by y, then z, then x.
     pub runs: Arc<[Run]>,
@@ -110,19 +108,19 @@ impl World {
     /// The loose pieces of up to `largest` voxels that hold some sample of a box, in order of their lowest samples there.
     /// Says what the settings would make of each, but takes none out, and makes no meshes.
     pub fn loose_pieces(&self, around: LatticeBox, settings: &LooseSettings) -> Vec<LoosePiece> {
-        let solid = Solid::new(self.samples(), self.grid, &self.stacks, None);
+        let solid = Solid::new(self, self.samples(), None);
         let Some(around) = around.intersection(self.grid.edit_bounds()) else { return Vec::new() };
-        let (low, high): (IVec3, IVec3) = (around.min >> 3, around.max >> 3);
+        let LatticeBox { min: low, max: high } = BrickPos::range(around);
         let near = |(x, z): (i32, i32)| (low.x..=high.x).contains(&x) && (low.z..=high.z).contains(&z);
         let mut seeds = Samples::default();
         for (&(x, z), ys) in self.stacks.iter().filter(|(stack, _)| near(**stack)) {
-            // Below what is stored the ground is whole; above it, nothing is solid but the ground.
+            // Below the stored bricks all ground is anchored; above them only pristine ground is solid.
             let (Some(&lowest), Some(&highest)) = (ys.first(), ys.last()) else { continue };
             let heights = self.ground.heights::<8>(Column::new(x * 8, z * 8));
             let top = heights.iter().flatten().max().map_or(highest, |&height| highest.max(height >> 11));
             for y in lowest.max(low.y)..=top.min(high.y) {
                 let pos = BrickPos(IVec3::new(x, y, z));
-                seeds.insert(pos, bits::within(pos, around));
+                seeds.insert(pos, layers::within(pos, around));
             }
         }
         let found = search::search(&solid, &seeds, settings.largest.into());
@@ -130,36 +128,27 @@ impl World {
     }
 }
 
-/// What edits cut off and what was taken out for it.
-#[derive(Default)]
-pub(super) struct Fallen {
-    pub pieces: Vec<LoosePiece>,
-    pub taken: Vec<TakenOut>,
+/// Samples next to those that drafted bricks turn to air; `before` are the samples without these bricks.
+pub(super) fn seeds(world: &World, before: SampleView, drafted: &[DraftedBrick]) -> Samples {
+    search::seeds(&Solid::new(world, before, None), drafted)
 }
 
-/// Samples next to those that drafted bricks turn to air, which lie over a world and newer bricks.
-pub(super) fn seeds(world: &World, over: &Bricks, drafted: &[DraftedBrick]) -> Samples {
-    let before = Solid::new(world.samples().over(over), world.grid, &world.stacks, None);
-    search::seeds(&before, drafted)
-}
-
-/// Looks for loose pieces at seeds, in a world with newer bricks over it, and takes them out if the settings and the rules
-/// say so. `lowest` are the lowest of the newer ones.
+/// Looks for loose pieces at seeds, in a world under newer bricks, and takes them out where the settings and rules say so.
+/// Returns the pieces, and what taking them out changed, as changes of edit 0.
 pub(super) fn fall(
     world: &World,
     rules: Option<&DiggingRules>,
-    over: &Bricks,
-    lowest: &Lowest,
+    newer: &Overlay,
     seeds: &Samples,
     settings: &LooseSettings,
-) -> Fallen {
+) -> (Vec<LoosePiece>, EditDelta) {
+    let (mut pieces, mut removed) = (Vec::new(), EditDelta::default());
     if seeds.is_empty() {
-        return Fallen::default();
+        return (pieces, removed);
     }
-    let samples = world.samples().over(over);
-    let solid = Solid::new(samples, world.grid, &world.stacks, Some(lowest));
+    let samples = newer.over(world.samples());
+    let solid = Solid::new(world, samples, Some(newer));
     let found = search::search(&solid, seeds, settings.largest.into());
-    let mut fallen = Fallen::default();
     let mut gone = Samples::default();
     for component in &found {
         let mut piece = describe(samples, component, settings);
@@ -167,35 +156,36 @@ pub(super) fn fall(
             piece.fate = PieceFate::Left;
         }
         if piece.fate != PieceFate::Left {
-            component.iter().for_each(|(&key, layers)| bits::include(&mut gone, search::brick(key), layers));
+            search::bricks(component).for_each(|(pos, layers)| bits::include(&mut gone, pos, layers));
         }
         if piece.fate == PieceFate::BrokeOff {
             piece.mesh = Some(Arc::new(mesh::closed(samples, world.grid, component, piece.bounds.min)));
         }
-        fallen.pieces.push(piece);
+        pieces.push(piece);
     }
-    let protected = protected_beside(rules, &fallen.pieces);
+    let protected = protected_beside(rules, &pieces);
     let air = air_around(&solid, &gone);
     for (&pos, layers) in &air {
-        let mut air = bits::and(layers, &bits::within(pos, world.grid.edit_bounds()));
+        let mut air = layers::and(layers, &layers::within(pos, world.grid.edit_bounds()));
         for &protected in &protected {
-            air = bits::without(&air, &bits::within(pos, protected));
+            air = layers::without(&air, &layers::within(pos, protected));
         }
         bits::include(&mut gone, pos, &air);
     }
-    let mut bricks: Vec<BrickPos> = gone.keys().copied().collect();
-    bricks.sort_unstable_by_key(|pos| (pos.0.x, pos.0.z, pos.0.y));
-    let take = |pos| take_out(samples, world.grid, pos, gone.get(&pos)?);
-    fallen.taken = bricks.into_iter().filter_map(take).collect();
-    fallen
+    let mut gone: Vec<(BrickPos, Layers)> = gone.into_iter().collect();
+    gone.sort_unstable_by_key(|(pos, _)| *pos);
+    for (pos, gone) in &gone {
+        take_out(samples, world.grid, *pos, gone, 0, &mut removed);
+    }
+    (pieces, removed)
 }
 
 /// Do the rules keep some part of a piece from being taken away, whatever the brush?
 fn keep(rules: &DiggingRules, component: &Component, piece: &LoosePiece) -> bool {
     let is_protected = |samples: &LatticeBox| {
-        let mut parts = component.iter().map(|(&key, layers)| (search::brick(key), layers));
         samples.intersection(piece.bounds).is_some()
-            && parts.any(|(pos, layers)| bits::and(layers, &bits::within(pos, *samples)) != NONE)
+            && search::bricks(component)
+                .any(|(pos, layers)| layers::and(layers, &layers::within(pos, *samples)) != NONE)
     };
     rules.bedrock.is_some_and(|bedrock| piece.bounds.min.y < bedrock)
         || rules.unbreakable.iter().any(|&material| piece.materials.of(material) > 0)
@@ -215,37 +205,30 @@ fn protected_beside(rules: Option<&DiggingRules>, pieces: &[LoosePiece]) -> Vec<
 /// The air that touches pieces and no other ground.
 fn air_around(solid: &Solid, pieces: &Samples) -> Samples {
     let mut air = Samples::default();
-    let rest = |pos: BrickPos| bits::without(&solid.layers(pos), pieces.get(&pos).unwrap_or(&NONE));
+    let rest = |pos: BrickPos| layers::without(&solid.layers(pos), pieces.get(&pos).unwrap_or(&NONE));
     for (pos, near) in bits::grown_set(pieces) {
-        let near = bits::without(&near, &solid.layers(pos));
+        let near = layers::without(&near, &solid.layers(pos));
         if near == NONE {
             continue;
         }
         let mut other = bits::grown(&rest(pos));
         for side in SIDES {
-            other = bits::or(&other, &bits::beyond(&rest(BrickPos(pos.0 - side)), side));
+            other = layers::or(&other, &bits::beyond(&rest(BrickPos(pos.0 - side)), side));
         }
-        bits::include(&mut air, pos, &bits::without(&near, &other));
+        bits::include(&mut air, pos, &layers::without(&near, &other));
     }
     air
 }
 
-/// What there is to say about a piece.
+/// Describes a piece; the settings decide what becomes of it.
 fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) -> LoosePiece {
     let mut runs: Vec<Run> = Vec::new();
     let (mut voxels, mut materials) = (0, MaterialCounts::default());
-    for (&key, layers) in piece {
-        let low = search::brick(key).origin();
-        for (row, y, z) in (0..8).flat_map(|y| (0..8).map(move |z| (layers[y] >> (z * 8) & 0xff, y, z))) {
-            let mut rest = row;
-            while rest != 0 {
-                let from = rest.trailing_zeros();
-                let len = (rest >> from).trailing_ones();
-                rest &= !(((1 << len) - 1) << from);
-                runs.push(Run { start: low + IVec3::new(from as i32, y as i32, z), len });
-            }
-        }
-        voxels += bits::count(layers);
+    for (pos, layers) in search::bricks(piece) {
+        runs.extend(
+            layers::indices(layers).map(|index| Run { start: pos.origin() + layers::offset(index), len: 1 }),
+        );
+        voxels += layers::count(layers);
     }
     runs.sort_unstable_by_key(|run| [run.start.y, run.start.z, run.start.x]);
     runs.dedup_by(|next, run| {
@@ -257,16 +240,7 @@ fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) ->
     for run in &runs {
         let end = run.start + IVec3::X * (run.len as i32 - 1);
         LatticeBox::include(&mut bounds, LatticeBox { min: run.start, max: end });
-        let (mut last, mut count) = (None, 0);
-        for x in 0..run.len as i32 {
-            let material = samples.material(run.start + IVec3::X * x);
-            if last != Some(material) {
-                last.into_iter().for_each(|last| materials.count_many(last, count));
-                (last, count) = (Some(material), 0);
-            }
-            count += 1;
-        }
-        last.into_iter().for_each(|last| materials.count_many(last, count));
+        materials.count_each((0..run.len as i32).map(|x| samples.material(run.start + IVec3::X * x)));
     }
     let bounds = bounds.unwrap_or(LatticeBox::point(IVec3::ZERO));
     LoosePiece { fate: settings.fate(voxels), bounds, voxels, materials, runs: runs.into(), mesh: None }

@@ -1,4 +1,4 @@
-//! The search for pieces that nothing ties to the deep.
+//! The search for pieces that are not anchored.
 //!
 //! From each seed a component of solid samples grows, brick by brick and the lowest brick first. Two things end it early:
 //! a brick without any stored one below it, whose solid samples stand on pristine ground all the way down; and a sample
@@ -6,38 +6,30 @@
 
 use std::collections::BTreeMap;
 
-use rustc_hash::FxHashMap;
-
-use super::bits::{self, NONE, SIDES, Samples};
-use crate::edits::DraftedBrick;
-use crate::lattice::{BrickPos, ChunkGrid, LatticeBox};
-use crate::volume::pristine_layers;
-use crate::volume::{Layers, SampleView};
+use super::bits::{self, SIDES, Samples};
+use crate::edits::{DraftedBrick, Overlay};
+use crate::lattice::{BrickPos, LatticeBox};
+use crate::terrain::world::World;
+use crate::volume::layers::{self, Layers, NONE};
+use crate::volume::{SampleView, pristine_layers};
 
 /// A world as the search sees it.
 pub(super) struct Solid<'a> {
+    world: &'a World,
     view: SampleView<'a>,
+    /// Bricks of the view that are newer than the world.
+    newer: Option<&'a Overlay>,
     /// Samples that belong to the world.
     bounds: LatticeBox,
-    stacks: &'a FxHashMap<(i32, i32), Vec<i32>>,
-    newer: Option<&'a Lowest>,
 }
 
-/// The lowest of newer bricks in each stack.
-pub(in crate::terrain) type Lowest = FxHashMap<(i32, i32), i32>;
-
 impl<'a> Solid<'a> {
-    /// A world with newer bricks over it, of which these are the lowest.
-    pub fn new(
-        view: SampleView<'a>,
-        grid: ChunkGrid,
-        stacks: &'a FxHashMap<(i32, i32), Vec<i32>>,
-        newer: Option<&'a Lowest>,
-    ) -> Self {
+    /// A view of a world.
+    pub fn new(world: &'a World, view: SampleView<'a>, newer: Option<&'a Overlay>) -> Self {
         // Pristine ground has no bottom.
-        let mut bounds = grid.edit_bounds();
+        let mut bounds = world.grid.edit_bounds();
         (bounds.min.y, bounds.max.y) = (i32::MIN, i32::MAX);
-        Self { view, bounds, stacks, newer }
+        Self { world, view, newer, bounds }
     }
 
     /// Which samples of a brick are solid.
@@ -46,43 +38,35 @@ impl<'a> Solid<'a> {
             Some(brick) => *brick.solid(),
             None => pristine_layers(self.view.ground(), pos),
         };
-        bits::and(&layers, &bits::within(pos, self.bounds))
+        layers::and(&layers, &layers::within(pos, self.bounds))
     }
 
     /// Is nothing stored in the brick's stack, from it downwards?
     fn is_bottomless(&self, pos: BrickPos) -> bool {
-        let stack = (pos.0.x, pos.0.z);
-        let lowest = self.stacks.get(&stack).and_then(|stack| stack.first());
-        [lowest, self.newer.and_then(|newer| newer.get(&stack))]
-            .iter()
-            .flatten()
-            .all(|&&lowest| pos.0.y < lowest)
+        let stored = self.world.stacks.get(&pos.stack()).and_then(|stack| stack.first().copied());
+        let newer = self.newer.and_then(|newer| newer.lowest(pos.stack()));
+        stored.into_iter().chain(newer).all(|lowest| pos.0.y < lowest)
     }
 }
 
-/// A set of samples in order of its bricks.
+/// A set of samples, by the [layer order](BrickPos::layer_order) of its bricks: the lowest first.
 pub(super) type Component = BTreeMap<[i32; 3], Layers>;
 
-/// The order of bricks: the lowest first.
-fn key(pos: BrickPos) -> [i32; 3] {
-    [pos.0.y, pos.0.z, pos.0.x]
-}
-
-/// And back.
-pub(super) fn brick([y, z, x]: [i32; 3]) -> BrickPos {
-    BrickPos(glam::IVec3::new(x, y, z))
+/// The bricks of a component with their samples, the lowest first.
+pub(super) fn bricks(component: &Component) -> impl Iterator<Item = (BrickPos, &Layers)> {
+    component.iter().map(|(&place, layers)| (BrickPos::from_layer_order(place), layers))
 }
 
 /// Every loose component of at most `largest` samples that holds one of the seeds, in order of their seeds.
 pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64) -> Vec<Component> {
     let mut order: Vec<(BrickPos, &Layers)> = seeds.iter().map(|(&pos, layers)| (pos, layers)).collect();
-    order.sort_unstable_by_key(|(pos, _)| key(*pos));
+    order.sort_unstable_by_key(|(pos, _)| pos.layer_order());
     let (mut seen, mut found) = (Samples::default(), Vec::new());
     let mut growth = Growth::default();
     for (pos, seeds) in order {
-        let seeds = bits::and(seeds, &solid.layers(pos));
+        let seeds = layers::and(seeds, &solid.layers(pos));
         loop {
-            let rest = bits::without(&seeds, seen.get(&pos).unwrap_or(&NONE));
+            let rest = layers::without(&seeds, seen.get(&pos).unwrap_or(&NONE));
             if rest == NONE {
                 break;
             }
@@ -91,7 +75,8 @@ pub(super) fn search(solid: &Solid, seeds: &Samples, largest: u64) -> Vec<Compon
                 bits::include(&mut seen, *pos, layers);
             }
             if is_loose {
-                found.push(growth.reached.iter().map(|(&pos, layers)| (key(pos), *layers)).collect());
+                found
+                    .push(growth.reached.iter().map(|(&pos, layers)| (pos.layer_order(), *layers)).collect());
             }
         }
     }
@@ -111,20 +96,20 @@ impl Growth {
     fn grow(&mut self, solid: &Solid, seen: &Samples, at: BrickPos, seed: &Layers, largest: u64) -> bool {
         self.reached.clear();
         self.waiting.clear();
-        self.waiting.insert(key(at), *seed);
+        self.waiting.insert(at.layer_order(), *seed);
         let mut voxels = 0;
         while let Some((next, from)) = self.waiting.pop_first() {
-            let pos = brick(next);
+            let pos = BrickPos::from_layer_order(next);
             let layers = solid.layers(pos);
             let before = self.reached.get(&pos).copied().unwrap_or(NONE);
-            let from = bits::without(&bits::and(&from, &layers), &before);
+            let from = layers::without(&layers::and(&from, &layers), &before);
             if from == NONE {
                 continue;
             }
-            let fresh = bits::without(&bits::flood(&from, &layers), &before);
+            let fresh = layers::without(&bits::flood(&from, &layers), &before);
             bits::include(&mut self.reached, pos, &fresh);
-            voxels += bits::count(&fresh);
-            let met = seen.get(&pos).is_some_and(|seen| bits::and(seen, &fresh) != NONE);
+            voxels += layers::count(&fresh);
+            let met = seen.get(&pos).is_some_and(|seen| layers::and(seen, &fresh) != NONE);
             if met || voxels > largest || solid.is_bottomless(pos) {
                 return false;
             }
@@ -133,11 +118,11 @@ impl Growth {
                 if beyond == NONE {
                     continue;
                 }
-                if seen.get(&beside).is_some_and(|seen| bits::and(seen, &beyond) != NONE) {
+                if seen.get(&beside).is_some_and(|seen| layers::and(seen, &beyond) != NONE) {
                     return false;
                 }
-                let waiting = self.waiting.entry(key(beside)).or_insert(NONE);
-                *waiting = bits::or(waiting, &beyond);
+                let waiting = self.waiting.entry(beside.layer_order()).or_insert(NONE);
+                *waiting = layers::or(waiting, &beyond);
             }
         }
         true
@@ -149,7 +134,7 @@ pub(super) fn seeds(before: &Solid, drafted: &[DraftedBrick]) -> Samples {
     let mut gone = Samples::default();
     for own in drafted {
         let was = before.layers(own.pos);
-        bits::include(&mut gone, own.pos, &bits::without(&was, own.brick.solid()));
+        bits::include(&mut gone, own.pos, &layers::without(&was, own.brick.solid()));
     }
     bits::grown_set(&gone)
 }

@@ -52,7 +52,7 @@ impl<'a> Care<'a> {
     fn new(work: &PreparedEdits<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
         let mut images = Images::default();
         let chisel = |tool| layout::chisel(tool, |image| images.first(image));
-        let chisels = work.tools.iter().map(chisel).collect();
+        let chisels = work.edits.iter().map(chisel).collect();
         if images.is_full {
             return Err(Fault::TooLarge(work.jobs().len()));
         }

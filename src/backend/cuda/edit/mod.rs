@@ -110,7 +110,7 @@ impl Session {
         let mut plan = Plan::default();
         uploads.plan(&mut plan);
         let job_list = plan.section::<EditJob>(jobs.len());
-        let tool_list = plan.section::<layout::Tool>(work.tools.len());
+        let tool_list = plan.section::<layout::Tool>(work.edits.len());
         let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
         care.iter_mut().for_each(|care| care.plan(&mut plan));
@@ -122,7 +122,7 @@ impl Session {
             bricks.take_many(&mut **device, jobs, all_jobs, targets, |job, target| EditJob { target, ..*job })
         };
         let write_lists = || {
-            fill(&work.tools, tools, MANY, |_, own| tool(own));
+            fill(&work.edits, tools, MANY, |_, own| tool(own));
             fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
         };
         side_by_side(are_many, take, write_lists).0?;
@@ -205,7 +205,7 @@ impl Session {
         };
         let finish = || {
             free_targets(bricks, edits.results.entries(jobs.len()), targets);
-            let mut effects = vec![EditEffect::default(); work.tools.len()];
+            let mut effects = vec![EditEffect::default(); work.edits.len()];
             enter_effects(&entries, &mut effects);
             effects
         };

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{Address, EditParams, NONE};
 use crate::brush::{SculptKernel, Stroke};
-use crate::edits::RunRules;
+use crate::edits::BatchRules;
 use crate::ground::GreyImage;
 use crate::lattice::LatticeBox;
 
@@ -80,7 +80,7 @@ pub(crate) fn chisel<'a>(
     tool: &'a crate::edits::PreparedEdit,
     image: impl FnOnce(&'a GreyImage) -> u32,
 ) -> Chisel {
-    let power = if tool.is_bound { tool.power.into() } else { -1 };
+    let power = if tool.is_ruled { tool.power.into() } else { -1 };
     let Some(of) = tool.sculptor.as_ref().and_then(SculptKernel::constants) else {
         return Chisel { power, ..Chisel::default() };
     };
@@ -117,7 +117,7 @@ pub(crate) fn chisel<'a>(
 }
 
 /// Rules, and what is protected.
-pub(crate) fn rules(run: &RunRules) -> (Rules, Vec<Protected>) {
+pub(crate) fn rules(run: &BatchRules) -> (Rules, Vec<Protected>) {
     let boxes = |samples: &LatticeBox| Protected { min: samples.min.to_array(), max: samples.max.to_array() };
     let (of, boxes): (_, Vec<Protected>) = (run.rules, run.protected.iter().map(boxes).collect());
     let mut rules = Rules {

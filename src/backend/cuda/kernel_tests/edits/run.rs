@@ -10,7 +10,7 @@ use super::super::{Device, Kernel, Slots, assert_same};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
-use crate::volume::{Brick, SampleView};
+use crate::volume::{Brick, SampleView, UniformKind};
 
 /// What room there is for output.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +84,7 @@ impl EditRun {
             });
         }
         let tools: Vec<Tool> =
-            work.tools.iter().map(|tool| layout::tool(tool.reach, tool.operation, &tool.evaluator)).collect();
+            work.edits.iter().map(|tool| layout::tool(tool.reach, tool.operation, &tool.evaluator)).collect();
 
         let bricks = device.upload(&slots.bricks);
         let results = device.output::<EditResult>(jobs.len());
@@ -117,7 +117,7 @@ impl EditRun {
                 (images.len() - image.samples().len()) as u32
             };
             let chisel = |tool: &crate::edits::PreparedEdit| layout::chisel(tool, &mut image);
-            let chisels: Vec<Chisel> = work.tools.iter().map(chisel).collect();
+            let chisels: Vec<Chisel> = work.edits.iter().map(chisel).collect();
             let rules = work.rules.as_ref().map_or(0, |rules| {
                 let (rules, boxes) = layout::rules(rules);
                 device.place(&[bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat())
@@ -190,7 +190,7 @@ impl EditRun {
             let (record, stored) = slot.split_at(RECORD_BYTES);
             let stored = stored.first_chunk().filter(|_| has(EditResult::HAS_MATERIALS));
             assert_same(&brick_of(&bytemuck::pod_read_unaligned(record), stored), brick, pos);
-            if let Some((sample, material)) = brick.uniform() {
+            if let Some(UniformKind { sample, material }) = brick.uniform() {
                 let sample = sample.distance().unwrap_or_default() as u16;
                 assert_eq!(result.uniform, u32::from(sample) | u32::from(material.0) << 16);
                 assert_eq!((result.record, result.material), (NONE, NONE));

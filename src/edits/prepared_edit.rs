@@ -1,0 +1,97 @@
+//! An edit with what is derived from it once.
+
+use glam::IVec3;
+
+use crate::brush::{Edit, Evaluator, Kind, SculptKernel};
+use crate::lattice::{ChunkGrid, LatticeBox};
+use crate::volume::DiggingRules;
+
+/// How far below and above itself new ground looks for its material, in voxels.
+pub(super) const LOOK: i32 = 64;
+
+/// An edit with what is derived from it once.
+pub(crate) struct PreparedEdit {
+    /// The part of the edit's reach that lies in the world.
+    pub reach: Option<LatticeBox>,
+    pub operation: Kind,
+    pub evaluator: Evaluator,
+    pub sculptor: Option<SculptKernel>,
+    pub power: u8,
+    /// May a digging rule restrict it? If not, it does what it would do without any rule.
+    pub is_ruled: bool,
+}
+
+impl PreparedEdit {
+    pub fn new(grid: ChunkGrid, edit: &Edit, rules: Option<&DiggingRules>) -> Self {
+        let mut own = Self {
+            reach: reach(grid, edit),
+            operation: edit.kind(),
+            evaluator: edit.evaluator(),
+            sculptor: edit.sculptor(),
+            power: edit.power(),
+            is_ruled: false,
+        };
+        own.set_rules(rules);
+        own
+    }
+
+    /// Finds out whether rules may restrict the edit.
+    pub(super) fn set_rules(&mut self, rules: Option<&DiggingRules>) {
+        self.is_ruled =
+            rules.zip(self.reach).is_some_and(|(rules, own)| may_restrict(rules, own, self.power));
+    }
+
+    /// Does the edit read other samples than those that it changes?
+    pub fn looks_around(&self) -> bool {
+        self.sculptor.is_some() || self.is_ruled
+    }
+
+    /// The samples that the edit reads, if it reads others than those that it changes.
+    pub(super) fn reads(&self) -> Option<LatticeBox> {
+        let all = self.reach.filter(|_| self.looks_around())?.grown(1);
+        let has_to_look = self.sculptor.as_ref().is_some_and(|own| own.material().is_none());
+        let look = IVec3::Y * if has_to_look { LOOK } else { 0 };
+        Some(LatticeBox { min: all.min - look, max: all.max + look })
+    }
+
+    /// May the edit change some of these samples? If not, it certainly changes none.
+    pub(super) fn reaches(&self, samples: LatticeBox) -> bool {
+        let reached = self.reach.and_then(|reach| reach.intersection(samples));
+        reached.is_some_and(|samples| !self.evaluator.is_out_of_reach(samples))
+    }
+}
+
+/// The part of an edit's reach that lies in the world; `None` when it lies outside.
+pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
+    edit.reach().intersection(grid.edit_bounds())
+}
+
+/// May some rule restrict an edit of this power that changes these samples?
+fn may_restrict(rules: &DiggingRules, samples: LatticeBox, power: u8) -> bool {
+    let around = samples.grown(1);
+    !rules.unbreakable.is_empty()
+        || rules.hardness.values().any(|&hardness| hardness > power)
+        || rules.bedrock.is_some_and(|bedrock| around.min.y < bedrock)
+        || rules.protected.iter().any(|own| own.intersection(around).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::MaterialId;
+
+    #[test]
+    fn edits_that_no_rule_can_restrict_are_told_apart() {
+        let samples = LatticeBox::point(IVec3::ZERO).grown(4);
+        let restricts = |rules: DiggingRules| may_restrict(&rules, samples, 100);
+        let (none, at) = (DiggingRules::default, |x| LatticeBox::point(IVec3::new(x, 0, 0)));
+        assert!(!restricts(none()) && !restricts(none().with_hardness(MaterialId(1), 100)));
+        assert!(restricts(none().with_hardness(MaterialId(1), 101)));
+        assert!(restricts(none().with_unbreakable(MaterialId(1))));
+        // A neighbour that stays holds the surface.
+        assert!(restricts(none().with_bedrock(-4)) && !restricts(none().with_bedrock(-5)));
+        assert!(restricts(none().with_protected(at(5))) && !restricts(none().with_protected(at(6))));
+        let inverted = LatticeBox { min: IVec3::splat(i32::MAX), max: IVec3::splat(-i32::MAX) };
+        assert!(!restricts(none().with_protected(inverted)));
+    }
+}

@@ -1,0 +1,61 @@
+//! Drafts a group of edits: all at once, or one by one where each looks for the ground that it cuts off.
+
+use std::collections::BTreeMap;
+
+use super::loose::{self, LoosePiece, LooseSettings};
+use super::queue::Submission;
+use super::world::World;
+use crate::brush::{Edit, Operation};
+use crate::edits::{Draft, Drafter, MergedBricks};
+use crate::volume::DiggingRules;
+
+/// Loose pieces by the number of the edit that cut them off.
+pub(super) type LoosePieces = BTreeMap<usize, Vec<LoosePiece>>;
+
+/// What a group of edits makes of the samples so far.
+pub(super) fn draft_group(
+    world: &World,
+    drafter: &mut Drafter,
+    group: &[Submission],
+) -> (Draft, LoosePieces) {
+    let edits: Vec<&Edit> = group.iter().filter_map(|submission| submission.edit.as_ref().ok()).collect();
+    let terms = group.first().map(|first| &first.terms);
+    let rules = terms.and_then(|terms| terms.rules.as_deref());
+    match terms.and_then(|terms| terms.loose.as_ref()) {
+        Some(settings) => one_by_one(world, drafter, &edits, rules, settings),
+        None => (drafter.draft(&edits, rules), LoosePieces::new()),
+    }
+}
+
+/// Can the operation turn solid samples into air?
+fn can_remove(edit: &Edit) -> bool {
+    !matches!(edit.operation(), Operation::Add { .. } | Operation::Paint { .. })
+}
+
+/// Drafts each edit that can remove ground by itself; what it cuts off falls before the next edit.
+fn one_by_one(
+    world: &World,
+    drafter: &mut Drafter,
+    edits: &[&Edit],
+    rules: Option<&DiggingRules>,
+    settings: &LooseSettings,
+) -> (Draft, LoosePieces) {
+    let (mut all, mut pieces) = (Draft::default(), LoosePieces::new());
+    let mut bricks = MergedBricks::default();
+    for group in edits.chunk_by(|a, b| !can_remove(a) && !can_remove(b)) {
+        let mut draft = drafter.draft(group, rules);
+        let can_cut_off = group.iter().any(|edit| can_remove(edit));
+        let seeds = can_cut_off.then(|| loose::seeds(world, drafter.samples(), &draft.bricks));
+        drafter.overlay.lay(&draft.bricks);
+        if let Some(seeds) = seeds {
+            let (found, removed) = loose::fall(world, rules, &drafter.overlay, &seeds, settings);
+            drafter.extend(&mut draft, removed);
+            if !found.is_empty() {
+                pieces.insert(all.effects.len(), found);
+            }
+        }
+        all.effects.append(&mut draft.effects);
+        bricks.add(draft.bricks);
+    }
+    (Draft { bricks: bricks.into_list(), hash: drafter.hash, ..all }, pieces)
+}

@@ -1,0 +1,91 @@
+//! What the plugin asks of a terrain besides what a game may ask.
+
+use super::commit::Commit;
+use super::history::{DeferredDrop, HistoryStep};
+use super::model::{StaleCommit, Terrain};
+use super::queue::{Request, Submission};
+use super::receipt::Receipt;
+use super::transaction::{Transaction, Work};
+use super::unseen::Unseen;
+use super::world::Version;
+
+impl Terrain {
+    /// Is a transaction under way that the plugin began?
+    pub(crate) fn waits_for_plugin(&self) -> bool {
+        self.in_flight.as_ref().is_some_and(|waiting| waiting.is_plugins)
+    }
+
+    /// Forgets what is queued and under way; all of it has been answered.
+    pub(crate) fn forget(&mut self) {
+        self.in_flight = None;
+        self.unseen = None;
+        self.queue.clear();
+    }
+
+    /// Tags of all brushes without a receipt, in order.
+    pub(crate) fn unanswered(&self) -> impl Iterator<Item = u64> {
+        self.submissions_in_flight().chain(self.queue.edits()).map(|submission| submission.tag)
+    }
+
+    fn submissions_in_flight(&self) -> impl Iterator<Item = &Submission> {
+        self.in_flight.iter().flat_map(|waiting| match &waiting.work {
+            Work::Edits(submissions) => &submissions[..],
+            Work::Step(..) => &[],
+        })
+    }
+
+    /// All steps through history without a receipt, in order.
+    pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
+        let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
+            Work::Step(step, _) => Some(step),
+            Work::Edits(_) => None,
+        });
+        let queued = self.queue.iter().filter_map(|request| match request {
+            Request::Step(step) => Some(*step),
+            Request::Edit(_) => None,
+        });
+        in_flight.chain(queued)
+    }
+
+    /// From now on the plugin shows this world, and wants to know what else is committed to it.
+    pub(crate) fn watch(&mut self) {
+        self.unseen = Some(Unseen::nothing(self.world.version()));
+    }
+
+    /// What the game committed since `shown`; `None` where that is not known.
+    pub(crate) fn take_unseen(&mut self, shown: Version) -> Option<Unseen> {
+        let now = self.world.version();
+        let unseen = self.unseen.replace(Unseen::nothing(now))?;
+        (unseen.follows(shown) && unseen.version() == now).then_some(unseen)
+    }
+
+    /// The commit that rejects all of the transaction with this ticket, because its task panicked; `None` if it is not under
+    /// way.
+    pub(crate) fn rejected(&self, ticket: u64) -> Option<Commit> {
+        let waiting = self.in_flight.as_ref().filter(|waiting| waiting.ticket == ticket)?;
+        let work = waiting.work.clone();
+        Some(Transaction { ticket, world: self.snapshot(), work, engine: None }.rejected())
+    }
+
+    /// Is the transaction of this ticket under way?
+    pub(crate) fn waits_for(&self, ticket: u64) -> bool {
+        self.in_flight.as_ref().is_some_and(|waiting| waiting.ticket == ticket)
+    }
+
+    /// Forgets what is not shown yet; the plugin has to show all of the world again.
+    pub(crate) fn forget_unseen(&mut self) {
+        self.unseen = None;
+    }
+
+    /// Commits a transaction of the plugin's, which shows it by itself. The caller may drop what is no longer needed elsewhere.
+    pub(crate) fn commit_shown(
+        &mut self,
+        commit: Commit,
+    ) -> Result<(Vec<Receipt>, DeferredDrop), StaleCommit> {
+        let done = self.install(commit)?;
+        if let Some(unseen) = &mut self.unseen {
+            *unseen = Unseen::nothing(self.world.version());
+        }
+        Ok(done)
+    }
+}

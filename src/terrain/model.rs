@@ -1,0 +1,286 @@
+//! The terrain: a world, the edits that wait for it, and the one transaction that may be under way.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::sync::Arc;
+
+use super::commit::Commit;
+use super::history::{DeferredDrop, HistoryReceipt, UndoStack};
+use super::loose::LooseSettings;
+use super::queue::{Queue, Request, Taken};
+use super::receipt::Receipt;
+use super::settings::{TerrainError, TerrainSettings};
+use super::transaction::{Transaction, Work};
+#[cfg(feature = "plugin")]
+use super::unseen::Unseen;
+use super::world::{World, unique};
+use crate::backend::Engine;
+use crate::ground::Ground;
+use crate::lattice::LatticeBox;
+use crate::volume::{DiggingRules, RulesError};
+
+/// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
+pub(super) const UNDO_BUDGET: usize = 64 << 20;
+
+/// Answers that nobody takes are kept up to this many; then the oldest are dropped.
+const KEPT_ANSWERS: usize = 1 << 16;
+
+/// Keeps one more answer.
+fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
+    if answers.len() == KEPT_ANSWERS {
+        answers.pop_front();
+    }
+    answers.push_back(answer);
+}
+
+/// A commit that its terrain does not wait for: from another terrain, or from a transaction that was given up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "this terrain does not wait for that commit; its transaction was given up, or belongs to another terrain"
+)]
+pub struct StaleCommit;
+
+/// A world, the edits that wait for it, and the one transaction that may be under way.
+///
+/// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
+/// to it. Committing by oneself, with [`apply`](Self::apply) say, works too: what that changed is shown some frames later.
+///
+/// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
+/// any other; a parent may scale it further.
+///
+/// To change levels, insert a new one on the same entity. Assigned through `&mut Terrain`, a new one is shown as well, but
+/// what waited in the old one goes without a receipt, and debris that fell from it stays.
+pub struct Terrain {
+    pub(super) world: Arc<World>,
+    engine: Option<Engine>,
+    voxel_size: f32,
+    pub(super) queue: Queue,
+    pub(super) in_flight: Option<InFlight>,
+    pub(super) answered: VecDeque<Receipt>,
+    pub(super) rules: Option<Arc<DiggingRules>>,
+    pub(super) loose: Option<LooseSettings>,
+    pub(super) undo_stack: UndoStack,
+    pub(super) step_receipts: VecDeque<HistoryReceipt>,
+    /// What the game committed since the plugin last showed the world; `None` while the plugin does not show it.
+    #[cfg(feature = "plugin")]
+    pub(super) unseen: Option<Unseen>,
+}
+
+impl fmt::Debug for Terrain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Terrain")
+            .field("world", &self.world)
+            .field("voxel_size", &self.voxel_size)
+            .field("waiting", &self.queue.len())
+            .field("is_busy", &self.in_flight.is_some())
+            .finish_non_exhaustive()
+    }
+}
+
+/// What a terrain keeps of the transaction under way.
+pub(super) struct InFlight {
+    pub ticket: u64,
+    pub work: Work,
+    /// How much work that is, as the queue counts.
+    estimate: u64,
+    /// Does the plugin run it?
+    #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
+    pub is_plugins: bool,
+}
+
+impl Terrain {
+    /// A terrain that nobody has edited yet.
+    ///
+    /// # Errors
+    /// When the chunk size or the voxel size is out of range.
+    pub fn new(ground: impl Into<Arc<Ground>>, settings: &TerrainSettings) -> Result<Self, TerrainError> {
+        settings.check()?;
+        let world = World::new(ground.into(), settings.chunk_size as i32);
+        Ok(Self {
+            world: Arc::new(world),
+            engine: None,
+            voxel_size: settings.voxel_size,
+            queue: Queue::default(),
+            in_flight: None,
+            answered: VecDeque::new(),
+            rules: None,
+            loose: None,
+            undo_stack: UndoStack::new(UNDO_BUDGET),
+            step_receipts: VecDeque::new(),
+            #[cfg(feature = "plugin")]
+            unseen: None,
+        })
+    }
+
+    /// From now on, transactions run on this engine. The world is the same whichever it is. Without one of its own a
+    /// terrain runs on the processor, or on whatever the plugin has.
+    pub fn set_engine(&mut self, engine: Engine) {
+        self.engine = Some(engine);
+    }
+
+    /// Edits that are submitted from now on obey these rules; those that wait or are under way keep theirs, and what is there
+    /// stays as it is. A journal is replayed exactly only if rules change at the same edits.
+    ///
+    /// # Errors
+    /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is changed
+    /// then.
+    pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
+        rules.check()?;
+        self.rules = (!rules.is_empty()).then(|| Arc::new(rules));
+        Ok(())
+    }
+
+    /// What edits may do; `None`: everything.
+    pub fn rules(&self) -> Option<&DiggingRules> {
+        self.rules.as_deref()
+    }
+
+    /// The engine of its own, if it has one.
+    pub fn engine(&self) -> Option<&Engine> {
+        self.engine.as_ref()
+    }
+
+    /// Metres along a voxel's side.
+    pub fn voxel_size(&self) -> f32 {
+        self.voxel_size
+    }
+
+    /// The world as last committed.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The world as last committed, to be read elsewhere. Drop it soon: while a snapshot is held, the next transaction has to
+    /// copy the world's index, or its commit does, if the snapshot was taken in between.
+    pub fn snapshot(&self) -> Arc<World> {
+        Arc::clone(&self.world)
+    }
+
+    /// Edits that are submitted from now on look for pieces of ground that they cut off, and receipts list them; `None`
+    /// turns that off, as it is at first. A terrain whose world has to be the same elsewhere needs the same settings there.
+    pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
+        self.loose = settings;
+    }
+
+    /// What edits look for, if they do.
+    pub fn loose(&self) -> Option<&LooseSettings> {
+        self.loose.as_ref()
+    }
+
+    /// Brushes, and steps through history, that wait for their transaction.
+    pub fn queued(&self) -> usize {
+        self.queue.len()
+    }
+
+    /// Is a transaction under way?
+    pub fn is_busy(&self) -> bool {
+        self.in_flight.is_some()
+    }
+
+    /// Makes one transaction of what is queued: of the brushes up to the first step through history, as many as the
+    /// [limits](Self::set_work_limits) allow, or of such a step.
+    /// `None` when nothing waits, or when one is under way already. Run it anywhere, then hand its commit to
+    /// [`commit`](Self::commit).
+    ///
+    /// Steps that find nothing to undo or redo need no transaction; they are answered at once.
+    #[must_use = "the terrain waits for the commit of its transaction"]
+    pub fn begin(&mut self) -> Option<Transaction> {
+        self.begin_for(false)
+    }
+
+    pub(crate) fn begin_for(&mut self, is_plugins: bool) -> Option<Transaction> {
+        if self.is_busy() {
+            return None;
+        }
+        let (work, estimate) = loop {
+            match self.queue.take()? {
+                (Taken::Edits(edits), estimate) => break (Work::Edits(edits), estimate),
+                (Taken::Step(step), estimate) => match self.undo_stack.next(step) {
+                    Some(target) => break (Work::Step(step, Arc::clone(target)), estimate),
+                    None => {
+                        self.queue.finish(estimate);
+                        self.answer_step(step.nothing());
+                    }
+                },
+            }
+        };
+        let ticket = unique();
+        self.in_flight = Some(InFlight { ticket, work: work.clone(), estimate, is_plugins });
+        Some(Transaction { ticket, world: self.snapshot(), work, engine: self.engine.clone() })
+    }
+
+    /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
+    ///
+    /// # Errors
+    /// When the commit is not that of the transaction under way; nothing is changed then.
+    pub fn commit(&mut self, commit: Commit) -> Result<Vec<Receipt>, StaleCommit> {
+        #[cfg(feature = "plugin")]
+        let news = self.unseen.is_some().then(|| Unseen::of(&commit, self.world.version()));
+        let (receipts, _) = self.install(commit)?;
+        #[cfg(feature = "plugin")]
+        if let (Some(unseen), Some(news)) = (&mut self.unseen, news) {
+            unseen.add(news, self.world.version());
+        }
+        Ok(receipts)
+    }
+
+    /// The same without a note for the plugin; the caller may drop what is no longer needed elsewhere.
+    pub(super) fn install(
+        &mut self,
+        mut commit: Commit,
+    ) -> Result<(Vec<Receipt>, DeferredDrop), StaleCommit> {
+        let done = self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket).ok_or(StaleCommit)?;
+        let mut copy = commit.copy.take();
+        if Arc::get_mut(&mut self.world).is_none()
+            && let Some(copy) = copy.take_if(|copy| copy.version() == self.world.version())
+        {
+            self.world = copy;
+        }
+        let installed = commit.install(Arc::make_mut(&mut self.world));
+        self.queue.finish(done.estimate);
+        installed.step.into_iter().for_each(|receipt| self.answer_step(receipt));
+        let mut dropped = DeferredDrop::default();
+        dropped.copy = copy;
+        for replaced in installed.replaced {
+            match &done.work {
+                Work::Edits(_) => self.undo_stack.record(replaced, &mut dropped),
+                Work::Step(step, used) => self.undo_stack.record_step(*step, used, replaced, &mut dropped),
+            }
+        }
+        Ok((installed.receipts, dropped))
+    }
+
+    /// Keeps the receipt of a brush until it is taken.
+    pub(super) fn answer(&mut self, receipt: Receipt) {
+        keep(&mut self.answered, receipt);
+    }
+
+    /// Keeps the receipt of a step until it is taken.
+    pub(super) fn answer_step(&mut self, receipt: HistoryReceipt) {
+        keep(&mut self.step_receipts, receipt);
+    }
+
+    /// Gives up the transaction that is under way, say because its task was lost. Its work is queued again, in front.
+    pub fn abandon(&mut self) {
+        let Some(lost) = self.in_flight.take() else { return };
+        match lost.work {
+            Work::Edits(submissions) => self.queue.put_back(submissions.iter().cloned().map(Request::Edit)),
+            Work::Step(step, _) => self.queue.put_back(std::iter::once(Request::Step(step))),
+        }
+    }
+
+    /// Will no queued or running edit change these samples? A queued step through history counts as reaching all that history
+    /// reaches. Loose pieces are not foreseen: what an edit cuts off may reach farther than the edit.
+    pub fn is_ready(&self, bounds: LatticeBox) -> bool {
+        let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
+            Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
+            Work::Step(_, target) => target.bounds.is_none_or(|own| own.intersection(bounds).is_none()),
+        });
+        let mut queued = self.queue.iter();
+        in_flight
+            && queued.all(|request| match request {
+                Request::Edit(submission) => submission.misses(bounds),
+                Request::Step(_) => !self.undo_stack.reaches(bounds),
+            })
+    }
+}

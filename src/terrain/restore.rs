@@ -1,0 +1,74 @@
+//! A step through history as a transaction: bricks, fields and mask of another time are put in place.
+
+use std::sync::Arc;
+
+use web_time::Instant;
+
+use super::change::replaced_bytes;
+use super::commit::Commit;
+use super::dirty::dirty_cells;
+use super::field_log::news_of_replaced;
+use super::history::{HistoryReceipt, HistoryStep, Restored, UndoDelta};
+use super::redraw;
+use super::stages::Stages;
+use super::transaction::Transaction;
+use crate::backend::Compute;
+use crate::edits::{EditEffect, count_replaced};
+use crate::lattice::LatticeBox;
+use crate::surface::vertex::WorldView;
+use crate::surface::{Mask, MaskView};
+use crate::volume::{Brick, Fields, pristine_layers};
+
+/// Puts in place what a step through history holds.
+pub(super) fn step(
+    transaction: &Transaction,
+    step: HistoryStep,
+    target: &UndoDelta,
+    backend: &dyn Compute,
+) -> Commit {
+    let (world, start, mut stages) = (&*transaction.world, Instant::now(), Stages::default());
+    let (change, mut bricks) = (target.change.clone(), Vec::with_capacity(target.change.bricks.len()));
+    let (mut effect, mut changed) = (EditEffect::default(), Vec::with_capacity(change.bricks.len()));
+    Stages::time(&mut stages.edit, || {
+        for (pos, after) in &change.bricks {
+            let before = world.bricks.get(pos).map(Arc::as_ref);
+            let own = count_replaced(&world.ground, *pos, [before, after.as_deref()], &mut effect);
+            let pristine = || Arc::new(Brick::pristine(pristine_layers(&world.ground, *pos)));
+            let brick = after.clone().unwrap_or_else(pristine);
+            changed.extend(own.map(|own| (*pos, own)));
+            bricks.push((*pos, brick));
+        }
+    });
+    let mut mask = Mask::default();
+    change.mask.iter().for_each(|&(word, cells)| mask.lay_word(word, cells));
+    let latest: Vec<_> = bricks.iter().map(|(pos, brick)| (*pos, brick.as_ref())).collect();
+    let view = WorldView {
+        samples: world.samples().under(&latest),
+        mask: MaskView::new(&world.mask).over(&mask),
+        grid: world.grid,
+    };
+    let dirty = Stages::time(&mut stages.meshing, || {
+        dirty_cells(world.grid, &changed, |&(pos, own)| (pos, own, false))
+    });
+    let meshes = redraw::updates(world, &view, backend, &dirty, &mask, &mut stages);
+
+    let nothing = Fields::default();
+    let news = change.fields.iter().flat_map(|(chunk, after)| {
+        let before = world.fields.get(chunk).unwrap_or(&nothing);
+        news_of_replaced(before, after).into_iter().map(|news| (*chunk, news))
+    });
+    let news = news.collect();
+    let bounds = changed.iter().map(|&(_, own)| own).reduce(LatticeBox::union);
+    let EditEffect { removed, added, painted, .. } = effect;
+    let restored = Restored { tags: target.tags.clone(), bounds, removed, added, painted };
+    let replaced_bytes = change.bricks.iter().map(|(pos, _)| replaced_bytes(world, *pos)).sum();
+    let sample_hash = change.sample_hash;
+    let delta = UndoDelta::new(change, replaced_bytes, target.group, target.tags.clone());
+    stages.whole = start.elapsed();
+    Commit {
+        step: Some(HistoryReceipt { step, outcome: Ok(restored) }),
+        news,
+        stages,
+        ..transaction.commit(vec![delta], sample_hash, meshes)
+    }
+}

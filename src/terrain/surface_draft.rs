@@ -1,0 +1,134 @@
+//! What the surface of one tile or chunk is made from, without the rest of the world.
+
+#[cfg(any(feature = "plugin", test))]
+use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
+
+#[cfg(any(feature = "plugin", test))]
+use super::surface::ChunkSurface;
+#[cfg(any(feature = "plugin", test))]
+use super::world::Drawn;
+use super::world::World;
+use crate::ground::Ground;
+use crate::lattice::{ChunkGrid, TilePos};
+use crate::surface::mask::Borders;
+use crate::surface::tile::{self, Rings};
+use crate::surface::vertex::WorldView;
+use crate::surface::{Indices, SurfaceMesh};
+
+/// What a tile draws: its columns stay as they are, so only its rings and indices change.
+#[derive(Clone, Debug)]
+pub struct TileUpdate {
+    pub(crate) tile: TilePos,
+    pub(crate) grid: ChunkGrid,
+    pub(crate) ground: Arc<Ground>,
+    /// The rings; their vertices follow after those of the columns.
+    pub(crate) rings: Arc<Rings>,
+    borders: Borders,
+    indices: OnceLock<Indices>,
+}
+
+impl TileUpdate {
+    /// A tile as a view has it, with rings that `rings` makes.
+    pub(super) fn new(
+        world: &World,
+        view: &WorldView,
+        tile: TilePos,
+        rings: impl FnOnce(&Borders) -> Arc<Rings>,
+    ) -> Self {
+        let borders = tile::borders(view, tile);
+        let (rings, ground) = (rings(&borders), Arc::clone(&world.ground));
+        Self { tile, grid: view.grid, ground, rings, borders, indices: OnceLock::new() }
+    }
+
+    /// The whole list of indices; made when it is first asked for.
+    pub fn indices(&self) -> &Indices {
+        self.indices.get_or_init(|| tile::indices(self.grid, self.tile, &self.borders, &self.rings))
+    }
+
+    /// The tile's whole mesh, its columns included.
+    pub fn mesh(&self) -> SurfaceMesh {
+        let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
+        SurfaceMesh { vertices, indices: self.indices().clone() }
+    }
+}
+
+/// All that the surface of one tile or chunk is made from, to make it on another thread. Unlike a snapshot it does not hold
+/// the world, so the next commit has nothing to copy.
+#[cfg(any(feature = "plugin", test))]
+pub(crate) enum SurfaceDraft {
+    Nothing,
+    /// A tile; its columns can be made in other forms from the ground.
+    Tile(TileUpdate),
+    Chunk(Arc<ChunkSurface>),
+}
+
+#[cfg(any(feature = "plugin", test))]
+impl World {
+    /// What the surface of a tile or chunk is made from, as it is now.
+    pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
+        match drawn {
+            Drawn::Tile(tile) if self.grid.has_tile(tile) => {
+                let rings = |_: &Borders| self.rings.get(&tile).cloned().unwrap_or_default();
+                SurfaceDraft::Tile(TileUpdate::new(self, &self.view(), tile, rings))
+            }
+            Drawn::Tile(_) => SurfaceDraft::Nothing,
+            Drawn::Chunk(chunk) => {
+                self.surfaces.get(&chunk).cloned().map_or(SurfaceDraft::Nothing, SurfaceDraft::Chunk)
+            }
+        }
+    }
+}
+
+#[cfg(any(feature = "plugin", test))]
+impl SurfaceDraft {
+    /// Is nothing drawn?
+    pub fn is_empty(&self) -> bool {
+        match self {
+            Self::Nothing => true,
+            Self::Tile(tile) => tile.indices().is_empty(),
+            Self::Chunk(chunk) => chunk.is_empty(),
+        }
+    }
+
+    /// The surface, relative to the origin of the tile or chunk.
+    pub fn surface(&self) -> Cow<'_, SurfaceMesh> {
+        match self {
+            Self::Nothing => Cow::default(),
+            Self::Tile(tile) => Cow::Owned(tile.mesh()),
+            Self::Chunk(chunk) => Cow::Borrowed(chunk.mesh()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::prelude::*;
+
+    #[test]
+    fn a_draft_makes_the_surface_that_the_world_has() {
+        let noise = NoiseHeights { seed: 5, scale: 20.0, amplitude: 9.0, base: 4.0, ..Default::default() };
+        let ground = Ground::from_noise(70, 60, &noise).expect("valid hills");
+        let settings = TerrainSettings { chunk_size: 16, ..Default::default() };
+        let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
+        for number in 0..12 {
+            let place =
+                Vec3::new((number * 23 % 70) as f32, (number * 7 % 12) as f32, (number * 31 % 60) as f32);
+            terrain.apply([Brush::dig(Shape::sphere(place, 5.0))]);
+            if number % 4 == 3 {
+                terrain.undo();
+            }
+            let world = terrain.world();
+            for (drawn, mesh) in world.drawn() {
+                let draft = world.draft(drawn);
+                assert!(*draft.surface() == mesh, "{drawn:?} after {number} digs");
+                assert_eq!(draft.is_empty(), mesh.is_empty());
+            }
+        }
+        let outside = Drawn::Tile(TilePos { x: 90, z: 0 });
+        assert!(terrain.world().draft(outside).is_empty());
+    }
+}
