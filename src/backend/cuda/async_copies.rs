@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex, Weak};
 
-use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::device::{Device, Fault, HostMemory, Launch, Mark};
 use super::lock;
 
 /// A copy that is under way.
@@ -153,8 +153,8 @@ impl Device for AsyncCopies {
         self.own.copy(from, to, bytes)
     }
 
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
-        self.own.launch(kernel, blocks, params)
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        self.own.launch(launch)
     }
 
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {

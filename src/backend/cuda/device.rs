@@ -75,6 +75,40 @@ impl Kernel {
     }
 }
 
+/// A kernel's parameters. The kernel reads exactly this struct, see `layout.cuh`.
+pub(super) trait KernelParams: bytemuck::Pod {
+    /// The kernel that takes them.
+    const KERNEL: Kernel;
+}
+
+/// A kernel and its parameters. Only made from [`KernelParams`], so a kernel is never launched with another's.
+#[derive(Clone, Copy)]
+pub(super) struct Launch<'a> {
+    kernel: Kernel,
+    blocks: u32,
+    params: &'a [u8],
+}
+
+impl<'a> Launch<'a> {
+    /// Launches the kernel of these parameters, a block for each of its jobs.
+    pub fn new<P: KernelParams>(blocks: u32, params: &'a P) -> Self {
+        Self { kernel: P::KERNEL, blocks, params: bytemuck::bytes_of(params) }
+    }
+
+    pub const fn kernel(self) -> Kernel {
+        self.kernel
+    }
+
+    pub const fn blocks(self) -> u32 {
+        self.blocks
+    }
+
+    /// The bytes of the parameters.
+    pub const fn params(self) -> &'a [u8] {
+        self.params
+    }
+}
+
 /// Memory of the host that a device copies from and to.
 pub(super) trait HostMemory: Send + Sync {
     /// Its bytes. Not to be looked at between the start of a copy and the next [`Device::wait`].
@@ -126,8 +160,8 @@ pub(super) trait Device: Send {
     /// Copies on the device.
     fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault>;
 
-    /// Runs a kernel, a block for each of its jobs.
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault>;
+    /// Runs a kernel.
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault>;
 
     /// Marks what was asked for up to now.
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault>;

@@ -15,7 +15,7 @@ use cudarc::driver::{CudaContext, CudaEvent, CudaStream, DriverError, result};
 use rustc_hash::FxHashSet;
 use web_time::Instant;
 
-use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::device::{Device, Fault, HostMemory, Kernel, Launch, Mark};
 use super::layout::THREADS;
 use crate::backend::CardChoice;
 
@@ -339,12 +339,12 @@ impl Device for Card {
 
     fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
         self.bind()?;
-        // SAFETY: both addresses are from `alloc`, or memory that was imported and is kept until the copy is waited for,
-        // with so many bytes each, and do not overlap.
+        // SAFETY: both addresses are from `alloc`, with so many bytes each, and do not overlap.
         unsafe { result::memcpy_dtod_async(to, from, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        let (blocks, params) = (launch.blocks(), launch.params());
         if blocks == 0 {
             return Ok(());
         }
@@ -357,8 +357,8 @@ impl Device for Card {
         let mut words = vec![0u64; params.len().div_ceil(8)];
         bytemuck::cast_slice_mut(&mut words)[..params.len()].copy_from_slice(params);
         let mut list = [words.as_mut_ptr().cast::<c_void>()];
-        let (function, stream) = (self.kernels[kernel as usize], self.stream.cu_stream());
-        // SAFETY: `params` is the kernel's parameter struct as the ABI has it. Its addresses are from `alloc` or from
+        let (function, stream) = (self.kernels[launch.kernel() as usize], self.stream.cu_stream());
+        // SAFETY: `Launch` holds the kernel's own parameter struct, laid out as in `layout.cuh`. Its addresses are from `alloc` or from
         // mapped memory, each with as many entries as the struct says, and live until the next `wait`.
         unsafe { result::launch_kernel(function, (blocks, 1, 1), (THREADS, 1, 1), 0, stream, &mut list) }
             .map_err(failed)

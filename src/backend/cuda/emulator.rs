@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::device::{Device, Fault, HostMemory, Launch, Mark};
 
 /// The process; it ends with this.
 pub(super) struct Emulator {
@@ -164,8 +164,9 @@ impl Device for Emulator {
         self.send(&all)
     }
 
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
-        self.ask(&[LAUNCH, kernel as u64, u64::from(blocks), params.len() as u64])?;
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        let params = launch.params();
+        self.ask(&[LAUNCH, launch.kernel() as u64, u64::from(launch.blocks()), params.len() as u64])?;
         self.send(params)?;
         match self.answer()? {
             0 => Ok(()),

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::device::{Device, Fault, HostMemory, Kernel};
+use super::device::{Device, Fault, HostMemory, Launch};
 use super::layout::{COLUMNS, HeightsParams};
 use super::session::Session;
 use super::staging::Plan;
@@ -103,7 +103,7 @@ fn fill(
     for part in heights.chunks_mut(slice) {
         params.count = part.len() as u32;
         let blocks = part.len().div_ceil(COLUMNS) as u32;
-        device.launch(Kernel::Heights, blocks, bytemuck::bytes_of(&params))?;
+        device.launch(Launch::new(blocks, &params))?;
         device.download(params.heights, &mut **next, 0..size_of_val(part))?;
         params.first += params.count;
         if let Some(part) = arrived.replace(part) {

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 
-use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::device::{Device, Fault, HostMemory, Launch, Mark};
 use crate::backend::EngineSettings;
 
 /// Of a device's free memory, the part that is used by default; and the most of it.
@@ -154,8 +154,8 @@ impl Device for Budgeted {
         self.own.copy(from, to, bytes)
     }
 
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
-        self.own.launch(kernel, blocks, params)
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        self.own.launch(launch)
     }
 
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {

@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use web_time::Instant;
 
 use super::cache::{RecordCache, reference};
-use super::device::{Device, Fault, Kernel};
+use super::device::{Device, Fault, Launch};
 use super::edit::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
 use super::lists::{cut, fill, hand_out};
@@ -335,7 +335,7 @@ impl Session {
         }
         self.input.send(&mut *self.device, plan)?;
         let params = ScatterParams { jobs: self.input.address(uploads.jobs) };
-        self.device.launch(Kernel::Scatter, uploads.len() as u32, bytemuck::bytes_of(&params))
+        self.device.launch(Launch::new(uploads.len() as u32, &params))
     }
 
     /// Writes where uploads go.

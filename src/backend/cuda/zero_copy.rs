@@ -7,7 +7,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::device::{Device, Fault, HostMemory, Kernel, Launch, Mark};
 use super::lock;
 
 /// Memory of the host, and where its shadow is.
@@ -159,8 +159,8 @@ impl Device for ZeroCopy {
         self.own.copy(from, to, bytes)
     }
 
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
-        if kernel != Kernel::Scatter {
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        if launch.kernel() != Kernel::Scatter {
             let mut all = lock(&self.all);
             all.gone.drain(..).for_each(|shadow| self.own.free(shadow));
             for piece in &all.list {
@@ -168,7 +168,7 @@ impl Device for ZeroCopy {
             }
             self.is_running = true;
         }
-        self.own.launch(kernel, blocks, params)
+        self.own.launch(launch)
     }
 
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {

@@ -8,7 +8,7 @@ mod jobs;
 mod output;
 
 use super::cache::RecordCache;
-use super::device::{Fault, Kernel};
+use super::device::{Fault, Launch};
 use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::fill;
 use super::session::{Session, Uploads};
@@ -155,10 +155,10 @@ impl Session {
             };
             let blocks = jobs.len() as u32;
             match &care {
-                None => self.device.launch(Kernel::Edit, blocks, bytemuck::bytes_of(&params))?,
+                None => self.device.launch(Launch::new(blocks, &params))?,
                 Some(care) => {
                     let params = care.params(params, &self.input);
-                    self.device.launch(Kernel::Careful, blocks, bytemuck::bytes_of(&params))?;
+                    self.device.launch(Launch::new(blocks, &params))?;
                 }
             }
             self.edits.results.fetch(&mut *self.device, jobs.len())?;

@@ -5,7 +5,7 @@ use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
 use super::super::layout::*;
-use super::{Device, Kernel, Slots, seeds, worlds};
+use super::{Device, Slots, seeds, worlds};
 use crate::brush::{Brush, Roughness, Shape};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, Column, LatticeBox, SNAP};
@@ -110,7 +110,7 @@ impl MeshRun {
             single: single_mix(view.samples.ground()),
             pad: 0,
         };
-        device.launch(Kernel::Mesh, jobs.len(), params);
+        device.launch(jobs.len(), params);
         let run = Self {
             results: device.read_checked(&results),
             positions: device.read_checked(&positions),

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use bytemuck::Pod;
 use fastrand::Rng;
 
-use super::device::{self, Kernel};
+use super::device::{self, KernelParams, Launch};
 use super::layout::*;
 use super::tests::{self, worlds};
 use crate::ground::Ground;
@@ -86,8 +86,8 @@ impl Device {
         self.read(output)
     }
 
-    fn launch<T: Pod>(&mut self, kernel: Kernel, blocks: usize, params: T) {
-        self.own.launch(kernel, blocks as u32, bytemuck::bytes_of(&params)).expect("the launch succeeds");
+    fn launch<P: KernelParams>(&mut self, blocks: usize, params: P) {
+        self.own.launch(Launch::new(blocks as u32, &params)).expect("the launch succeeds");
         self.own.wait().expect("the kernel succeeds");
     }
 
@@ -171,6 +171,6 @@ fn bytes_are_scattered() {
         at += words + rng.usize(0..4) * 2;
     }
     let params = ScatterParams { jobs: device.upload(&jobs) };
-    device.launch(Kernel::Scatter, jobs.len(), params);
+    device.launch(jobs.len(), params);
     assert!(device.read_checked(&to) == expected);
 }

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{Address, EditParams, NONE};
+use crate::backend::cuda::device::{Kernel, KernelParams};
 use crate::brush::{SculptKernel, Stroke};
 use crate::edits::BatchRules;
 use crate::ground::GreyImage;
@@ -71,9 +72,9 @@ pub(crate) struct CarefulParams {
     pub pad: u32,
 }
 
-// layout.cuh says the same.
-const _: () = assert!(size_of::<Chisel>() == 152 && size_of::<CarefulParams>() == 152);
-const _: () = assert!(size_of::<Rules>() == 296 && size_of::<Protected>() == 24);
+impl KernelParams for CarefulParams {
+    const KERNEL: Kernel = Kernel::Careful;
+}
 
 /// What an edit that looks around needs besides; `image` says where the samples of an image begin.
 pub(crate) fn chisel<'a>(

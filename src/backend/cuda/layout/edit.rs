@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
 
 use super::Address;
+use crate::backend::cuda::device::{Kernel, KernelParams};
 use crate::brush::{Evaluator, Kind};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
 
@@ -142,11 +143,9 @@ pub(crate) struct EditParams {
     pub count_capacity: u32,
 }
 
-// layout.cuh says the same.
-const _: () =
-    assert!(size_of::<EditJob>() == 48 && size_of::<Tool>() == 128 && size_of::<EditResult>() == 32);
-const _: () =
-    assert!(size_of::<EditPart>() == 16 && size_of::<EditCount>() == 16 && size_of::<EditParams>() == 104);
+impl KernelParams for EditParams {
+    const KERNEL: Kernel = Kernel::Edit;
+}
 
 /// An edit that reaches these samples of the world; `None`: it reaches none.
 pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> Tool {

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{Address, THREADS};
+use crate::backend::cuda::device::{Kernel, KernelParams};
 use crate::ground::NoiseNumbers;
 
 /// Columns of a block of `heights`.
@@ -28,5 +29,9 @@ pub(crate) struct HeightsParams {
     pub pad: u32,
 }
 
-// layout.cuh says the same.
-const _: () = assert!(size_of::<HeightsParams>() == 128 && crate::ground::MAX_OCTAVES <= 16);
+impl KernelParams for HeightsParams {
+    const KERNEL: Kernel = Kernel::Heights;
+}
+
+// The kernel keeps as many octaves.
+const _: () = assert!(crate::ground::MAX_OCTAVES <= 16);

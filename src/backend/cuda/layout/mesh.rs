@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::Address;
+use crate::backend::cuda::device::{Kernel, KernelParams};
 use crate::ground::Ground;
 use crate::surface::vertex::WorldView;
 use crate::surface::{MaterialMix, block};
@@ -101,10 +102,9 @@ pub(crate) struct SingleMix {
     pub weights: u32,
 }
 
-// layout.cuh says the same.
-const _: () =
-    assert!(size_of::<ColumnJob>() == 80 && size_of::<MeshJob>() == 24 && size_of::<MeshResult>() == 16);
-const _: () = assert!(size_of::<MeshParams>() == 128);
+impl KernelParams for MeshParams {
+    const KERNEL: Kernel = Kernel::Mesh;
+}
 
 /// The stack of bricks (x, z) as blocks see it, whose record is in slot `stack`.
 pub(crate) fn column_job(view: &WorldView, (x, z): (i32, i32), stack: u32) -> ColumnJob {

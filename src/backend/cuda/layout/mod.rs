@@ -3,6 +3,8 @@
 //! All numbers are little-endian. Bricks on the device are called by a *reference*, `slot << 1 | has_materials`, or
 //! [`NONE`]. Samples of a brick are numbered `x + 8 z + 64 y`. Boxes inside a brick are one word, see [`pack_box`].
 
+#[cfg(test)]
+mod agreement;
 mod careful;
 mod edit;
 mod heights;
@@ -11,6 +13,7 @@ mod mesh;
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
 
+use crate::backend::cuda::device::{Kernel, KernelParams};
 use crate::ground::{ColumnMaterial, Ground, MaterialId};
 use crate::lattice::{Column, LatticeBox};
 use crate::volume::{Brick, Sample};
@@ -81,10 +84,9 @@ pub(crate) struct ScatterParams {
     pub jobs: Address,
 }
 
-// layout.cuh says the same.
-const _: () = assert!(size_of::<BrickRecord>() == 1152 && BRICK_BYTES == 1664);
-const _: () = assert!(size_of::<StackRecord>() == 976);
-const _: () = assert!(size_of::<ScatterJob>() == 24 && size_of::<ScatterParams>() == 8);
+impl KernelParams for ScatterParams {
+    const KERNEL: Kernel = Kernel::Scatter;
+}
 
 /// Writes a brick as it is in a slot: [`BRICK_BYTES`], or [`RECORD_BYTES`] where `out` has no room for materials.
 pub(crate) fn brick_record(brick: &Brick, out: &mut [u8]) {

@@ -2,7 +2,7 @@
 
 mod output;
 
-use super::device::{Fault, Kernel};
+use super::device::{Fault, Launch};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
 use super::lists::{cut, fill, hand_out, map};
 use super::session::{Session, Stacks, Uploads, windows};
@@ -46,25 +46,24 @@ impl Session {
     ) -> Result<Meshed, Fault> {
         self.begin();
         let mut uploads = Uploads::new(view.samples.ground());
-        let meshed = self.run_mesh(view, blocks, &mut uploads, true, meanwhile);
+        let meshed = self.run_mesh(view, blocks, &mut uploads, meanwhile);
         if meshed.is_err() {
             self.give_up(&uploads);
         }
         meshed
     }
 
-    /// Has blocks meshed; their [`MeshResult`](layout::MeshResult)s are here then, and surfaces not yet. These stay on the device unless they are
-    /// wanted `on_host`.
+    /// Meshes blocks. When this returns, their [`MeshResult`](layout::MeshResult)s have arrived; the surfaces may still be on
+    /// their way.
     fn run_mesh<'a>(
         &mut self,
         view: &WorldView<'a>,
         blocks: &[Block],
         uploads: &mut Uploads<'a>,
-        on_host: bool,
         meanwhile: &(dyn Fn() + Sync),
     ) -> Result<Meshed, Fault> {
         // Written on the device, to be copied, instead of straight to the host's memory.
-        let is_long = !on_host || blocks.len() >= COPIED;
+        let is_long = blocks.len() >= COPIED;
         if blocks.len() > MOST_JOBS {
             return Err(Fault::TooLarge(blocks.len()));
         }
@@ -119,7 +118,7 @@ impl Session {
                 single: layout::single_mix(ground),
                 pad: 0,
             };
-            self.device.launch(Kernel::Mesh, blocks.len() as u32, bytemuck::bytes_of(&params))?;
+            self.device.launch(Launch::new(blocks.len() as u32, &params))?;
             self.meshes.results.fetch(&mut *self.device, blocks.len())?;
             meanwhile();
             self.device.wait()?;
@@ -128,12 +127,11 @@ impl Session {
             let all = extents.last().copied().unwrap_or_default();
             let lists = &mut self.meshes.lists;
             if !lists.reserve(&mut *self.device, all.totals(), is_long)? {
-                // Whoever draws surfaces takes them from where results say they are.
+                // Surfaces are read where results say they are.
                 if !all.is_in_lists() {
                     return Err(Fault::Failed("surfaces beyond the ends of their lists".into()));
                 }
-                let extents = if on_host { &extents[..] } else { &[] };
-                let marks = lists.begin_fetch(&mut *self.device, extents, plain.is_none())?;
+                let marks = lists.begin_fetch(&mut *self.device, &extents, plain.is_none())?;
                 self.kept.put(windows);
                 return Ok(Meshed { plain, marks });
             }

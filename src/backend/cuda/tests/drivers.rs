@@ -1,6 +1,6 @@
 //! Devices that can't be opened, or not be trusted.
 
-use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
 use super::super::emulator::skip;
 use super::*;
 
@@ -187,8 +187,8 @@ fn a_device_that_computes_something_else_is_not_trusted() {
         fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
             self.0.copy(from, to, bytes)
         }
-        fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
-            self.0.launch(kernel, blocks, params)
+        fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+            self.0.launch(launch)
         }
         fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
             self.0.mark()

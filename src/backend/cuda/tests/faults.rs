@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, Once};
 
-use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
 use super::*;
 use crate::backend::Stage;
 
@@ -83,9 +83,9 @@ impl Device for Faulty {
         self.plan.call()?;
         self.own.copy(from, to, bytes)
     }
-    fn launch(&mut self, kernel: Kernel, blocks: u32, params: &[u8]) -> Result<(), Fault> {
+    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
         self.plan.call()?;
-        self.own.launch(kernel, blocks, params)
+        self.own.launch(launch)
     }
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
         self.plan.call()?;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::device::{Device, Fault, HostMemory, Kernel, Mark};
+use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
 use super::super::staging::OutputList;
 
 /// A device of so many bytes beside a host of so many more, whose memory its kernels reach.
@@ -81,7 +81,7 @@ impl Device for Tight {
     fn copy(&mut self, _: u64, _: u64, _: usize) -> Result<(), Fault> {
         Ok(())
     }
-    fn launch(&mut self, _: Kernel, _: u32, _: &[u8]) -> Result<(), Fault> {
+    fn launch(&mut self, _: Launch<'_>) -> Result<(), Fault> {
         Ok(())
     }
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {

@@ -6,7 +6,7 @@ use fastrand::Rng;
 use glam::IVec3;
 
 use super::super::super::layout::{self, *};
-use super::super::{Device, Kernel, Slots, assert_same};
+use super::super::{Device, Slots, assert_same};
 use crate::edits::{EditDelta, PreparedEdits};
 use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
@@ -132,9 +132,9 @@ impl EditRun {
                 last: [work.grid.width(), work.grid.depth()],
                 pad: 0,
             };
-            device.launch(Kernel::Careful, jobs.len(), params);
+            device.launch(jobs.len(), params);
         } else {
-            device.launch(Kernel::Edit, jobs.len(), params);
+            device.launch(jobs.len(), params);
         }
         let run = Self {
             jobs,
