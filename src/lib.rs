@@ -280,7 +280,7 @@
 //!
 //! # System sets
 //!
-//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Dress`. A brush that is sent before `Collect`
+//! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Propagate`. A brush that is sent before `Collect`
 //! starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
 //!
 //! # Features

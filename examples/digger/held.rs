@@ -40,7 +40,7 @@ impl Plugin for HeldPlugin {
     fn build(&self, app: &mut App) {
         app.insert_resource(ShowHand(true))
             .add_systems(PostStartup, grip)
-            .add_systems(Update, (show, carry, tint).after(BurrowSystems::Dress));
+            .add_systems(Update, (show, carry, tint).after(BurrowSystems::Propagate));
     }
 }
 

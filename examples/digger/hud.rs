@@ -51,7 +51,7 @@ impl Plugin for HudPlugin {
         app.insert_resource(ShowHud(true)).add_message::<Hint>().add_systems(Startup, write_all).add_systems(
             Update,
             (show, mark_tool, count_materials, aim, tell_hour, tell_hints, tell_finds, tell_keys)
-                .after(BurrowSystems::Dress),
+                .after(BurrowSystems::Propagate),
         );
     }
 }

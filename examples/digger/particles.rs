@@ -81,7 +81,7 @@ impl Plugin for ParticlesPlugin {
     fn build(&self, app: &mut App) {
         app.add_message::<Burst>()
             .add_systems(Startup, fill_pools)
-            .add_systems(Update, (scatter, fly, face_eyes).chain().after(BurrowSystems::Dress));
+            .add_systems(Update, (scatter, fly, face_eyes).chain().after(BurrowSystems::Propagate));
     }
 }
 

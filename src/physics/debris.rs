@@ -93,7 +93,7 @@ impl Plugin for DebrisPlugin {
             (break_off, make_room, take_shape, crumble)
                 .chain()
                 .after(BurrowSystems::Commit)
-                .before(BurrowSystems::Dress),
+                .before(BurrowSystems::Propagate),
         );
     }
 }

@@ -151,7 +151,7 @@ impl Plugin for TerrainPhysicsPlugin {
                 Update,
                 (
                     TerrainPhysicsSystems::Near.before(BurrowSystems::Load),
-                    TerrainPhysicsSystems::Upkeep.after(BurrowSystems::Dress),
+                    TerrainPhysicsSystems::Upkeep.after(BurrowSystems::Propagate),
                 ),
             )
             .add_observer(colliders::forget)

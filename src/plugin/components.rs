@@ -89,8 +89,8 @@ pub struct Field {
 ///     }
 /// }
 /// # let mut app = App::new();
-/// // In the frame in which the ground loses it, and dressed.
-/// app.add_systems(Update, show.after(BurrowSystems::Commit).before(BurrowSystems::Dress));
+/// // In the frame in which the ground loses it, so that the piece inherits the terrain's components.
+/// app.add_systems(Update, show.after(BurrowSystems::Commit).before(BurrowSystems::Propagate));
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]

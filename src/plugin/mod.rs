@@ -24,12 +24,12 @@ mod companion;
 mod components;
 mod engine;
 mod entities;
-mod hand_on;
 mod heightmap;
 mod intake;
 mod load;
 mod meshes;
 mod messages;
+mod propagate;
 mod query;
 mod reach;
 mod settings;
@@ -40,8 +40,6 @@ pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, tell};
-#[cfg(feature = "render")]
-pub(crate) use hand_on::{HandedOn, hand_on, hand_on_with_pieces, take_from_pieces};
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
@@ -53,6 +51,8 @@ pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
     LoosePieceFound, Redo, TargetedBrush, Undo,
 };
+#[cfg(feature = "render")]
+pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_from_pieces};
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings, LooseGround};
 pub(crate) use threads::free_later;
@@ -104,7 +104,7 @@ pub enum BurrowSystems {
     /// Queued brushes start as transactions.
     Begin,
     /// New tiles, chunks and pieces get their terrain's material, layers and shadows.
-    Dress,
+    Propagate,
 }
 
 /// Transactions, entities and messages; works in `MinimalPlugins`.
@@ -141,7 +141,7 @@ impl Plugin for TerrainPlugin {
                     BurrowSystems::Collect,
                     BurrowSystems::Commit,
                     BurrowSystems::Begin,
-                    BurrowSystems::Dress,
+                    BurrowSystems::Propagate,
                 )
                     .chain(),
             )
@@ -164,7 +164,7 @@ impl Plugin for TerrainPlugin {
                 ),
             );
         app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
-        hand_on::add(app);
+        propagate::add(app);
     }
 
     #[cfg(feature = "render")]

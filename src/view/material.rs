@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use bevy::prelude::*;
 
-use crate::plugin::hand_on_with_pieces;
+use crate::plugin::propagate_with_pieces;
 
 /// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles, chunks and
 /// [pieces](crate::plugin::GroundPiece), again whenever it changes, and takes it off with the terrain's. A piece that comes
@@ -24,6 +24,6 @@ impl<M: Material> Default for TerrainMaterialPlugin<M> {
 
 impl<M: Material> Plugin for TerrainMaterialPlugin<M> {
     fn build(&self, app: &mut App) {
-        hand_on_with_pieces::<MeshMaterial3d<M>>(app);
+        propagate_with_pieces::<MeshMaterial3d<M>>(app);
     }
 }

@@ -37,7 +37,7 @@ use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, hand_on, take_from_pieces};
+use crate::plugin::{BurrowSystems, propagate_to_ground, remove_from_pieces};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -54,7 +54,7 @@ impl Plugin for GroundPlugin {
         }
         embedded_asset!(app, "ground.wgsl");
         // Pieces have one of their own, which knows where they were in the ground.
-        hand_on::<MeshMaterial3d<GroundMaterial>>(app);
+        propagate_to_ground::<MeshMaterial3d<GroundMaterial>>(app);
         keep_materials(app);
         app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
             .add_systems(Update, textures::load_textures.before(dress).after(BurrowSystems::Begin));
@@ -75,10 +75,10 @@ fn keep_materials(app: &mut App) {
     app.add_systems(
         Update,
         (
-            (dress, undress).chain().after(BurrowSystems::Begin).before(BurrowSystems::Dress),
-            (take_from_pieces::<MeshMaterial3d<GroundMaterial>>, pieces::dress)
+            (dress, undress).chain().after(BurrowSystems::Begin).before(BurrowSystems::Propagate),
+            (remove_from_pieces::<MeshMaterial3d<GroundMaterial>>, pieces::dress)
                 .chain()
-                .in_set(BurrowSystems::Dress),
+                .in_set(BurrowSystems::Propagate),
         ),
     )
     // Where meshes are drawn is known then; a material that changes later is drawn as it was.

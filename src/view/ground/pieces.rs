@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::look::GroundLook;
 use super::material::{GroundExtension, GroundMaterial};
-use crate::plugin::{GroundPiece, HandedOn};
+use crate::plugin::{GroundPiece, Inherited};
 use crate::terrain::Terrain;
 
 /// What a piece of this terrain is drawn with.
@@ -25,7 +25,7 @@ pub(super) fn dress(
         let own =
             GroundMaterial { base: terrain.base.clone(), extension: of_piece(&terrain.extension, piece) };
         let own = MeshMaterial3d(materials.add(own));
-        commands.entity(entity).try_insert((own, HandedOn::<MeshMaterial3d<GroundMaterial>>::default()));
+        commands.entity(entity).try_insert((own, Inherited::<MeshMaterial3d<GroundMaterial>>::default()));
     }
 }
 

@@ -1,8 +1,8 @@
-//! What a terrain hands on to its tiles, chunks and pieces: Bevy asks the entity of each mesh for its material, layers and
-//! shadows, and not that of the terrain.
+//! Propagates components from a terrain to its tiles, chunks and pieces: Bevy reads material, layers and shadows from the
+//! entity of each mesh, not from the terrain's.
 //!
-//! Bevy's `HierarchyPropagatePlugin` would hand them on to everything below a terrain, what a game has put there included,
-//! and to no piece that is elsewhere.
+//! Bevy's `HierarchyPropagatePlugin` does not fit: it would also change what a game puts below a terrain, and it would miss
+//! pieces that are elsewhere in the hierarchy.
 
 use std::marker::PhantomData;
 
@@ -14,50 +14,50 @@ use bevy::prelude::*;
 use super::{BurrowSystems, Chunk, GroundPiece, Tile};
 use crate::terrain::Terrain;
 
-/// Has layers and shadows handed on.
+/// Adds the systems that propagate layers and shadows.
 pub(super) fn add(app: &mut App) {
-    hand_on_with_pieces::<RenderLayers>(app);
+    propagate_with_pieces::<RenderLayers>(app);
     #[cfg(feature = "render")]
     {
-        hand_on_with_pieces::<NotShadowCaster>(app);
-        hand_on_with_pieces::<NotShadowReceiver>(app);
+        propagate_with_pieces::<NotShadowCaster>(app);
+        propagate_with_pieces::<NotShadowReceiver>(app);
     }
 }
 
-/// On a piece that has a component of this type from its terrain, and not of its own.
+/// Marks a piece whose component of this type comes from its terrain.
 #[derive(Component)]
-pub(crate) struct HandedOn<C: Component>(PhantomData<fn() -> C>);
+pub(crate) struct Inherited<C: Component>(PhantomData<fn() -> C>);
 
-impl<C: Component> Default for HandedOn<C> {
+impl<C: Component> Default for Inherited<C> {
     fn default() -> Self {
         Self(PhantomData)
     }
 }
 
-/// Has tiles and chunks wear a component of their terrain, and pieces as well.
-pub(crate) fn hand_on_with_pieces<C: Component + Clone>(app: &mut App) {
-    hand_on::<C>(app);
+/// Propagates a component of a terrain to its tiles, chunks and pieces.
+pub(crate) fn propagate_with_pieces<C: Component + Clone>(app: &mut App) {
+    propagate_to_ground::<C>(app);
     app.add_systems(
         Update,
-        (take_from_pieces::<C>, give_to_pieces::<C>).chain().in_set(BurrowSystems::Dress),
+        (remove_from_pieces::<C>, insert_on_pieces::<C>).chain().in_set(BurrowSystems::Propagate),
     );
 }
 
-/// Has tiles and chunks wear a component of their terrain, as it is put on, changed and taken off; pieces do not.
-pub(crate) fn hand_on<C: Component + Clone>(app: &mut App) {
+/// Propagates a component of a terrain to its tiles and chunks when it is inserted, changed or removed.
+pub(crate) fn propagate_to_ground<C: Component + Clone>(app: &mut App) {
     app.add_systems(
         Update,
-        (take::<C>, give_to_new::<C>, give_to_all::<C>).chain().in_set(BurrowSystems::Dress),
+        (remove::<C>, insert_on_new::<C>, insert_on_all::<C>).chain().in_set(BurrowSystems::Propagate),
     );
 }
 
 /// A tile or chunk.
 type Drawn = Or<(With<Tile>, With<Chunk>)>;
 
-/// A tile or chunk that just came.
+/// A tile or chunk that was just spawned.
 type New = (Drawn, Or<(Added<Tile>, Added<Chunk>)>);
 
-fn take<C: Component>(
+fn remove<C: Component>(
     mut commands: Commands,
     mut removed: RemovedComponents<C>,
     terrains: Query<&Children, (With<Terrain>, Without<C>)>,
@@ -70,7 +70,7 @@ fn take<C: Component>(
     }
 }
 
-fn give_to_new<C: Component + Clone>(
+fn insert_on_new<C: Component + Clone>(
     mut commands: Commands,
     new: Query<(Entity, &ChildOf), New>,
     terrains: Query<&C, With<Terrain>>,
@@ -82,7 +82,7 @@ fn give_to_new<C: Component + Clone>(
     }
 }
 
-fn give_to_all<C: Component + Clone>(
+fn insert_on_all<C: Component + Clone>(
     mut commands: Commands,
     terrains: Query<(&C, &Children), (With<Terrain>, Changed<C>)>,
     drawn: Query<(), Drawn>,
@@ -94,22 +94,22 @@ fn give_to_all<C: Component + Clone>(
     }
 }
 
-/// Pieces of a terrain that has lost a component lose what they have from it.
-pub(crate) fn take_from_pieces<C: Component>(
+/// Removes a component from the pieces that inherited it once their terrain no longer has it.
+pub(crate) fn remove_from_pieces<C: Component>(
     mut commands: Commands,
     mut removed: RemovedComponents<C>,
     bare: Query<(), (With<Terrain>, Without<C>)>,
-    pieces: Query<(Entity, &GroundPiece), With<HandedOn<C>>>,
+    pieces: Query<(Entity, &GroundPiece), With<Inherited<C>>>,
 ) {
     for terrain in removed.read().filter(|&entity| bare.contains(entity)) {
         for (piece, _) in pieces.iter().filter(|(_, piece)| piece.terrain == terrain) {
-            commands.entity(piece).try_remove::<(C, HandedOn<C>)>();
+            commands.entity(piece).try_remove::<(C, Inherited<C>)>();
         }
     }
 }
 
-/// A piece that comes with its own keeps that, until the terrain's changes.
-fn give_to_pieces<C: Component + Clone>(
+/// A piece that is spawned with its own component keeps it until the terrain's changes.
+fn insert_on_pieces<C: Component + Clone>(
     mut commands: Commands,
     pieces: Query<(Entity, Ref<GroundPiece>, Has<C>)>,
     terrains: Query<Ref<C>, With<Terrain>>,
@@ -118,7 +118,7 @@ fn give_to_pieces<C: Component + Clone>(
         let Ok(own) = terrains.get(piece.terrain) else { continue };
         let is_due = if piece.is_added() { !has_own } else { own.is_changed() };
         if is_due {
-            commands.entity(entity).try_insert((C::clone(&own), HandedOn::<C>::default()));
+            commands.entity(entity).try_insert((C::clone(&own), Inherited::<C>::default()));
         }
     }
 }
