@@ -98,6 +98,10 @@ macro_rules! shapes {
             $($name,)*
         }
 
+        /// The names of all shapes, in the order of their numbers.
+        #[cfg(all(test, feature = "cuda"))]
+        pub(crate) const NAMES: &[&str] = &[$(stringify!($name)),*];
+
         impl Shape {
             fn quantize(&self) -> Result<QuantizedShape, BrushError> {
                 Ok(match self {

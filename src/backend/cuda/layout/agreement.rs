@@ -190,7 +190,6 @@ fn every_constant_is_the_same() {
     let numbered =
         |names: &[&str]| names.iter().zip(0..).map(|(name, n)| ((*name).to_owned(), n)).collect::<Vec<_>>();
     for (name, number) in [
-        numbered(&["SPHERE", "CUBOID", "CYLINDER", "CAPSULE", "CONE"]),
         numbered(&["DIG", "ADD", "PAINT"]),
         numbered(&["PLAIN", "SMOOTH", "SHARPEN", "FLATTEN", "LEVEL", "SHIFT", "STAMP", "TERRACE"]),
     ]
@@ -199,4 +198,12 @@ fn every_constant_is_the_same() {
         check(&name, number);
     }
     assert!(found.is_empty(), "not compared: {:?}", found.keys());
+}
+
+#[test]
+fn shapes_have_the_same_numbers() {
+    let shapes = include_str!("../kernels/shapes.cuh");
+    let list = shapes.split_once("enum Kind {").and_then(|(_, rest)| rest.split_once('}')).expect("a list").0;
+    let names: Vec<String> = list.split(',').map(|name| name.trim().to_lowercase()).collect();
+    assert!(crate::brush::shapes::NAMES.iter().map(|name| name.to_lowercase()).eq(names));
 }
