@@ -58,10 +58,9 @@ test: setup test-model test-plugin test-examples ## Install what is missing, the
 setup: ## Install what is missing
 	@tools/setup.sh test
 
-# Model tests, in the dev profile: optimised, with overflow checks.
+# Model tests, in the dev profile: optimised, with overflow checks. Their examples in the documentation run with the plugin's.
 test-model:
 	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example paper
-	cargo test $(WITHOUT_BEVY) --doc
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::

@@ -97,13 +97,13 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     if tool.shape == ToolShape::Box {
         slider(ui, "Half width", &mut tool.half.x, radii.clone(), length);
         slider(ui, "Half height", &mut tool.half.y, radii.clone(), length);
-        slider(ui, "Half depth", &mut tool.half.z, radii, length);
+        slider(ui, "Half depth", &mut tool.half.z, radii.clone(), length);
         slider(ui, "Turn", &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
     } else {
-        slider(ui, "Radius", &mut tool.radius, radii, length);
+        slider(ui, "Radius", &mut tool.radius, radii.clone(), length);
     }
     if tool.shape == ToolShape::Torus {
-        slider(ui, "Tube", &mut tool.tube, 0.05..=1.0, percent);
+        slider(ui, "Tube", &mut tool.tube, radii.clone(), length);
     }
     if tool.shape.is_long() {
         slider(ui, "Length", &mut tool.length, LENGTH.range(voxel), length);
@@ -144,7 +144,7 @@ fn surface(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
 
 /// Draws a shape in the middle of a rectangle: its outline, seen from the front and a little above.
 fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
-    let tool = BrushTool { shape, radius: 0.8, half: Vec3::splat(0.7), length: 1.6, ..BrushTool::default() };
+    let tool = BrushTool { shape, radius: 0.8, half: Vec3::splat(0.7), length: 1.6, tube: 0.3, ..BrushTool::default() };
     let tool =
         if shape == ToolShape::Capsule { BrushTool { radius: 0.5, length: 0.9, ..tool } } else { tool };
     let tilt = Quat::from_euler(EulerRot::XYZ, 0.4, 0.5, 0.0);

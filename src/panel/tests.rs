@@ -315,6 +315,7 @@ fn what_sliders_offer_the_terrain_takes() {
         "Half width",
         "Half height",
         "Half depth",
+        "Tube",
         "Length",
         "Falloff",
         "Amount",

@@ -32,7 +32,7 @@ pub struct BrushTool {
     pub shape: ToolShape,
     /// Of all shapes but boxes; of a ring, from its middle to that of its tube.
     pub radius: f32,
-    /// Radius of a ring's tube, as a part of the ring's radius.
+    /// Radius of a ring's tube; at most the ring's own radius counts.
     pub tube: f32,
     /// Half the sides of a box.
     pub half: Vec3,
@@ -81,7 +81,7 @@ impl Default for BrushTool {
             operation: ToolOperation::Dig,
             shape: ToolShape::Sphere,
             radius: 4.0,
-            tube: 0.3,
+            tube: 1.2,
             half: Vec3::splat(4.0),
             length: 8.0,
             align: ToolAlign::Upright,
@@ -222,7 +222,7 @@ impl BrushTool {
             ToolShape::Cylinder => Shape::cylinder(end, axis * self.length, self.radius),
             ToolShape::Capsule => Shape::capsule(end, end + axis * self.length, self.radius),
             ToolShape::Cone => Shape::cone(end, axis * self.length, self.radius),
-            ToolShape::Torus => Shape::torus(middle, axis, self.radius, self.radius * self.tube),
+            ToolShape::Torus => Shape::torus(middle, axis, self.radius, self.tube.min(self.radius)),
         }
     }
 
@@ -256,7 +256,7 @@ impl BrushTool {
             ToolShape::Box => self.half.y,
             ToolShape::Cylinder | ToolShape::Cone => self.length / 2.0,
             ToolShape::Capsule => self.length / 2.0 + self.radius,
-            ToolShape::Torus => self.radius * self.tube,
+            ToolShape::Torus => self.tube.min(self.radius),
         }
     }
 
@@ -332,7 +332,7 @@ mod tests {
                     BrushTool { shape, sink, radius: 3.0, half: Vec3::splat(3.0), ..BrushTool::default() };
                 let tool = match shape {
                     ToolShape::Capsule => BrushTool { radius: 1.0, length: 4.0, ..tool },
-                    ToolShape::Torus => BrushTool { tube: 1.0, ..tool },
+                    ToolShape::Torus => BrushTool { tube: 3.0, ..tool },
                     _ => BrushTool { length: 6.0, ..tool },
                 };
                 let mut top = f32::MIN;

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 
 use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
+use super::figures::{end_commands, start_commands};
 use super::intake::{pieces, tell_steps};
-use super::load::Loading;
+use super::loading::Loading;
 use super::meshes::{Ready, Wardrobe};
 use super::threads::{ThreadTask, Threads};
 use super::{
@@ -75,6 +76,7 @@ struct Job {
 impl Job {
     /// Runs the transaction, and makes all that is shown with its commit.
     fn run(self) -> Prepared {
+        let _span = info_span!("burrow transaction").entered();
         let start = Instant::now();
         let Self { terrain, transaction, engine, workshop, voxel_size, grid, revision } = self;
         let mut commit = transaction.run_on(&engine);
@@ -88,7 +90,7 @@ impl Job {
         let drafts: Vec<_> = tiles.chain(chunks).collect();
         let make =
             |(drawn, draft): (Drawn, SurfaceDraft)| workshop.make(&part(drawn), draft.is_empty(), || draft);
-        let parts = for_each_part(drafts, make);
+        let parts = info_span!("burrow surfaces").in_scope(|| for_each_part(drafts, make));
         let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
         if let Some(wardrobe) = &workshop.wardrobe {
             pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
@@ -213,7 +215,7 @@ pub(super) fn commit_transactions(
     if done.is_empty() {
         return;
     }
-    screen.commands.queue(|world: &mut World| world.insert_resource(Applying(Instant::now())));
+    start_commands(&mut screen.commands);
     let mut swapped = 0;
     for entity in done {
         let Ok((_, terrain, entities, mut transaction)) = terrains.get_mut(entity) else { continue };
@@ -229,11 +231,7 @@ pub(super) fn commit_transactions(
             swapped += swaps;
         }
     }
-    screen.commands.queue(|world: &mut World| {
-        if let Some(Applying(start)) = world.remove_resource() {
-            world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
-        }
-    });
+    end_commands(&mut screen.commands);
 }
 
 /// The terrains whose transactions are done, the oldest first: whoever had to wait for the budget is next.
@@ -263,6 +261,7 @@ fn commit(
     screen: &mut Screen,
     news: &mut News,
 ) -> bool {
+    let _span = info_span!("burrow commit").entered();
     let start = Instant::now();
     let (what, parts, pieces, took) = match (prepared, ticket) {
         (Some(Prepared { what, parts, pieces, took }), _) => (what, parts, pieces, took),
@@ -383,23 +382,6 @@ impl News<'_> {
         self.receipts.write_batch(receipts.into_iter().map(applied));
     }
 }
-
-impl BurrowFigures {
-    /// Counts one more commit: its brushes, and how long it took in its task and here.
-    fn count(&mut self, brushes: u64, transaction: Duration, commit: Duration) {
-        self.commits += 1;
-        self.brushes += brushes;
-        self.last_transaction = transaction;
-        self.transactions.push(transaction);
-        self.last_commit = commit;
-        self.commit_times.push(commit);
-        self.main_thread += commit;
-    }
-}
-
-/// When the entities that a frame's commits change began to be changed.
-#[derive(Resource)]
-struct Applying(Instant);
 
 /// Tells which surface an entity shows, and does to it what goes with that.
 pub(super) fn attach(

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::{Chunk, Field, FieldChanged, FieldCreated, FieldMerged, TerrainReady, Tile};
 use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, FieldNews, Terrain, Version, World};
+use crate::terrain::{Drawn, FieldNews, Version, World};
 use crate::volume::{self, FieldId};
 
 /// The entities below a terrain, and the world that they show. Its presence says that the terrain has loaded.
@@ -162,18 +162,4 @@ pub(crate) fn tell<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Comm
             world.trigger(event);
         }
     });
-}
-
-/// Takes a terrain's entities along when only its component goes.
-pub(super) fn remove_with_terrain(
-    gone: On<Remove, Terrain>,
-    terrains: Query<(&TerrainEntities, Option<&Children>)>,
-    mut commands: Commands,
-) {
-    if let Ok((entities, children)) = terrains.get(gone.entity) {
-        entities.despawn(&mut commands, children);
-    }
-    commands
-        .entity(gone.entity)
-        .try_remove::<(TerrainEntities, super::load::Loading, super::commit::InFlight)>();
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::NoAutoAabb;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
@@ -12,48 +11,12 @@ use rayon::prelude::*;
 use super::commit::{InFlight, Numbers, attach, begin_unseen};
 use super::companion::{Fresh, Workshop};
 use super::entities::{TerrainEntities, tell};
+use super::loading::{Loaded, Loading};
 use super::meshes::Wardrobe;
 use super::threads::{ThreadTask, Threads};
 use super::{BurrowSettings, ChunkCreated, Companions, MaterialColors, Part};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
-
-/// A terrain's tiles are all shown, and it takes transactions.
-///
-/// Shown is not painted: while textures are made or loaded, a terrain with a `GroundLook` has no material, and nothing of
-/// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
-/// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
-///
-/// It comes again whenever a terrain has loaded anew, because another one took its place, or because the game changed more of
-/// it by itself than a frame [swaps](BurrowSettings::swaps_per_frame). Whoever spawns something then
-/// looks first whether it is there.
-#[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TerrainReady {
-    /// The terrain's entity.
-    pub entity: Entity,
-}
-
-/// Meshes on their way to the frame in which they are shown, all made from one snapshot.
-#[derive(Component)]
-pub(super) struct Loading {
-    world: Arc<World>,
-    task: Option<ThreadTask<Vec<Fresh>>>,
-    waiting: Vec<Fresh>,
-    ready: HashMap<Drawn, Loaded>,
-}
-
-impl Loading {
-    /// Are these meshes of this terrain, whatever the game did to it since?
-    fn is_of(&self, terrain: &Terrain) -> bool {
-        self.world.version().is_same_world(terrain.world().version())
-    }
-}
-
-/// A part whose mesh, if it has one, is with the renderer.
-struct Loaded {
-    mesh: Option<(Handle<Mesh>, Aabb)>,
-    fresh: Fresh,
-}
 
 /// Terrains that no task works for.
 type Idle = (Without<Loading>, Without<InFlight>);
@@ -139,6 +102,18 @@ fn drop_misfits(
     }
 }
 
+/// Takes a terrain's entities along when only its component goes.
+pub(super) fn remove_with_terrain(
+    gone: On<Remove, Terrain>,
+    terrains: Query<(&TerrainEntities, Option<&Children>)>,
+    mut commands: Commands,
+) {
+    if let Ok((entities, children)) = terrains.get(gone.entity) {
+        entities.despawn(&mut commands, children);
+    }
+    commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight)>();
+}
+
 /// Starts the task of each terrain that is new, or whose world the game changed by itself: then only what that changed is
 /// made anew.
 pub(super) fn start_loading(
@@ -203,6 +178,7 @@ fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform) {
 
 /// Everything that a world draws, and what goes with it.
 fn make_all(world: &World, workshop: &Workshop, (terrain, voxel_size): (Entity, f32)) -> Vec<Fresh> {
+    let _span = info_span!("burrow load").entered();
     let chunks = world.drawn_chunks().map(Drawn::Chunk);
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
     let make = |&drawn: &Drawn| {

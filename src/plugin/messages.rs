@@ -155,3 +155,18 @@ pub struct FieldMerged {
     /// The entity of the field that holds its data now.
     pub into: Entity,
 }
+
+/// A terrain's tiles are all shown, and it takes transactions.
+///
+/// Shown is not painted: while textures are made or loaded, a terrain with a `GroundLook` has no material, and nothing of
+/// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
+/// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
+///
+/// It comes again whenever a terrain has loaded anew, because another one took its place, or because the game changed more of
+/// it by itself than a frame [swaps](super::BurrowSettings::swaps_per_frame). Whoever spawns something then
+/// looks first whether it is there.
+#[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TerrainReady {
+    /// The terrain's entity.
+    pub entity: Entity,
+}

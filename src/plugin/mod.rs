@@ -16,17 +16,23 @@
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //!
+//! [`BurrowFigures`] tells what all of this takes; so do Bevy's [`diagnostics`], and tracing spans named after transactions, commits
+//! and loads.
+//!
 //! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
 //! commit: see [`Companion`].
 
 mod commit;
 mod companion;
 mod components;
+pub mod diagnostics;
 mod engine;
 mod entities;
+mod figures;
 mod heightmap;
 mod intake;
 mod load;
+mod loading;
 mod meshes;
 mod messages;
 mod propagate;
@@ -40,21 +46,21 @@ pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, tell};
+pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
-pub use load::TerrainReady;
 pub use meshes::{
     ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
-    LoosePieceFound, Redo, TargetedBrush, Undo,
+    LoosePieceFound, Redo, TargetedBrush, TerrainReady, Undo,
 };
 #[cfg(feature = "render")]
 pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_from_pieces};
 pub use query::{TerrainHit, Terrains};
-pub use settings::{BurrowEngine, BurrowFigures, BurrowSettings, LooseGround};
+pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub(crate) use threads::free_later;
 #[cfg(any(feature = "render", feature = "avian"))]
 pub(crate) use threads::{ThreadTask, Threads};
@@ -133,7 +139,7 @@ impl Plugin for TerrainPlugin {
             .add_observer(intake::answer_with_terrain)
             .add_observer(intake::start_looking)
             .add_observer(intake::stop_looking)
-            .add_observer(entities::remove_with_terrain)
+            .add_observer(load::remove_with_terrain)
             .configure_sets(
                 Update,
                 (
@@ -165,6 +171,7 @@ impl Plugin for TerrainPlugin {
             );
         app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
         propagate::add(app);
+        diagnostics::add(app);
     }
 
     #[cfg(feature = "render")]

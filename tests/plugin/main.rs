@@ -5,6 +5,7 @@ mod companions;
 #[cfg(feature = "debug")]
 mod debug_views;
 mod despawning;
+mod diagnostics;
 mod entities;
 mod handed_on;
 mod heightmaps;

@@ -1,0 +1,62 @@
+//! What the plugin did lately, and what it took.
+
+use std::time::Duration;
+
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+
+use super::Times;
+
+/// What the plugin did lately.
+#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Default)]
+pub struct BurrowFigures {
+    /// Commits so far.
+    pub commits: u64,
+    /// Brushes in these commits.
+    pub brushes: u64,
+    /// Meshes swapped so far.
+    pub swaps: u64,
+    /// How long the last transaction took in its task.
+    pub last_transaction: Duration,
+    /// How long the last commit took on the main thread.
+    pub last_commit: Duration,
+    /// How long the latest transactions took in their tasks.
+    pub transactions: Times,
+    /// How long the latest commits took on the main thread.
+    pub commit_times: Times,
+    /// What this frame's intake, commits and starts of transactions took together on the main thread: systems, and changes
+    /// to entities.
+    pub main_thread: Duration,
+}
+
+impl BurrowFigures {
+    /// Counts one more commit: its brushes, and how long it took in its task and on the main thread.
+    pub(super) fn count(&mut self, brushes: u64, transaction: Duration, commit: Duration) {
+        self.commits += 1;
+        self.brushes += brushes;
+        self.last_transaction = transaction;
+        self.transactions.push(transaction);
+        self.last_commit = commit;
+        self.commit_times.push(commit);
+        self.main_thread += commit;
+    }
+}
+
+/// When the commands of a frame's commits began to be applied.
+#[derive(Resource)]
+struct CommandsStarted(Instant);
+
+/// The commands that follow count as the plugin's time on the main thread, until [`end_commands`].
+pub(super) fn start_commands(commands: &mut Commands) {
+    commands.queue(|world: &mut World| world.insert_resource(CommandsStarted(Instant::now())));
+}
+
+/// Ends what [`start_commands`] began.
+pub(super) fn end_commands(commands: &mut Commands) {
+    commands.queue(|world: &mut World| {
+        if let Some(CommandsStarted(start)) = world.remove_resource() {
+            world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
+        }
+    });
+}
