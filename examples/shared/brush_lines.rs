@@ -185,8 +185,8 @@ mod tests {
             (r#"{"undo":false}"#, "either `undo` or `redo` is to be true"),
             (r#"{"undo":true,"redo":true}"#, "either `undo` or `redo` is to be true"),
             (r#"{"undo":1}"#, "column 9: invalid type: integer `1`, expected a boolean"),
-            (r#"{"shape":"ball"}"#, "column 15: unknown variant `ball`"),
-            (r#"  {"shape":"ball"}"#, "column 17: unknown variant `ball`"),
+            (r#"{"shape":"ball"}"#, "column 16: unknown variant `ball`"),
+            (r#"  {"shape":"ball"}"#, "column 18: unknown variant `ball`"),
             ("{", "column 1: EOF while parsing"),
         ] {
             let found = fault(line);

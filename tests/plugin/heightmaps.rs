@@ -86,10 +86,10 @@ fn files_that_are_no_heightmap_fail_with_their_reason() {
     let color = png(image::DynamicImage::ImageRgb8(image::ImageBuffer::new(8, 8)));
     folder.put("good.png", &grey);
     let files: [(&str, &[u8], &str); 6] = [
-        ("cut.png", &grey[..grey.len() / 2], "cut off"),
+        ("cut.png", &grey[..grey.len() / 2], "truncated"),
         ("color.png", &color, "plain grey"),
         ("empty.png", b"", ""),
-        ("words.png", b"this is no image at all, but text", "signature"),
+        ("words.png", b"this is no image at all, but text", "decoded"),
         ("heights.raw", &[0; 128], "no header"),
         ("heights.r16", &[0; 128], "no header"),
     ];
