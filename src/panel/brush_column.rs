@@ -144,7 +144,14 @@ fn surface(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
 
 /// Draws a shape in the middle of a rectangle: its outline, seen from the front and a little above.
 fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
-    let tool = BrushTool { shape, radius: 0.8, half: Vec3::splat(0.7), length: 1.6, tube: 0.3, ..BrushTool::default() };
+    let tool = BrushTool {
+        shape,
+        radius: 0.8,
+        half: Vec3::splat(0.7),
+        length: 1.6,
+        tube: 0.3,
+        ..BrushTool::default()
+    };
     let tool =
         if shape == ToolShape::Capsule { BrushTool { radius: 0.5, length: 0.9, ..tool } } else { tool };
     let tilt = Quat::from_euler(EulerRot::XYZ, 0.4, 0.5, 0.0);

@@ -1,20 +1,14 @@
 //! A body that walks: a capsule that walks, jumps, steps and slides over ground that is being dug.
 
 use avian3d::prelude::*;
-use bevy::ecs::schedule::{InternedScheduleLabel, ScheduleLabel};
-use bevy::ecs::system::SystemParam;
-use bevy::math::Affine3A;
 use bevy::prelude::*;
-
-use super::HeldByGround;
-use super::walking::Walk;
 
 /// A walking body: a kinematic capsule for avian, moved by its [`CharacterSteering`].
 ///
 /// Its `Transform` is at the capsule's middle; [`feet`](Self::feet) and [`eyes`](Self::eyes) are measured from there. Below
 /// a parent it is carried along, and walks in the world all the same. Change its height, and its feet stay where they are:
 /// a game that lets it stand up again makes sure first that there is room.
-/// [`CharacterPlugin`] moves it; with avian's `TransformInterpolation` beside it, it moves smoothly at any frame rate. It
+/// [`CharacterPlugin`](super::CharacterPlugin) moves it; with avian's `TransformInterpolation` beside it, it moves smoothly at any frame rate. It
 /// needs colliders under it: give it, or the camera that follows it, a [`ColliderSource`](super::ColliderSource).
 ///
 /// ```
@@ -135,147 +129,4 @@ pub struct CharacterMotion {
     pub grounded: bool,
     /// The normal of what it stands on, if it does.
     pub ground_normal: Vec3,
-}
-
-/// Moves characters, in `FixedUpdate` unless told otherwise.
-///
-/// A game that wants them elsewhere gives the schedule; time is that of the schedule.
-pub struct CharacterPlugin {
-    schedule: InternedScheduleLabel,
-}
-
-impl CharacterPlugin {
-    /// Moves characters in this schedule.
-    pub fn new(schedule: impl ScheduleLabel) -> Self {
-        Self { schedule: schedule.intern() }
-    }
-}
-
-impl Default for CharacterPlugin {
-    fn default() -> Self {
-        Self::new(FixedUpdate)
-    }
-}
-
-/// Where characters are moved; steer them before.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct CharacterSystems;
-
-impl Plugin for CharacterPlugin {
-    fn build(&self, app: &mut App) {
-        app.add_observer(give_collider)
-            .add_observer(forget_size)
-            .add_systems(self.schedule, (resize, move_characters).chain().in_set(CharacterSystems));
-    }
-}
-
-/// What a character's collider was made for: radius and height.
-#[derive(Component, Clone, Copy, PartialEq)]
-struct Size(f32, f32);
-
-impl Size {
-    fn of(character: &Character) -> Self {
-        Self(character.radius, character.height)
-    }
-}
-
-/// A new character gets its capsule; what becomes of one that takes another's place is [`resize`]'s.
-fn give_collider(
-    new: On<Insert, Character>,
-    characters: Query<&Character, Without<Size>>,
-    mut commands: Commands,
-) {
-    if let Ok(character) = characters.get(new.entity) {
-        commands.entity(new.entity).try_insert((character.collider(), Size::of(character)));
-    }
-}
-
-/// Who is no character any more may become one as if it had never been.
-fn forget_size(gone: On<Remove, Character>, mut commands: Commands) {
-    commands.entity(gone.entity).try_remove::<Size>();
-}
-
-/// A character whose size changed gets another capsule; its feet stay.
-fn resize(
-    mut commands: Commands,
-    mut changed: Query<(Entity, &Character, &mut Size), Changed<Character>>,
-    mut places: Places,
-) {
-    for (entity, character, mut size) in &mut changed {
-        let taller = character.height - size.1;
-        if size.set_if_neq(Size::of(character)) {
-            commands.entity(entity).try_insert(character.collider());
-            if let Some(middle) = places.get(entity) {
-                places.set(entity, middle + Vec3::Y * (taller / 2.0));
-            }
-        }
-    }
-}
-
-/// Where characters are in the world, whatever they are children of.
-#[derive(SystemParam)]
-struct Places<'w, 's> {
-    parents: Query<'w, 's, &'static ChildOf>,
-    transforms: ParamSet<'w, 's, (TransformHelper<'w, 's>, Query<'w, 's, &'static mut Transform>)>,
-}
-
-impl Places<'_, '_> {
-    /// From the space that an entity's `Transform` counts in to the world; `None` where that is the same.
-    fn frame(&mut self, entity: Entity) -> Option<Affine3A> {
-        let parent = self.parents.get(entity).ok()?.parent();
-        Some(self.transforms.p0().compute_global_transform(parent).ok()?.affine())
-    }
-
-    fn get(&mut self, entity: Entity) -> Option<Vec3> {
-        let frame = self.frame(entity);
-        let place = self.transforms.p1().get(entity).ok()?.translation;
-        Some(frame.map_or(place, |frame| frame.transform_point3(place)))
-    }
-
-    fn set(&mut self, entity: Entity, place: Vec3) {
-        let frame = self.frame(entity);
-        let place = frame.map_or(place, |frame| frame.inverse().transform_point3(place));
-        if place.is_finite()
-            && let Ok(mut transform) = self.transforms.p1().get_mut(entity)
-        {
-            transform.translation = place;
-        }
-    }
-}
-
-fn move_characters(
-    time: Res<Time>,
-    mover: MoveAndSlide,
-    mut places: Places,
-    mut characters: Query<
-        (
-            Entity,
-            &Character,
-            &CharacterSteering,
-            &mut CharacterMotion,
-            &mut LinearVelocity,
-            &Collider,
-            Option<&RigidBodyColliders>,
-            Option<&CollisionLayers>,
-        ),
-        Without<HeldByGround>,
-    >,
-) {
-    // A hiccup of the machine must not become a leap.
-    let dt = time.delta_secs().min(0.25);
-    if dt <= 0.0 {
-        return;
-    }
-    for (entity, character, steering, mut motion, mut velocity, collider, own, layers) in &mut characters {
-        let Some(before) = places.get(entity).filter(|place| place.is_finite()) else { continue };
-        let own = own.into_iter().flatten().chain([entity]);
-        let walk = Walk::new(&mover, collider, layers, character, own);
-        let (place, after) = walk.advance(before, *motion, steering, dt);
-        motion.set_if_neq(after);
-        if place != before {
-            places.set(entity, place);
-        }
-        // What the solver shows to bodies that are in the way.
-        velocity.set_if_neq(LinearVelocity((place - before) / dt));
-    }
 }

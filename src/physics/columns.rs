@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
-use super::colliders::GroundCollider;
+use super::ground::GroundCollider;
 use crate::lattice::TilePos;
 use crate::plugin::{Chunk, ShownSurface, Tile};
 use crate::terrain::Drawn;

@@ -51,27 +51,31 @@
 //! into [`GroundContact`].
 
 mod character;
+mod character_plugin;
 mod colliders;
 mod columns;
 mod cone;
 mod debris;
 mod frame;
+mod ground;
 mod hold;
 mod hull;
 mod near;
 mod shape;
 mod solids;
+mod sources;
 mod upkeep;
 mod wake;
 mod walking;
 
-pub use character::{Character, CharacterMotion, CharacterPlugin, CharacterSteering, CharacterSystems};
-pub use colliders::{GroundBody, GroundCollider, GroundContact};
+pub use character::{Character, CharacterMotion, CharacterSteering};
+pub use character_plugin::{CharacterPlugin, CharacterSystems};
 pub use debris::{Debris, DebrisCrumbled, DebrisPlugin, DebrisSettings};
+pub use ground::{GroundBody, GroundCollider, GroundContact};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
-pub use near::ColliderSource;
 pub use shape::GroundShape;
+pub use sources::ColliderSource;
 
 use std::time::Duration;
 
@@ -159,7 +163,7 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_observer(columns::note_new)
             .add_observer(columns::note_gone)
             .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
-            .add_systems(Update, near::find_near.in_set(TerrainPhysicsSystems::Near))
+            .add_systems(Update, sources::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))
             .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
             .add_systems(

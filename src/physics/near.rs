@@ -2,22 +2,12 @@
 
 use std::sync::Arc;
 
-use avian3d::prelude::*;
-use bevy::math::Vec3A;
 use bevy::platform::collections::HashMap;
-use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::colliders::Grounds;
 use super::columns::ColumnKey;
-use super::solids::{Extent, Solids};
-use super::{HeldByGround, PhysicsFigures};
 use crate::lattice::{ChunkGrid, TilePos};
-use crate::terrain::Terrain;
-
-/// How far ahead of a source colliders are made, in seconds.
-const AHEAD: f32 = 1.0;
 
 /// Places that a way ahead is looked at in, at most: one for each chunk's width of it.
 const STOPS: u32 = 64;
@@ -33,33 +23,8 @@ pub(super) fn ahead(way: Vec3, grid: ChunkGrid) -> Vec3 {
     way.clamp_length_max(STOPS as f32 * grid.size() as f32)
 }
 
-/// Ground around this entity has colliders, in all columns of chunks within its radius; elsewhere it has none.
-///
-/// Put it on players and on whatever else needs ground. With a radius of `f32::INFINITY` all ground has colliders, wherever
-/// the entity is.
-///
-/// A source that comes to another voxel costs some time on the main thread for each column of chunks within its radius, and
-/// around each chunk's width of its way; one that reaches all of a terrain, only when it comes to another column. Each
-/// collider costs time in a task, and memory.
-///
-/// With a `LinearVelocity`, ground where it will be in a second, or on the next 64 chunks of its way, has colliders too.
-/// Bodies need not be sources: those too far from any are [held](super::HeldByGround).
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-#[reflect(Component, Default)]
-#[require(Transform)]
-pub struct ColliderSource {
-    /// Metres, along x and z.
-    pub radius: f32,
-}
-
-impl Default for ColliderSource {
-    fn default() -> Self {
-        Self { radius: 48.0 }
-    }
-}
-
 /// A place in voxels along x and z, and how far around it colliders are wanted.
-type Stop = (Vec2, f32);
+pub(super) type Stop = (Vec2, f32);
 
 /// The largest stops, by which others may be covered: a crowd has thousands that are all alike, and cover none.
 const LARGEST: usize = 16;
@@ -104,7 +69,7 @@ fn telling(grid: ChunkGrid, mut stops: Vec<Stop>) -> Vec<Stop> {
 
 /// Where a source that is at `from` and goes this `way` wants ground within a `radius`, in voxels: here, and ahead, in one
 /// place for each chunk's width of the way.
-fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
+pub(super) fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
     let stride = grid.size() as f32;
     // Not every hair's breadth of a move is news; where all of the ground is near, not even another voxel is, and what is
     // ahead is near already. How much farther it would reach says nothing: what is nearest comes first.
@@ -160,6 +125,14 @@ impl Area {
 pub(super) struct Neighbourhood(HashMap<Entity, Arc<Area>>);
 
 impl Neighbourhood {
+    /// Enters a terrain with the stops of its sources. What is the same as before shares its memory.
+    pub fn insert(&mut self, terrain: Entity, grid: ChunkGrid, stops: Vec<Stop>, before: &Self) {
+        let stops = telling(grid, stops);
+        let same = before.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
+        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));
+        self.0.insert(terrain, area);
+    }
+
     /// How far the nearest source's radius ends from a column, in voxels; negative within it. `None` if that is farther
     /// than a chunk is wide: colliders go there, but not before, for those who walk along a border are not to make them
     /// come and go.
@@ -193,49 +166,6 @@ impl Neighbourhood {
             }
         }
     }
-}
-
-/// Looks where sources are, and tells tasks.
-pub(super) fn find_near(
-    grounds: Res<Grounds>,
-    places: TransformHelper,
-    terrains: Query<(Entity, &Terrain)>,
-    sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
-    solids: Solids,
-    mut known: Local<Neighbourhood>,
-    mut figures: ResMut<PhysicsFigures>,
-) {
-    let start = Instant::now();
-    let mut near = Neighbourhood::default();
-    for (terrain, model) in &terrains {
-        let Ok(place) = places.compute_global_transform(terrain) else { continue };
-        let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
-        let grid = model.world().grid();
-        let mut all = Vec::new();
-        for (source, &ColliderSource { radius }, velocity, hold, extent) in &sources {
-            let Ok(place) = places.compute_global_transform(source) else { continue };
-            // One that is held goes on as it came, once there is ground where it was going.
-            let velocity = hold.and_then(HeldByGround::stopped).or(velocity.map(|velocity| velocity.0));
-            let from = inverse.transform_point3(place.translation());
-            let way = inverse.transform_vector3(velocity.unwrap_or_default() * AHEAD);
-            if !(from.is_finite() && way.is_finite() && radius >= 0.0) {
-                continue;
-            }
-            // No body is held for want of ground that it reaches itself.
-            let reach = solids.reach(&extent).map_or(Vec3::ZERO, |reach| reach.farthest());
-            let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
-            all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), (radius / size).max(own)));
-        }
-        let stops = telling(grid, all);
-        let same = known.0.get(&terrain).filter(|area| area.grid == grid && area.stops == stops);
-        let area = same.cloned().unwrap_or_else(|| Arc::new(Area::new(grid, stops)));
-        near.0.insert(terrain, area);
-    }
-    if !near.is(&known) {
-        grounds.set_near(near.clone());
-        *known = near;
-    }
-    figures.main_thread += start.elapsed();
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
 use super::character::Character;
-use super::colliders::GroundContact;
+use super::ground::GroundContact;
 
 /// How far from its position a body reaches at most, in metres: boxes of what is fast are long.
 pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
