@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, larger, smaller};
 use super::sphere::ball;
-use super::{Convert, Extent, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{difference, measure};
 
@@ -15,9 +15,9 @@ use crate::brush::quantize::{difference, measure};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Capsule<N: Numbers = Voxels> {
     /// One end of the segment.
-    pub from: N::Point,
+    pub from: N::Vector,
     /// The other end.
-    pub to: N::Point,
+    pub to: N::Vector,
     /// Its radius.
     pub radius: N::Length,
 }
@@ -32,8 +32,8 @@ impl Shape {
 impl<N: Numbers> Capsule<N> {
     pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Capsule<C::To>, BrushError> {
         Ok(Capsule {
-            from: to.point("from", self.from)?,
-            to: to.point("to", self.to)?,
+            from: to.vector("from", Kind::Point, self.from)?,
+            to: to.vector("to", Kind::Point, self.to)?,
             radius: to.length("radius", self.radius)?,
         })
     }

@@ -4,7 +4,7 @@ use glam::{IVec3, Mat3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, dot, larger, length, smaller};
-use super::{Convert, Extent, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::matrix;
 
@@ -12,9 +12,9 @@ use crate::brush::quantize::matrix;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cuboid<N: Numbers = Voxels> {
     /// Its middle.
-    pub center: N::Point,
+    pub center: N::Vector,
     /// Half its sides, along its own axes.
-    pub half: N::Sides,
+    pub half: N::Vector,
     /// From its own axes to the terrain's; of length 1. It may be left out in a line of JSON.
     #[serde(default = "N::unturned", skip_serializing_if = "N::may_leave_out")]
     pub rotation: N::Turn,
@@ -35,8 +35,8 @@ impl Shape {
 impl<N: Numbers> Cuboid<N> {
     pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Cuboid<C::To>, BrushError> {
         Ok(Cuboid {
-            center: to.point("center", self.center)?,
-            half: to.sides("half", self.half)?,
+            center: to.vector("center", Kind::Point, self.center)?,
+            half: to.vector("half", Kind::Sides, self.half)?,
             rotation: to.turn("rotation", self.rotation)?,
         })
     }

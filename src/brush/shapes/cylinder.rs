@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, larger, length, smaller};
-use super::{Convert, Extent, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{check_point, disc, measure, sum};
 
@@ -14,9 +14,9 @@ use crate::brush::quantize::{check_point, disc, measure, sum};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cylinder<N: Numbers = Voxels> {
     /// Centre of one end.
-    pub base: N::Point,
+    pub base: N::Vector,
     /// From there to the centre of the other end.
-    pub axis: N::Arrow,
+    pub axis: N::Vector,
     /// Its radius.
     pub radius: N::Length,
 }
@@ -31,8 +31,8 @@ impl Shape {
 impl<N: Numbers> Cylinder<N> {
     pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Cylinder<C::To>, BrushError> {
         Ok(Cylinder {
-            base: to.point("base", self.base)?,
-            axis: to.arrow("axis", self.axis)?,
+            base: to.vector("base", Kind::Point, self.base)?,
+            axis: to.vector("axis", Kind::Arrow, self.axis)?,
             radius: to.length("radius", self.radius)?,
         })
     }

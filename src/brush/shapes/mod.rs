@@ -27,7 +27,7 @@ pub use torus::Torus;
 
 use distance::Distance;
 pub(super) use distance::{larger, smaller};
-use numbers::{Check, Convert, Names, Quantize, Restore, Transform};
+use numbers::{Check, Convert, Kind, Quantize, Restore, Transform};
 use outline::Outline;
 
 use super::BrushError;
@@ -94,7 +94,7 @@ macro_rules! shapes {
 
         /// The shapes' numbers, by which `kernels/shapes.cuh` knows them.
         #[cfg(feature = "cuda")]
-        enum Kind {
+        enum Number {
             $($name,)*
         }
 
@@ -213,7 +213,7 @@ macro_rules! shapes {
             #[cfg(feature = "cuda")]
             pub(super) fn constants(&self) -> (u32, [f32; 12]) {
                 let (kind, own) = match self {
-                    $(Self::$name(form) => (Kind::$name, form.constants()),)*
+                    $(Self::$name(form) => (Number::$name, form.constants()),)*
                 };
                 let mut all = [0.0; 12];
                 all.iter_mut().zip(own).for_each(|(place, value)| *place = value);
@@ -237,25 +237,27 @@ shapes! {
 impl Shape {
     /// The shape after every point p moved to `turn * (p * scale) + shift`.
     pub(super) fn transformed(&self, turn: Quat, shift: Vec3, scale: f32) -> Self {
-        self.moved(Transform { arrow: &|v| turn * (v * scale), shift, turn, scale })
+        self.moved(Transform { arrow: &|v| turn * (v * scale), shift, turn, scale, fields: Vec::new() }).0
     }
 
     /// The shape with its points and arrows stretched, and its sizes as they were.
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
     pub(crate) fn stretched(&self, stretch: impl Fn(Vec3) -> Vec3) -> Self {
-        self.moved(Transform { arrow: &stretch, shift: Vec3::ZERO, turn: Quat::IDENTITY, scale: 1.0 })
-    }
-
-    fn moved(&self, mut to: Transform) -> Self {
-        // Moving fails for no number.
-        self.convert(&mut to).unwrap_or(*self)
+        let (shift, turn) = (Vec3::ZERO, Quat::IDENTITY);
+        self.moved(Transform { arrow: &stretch, shift, turn, scale: 1.0, fields: Vec::new() }).0
     }
 
     /// The names of its fields.
     pub(super) fn fields(&self) -> Vec<&'static str> {
-        let mut names = Names::default();
-        let _ = self.convert(&mut names);
-        names.0
+        let (shift, turn) = (Vec3::ZERO, Quat::IDENTITY);
+        self.moved(Transform { arrow: &|v| v, shift, turn, scale: 1.0, fields: Vec::new() }).1
+    }
+
+    /// The shape moved, and the names of its fields.
+    fn moved(&self, mut to: Transform) -> (Self, Vec<&'static str>) {
+        // Moving fails for no number.
+        let moved = self.convert(&mut to).unwrap_or(*self);
+        (moved, to.fields)
     }
 }
 

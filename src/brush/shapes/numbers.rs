@@ -7,18 +7,14 @@ use glam::{Quat, Vec3};
 use crate::brush::BrushError;
 use crate::brush::quantize::{self, voxels};
 
-/// What the fields of a shape hold: [`Voxels`] in a brush, integers in an edit.
+/// What the fields of a shape hold: [`Voxels`] in a brush, [`Units`] in an edit.
 pub trait Numbers: Copy + Debug + PartialEq {
-    /// A place.
-    type Point: Copy + Debug + PartialEq;
-    /// The way from one place to another.
-    type Arrow: Copy + Debug + PartialEq;
+    /// A place, the way to another place, or half the sides of a box.
+    type Vector: Copy + Debug + PartialEq;
     /// A direction of any length but zero.
     type Direction: Copy + Debug + PartialEq;
     /// A radius.
     type Length: Copy + Debug + PartialEq;
-    /// Half the sides of a box.
-    type Sides: Copy + Debug + PartialEq;
     /// A rotation.
     type Turn: Copy + Debug + PartialEq;
 
@@ -36,11 +32,9 @@ pub trait Numbers: Copy + Debug + PartialEq {
 pub struct Voxels;
 
 impl Numbers for Voxels {
-    type Point = Vec3;
-    type Arrow = Vec3;
+    type Vector = Vec3;
     type Direction = Vec3;
     type Length = f32;
-    type Sides = Vec3;
     type Turn = Quat;
 
     fn unturned() -> Quat {
@@ -57,16 +51,25 @@ impl Numbers for Voxels {
 pub struct Units;
 
 impl Numbers for Units {
-    type Point = [i32; 3];
-    type Arrow = [i32; 3];
+    type Vector = [i32; 3];
     type Direction = [i16; 3];
     type Length = i32;
-    type Sides = [i32; 3];
     type Turn = [i16; 4];
 
     fn unturned() -> [i16; 4] {
         [0, 0, 0, i16::MAX]
     }
+}
+
+/// What a vector is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A place.
+    Point,
+    /// The way from one place to another.
+    Arrow,
+    /// Half the sides of a box.
+    Sides,
 }
 
 /// Makes other numbers of those of a shape, which hands over one after the other with the name of its field. So what
@@ -77,36 +80,21 @@ pub trait Convert {
     /// What they shall hold.
     type To: Numbers;
 
-    /// Converts a place.
-    fn point(&mut self, field: &'static str, value: Point<Self::From>)
-    -> Result<Point<Self::To>, BrushError>;
-    /// Converts the way from one place to another.
-    fn arrow(&mut self, field: &'static str, value: Arrow<Self::From>)
-    -> Result<Arrow<Self::To>, BrushError>;
-    /// Converts a direction.
-    fn direction(
+    fn vector(
         &mut self,
         field: &'static str,
-        value: Direction<Self::From>,
-    ) -> Result<Direction<Self::To>, BrushError>;
-    /// Converts a radius.
-    fn length(
-        &mut self,
-        field: &'static str,
-        value: Length<Self::From>,
-    ) -> Result<Length<Self::To>, BrushError>;
-    /// Converts half the sides of a box.
-    fn sides(&mut self, field: &'static str, value: Sides<Self::From>)
-    -> Result<Sides<Self::To>, BrushError>;
-    /// Converts a rotation.
-    fn turn(&mut self, field: &'static str, value: Turn<Self::From>) -> Result<Turn<Self::To>, BrushError>;
+        kind: Kind,
+        value: Vector<Self::From>,
+    ) -> Made<Vector<Self::To>>;
+    fn direction(&mut self, field: &'static str, value: Direction<Self::From>) -> Made<Direction<Self::To>>;
+    fn length(&mut self, field: &'static str, value: Length<Self::From>) -> Made<Length<Self::To>>;
+    fn turn(&mut self, field: &'static str, value: Turn<Self::From>) -> Made<Turn<Self::To>>;
 }
 
-type Point<N> = <N as Numbers>::Point;
-type Arrow<N> = <N as Numbers>::Arrow;
+type Made<T> = Result<T, BrushError>;
+type Vector<N> = <N as Numbers>::Vector;
 type Direction<N> = <N as Numbers>::Direction;
 type Length<N> = <N as Numbers>::Length;
-type Sides<N> = <N as Numbers>::Sides;
 type Turn<N> = <N as Numbers>::Turn;
 
 /// Rounds a brush's numbers to integers, halves to even.
@@ -116,28 +104,26 @@ impl Convert for Quantize {
     type From = Voxels;
     type To = Units;
 
-    fn point(&mut self, field: &'static str, value: Vec3) -> Result<[i32; 3], BrushError> {
-        quantize::point(field, value)
+    fn vector(&mut self, field: &'static str, kind: Kind, value: Vec3) -> Made<[i32; 3]> {
+        match kind {
+            Kind::Point => quantize::point(field, value),
+            Kind::Arrow => quantize::arrow(field, value),
+            Kind::Sides => {
+                let [x, y, z] = value.to_array().map(|side| quantize::size(field, side));
+                Ok([x?, y?, z?])
+            }
+        }
     }
 
-    fn arrow(&mut self, field: &'static str, value: Vec3) -> Result<[i32; 3], BrushError> {
-        quantize::arrow(field, value)
-    }
-
-    fn direction(&mut self, field: &'static str, value: Vec3) -> Result<[i16; 3], BrushError> {
+    fn direction(&mut self, field: &'static str, value: Vec3) -> Made<[i16; 3]> {
         quantize::direction(field, value)
     }
 
-    fn length(&mut self, field: &'static str, value: f32) -> Result<i32, BrushError> {
+    fn length(&mut self, field: &'static str, value: f32) -> Made<i32> {
         quantize::size(field, value)
     }
 
-    fn sides(&mut self, field: &'static str, value: Vec3) -> Result<[i32; 3], BrushError> {
-        let [x, y, z] = value.to_array().map(|side| quantize::size(field, side));
-        Ok([x?, y?, z?])
-    }
-
-    fn turn(&mut self, _: &'static str, value: Quat) -> Result<[i16; 4], BrushError> {
+    fn turn(&mut self, _: &'static str, value: Quat) -> Made<[i16; 4]> {
         quantize::turn(value)
     }
 }
@@ -149,27 +135,24 @@ impl Convert for Check {
     type From = Units;
     type To = Units;
 
-    fn point(&mut self, field: &'static str, value: [i32; 3]) -> Result<[i32; 3], BrushError> {
-        quantize::check_point(field, value).map(|()| value)
+    fn vector(&mut self, field: &'static str, kind: Kind, value: [i32; 3]) -> Made<[i32; 3]> {
+        match kind {
+            Kind::Point => quantize::check_point(field, value)?,
+            Kind::Arrow => quantize::check_arrow(field, value)?,
+            Kind::Sides => value.into_iter().try_for_each(|side| quantize::check_size(field, side))?,
+        }
+        Ok(value)
     }
 
-    fn arrow(&mut self, field: &'static str, value: [i32; 3]) -> Result<[i32; 3], BrushError> {
-        quantize::check_arrow(field, value).map(|()| value)
-    }
-
-    fn direction(&mut self, field: &'static str, value: [i16; 3]) -> Result<[i16; 3], BrushError> {
+    fn direction(&mut self, field: &'static str, value: [i16; 3]) -> Made<[i16; 3]> {
         quantize::check_direction(field, value).map(|()| value)
     }
 
-    fn length(&mut self, field: &'static str, value: i32) -> Result<i32, BrushError> {
+    fn length(&mut self, field: &'static str, value: i32) -> Made<i32> {
         quantize::check_size(field, value).map(|()| value)
     }
 
-    fn sides(&mut self, field: &'static str, value: [i32; 3]) -> Result<[i32; 3], BrushError> {
-        value.into_iter().try_for_each(|side| quantize::check_size(field, side)).map(|()| value)
-    }
-
-    fn turn(&mut self, _: &'static str, value: [i16; 4]) -> Result<[i16; 4], BrushError> {
+    fn turn(&mut self, _: &'static str, value: [i16; 4]) -> Made<[i16; 4]> {
         quantize::check_turn(value).map(|()| value)
     }
 }
@@ -181,27 +164,19 @@ impl Convert for Restore {
     type From = Units;
     type To = Voxels;
 
-    fn point(&mut self, _: &'static str, value: [i32; 3]) -> Result<Vec3, BrushError> {
+    fn vector(&mut self, _: &'static str, _: Kind, value: [i32; 3]) -> Made<Vec3> {
         Ok(quantize::restored_point(value))
     }
 
-    fn arrow(&mut self, field: &'static str, value: [i32; 3]) -> Result<Vec3, BrushError> {
-        self.point(field, value)
-    }
-
-    fn direction(&mut self, _: &'static str, value: [i16; 3]) -> Result<Vec3, BrushError> {
+    fn direction(&mut self, _: &'static str, value: [i16; 3]) -> Made<Vec3> {
         Ok(quantize::restored_direction(value))
     }
 
-    fn length(&mut self, _: &'static str, value: i32) -> Result<f32, BrushError> {
+    fn length(&mut self, _: &'static str, value: i32) -> Made<f32> {
         Ok(voxels(value))
     }
 
-    fn sides(&mut self, field: &'static str, value: [i32; 3]) -> Result<Vec3, BrushError> {
-        self.point(field, value)
-    }
-
-    fn turn(&mut self, _: &'static str, value: [i16; 4]) -> Result<Quat, BrushError> {
+    fn turn(&mut self, _: &'static str, value: [i16; 4]) -> Made<Quat> {
         Ok(quantize::restored_turn(value))
     }
 }
@@ -215,73 +190,35 @@ pub(super) struct Transform<'a> {
     pub turn: Quat,
     /// What becomes of sizes.
     pub scale: f32,
+    /// The names of the fields.
+    pub fields: Vec<&'static str>,
 }
 
 impl Convert for Transform<'_> {
     type From = Voxels;
     type To = Voxels;
 
-    fn point(&mut self, _: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        Ok((self.arrow)(value) + self.shift)
+    fn vector(&mut self, field: &'static str, kind: Kind, value: Vec3) -> Made<Vec3> {
+        self.fields.push(field);
+        Ok(match kind {
+            Kind::Point => (self.arrow)(value) + self.shift,
+            Kind::Arrow => (self.arrow)(value),
+            Kind::Sides => value * self.scale,
+        })
     }
 
-    fn arrow(&mut self, _: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
+    fn direction(&mut self, field: &'static str, value: Vec3) -> Made<Vec3> {
+        self.fields.push(field);
         Ok((self.arrow)(value))
     }
 
-    fn direction(&mut self, _: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        Ok((self.arrow)(value))
-    }
-
-    fn length(&mut self, _: &'static str, value: f32) -> Result<f32, BrushError> {
+    fn length(&mut self, field: &'static str, value: f32) -> Made<f32> {
+        self.fields.push(field);
         Ok(value * self.scale)
     }
 
-    fn sides(&mut self, _: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        Ok(value * self.scale)
-    }
-
-    fn turn(&mut self, _: &'static str, value: Quat) -> Result<Quat, BrushError> {
+    fn turn(&mut self, field: &'static str, value: Quat) -> Made<Quat> {
+        self.fields.push(field);
         Ok(self.turn * value)
-    }
-}
-
-/// Takes down the names of a shape's fields.
-#[derive(Default)]
-pub(super) struct Names(pub Vec<&'static str>);
-
-impl Names {
-    fn name<T>(&mut self, field: &'static str, value: T) -> Result<T, BrushError> {
-        self.0.push(field);
-        Ok(value)
-    }
-}
-
-impl Convert for Names {
-    type From = Voxels;
-    type To = Voxels;
-
-    fn point(&mut self, field: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        self.name(field, value)
-    }
-
-    fn arrow(&mut self, field: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        self.name(field, value)
-    }
-
-    fn direction(&mut self, field: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        self.name(field, value)
-    }
-
-    fn length(&mut self, field: &'static str, value: f32) -> Result<f32, BrushError> {
-        self.name(field, value)
-    }
-
-    fn sides(&mut self, field: &'static str, value: Vec3) -> Result<Vec3, BrushError> {
-        self.name(field, value)
-    }
-
-    fn turn(&mut self, field: &'static str, value: Quat) -> Result<Quat, BrushError> {
-        self.name(field, value)
     }
 }

@@ -6,14 +6,14 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, length};
-use super::{Convert, Extent, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
 use crate::brush::BrushError;
 
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sphere<N: Numbers = Voxels> {
     /// Its middle.
-    pub center: N::Point,
+    pub center: N::Vector,
     /// Its radius.
     pub radius: N::Length,
 }
@@ -27,7 +27,10 @@ impl Shape {
 
 impl<N: Numbers> Sphere<N> {
     pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Sphere<C::To>, BrushError> {
-        Ok(Sphere { center: to.point("center", self.center)?, radius: to.length("radius", self.radius)? })
+        Ok(Sphere {
+            center: to.vector("center", Kind::Point, self.center)?,
+            radius: to.length("radius", self.radius)?,
+        })
     }
 }
 

@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, length};
-use super::{Convert, Extent, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{disc, voxels};
 
@@ -14,7 +14,7 @@ use crate::brush::quantize::{disc, voxels};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Torus<N: Numbers = Voxels> {
     /// Its middle.
-    pub center: N::Point,
+    pub center: N::Vector,
     /// Where its hole points; only the direction counts.
     pub axis: N::Direction,
     /// Radius of the circle.
@@ -33,7 +33,7 @@ impl Shape {
 impl<N: Numbers> Torus<N> {
     pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Torus<C::To>, BrushError> {
         Ok(Torus {
-            center: to.point("center", self.center)?,
+            center: to.vector("center", Kind::Point, self.center)?,
             axis: to.direction("axis", self.axis)?,
             radius: to.length("radius", self.radius)?,
             tube: to.length("tube", self.tube)?,
