@@ -66,6 +66,7 @@ use crate::surface::vertex::WorldView;
 use device::{Device, Fault};
 use memory::{Limits, Usage};
 use session::Session;
+use surfaces::Surfaces;
 
 /// A card beside the processor. It is opened when it is first wanted.
 pub(super) struct Cuda {
@@ -327,7 +328,7 @@ impl Cuda {
         let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
         self.offer(choice, load, missing, work, |session, meshed| {
             let Session { meshes, device, .. } = session;
-            let surfaces = meshes.surfaces(view, blocks, meshed);
+            let surfaces = Surfaces::new(meshes, view, blocks, meshed);
             let drawn = catch_unwind(AssertUnwindSafe(|| then(&surfaces)));
             // Whoever needed no more than some of them did not wait for all; and who panicked leaves the session to others.
             let is_over = surfaces.arrival.is_over();

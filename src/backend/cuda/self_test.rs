@@ -7,6 +7,7 @@ use glam::{IVec3, Vec2, Vec3};
 
 use super::device::Fault;
 use super::session::Session;
+use super::surfaces::Surfaces;
 use crate::backend::{Compute, Cpu};
 use crate::brush::{Brush, Edit, Roughness, Shape, Stamp};
 use crate::edits::{DraftedBrick, EditDelta, EditEffect, PreparedEdits, enter_effects, latest};
@@ -97,7 +98,7 @@ fn compare_meshes(session: &mut Session, view: &WorldView, blocks: &[Block]) -> 
     let mut expected = Parts::default();
     Cpu.mesh(view, blocks, &|| {}, &mut |fresh| expected = collected(blocks, fresh));
     let meshed = session.mesh(view, blocks, &|| {})?;
-    let surfaces = session.meshes.surfaces(view, blocks, meshed);
+    let surfaces = Surfaces::new(&session.meshes, view, blocks, meshed);
     let found = collected(blocks, &surfaces);
     surfaces.arrival.end()?;
     same(&expected, &found).then_some(()).ok_or(Fault::SelfTest)

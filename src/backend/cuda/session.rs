@@ -7,10 +7,10 @@ use web_time::Instant;
 
 use super::cache::{RecordCache, reference};
 use super::device::{Device, Fault, Launch};
-use super::edit::EditOutput;
+use super::edit::output::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
 use super::lists::{cut, fill, hand_out};
-use super::mesh::MeshOutput;
+use super::mesh::output::MeshOutput;
 use super::staging::{InputBuffer, Plan, Section};
 use super::windows::{KeptSlabs, Windows};
 use crate::edits::PreparedEdits;

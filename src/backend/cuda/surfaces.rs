@@ -11,11 +11,12 @@ use web_time::Instant;
 use super::device::{Fault, Mark};
 use super::guarded;
 use super::layout::MeshResult;
-use super::mesh::{MeshLists, PIECE};
+use super::mesh::output::{MeshLists, MeshOutput, Meshed, PIECE};
 use crate::lattice::{ChunkGrid, SNAP};
 use crate::surface::MaterialMix;
 use crate::surface::block::Block;
 use crate::surface::meshed_blocks::{BlockVertices, MeshedBlock, MeshedBlocks, PackedMixes, PackedVertices};
+use crate::surface::vertex::WorldView;
 
 /// What a launch wrote for some blocks.
 pub(super) struct Surfaces<'a> {
@@ -28,6 +29,20 @@ pub(super) struct Surfaces<'a> {
     /// What all vertices are made of, where that is the same; else each has its own.
     pub plain: Option<MaterialMix>,
     pub arrival: Arrival,
+}
+
+impl<'a> Surfaces<'a> {
+    /// What was written for these blocks.
+    pub fn new(output: &'a MeshOutput, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Self {
+        Self {
+            grid: view.grid,
+            blocks,
+            results: output.results.entries(blocks.len()),
+            lists: &output.lists,
+            plain: meshed.plain,
+            arrival: Arrival::new(meshed.marks),
+        }
+    }
 }
 
 /// Copies on their way, each with the surfaces of so many blocks more.

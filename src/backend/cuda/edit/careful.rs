@@ -8,8 +8,7 @@ use super::super::lists::in_pieces;
 use super::super::session::{Session, Uploads, windows};
 use super::super::staging::{InputBuffer, Plan, Section};
 use super::super::windows::{KeptSlabs, Windows};
-use super::LONG;
-use super::jobs::pos;
+use super::output::LONG;
 use crate::edits::PreparedEdits;
 use crate::ground::GreyImage;
 
@@ -151,7 +150,7 @@ impl Session {
         jobs: &mut [EditJob],
         uploads: &mut Uploads<'a>,
     ) -> Result<Care<'a>, Fault> {
-        let mut windows = windows(&self.bricks, work.base, jobs, pos, look.bricks(), &mut self.kept);
+        let mut windows = windows(&self.bricks, work.base, jobs, EditJob::pos, look.bricks(), &mut self.kept);
         self.complete(uploads, &mut windows)?;
         in_pieces(jobs, LONG, |first, jobs| {
             for (number, job) in (first..).zip(jobs) {

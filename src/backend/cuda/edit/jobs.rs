@@ -1,27 +1,14 @@
 //! Jobs of the edit kernels: the bricks that edits may reach, each with its edits, its stack and what it is now.
 
-use glam::IVec3;
-
 use super::super::cache::reference;
 use super::super::device::Fault;
 use super::super::layout::{self, EditJob, MOST_JOBS, NONE};
 use super::super::lists::{cut, map, map_into};
 use super::super::session::{Session, Uploads};
-use super::{LONG, PIECE};
+use super::output::{LONG, PIECE};
 use crate::edits::{Job, PreparedEdits};
-use crate::lattice::{BrickPos, ChunkGrid, pieces};
+use crate::lattice::{ChunkGrid, pieces};
 use crate::volume::Brick;
-
-/// Which brick a job is about.
-pub(super) fn pos(job: &EditJob) -> BrickPos {
-    BrickPos(IVec3::from_array(job.brick))
-}
-
-/// The stack that a job's brick belongs to.
-fn place(job: &EditJob) -> (i32, i32) {
-    let [x, _, z] = job.brick;
-    (x, z)
-}
 
 /// A job for each brick that edits may reach, in order: where the brick is, which edits it takes, how chunks cut it. They
 /// take the place of what the list holds. `complete` gets those of some bricks that follow each other, and the number of the
@@ -89,15 +76,15 @@ impl Session {
         let (stacks, slots, base) = (&self.stacks, &self.bricks, work.base);
         let missing = list(work, jobs, |first, jobs| {
             let (mut number, mut missing) = (first, Missing::default());
-            for stack in jobs.chunk_by_mut(|a, b| place(a) == place(b)) {
-                let slot = stacks.find(base.ground(), place(&stack[0]));
+            for stack in jobs.chunk_by_mut(|a, b| a.place() == b.place()) {
+                let slot = stacks.find(base.ground(), stack[0].place());
                 if slot.is_none() {
                     missing.stacks.push(number);
                 }
                 for (number, job) in (number..).zip(&mut *stack) {
                     job.stack = slot.unwrap_or_default();
                     job.base = NONE;
-                    let brick = if with_bricks { base.brick(pos(job)) } else { None };
+                    let brick = if with_bricks { base.brick(job.pos()) } else { None };
                     let Some(brick) = brick else { continue };
                     match slots.find(brick.tag.get()) {
                         Some(slot) => job.base = reference(slot, brick),
@@ -110,9 +97,9 @@ impl Session {
         })?;
         for Missing { stacks, bricks } in missing {
             for first in stacks {
-                let stack = place(&jobs[first]);
+                let stack = jobs[first].place();
                 let slot = self.need_stack(uploads, stack)?;
-                let own = jobs[first..].iter_mut().take_while(|job| place(job) == stack);
+                let own = jobs[first..].iter_mut().take_while(|job| job.place() == stack);
                 own.for_each(|job| job.stack = slot);
             }
             for (number, brick) in bricks {
@@ -151,7 +138,7 @@ mod tests {
             let mut next = 0;
             for (job, of_brick) in jobs.iter().zip(work.bricks()) {
                 assert_eq!((job.first, job.count), (next, of_brick.len() as u32));
-                assert_eq!((pos(job), job.cuts), (of_brick[0].pos(), layout::cuts(grid, of_brick[0].pos())));
+                assert_eq!((job.pos(), job.cuts), (of_brick[0].pos(), layout::cuts(grid, of_brick[0].pos())));
                 next += job.count;
             }
         }

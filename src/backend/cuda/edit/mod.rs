@@ -5,7 +5,7 @@
 
 mod careful;
 mod jobs;
-mod output;
+pub(super) mod output;
 
 use super::cache::RecordCache;
 use super::device::{Fault, Launch};
@@ -16,14 +16,7 @@ use super::staging::Plan;
 use crate::edits::{EditDelta, EditEffect, PreparedEdit, PreparedEdits, enter_effects};
 use crate::lattice::side_by_side;
 use careful::Look;
-pub(super) use output::EditOutput;
-use output::Totals;
-
-/// From how many bricks on they are dealt with side by side.
-const LONG: usize = 1024;
-
-/// How many a thread deals with at a time then: few, so that all threads end together.
-const PIECE: usize = 256;
+use output::{LONG, Target, Totals};
 
 /// From how many entries on plain lists are copied side by side.
 const LONG_LIST: usize = 1 << 14;
@@ -42,9 +35,6 @@ const KEPT_JOBS: usize = 1 << 16;
 
 /// Most passes: each gives twice the room where it is not known how much is needed.
 const PASSES: usize = 12;
-
-/// A slot that is to hold a changed brick, with its tag.
-type Target = (u32, u64);
 
 impl Session {
     /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.

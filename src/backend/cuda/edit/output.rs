@@ -11,12 +11,19 @@ use super::super::layout::{
 };
 use super::super::lists::{map, map_numbers};
 use super::super::staging::OutputList;
-use super::jobs::pos;
-use super::{LONG, PIECE, Target};
 use crate::edits::{DraftedBrick, EditDelta};
 use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
 use crate::volume::{Brick, VoxelOutcome};
+
+/// From how many bricks on they are dealt with side by side.
+pub(super) const LONG: usize = 1024;
+
+/// How many a thread deals with at a time then: few, so that all threads end together.
+pub(super) const PIECE: usize = 256;
+
+/// A slot that is to hold a changed brick, with its tag.
+pub(super) type Target = (u32, u64);
 
 /// Entries of each list that one ledger adds up.
 const ENTRIES: usize = 1024;
@@ -202,8 +209,8 @@ impl EditOutput {
                 0 => stored(result, targets[number as usize].1),
                 _ => Arc::clone(&uniform[&Uniform::new(result)]),
             };
-            let bounds = layout::unpack_box(result.bounds, pos(job).origin());
-            DraftedBrick::new(pos(job), brick, bounds, result.flags & EditResult::EXTENDED != 0)
+            let bounds = layout::unpack_box(result.bounds, job.pos().origin());
+            DraftedBrick::new(job.pos(), brick, bounds, result.flags & EditResult::EXTENDED != 0)
         };
         let bricks = map(&changed.numbers, LONG, drafted);
         EditDelta { bricks, hash: changed.hash, ..EditDelta::default() }
@@ -254,7 +261,7 @@ fn piece<T>(list: &[T], length: usize, number: usize) -> &[T] {
 
 /// Adds what an edit changed in a chunk's part of a brick.
 fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, ledger: &mut EditDelta) {
-    let Some(pos) = jobs.get(part.job as usize).map(pos) else { return };
+    let Some(pos) = jobs.get(part.job as usize).map(EditJob::pos) else { return };
     let bounds = layout::unpack_box(part.bounds, pos.origin());
     ledger.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
 }
@@ -292,7 +299,7 @@ mod tests {
         let (mut ledger, mut expected) = (EditDelta::default(), BTreeMap::new());
         for number in 0..600 {
             let (job, edit, part) = (number / 20, rng.u32(0..3), rng.u32(0..2));
-            let pos = pos(&jobs[job as usize]);
+            let pos = jobs[job as usize].pos();
             let point = pos.origin() + IVec3::new(rng.i32(0..8), 3, 4);
             let bounds = layout::pack_box(LatticeBox::point(point), pos.origin());
             add_part(grid, &jobs, &EditPart { job, edit, part, bounds }, &mut ledger);

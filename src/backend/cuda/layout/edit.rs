@@ -34,6 +34,19 @@ pub(crate) struct EditJob {
     pub pad: u32,
 }
 
+impl EditJob {
+    /// Which brick it is about.
+    pub fn pos(&self) -> BrickPos {
+        BrickPos(IVec3::from_array(self.brick))
+    }
+
+    /// The stack that the brick belongs to.
+    pub fn place(&self) -> (i32, i32) {
+        let [x, _, z] = self.brick;
+        (x, z)
+    }
+}
+
 /// An edit, all that is derived from it once included.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]

@@ -1,6 +1,6 @@
 //! Meshing on the device: one launch for all blocks. [`output`](self::output) is what came of it.
 
-mod output;
+pub(super) mod output;
 
 use super::device::{Fault, Launch};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
@@ -13,7 +13,7 @@ use crate::lattice::{pieces, side_by_side};
 use crate::surface::MaterialMix;
 use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
-pub(super) use output::{MeshLists, MeshOutput, Meshed, PIECE};
+use output::Meshed;
 
 /// Blocks of some stacks that one thread deals with.
 struct Piece<'b> {

@@ -6,15 +6,12 @@ use super::super::device::{Device, Fault, Mark};
 use super::super::layout::MeshResult;
 use super::super::lists::map;
 use super::super::staging::OutputList;
-use super::super::surfaces::{Arrival, Surfaces};
 use crate::surface::MaterialMix;
-use crate::surface::block::Block;
-use crate::surface::vertex::WorldView;
 
 /// What the mesh kernel writes.
 pub(in super::super) struct MeshOutput {
-    pub(super) results: OutputList,
-    pub(super) lists: MeshLists,
+    pub(in super::super) results: OutputList,
+    pub(in super::super) lists: MeshLists,
 }
 
 /// Surfaces of all blocks.
@@ -64,18 +61,6 @@ impl MeshOutput {
             *own = all;
         });
         extents
-    }
-
-    /// What was written for blocks, on its way to the host where it is not there.
-    pub fn surfaces<'a>(&'a self, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Surfaces<'a> {
-        Surfaces {
-            grid: view.grid,
-            blocks,
-            results: self.results.entries(blocks.len()),
-            lists: &self.lists,
-            plain: meshed.plain,
-            arrival: Arrival::new(meshed.marks),
-        }
     }
 }
 
@@ -182,9 +167,9 @@ impl Extent {
 /// What a launch wrote.
 pub(in super::super) struct Meshed {
     /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
-    pub(super) plain: Option<MaterialMix>,
+    pub(in super::super) plain: Option<MaterialMix>,
     /// Copies to the host that are under way, one for each [`PIECE`] of blocks.
-    pub(super) marks: Vec<Box<dyn Mark>>,
+    pub(in super::super) marks: Vec<Box<dyn Mark>>,
 }
 
 #[cfg(test)]
