@@ -1,10 +1,7 @@
-//! Settings and figures, as reflected resources.
-
-use std::time::Duration;
+//! Settings, as resources and components.
 
 use bevy::prelude::*;
 
-use super::Times;
 use crate::backend::{Backend, Engine};
 use crate::terrain::LooseSettings;
 
@@ -82,27 +79,4 @@ impl From<LooseGround> for LooseSettings {
     fn from(LooseGround { largest, crumbs, debris }: LooseGround) -> Self {
         Self { largest, crumbs, debris }
     }
-}
-
-/// What the plugin did lately.
-#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
-#[reflect(Resource, Default)]
-pub struct BurrowFigures {
-    /// Commits so far.
-    pub commits: u64,
-    /// Brushes in these commits.
-    pub brushes: u64,
-    /// Meshes swapped so far.
-    pub swaps: u64,
-    /// How long the last transaction took in its task.
-    pub last_transaction: Duration,
-    /// How long the last commit took on the main thread.
-    pub last_commit: Duration,
-    /// How long the latest transactions took in their tasks.
-    pub transactions: Times,
-    /// How long the latest commits took on the main thread.
-    pub commit_times: Times,
-    /// What this frame's intake, commits and starts of transactions took together on the main thread: systems, and changes
-    /// to entities.
-    pub main_thread: Duration,
 }

@@ -1,0 +1,70 @@
+//! What the plugin measures.
+
+use std::time::Duration;
+
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+
+use super::Times;
+
+/// What the plugin did lately.
+#[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Default)]
+pub struct BurrowFigures {
+    /// Commits so far.
+    pub commits: u64,
+    /// Brushes in these commits.
+    pub brushes: u64,
+    /// Meshes swapped so far.
+    pub swaps: u64,
+    /// How long the last transaction took in its task.
+    pub last_transaction: Duration,
+    /// How long the last commit took on the main thread.
+    pub last_commit: Duration,
+    /// How long the latest transactions took in their tasks.
+    pub transactions: Times,
+    /// How long the latest commits took on the main thread.
+    pub commit_times: Times,
+    /// How long collecting brushes, committing and starting transactions took together on the main thread in this frame:
+    /// systems, and changes to entities.
+    pub main_thread: Duration,
+}
+
+/// How long the parts of a transaction took in its task.
+#[derive(Clone, Copy, Default)]
+pub(super) struct TaskTimes {
+    pub edit: Duration,
+    pub mesh: Duration,
+    pub total: Duration,
+}
+
+impl BurrowFigures {
+    /// Counts a commit: its brushes, and how long it took in its task and on the main thread.
+    pub(super) fn count(&mut self, brushes: u64, transaction: Duration, commit: Duration) {
+        self.commits += 1;
+        self.brushes += brushes;
+        self.last_transaction = transaction;
+        self.transactions.push(transaction);
+        self.last_commit = commit;
+        self.commit_times.push(commit);
+        self.main_thread += commit;
+    }
+}
+
+/// When the commands of a frame's commits began to run.
+#[derive(Resource)]
+struct CommandsStart(Instant);
+
+/// Queues a command that starts to measure the commands behind it.
+pub(super) fn start_measuring(commands: &mut Commands) {
+    commands.queue(|world: &mut World| world.insert_resource(CommandsStart(Instant::now())));
+}
+
+/// Queues a command that adds the time since [`start_measuring`] to the main thread's.
+pub(super) fn stop_measuring(commands: &mut Commands) {
+    commands.queue(|world: &mut World| {
+        if let Some(CommandsStart(start)) = world.remove_resource() {
+            world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
+        }
+    });
+}
