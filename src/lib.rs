@@ -85,7 +85,7 @@
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for textures of its own |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
 //! | other cameras, no shadows | `RenderLayers`, `NotShadowCaster`, `NotShadowReceiver` on the terrain |
-//! | more from the same surfaces, in the same commit | `Companion`s |
+//! | more from the same surfaces, in the same commit | `SurfaceProcessor`s |
 //! | its own look | any `Material` through `TerrainMaterialPlugin`; `MaterialColors` |
 //! | an editor's panel | `BurrowPanelPlugin`, and `BrushTool` for the brush in hand (feature `egui`) |
 //! | to see what the model holds | `BurrowDebugPlugin` and the switches of `BurrowDebug` (feature `debug`) |

@@ -15,7 +15,7 @@ use super::ground::{GroundBody, GroundCollider, GroundContact};
 use super::near::Neighbourhood;
 use super::shape::GroundShape;
 use super::wake::{GroundChange, GroundChanges};
-use crate::plugin::{Attachment, Companion, Part, ShownSurface};
+use crate::plugin::{CommitAction, Part, ShownSurface, SurfaceProcessor};
 use crate::surface::SurfaceMesh;
 use crate::terrain::Drawn;
 
@@ -66,7 +66,7 @@ impl Grounds {
     }
 }
 
-impl Companion for Grounds {
+impl SurfaceProcessor for Grounds {
     /// Near sources, and a little farther off where there is a collider that has not gone yet: what is dug out of a tile
     /// there takes ground from it, so the chunk that draws the hole gets its collider with the tile's new one.
     fn wants(&self, part: &Part) -> bool {
@@ -77,7 +77,7 @@ impl Companion for Grounds {
         near.distance((part.terrain, tile)).is_some_and(|distance| distance <= 0.0 || stays())
     }
 
-    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
+    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<CommitAction> {
         let prepared = self.prepare(part, surface);
         Some(Box::new(move |entity| {
             entity.queue_silenced(move |part: EntityWorldMut| prepared.attach(part));

@@ -7,7 +7,8 @@ use super::debris_collider;
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, SNAP};
 use crate::plugin::{
-    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, ThreadTask, Threads, tell,
+    BurrowSystems, GroundPiece, HistoryMoved, LoosePieceFound, MaterialColors, ThreadTask, Threads,
+    trigger_if_alive,
 };
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, Restored, Terrain};
@@ -202,7 +203,7 @@ fn crumble(mut commands: Commands, time: Res<Time>, mut pieces: Query<(Entity, &
     for (entity, mut debris) in &mut pieces {
         debris.left -= time.delta_secs();
         if debris.left <= 0.0 {
-            tell(&mut commands, DebrisCrumbled { entity });
+            trigger_if_alive(&mut commands, DebrisCrumbled { entity });
             commands.entity(entity).try_despawn();
         }
     }

@@ -83,7 +83,7 @@ use avian3d::physics_transform::PhysicsTransformSystems;
 use avian3d::prelude::{PhysicsSchedule, PhysicsStepSystems, PhysicsSystems};
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, Companions};
+use crate::plugin::{BurrowSystems, SurfaceProcessors};
 
 /// Colliders for terrains. Needs avian's `PhysicsPlugins`, and the crate's own `BurrowPlugins`.
 ///
@@ -141,7 +141,7 @@ pub struct PhysicsFigures {
 impl Plugin for TerrainPhysicsPlugin {
     fn build(&self, app: &mut App) {
         let grounds = colliders::Grounds::default();
-        app.init_resource::<Companions>()
+        app.init_resource::<SurfaceProcessors>()
             .init_resource::<PhysicsFigures>()
             .init_resource::<GroundContact>()
             .init_resource::<IsAroundSteps>()
@@ -149,7 +149,7 @@ impl Plugin for TerrainPhysicsPlugin {
             .init_resource::<wake::Watched>()
             .init_resource::<upkeep::Work>()
             .init_resource::<columns::Columns>();
-        app.world_mut().resource_mut::<Companions>().add(grounds.clone());
+        app.world_mut().resource_mut::<SurfaceProcessors>().add(grounds.clone());
         app.insert_resource(grounds)
             .configure_sets(
                 Update,

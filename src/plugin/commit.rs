@@ -1,143 +1,25 @@
-//! Transactions: started in tasks, committed whole in one frame.
-
-use std::time::Duration;
+//! Starts transactions, and commits each of them whole in one frame.
 
 use bevy::camera::visibility::NoAutoAabb;
+use bevy::diagnostic::Diagnostics;
 use bevy::ecs::system::SystemParam;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
-use rayon::prelude::*;
 
-use super::companion::{Fresh, Workshop};
-use super::entities::{TerrainEntities, tell};
-use super::figures::{end_commands, start_commands};
-use super::intake::{pieces, tell_steps};
-use super::loading::Loading;
-use super::meshes::{Ready, Wardrobe};
-use super::threads::{ThreadTask, Threads};
+use super::collect::send_history;
+use super::diagnostics::measure_commit;
+use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
+use super::figures::{TaskTimes, start_measuring, stop_measuring};
+use super::load::Loading;
+use super::meshes::BuiltMesh;
+use super::processor::{BuiltSurface, SurfaceBuilder};
+use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
-    Attachment, BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated,
-    Companions, HistoryMoved, LoosePieceFound, MaterialColors, Part, ShownSurface, free_later,
+    BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
+    LoosePieceFound, MaterialColors, SurfaceProcessors, free_later,
 };
-use crate::backend::Engine;
-use crate::lattice::{ChunkGrid, ChunkPos};
-use crate::terrain::{
-    Commit, Drawn, FieldNews, Receipt, Rejection, SurfaceDraft, Terrain, Transaction, Unseen,
-};
-
-/// The transaction, or what is shown of what the game committed itself, that a terrain waits for.
-#[derive(Component)]
-pub(super) struct InFlight {
-    /// Counts them, over all terrains.
-    number: u64,
-    /// Of the transaction, if it is one.
-    ticket: Option<u64>,
-    task: ThreadTask<Prepared>,
-    /// The result, or that the task panicked.
-    done: Option<Result<Prepared, TaskPanicked>>,
-}
-
-/// A task panicked; the panic's message has been printed.
-struct TaskPanicked;
-
-/// Meshes and what goes with them, as they come from the task, and what they show.
-struct Prepared {
-    what: Shows,
-    parts: Vec<Fresh>,
-    pieces: Vec<LoosePieceFound>,
-    took: Duration,
-}
-
-/// What is shown.
-enum Shows {
-    /// A commit, once it is settled.
-    Commit(Box<Commit>),
-    /// What the game committed itself.
-    Unseen(Unseen),
-}
-
-/// From how many tiles and chunks on threads share them.
-const PARALLEL_PARTS: usize = 8;
-
-/// A transaction on its way into a task, with what its meshes are made with.
-struct Job {
-    /// The terrain's entity.
-    terrain: Entity,
-    transaction: Transaction,
-    engine: Engine,
-    workshop: Workshop,
-    /// Metres along a voxel's side.
-    voxel_size: f32,
-    grid: ChunkGrid,
-    /// Of the world once this is committed.
-    revision: u64,
-}
-
-impl Job {
-    /// Runs the transaction, and makes all that is shown with its commit.
-    fn run(self) -> Prepared {
-        let _span = info_span!("burrow transaction").entered();
-        let start = Instant::now();
-        let Self { terrain, transaction, engine, workshop, voxel_size, grid, revision } = self;
-        let mut commit = transaction.run_on(&engine);
-        let part = |drawn| Part::new(terrain, voxel_size, grid, revision, drawn);
-        // Taken out, so that they are dropped here and not on the main thread.
-        let updates = std::mem::take(&mut commit.meshes);
-        let tiles =
-            updates.tiles.into_iter().map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
-        let chunks = updates.chunks.into_iter();
-        let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
-        let drafts: Vec<_> = tiles.chain(chunks).collect();
-        let make =
-            |(drawn, draft): (Drawn, SurfaceDraft)| workshop.make(&part(drawn), draft.is_empty(), || draft);
-        let parts = info_span!("burrow surfaces").in_scope(|| for_each_part(drafts, make));
-        let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
-        if let Some(wardrobe) = &workshop.wardrobe {
-            pieces.iter_mut().for_each(|piece| piece.dress(wardrobe));
-        }
-        Prepared { what: Shows::Commit(Box::new(commit)), parts, pieces, took: start.elapsed() }
-    }
-}
-
-/// Makes parts, several at a time where there are many.
-fn for_each_part<T: Send>(parts: Vec<T>, make: impl Fn(T) -> Fresh + Sync + Send) -> Vec<Fresh> {
-    if parts.len() < PARALLEL_PARTS {
-        parts.into_iter().map(make).collect()
-    } else {
-        parts.into_par_iter().map(make).collect()
-    }
-}
-
-/// Starts on what the game changed of a terrain that is shown.
-pub(super) fn begin_unseen(
-    commands: &mut Commands,
-    (entity, terrain): (Entity, &Terrain),
-    unseen: Unseen,
-    workshop: Workshop,
-    number: u64,
-) {
-    let (world, voxel_size) = (terrain.world(), terrain.voxel_size());
-    let part = |drawn| Part::new(entity, voxel_size, world.grid(), world.revision(), drawn);
-    let parts: Vec<(Part, SurfaceDraft)> =
-        unseen.drawn().map(|drawn| (part(drawn), world.draft(drawn))).collect();
-    let task = ThreadTask::start(Threads::Transactions, move || {
-        let start = Instant::now();
-        let parts = for_each_part(parts, |(part, draft)| workshop.make(&part, false, || draft));
-        Prepared { what: Shows::Unseen(unseen), parts, pieces: Vec::new(), took: start.elapsed() }
-    });
-    commands.entity(entity).try_insert(InFlight { number, ticket: None, task, done: None });
-}
-
-/// Counts transactions over all terrains, so that they are committed in the order in which they began.
-#[derive(Resource, Default)]
-pub(super) struct Numbers(u64);
-
-impl Numbers {
-    pub fn next(&mut self) -> u64 {
-        self.0 += 1;
-        self.0
-    }
-}
+use crate::lattice::ChunkPos;
+use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
 pub(super) fn begin_transactions(
@@ -147,150 +29,123 @@ pub(super) fn begin_transactions(
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
-    companions: Res<Companions>,
+    processors: Res<SurfaceProcessors>,
     engine: Res<BurrowEngine>,
     mut figures: ResMut<BurrowFigures>,
     mut moved: MessageWriter<HistoryMoved>,
-    mut numbers: ResMut<Numbers>,
+    mut counter: ResMut<TaskCounter>,
 ) {
     let start = Instant::now();
-    let draws = assets.is_some();
     for (entity, mut terrain, entities, colors) in &mut terrains {
-        // The game put a terrain here whose task another entity had.
+        // The game moved a terrain here while a task of another entity ran for it.
         if terrain.waits_for_plugin() {
             terrain.abandon();
         }
-        // What the game changed by itself is shown first.
+        // Changes that the game made itself are shown first.
         if terrain.queued() == 0 || !entities.show(terrain.world()) {
             continue;
         }
         let transaction = terrain.begin_for(true);
-        tell_steps(entity, &mut terrain, &mut moved);
+        send_history(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
-        let ticket = Some(transaction.ticket());
         let engine = terrain.engine().unwrap_or(&engine).clone();
-        let wardrobe = draws.then(|| Wardrobe::new(terrain.world(), colors));
-        let workshop = Workshop { wardrobe, companions: companions.clone() };
-        let job = Job {
-            terrain: entity,
-            transaction,
-            engine,
-            workshop,
-            voxel_size: terrain.voxel_size(),
-            grid: terrain.world().grid(),
-            revision: terrain.world().revision() + 1,
-        };
-        let task = ThreadTask::start(Threads::Transactions, move || job.run());
-        let number = numbers.next();
-        commands.entity(entity).try_insert(InFlight { number, ticket, task, done: None });
+        let mut builder = SurfaceBuilder::new((entity, &terrain), colors, assets.is_some(), &processors);
+        builder.revision += 1;
+        let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);
+        commands.entity(entity).try_insert(task);
     }
     figures.main_thread += start.elapsed();
 }
 
-/// What shows commits: entities and their meshes.
+/// What commits change: entities, meshes and figures.
 #[derive(SystemParam)]
-pub(super) struct Screen<'w, 's> {
+pub(super) struct Display<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
     meshes: Query<'w, 's, &'static Mesh3d>,
     figures: ResMut<'w, BurrowFigures>,
+    diagnostics: Diagnostics<'w, 's>,
 }
 
-/// What commits say in messages.
+/// The messages that commits send.
 #[derive(SystemParam)]
-pub(super) struct News<'w> {
+pub(super) struct CommitMessages<'w> {
     receipts: MessageWriter<'w, BrushApplied>,
     moved: MessageWriter<'w, HistoryMoved>,
     found: MessageWriter<'w, LoosePieceFound>,
 }
 
-/// Commits what is done: each commit whole, as many of them as the frame's budget of swaps allows, and at least one.
+/// Commits what is done: each transaction whole, as many as the frame's budget of swaps allows, and at least one.
 pub(super) fn commit_transactions(
     settings: Res<BurrowSettings>,
     mut terrains: Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
-    mut screen: Screen,
-    mut news: News,
+    mut display: Display,
+    mut messages: CommitMessages,
 ) {
-    let done = done_in_order(&mut terrains);
+    // The oldest first: a task that had to wait for the budget is next.
+    let mut done: Vec<(u64, Entity)> = Vec::new();
+    for (entity, _, _, mut task) in &mut terrains {
+        if task.is_done() {
+            done.push((task.number, entity));
+        }
+    }
     if done.is_empty() {
         return;
     }
-    start_commands(&mut screen.commands);
+    done.sort_unstable();
+    let _span = info_span!("burrow_commit").entered();
+    start_measuring(&mut display.commands);
     let mut swapped = 0;
-    for entity in done {
-        let Ok((_, terrain, entities, mut transaction)) = terrains.get_mut(entity) else { continue };
-        let done = transaction.done.as_ref().and_then(|done| done.as_ref().ok());
-        let swaps = done.map_or(0, |prepared| prepared.parts.len());
+    for (_, entity) in done {
+        let Ok((_, terrain, entities, mut task)) = terrains.get_mut(entity) else { continue };
+        let swaps = match &task.done {
+            Some(Ok(output)) => output.surfaces.len(),
+            _ => 0,
+        };
         if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
             continue;
         }
-        let Some(prepared) = transaction.done.take() else { continue };
-        let ticket = transaction.ticket;
-        screen.commands.entity(entity).try_remove::<InFlight>();
-        if commit((entity, ticket), terrain, entities, prepared.ok(), &mut screen, &mut news) {
+        let Some(output) = task.done.take() else { continue };
+        let ticket = task.ticket;
+        display.commands.entity(entity).try_remove::<InFlight>();
+        if commit((entity, ticket), terrain, entities, output.ok(), &mut display, &mut messages) {
             swapped += swaps;
         }
     }
-    end_commands(&mut screen.commands);
+    stop_measuring(&mut display.commands);
 }
 
-/// The terrains whose transactions are done, the oldest first: whoever had to wait for the budget is next.
-fn done_in_order(
-    terrains: &mut Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
-) -> Vec<Entity> {
-    let mut done = Vec::new();
-    for (entity, _, _, mut transaction) in terrains.iter_mut() {
-        if transaction.done.is_none() {
-            transaction.done = transaction.task.check().map(|done| done.map_err(|_| TaskPanicked));
-        }
-        if transaction.done.is_some() {
-            done.push((transaction.number, entity));
-        }
-    }
-    done.sort_unstable();
-    done.into_iter().map(|(_, entity)| entity).collect()
-}
-
-/// Commits one transaction, and says whether it did: one that the game gave up is refused, and its edits wait in the
-/// queue again. Where the task panicked, nothing is changed, and all that it was for is answered so.
+/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait in
+/// the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
 fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
     mut entities: Mut<TerrainEntities>,
-    prepared: Option<Prepared>,
-    screen: &mut Screen,
-    news: &mut News,
+    output: Option<TaskOutput>,
+    display: &mut Display,
+    messages: &mut CommitMessages,
 ) -> bool {
-    let _span = info_span!("burrow commit").entered();
     let start = Instant::now();
-    let (what, parts, pieces, took) = match (prepared, ticket) {
-        (Some(Prepared { what, parts, pieces, took }), _) => (what, parts, pieces, took),
-        (None, ticket) => {
-            error_once!("a task of the plugin's panicked; this is a bug, please report it");
-            let refused = ticket.and_then(|ticket| terrain.rejected(ticket));
-            let Some(refused) = refused else {
-                // What it was to show is shown by loading all of it.
-                terrain.bypass_change_detection().forget_unseen();
-                return false;
-            };
-            (Shows::Commit(Box::new(refused)), Vec::new(), Vec::new(), Duration::ZERO)
-        }
+    let Some(TaskOutput { change, surfaces, pieces, times }) =
+        output.or_else(|| output_of_panicked(&mut terrain, ticket))
+    else {
+        return false;
     };
-    let commit = match what {
-        Shows::Unseen(unseen) => {
+    let commit = match change {
+        Change::Unseen(unseen) => {
             let is_shown = unseen.is_of(terrain.world()) && unseen.follows(entities.shown);
             if is_shown {
                 entities.shown = unseen.version();
-                screen.show(entity, &terrain, &mut entities, parts, unseen.fields(), true);
-                // Who changes the ground in each frame is always one step ahead; all of what was loaded is there.
-                entities.tell_ready(&mut screen.commands, entity);
-                screen.figures.main_thread += start.elapsed();
+                display.show((entity, terrain.world()), &mut entities, surfaces, unseen.fields(), true);
+                // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
+                entities.trigger_ready(&mut display.commands, entity);
+                display.figures.main_thread += start.elapsed();
             }
             return is_shown;
         }
-        Shows::Commit(commit) if ticket.is_some_and(|ticket| terrain.waits_for(ticket)) => *commit,
-        Shows::Commit(commit) => {
-            free_later((commit, parts));
+        Change::Transaction(commit) if ticket.is_some_and(|ticket| terrain.waits_for(ticket)) => *commit,
+        Change::Transaction(commit) => {
+            free_later((commit, surfaces));
             return false;
         }
     };
@@ -300,106 +155,97 @@ fn commit(
         free_later(waste);
     }
     let is_step = terrain.has_history_receipts();
-    tell_steps(entity, &mut terrain, &mut news.moved);
+    send_history(entity, &mut terrain, &mut messages.moved);
     entities.shown = terrain.world().version();
-    screen.show(entity, &terrain, &mut entities, parts, &fields, is_step);
-    let brushes = receipts.len() as u64;
+    let triangles = surfaces.iter().map(BuiltSurface::triangles).sum();
+    display.show((entity, terrain.world()), &mut entities, surfaces, &fields, is_step);
     if receipts.iter().any(|receipt| receipt.outcome == Err(Rejection::Panicked)) {
         warn_once!("a brush was rejected because applying it panicked; this is a bug, please report it");
     }
-    news.tell(entity, receipts, pieces);
-    screen.figures.count(brushes, took, start.elapsed());
+    let brushes = receipts.len() as u64;
+    messages.found.write_batch(pieces);
+    let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
+    messages.receipts.write_batch(receipts.into_iter().map(applied));
+    let took = start.elapsed();
+    display.figures.count(brushes, times.total, took);
+    measure_commit(&mut display.diagnostics, times, took, triangles);
     true
 }
 
-impl Screen<'_, '_> {
+/// What is committed instead if a task panicked: the rejection of its transaction. `None` if it was not a transaction, or
+/// the terrain no longer waits for it; the terrain is loaded anew then.
+fn output_of_panicked(terrain: &mut Mut<Terrain>, ticket: Option<u64>) -> Option<TaskOutput> {
+    error_once!("a task of the plugin's panicked; this is a bug, please report it");
+    let rejected = ticket.and_then(|ticket| terrain.rejected(ticket));
+    let Some(rejected) = rejected else {
+        terrain.bypass_change_detection().forget_unseen();
+        return None;
+    };
+    let change = Change::Transaction(Box::new(rejected));
+    Some(TaskOutput { change, surfaces: Vec::new(), pieces: Vec::new(), times: TaskTimes::default() })
+}
+
+impl Display<'_, '_> {
     /// Shows all that a commit changed of a terrain.
     fn show(
         &mut self,
-        entity: Entity,
-        terrain: &Terrain,
+        (entity, world): (Entity, &Ground),
         entities: &mut TerrainEntities,
-        parts: Vec<Fresh>,
+        surfaces: Vec<BuiltSurface>,
         fields: &[(ChunkPos, FieldNews)],
         is_step: bool,
     ) {
-        let world = terrain.world();
         let with_fields = fields.iter().map(|&(chunk, _)| (Drawn::Chunk(chunk), None));
-        let with_surfaces = parts.into_iter().map(|fresh| (fresh.drawn, Some(fresh)));
+        let with_surfaces = surfaces.into_iter().map(|built| (built.drawn, Some(built)));
         let mut touched = Vec::new();
-        for (drawn, fresh) in with_surfaces.chain(with_fields) {
+        for (drawn, built) in with_surfaces.chain(with_fields) {
             if let (Drawn::Chunk(chunk), true) = (drawn, is_step) {
                 touched.push(chunk);
             }
-            self.show_part((entity, terrain), entities, drawn, fresh);
+            self.show_part((entity, world), entities, drawn, built);
         }
-        entities.tell_fields(&mut self.commands, world, fields);
+        entities.update_fields(&mut self.commands, world, fields);
         entities.drop_empty(&mut self.commands, world, touched);
     }
 
-    /// Shows a tile or chunk with its new surface, if it has a new one; spawns it where it has no entity yet.
+    /// Shows a tile or chunk with its new surface, if it has a new one; spawns its entity if it has none yet.
     fn show_part(
         &mut self,
-        (entity, terrain): (Entity, &Terrain),
+        (entity, world): (Entity, &Ground),
         entities: &mut TerrainEntities,
         drawn: Drawn,
-        fresh: Option<Fresh>,
+        built: Option<BuiltSurface>,
     ) {
         let commands = &mut self.commands;
         let child = entities.get(commands, drawn);
         let is_new = child.is_none();
         let is_gone = match drawn {
-            Drawn::Chunk(chunk) => {
-                terrain.world().fields_of(chunk).is_none() && !terrain.world().draws(chunk)
-            }
+            Drawn::Chunk(chunk) => is_empty(world, chunk),
             Drawn::Tile(_) => false,
         };
-        if is_new && (is_gone || fresh.as_ref().is_some_and(|fresh| fresh.shown.is_empty)) {
+        if is_new && (is_gone || built.as_ref().is_some_and(|built| built.shown.is_empty)) {
             return;
         }
-        let child = child.unwrap_or_else(|| entities.spawn(commands, entity, terrain.world(), drawn));
-        let has_changed = fresh.is_some();
-        if let Some(fresh) = fresh {
+        let child = child.unwrap_or_else(|| entities.spawn(commands, entity, world, drawn));
+        let has_changed = built.is_some();
+        if let Some(BuiltSurface { mesh, shown, actions, .. }) = built {
             if let Some(assets) = &mut self.assets {
-                swap(commands, assets, child, self.meshes.get(child).ok(), fresh.mesh);
+                swap(commands, assets, child, self.meshes.get(child).ok(), mesh);
                 self.figures.swaps += 1;
             }
-            attach(commands, child, fresh.shown, fresh.attachments);
+            apply_actions(commands, child, shown, actions);
         }
         match drawn {
-            Drawn::Chunk(_) if is_new => tell(commands, ChunkCreated { entity: child }),
-            Drawn::Chunk(_) if has_changed => tell(commands, ChunkChanged { entity: child }),
+            Drawn::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
+            Drawn::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
             _ => {}
         }
     }
 }
 
-impl News<'_> {
-    /// Tells what became of a transaction's brushes, and what they cut off.
-    fn tell(&mut self, terrain: Entity, receipts: Vec<Receipt>, pieces: Vec<LoosePieceFound>) {
-        self.found.write_batch(pieces);
-        let applied = |receipt| BrushApplied { terrain: Some(terrain), receipt };
-        self.receipts.write_batch(receipts.into_iter().map(applied));
-    }
-}
-
-/// Tells which surface an entity shows, and does to it what goes with that.
-pub(super) fn attach(
-    commands: &mut Commands,
-    child: Entity,
-    shown: ShownSurface,
-    attachments: Vec<Attachment>,
-) {
-    let Ok(mut child) = commands.get_entity(child) else { return };
-    child.try_insert(shown);
-    for attachment in attachments {
-        attachment(&mut child);
-    }
-}
-
 /// Bevy's renderer forgets which material an entity has when its mesh is removed, and asks again only when it comes into
 /// view or gets another material.
-fn look_again(mut child: EntityWorldMut) {
+fn refresh_material(mut child: EntityWorldMut) {
     if let Some(mut visibility) = child.get_mut::<ViewVisibility>() {
         visibility.set_changed();
     }
@@ -411,23 +257,23 @@ fn swap(
     assets: &mut Assets<Mesh>,
     child: Entity,
     shown: Option<&Mesh3d>,
-    ready: Ready,
+    mesh: BuiltMesh,
 ) {
     let Ok(mut child) = commands.get_entity(child) else { return };
-    match (ready, shown) {
+    match (mesh, shown) {
         (None, _) => {
             child.try_remove::<Mesh3d>();
         }
         (Some((mesh, bounds)), shown) => {
-            let mut fresh = Some(mesh);
+            let mut new = Some(mesh);
             if let Some(Mesh3d(handle)) = shown
-                && let Some(mesh) = fresh.take()
+                && let Some(mesh) = new.take()
                 && let Err(error) = assets.insert(handle, mesh)
             {
                 warn!("a mesh could not be swapped: {error}");
             }
-            if let Some(mesh) = fresh {
-                child.try_insert(Mesh3d(assets.add(mesh))).queue_silenced(look_again);
+            if let Some(mesh) = new {
+                child.try_insert(Mesh3d(assets.add(mesh))).queue_silenced(refresh_material);
             }
             child.try_insert((bounds, NoAutoAabb));
         }

@@ -1,53 +1,72 @@
-//! The plugin's figures as Bevy's diagnostics.
+//! The figures of the plugin as Bevy diagnostics, for `LogDiagnosticsPlugin` and other tools that read the
+//! [`DiagnosticsStore`](bevy::diagnostic::DiagnosticsStore). The bytes that a terrain takes are not measured in each frame,
+//! because every brick would be visited: ask [`Terrain::memory`].
+
+use std::time::Duration;
 
 use bevy::diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic};
 use bevy::prelude::*;
 
-use super::{BurrowFigures, BurrowSystems, Times};
+use super::BurrowFigures;
+use super::figures::TaskTimes;
 use crate::terrain::Terrain;
 
-/// How long a transaction took in its task, in milliseconds: one measurement for each.
+/// Milliseconds that a transaction took in its task, measured once per commit.
 pub const TRANSACTION: DiagnosticPath = DiagnosticPath::const_new("burrow/transaction");
 
-/// How long a commit took on the main thread, in milliseconds: one measurement for each.
+/// Milliseconds of a transaction in which the edits were applied and the surfaces extracted, measured once per commit.
+pub const EDIT: DiagnosticPath = DiagnosticPath::const_new("burrow/edit");
+
+/// Milliseconds of a transaction in which Bevy meshes were built and surface processors ran, measured once per commit.
+pub const MESH: DiagnosticPath = DiagnosticPath::const_new("burrow/mesh");
+
+/// Milliseconds that a commit took on the main thread, measured once per commit.
 pub const COMMIT: DiagnosticPath = DiagnosticPath::const_new("burrow/commit");
 
-/// What the plugin took on the main thread, in milliseconds: one measurement for each frame.
+/// Triangles in the meshes that a commit swapped in, measured once per commit.
+pub const TRIANGLES: DiagnosticPath = DiagnosticPath::const_new("burrow/triangles");
+
+/// Milliseconds that the plugin took on the main thread, measured once per frame.
 pub const MAIN_THREAD: DiagnosticPath = DiagnosticPath::const_new("burrow/main_thread");
 
-/// Brushes that wait in the queues of all terrains: one measurement for each frame.
+/// Edits and steps of history that wait for a transaction, over all terrains, measured once per frame.
 pub const WAITING: DiagnosticPath = DiagnosticPath::const_new("burrow/waiting");
 
-/// Meshes that were swapped: one measurement for each frame.
-pub const SWAPS: DiagnosticPath = DiagnosticPath::const_new("burrow/swaps");
-
-pub(super) fn add(app: &mut App) {
-    for path in [TRANSACTION, COMMIT, MAIN_THREAD] {
-        app.register_diagnostic(Diagnostic::new(path).with_suffix(" ms"));
+/// Registers the diagnostics.
+pub(super) fn register(app: &mut App) {
+    for path in [TRANSACTION, EDIT, MESH, COMMIT, MAIN_THREAD] {
+        app.register_diagnostic(Diagnostic::new(path).with_suffix("ms"));
     }
-    for path in [WAITING, SWAPS] {
+    for path in [TRIANGLES, WAITING] {
         app.register_diagnostic(Diagnostic::new(path));
     }
-    app.add_systems(Update, measure.after(BurrowSystems::Propagate));
 }
 
-/// Measures what happened since the last frame.
-fn measure(
+fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+/// Measures a commit.
+pub(super) fn measure_commit(
+    diagnostics: &mut Diagnostics,
+    task: TaskTimes,
+    commit: Duration,
+    triangles: usize,
+) {
+    for (path, time) in
+        [(&TRANSACTION, task.total), (&EDIT, task.edit), (&MESH, task.mesh), (&COMMIT, commit)]
+    {
+        diagnostics.add_measurement(path, || milliseconds(time));
+    }
+    diagnostics.add_measurement(&TRIANGLES, || triangles as f64);
+}
+
+/// Measures a frame.
+pub(super) fn measure_frame(
+    mut diagnostics: Diagnostics,
     figures: Res<BurrowFigures>,
     terrains: Query<&Terrain>,
-    mut diagnostics: Diagnostics,
-    mut last: Local<(u64, u64)>,
 ) {
-    let (commits, swaps) = (figures.commits.saturating_sub(last.0), figures.swaps.saturating_sub(last.1));
-    *last = (figures.commits, figures.swaps);
-    let mut latest = |path: DiagnosticPath, times: &Times| {
-        for time in times.iter().skip(times.len().saturating_sub(commits as usize)) {
-            diagnostics.add_measurement(&path, || time.as_secs_f64() * 1e3);
-        }
-    };
-    latest(TRANSACTION, &figures.transactions);
-    latest(COMMIT, &figures.commit_times);
-    diagnostics.add_measurement(&MAIN_THREAD, || figures.main_thread.as_secs_f64() * 1e3);
+    diagnostics.add_measurement(&MAIN_THREAD, || milliseconds(figures.main_thread));
     diagnostics.add_measurement(&WAITING, || terrains.iter().map(Terrain::queued).sum::<usize>() as f64);
-    diagnostics.add_measurement(&SWAPS, || swaps as f64);
 }

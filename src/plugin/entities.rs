@@ -4,12 +4,14 @@ use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
-use super::{Chunk, Field, FieldChanged, FieldCreated, FieldMerged, TerrainReady, Tile};
+use super::{
+    Chunk, CommitAction, Field, FieldChanged, FieldCreated, FieldMerged, ShownSurface, TerrainReady, Tile,
+};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, FieldNews, Version, World};
 use crate::volume::{self, FieldId};
 
-/// The entities below a terrain, and the world that they show. Its presence says that the terrain has loaded.
+/// The entities below a terrain, and the world that they show. A terrain has this component once it has loaded.
 #[derive(Component)]
 pub struct TerrainEntities {
     pub(super) shown: Version,
@@ -17,13 +19,19 @@ pub struct TerrainEntities {
     pub(super) voxel_size: f32,
     drawn: HashMap<Drawn, Entity>,
     fields: HashMap<FieldId, Entity>,
-    /// Does the game know that the terrain is ready?
-    is_told: bool,
+    /// Was [`TerrainReady`] triggered?
+    is_ready_sent: bool,
 }
 
 impl TerrainEntities {
     pub(super) fn new(shown: Version, voxel_size: f32) -> Self {
-        Self { shown, voxel_size, drawn: HashMap::default(), fields: HashMap::default(), is_told: false }
+        Self {
+            shown,
+            voxel_size,
+            drawn: HashMap::default(),
+            fields: HashMap::default(),
+            is_ready_sent: false,
+        }
     }
 
     /// Are they those of this world, as it is now? Not while one that the game changed by itself loads.
@@ -31,11 +39,11 @@ impl TerrainEntities {
         self.shown == world.version()
     }
 
-    /// Tells that a terrain is ready, once.
-    pub(super) fn tell_ready(&mut self, commands: &mut Commands, terrain: Entity) {
-        if !self.is_told {
-            self.is_told = true;
-            tell(commands, TerrainReady { entity: terrain });
+    /// Triggers [`TerrainReady`], once.
+    pub(super) fn trigger_ready(&mut self, commands: &mut Commands, terrain: Entity) {
+        if !self.is_ready_sent {
+            self.is_ready_sent = true;
+            trigger_if_alive(commands, TerrainReady { entity: terrain });
         }
     }
 
@@ -48,8 +56,8 @@ impl TerrainEntities {
                 commands.entity(child).try_despawn();
             }
         }
-        // What a game took from the terrain.
-        own.into_iter().for_each(|stray| commands.entity(stray).try_despawn());
+        // Those that a game moved to another parent.
+        own.into_iter().for_each(|entity| commands.entity(entity).try_despawn());
     }
 
     /// The entity of a tile or chunk, if it has one and the game did not despawn it.
@@ -79,11 +87,11 @@ impl TerrainEntities {
         let Some(parent) = self.get(commands, Drawn::Chunk(chunk)) else { return };
         let child = spawn_below(commands, parent, Field::from(field));
         self.fields.insert(field.id, child);
-        tell(commands, FieldCreated { entity: child });
+        trigger_if_alive(commands, FieldCreated { entity: child });
     }
 
     /// Entities and events of fields that a commit changed.
-    pub(super) fn tell_fields(
+    pub(super) fn update_fields(
         &mut self,
         commands: &mut Commands,
         world: &World,
@@ -102,7 +110,7 @@ impl TerrainEntities {
                     match self.living_field(commands, id) {
                         Some(child) => {
                             commands.entity(child).try_insert(Field::from(field));
-                            tell(commands, FieldChanged { entity: child });
+                            trigger_if_alive(commands, FieldChanged { entity: child });
                         }
                         None => self.spawn_field(commands, chunk, field),
                     }
@@ -118,7 +126,7 @@ impl TerrainEntities {
                     self.fields.remove(&gone);
                     let Some(child) = child else { continue };
                     if let Some(into) = into {
-                        tell(commands, FieldMerged { entity: child, into });
+                        trigger_if_alive(commands, FieldMerged { entity: child, into });
                     }
                     commands.entity(child).try_despawn();
                 }
@@ -129,7 +137,7 @@ impl TerrainEntities {
     /// Despawns those of some chunks that draw nothing and hold no field any more, as after an undo.
     pub(super) fn drop_empty(&mut self, commands: &mut Commands, world: &World, chunks: Vec<ChunkPos>) {
         for chunk in chunks {
-            if world.fields_of(chunk).is_none() && !world.draws(chunk) {
+            if is_empty(world, chunk) {
                 let child = self.get(commands, Drawn::Chunk(chunk));
                 self.drawn.remove(&Drawn::Chunk(chunk));
                 child.into_iter().for_each(|child| commands.entity(child).try_despawn());
@@ -156,10 +164,29 @@ fn spawn_below(commands: &mut Commands, parent: Entity, bundle: impl Bundle) -> 
 }
 
 /// Triggers an event, unless its entity is gone by the time the command runs.
-pub(crate) fn tell<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Commands, event: E) {
+pub(crate) fn trigger_if_alive<'a, E: EntityEvent<Trigger<'a>: Default>>(commands: &mut Commands, event: E) {
     commands.queue(move |world: &mut bevy::ecs::world::World| {
         if world.get_entity(event.event_target()).is_ok() {
             world.trigger(event);
         }
     });
+}
+
+/// Does a chunk hold no field and draw nothing?
+pub(super) fn is_empty(world: &World, chunk: ChunkPos) -> bool {
+    world.fields_of(chunk).is_none() && !world.draws(chunk)
+}
+
+/// Records which surface an entity shows, and runs the actions that come with it.
+pub(super) fn apply_actions(
+    commands: &mut Commands,
+    child: Entity,
+    shown: ShownSurface,
+    actions: Vec<CommitAction>,
+) {
+    let Ok(mut child) = commands.get_entity(child) else { return };
+    child.try_insert(shown);
+    for action in actions {
+        action(&mut child);
+    }
 }

@@ -1,4 +1,4 @@
-//! What the plugin did lately, and what it took.
+//! What the plugin measures.
 
 use std::time::Duration;
 
@@ -25,13 +25,21 @@ pub struct BurrowFigures {
     pub transactions: Times,
     /// How long the latest commits took on the main thread.
     pub commit_times: Times,
-    /// What this frame's intake, commits and starts of transactions took together on the main thread: systems, and changes
-    /// to entities.
+    /// How long collecting brushes, committing and starting transactions took together on the main thread in this frame:
+    /// systems, and changes to entities.
     pub main_thread: Duration,
 }
 
+/// How long the parts of a transaction took in its task.
+#[derive(Clone, Copy, Default)]
+pub(super) struct TaskTimes {
+    pub edit: Duration,
+    pub mesh: Duration,
+    pub total: Duration,
+}
+
 impl BurrowFigures {
-    /// Counts one more commit: its brushes, and how long it took in its task and on the main thread.
+    /// Counts a commit: its brushes, and how long it took in its task and on the main thread.
     pub(super) fn count(&mut self, brushes: u64, transaction: Duration, commit: Duration) {
         self.commits += 1;
         self.brushes += brushes;
@@ -43,19 +51,19 @@ impl BurrowFigures {
     }
 }
 
-/// When the commands of a frame's commits began to be applied.
+/// When the commands of a frame's commits began to run.
 #[derive(Resource)]
-struct CommandsStarted(Instant);
+struct CommandsStart(Instant);
 
-/// The commands that follow count as the plugin's time on the main thread, until [`end_commands`].
-pub(super) fn start_commands(commands: &mut Commands) {
-    commands.queue(|world: &mut World| world.insert_resource(CommandsStarted(Instant::now())));
+/// Queues a command that starts to measure the commands behind it.
+pub(super) fn start_measuring(commands: &mut Commands) {
+    commands.queue(|world: &mut World| world.insert_resource(CommandsStart(Instant::now())));
 }
 
-/// Ends what [`start_commands`] began.
-pub(super) fn end_commands(commands: &mut Commands) {
+/// Queues a command that adds the time since [`start_measuring`] to the main thread's.
+pub(super) fn stop_measuring(commands: &mut Commands) {
     commands.queue(|world: &mut World| {
-        if let Some(CommandsStarted(start)) = world.remove_resource() {
+        if let Some(CommandsStart(start)) = world.remove_resource() {
             world.resource_mut::<BurrowFigures>().main_thread += start.elapsed();
         }
     });

@@ -3,20 +3,41 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::NoAutoAabb;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use rayon::prelude::*;
 
-use super::commit::{InFlight, Numbers, attach, begin_unseen};
-use super::companion::{Fresh, Workshop};
-use super::entities::{TerrainEntities, tell};
-use super::loading::{Loaded, Loading};
-use super::meshes::Wardrobe;
+use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
+use super::processor::{BuiltSurface, SurfaceBuilder};
+use super::task::{InFlight, TaskCounter};
 use super::threads::{ThreadTask, Threads};
-use super::{BurrowSettings, ChunkCreated, Companions, MaterialColors, Part};
+use super::{BurrowSettings, ChunkCreated, MaterialColors, SurfaceProcessors};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
+
+/// Meshes on their way to the frame in which they are shown, all made from one snapshot.
+#[derive(Component)]
+pub(super) struct Loading {
+    world: Arc<World>,
+    task: Option<ThreadTask<Vec<BuiltSurface>>>,
+    waiting: Vec<BuiltSurface>,
+    ready: HashMap<Drawn, Loaded>,
+}
+
+impl Loading {
+    /// Are these meshes of this terrain, whatever the game did to it since?
+    fn is_of(&self, terrain: &Terrain) -> bool {
+        self.world.version().is_same_world(terrain.world().version())
+    }
+}
+
+/// A part whose mesh, if it has one, is with the renderer.
+struct Loaded {
+    mesh: Option<(Handle<Mesh>, Aabb)>,
+    built: BuiltSurface,
+}
 
 /// Terrains that no task works for.
 type Idle = (Without<Loading>, Without<InFlight>);
@@ -40,7 +61,7 @@ fn scale(mut transform: Mut<Transform>, terrain: &Terrain) {
 /// A terrain that comes is scaled and placed at once: who asks about it in the frame that spawned it, in `Startup` say,
 /// finds it where it is. What was made for another terrain on its entity goes, unless it may be shown until the new one
 /// has loaded.
-pub(super) fn take_in(
+pub(super) fn prepare_new(
     new: On<Insert, Terrain>,
     mut commands: Commands,
     terrains: Query<(&Terrain, Option<&TerrainEntities>, Option<&Children>)>,
@@ -49,7 +70,7 @@ pub(super) fn take_in(
     let entity = new.entity;
     let Ok((terrain, entities, children)) = terrains.get(entity) else { return };
     commands.entity(entity).try_remove::<(Loading, InFlight)>();
-    drop_misfits(&mut commands, entity, terrain, entities, children);
+    drop_resized(&mut commands, entity, terrain, entities, children);
     if let Ok(transform) = places.p0().get_mut(entity) {
         scale(transform, terrain);
     }
@@ -61,7 +82,7 @@ pub(super) fn take_in(
 
 /// What is under way for a terrain whose entities are gone is for another one: whatever the game did in between, it must not
 /// wait for that.
-pub(super) fn drop_strays(
+pub(super) fn drop_stray_tasks(
     mut commands: Commands,
     strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
 ) {
@@ -71,7 +92,7 @@ pub(super) fn drop_strays(
 }
 
 /// The same for a terrain that the game put in place of another one without inserting it, by `mem::swap` say.
-pub(super) fn drop_former(
+pub(super) fn drop_replaced(
     mut commands: Commands,
     terrains: Query<
         (Entity, &Terrain, Option<&Loading>, Option<&TerrainEntities>, Option<&Children>),
@@ -82,13 +103,13 @@ pub(super) fn drop_former(
         if loading.is_some_and(|loading| !loading.is_of(terrain)) {
             commands.entity(entity).try_remove::<Loading>();
         }
-        drop_misfits(&mut commands, entity, terrain, entities, children);
+        drop_resized(&mut commands, entity, terrain, entities, children);
     }
 }
 
 /// Takes tiles and chunks away that were made for voxels of another size: the new scale would draw them too large or too
 /// small.
-fn drop_misfits(
+fn drop_resized(
     commands: &mut Commands,
     entity: Entity,
     terrain: &Terrain,
@@ -102,7 +123,7 @@ fn drop_misfits(
     }
 }
 
-/// Takes a terrain's entities along when only its component goes.
+/// Despawns the entities below a terrain when only its component is removed.
 pub(super) fn remove_with_terrain(
     gone: On<Remove, Terrain>,
     terrains: Query<(&TerrainEntities, Option<&Children>)>,
@@ -120,31 +141,29 @@ pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<(Entity, &mut Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
     assets: Option<Res<Assets<Mesh>>>,
-    companions: Res<Companions>,
+    processors: Res<SurfaceProcessors>,
     settings: Res<BurrowSettings>,
-    mut numbers: ResMut<Numbers>,
+    mut counter: ResMut<TaskCounter>,
 ) {
     for (entity, mut terrain, colors, entities) in &mut terrains {
         if entities.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
-        let workshop = Workshop {
-            wardrobe: assets.is_some().then(|| Wardrobe::new(terrain.world(), colors)),
-            companions: companions.clone(),
-        };
-        // Not a change that the game has to hear of.
+        let builder = SurfaceBuilder::new((entity, &terrain), colors, assets.is_some(), &processors);
+        // For the game this is no change.
         let model = terrain.bypass_change_detection();
         let unseen = entities.and_then(|entities| model.take_unseen(entities.shown));
         // More than a frame may swap is loaded anew, piece by piece.
         if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
-            begin_unseen(&mut commands, (entity, model), unseen, workshop, numbers.next());
+            let task = InFlight::unseen(counter.next(), model, unseen, builder);
+            commands.entity(entity).try_insert(task);
             continue;
         }
         model.watch();
-        let (world, voxel_size) = (model.snapshot(), model.voxel_size());
-        let task = (!workshop.is_idle()).then(|| {
+        let world = model.snapshot();
+        let task = (!builder.is_idle()).then(|| {
             let world = Arc::clone(&world);
-            ThreadTask::start(Threads::Background, move || make_all(&world, &workshop, (entity, voxel_size)))
+            ThreadTask::start(Threads::Background, move || build_world(&world, &builder))
         });
         let loading = Loading { world, task, waiting: Vec::new(), ready: HashMap::default() };
         commands.entity(entity).try_insert(loading);
@@ -176,16 +195,12 @@ fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform) {
     }
 }
 
-/// Everything that a world draws, and what goes with it.
-fn make_all(world: &World, workshop: &Workshop, (terrain, voxel_size): (Entity, f32)) -> Vec<Fresh> {
-    let _span = info_span!("burrow load").entered();
+/// Builds all surfaces of a world.
+fn build_world(world: &World, builder: &SurfaceBuilder) -> Vec<BuiltSurface> {
+    let _span = info_span!("burrow_load").entered();
     let chunks = world.drawn_chunks().map(Drawn::Chunk);
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
-    let make = |&drawn: &Drawn| {
-        let part = Part::new(terrain, voxel_size, world.grid(), world.revision(), drawn);
-        workshop.make(&part, false, || world.draft(drawn))
-    };
-    all.par_iter().map(make).collect()
+    all.par_iter().map(|&drawn| builder.build(drawn, false, || world.draft(drawn))).collect()
 }
 
 /// Hands meshes to the renderer, a budget's worth per frame, and shows all of them once none waits; what was shown
@@ -204,11 +219,11 @@ pub(super) fn finish_loading(
         }
         let rest = loading.waiting.len().saturating_sub(budget);
         budget -= loading.waiting.len() - rest;
-        for mut fresh in loading.waiting.split_off(rest) {
+        for mut built in loading.waiting.split_off(rest) {
             let mesh = assets
                 .as_mut()
-                .and_then(|assets| fresh.mesh.take().map(|(mesh, bounds)| (assets.add(mesh), bounds)));
-            loading.ready.insert(fresh.drawn, Loaded { mesh, fresh });
+                .and_then(|assets| built.mesh.take().map(|(mesh, bounds)| (assets.add(mesh), bounds)));
+            loading.ready.insert(built.drawn, Loaded { mesh, built });
         }
         if !loading.waiting.is_empty() {
             continue;
@@ -219,7 +234,7 @@ pub(super) fn finish_loading(
         let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
         // What the game changed meanwhile is shown next.
         if entities.show(terrain.world()) {
-            entities.tell_ready(&mut commands, entity);
+            entities.trigger_ready(&mut commands, entity);
         }
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
     }
@@ -237,14 +252,14 @@ fn show(
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     for drawn in world.grid().tiles().map(Drawn::Tile).chain(chunks.into_iter().map(Drawn::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
-        if let Some(Loaded { mesh, fresh }) = loading.ready.remove(&drawn) {
+        if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {
             if let Some((handle, bounds)) = mesh {
                 commands.entity(child).try_insert((Mesh3d(handle), bounds, NoAutoAabb));
             }
-            attach(commands, child, fresh.shown, fresh.attachments);
+            apply_actions(commands, child, built.shown, built.actions);
         }
         if let Drawn::Chunk(_) = drawn {
-            tell(commands, ChunkCreated { entity: child });
+            trigger_if_alive(commands, ChunkCreated { entity: child });
         }
     }
     for (chunk, fields) in world.fields() {

@@ -34,16 +34,16 @@ pub const ATTRIBUTE_GROUND_COVER: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundCover", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
 
 /// A mesh ready to be swapped in, with its bounds; `None` where nothing is to be drawn.
-pub(crate) type Ready = Option<(Mesh, Aabb)>;
+pub(crate) type BuiltMesh = Option<(Mesh, Aabb)>;
 
 /// What a mesh is made of beside its surface: colours, and the ground as it was before anyone dug.
 #[derive(Clone)]
-pub(crate) struct Wardrobe {
+pub(crate) struct MeshBuilder {
     colors: MaterialColors,
     ground: Arc<Ground>,
 }
 
-impl Wardrobe {
+impl MeshBuilder {
     /// Without colours, meshes have none.
     pub(crate) fn new(world: &World, colors: Option<&MaterialColors>) -> Self {
         let colors = colors.cloned().unwrap_or(MaterialColors(Vec::new()));
@@ -51,7 +51,7 @@ impl Wardrobe {
     }
 
     /// Builds the Bevy mesh of a surface whose positions count from this point, in the task.
-    pub(crate) fn build(&self, origin: IVec3, draft: &SurfaceDraft) -> Ready {
+    pub(crate) fn build(&self, origin: IVec3, draft: &SurfaceDraft) -> BuiltMesh {
         match draft {
             SurfaceDraft::Nothing => None,
             SurfaceDraft::Tile(tile) => self.build_tile(origin, tile),
@@ -60,7 +60,7 @@ impl Wardrobe {
     }
 
     /// The same of a surface that has all of its vertices.
-    pub(crate) fn build_whole(&self, origin: IVec3, surface: &SurfaceMesh) -> Ready {
+    pub(crate) fn build_whole(&self, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
         if surface.is_empty() {
             return None;
         }
@@ -70,7 +70,7 @@ impl Wardrobe {
     }
 
     /// The same of a tile, straight from the ground: nothing but its rings and indices depends on what was dug.
-    fn build_tile(&self, origin: IVec3, draft: &TileUpdate) -> Ready {
+    fn build_tile(&self, origin: IVec3, draft: &TileUpdate) -> BuiltMesh {
         if draft.indices().is_empty() {
             return None;
         }
@@ -89,7 +89,7 @@ impl Wardrobe {
 
 /// The attributes of a mesh in the making.
 struct Arrays<'a> {
-    wardrobe: &'a Wardrobe,
+    mesh_builder: &'a MeshBuilder,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
     ids: Vec<[u8; 4]>,
@@ -103,24 +103,24 @@ struct Arrays<'a> {
 }
 
 impl<'a> Arrays<'a> {
-    fn with_capacity(vertices: usize, wardrobe: &'a Wardrobe) -> Self {
-        let blended = (MaterialMix::default(), blend(MaterialMix::default(), &wardrobe.colors));
+    fn with_capacity(vertices: usize, mesh_builder: &'a MeshBuilder) -> Self {
+        let blended = (MaterialMix::default(), blend(MaterialMix::default(), &mesh_builder.colors));
         Self {
-            wardrobe,
+            mesh_builder,
             positions: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(vertices),
             ids: Vec::with_capacity(vertices),
             weights: Vec::with_capacity(vertices),
             depths: Vec::with_capacity(vertices),
             covers: Vec::with_capacity(vertices),
-            colors: Vec::with_capacity(if wardrobe.colors.0.is_empty() { 0 } else { vertices }),
+            colors: Vec::with_capacity(if mesh_builder.colors.0.is_empty() { 0 } else { vertices }),
             blended,
         }
     }
 
     /// Appends vertices whose positions count from some point.
     fn push(&mut self, vertices: &[Vertex], origin: IVec3) {
-        let ground = &*self.wardrobe.ground;
+        let ground = &*self.mesh_builder.ground;
         self.positions.extend(vertices.iter().map(Vertex::position_f32));
         self.normals.extend(vertices.iter().map(|vertex| vertex.normal.to_array()));
         for vertex in vertices {
@@ -147,15 +147,15 @@ impl<'a> Arrays<'a> {
     fn push_mix(&mut self, mix: MaterialMix) {
         self.ids.push(mix.ids);
         self.weights.push(mix.weights);
-        if !self.wardrobe.colors.0.is_empty() {
+        if !self.mesh_builder.colors.0.is_empty() {
             if self.blended.0 != mix {
-                self.blended = (mix, blend(mix, &self.wardrobe.colors));
+                self.blended = (mix, blend(mix, &self.mesh_builder.colors));
             }
             self.colors.push(self.blended.1);
         }
     }
 
-    fn finish(self, indices: &surface::Indices) -> Ready {
+    fn finish(self, indices: &surface::Indices) -> BuiltMesh {
         let first = Vec3::from(*self.positions.first()?);
         let corners =
             |(min, max): (Vec3, Vec3), at: &[f32; 3]| (min.min(Vec3::from(*at)), max.max(Vec3::from(*at)));
@@ -174,7 +174,7 @@ impl<'a> Arrays<'a> {
                 surface::Indices::U16(list) => Indices::U16(list.clone()),
                 surface::Indices::U32(list) => Indices::U32(list.clone()),
             });
-        if !self.wardrobe.colors.0.is_empty() {
+        if !self.mesh_builder.colors.0.is_empty() {
             mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, self.colors);
         }
         Some((mesh, Aabb::from_min_max(min, max)))
@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// All that a Bevy mesh holds, as bytes.
-    fn bytes_of(ready: Ready) -> Option<(Vec<Vec<u8>>, Option<Indices>, Aabb)> {
+    fn bytes_of(ready: BuiltMesh) -> Option<(Vec<Vec<u8>>, Option<Indices>, Aabb)> {
         let (mesh, bounds) = ready?;
         let attributes = mesh.attributes().map(|(_, values)| values.get_bytes().to_vec());
         Some((attributes.collect(), mesh.indices().cloned(), bounds))
@@ -367,7 +367,7 @@ mod tests {
             let ground = Ground::from_noise(70, 60, &noise).unwrap().with_materials(&control).unwrap();
             let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
             let mut terrain = Terrain::new(ground, &settings).unwrap();
-            let dressers = [None, Some(&colors)].map(|colors| Wardrobe::new(terrain.world(), colors));
+            let dressers = [None, Some(&colors)].map(|colors| MeshBuilder::new(terrain.world(), colors));
             let mut compared = 0;
             for i in 0..9 {
                 let place = Vec3::new((i * 23 % 71) as f32, (i * 7 % 12) as f32, (i * 31 % 61) as f32);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 
 use super::MaterialColors;
-use super::meshes::Wardrobe;
+use super::meshes::MeshBuilder;
 use crate::brush::Brush;
 use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
 
@@ -105,18 +105,33 @@ impl LoosePieceFound {
         if let Some(ready) = &self.ready {
             return Some(Mesh::clone(ready));
         }
-        self.build(&Wardrobe::new(terrain.world(), Some(colors)))
+        self.build(&MeshBuilder::new(terrain.world(), Some(colors)))
     }
 
-    fn build(&self, wardrobe: &Wardrobe) -> Option<Mesh> {
+    fn build(&self, mesh_builder: &MeshBuilder) -> Option<Mesh> {
         let surface = self.piece.mesh.as_ref()?;
-        wardrobe.build_whole(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
+        mesh_builder.build_whole(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
     }
 
     /// Makes its mesh, in the task.
-    pub(super) fn dress(&mut self, wardrobe: &Wardrobe) {
-        self.ready = self.build(wardrobe).map(Arc::new);
+    pub(super) fn build_mesh(&mut self, mesh_builder: &MeshBuilder) {
+        self.ready = self.build(mesh_builder).map(Arc::new);
     }
+}
+
+/// All tiles of a terrain are shown, and it takes transactions.
+///
+/// A terrain that is shown may not be drawn yet: while textures are made or loaded, a terrain with a `GroundLook` has no
+/// material. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look nor a
+/// `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` propagates becomes ready too, and is never drawn.
+///
+/// The event comes again whenever a terrain has loaded anew, because another terrain took its place, or because the game
+/// itself changed more of it than a frame [swaps](super::BurrowSettings::swaps_per_frame). An observer that spawns something
+/// should check whether it is there already.
+#[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TerrainReady {
+    /// The terrain's entity.
+    pub entity: Entity,
 }
 
 /// A chunk got its entity.
@@ -154,19 +169,4 @@ pub struct FieldMerged {
     pub entity: Entity,
     /// The entity of the field that holds its data now.
     pub into: Entity,
-}
-
-/// A terrain's tiles are all shown, and it takes transactions.
-///
-/// Shown is not painted: while textures are made or loaded, a terrain with a `GroundLook` has no material, and nothing of
-/// it is drawn. Games that wait for a picture wait for `GroundLoading::is_ready` as well. A terrain with neither a look
-/// nor a `MeshMaterial3d` of a type that a `TerrainMaterialPlugin` hands on becomes ready too, and is never drawn.
-///
-/// It comes again whenever a terrain has loaded anew, because another one took its place, or because the game changed more of
-/// it by itself than a frame [swaps](super::BurrowSettings::swaps_per_frame). Whoever spawns something then
-/// looks first whether it is there.
-#[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TerrainReady {
-    /// The terrain's entity.
-    pub entity: Entity,
 }

@@ -16,36 +16,32 @@
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //!
-//! [`BurrowFigures`] tells what all of this takes; so do Bevy's [`diagnostics`], and tracing spans named after transactions, commits
-//! and loads.
-//!
 //! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
-//! commit: see [`Companion`].
+//! commit: see [`SurfaceProcessor`].
 
+mod collect;
 mod commit;
-mod companion;
 mod components;
 pub mod diagnostics;
 mod engine;
 mod entities;
 mod figures;
 mod heightmap;
-mod intake;
 mod load;
-mod loading;
 mod meshes;
 mod messages;
+mod processor;
 mod propagate;
 mod query;
 mod reach;
 mod settings;
+mod task;
 mod threads;
 mod times;
 
-pub use companion::{Attachment, Companion, Companions, Part};
 pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
-pub(crate) use entities::{TerrainEntities, tell};
+pub(crate) use entities::{TerrainEntities, trigger_if_alive};
 pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
@@ -57,6 +53,7 @@ pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
     LoosePieceFound, Redo, TargetedBrush, TerrainReady, Undo,
 };
+pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 #[cfg(feature = "render")]
 pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_from_pieces};
 pub use query::{TerrainHit, Terrains};
@@ -122,8 +119,8 @@ impl Plugin for TerrainPlugin {
         app.init_resource::<BurrowSettings>()
             .init_resource::<BurrowFigures>()
             .init_resource::<BurrowEngine>()
-            .init_resource::<commit::Numbers>()
-            .init_resource::<Companions>()
+            .init_resource::<task::TaskCounter>()
+            .init_resource::<SurfaceProcessors>()
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()
@@ -134,11 +131,11 @@ impl Plugin for TerrainPlugin {
             .register_required_components::<Terrain, Transform>()
             .register_required_components::<Terrain, Visibility>()
             .register_required_components::<Terrain, MaterialColors>()
-            .add_observer(load::take_in)
-            .add_observer(intake::free_history)
-            .add_observer(intake::answer_with_terrain)
-            .add_observer(intake::start_looking)
-            .add_observer(intake::stop_looking)
+            .add_observer(load::prepare_new)
+            .add_observer(collect::free_history)
+            .add_observer(collect::answer_removed)
+            .add_observer(collect::enable_loose_search)
+            .add_observer(collect::disable_loose_search)
             .add_observer(load::remove_with_terrain)
             .configure_sets(
                 Update,
@@ -156,22 +153,23 @@ impl Plugin for TerrainPlugin {
                 (
                     (
                         load::scale_terrains,
-                        load::drop_strays,
-                        load::drop_former,
+                        load::drop_stray_tasks,
+                        load::drop_replaced,
                         load::start_loading,
                         load::place_terrains,
                         load::finish_loading,
                     )
                         .chain()
                         .in_set(BurrowSystems::Load),
-                    (intake::collect_brushes, intake::collect_steps).chain().in_set(BurrowSystems::Collect),
+                    (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
                     commit::begin_transactions.in_set(BurrowSystems::Begin),
+                    diagnostics::measure_frame.after(BurrowSystems::Begin),
                 ),
             );
         app.add_systems(Update, engine::trim_engines.run_if(on_timer(engine::TRIMMED_EVERY)));
+        diagnostics::register(app);
         propagate::add(app);
-        diagnostics::add(app);
     }
 
     #[cfg(feature = "render")]

@@ -1,4 +1,4 @@
-//! Settings, as reflected resources and components.
+//! Settings, as resources and components.
 
 use bevy::prelude::*;
 

@@ -1,13 +1,11 @@
 //! The Bevy plugin from outside: brushes go in as messages, and what is shown, told and kept is looked at frame by frame.
 #![cfg(feature = "plugin")]
 
-mod companions;
 #[cfg(feature = "debug")]
 mod debug_views;
 mod despawning;
 mod diagnostics;
 mod entities;
-mod handed_on;
 mod heightmaps;
 mod history;
 mod holes;
@@ -16,6 +14,8 @@ mod loose;
 #[cfg(feature = "render")]
 mod materials;
 mod order;
+mod processors;
+mod propagate;
 mod queries;
 mod receipts;
 mod replacing;

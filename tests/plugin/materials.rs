@@ -41,7 +41,7 @@ fn add<M: Material>(stage: &mut Stage, material: M) -> Handle<M> {
 }
 
 /// What holds for every type of material.
-fn is_handed_on<M: Material + Default>(mut stage: Stage) {
+fn is_propagated<M: Material + Default>(mut stage: Stage) {
     let (first, second) = (add(&mut stage, M::default()), add(&mut stage, M::default()));
     let mut model = steep();
     model.apply(random_brushes(19, 10));
@@ -76,13 +76,13 @@ fn is_handed_on<M: Material + Default>(mut stage: Stage) {
 }
 
 #[test]
-fn the_standard_material_is_handed_on() {
-    is_handed_on::<StandardMaterial>(stage());
+fn the_standard_material_is_propagated() {
+    is_propagated::<StandardMaterial>(stage());
 }
 
 #[test]
-fn a_material_of_the_games_own_is_handed_on() {
-    is_handed_on::<Glow>(stage());
+fn a_material_of_the_games_own_is_propagated() {
+    is_propagated::<Glow>(stage());
 }
 
 #[test]

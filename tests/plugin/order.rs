@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bevy::prelude::*;
-use bevy_burrow::plugin::{Attachment, Companion, Companions, Part, ShownSurface};
+use bevy_burrow::plugin::{CommitAction, Part, ShownSurface, SurfaceProcessor, SurfaceProcessors};
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::WorkLimits;
@@ -178,17 +178,17 @@ fn of_what_a_game_changes_by_itself_only_that_is_meshed_anew() {
 
 struct Faulty;
 
-impl Companion for Faulty {
-    fn build(&self, part: &Part, _: &SurfaceMesh) -> Option<Attachment> {
+impl SurfaceProcessor for Faulty {
+    fn build(&self, part: &Part, _: &SurfaceMesh) -> Option<CommitAction> {
         assert!(part.revision == 0, "as it was told");
         None
     }
 }
 
 #[test]
-fn a_companion_that_panics_does_not_take_the_ground_along() {
+fn a_processor_that_panics_does_not_take_the_ground_along() {
     let mut stage = Stage::drawing();
-    stage.app.world_mut().resource_mut::<Companions>().add(Faulty);
+    stage.app.world_mut().resource_mut::<SurfaceProcessors>().add(Faulty);
     let terrain = stage.show(steep());
     stage.send(dig(30.0, 8.0, 30.0, 4.0));
     stage.settle();

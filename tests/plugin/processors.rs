@@ -1,7 +1,7 @@
-//! Companions: what goes with surfaces comes with them, in the same frame, with meshes and without.
+//! Surface processors: their data is swapped in with the mesh, in the same frame, and on servers without meshes.
 
 use bevy::prelude::*;
-use bevy_burrow::plugin::{Attachment, Companion, Companions, Part, ShownSurface};
+use bevy_burrow::plugin::{CommitAction, Part, ShownSurface, SurfaceProcessor, SurfaceProcessors};
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::Drawn;
 
@@ -13,8 +13,8 @@ struct Triangles(usize, Drawn);
 
 struct Counter;
 
-impl Companion for Counter {
-    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<Attachment> {
+impl SurfaceProcessor for Counter {
+    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<CommitAction> {
         let count = Triangles(surface.indices.len() / 3, part.drawn);
         Some(Box::new(move |entity| {
             entity.try_insert(count);
@@ -35,9 +35,9 @@ fn assert_counted(stage: &mut Stage, terrain: Entity) {
 }
 
 #[test]
-fn companions_come_with_every_commit() {
+fn processors_come_with_every_commit() {
     for mut stage in [Stage::drawing(), Stage::server()] {
-        stage.app.world_mut().resource_mut::<Companions>().add(Counter);
+        stage.app.world_mut().resource_mut::<SurfaceProcessors>().add(Counter);
         let terrain = stage.show(steep());
         assert_counted(&mut stage, terrain);
         let mut revision = stage.terrain(terrain).world().revision();

@@ -141,7 +141,7 @@ pub(super) fn collect_steps(
     }
     // Those that there was no room for, and those of steps that the game took itself.
     for (entity, mut terrain) in &mut terrains {
-        tell_steps(entity, &mut terrain, &mut moved);
+        send_history(entity, &mut terrain, &mut moved);
     }
     figures.main_thread += start.elapsed();
 }
@@ -160,7 +160,7 @@ pub(super) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Ite
 }
 
 /// A terrain that is [`LooseGround`] looks for pieces at once, whoever edits it.
-pub(super) fn start_looking(
+pub(super) fn enable_loose_search(
     new: On<Insert, (LooseGround, Terrain)>,
     mut terrains: Query<(&mut Terrain, &LooseGround)>,
 ) {
@@ -170,14 +170,14 @@ pub(super) fn start_looking(
 }
 
 /// A terrain that is no [`LooseGround`] any more looks for nothing.
-pub(super) fn stop_looking(gone: On<Remove, LooseGround>, mut terrains: Query<&mut Terrain>) {
+pub(super) fn disable_loose_search(gone: On<Remove, LooseGround>, mut terrains: Query<&mut Terrain>) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         terrain.set_loose(None);
     }
 }
 
 /// Hands out what became of a terrain's steps.
-pub(super) fn tell_steps(
+pub(super) fn send_history(
     entity: Entity,
     terrain: &mut Mut<Terrain>,
     moved: &mut MessageWriter<HistoryMoved>,
@@ -196,7 +196,7 @@ fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
 /// does not do what was answered.
 ///
 /// Its world may be large: it is held until the component is gone, to be freed elsewhere.
-pub(super) fn answer_with_terrain(
+pub(super) fn answer_removed(
     gone: On<Discard, Terrain>,
     mut commands: Commands,
     mut terrains: Query<&mut Terrain>,
@@ -206,7 +206,7 @@ pub(super) fn answer_with_terrain(
     let Ok(mut terrain) = terrains.get_mut(gone.entity) else { return };
     let answered = terrain.take_answered().into_iter();
     answers.write_batch(answered.map(|receipt| BrushApplied { terrain: Some(gone.entity), receipt }));
-    tell_steps(gone.entity, &mut terrain, &mut moved);
+    send_history(gone.entity, &mut terrain, &mut moved);
     let answer = |tag| BrushApplied {
         terrain: Some(gone.entity),
         receipt: Receipt { tag, outcome: Err(Rejection::TerrainGone) },

@@ -60,7 +60,7 @@ fn a_piece_that_comes_with_layers_keeps_them_and_other_terrains_have_their_own()
 
 #[cfg(feature = "render")]
 #[test]
-fn shadows_are_handed_on() {
+fn shadows_are_propagated() {
     use bevy::light::{NotShadowCaster, NotShadowReceiver};
 
     let mut stage = Stage::drawing();

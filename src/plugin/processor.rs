@@ -1,0 +1,215 @@
+//! Extra data for each surface: built in the same task as the meshes, swapped in by the same commit.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use bevy::prelude::*;
+use rayon::prelude::*;
+
+use super::meshes::{BuiltMesh, MeshBuilder};
+use super::{MaterialColors, ShownSurface};
+use crate::lattice::ChunkGrid;
+use crate::surface::SurfaceMesh;
+use crate::terrain::{Drawn, SurfaceDraft, Terrain};
+
+/// A tile or chunk whose surface is built.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// The terrain's entity.
+    pub terrain: Entity,
+    /// Which tile or chunk.
+    pub drawn: Drawn,
+    /// The lattice point that positions of its surface count from, in voxels of the terrain.
+    pub origin: IVec3,
+    /// Cells along its sides.
+    pub size: i32,
+    /// Metres along a voxel's side.
+    pub voxel_size: f32,
+    /// The revision of the world that its surface is of.
+    pub revision: u64,
+}
+
+impl Part {
+    pub(crate) fn new(
+        terrain: Entity,
+        voxel_size: f32,
+        grid: ChunkGrid,
+        revision: u64,
+        drawn: Drawn,
+    ) -> Self {
+        let origin = match drawn {
+            Drawn::Tile(tile) => grid.tile_cells(tile).0.at(0),
+            Drawn::Chunk(chunk) => grid.origin(chunk),
+        };
+        Self { terrain, drawn, origin, size: grid.size(), voxel_size, revision }
+    }
+}
+
+/// Changes the entity of a tile or chunk in the frame in which it shows its new surface.
+pub type CommitAction = Box<dyn FnOnce(&mut EntityCommands) + Send + Sync>;
+
+/// Builds extra data for each surface off-thread, and swaps it in with the mesh: colliders, or a navigation mesh.
+///
+/// [`build`](Self::build) runs in the task that makes the surface of a tile or chunk. The [`CommitAction`] that it returns
+/// runs on the entity of that tile or chunk in the frame in which the mesh is swapped, on a server without meshes too.
+/// Large transactions build several parts at a time on rayon's threads: a processor that uses rayon itself should hold no
+/// lock while it does. If a processor panics, that part goes without its data, and an error is logged once.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::plugin::{CommitAction, SurfaceProcessor, SurfaceProcessors, Part};
+/// # use bevy_burrow::surface::SurfaceMesh;
+/// #[derive(Component)]
+/// struct Triangles(usize);
+///
+/// struct Counter;
+///
+/// impl SurfaceProcessor for Counter {
+///     fn build(&self, _: &Part, surface: &SurfaceMesh) -> Option<CommitAction> {
+///         let count = surface.indices.len() / 3;
+///         Some(Box::new(move |entity| {
+///             entity.try_insert(Triangles(count));
+///         }))
+///     }
+/// }
+///
+/// # let mut app = App::new();
+/// app.init_resource::<SurfaceProcessors>();
+/// app.world_mut().resource_mut::<SurfaceProcessors>().add(Counter);
+/// ```
+pub trait SurfaceProcessor: Send + Sync + 'static {
+    /// Is there anything to build for this part? A server does not assemble surfaces that no processor wants.
+    fn wants(&self, part: &Part) -> bool {
+        let _ = part;
+        true
+    }
+
+    /// Builds the data for a new surface. Its positions are relative to the part's origin; it may be empty.
+    fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<CommitAction>;
+}
+
+/// All surface processors. A processor that is added later is not called for surfaces that are already shown.
+#[derive(Resource, Clone, Default)]
+pub struct SurfaceProcessors(Vec<Arc<dyn SurfaceProcessor>>);
+
+impl SurfaceProcessors {
+    /// Adds a processor.
+    pub fn add(&mut self, processor: impl SurfaceProcessor) {
+        self.0.push(Arc::new(processor));
+    }
+
+    /// Are there no processors?
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl fmt::Debug for SurfaceProcessors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SurfaceProcessors").field("count", &self.0.len()).finish_non_exhaustive()
+    }
+}
+
+/// Runs code of a processor. If it panics, an error is logged once, and the ground is shown without its data.
+fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
+    let done = catch_unwind(AssertUnwindSafe(work));
+    if done.is_err() {
+        error_once!("a surface processor panicked; the ground is shown without its data");
+    }
+    done.ok()
+}
+
+/// The new surface of a tile or chunk, ready to be swapped in.
+pub(super) struct BuiltSurface {
+    pub drawn: Drawn,
+    pub mesh: BuiltMesh,
+    pub shown: ShownSurface,
+    pub actions: Vec<CommitAction>,
+}
+
+impl BuiltSurface {
+    /// Triangles in the mesh.
+    pub fn triangles(&self) -> usize {
+        let indices = self.mesh.as_ref().and_then(|(mesh, _)| mesh.indices());
+        indices.map_or(0, |indices| indices.len() / 3)
+    }
+}
+
+/// From how many surfaces on they are built in parallel.
+const PARALLEL_SURFACES: usize = 8;
+
+/// Builds meshes and extra data for the surfaces of one terrain, in a task.
+#[derive(Clone)]
+pub(super) struct SurfaceBuilder {
+    terrain: Entity,
+    voxel_size: f32,
+    grid: ChunkGrid,
+    /// The revision of the world that the surfaces belong to.
+    pub revision: u64,
+    /// `None` where there are no meshes.
+    pub mesh_builder: Option<MeshBuilder>,
+    processors: SurfaceProcessors,
+}
+
+impl SurfaceBuilder {
+    /// A builder for the terrain's world as it is now.
+    pub fn new(
+        (entity, terrain): (Entity, &Terrain),
+        colors: Option<&MaterialColors>,
+        has_meshes: bool,
+        processors: &SurfaceProcessors,
+    ) -> Self {
+        let world = terrain.world();
+        Self {
+            terrain: entity,
+            voxel_size: terrain.voxel_size(),
+            grid: world.grid(),
+            revision: world.revision(),
+            mesh_builder: has_meshes.then(|| MeshBuilder::new(world, colors)),
+            processors: processors.clone(),
+        }
+    }
+
+    /// Is there nothing to build?
+    pub fn is_idle(&self) -> bool {
+        self.mesh_builder.is_none() && self.processors.is_empty()
+    }
+
+    /// Builds everything for these surfaces; many are built in parallel.
+    pub fn build_all(&self, drafts: Vec<(Drawn, SurfaceDraft)>) -> Vec<BuiltSurface> {
+        let build = |(drawn, draft): (Drawn, SurfaceDraft)| self.build(drawn, draft.is_empty(), || draft);
+        if drafts.len() < PARALLEL_SURFACES {
+            drafts.into_iter().map(build).collect()
+        } else {
+            drafts.into_par_iter().map(build).collect()
+        }
+    }
+
+    /// Builds everything for one surface. `draft` is called only if something is built from it; otherwise `is_empty` says
+    /// whether the surface is known to have no triangles.
+    pub fn build(&self, drawn: Drawn, is_empty: bool, draft: impl FnOnce() -> SurfaceDraft) -> BuiltSurface {
+        let part = &Part::new(self.terrain, self.voxel_size, self.grid, self.revision, drawn);
+        let wants =
+            |processor: &&Arc<dyn SurfaceProcessor>| guarded(|| processor.wants(part)).unwrap_or(false);
+        let processors: Vec<_> = self.processors.0.iter().filter(wants).collect();
+        let mut built = BuiltSurface {
+            drawn,
+            mesh: None,
+            shown: ShownSurface { revision: self.revision, is_empty },
+            actions: Vec::new(),
+        };
+        if self.mesh_builder.is_none() && processors.is_empty() {
+            return built;
+        }
+        let draft = draft();
+        built.shown.is_empty = draft.is_empty();
+        built.mesh = self.mesh_builder.as_ref().and_then(|builder| builder.build(part.origin, &draft));
+        if !processors.is_empty() {
+            let surface = &draft.surface();
+            let build = |processor: &Arc<dyn SurfaceProcessor>| guarded(|| processor.build(part, surface));
+            built.actions = processors.into_iter().filter_map(build).flatten().collect();
+        }
+        built
+    }
+}

@@ -1,0 +1,109 @@
+//! The task that a terrain waits for: it runs a transaction, and builds the surfaces that the next commit shows.
+
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+
+use super::LoosePieceFound;
+use super::collect::pieces;
+use super::figures::TaskTimes;
+use super::processor::{BuiltSurface, SurfaceBuilder};
+use super::threads::{ThreadTask, Threads};
+use crate::backend::Engine;
+use crate::terrain::{Commit, Drawn, SurfaceDraft, Terrain, Transaction, Unseen};
+
+/// The task that a terrain waits for.
+#[derive(Component)]
+pub(super) struct InFlight {
+    /// Counts tasks over all terrains.
+    pub number: u64,
+    /// The ticket of the transaction; `None` for changes that the game made itself.
+    pub ticket: Option<u64>,
+    task: ThreadTask<TaskOutput>,
+    /// The result once the task is done.
+    pub done: Option<Result<TaskOutput, TaskPanicked>>,
+}
+
+/// A task panicked; the panic's message has been printed.
+pub(super) struct TaskPanicked;
+
+/// Surfaces that a task built, and what they show.
+pub(super) struct TaskOutput {
+    pub change: Change,
+    pub surfaces: Vec<BuiltSurface>,
+    pub pieces: Vec<LoosePieceFound>,
+    pub times: TaskTimes,
+}
+
+/// What changed the ground.
+pub(super) enum Change {
+    /// A transaction, not committed yet.
+    Transaction(Box<Commit>),
+    /// Commits that the game made itself.
+    Unseen(Unseen),
+}
+
+impl InFlight {
+    fn start(number: u64, ticket: Option<u64>, work: impl FnOnce() -> TaskOutput + Send + 'static) -> Self {
+        Self { number, ticket, task: ThreadTask::start(Threads::Transactions, work), done: None }
+    }
+
+    /// Runs a transaction, and builds the surfaces that it changes.
+    pub fn transaction(
+        number: u64,
+        terrain: Entity,
+        transaction: Transaction,
+        engine: Engine,
+        builder: SurfaceBuilder,
+    ) -> Self {
+        Self::start(number, Some(transaction.ticket()), move || {
+            let _span = info_span!("burrow_transaction").entered();
+            let start = Instant::now();
+            let mut commit = info_span!("burrow_edit").in_scope(|| transaction.run_on(&engine));
+            let edit = start.elapsed();
+            // Taken out of the commit, so that they are dropped here and not on the main thread.
+            let updates = std::mem::take(&mut commit.meshes);
+            let tiles = updates.tiles.into_iter();
+            let tiles = tiles.map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
+            let chunks = updates.chunks.into_iter();
+            let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
+            let _span = info_span!("burrow_mesh").entered();
+            let surfaces = builder.build_all(tiles.chain(chunks).collect());
+            let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
+            if let Some(mesh_builder) = &builder.mesh_builder {
+                pieces.iter_mut().for_each(|piece| piece.build_mesh(mesh_builder));
+            }
+            let total = start.elapsed();
+            let times = TaskTimes { edit, mesh: total - edit, total };
+            TaskOutput { change: Change::Transaction(Box::new(commit)), surfaces, pieces, times }
+        })
+    }
+
+    /// Builds the surfaces that the game changed itself.
+    pub fn unseen(number: u64, terrain: &Terrain, unseen: Unseen, builder: SurfaceBuilder) -> Self {
+        let drafts = unseen.drawn().map(|drawn| (drawn, terrain.world().draft(drawn))).collect();
+        Self::start(number, None, move || {
+            let surfaces = info_span!("burrow_mesh").in_scope(|| builder.build_all(drafts));
+            let (change, times) = (Change::Unseen(unseen), TaskTimes::default());
+            TaskOutput { change, surfaces, pieces: Vec::new(), times }
+        })
+    }
+
+    /// Is the task done?
+    pub fn is_done(&mut self) -> bool {
+        if self.done.is_none() {
+            self.done = self.task.check().map(|done| done.map_err(|_| TaskPanicked));
+        }
+        self.done.is_some()
+    }
+}
+
+/// Numbers tasks over all terrains, so that they are committed in the order in which they began.
+#[derive(Resource, Default)]
+pub(super) struct TaskCounter(u64);
+
+impl TaskCounter {
+    pub fn next(&mut self) -> u64 {
+        self.0 += 1;
+        self.0
+    }
+}
