@@ -132,10 +132,8 @@ fn wait_for_a_slow_card() {
     let mark = card.mark().expect("a mark");
     mark.wait().expect("the card works");
     let (took, busy) = (start.elapsed(), processor_time().expect("as before") - before);
-    assert!(
-        took > Duration::from_millis(120) && busy < Duration::from_millis(5),
-        "{busy:?} busy of {took:?}"
-    );
+    // A thread that spins is busy all the time.
+    assert!(took > Duration::from_millis(120) && busy < took / 4, "{busy:?} busy of {took:?}");
 }
 
 #[test]
