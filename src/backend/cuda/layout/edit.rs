@@ -51,7 +51,7 @@ impl EditJob {
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Tool {
-    /// Sphere, cuboid, cylinder, capsule, cone.
+    /// Which of the shapes, in the order of `brush/shapes/mod.rs`.
     pub kind: u32,
     /// Dig, add, paint.
     pub operation: u32,
