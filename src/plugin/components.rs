@@ -66,10 +66,12 @@ pub struct Field {
     pub revision: u64,
 }
 
-/// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
-/// gets the terrain's material, layers and shadows as a [`Tile`] does, unless it comes with its own of the same type, and follows as they
-/// change or are taken off, as long as that terrain is there. With a `GroundLook`, what is drawn on it stays where it was in
-/// the ground, wherever it goes.
+/// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them: a
+/// relationship to that terrain, which lists its pieces in [`GroundPieces`]. A piece inherits the terrain's material, layers
+/// and shadows as a [`Tile`] does, unless it is spawned with its own of the same type. It follows when they change or are
+/// removed. With a `GroundLook`, the texture on a piece stays where it was in the ground, wherever the piece goes.
+///
+/// When the terrain is despawned, its pieces stay as they are, and lose this component.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -94,14 +96,21 @@ pub struct Field {
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
+#[relationship(relationship_target = GroundPieces)]
 #[require(Transform, Visibility)]
 pub struct GroundPiece {
     /// The terrain that it was part of.
-    #[entities]
+    #[relationship]
     pub terrain: Entity,
-    /// Where its mesh counts from, in voxels of the terrain.
+    /// The lattice point that positions of its mesh count from, in voxels of the terrain.
     pub origin: IVec3,
 }
+
+/// The pieces of a terrain. Bevy keeps it up to date; see [`GroundPiece`].
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default)]
+#[relationship_target(relationship = GroundPiece)]
+pub struct GroundPieces(Vec<Entity>);
 
 impl From<TilePos> for Tile {
     fn from(tile: TilePos) -> Self {

@@ -39,7 +39,7 @@ mod task;
 mod threads;
 mod times;
 
-pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
+pub use components::{Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};
 pub use figures::BurrowFigures;
@@ -55,7 +55,7 @@ pub use messages::{
 };
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 #[cfg(feature = "render")]
-pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_from_pieces};
+pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub(crate) use threads::free_later;
