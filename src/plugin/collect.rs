@@ -1,4 +1,4 @@
-//! Messages on their way into the queues of terrains: brushes, undo, redo.
+//! Moves messages into the queues of terrains: brushes, undo, redo.
 
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
@@ -14,8 +14,8 @@ use crate::terrain::{
     HistoryReceipt, HistoryRejection, HistoryStep, Receipt, Rejection, Terrain, Together, unique,
 };
 
-/// Moves brushes into their terrains' space and queues them. A terrain that a brush reaches and that can't take it
-/// answers at once, and so does a brush that reaches none.
+/// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected at
+/// once, and so is a brush that reaches no terrain.
 pub(super) fn collect_brushes(
     mut brushes: MessageReader<Brush>,
     mut targeted: MessageReader<TargetedBrush>,
@@ -41,28 +41,28 @@ pub(super) fn collect_brushes(
     let mut reject = |brush: &Brush, terrain, rejection| {
         answers.write(BrushApplied { terrain, receipt: Receipt { tag: brush.tag, outcome: Err(rejection) } });
     };
-    // Those of one frame are one step of undo.
+    // Brushes of one frame are undone together.
     let together = Together::Batch(unique());
     for brush in brushes.read() {
-        // What the brush is told if no terrain answers.
+        // The rejection that is sent if no terrain answers.
         let mut unanswered = Some(Rejection::OutsideWorld);
-        // A terrain is borrowed to be changed only once it takes a brush: for `Changed<Terrain>`, others stay as they are.
+        // Only terrains that queue a brush are borrowed mutably, so that others do not count as changed.
         for (entity, mut terrain, _) in &mut terrains {
             let Ok(place) = places.compute_global_transform(entity) else { continue };
-            match Claim::of(brush, &place, terrain.world().grid()) {
-                Claim::Taken(edit) => {
+            match Effect::of(brush, &place, terrain.world().grid()) {
+                Effect::Taken(edit) => {
                     match terrain.admit(Some(&edit)) {
                         Ok(()) => terrain.queue_edit(brush.tag, Ok(edit), brush.stroke, together),
                         Err(rejection) => reject(brush, Some(entity), rejection),
                     }
                     unanswered = None;
                 }
-                Claim::Refused(error) => {
+                Effect::Refused(error) => {
                     reject(brush, Some(entity), error.into());
                     unanswered = None;
                 }
-                Claim::Beside => {}
-                Claim::Nowhere(error) => unanswered = unanswered.map(|_| error.into()),
+                Effect::Beside => {}
+                Effect::Nowhere(error) => unanswered = unanswered.map(|_| error.into()),
             }
         }
         if let Some(why) = unanswered {
@@ -84,19 +84,19 @@ pub(super) fn collect_brushes(
     figures.main_thread = start.elapsed();
 }
 
-/// What a brush in world space is to a terrain.
-enum Claim {
+/// How a brush in world space affects a terrain.
+enum Effect {
     /// An edit that reaches it.
     Taken(Edit),
-    /// It reaches the terrain, which can't take it.
+    /// It reaches the terrain, but is not valid there.
     Refused(BrushError),
     /// It does not reach the terrain.
     Beside,
-    /// Its place is no number.
+    /// Its position is not a number.
     Nowhere(BrushError),
 }
 
-impl Claim {
+impl Effect {
     fn of(brush: &Brush, place: &GlobalTransform, grid: ChunkGrid) -> Self {
         let local = to_terrain(brush, place);
         match Edit::quantize(&local) {
@@ -111,7 +111,7 @@ impl Claim {
     }
 }
 
-/// Queues steps through history, behind the brushes of this frame. One that no terrain can take is answered at once.
+/// Queues undo and redo behind the brushes of this frame. A step without any terrain is answered at once.
 pub(super) fn collect_steps(
     mut undos: MessageReader<Undo>,
     mut redos: MessageReader<Redo>,
@@ -139,7 +139,7 @@ pub(super) fn collect_steps(
             moved.write(gone(target, step));
         }
     }
-    // Those that there was no room for, and those of steps that the game took itself.
+    // Results of steps that the queue had no room for, and of steps that the game took itself.
     for (entity, mut terrain) in &mut terrains {
         send_history(entity, &mut terrain, &mut moved);
     }
@@ -154,12 +154,12 @@ pub(super) fn pieces(terrain: Entity, receipts: &[Receipt]) -> impl Iterator<Ite
             terrain,
             tag: receipt.tag,
             piece: piece.clone(),
-            ready: None,
+            mesh: None,
         })
     })
 }
 
-/// A terrain that is [`LooseGround`] looks for pieces at once, whoever edits it.
+/// A terrain with [`LooseGround`] looks for pieces at once.
 pub(super) fn enable_loose_search(
     new: On<Insert, (LooseGround, Terrain)>,
     mut terrains: Query<(&mut Terrain, &LooseGround)>,
@@ -169,14 +169,14 @@ pub(super) fn enable_loose_search(
     }
 }
 
-/// A terrain that is no [`LooseGround`] any more looks for nothing.
+/// A terrain without [`LooseGround`] stops looking for pieces.
 pub(super) fn disable_loose_search(gone: On<Remove, LooseGround>, mut terrains: Query<&mut Terrain>) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         terrain.set_loose(None);
     }
 }
 
-/// Hands out what became of a terrain's steps.
+/// Sends the results of a terrain's undo and redo steps.
 pub(super) fn send_history(
     entity: Entity,
     terrain: &mut Mut<Terrain>,
@@ -192,10 +192,9 @@ fn gone(terrain: Option<Entity>, step: HistoryStep) -> HistoryMoved {
     HistoryMoved { terrain, receipt: HistoryReceipt { step, outcome: Err(HistoryRejection::TerrainGone) } }
 }
 
-/// Brushes and steps that a terrain had not come to when it goes, or another one takes its place. If it comes back, it
-/// does not do what was answered.
+/// Answers brushes and steps that wait in a terrain that is removed or replaced, and clears its queue.
 ///
-/// Its world may be large: it is held until the component is gone, to be freed elsewhere.
+/// Its world may be large: a reference keeps it until the component is gone, so that it is freed on another thread.
 pub(super) fn answer_removed(
     gone: On<Discard, Terrain>,
     mut commands: Commands,
@@ -218,17 +217,17 @@ pub(super) fn answer_removed(
     commands.queue(move |_: &mut World| free_later(world));
 }
 
-/// The history of a terrain that is despawned, and so can't be taken up again, is freed on another thread, too.
+/// Frees the history of a despawned terrain on another thread.
 pub(super) fn free_history(gone: On<Despawn, Terrain>, mut terrains: Query<&mut Terrain>) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {
         free_later(terrain.rebudget_undo(0));
     }
 }
 
-/// How much the scale along one axis may differ from another's, by rounding, where all are the same.
+/// How much equal scales along two axes may differ by rounding.
 const EVEN: f32 = 1e-5;
 
-/// A brush in world space as its terrain sees it, in voxels.
+/// Transforms a brush from world space into voxels of a terrain.
 fn to_terrain(brush: &Brush, place: &GlobalTransform) -> Brush {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
     if (scale / scale.x).abs_diff_eq(Vec3::ONE, EVEN) {
@@ -238,18 +237,18 @@ fn to_terrain(brush: &Brush, place: &GlobalTransform) -> Brush {
     }
 }
 
-/// The same for a terrain whose axes have one scale.
+/// The brush for a terrain that is scaled evenly.
 fn evenly(brush: &Brush, scale: f32, rotation: Quat, translation: Vec3) -> Brush {
     let (rotation, scale) = (rotation.inverse(), scale.recip());
     brush.transformed(rotation, rotation * -translation * scale, scale)
 }
 
-/// The same for a terrain that a parent stretches: points go where the ground has them, and sizes, which have no
-/// direction, by the scale that a volume has.
+/// The brush for a terrain that a parent stretches: points are transformed exactly, and sizes, which have no direction, are
+/// scaled by the cube root of the change in volume.
 fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Brush {
     let scale = matrix.determinant().abs().cbrt();
     let mut brush = evenly(brush, scale, rotation, translation);
-    // What is left to do of the way into the terrain.
+    // The rest of the transform into the terrain.
     let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;
     let stretch = |point: &mut Vec3| *point = rest * *point;
     let lift = |height: &mut f32| *height *= rest.y_axis.y;
@@ -262,7 +261,7 @@ fn stretched(brush: &Brush, matrix: Mat3A, rotation: Quat, translation: Vec3) ->
         Operation::Level { height } => lift(height),
         Operation::Terrace { step, base } => [step, base].into_iter().for_each(lift),
         Operation::Stamp { stamp } => stretch(&mut stamp.center),
-        // Nothing in them has a place or a height; amounts are scaled as sizes are.
+        // They have no position or height; amounts are scaled like sizes.
         Operation::Dig
         | Operation::Add { .. }
         | Operation::Paint { .. }

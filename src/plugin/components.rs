@@ -1,4 +1,4 @@
-//! Components: what marks terrains, tiles, chunks and fields.
+//! Components of terrains, tiles, chunks, fields and pieces.
 
 use bevy::ecs::component::{Component, Mutable, StorageType};
 use bevy::prelude::*;
@@ -15,9 +15,9 @@ impl Component for Terrain {
 
 /// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.
 ///
-/// It wears the terrain's material, and has its `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver`: put them on the
-/// terrain. Leave tiles out of saved scenes: a scene of the whole world brings them back without their terrain, which is
-/// not reflected.
+/// It inherits the terrain's material, `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver`: insert them on the terrain.
+/// Leave tiles out of saved scenes: a scene of the whole world would restore them without their terrain, which is not
+/// reflected.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -28,8 +28,8 @@ pub struct Tile {
     pub z: i32,
 }
 
-/// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` where it draws something, even where it holds
-/// no field itself. Dressed, and left out of saved scenes, like a [`Tile`].
+/// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` if it draws something, even if it has no field
+/// itself. It inherits components, and is left out of saved scenes, like a [`Tile`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -42,11 +42,11 @@ pub struct Chunk {
     pub z: i32,
 }
 
-/// Which surface a tile or chunk shows, where one was made of it: the plugin writes it in the frame of the swap.
+/// Which surface a tile or chunk shows, if one was built: the plugin writes it in the frame of the swap.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct ShownSurface {
-    /// The revision of the world that it is of; it stays while other parts change.
+    /// The revision of the world that the surface belongs to; it stays while other parts change.
     pub revision: u64,
     /// Is it known to have no triangles?
     pub is_empty: bool,
@@ -56,7 +56,7 @@ pub struct ShownSurface {
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct Field {
-    /// Its name in receipts.
+    /// Its id in receipts.
     pub id: u64,
     /// Lowest edited lattice point, in voxels of the terrain.
     pub min: IVec3,
@@ -66,10 +66,12 @@ pub struct Field {
     pub revision: u64,
 }
 
-/// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them. It
-/// gets the terrain's material, layers and shadows as a [`Tile`] does, unless it comes with its own of the same type, and follows as they
-/// change or are taken off, as long as that terrain is there. With a `GroundLook`, what is drawn on it stays where it was in
-/// the ground, wherever it goes.
+/// A mesh that was part of a terrain and now moves by itself, as [`LoosePieceFound`](super::LoosePieceFound) has them: a
+/// relationship to that terrain, which lists its pieces in [`GroundPieces`]. A piece inherits the terrain's material, layers
+/// and shadows as a [`Tile`] does, unless it is spawned with its own of the same type. It follows when they change or are
+/// removed. With a `GroundLook`, the texture on a piece stays where it was in the ground, wherever the piece goes.
+///
+/// When the terrain is despawned, its pieces stay as they are, and lose this component.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -94,14 +96,21 @@ pub struct Field {
 /// ```
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
+#[relationship(relationship_target = GroundPieces)]
 #[require(Transform, Visibility)]
 pub struct GroundPiece {
     /// The terrain that it was part of.
-    #[entities]
+    #[relationship]
     pub terrain: Entity,
-    /// Where its mesh counts from, in voxels of the terrain.
+    /// The lattice point that positions of its mesh count from, in voxels of the terrain.
     pub origin: IVec3,
 }
+
+/// The pieces of a terrain. Bevy keeps it up to date; see [`GroundPiece`].
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default)]
+#[relationship_target(relationship = GroundPiece)]
+pub struct GroundPieces(Vec<Entity>);
 
 impl From<TilePos> for Tile {
     fn from(tile: TilePos) -> Self {
@@ -133,11 +142,11 @@ impl From<&volume::Field> for Field {
     }
 }
 
-/// The colour of each material id, for the vertex colours of a terrain's meshes; put it on the terrain's entity. Ids past
-/// its end have the last colour. Materials that sample textures by id ignore it, `GroundMaterial` among them; without any
-/// colour in it, meshes have none, which saves 16 bytes a vertex.
+/// The colour of each material id, for the vertex colours of a terrain's meshes; insert it on the terrain's entity. Ids past
+/// its end have the last colour. Materials that sample textures by id, like `GroundMaterial`, ignore it. If it is empty,
+/// meshes have no vertex colours, which saves 16 bytes a vertex.
 ///
-/// Meshes made after a change have the new colours, and those made after it was taken off have none.
+/// Only meshes that are built after a change have the new colours, and after its removal none.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component)]
 pub struct MaterialColors(pub Vec<LinearRgba>);

@@ -1,4 +1,4 @@
-//! What the plugin does for the engines of its terrains.
+//! Maintenance of the engines that terrains run on.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use super::threads::Threads;
 use crate::backend::{Engine, EngineState};
 use crate::terrain::Terrain;
 
-/// How often engines are asked to give back what they have not used lately.
+/// How often engines free memory that they have not used lately.
 pub(super) const TRIMMED_EVERY: Duration = Duration::from_secs(30);
 
-/// Cards give memory back by themselves when a transaction comes; here, when none does.
+/// Engines free memory at each transaction; this covers the time in which there are none.
 pub(super) fn trim_engines(engine: Res<BurrowEngine>, terrains: Query<&Terrain>) {
     let own = terrains.iter().filter_map(Terrain::engine);
     let opened = own.chain([&engine.0]).filter(|engine| matches!(engine.state(), EngineState::Cuda(_)));
@@ -22,7 +22,7 @@ pub(super) fn trim_engines(engine: Res<BurrowEngine>, terrains: Query<&Terrain>)
     }
 }
 
-/// Of several cards, the one that draws is the nearest to what is drawn.
+/// Suggests the card that draws, if there are several.
 #[cfg(feature = "render")]
 pub(super) fn suggest_renderers_card(world: &World) {
     use bevy::render::renderer::RenderAdapterInfo;

@@ -1,4 +1,4 @@
-//! The entities below a terrain: which one shows what.
+//! The entities below a terrain.
 
 use bevy::ecs::entity::EntityHashSet;
 use bevy::platform::collections::HashMap;
@@ -15,7 +15,7 @@ use crate::volume::{self, FieldId};
 #[derive(Component)]
 pub struct TerrainEntities {
     pub(super) shown: Version,
-    /// Metres along the side of the voxels that they were made for.
+    /// Metres along the side of the voxels that they were built for.
     pub(super) voxel_size: f32,
     drawn: HashMap<Drawn, Entity>,
     fields: HashMap<FieldId, Entity>,
@@ -34,7 +34,7 @@ impl TerrainEntities {
         }
     }
 
-    /// Are they those of this world, as it is now? Not while one that the game changed by itself loads.
+    /// Do they show the current state of this world? False while changes of the game load.
     pub(crate) fn show(&self, world: &World) -> bool {
         self.shown == world.version()
     }
@@ -90,7 +90,7 @@ impl TerrainEntities {
         trigger_if_alive(commands, FieldCreated { entity: child });
     }
 
-    /// Entities and events of fields that a commit changed.
+    /// Updates the entities of fields that a commit changed, and triggers their events.
     pub(super) fn update_fields(
         &mut self,
         commands: &mut Commands,
@@ -134,7 +134,7 @@ impl TerrainEntities {
         }
     }
 
-    /// Despawns those of some chunks that draw nothing and hold no field any more, as after an undo.
+    /// Despawns chunks of this list that draw nothing and have no field any more, as after an undo.
     pub(super) fn drop_empty(&mut self, commands: &mut Commands, world: &World, chunks: Vec<ChunkPos>) {
         for chunk in chunks {
             if is_empty(world, chunk) {
@@ -172,7 +172,7 @@ pub(crate) fn trigger_if_alive<'a, E: EntityEvent<Trigger<'a>: Default>>(command
     });
 }
 
-/// Does a chunk hold no field and draw nothing?
+/// Does a chunk have no field, and draw nothing?
 pub(super) fn is_empty(world: &World, chunk: ChunkPos) -> bool {
     world.fields_of(chunk).is_none() && !world.draws(chunk)
 }

@@ -8,20 +8,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::ground::{GreyImage, ImageError, ImageLimits, RawFormat};
 
-/// A grey image whose samples are heights; make a [`Ground`](crate::ground::Ground) of it.
+/// A grey image whose samples are heights, for a [`Ground`](crate::ground::Ground).
 #[derive(Asset, TypePath, Clone, Debug)]
 pub struct HeightmapImage(pub GreyImage);
 
 /// How a heightmap file is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HeightmapSettings {
-    /// For RAW files: width, height and byte order, which they do not tell.
+    /// For RAW files: width, height and byte order, which the file does not contain.
     pub raw: Option<RawHeightmap>,
     /// What a file may cost.
     pub limits: ImageLimits,
 }
 
-/// What a headerless RAW file does not tell.
+/// The layout of a RAW file, which has no header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RawHeightmap {
     /// Samples along x.
@@ -32,23 +32,23 @@ pub struct RawHeightmap {
     pub format: RawFormat,
 }
 
-/// Why a heightmap asset can't be loaded.
+/// Why a heightmap asset cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HeightmapError {
-    /// The file can't be read.
+    /// The file cannot be read.
     #[error("reading a heightmap: {0}")]
     Read(#[from] std::io::Error),
-    /// The file is no usable heightmap.
+    /// The file is not a usable heightmap.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// A RAW file needs its size told.
+    /// A RAW file was loaded without its size.
     #[error("a RAW heightmap has no header: load it with HeightmapSettings {{ raw: Some(..) }}")]
     RawSize,
 }
 
-/// Loads `.png`, `.raw` and `.r16` files as [`HeightmapImage`]. Who loads a `.png` says of which type, as
-/// `load::<HeightmapImage>` does; without that it is an ordinary picture.
+/// Loads `.png`, `.raw` and `.r16` files as [`HeightmapImage`]. A `.png` needs its type, as in
+/// `load::<HeightmapImage>`; otherwise Bevy loads it as an ordinary image.
 #[derive(Default, TypePath)]
 pub struct HeightmapLoader;
 
@@ -76,12 +76,12 @@ impl AssetLoader for HeightmapLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        // Not "png": the last loader of an extension gets all files that nobody asks a type for.
+        // Not "png": the last loader of an extension gets all files that are loaded without a type.
         &["raw", "r16"]
     }
 }
 
-/// Reads a file, but no further than one byte past the limit: the decoder then says what is wrong.
+/// Reads a file up to one byte past the limit; the decoder reports what is wrong.
 async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, std::io::Error> {
     use bevy::tasks::futures_lite::AsyncReadExt;
     let mut bytes = Vec::new();
@@ -94,12 +94,12 @@ async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<Vec<u8>, st
 pub struct HeightmapPlugin;
 
 impl Plugin for HeightmapPlugin {
-    // At once where that is possible: games may load a heightmap while they are built, in a `FromWorld` say.
+    // At once if possible: games may load a heightmap while plugins are built, for example in a `FromWorld`.
     fn build(&self, app: &mut App) {
         register(app);
     }
 
-    // Else once all plugins are there, in whatever order they were added.
+    // Otherwise once all plugins are there, in any order.
     fn finish(&self, app: &mut App) {
         register(app);
     }
@@ -109,11 +109,11 @@ impl Plugin for HeightmapPlugin {
 #[derive(Resource)]
 struct Registered;
 
-/// Does nothing without an asset server, or the second time.
+/// Does nothing without an asset server, or if called again.
 fn register(app: &mut App) {
     let world = app.world();
     if world.contains_resource::<AssetServer>() && !world.contains_resource::<Registered>() {
-        // A game may have told of the asset by itself.
+        // The game may have registered the asset itself.
         if !world.contains_resource::<Assets<HeightmapImage>>() {
             app.init_asset::<HeightmapImage>();
         }

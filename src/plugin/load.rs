@@ -1,4 +1,4 @@
-//! New terrains: all their meshes are made in a task, and shown in one frame when all of them are there.
+//! Loads new terrains: all surfaces are built in a task, and shown in one frame once all of them are there.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use super::{BurrowSettings, ChunkCreated, MaterialColors, SurfaceProcessors};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
 
-/// Meshes on their way to the frame in which they are shown, all made from one snapshot.
+/// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
@@ -27,22 +27,22 @@ pub(super) struct Loading {
 }
 
 impl Loading {
-    /// Are these meshes of this terrain, whatever the game did to it since?
+    /// Are these surfaces of this terrain, even if the game changed it since?
     fn is_of(&self, terrain: &Terrain) -> bool {
         self.world.version().is_same_world(terrain.world().version())
     }
 }
 
-/// A part whose mesh, if it has one, is with the renderer.
+/// A surface whose mesh, if it has one, was passed to the renderer.
 struct Loaded {
     mesh: Option<(Handle<Mesh>, Aabb)>,
     built: BuiltSurface,
 }
 
-/// Terrains that no task works for.
+/// Terrains without a task.
 type Idle = (Without<Loading>, Without<InFlight>);
 
-/// Keeps the entities of terrains as large as their voxels are, wherever games put them.
+/// Scales the entities of terrains to the size of their voxels.
 pub(super) fn scale_terrains(
     mut terrains: Query<(&Terrain, &mut Transform), Or<(Changed<Transform>, Changed<Terrain>)>>,
 ) {
@@ -58,9 +58,9 @@ fn scale(mut transform: Mut<Transform>, terrain: &Terrain) {
     }
 }
 
-/// A terrain that comes is scaled and placed at once: who asks about it in the frame that spawned it, in `Startup` say,
-/// finds it where it is. What was made for another terrain on its entity goes, unless it may be shown until the new one
-/// has loaded.
+/// Scales and places a new terrain at once, so that queries in the frame that spawned it, for example in `Startup`, find it
+/// in its place. Tasks of another terrain on its entity are dropped. The tiles and chunks of that terrain stay until the new
+/// one has loaded, unless they have another size.
 pub(super) fn prepare_new(
     new: On<Insert, Terrain>,
     mut commands: Commands,
@@ -80,8 +80,8 @@ pub(super) fn prepare_new(
     }
 }
 
-/// What is under way for a terrain whose entities are gone is for another one: whatever the game did in between, it must not
-/// wait for that.
+/// Drops tasks of terrains that have no entities: such a task belongs to a former terrain, and the new one must not wait
+/// for it.
 pub(super) fn drop_stray_tasks(
     mut commands: Commands,
     strays: Query<Entity, (With<Terrain>, With<InFlight>, Without<TerrainEntities>)>,
@@ -91,7 +91,7 @@ pub(super) fn drop_stray_tasks(
     }
 }
 
-/// The same for a terrain that the game put in place of another one without inserting it, by `mem::swap` say.
+/// Does the same for a terrain that replaced another one without an insertion, for example by `mem::swap`.
 pub(super) fn drop_replaced(
     mut commands: Commands,
     terrains: Query<
@@ -107,8 +107,7 @@ pub(super) fn drop_replaced(
     }
 }
 
-/// Takes tiles and chunks away that were made for voxels of another size: the new scale would draw them too large or too
-/// small.
+/// Despawns tiles and chunks that were built for voxels of another size: they would be drawn too large or too small.
 fn drop_resized(
     commands: &mut Commands,
     entity: Entity,
@@ -118,7 +117,7 @@ fn drop_resized(
 ) {
     if let Some(entities) = entities.filter(|entities| entities.voxel_size != terrain.voxel_size()) {
         entities.despawn(commands, children);
-        // A transaction under way was the other terrain's, and nothing is left that it could change.
+        // A running transaction belongs to the former terrain.
         commands.entity(entity).try_remove::<(TerrainEntities, InFlight)>();
     }
 }
@@ -135,8 +134,8 @@ pub(super) fn remove_with_terrain(
     commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight)>();
 }
 
-/// Starts the task of each terrain that is new, or whose world the game changed by itself: then only what that changed is
-/// made anew.
+/// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces are
+/// built.
 pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<(Entity, &mut Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
@@ -153,7 +152,7 @@ pub(super) fn start_loading(
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
         let unseen = entities.and_then(|entities| model.take_unseen(entities.shown));
-        // More than a frame may swap is loaded anew, piece by piece.
+        // If more has changed than a frame may swap, the terrain is loaded anew over several frames.
         if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
             let task = InFlight::unseen(counter.next(), model, unseen, builder);
             commands.entity(entity).try_insert(task);
@@ -170,7 +169,7 @@ pub(super) fn start_loading(
     }
 }
 
-/// Places terrains before anyone asks about them; Bevy itself does so only at the end of the frame, if at all.
+/// Updates the global transforms of terrains before they are queried; Bevy does so only at the end of the frame, if at all.
 pub(super) fn place_terrains(
     places: TransformHelper,
     mut terrains: Query<(Entity, &mut GlobalTransform), With<Terrain>>,
@@ -178,7 +177,9 @@ pub(super) fn place_terrains(
     for (entity, place) in &mut terrains {
         match places.compute_global_transform(entity) {
             Ok(now) => put(place, now),
-            Err(error) => warn_once!("the terrain {entity} is nowhere, and no brush reaches it: {error}"),
+            Err(error) => {
+                warn_once!("the terrain {entity} has no global transform, and no brush reaches it: {error}")
+            }
         }
     }
 }
@@ -188,8 +189,8 @@ fn put(mut place: Mut<GlobalTransform>, now: GlobalTransform) {
         *place = now;
         if !keeps_bits(&now) {
             warn_once!(
-                "a terrain is rotated, scaled by no power of two, or moved by a part of a voxel: hairline cracks may \
-                 show at its seams"
+                "a terrain is rotated, its scale is not a power of two, or its position is not in whole voxels: hairline \
+                 cracks may show at its seams"
             );
         }
     }
@@ -203,8 +204,8 @@ fn build_world(world: &World, builder: &SurfaceBuilder) -> Vec<BuiltSurface> {
     all.par_iter().map(|&drawn| builder.build(drawn, false, || world.draft(drawn))).collect()
 }
 
-/// Hands meshes to the renderer, a budget's worth per frame, and shows all of them once none waits; what was shown
-/// before goes in that frame.
+/// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and chunks
+/// are despawned in that frame.
 pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
@@ -232,7 +233,7 @@ pub(super) fn finish_loading(
             old.despawn(&mut commands, children);
         }
         let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
-        // What the game changed meanwhile is shown next.
+        // Changes that the game made meanwhile are shown next.
         if entities.show(terrain.world()) {
             entities.trigger_ready(&mut commands, entity);
         }
@@ -270,8 +271,8 @@ fn show(
     entities
 }
 
-/// Have seams the same bits on both sides there? They have as long as a terrain is not turned, its voxels are as large as
-/// a power of two, and it is moved by whole ones.
+/// Do both sides of seams keep the same bits there? They do if the terrain is not rotated, its scale is a power of two, and
+/// it is moved by whole voxels.
 fn keeps_bits(place: &GlobalTransform) -> bool {
     let (scale, rotation, translation) = place.to_scale_rotation_translation();
     scale == Vec3::splat(scale.x)

@@ -36,7 +36,7 @@ pub const ATTRIBUTE_GROUND_COVER: MeshVertexAttribute =
 /// A mesh ready to be swapped in, with its bounds; `None` where nothing is to be drawn.
 pub(crate) type BuiltMesh = Option<(Mesh, Aabb)>;
 
-/// What a mesh is made of beside its surface: colours, and the ground as it was before anyone dug.
+/// Builds Bevy meshes from surfaces, with the colours and the undug ground of a terrain.
 #[derive(Clone)]
 pub(crate) struct MeshBuilder {
     colors: MaterialColors,
@@ -44,7 +44,7 @@ pub(crate) struct MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// Without colours, meshes have none.
+    /// Without `colors`, meshes have no vertex colours.
     pub(crate) fn new(world: &World, colors: Option<&MaterialColors>) -> Self {
         let colors = colors.cloned().unwrap_or(MaterialColors(Vec::new()));
         Self { colors, ground: world.shared_ground() }
@@ -59,7 +59,7 @@ impl MeshBuilder {
         }
     }
 
-    /// The same of a surface that has all of its vertices.
+    /// Builds the mesh of a surface that has all of its vertices.
     pub(crate) fn build_whole(&self, origin: IVec3, surface: &SurfaceMesh) -> BuiltMesh {
         if surface.is_empty() {
             return None;
@@ -69,7 +69,7 @@ impl MeshBuilder {
         arrays.finish(&surface.indices)
     }
 
-    /// The same of a tile, straight from the ground: nothing but its rings and indices depends on what was dug.
+    /// Builds the mesh of a tile straight from the ground: only its rings and indices depend on digging.
     fn build_tile(&self, origin: IVec3, draft: &TileUpdate) -> BuiltMesh {
         if draft.indices().is_empty() {
             return None;
@@ -87,7 +87,7 @@ impl MeshBuilder {
     }
 }
 
-/// The attributes of a mesh in the making.
+/// The attributes of a mesh while it is built.
 struct Arrays<'a> {
     mesh_builder: &'a MeshBuilder,
     positions: Vec<[f32; 3]>,
@@ -96,9 +96,9 @@ struct Arrays<'a> {
     weights: Vec<[u8; 4]>,
     depths: Vec<f32>,
     covers: Vec<[u8; 4]>,
-    /// None where there are no colours to blend.
+    /// Empty if there are no colours to blend.
     colors: Vec<[f32; 4]>,
-    /// The materials last blended, and what came of them.
+    /// The materials that were blended last, and their colour.
     blended: (MaterialMix, [f32; 4]),
 }
 
@@ -140,7 +140,7 @@ impl<'a> Arrays<'a> {
             self.covers.push([Origin::own_cover(material) as u8, u8::MAX, 0, 0]);
             self.push_mix(MaterialMix::column(material));
         }
-        // They are the surface, and of its materials.
+        // They lie on the undug surface.
         self.depths.resize(self.positions.len(), 0.0);
     }
 
@@ -181,15 +181,15 @@ impl<'a> Arrays<'a> {
     }
 }
 
-/// Where a vertex lies in the ground as it was. A function of its place and materials alone, so both sides of a seam have
-/// the same bits.
+/// Where a vertex lies in the undug ground. It depends only on the position and materials of the vertex, so both sides of a
+/// seam get the same bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Origin {
     /// Voxels below the pristine surface; above it less than 0.
     depth: f32,
     /// How much the column's overlay covers.
     cover: u8,
-    /// 255 where the materials are the ground's own, 0 where somebody built or painted others.
+    /// 255 if the materials are the ground's own, 0 if others were built or painted.
     own: u8,
 }
 
@@ -220,7 +220,7 @@ impl Origin {
         Self { depth, cover: cover.clamp(0, 255) as u8, own: if own { 255 } else { 0 } }
     }
 
-    /// How much a column's overlay covers: nothing, where it is what lies below.
+    /// How much a column's overlay covers: nothing if it is the same as the base.
     fn own_cover(material: ColumnMaterial) -> i32 {
         i32::from(if material.base == material.overlay { 0 } else { material.blend })
     }
@@ -349,7 +349,7 @@ mod tests {
         }
     }
 
-    /// All that a Bevy mesh holds, as bytes.
+    /// All data of a Bevy mesh, as bytes.
     fn bytes_of(ready: BuiltMesh) -> Option<(Vec<Vec<u8>>, Option<Indices>, Aabb)> {
         let (mesh, bounds) = ready?;
         let attributes = mesh.attributes().map(|(_, values)| values.get_bytes().to_vec());
@@ -367,7 +367,7 @@ mod tests {
             let ground = Ground::from_noise(70, 60, &noise).unwrap().with_materials(&control).unwrap();
             let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
             let mut terrain = Terrain::new(ground, &settings).unwrap();
-            let dressers = [None, Some(&colors)].map(|colors| MeshBuilder::new(terrain.world(), colors));
+            let builders = [None, Some(&colors)].map(|colors| MeshBuilder::new(terrain.world(), colors));
             let mut compared = 0;
             for i in 0..9 {
                 let place = Vec3::new((i * 23 % 71) as f32, (i * 7 % 12) as f32, (i * 31 % 61) as f32);
@@ -375,9 +375,9 @@ mod tests {
                 let commit = terrain.begin().unwrap().run();
                 for (tile, update) in &commit.meshes.tiles {
                     let origin = terrain.world().origin(Drawn::Tile(*tile));
-                    for dresser in &dressers {
-                        let found = bytes_of(dresser.build(origin, &SurfaceDraft::Tile(update.clone())));
-                        assert!(found == bytes_of(dresser.build_whole(origin, &update.mesh())), "{tile:?}");
+                    for builder in &builders {
+                        let found = bytes_of(builder.build(origin, &SurfaceDraft::Tile(update.clone())));
+                        assert!(found == bytes_of(builder.build_whole(origin, &update.mesh())), "{tile:?}");
                         compared += usize::from(found.is_some());
                     }
                 }

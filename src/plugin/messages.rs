@@ -1,4 +1,4 @@
-//! Messages and entity events: brushes in, news out.
+//! Messages and entity events.
 
 use std::sync::Arc;
 
@@ -9,11 +9,10 @@ use super::meshes::MeshBuilder;
 use crate::brush::Brush;
 use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
 
-/// A brush in world space: every terrain that it reaches obeys it, hidden ones too.
+/// A brush in world space. It edits every terrain that it reaches, hidden ones too.
 ///
-/// On a terrain that a parent stretches, a brush's points, axes and heights are where the world has them. Its sizes (radii,
-/// half sides, amounts, falloff, roughness) are scaled by the cube root of what a volume is scaled by: counted in voxels, a
-/// ball stays a ball.
+/// If a parent stretches a terrain, the points, axes and heights of a brush are transformed exactly. Its sizes (radii, half
+/// sides, amounts, falloff, roughness) are scaled by the cube root of the change in volume: in voxels, a ball stays a ball.
 impl Message for Brush {}
 
 /// A brush in world space for one terrain alone.
@@ -21,27 +20,26 @@ impl Message for Brush {}
 pub struct TargetedBrush {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// What to do.
+    /// The brush.
     pub brush: Brush,
 }
 
-/// What became of a brush: one from each terrain that it reaches, whether that took it or refused it. Bounds count in
-/// voxels of the terrain.
+/// The result of a brush: one message for each terrain that it reaches, applied or rejected. Bounds are in voxels of the
+/// terrain.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct BrushApplied {
-    /// The terrain; `None` for a brush that reaches none, or whose place is no number.
+    /// The terrain; `None` for a brush that reaches none, or whose position is not a number.
     pub terrain: Option<Entity>,
     /// Scenario, volumes, bounds, or why it was rejected.
     pub receipt: Receipt,
 }
 
-/// A step back: the last stroke that changed the ground is undone, or where brushes are of no [stroke](Brush::stroke), what
-/// was sent in one frame. [`HistoryMoved`] says what came of it.
+/// Undoes the last [stroke](Brush::stroke) that changed the ground. Brushes without a stroke are undone by the frame in which
+/// they were sent. A [`HistoryMoved`] is sent when it is done.
 ///
-/// Steps are queued with brushes, in one order. Bevy keeps messages of one type in theirs, and none between types: those
-/// of one frame are taken as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. What is a step does not
-/// depend on when transactions run. Frames come as fast as a machine draws them: where steps must be the same on all, give
-/// brushes a stroke.
+/// Undo and redo are queued together with brushes. Bevy keeps the order of messages of one type only, so those of one frame
+/// are read as all [`Brush`]es, then [`TargetedBrush`]es, then `Undo`s, then [`Redo`]s. When transactions run makes no
+/// difference to what is undone together, but the frame rate does: give brushes a stroke if all machines must agree.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -61,49 +59,49 @@ pub struct Undo {
     pub terrain: Option<Entity>,
 }
 
-/// A step forth: what was undone last is done again. See [`Undo`].
+/// Does again what was undone last. See [`Undo`].
 #[derive(Message, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Redo {
     /// The terrain's entity; `None` for every terrain there is.
     pub terrain: Option<Entity>,
 }
 
-/// A step through a terrain's history was taken, in the frame in which its meshes are shown, or there was none to take.
-/// Each [`Undo`] and [`Redo`] gets one from each terrain that it is for.
+/// The result of an [`Undo`] or [`Redo`], sent in the frame in which its meshes are shown: one for each terrain that it is
+/// for.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct HistoryMoved {
-    /// The terrain; `None` where there is none at all.
+    /// The terrain; `None` if there is none at all.
     pub terrain: Option<Entity>,
-    /// Back or forth, and what it changed; bounds count in voxels of the terrain.
+    /// What was undone or redone, and what it changed; bounds are in voxels of the terrain.
     pub receipt: HistoryReceipt,
 }
 
-/// A brush cut a piece of ground off, on a terrain with [`LooseGround`](super::LooseGround). What was taken out of the
-/// ground is gone in the frame of this message. The brush's receipt lists its pieces as well.
+/// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or breaks
+/// off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well.
 #[derive(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceFound {
-    /// The terrain; below it the piece is at home, counted in voxels.
+    /// The terrain. Positions of the piece are in its space, in voxels.
     pub terrain: Entity,
     /// The brush's tag.
     pub tag: u64,
-    /// Its bounds, voxels, materials and, where it broke off, its surface.
+    /// Its bounds, voxels, materials and, if it broke off, its surface.
     pub piece: LoosePiece,
-    /// Its mesh, where there are meshes: made in the transaction's task.
-    pub(super) ready: Option<Arc<Mesh>>,
+    /// Its mesh, built in the transaction's task; `None` if there are no meshes.
+    pub(super) mesh: Option<Arc<Mesh>>,
 }
 
 impl LoosePieceFound {
-    /// Where the piece's mesh counts from, in voxels of the terrain: the translation of an entity below it that shows it.
+    /// The origin of the piece's mesh in voxels of the terrain: the translation for a child of the terrain that shows it.
     pub fn origin(&self) -> Vec3 {
         self.piece.bounds.min.as_vec3()
     }
 
-    /// The piece as a mesh like those of chunks, for any material that they can have; `None` unless it broke off. It wants
-    /// the terrain, which knows how deep in the ground the piece was. With a [`GroundPiece`](super::GroundPiece) it is drawn
-    /// as the terrain is; its colours are those of when the brush began to work.
+    /// The piece as a mesh with the attributes of a chunk's, for the same materials; `None` unless it broke off. The terrain
+    /// is needed for the depth of the piece in the ground. With a [`GroundPiece`](super::GroundPiece) it is drawn like the
+    /// terrain. Its colours are those from the start of the transaction.
     pub fn mesh(&self, terrain: &Terrain, colors: &MaterialColors) -> Option<Mesh> {
-        if let Some(ready) = &self.ready {
-            return Some(Mesh::clone(ready));
+        if let Some(mesh) = &self.mesh {
+            return Some(Mesh::clone(mesh));
         }
         self.build(&MeshBuilder::new(terrain.world(), Some(colors)))
     }
@@ -113,9 +111,9 @@ impl LoosePieceFound {
         mesh_builder.build_whole(self.piece.bounds.min, surface).map(|(mesh, _)| mesh)
     }
 
-    /// Makes its mesh, in the task.
+    /// Builds its mesh in the task.
     pub(super) fn build_mesh(&mut self, mesh_builder: &MeshBuilder) {
-        self.ready = self.build(mesh_builder).map(Arc::new);
+        self.mesh = self.build(mesh_builder).map(Arc::new);
     }
 }
 
@@ -134,7 +132,7 @@ pub struct TerrainReady {
     pub entity: Entity,
 }
 
-/// A chunk got its entity.
+/// The entity of a chunk was spawned.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChunkCreated {
     /// The chunk's entity.
@@ -148,7 +146,7 @@ pub struct ChunkChanged {
     pub entity: Entity,
 }
 
-/// A field got its entity.
+/// The entity of a field was spawned.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldCreated {
     /// The field's entity.
@@ -162,11 +160,11 @@ pub struct FieldChanged {
     pub entity: Entity,
 }
 
-/// A field went into another one; its entity is despawned right after this.
+/// A field was merged into another one; its entity is despawned right after this event.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FieldMerged {
-    /// The entity of the field that is gone.
+    /// The entity of the field that was merged.
     pub entity: Entity,
-    /// The entity of the field that holds its data now.
+    /// The entity of the field that has its data now.
     pub into: Entity,
 }

@@ -1,23 +1,22 @@
-//! The Bevy plugin: brushes in, meshes and receipts out.
+//! The Bevy plugin: turns brush messages into meshes and receipts.
 //!
 //! Put a [`Terrain`] on an entity. The plugin spawns one child for each [`Tile`], and one for each [`Chunk`] that digging
 //! touches, with a [`Field`] below it for each region of edits. [`Brush`] messages, in world space, become transactions
-//! that run on threads of the plugin's own; a finished one is committed in a single frame:
-//! meshes, entities, [`BrushApplied`] receipts and entity events. Without an `Assets<Mesh>`, on a server with
-//! `MinimalPlugins`, all of that happens but the meshes.
+//! that run on the plugin's own threads; a finished one is committed in a single frame:
+//! meshes, entities, [`BrushApplied`] receipts and entity events. A server with `MinimalPlugins` has no `Assets<Mesh>`: it
+//! gets everything but the meshes.
 //!
-//! [`Undo`] and [`Redo`] messages go back and forth by whole strokes, and [`HistoryMoved`] tells when.
-//! On [`LooseGround`], [`LoosePieceFound`] tells what a brush cut off.
+//! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
+//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off.
 //!
-//! What a game puts on the terrain's entity goes for its tiles, chunks and pieces: a `MeshMaterial3d`, [`RenderLayers`], and,
-//! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. Bevy asks each mesh for its own, so new tiles,
-//! chunks and [`GroundPiece`]s get the terrain's, and follow as it is put on, changed and taken off. A piece that comes with
-//! its own, of the same type, keeps that until the terrain's changes.
+//! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`], and,
+//! with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is inserted, changed
+//! or removed. An entity that is spawned with its own, of the same type, keeps it until the terrain's changes.
 //!
 //! [`RenderLayers`]: bevy::camera::visibility::RenderLayers
 //!
-//! Games and other parts of this crate make more from the same surfaces, in the same task, and show it in the same
-//! commit: see [`SurfaceProcessor`].
+//! A [`SurfaceProcessor`] builds extra data for each surface off-thread, and swaps it in with the mesh. Figures are in
+//! [`BurrowFigures`], and in Bevy's [`diagnostics`]; transactions, edits, meshes, commits and loads have tracing spans.
 
 mod collect;
 mod commit;
@@ -39,7 +38,7 @@ mod task;
 mod threads;
 mod times;
 
-pub use components::{Chunk, Field, GroundPiece, MaterialColors, ShownSurface, Tile};
+pub use components::{Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};
 pub use figures::BurrowFigures;
@@ -55,7 +54,7 @@ pub use messages::{
 };
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 #[cfg(feature = "render")]
-pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_from_pieces};
+pub(crate) use propagate::{Inherited, propagate_to_ground, propagate_with_pieces, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 pub(crate) use threads::free_later;
@@ -72,15 +71,15 @@ use crate::terrain::Terrain;
 
 /// Everything a game needs. Parts can be disabled, as in any plugin group.
 ///
-/// They come after Bevy's own, `add_plugins((DefaultPlugins, BurrowPlugins))`: the other way round no terrain with a
-/// `GroundLook` is drawn, and an error says so.
+/// Add them after Bevy's own, `add_plugins((DefaultPlugins, BurrowPlugins))`: otherwise no terrain with a `GroundLook` is
+/// drawn, and an error is logged.
 ///
 /// | plugin | what it does |
 /// | --- | --- |
 /// | [`TerrainPlugin`] | transactions, entities, messages |
 /// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
-/// | `TerrainMaterialPlugin<StandardMaterial>` | dresses tiles, chunks and pieces (feature `render`) |
-/// | `GroundPlugin` | layers of texture for terrains with a `GroundLook` (feature `render`) |
+/// | `TerrainMaterialPlugin<StandardMaterial>` | propagates materials to tiles, chunks and pieces (feature `render`) |
+/// | `GroundPlugin` | texture layers for terrains with a `GroundLook` (feature `render`) |
 #[derive(Default)]
 pub struct BurrowPlugins;
 
@@ -98,15 +97,15 @@ impl PluginGroup for BurrowPlugins {
 /// What the plugin does each frame in `Update`, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BurrowSystems {
-    /// New terrains are prepared; their tiles appear, all at once, when all are meshed.
+    /// New terrains are loaded; their tiles appear all at once when all meshes are built.
     Load,
-    /// Brush, undo and redo messages are checked and queued. Send them before, to have them in this frame's transaction.
+    /// Brush, undo and redo messages are checked and queued. Send them before this set to have them in this frame's transaction.
     Collect,
-    /// Transactions that are done are committed: meshes, entities, receipts, events.
+    /// Finished transactions are committed: meshes, entities, receipts, events.
     Commit,
     /// Queued brushes start as transactions.
     Begin,
-    /// New tiles, chunks and pieces get their terrain's material, layers and shadows.
+    /// Tiles, chunks and pieces inherit their terrain's material, layers and shadows.
     Propagate,
 }
 

@@ -1,12 +1,14 @@
 //! Propagates components from a terrain to its tiles, chunks and pieces: Bevy reads material, layers and shadows from the
 //! entity of each mesh, not from the terrain's.
 //!
-//! Bevy's `HierarchyPropagatePlugin` does not fit: it would also change what a game puts below a terrain, and it would miss
-//! pieces that are elsewhere in the hierarchy.
+//! Bevy's `HierarchyPropagatePlugin` does not fit: games would have to wrap each component in a `Propagate`, and a piece that
+//! is spawned with its own component would lose it.
 
 use std::marker::PhantomData;
 
 use bevy::camera::visibility::RenderLayers;
+use bevy::ecs::query::QueryFilter;
+use bevy::ecs::relationship::Relationship;
 #[cfg(feature = "render")]
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::prelude::*;
@@ -24,7 +26,7 @@ pub(super) fn add(app: &mut App) {
     }
 }
 
-/// Marks a piece whose component of this type comes from its terrain.
+/// Marks an entity whose component of this type comes from its terrain.
 #[derive(Component)]
 pub(crate) struct Inherited<C: Component>(PhantomData<fn() -> C>);
 
@@ -37,88 +39,59 @@ impl<C: Component> Default for Inherited<C> {
 /// Propagates a component of a terrain to its tiles, chunks and pieces.
 pub(crate) fn propagate_with_pieces<C: Component + Clone>(app: &mut App) {
     propagate_to_ground::<C>(app);
-    app.add_systems(
-        Update,
-        (remove_from_pieces::<C>, insert_on_pieces::<C>).chain().in_set(BurrowSystems::Propagate),
-    );
+    propagate::<C, GroundPiece, ()>(app);
 }
 
-/// Propagates a component of a terrain to its tiles and chunks when it is inserted, changed or removed.
+/// Propagates a component of a terrain to its tiles and chunks.
 pub(crate) fn propagate_to_ground<C: Component + Clone>(app: &mut App) {
+    propagate::<C, ChildOf, Or<(With<Tile>, With<Chunk>)>>(app);
+}
+
+/// Propagates a component of a terrain along a relationship when it is inserted, changed or removed.
+fn propagate<C: Component + Clone, R: Relationship, F: QueryFilter + 'static>(app: &mut App) {
     app.add_systems(
         Update,
-        (remove::<C>, insert_on_new::<C>, insert_on_all::<C>).chain().in_set(BurrowSystems::Propagate),
+        (remove_inherited::<C, R>, insert_on_new::<C, R, F>, insert_changed::<C, R, F>)
+            .chain()
+            .in_set(BurrowSystems::Propagate),
     );
 }
 
-/// A tile or chunk.
-type Drawn = Or<(With<Tile>, With<Chunk>)>;
-
-/// A tile or chunk that was just spawned.
-type New = (Drawn, Or<(Added<Tile>, Added<Chunk>)>);
-
-fn remove<C: Component>(
+/// Removes a component from the entities that inherited it once their terrain no longer has it.
+pub(crate) fn remove_inherited<C: Component, R: Relationship>(
     mut commands: Commands,
     mut removed: RemovedComponents<C>,
-    terrains: Query<&Children, (With<Terrain>, Without<C>)>,
-    drawn: Query<(), Drawn>,
+    terrains: Query<&R::RelationshipTarget, (With<Terrain>, Without<C>)>,
+    inherited: Query<(), With<Inherited<C>>>,
 ) {
-    for children in removed.read().filter_map(|entity| terrains.get(entity).ok()) {
-        for child in children.iter().filter(|&child| drawn.contains(child)) {
-            commands.entity(child).try_remove::<C>();
+    for sources in removed.read().filter_map(|entity| terrains.get(entity).ok()) {
+        for entity in sources.iter().filter(|&entity| inherited.contains(entity)) {
+            commands.entity(entity).try_remove::<(C, Inherited<C>)>();
         }
     }
 }
 
-fn insert_on_new<C: Component + Clone>(
+/// An entity that is spawned with its own component keeps it until the terrain's changes.
+fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
     mut commands: Commands,
-    new: Query<(Entity, &ChildOf), New>,
+    new: Query<(Entity, &R), (F, Added<R>, Without<C>)>,
     terrains: Query<&C, With<Terrain>>,
 ) {
-    for (entity, parent) in &new {
-        if let Ok(own) = terrains.get(parent.parent()) {
-            commands.entity(entity).try_insert(own.clone());
+    for (entity, link) in &new {
+        if let Ok(component) = terrains.get(link.get()) {
+            commands.entity(entity).try_insert((component.clone(), Inherited::<C>::default()));
         }
     }
 }
 
-fn insert_on_all<C: Component + Clone>(
+fn insert_changed<C: Component + Clone, R: Relationship, F: QueryFilter>(
     mut commands: Commands,
-    terrains: Query<(&C, &Children), (With<Terrain>, Changed<C>)>,
-    drawn: Query<(), Drawn>,
+    terrains: Query<(&C, &R::RelationshipTarget), (With<Terrain>, Changed<C>)>,
+    links: Query<Ref<R>, F>,
 ) {
-    for (own, children) in &terrains {
-        for child in children.iter().filter(|&child| drawn.contains(child)) {
-            commands.entity(child).try_insert(own.clone());
-        }
-    }
-}
-
-/// Removes a component from the pieces that inherited it once their terrain no longer has it.
-pub(crate) fn remove_from_pieces<C: Component>(
-    mut commands: Commands,
-    mut removed: RemovedComponents<C>,
-    bare: Query<(), (With<Terrain>, Without<C>)>,
-    pieces: Query<(Entity, &GroundPiece), With<Inherited<C>>>,
-) {
-    for terrain in removed.read().filter(|&entity| bare.contains(entity)) {
-        for (piece, _) in pieces.iter().filter(|(_, piece)| piece.terrain == terrain) {
-            commands.entity(piece).try_remove::<(C, Inherited<C>)>();
-        }
-    }
-}
-
-/// A piece that is spawned with its own component keeps it until the terrain's changes.
-fn insert_on_pieces<C: Component + Clone>(
-    mut commands: Commands,
-    pieces: Query<(Entity, Ref<GroundPiece>, Has<C>)>,
-    terrains: Query<Ref<C>, With<Terrain>>,
-) {
-    for (entity, piece, has_own) in &pieces {
-        let Ok(own) = terrains.get(piece.terrain) else { continue };
-        let is_due = if piece.is_added() { !has_own } else { own.is_changed() };
-        if is_due {
-            commands.entity(entity).try_insert((C::clone(&own), Inherited::<C>::default()));
+    for (component, sources) in &terrains {
+        for entity in sources.iter().filter(|&entity| links.get(entity).is_ok_and(|link| !link.is_added())) {
+            commands.entity(entity).try_insert((component.clone(), Inherited::<C>::default()));
         }
     }
 }

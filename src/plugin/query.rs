@@ -1,4 +1,4 @@
-//! Questions about the ground in world space, over all terrains.
+//! Queries about the ground in world space, over all terrains.
 
 use bevy::ecs::system::SystemParam;
 use bevy::math::Affine3A;
@@ -9,10 +9,10 @@ use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
 use crate::terrain::{Span, Terrain};
 
-/// A system parameter that asks all terrains about the ground, in world space, hidden ones too.
+/// A system parameter for queries about the ground of all terrains in world space, hidden ones too.
 ///
 /// Terrains may be moved, rotated and evenly scaled; for [`height`](Self::height) and [`spans`](Self::spans) they must
-/// not be rotated. A terrain is asked where it was when it was inserted, or at the start of this frame's
+/// not be rotated. The place of a terrain is the one at its insertion or at the start of this frame's
 /// [`BurrowSystems::Load`](super::BurrowSystems::Load), whichever came last.
 ///
 /// ```
@@ -50,8 +50,8 @@ pub struct TerrainHit {
 }
 
 impl Terrains<'_, '_> {
-    /// The first ground that a ray meets within `max_distance` metres. Bevy's mesh picking passes through ground, whose
-    /// meshes live in the render world only: pick it with this.
+    /// The first ground that a ray meets within `max_distance` metres. Bevy's mesh picking does not hit
+    /// the ground, because its meshes are in the render world only: use this instead.
     pub fn raycast(&self, ray: Ray3d, max_distance: f32) -> Option<TerrainHit> {
         let hits = self.terrains.iter().filter_map(|(entity, terrain, place, _)| {
             let affine = place.affine();
@@ -74,13 +74,13 @@ impl Terrains<'_, '_> {
         hits.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.terrain.cmp(&b.terrain)))
     }
 
-    /// The topmost ground over (x, z), of all terrains there; `None` where none is.
+    /// The topmost ground over (x, z), of all terrains there; `None` if there is none.
     pub fn height(&self, x: f32, z: f32) -> Option<f32> {
         self.spans(x, z).last().map(|span| span.floor as f32)
     }
 
-    /// The stretches of air over (x, z), lowest first, in metres. Where terrains overlap, those of the one whose ground is
-    /// topmost there, and of two at one height always those of the same one.
+    /// The stretches of air over (x, z), lowest first, in metres. Where terrains overlap, the one with
+    /// the topmost ground counts; of two at one height it is always the same one.
     pub fn spans(&self, x: f32, z: f32) -> Vec<Span> {
         let over = self.terrains.iter().filter_map(|(entity, terrain, place, _)| {
             let (origin, scale) = (place.translation().as_dvec3(), f64::from(place.scale().x));
@@ -97,23 +97,23 @@ impl Terrains<'_, '_> {
         highest.map(|(_, _, spans)| spans).unwrap_or_default()
     }
 
-    /// The unit normal of the surface that is nearest to `place` along the y of its terrain; `None` where no terrain is.
+    /// The unit normal of the surface that is nearest to `place` along the y of its terrain; `None` if there is no terrain.
     pub fn normal(&self, place: Vec3) -> Option<Vec3> {
         let (terrain, affine) = self.nearest(place)?;
         let normal = terrain.world().normal(affine.inverse().transform_point3(place).as_dvec3())?;
         Some(affine.transform_vector3(normal).normalize_or_zero())
     }
 
-    /// What the ground is made of at a place on or in it; `None` where no terrain is. Where terrains overlap, the one
-    /// answers whose surface is nearest along its y.
+    /// What the ground is made of at a place on or in it; `None` if there is no terrain. Where terrains overlap, the one
+    /// whose surface is nearest along its y counts.
     pub fn material(&self, place: Vec3) -> Option<MaterialId> {
         let (terrain, affine) = self.nearest(place)?;
         let local = affine.inverse().transform_point3(place).as_dvec3();
         terrain.world().height(local.x, local.z).map(|_| terrain.world().material_under(local))
     }
 
-    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one. Where there
-    /// is only one terrain that is it, whether it is there or not.
+    /// The terrain whose surface is nearest to a place along its y; of two at one distance always the same one. If there is
+    /// only one terrain, it is returned even if it does not reach there.
     fn nearest(&self, place: Vec3) -> Option<(&Terrain, Affine3A)> {
         if let Ok((_, terrain, at, _)) = self.terrains.single() {
             return Some((terrain, at.affine()));
@@ -137,15 +137,15 @@ impl Terrains<'_, '_> {
         })
     }
 
-    /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there? Not while
-    /// there is no terrain at all, nor with a corner that is no number. Infinite corners stand for everywhere.
+    /// Is all ground between two corners shown as it is, with no terrain loading and no edit on its way there? False
+    /// if there is no terrain at all, or a corner is not a number. Infinite corners stand for everywhere.
     ///
-    /// Shown is not painted: see [`TerrainReady`](super::TerrainReady).
+    /// A terrain that is shown may not be drawn yet: see [`TerrainReady`](super::TerrainReady).
     pub fn is_ready(&self, min: Vec3, max: Vec3) -> bool {
         if self.terrains.is_empty() || min.is_nan() || max.is_nan() {
             return false;
         }
-        // Farther than any terrain reaches; infinite numbers can't be turned.
+        // Farther than any terrain reaches; infinite numbers cannot be rotated.
         let far = Vec3::splat(1.0e9);
         let (min, max) = (min.clamp(-far, far), max.clamp(-far, far));
         self.terrains.iter().all(|(_, terrain, place, entities)| {

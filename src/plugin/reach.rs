@@ -1,11 +1,11 @@
-//! Which worlds a brush reaches: even one that is too large, too small or else not valid there.
+//! Whether a brush reaches a world, even if it is not valid there.
 
 use bevy::prelude::*;
 
 use crate::brush::{BAND, Extent, Shape};
 use crate::lattice::{ChunkGrid, ONE};
 
-/// Does a shape, in voxels, come near to a world's columns? `None` where its place is no number.
+/// Does a shape, in voxels, come near to a world's columns? `None` if its position is not a number.
 pub(super) fn reaches(shape: &Shape, grid: ChunkGrid) -> Option<bool> {
     let (low, high) = bounds(shape)?;
     let (world, band) = (grid.edit_bounds(), (BAND / ONE) as f32);
@@ -13,7 +13,7 @@ pub(super) fn reaches(shape: &Shape, grid: ChunkGrid) -> Option<bool> {
     Some(low.cmple(max).all() && min.cmple(high).all())
 }
 
-/// A box around a shape, wider than need be where that is round. Sizes that are none count as 0.
+/// A box around a shape, larger than necessary for round shapes. Invalid sizes count as 0.
 fn bounds(shape: &Shape) -> Option<(Vec3, Vec3)> {
     let Extent { ends: [from, to], around } = shape.extent();
     if from.is_nan() || to.is_nan() {

@@ -6,7 +6,7 @@ use crate::backend::{Backend, Engine};
 use crate::terrain::LooseSettings;
 
 /// What terrains without an engine of their own run their transactions on. [`Backend::Auto`] unless the game inserts
-/// another one, best before the plugins; [`Engine::state`] and [`Engine::figures`] tell what it does.
+/// another one, best before the plugins; [`Engine::state`] and [`Engine::figures`] show what it does.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -27,10 +27,9 @@ impl Default for BurrowEngine {
 #[derive(Resource, Reflect, Clone, Debug, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct BurrowSettings {
-    /// Meshes swapped per frame. A commit is never cut: one that is larger goes in whole, and others wait for the next
-    /// frame.
+    /// Meshes swapped per frame. A commit is never split: a larger one is shown whole, and others wait for the next frame.
     pub swaps_per_frame: usize,
-    /// Meshes of tiles and chunks handed to the renderer per frame while a terrain loads. They show only when all are there.
+    /// Meshes of tiles and chunks passed to the renderer per frame while a terrain loads. They are shown once all are there.
     pub loads_per_frame: usize,
 }
 
@@ -40,17 +39,16 @@ impl Default for BurrowSettings {
     }
 }
 
-/// Put on a terrain's entity, brushes look for pieces of ground that they cut off, and [`LoosePieceFound`] tells of each;
-/// take it off, and they stop. What a game [applies](crate::terrain::Terrain::apply) by itself looks for them too; its
-/// receipts list them, no message tells of them, and none falls as debris. A terrain
-/// that is not spawned yet knows nothing of this: before a journal is replayed on it,
-/// `terrain.set_loose(Some(loose.into()))` has to tell it.
+/// Makes brushes look for pieces of ground that they cut off: insert it on a terrain's entity, and a [`LoosePieceFound`] is
+/// sent for each piece. Brushes that a game [applies](crate::terrain::Terrain::apply) itself look for pieces too, but these
+/// are only listed in the receipts: no message is sent, and none falls as debris. A terrain that is not spawned yet does not
+/// have this component: call `terrain.set_loose(Some(loose.into()))` before you replay a journal on it.
 ///
 /// ```
 /// # use bevy::prelude::*;
 /// # use bevy_burrow::prelude::*;
 /// # fn system(mut commands: Commands, terrain: Terrain) {
-/// // Crumbs vanish, larger pieces break off, and what has more than 4096 voxels hangs on.
+/// // Crumbs vanish, larger pieces break off, and pieces of more than 4096 voxels stay.
 /// commands.spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
 /// # }
 /// ```
@@ -59,16 +57,16 @@ impl Default for BurrowSettings {
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct LooseGround {
-    /// The largest piece to look for, in voxels; whatever is larger counts as tied. Bounds the time of a search.
+    /// The largest piece to look for, in voxels; larger pieces count as connected. It limits the time of a search.
     pub largest: u32,
-    /// Pieces up to so many voxels vanish.
+    /// Pieces up to this many voxels vanish.
     pub crumbs: u32,
-    /// Larger ones, up to so many voxels, are taken out of the ground and come with a closed mesh. Others stay.
+    /// Larger pieces up to this many voxels are removed from the ground and come with a closed mesh. Others stay.
     pub debris: u32,
 }
 
 impl Default for LooseGround {
-    /// Pieces are told of, and stay.
+    /// Pieces are reported, and stay.
     fn default() -> Self {
         let LooseSettings { largest, crumbs, debris } = LooseSettings::default();
         Self { largest, crumbs, debris }

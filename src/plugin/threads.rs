@@ -1,11 +1,10 @@
-//! Threads for what takes its time: transactions, and whatever may take longer.
+//! Threads for long work: transactions, and background work that may take longer.
 //!
-//! Bevy's task pools are shared: `AsyncComputeTaskPool` compiles pipelines and has one thread on four cores, so synchronous
-//! work of seconds would keep others waiting there, and rayon's own pool is the game's. What is done here nobody else waits
-//! for. There are two pools, so that a world that loads does not keep the transactions of another one waiting; their threads
-//! sleep unless there is work.
+//! Bevy's task pools are shared: `AsyncComputeTaskPool` compiles pipelines and has one thread on four cores, so work
+//! of seconds would block other users, and rayon's global pool belongs to the game. There are two pools, so that a world that
+//! loads does not delay the transactions of another one. Their threads sleep while there is no work.
 //!
-//! Where there are no threads, work is done at once.
+//! On platforms without threads, work is done at once.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -15,16 +14,16 @@ use std::thread;
 use bevy::platform::cell::SyncCell;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Whose work it is.
+/// A pool of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Threads {
-    /// Of transactions, which somebody waits for.
+    /// For transactions, which players wait for.
     Transactions,
-    /// Of whatever may take longer: loads, colliders, textures, memory that is freed.
+    /// For everything that may take longer: loads, colliders, textures, freeing memory.
     Background,
 }
 
-/// Bytes of a thread's stack: who waits within one piece of work may do another one meanwhile, on top of it.
+/// Bytes of a thread's stack. A thread that waits inside one job may run another one on top of it.
 const STACK: usize = 8 << 20;
 
 impl Threads {
@@ -46,7 +45,7 @@ impl Threads {
         pool.get_or_init(build).as_ref()
     }
 
-    /// Does something there.
+    /// Runs work on this pool.
     pub fn spawn(self, work: impl FnOnce() + Send + 'static) {
         match self.pool() {
             Some(pool) => pool.spawn_fifo(work),
@@ -55,38 +54,38 @@ impl Threads {
     }
 }
 
-/// Frees on another thread what takes its time to free.
+/// Drops a large value on another thread.
 pub(crate) fn free_later(waste: impl Send + 'static) {
     Threads::Background.spawn(move || drop(waste));
 }
 
-/// Work on such a thread. If it has not begun when this is dropped, it never does; else its result is dropped.
+/// Work on one of these pools. Dropping this cancels work that has not begun; otherwise its result is dropped.
 pub(crate) struct ThreadTask<T: Send + 'static> {
     result: SyncCell<Receiver<thread::Result<T>>>,
     _wanted: Arc<()>,
 }
 
 impl<T: Send + 'static> ThreadTask<T> {
-    /// Starts it.
+    /// Starts work.
     pub fn start(threads: Threads, work: impl FnOnce() -> T + Send + 'static) -> Self {
         let (sender, receiver) = sync_channel(1);
         let wanted = Arc::new(());
         let is_wanted = Arc::downgrade(&wanted);
         threads.spawn(move || {
             if is_wanted.strong_count() > 0 {
-                // Whoever waits hears of a panic; if nobody does, the result goes.
+                // A panic is passed on. An error means that nobody waits any more.
                 let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
             }
         });
         Self { result: SyncCell::new(receiver), _wanted: wanted }
     }
 
-    /// The result, once, if it is there: that the work panicked is one, too.
+    /// The result once it is there, or the panic of the work; only the first call returns it.
     pub fn check(&mut self) -> Option<thread::Result<T>> {
         self.result.get().try_recv().ok()
     }
 
-    /// The same; panics as the work did.
+    /// The result once it is there; resumes the panic if the work panicked.
     pub fn finish(&mut self) -> Option<T> {
         self.check().map(|result| result.unwrap_or_else(|panic| resume_unwind(panic)))
     }
@@ -116,17 +115,17 @@ mod tests {
     }
 
     /// Keeps the threads of the background busy until what it returns is dropped.
-    fn hold_background() -> impl Sized {
+    fn block_background() -> impl Sized {
         let many = Threads::Background.pool().map_or(0, ThreadPool::current_num_threads);
         let (mut gate, (begun, begins)) = (Vec::new(), channel());
         for _ in 0..many {
-            let (hold, held) = channel::<()>();
-            gate.push(hold);
+            let (sender, receiver) = channel::<()>();
+            gate.push(sender);
             let begun = begun.clone();
             Threads::Background.spawn(move || {
                 begun.send(()).expect("somebody waits for it");
-                // An error: what was held on to is gone.
-                let _ = held.recv();
+                // Returns an error once the gate is dropped.
+                let _ = receiver.recv();
             });
         }
         (0..many).for_each(|_| begins.recv().expect("it begins"));
@@ -135,11 +134,11 @@ mod tests {
 
     #[test]
     fn transactions_do_not_wait_for_loads() {
-        let held = hold_background();
+        let gate = block_background();
         let mut load = ThreadTask::start(Threads::Background, || 2);
         assert_eq!(wait(&mut ThreadTask::start(Threads::Transactions, || 3)).unwrap(), 3);
         assert!(load.check().is_none());
-        drop(held);
+        drop(gate);
         assert_eq!(wait(&mut load).unwrap(), 2);
     }
 
@@ -153,10 +152,10 @@ mod tests {
         app.update();
         let world = Arc::downgrade(&app.world().get::<Terrain>(terrain).unwrap().snapshot());
         assert_eq!(world.strong_count(), 1);
-        let held = hold_background();
+        let gate = block_background();
         app.world_mut().despawn(terrain);
         assert_eq!(world.strong_count(), 1, "freed on the main thread");
-        drop(held);
+        drop(gate);
         let start = Instant::now();
         while world.strong_count() > 0 {
             assert!(start.elapsed() < Duration::from_secs(60), "it is never freed");
@@ -166,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_a_result() {
-        let mut work = ThreadTask::start(Threads::Transactions, || -> u32 { panic!("as it was told") });
+        let mut work = ThreadTask::start(Threads::Transactions, || -> u32 { panic!("on purpose") });
         assert!(wait(&mut work).is_err());
         assert!(work.check().is_none());
     }

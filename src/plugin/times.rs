@@ -1,14 +1,14 @@
-//! The latest times of something, for percentiles.
+//! The latest durations of repeated work, for percentiles.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use bevy::prelude::*;
 
-/// How many times are kept.
+/// How many durations are kept.
 const KEPT: usize = 256;
 
-/// How long something took, the latest 256 times.
+/// The latest 256 durations of repeated work.
 #[derive(Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Default)]
 pub struct Times {
@@ -16,7 +16,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Takes in one more; the oldest one goes when there are too many.
+    /// Adds a duration; the oldest is dropped when there are too many.
     pub fn push(&mut self, took: Duration) {
         if self.latest.len() == KEPT {
             self.latest.pop_front();
@@ -24,7 +24,7 @@ impl Times {
         self.latest.push_back(took);
     }
 
-    /// Every time that is kept, the oldest first.
+    /// All durations that are kept, the oldest first.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Duration> {
         self.latest.iter().copied()
     }
@@ -34,13 +34,13 @@ impl Times {
         self.latest.len()
     }
 
-    /// Was nothing taken in yet?
+    /// Was nothing measured yet?
     pub fn is_empty(&self) -> bool {
         self.latest.is_empty()
     }
 
-    /// The least of the kept times that so many percent of them do not exceed; `None` where none is kept. Percentages over
-    /// 100 count as 100.
+    /// The duration that this percentage of the kept ones does not exceed; `None` if none is kept. Percentages over 100
+    /// count as 100.
     ///
     /// ```
     /// # use bevy_burrow::plugin::Times;

@@ -37,7 +37,7 @@ use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, propagate_to_ground, remove_from_pieces};
+use crate::plugin::{BurrowSystems, GroundPiece, propagate_to_ground, remove_inherited};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -76,7 +76,7 @@ fn keep_materials(app: &mut App) {
         Update,
         (
             (dress, undress).chain().after(BurrowSystems::Begin).before(BurrowSystems::Propagate),
-            (remove_from_pieces::<MeshMaterial3d<GroundMaterial>>, pieces::dress)
+            (remove_inherited::<MeshMaterial3d<GroundMaterial>, GroundPiece>, pieces::dress)
                 .chain()
                 .in_set(BurrowSystems::Propagate),
         ),
