@@ -259,7 +259,7 @@ fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
     };
     refused(&edits, &[], "heights.png: No such file");
     desk.put("heights.png", "no image at all");
-    refused(&edits, &[], "heights.png: the file is no PNG");
+    refused(&edits, &[], "heights.png: the image cannot be decoded");
     desk.put_image(&[1, 2, 3], 3);
     refused(&edits, &[], "spans no cell");
     image::save_buffer(desk.path("heights.png"), &[0; 12], 2, 2, image::ExtendedColorType::Rgb8)

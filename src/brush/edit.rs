@@ -8,7 +8,7 @@ use super::quantized_operation::QuantizedOperation;
 use super::roughness::QuantizedRoughness;
 use super::sculpt_kernel::SculptKernel;
 use super::shapes::QuantizedShape;
-use super::{BAND, Blend, Brush, BrushError, Evaluator, Kind, Operation, Roughness, Shape};
+use super::{BAND, Blend, Brush, BrushError, Evaluator, FULL_POWER, Kind, Operation, Roughness, Shape};
 use crate::lattice::{LatticeBox, ONE};
 
 /// A brush in integers: the same edit changes the same samples to the same bits on every machine.
@@ -45,11 +45,18 @@ pub struct Edit {
 struct Unchecked {
     shape: QuantizedShape,
     operation: QuantizedOperation,
+    #[serde(default)]
     blend: Option<QuantizedBlend>,
+    #[serde(default = "full_power")]
     power: u8,
     roughness: Option<QuantizedRoughness>,
     tag: u64,
+    #[serde(default)]
     stroke: Option<u64>,
+}
+
+fn full_power() -> u8 {
+    FULL_POWER
 }
 
 impl Edit {

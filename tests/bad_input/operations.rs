@@ -63,30 +63,28 @@ proptest! {
         stroke in prop::option::of(any::<u64>()),
     ) {
         let [a, b, c, d, e, f, g, h] = numbers;
-        let fade = if is_faded { [256, 1024] } else { [g, h] };
-        let fade = format!(r#""fade":{{"strength":{},"falloff":{},"material":null}}"#, fade[0], fade[1]);
+        let blend = if is_faded { [256, 1024] } else { [g, h] };
+        let blend = format!(r#"{{"strength":{},"falloff":{},"material":null}}"#, blend[0], blend[1]);
         let normal = if straight { [0, i16::MAX, 0] } else { [d, e, f].map(|n| n as i16) };
         let turn = if straight { [0, 0, 0, i16::MAX] } else { [a, b, c, d].map(|n| n as i16) };
         let own = match operation {
-            0 => r#""smooth":{"#.to_string(),
-            1 => r#""sharpen":{"#.into(),
-            2 => format!(r#""flatten":{{"point":[{a},{b},{c}],"normal":{normal:?},"#),
-            3 => format!(r#""level":{{"height":{a},"#),
-            4 => format!(r#""raise":{{"amount":{a},"#),
-            5 => format!(r#""lower":{{"amount":{a},"#),
-            6 => format!(r#""terrace":{{"step":{a},"base":{b},"#),
+            0 => r#""smooth""#.to_string(),
+            1 => r#""sharpen""#.into(),
+            2 => format!(r#"{{"flatten":{{"point":[{a},{b},{c}],"normal":{normal:?}}}}}"#),
+            3 => format!(r#"{{"level":{{"height":{a}}}}}"#),
+            4 => format!(r#"{{"raise":{{"amount":{a}}}}}"#),
+            5 => format!(r#"{{"lower":{{"amount":{a}}}}}"#),
+            6 => format!(r#"{{"terrace":{{"step":{a},"base":{b}}}}}"#),
             _ => {
                 let relief = format!(r#"{{"width":2,"height":3,"samples":[0,{},65535,9,{},1]}}"#, a as u16, b as u16);
                 format!(
-                    r#""stamp":{{"stamp":{{"center":[{a},{b},{c}],"rotation":{turn:?},"half":[{d},{e}],"height":{f},"relief":{relief}}},"#
+                    r#"{{"stamp":{{"stamp":{{"center":[{a},{b},{c}],"rotation":{turn:?},"half":[{d},{e}],"height":{f},"relief":{relief}}}}}}}"#
                 )
             }
         };
-        let own = format!("{{{own}{fade}}}}}");
-        let own = if power < 99 { format!(r#"{{"limited":{{"power":{power},"operation":{own}}}}}"#) } else { own };
         let stroke = stroke.map_or("null".into(), |stroke| stroke.to_string());
         let json = format!(
-            r#"{{"shape":{{"sphere":{{"center":[1792,2304,1536],"radius":900}}}},"operation":{own},"roughness":null,"tag":9,"stroke":{stroke}}}"#
+            r#"{{"shape":{{"sphere":{{"center":[1792,2304,1536],"radius":900}}}},"operation":{own},"blend":{blend},"power":{power},"roughness":null,"tag":9,"stroke":{stroke}}}"#
         );
         let json = json.replace(' ', "");
         let Ok(edit) = serde_json::from_str::<Edit>(&json) else { return Ok(()) };
