@@ -7,7 +7,7 @@
 //! ```
 //!
 //! It runs Bevy's `MinimalPlugins` and `BurrowPlugins`, so it needs no window, no graphics and no assets. A script has a
-//! brush a line, as [`Brush`](bevy_burrow::brush::Brush) describes it, in voxels; `{"undo":true}` and `{"redo":true}`
+//! brush a line, as [`Brush`] describes it, in voxels; `{"undo":true}` and `{"redo":true}`
 //! are steps through history, and blank lines and lines that start with `#` count for nothing. `-` reads standard input
 //! as it comes in; without a script it digs at random, the same each time.
 //!
