@@ -3,7 +3,7 @@
 use bevy::math::{EulerRot, Quat, Vec3};
 use bevy_egui::egui::{self, Color32, Pos2, Rect, Shape, Stroke, Ui, Vec2};
 
-use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP};
+use super::lengths::{AMOUNT, BUMP, BUMP_WIDTH, FALLOFF, LENGTH, RADIUS, STEP, TUBE};
 use super::operations::{Need, OPERATIONS};
 use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
@@ -97,13 +97,13 @@ fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     if tool.shape == ToolShape::Box {
         slider(ui, "Half width", &mut tool.half.x, radii.clone(), length);
         slider(ui, "Half height", &mut tool.half.y, radii.clone(), length);
-        slider(ui, "Half depth", &mut tool.half.z, radii.clone(), length);
+        slider(ui, "Half depth", &mut tool.half.z, radii, length);
         slider(ui, "Turn", &mut tool.turn, -180.0..=180.0, |slider| slider.max_decimals(0).suffix("°"));
     } else {
-        slider(ui, "Radius", &mut tool.radius, radii.clone(), length);
+        slider(ui, "Radius", &mut tool.radius, radii, length);
     }
     if tool.shape == ToolShape::Torus {
-        slider(ui, "Tube", &mut tool.tube, radii.clone(), length);
+        slider(ui, "Tube", &mut tool.tube, TUBE.range(voxel), length);
     }
     if tool.shape.is_long() {
         slider(ui, "Length", &mut tool.length, LENGTH.range(voxel), length);

@@ -23,6 +23,8 @@ impl Length {
 
 /// Radii, and half the sides of boxes. All of the most together are within the volume that a shape may have.
 pub const RADIUS: Length = Length { metres: (0.5, 32.0), voxels: (0.25, 128.0) };
+/// Of the tube of a ring.
+pub const TUBE: Length = Length { metres: (0.5, 16.0), voxels: (0.25, 64.0) };
 /// Of cylinders, capsules and cones.
 pub const LENGTH: Length = Length { metres: (1.0, 64.0), voxels: (0.25, 256.0) };
 pub const FALLOFF: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
@@ -39,7 +41,7 @@ mod tests {
     #[test]
     fn something_is_offered_whatever_the_voxels() {
         for voxel in (-3..=3).map(|power| 2f32.powi(power)) {
-            for length in [RADIUS, LENGTH, FALLOFF, AMOUNT, STEP, BUMP, BUMP_WIDTH] {
+            for length in [RADIUS, TUBE, LENGTH, FALLOFF, AMOUNT, STEP, BUMP, BUMP_WIDTH] {
                 let range = length.range(voxel);
                 assert!(range.start() < range.end(), "{range:?} at {voxel}");
                 // Sliders show tenths: their ends are none that rounding carries beyond the limits.
