@@ -12,6 +12,7 @@ pub trait Distance {
     fn at(&self, x: f32, y: f32, z: f32) -> f32;
 
     /// At most twelve numbers that the distance is computed from, as `kernels/shapes.cuh` reads them.
+    #[cfg_attr(not(feature = "cuda"), expect(dead_code))]
     fn constants(&self) -> Vec<f32>;
 
     /// Distances of a run of points along x.
