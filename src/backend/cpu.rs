@@ -8,12 +8,10 @@ use rayon::prelude::*;
 
 use super::{Compute, lock};
 use crate::edits::{EditDelta, PreparedEdits};
+use crate::lattice::ItemCost;
 use crate::surface::block::{Block, Mesher, Parts};
 use crate::surface::meshed_blocks::{Group, MeshedBlocks, PartLists};
 use crate::surface::vertex::WorldView;
-
-/// From how many blocks on meshing is spread over threads; below, handing out costs more than it saves.
-pub(crate) const PARALLEL_BLOCKS: usize = 48;
 
 /// How many stacks of bricks a thread takes at a time.
 const STACKS: usize = 4;
@@ -52,7 +50,7 @@ impl Compute for Cpu {
         then: &mut dyn FnMut(&dyn MeshedBlocks),
     ) {
         meanwhile();
-        if blocks.len() < PARALLEL_BLOCKS {
+        if !ItemCost::Brick.is_shared(blocks.len()) {
             let mut parts = MESHER.with_borrow_mut(|(_, kept)| std::mem::take(kept));
             mesh(view, blocks, &mut parts);
             then(&parts);

@@ -21,7 +21,7 @@ mod engine;
 mod settings;
 
 pub use choice::{Choice, Estimate, Stage};
-pub(crate) use cpu::{Cpu, PARALLEL_BLOCKS};
+pub(crate) use cpu::Cpu;
 pub use engine::{Engine, EngineFigures, EngineState};
 pub use settings::{CardChoice, EngineSettings};
 

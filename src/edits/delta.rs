@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::effect::{DraftedBrick, EditEffect};
 use crate::ground::MaterialId;
-use crate::lattice::{ChunkPos, LatticeBox};
+use crate::lattice::{ChunkPos, ItemCost, LatticeBox};
 use crate::volume::VoxelOutcome;
 
 /// What edits did to some bricks.
@@ -100,13 +100,10 @@ impl Counts<'_> {
     }
 }
 
-/// With at least this many parts and counts, threads share the work of adding them up.
-const MANY_ENTRIES: usize = 1 << 11;
-
 /// Adds up the parts and counts of deltas, edit by edit.
 pub(crate) fn enter_effects(deltas: &[EditDelta], effects: &mut [EditEffect]) {
     let entries: usize = deltas.iter().map(|delta| delta.parts.len() + delta.counts.len()).sum();
-    if entries < MANY_ENTRIES {
+    if !ItemCost::Lookup.is_shared(entries) {
         return deltas.iter().for_each(|delta| enter_some(delta, 0, effects));
     }
     // Each thread takes some of the edits.
@@ -153,7 +150,7 @@ mod tests {
         for edits in [1, 37] {
             let mut delta = || {
                 let mut delta = EditDelta::default();
-                for _ in 0..MANY_ENTRIES / 3 {
+                for _ in 0..ItemCost::Lookup.shared_from() / 3 {
                     let point = IVec3::new(rng.i32(-90..90), rng.i32(-9..9), rng.i32(-90..90));
                     delta.parts.push(PartEffect {
                         edit: rng.usize(..edits),

@@ -5,15 +5,13 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::batches::{MOST_BRICKS, batches};
 use super::delta::{EditDelta, enter_effects};
 use super::effect::{DraftedBrick, EditEffect, MergedBricks, Overlay};
 use super::prepared::PreparedEdits;
 use super::prepared_edit::PreparedEdit;
 use crate::brush::Edit;
-use crate::lattice::{BrickPos, ChunkGrid};
+use crate::lattice::{BrickPos, ChunkGrid, ItemCost, parallel_map};
 use crate::volume::{Brick, DiggingRules, SampleView, UniformBricks};
 
 /// What a list of edits makes of a world.
@@ -144,16 +142,9 @@ fn add(
     }
 }
 
-/// With at least this many bricks, threads share the copying of a list.
-const PARALLEL: usize = 1 << 13;
-
 /// Bricks as a list that a [`SampleView`] can be laid [under](SampleView::under).
 pub(crate) fn latest(drafted: &[DraftedBrick]) -> Vec<(BrickPos, &Brick)> {
-    if drafted.len() < PARALLEL {
-        drafted.iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
-    } else {
-        drafted.par_iter().map(|drafted| (drafted.pos, &*drafted.brick)).collect()
-    }
+    parallel_map(drafted, ItemCost::Copy, |drafted| (drafted.pos, &*drafted.brick))
 }
 
 #[cfg(test)]

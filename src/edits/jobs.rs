@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::prepared_edit::PreparedEdit;
-use crate::lattice::{BrickPos, LatticeBox, sort_by_place};
+use crate::lattice::{BrickPos, ItemCost, LatticeBox, sort_by_place};
 
 /// One edit's work on one brick; sorted by brick, then by edit.
 #[derive(Clone, Copy)]
@@ -28,14 +28,11 @@ impl Job {
     }
 }
 
-/// With at least this many bricks around edits, each edit's counted by itself, threads take slabs.
-const PARALLEL: u64 = 1024;
-
 /// Every brick that some edit may reach, once for each edit: by brick, and for each brick in order of the edits.
 pub(super) fn jobs(edits: &[PreparedEdit]) -> Vec<Job> {
     let reaches = || (0..).zip(edits).filter_map(|(edit, own)| Some((edit, BrickPos::range(own.reach?))));
     let around = reaches().fold(0, |sum: u64, (_, bricks)| sum.saturating_add(bricks.volume()));
-    if around < PARALLEL {
+    if !ItemCost::Lookup.is_shared(usize::try_from(around).unwrap_or(usize::MAX)) {
         let mut jobs = Vec::with_capacity(around as usize);
         reaches().for_each(|(edit, bricks)| add(edits, edit, bricks, &mut jobs));
         sort(&mut jobs);

@@ -12,11 +12,8 @@ use super::jobs::{Job, jobs};
 use super::padded_brick::PaddedBrick;
 use super::prepared_edit::PreparedEdit;
 use super::rule_scope::{BatchRules, BrickRules};
-use crate::lattice::{ChunkGrid, pieces};
+use crate::lattice::{ChunkGrid, ItemCost, pieces};
 use crate::volume::{DiggingRules, SampleView};
-
-/// With at least this many jobs, threads share them.
-const PARALLEL_JOBS: usize = 64;
 
 /// How many jobs are done before their deltas are added up. With many edits deltas take more memory than bricks, and most
 /// bricks of a large cave are replaced by a shared one.
@@ -100,7 +97,7 @@ impl<'a> PreparedEdits<'a> {
             jobs.chunk_by(Job::is_same_brick).for_each(|jobs| apply_jobs(self, jobs, &mut delta));
             delta
         };
-        if self.jobs.len() < PARALLEL_JOBS {
+        if !ItemCost::Brick.is_shared(self.jobs.len()) {
             each(&mut [work(&self.jobs)]);
             return;
         }

@@ -15,13 +15,13 @@
 mod boxes;
 mod grid;
 pub(crate) mod hash;
-mod pieces;
+mod parallel;
 mod places;
 mod tables;
 
 pub use boxes::LatticeBox;
 pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
-pub(crate) use pieces::{pieces, side_by_side};
+pub(crate) use parallel::{ItemCost, parallel_map, parallel_map_into, pieces, side_by_side};
 pub(crate) use places::{order_of_places, sort_by_place};
 pub(crate) use tables::{give_back, table_bytes};
 

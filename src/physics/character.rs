@@ -1,15 +1,15 @@
-//! A body that walks: a capsule that walks, jumps, steps and slides over ground that is being dug.
+//! A character: a capsule that walks, jumps, climbs steps and slides on ground that is being dug.
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
 
-/// A walking body: a kinematic capsule for avian, moved by its [`CharacterSteering`].
+/// A character: a kinematic capsule for avian, moved by its [`CharacterSteering`].
 ///
-/// Its `Transform` is at the capsule's middle; [`feet`](Self::feet) and [`eyes`](Self::eyes) are measured from there. Below
-/// a parent it is carried along, and walks in the world all the same. Change its height, and its feet stay where they are:
-/// a game that lets it stand up again makes sure first that there is room.
-/// [`CharacterPlugin`](super::CharacterPlugin) moves it; with avian's `TransformInterpolation` beside it, it moves smoothly at any frame rate. It
-/// needs colliders under it: give it, or the camera that follows it, a [`ColliderSource`](super::ColliderSource).
+/// Its `Transform` is at the middle of the capsule; [`feet`](Self::feet) and [`eyes`](Self::eyes) are measured from there.
+/// A parent carries it along. If its height changes, its feet stay in place; before a game lets it stand up, it must check
+/// that there is room. [`CharacterPlugin`](super::CharacterPlugin) moves it. Add avian's `TransformInterpolation` for smooth
+/// motion at any frame rate. It needs colliders below it: give it, or the camera that follows it, a
+/// [`ColliderSource`](super::ColliderSource).
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -47,15 +47,15 @@ pub struct Character {
     pub eye_height: f32,
     /// Metres per second.
     pub walk_speed: f32,
-    /// Metres per second, in a hurry.
+    /// Metres per second.
     pub run_speed: f32,
-    /// How high a jump lifts the soles, in metres.
+    /// The height of a jump, in metres.
     pub jump_height: f32,
     /// Metres per second squared, downwards.
     pub gravity: f32,
     /// The fastest fall, in metres per second.
     pub fastest_fall: f32,
-    /// The highest step that is walked up without a jump, in metres.
+    /// The highest step that is climbed without a jump, in metres.
     pub step_height: f32,
     /// The steepest ground that can be stood on, in radians.
     pub steepest: f32,
@@ -85,7 +85,7 @@ impl Default for Character {
 }
 
 impl Character {
-    /// Where to put a character that is to stand at `feet`.
+    /// The transform of a character that stands at `feet`.
     pub fn standing_at(&self, feet: Vec3) -> Transform {
         Transform::from_translation(feet + Vec3::Y * (self.height / 2.0))
     }
@@ -95,7 +95,7 @@ impl Character {
         middle - Vec3::Y * (self.height / 2.0)
     }
 
-    /// Between the eyes of a character whose middle is here.
+    /// The eyes of a character whose middle is here.
     pub fn eyes(&self, middle: Vec3) -> Vec3 {
         self.feet(middle) + Vec3::Y * self.eye_height
     }
@@ -107,26 +107,26 @@ impl Character {
     }
 }
 
-/// What a character wants.
+/// The input of a character.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default)]
 pub struct CharacterSteering {
-    /// Where to, as (x, z) of the world; longer than 1 counts as 1.
+    /// The direction (x, z) in world space; its length, at most 1, scales the speed.
     pub direction: Vec2,
-    /// In a hurry?
+    /// Whether to run.
     pub run: bool,
-    /// Off the ground, if on it?
+    /// Whether to jump, if on the ground.
     pub jump: bool,
 }
 
-/// How a character moves.
+/// The motion of a character.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq)]
 #[reflect(Component, Default)]
 pub struct CharacterMotion {
     /// Metres per second.
     pub velocity: Vec3,
-    /// Does it stand on something?
+    /// Whether it stands on something.
     pub grounded: bool,
-    /// The normal of what it stands on, if it does.
+    /// The normal of what it stands on; zero in the air.
     pub ground_normal: Vec3,
 }

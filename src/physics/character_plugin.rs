@@ -1,4 +1,4 @@
-//! Moves characters, and gives them their capsules.
+//! Moves characters and keeps their capsules up to date.
 
 use avian3d::prelude::*;
 use bevy::ecs::schedule::{InternedScheduleLabel, ScheduleLabel};
@@ -10,15 +10,13 @@ use super::HeldByGround;
 use super::character::{Character, CharacterMotion, CharacterSteering};
 use super::walking::Walk;
 
-/// Moves characters, in `FixedUpdate` unless told otherwise.
-///
-/// A game that wants them elsewhere gives the schedule; time is that of the schedule.
+/// Moves characters, by default in `FixedUpdate`.
 pub struct CharacterPlugin {
     schedule: InternedScheduleLabel,
 }
 
 impl CharacterPlugin {
-    /// Moves characters in this schedule.
+    /// Moves characters in this schedule, by the `Time` of that schedule.
     pub fn new(schedule: impl ScheduleLabel) -> Self {
         Self { schedule: schedule.intern() }
     }
@@ -30,7 +28,7 @@ impl Default for CharacterPlugin {
     }
 }
 
-/// Where characters are moved; steer them before.
+/// The systems that move characters. Steer them before.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CharacterSystems;
 
@@ -42,7 +40,7 @@ impl Plugin for CharacterPlugin {
     }
 }
 
-/// What a character's collider was made for: radius and height.
+/// The radius and height that a character's collider was made for.
 #[derive(Component, Clone, Copy, PartialEq)]
 struct Size(f32, f32);
 
@@ -52,7 +50,7 @@ impl Size {
     }
 }
 
-/// A new character gets its capsule; what becomes of one that takes another's place is [`resize`]'s.
+/// Inserts the capsule of a new character. [`resize`] handles one that replaces another.
 fn give_collider(
     new: On<Insert, Character>,
     characters: Query<&Character, Without<Size>>,
@@ -63,12 +61,12 @@ fn give_collider(
     }
 }
 
-/// Who is no character any more may become one as if it had never been.
+/// Lets an entity that stops being a character become one again.
 fn forget_size(gone: On<Remove, Character>, mut commands: Commands) {
     commands.entity(gone.entity).try_remove::<Size>();
 }
 
-/// A character whose size changed gets another capsule; its feet stay.
+/// Replaces the capsule of a character whose size changed. Its feet stay in place.
 fn resize(
     mut commands: Commands,
     mut changed: Query<(Entity, &Character, &mut Size), Changed<Character>>,
@@ -85,7 +83,7 @@ fn resize(
     }
 }
 
-/// Where characters are in the world, whatever they are children of.
+/// World-space places of characters, which may have parents.
 #[derive(SystemParam)]
 struct Places<'w, 's> {
     parents: Query<'w, 's, &'static ChildOf>,
@@ -93,7 +91,7 @@ struct Places<'w, 's> {
 }
 
 impl Places<'_, '_> {
-    /// From the space that an entity's `Transform` counts in to the world; `None` where that is the same.
+    /// The global transform of an entity's parent; `None` without a parent.
     fn frame(&mut self, entity: Entity) -> Option<Affine3A> {
         let parent = self.parents.get(entity).ok()?.parent();
         Some(self.transforms.p0().compute_global_transform(parent).ok()?.affine())
@@ -134,7 +132,7 @@ fn move_characters(
         Without<HeldByGround>,
     >,
 ) {
-    // A hiccup of the machine must not become a leap.
+    // A long frame must not become a leap.
     let dt = time.delta_secs().min(0.25);
     if dt <= 0.0 {
         return;
@@ -148,7 +146,7 @@ fn move_characters(
         if place != before {
             places.set(entity, place);
         }
-        // What the solver shows to bodies that are in the way.
+        // The solver pushes other bodies by this.
         velocity.set_if_neq(LinearVelocity((place - before) / dt));
     }
 }

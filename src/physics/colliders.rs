@@ -1,4 +1,4 @@
-//! Colliders of tiles and chunks: made with the meshes, put in their place with them.
+//! Colliders of tiles and chunks. They are built with the meshes and swapped in with them.
 
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -19,19 +19,19 @@ use crate::plugin::{CommitAction, Part, ShownSurface, SurfaceProcessor};
 use crate::surface::SurfaceMesh;
 use crate::terrain::Drawn;
 
-/// What tasks and the main thread know of ground.
+/// State shared by tasks and the main thread.
 #[derive(Default)]
-struct Known {
+struct Shared {
     near: RwLock<Neighbourhood>,
     shapes: RwLock<HashMap<(Entity, Drawn), Arc<GroundShape>>>,
 }
 
-/// Where colliders are wanted, and which there are; tasks look at it too.
+/// Where colliders are wanted, and the shapes of those that exist.
 #[derive(Resource, Clone, Default)]
-pub(super) struct Grounds(Arc<Known>);
+pub(super) struct GroundColliders(Arc<Shared>);
 
-impl Grounds {
-    /// A copy, for the main thread.
+impl GroundColliders {
+    /// The area around sources, as last set.
     pub fn near(&self) -> Neighbourhood {
         self.0.near.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -58,17 +58,17 @@ impl Grounds {
         };
     }
 
-    /// Makes a collider, in a task.
-    pub fn prepare(&self, part: &Part, surface: &SurfaceMesh) -> PreparedCollider {
+    /// Builds a collider. Call it in a task.
+    pub fn build(&self, part: &Part, surface: &SurfaceMesh) -> BuiltCollider {
         let shape = GroundShape::new(surface, part.voxel_size).map(Arc::new);
         let changed = GroundShape::difference(self.shape(part).as_deref(), shape.as_deref());
-        PreparedCollider { grounds: self.clone(), part: *part, shape, changed }
+        BuiltCollider { colliders: self.clone(), part: *part, shape, changed }
     }
 }
 
-impl SurfaceProcessor for Grounds {
-    /// Near sources, and a little farther off where there is a collider that has not gone yet: what is dug out of a tile
-    /// there takes ground from it, so the chunk that draws the hole gets its collider with the tile's new one.
+impl SurfaceProcessor for GroundColliders {
+    /// True within a source's radius. It also is a little beyond, where a collider remains: a dig there cuts a hole into the
+    /// tile's collider, so the chunk that fills the hole must get its own in the same commit.
     fn wants(&self, part: &Part) -> bool {
         let near = self.0.near.read().unwrap_or_else(PoisonError::into_inner);
         let tile = column(part.drawn);
@@ -78,41 +78,46 @@ impl SurfaceProcessor for Grounds {
     }
 
     fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<CommitAction> {
-        let prepared = self.prepare(part, surface);
+        let collider = GroundColliders::build(self, part, surface);
         Some(Box::new(move |entity| {
-            entity.queue_silenced(move |part: EntityWorldMut| prepared.attach(part));
+            entity.queue_silenced(move |part: EntityWorldMut| collider.attach(part));
         }))
     }
 }
 
-/// What is added to the box around a collider, in metres: as much as avian adds itself.
+/// The margin around a collider's bounding box, in metres; the same as avian's own.
 const MARGIN: f32 = 0.05;
 
-/// A collider on its way to its tile or chunk.
-pub(super) struct PreparedCollider {
-    grounds: Grounds,
+/// A collider that is to be attached to its tile or chunk.
+pub(super) struct BuiltCollider {
+    colliders: GroundColliders,
     part: Part,
     shape: Option<Arc<GroundShape>>,
-    /// Where it differs from the one before, in metres from the part's origin.
+    /// The box in which it differs from its predecessor, in metres from the part's origin.
     changed: Option<(Vec3, Vec3)>,
 }
 
-impl PreparedCollider {
-    /// Puts the collider in place of the old one, unless the surface has changed since it was made.
+/// The child of a tile or chunk that has its collider.
+fn body_of(part: &EntityWorldMut) -> Option<Entity> {
+    let mut children = part.get::<Children>()?.iter();
+    children.find(|&child| part.world().get::<GroundBody>(child).is_some())
+}
+
+impl BuiltCollider {
+    /// Replaces the part's collider, unless its surface has changed since this one was built.
     pub fn attach(self, mut part: EntityWorldMut) {
         let owner = part.id();
         let is_newer = |revision: u64| revision > self.part.revision;
         let shown = part.get::<ShownSurface>().is_some_and(|shown| is_newer(shown.revision));
-        let old = part.get::<GroundCollider>().copied();
-        if shown || old.is_some_and(|old| is_newer(old.revision)) {
+        if shown || part.get::<GroundCollider>().is_some_and(|old| is_newer(old.revision)) {
             part.world_scope(|world| world.resource_mut::<PhysicsFigures>().stale += 1);
             return;
         }
-        let old = old.and_then(|old| old.body);
-        self.grounds.set_shape(&self.part, self.shape.clone());
-        let body = part.world_scope(|world| {
+        let old = body_of(&part);
+        self.colliders.set_shape(&self.part, self.shape.clone());
+        part.world_scope(|world| {
             if let Some((low, high)) = self.changed {
-                // A new part is not placed itself before the end of the frame.
+                // The GlobalTransform of a new part is not computed before the end of the frame.
                 let terrain = world.get::<GlobalTransform>(self.part.terrain).copied().unwrap_or_default();
                 let place = terrain * Transform::from_translation(self.part.origin.as_vec3());
                 let change = GroundChange::new(self.part.terrain, &place, self.part.voxel_size, low, high);
@@ -124,14 +129,11 @@ impl PreparedCollider {
             world.resource_mut::<PhysicsFigures>().swaps += 1;
             let contact = world.resource::<GroundContact>().clone();
             match (self.shape, old.and_then(|old| world.get_entity_mut(old).ok())) {
-                (None, None) => None,
-                (None, Some(old)) => {
-                    old.despawn();
-                    None
-                }
+                (None, None) => {}
+                (None, Some(old)) => old.despawn(),
                 (Some(shape), Some(mut old)) => {
-                    // Under the same entity: who touches it keeps touching it. Avian looks for it by its old box up to
-                    // the next step; who walks before would sink where it has grown.
+                    // The entity stays, so contacts with it do too. Avian would find it by its old box until the next
+                    // step, and a character that moves before would sink where the ground grew.
                     let collider = Collider::from(SharedShape(shape));
                     if let (Some(place), Some(turn)) = (old.get::<Position>(), old.get::<Rotation>()) {
                         let bounds = collider.aabb(place.0, *turn).grow(Vec3::splat(MARGIN));
@@ -139,87 +141,83 @@ impl PreparedCollider {
                     }
                     contact.apply(&mut old);
                     old.insert(collider);
-                    Some(old.id())
                 }
                 (Some(shape), None) => {
                     let mut body = world.spawn((
-                        GroundBody { terrain: self.part.terrain, part: owner, drawn: self.part.drawn },
-                        RigidBody::Static,
-                        // Shapes are in metres already.
+                        GroundBody { terrain: self.part.terrain, drawn: self.part.drawn },
+                        // Shapes are in metres, parts in voxels.
                         Transform::from_scale(Vec3::splat(self.part.voxel_size.recip())),
                         ChildOf(owner),
                         Collider::from(SharedShape(shape)),
                     ));
                     contact.apply(&mut body);
-                    Some(body.id())
                 }
             }
         });
-        part.insert(GroundCollider { body, revision: self.part.revision });
+        part.insert(GroundCollider { revision: self.part.revision });
     }
 }
 
-/// Takes a tile's or chunk's collider away.
+/// Removes a tile's or chunk's collider.
 pub(super) fn detach(mut part: EntityWorldMut) {
-    let Some(old) = part.take::<GroundCollider>() else { return };
-    part.world_scope(|world| {
-        if let Some(Ok(body)) = old.body.map(|body| world.get_entity_mut(body)) {
-            body.despawn();
-        }
-    });
+    part.remove::<GroundCollider>();
+    if let Some(body) = body_of(&part) {
+        part.world_scope(|world| world.despawn(body));
+    }
 }
 
-/// Lets go of a shape whose collider is gone, whoever despawned it; its tile or chunk has no collider then. Where nobody
-/// [detached](detach) it, ground has gone, and who sleeps there is told.
+/// Drops the shape of a body that was removed, whoever did that, and unmarks its tile or chunk. Unless the plugin itself
+/// [detached](detach) it, ground is gone, so bodies that sleep on it have to wake.
 pub(super) fn forget(
     gone: On<Remove, GroundBody>,
-    bodies: Query<(&GroundBody, Option<&ColliderAabb>)>,
+    bodies: Query<(&GroundBody, &ChildOf, Option<&ColliderAabb>)>,
     parts: Query<Has<GroundCollider>>,
-    grounds: Res<Grounds>,
+    colliders: Res<GroundColliders>,
     mut changes: ResMut<GroundChanges>,
     mut figures: ResMut<PhysicsFigures>,
     mut commands: Commands,
 ) {
-    let gone = gone.entity;
-    let Ok((body, bounds)) = bodies.get(gone) else { return };
-    let is_detached = parts.get(body.part).is_ok_and(|has_collider| !has_collider);
+    let Ok((body, part, bounds)) = bodies.get(gone.entity) else { return };
+    let is_detached = parts.get(part.parent()).is_ok_and(|has_collider| !has_collider);
     if let Some(bounds) = bounds.filter(|_| !is_detached) {
         changes.add(body.drawn, GroundChange::around(body.terrain, bounds));
         figures.changes = changes.len();
     }
-    let mut shapes = grounds.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
+    let mut shapes = colliders.0.shapes.write().unwrap_or_else(PoisonError::into_inner);
     shapes.remove(&(body.terrain, body.drawn));
-    let Ok(mut part) = commands.get_entity(body.part) else { return };
+    let Ok(mut part) = commands.get_entity(part.parent()) else { return };
     part.queue_silenced(move |mut part: EntityWorldMut| {
-        if part.get::<GroundCollider>().is_some_and(|ground| ground.body == Some(gone)) {
+        if body_of(&part).is_none() {
             part.remove::<GroundCollider>();
         }
     });
 }
 
-/// Puts colliders where their tiles and chunks are, before a step. Avian itself would take over no turn of less than a tenth
-/// of a degree: ground that turns slowly would leave its colliders behind.
+/// Moves colliders to their tiles and chunks before a step. Avian itself ignores rotations of less than a tenth of a degree,
+/// so ground that turns slowly would leave its colliders behind.
 pub(super) fn follow(
-    parts: Query<(Entity, &GroundCollider), Or<(Changed<GlobalTransform>, Changed<GroundCollider>)>>,
+    parts: Query<
+        (Entity, &Children),
+        (With<GroundCollider>, Or<(Changed<GlobalTransform>, Changed<GroundCollider>)>),
+    >,
     places: TransformHelper,
     mut bodies: Query<(&GroundBody, &Collider, Ref<ColliderAabb>, &mut Position, &mut Rotation)>,
     mut changes: ResMut<GroundChanges>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
-    for (part, ground) in &parts {
-        let Some(body) = ground.body else { continue };
-        let (Ok(body), Ok(place)) = (bodies.get_mut(body), places.compute_global_transform(part)) else {
+    for (part, children) in &parts {
+        let mut bodies = bodies.iter_many_mut(children);
+        let Some((body, collider, bounds, mut position, mut turn)) = bodies.fetch_next() else { continue };
+        let Ok(place) = places.compute_global_transform(part).map(|place| place.compute_transform()) else {
             continue;
         };
-        let (body, collider, bounds, mut position, mut turn) = body;
-        let place = place.compute_transform();
         if !place.is_finite() {
             continue;
         }
         let is_put = position.set_if_neq(Position(place.translation));
         let is_turned = turn.set_if_neq(Rotation(place.rotation));
-        // Whoever was there before a collider has been told when it came.
+        // A new collider's change was recorded when it was attached.
         if (is_put || is_turned) && !bounds.is_added() {
             let bounds = bounds.merged(collider.aabb(place.translation, place.rotation));
             changes.add(body.drawn, GroundChange::around(body.terrain, &bounds));
@@ -229,11 +227,11 @@ pub(super) fn follow(
     figures.main_thread += start.elapsed();
 }
 
-/// Keeps bodies of ground at the origins of their tiles and chunks, after a step: Avian works out from where they are in the
-/// world where that is below their parents, and what it rounds would add up.
-pub(super) fn stay(mut bodies: Query<&mut Transform, (With<GroundBody>, Changed<Transform>)>) {
-    for mut place in &mut bodies {
-        let home = Transform::from_scale(place.scale);
-        place.set_if_neq(home);
+/// Resets bodies of ground to the origins of their parts after a step. Avian computes their local transforms from the global
+/// ones, and the rounding errors would add up.
+pub(super) fn reset_to_parent(mut bodies: Query<&mut Transform, (With<GroundBody>, Changed<Transform>)>) {
+    for mut transform in &mut bodies {
+        let origin = Transform::from_scale(transform.scale);
+        transform.set_if_neq(origin);
     }
 }

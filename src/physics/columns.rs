@@ -1,4 +1,4 @@
-//! Columns of chunks: which tiles and chunks stand in them, and which of these lack a collider.
+//! Columns of chunks, with their tiles and chunks, and which of these lack a collider.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +13,7 @@ use crate::terrain::Drawn;
 /// A column of chunks of a terrain's entity.
 pub(super) type ColumnKey = (Entity, TilePos);
 
-/// The column that a tile or chunk stands in.
+/// The column of a tile or chunk.
 pub(super) fn column(drawn: Drawn) -> TilePos {
     match drawn {
         Drawn::Tile(tile) => tile,
@@ -34,6 +34,7 @@ pub(super) type Parts<'w, 's> = Query<
     (
         &'static ShownSurface,
         Option<&'static GroundCollider>,
+        Option<&'static Children>,
         &'static ChildOf,
         Option<&'static Tile>,
         Option<&'static Chunk>,
@@ -41,102 +42,101 @@ pub(super) type Parts<'w, 's> = Query<
     Or<(With<Tile>, With<Chunk>)>,
 >;
 
-/// What a part's collider is like.
-pub(super) struct Look {
+/// The state of a part's collider.
+pub(super) struct PartState {
     pub has_collider: bool,
     pub is_missing: bool,
-    /// Nothing is missing, or not any more.
-    pub is_there: bool,
+    /// It has a collider, or needs none.
+    pub is_ready: bool,
 }
 
-/// What stands in a column, as it was when it was looked at last.
+/// The parts of a column, as of the last check.
 #[derive(Default)]
-struct State {
+struct ColumnState {
     parts: Vec<(Entity, Drawn)>,
     colliders: usize,
     missing: Vec<(Entity, Drawn)>,
     is_ready: bool,
 }
 
-/// All columns in which there is a tile or chunk that shows something. They are looked at again only when something
-/// happened in them.
+/// All columns with a tile or chunk that shows a surface. They are checked again only when a part of them changed.
 #[derive(Resource, Default)]
 pub(super) struct Columns {
-    /// Tiles and chunks that something happened to.
-    news: Vec<Entity>,
-    homes: HashMap<Entity, ColumnKey>,
-    states: HashMap<ColumnKey, State>,
-    /// Those in which something is missing, by terrain.
+    /// Tiles and chunks that changed since the last check.
+    changed_parts: Vec<Entity>,
+    column_of: HashMap<Entity, ColumnKey>,
+    states: HashMap<ColumnKey, ColumnState>,
+    /// Columns with a missing collider, by terrain.
     waiting: BTreeMap<Entity, BTreeSet<TilePos>>,
     colliders: usize,
     missing: usize,
-    /// Those that have got ready since, or are not any more, or are empty.
-    turned: Vec<ColumnKey>,
+    /// Columns that became ready, unready or empty.
+    changed: Vec<ColumnKey>,
 }
 
 impl Columns {
-    /// Has everything that has triangles in this column a collider? `None` where nothing stands in it: it is to come yet, or
-    /// the game took it away.
+    /// Whether all surfaces of this column have colliders; `None` for a column without tiles and chunks, which were not
+    /// spawned yet, or were despawned by the game.
     pub fn is_ready(&self, column: ColumnKey) -> Option<bool> {
         self.states.get(&column).map(|state| state.is_ready)
     }
 
-    /// Was there a collider in this column when it was looked at last?
+    /// Whether this column had a collider at the last check.
     pub fn has_colliders(&self, column: ColumnKey) -> bool {
         self.states.get(&column).is_some_and(|state| state.colliders > 0)
     }
 
-    /// The columns that have got ready since this was asked last, or are not any more, or in which nothing stands any more.
-    pub fn take_turned(&mut self) -> Vec<ColumnKey> {
-        std::mem::take(&mut self.turned)
+    /// Takes the columns that became ready, unready or empty since the last call.
+    pub fn take_changed(&mut self) -> Vec<ColumnKey> {
+        std::mem::take(&mut self.changed)
     }
 
-    /// How many tiles and chunks have a collider, and how many wait for one.
+    /// How many tiles and chunks have a collider, and how many still need one.
     pub fn counts(&self) -> (usize, usize) {
         (self.colliders, self.missing)
     }
 
-    /// The columns of all tiles and chunks that something happened to since.
-    pub fn take_news(&mut self, parts: &Parts) -> BTreeSet<ColumnKey> {
+    /// Takes the columns of all tiles and chunks that changed since the last call.
+    pub fn take_touched(&mut self, parts: &Parts) -> BTreeSet<ColumnKey> {
         let mut touched = BTreeSet::new();
-        for part in std::mem::take(&mut self.news) {
+        for part in std::mem::take(&mut self.changed_parts) {
             let found = parts.get(part).ok().and_then(|(.., parent, tile, chunk)| {
                 let drawn = drawn(tile, chunk)?;
                 Some(((parent.parent(), column(drawn)), drawn))
             });
-            let (before, now) = (self.homes.get(&part).copied(), found.map(|(home, _)| home));
+            let (before, now) = (self.column_of.get(&part).copied(), found.map(|(column, _)| column));
             touched.extend(before.into_iter().chain(now));
             if before == now {
                 continue;
             }
-            if let Some(state) = before.and_then(|home| self.states.get_mut(&home)) {
+            if let Some(state) = before.and_then(|column| self.states.get_mut(&column)) {
                 state.parts.retain(|&(other, _)| other != part);
             }
-            self.homes.remove(&part);
-            if let Some((home, drawn)) = found {
-                self.homes.insert(part, home);
-                self.states.entry(home).or_default().parts.push((part, drawn));
+            self.column_of.remove(&part);
+            if let Some((column, drawn)) = found {
+                self.column_of.insert(part, column);
+                self.states.entry(column).or_default().parts.push((part, drawn));
             }
         }
         touched
     }
 
-    /// Looks at each part of a column; tells how many there are.
-    pub fn look(&mut self, column: ColumnKey, mut look: impl FnMut(Entity) -> Option<Look>) -> usize {
+    /// Checks each part of a column and returns how many there are.
+    pub fn check(&mut self, column: ColumnKey, mut check: impl FnMut(Entity) -> Option<PartState>) -> usize {
         let Some(state) = self.states.get_mut(&column) else { return 0 };
         let (colliders, missing, was_ready) = (state.colliders, state.missing.len(), state.is_ready);
         (state.colliders, state.is_ready) = (0, true);
         state.missing.clear();
         for &(part, drawn) in &state.parts {
-            let Some(look) = look(part) else { continue };
-            state.colliders += usize::from(look.has_collider);
-            state.missing.extend(look.is_missing.then_some((part, drawn)));
-            state.is_ready &= look.is_there;
+            let Some(found) = check(part) else { continue };
+            state.colliders += usize::from(found.has_collider);
+            state.missing.extend(found.is_missing.then_some((part, drawn)));
+            state.is_ready &= found.is_ready;
         }
         self.colliders = self.colliders + state.colliders - colliders;
         self.missing = self.missing + state.missing.len() - missing;
         if was_ready != state.is_ready || state.parts.is_empty() {
-            self.turned.push(column);
+            self.changed.push(column);
         }
         let (terrain, tile) = column;
         if !state.missing.is_empty() {
@@ -154,12 +154,12 @@ impl Columns {
         count
     }
 
-    /// The terrains in which something is missing.
+    /// The terrains that miss colliders.
     pub fn waiting(&self) -> impl Iterator<Item = Entity> {
         self.waiting.keys().copied()
     }
 
-    /// What is missing in a terrain.
+    /// The tiles and chunks of a terrain that miss a collider.
     pub fn missing(&self, terrain: Entity) -> impl Iterator<Item = (TilePos, Entity, Drawn)> {
         let columns = self.waiting.get(&terrain).into_iter().flatten();
         columns.flat_map(move |&tile| {
@@ -169,12 +169,12 @@ impl Columns {
     }
 }
 
-/// A tile or chunk shows something new, or has got a collider.
-pub(super) fn note_new(new: On<Insert, (ShownSurface, GroundCollider)>, mut columns: ResMut<Columns>) {
-    columns.news.push(new.entity);
+/// A tile or chunk shows a new surface, or has a new collider.
+pub(super) fn record_insert(new: On<Insert, (ShownSurface, GroundCollider)>, mut columns: ResMut<Columns>) {
+    columns.changed_parts.push(new.entity);
 }
 
-/// A tile or chunk is gone, or has lost its collider.
-pub(super) fn note_gone(gone: On<Remove, (ShownSurface, GroundCollider)>, mut columns: ResMut<Columns>) {
-    columns.news.push(gone.entity);
+/// A tile or chunk was removed, or has lost its collider.
+pub(super) fn record_remove(gone: On<Remove, (ShownSurface, GroundCollider)>, mut columns: ResMut<Columns>) {
+    columns.changed_parts.push(gone.entity);
 }

@@ -1,17 +1,17 @@
-//! Which way ground may push: contact normals of a triangle that knows its neighbours.
+//! Contact normals of a triangle that knows its neighbours.
 //!
-//! A body that rolls from one triangle to the next touches the edge between them, and by the triangle alone the edge
-//! could push it anywhere outwards: on flat ground that is a bump. With the neighbours known, an edge pushes no farther
-//! to the side than the neighbour's own normal leans, and not at all where the ground is flat or hollow.
+//! A body that rolls from one triangle to the next touches the edge between them. A lone triangle's edge could push it in any
+//! outward direction, which is a bump on flat ground. With the neighbours known, a contact normal leans over an edge at most
+//! as far as the neighbour's own normal, and not at all where the ground is flat or concave.
 
 use avian3d::parry::math::Vector;
 use avian3d::parry::query::details::NormalConstraints;
 
-/// How much farther than its neighbours a normal may lean, as a sine: rounding must not decide between two triangles
-/// whose edge a body is right above.
+/// How much farther than its neighbours a normal may lean, as a sine. Rounding must not decide between two triangles when a
+/// body is right above their edge.
 const SLACK: f32 = 1e-3;
 
-/// How often sides take turns. At a right corner each round halves what is too much.
+/// The most rounds over the three sides. At a right angle each round halves the excess.
 const ROUNDS: usize = 16;
 
 /// The normals of one triangle and its three sides.
@@ -19,12 +19,12 @@ const ROUNDS: usize = 16;
 pub(super) struct NormalCone {
     /// The triangle's own normal.
     pub face: Vector,
-    /// For each side: the direction within the triangle's plane that leads out over it, and the neighbour's normal.
+    /// For each side: the outward direction in the triangle's plane, and the neighbour's normal.
     pub sides: [(Vector, Vector); 3],
 }
 
 impl NormalCone {
-    /// Turns a normal back that leans too far over a side; says whether one did.
+    /// Rotates a normal back that leans too far over a side, and returns whether it did.
     fn turn(&self, normal: &mut Vector) -> bool {
         let mut is_turned = false;
         for (outwards, beyond) in &self.sides {
@@ -46,11 +46,11 @@ impl NormalCone {
 
 impl NormalConstraints for NormalCone {
     fn project_local_normal_mut(&self, normal: &mut Vector) -> bool {
-        // Ground has one side.
+        // Ground is one-sided.
         if normal.dot(self.face) < 0.0 {
             return false;
         }
-        // What one side turns back may lean over another one, at an obtuse corner.
+        // After the correction for one side, the normal may lean over another.
         for _ in 0..ROUNDS {
             if !self.turn(normal) {
                 return true;
@@ -65,7 +65,7 @@ impl NormalConstraints for NormalCone {
 mod tests {
     use super::*;
 
-    /// A level triangle; its first side, towards +x, meets ground with this normal, and the other sides level ground.
+    /// A level triangle whose neighbour across its first side, towards +x, has this normal. The others are level.
     fn beside(beyond: Vector) -> NormalCone {
         let diagonal = Vector::new(-1.0, 0.0, 1.0).normalize();
         NormalCone {

@@ -1,4 +1,4 @@
-//! Loose pieces of ground that fall as bodies.
+//! Loose pieces of ground that fall as rigid bodies.
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
@@ -13,13 +13,13 @@ use crate::plugin::{
 use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, Restored, Terrain};
 
-/// Ground that broke off falls as a body. Put a [`LooseGround`](crate::plugin::LooseGround) with some `debris` on the
-/// terrain, and pieces up to so many voxels fall. With `Assets<Mesh>` a piece is drawn from the frame on in which the ground
-/// loses it; it falls, and is in the way, when its collider is done, which a task makes. Its mesh comes with the transaction;
-/// only where a game commits by itself is it made on the main thread.
+/// Lets ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain; its
+/// `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the frame in
+/// which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built with the
+/// transaction; only if a game commits by itself is it built on the main thread.
 ///
-/// Needs avian's `PhysicsPlugins` and the [`TerrainPhysicsPlugin`](super::TerrainPhysicsPlugin), and for ground to fall on a
-/// [`ColliderSource`](super::ColliderSource) nearby.
+/// Requires avian's `PhysicsPlugins`, the [`TerrainPhysicsPlugin`](super::TerrainPhysicsPlugin), and a
+/// [`ColliderSource`](super::ColliderSource) nearby, so that there is ground to fall on.
 ///
 /// ```no_run
 /// # use bevy::prelude::*;
@@ -33,17 +33,17 @@ use crate::terrain::{PieceFate, Restored, Terrain};
 #[derive(Default)]
 pub struct DebrisPlugin;
 
-/// How debris behaves. Changes count for pieces that fall later.
+/// How debris behaves. Changes apply to later pieces.
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct DebrisSettings {
-    /// Pieces at once. While there are as many, others vanish.
+    /// The most pieces at once. Further ones vanish.
     pub most: usize,
-    /// Seconds from when a piece takes shape as a body until it crumbles.
+    /// Seconds from when a piece becomes a body until it crumbles.
     pub stay: f32,
-    /// How slippery pieces are.
+    /// Friction of the pieces.
     pub friction: Friction,
-    /// How bouncy they are.
+    /// Restitution of the pieces.
     pub restitution: Restitution,
 }
 
@@ -53,18 +53,16 @@ impl Default for DebrisSettings {
     }
 }
 
-/// A piece of ground that fell, or falls: on the body, whose `Transform` is in the middle of the piece. Its mesh is a
-/// child, a [`GroundPiece`], and looks as it did in the ground.
+/// A piece of ground that broke off and is a rigid body now. Its `Transform` is at the middle of the piece, [`DebrisOf`]
+/// is its terrain, and its mesh is a child with a [`GroundPiece`] that looks as it did in the ground.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
-    /// The terrain that it was part of.
-    pub terrain: Entity,
     /// The tag of the brush that cut it off.
     pub tag: u64,
-    /// What most of it is made of.
+    /// Its most common material.
     pub material: MaterialId,
-    /// How large it is, in voxels.
+    /// Its size in voxels.
     pub voxels: u64,
     /// Half the sides of its bounds as it was in the ground, in metres.
     pub half: Vec3,
@@ -72,17 +70,30 @@ pub struct Debris {
     pub left: f32,
 }
 
-/// A piece has lain about for long enough; it is despawned right after this.
+/// The relationship of a piece to the terrain that it broke off from, which lists its pieces in [`TerrainDebris`].
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Component)]
+#[relationship(relationship_target = TerrainDebris)]
+pub struct DebrisOf(pub Entity);
+
+/// The pieces that broke off from a terrain, including those whose colliders are still being built. They are despawned with
+/// it, and when another `Terrain` replaces it.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default)]
+#[relationship_target(relationship = DebrisOf, linked_spawn)]
+pub struct TerrainDebris(Vec<Entity>);
+
+/// A piece's time is over. It is despawned right after this event.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebrisCrumbled {
     /// The piece's entity.
     pub entity: Entity,
 }
 
-/// A piece that is drawn already, and whose collider is being made: no body yet, it stays where it was in the ground.
+/// A piece that is drawn, but not a body yet, since its collider is being built. It stays where it was in the ground.
 #[derive(Component)]
 #[require(Transform, Visibility)]
-struct Shaping {
+struct PendingDebris {
     debris: Debris,
     task: ThreadTask<Option<Collider>>,
 }
@@ -91,7 +102,7 @@ impl Plugin for DebrisPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<DebrisSettings>().add_observer(clear).add_systems(
             Update,
-            (break_off, make_room, take_shape, crumble)
+            (break_off, despawn_in_restored_ground, become_body, crumble)
                 .chain()
                 .after(BurrowSystems::Commit)
                 .before(BurrowSystems::Propagate),
@@ -99,18 +110,18 @@ impl Plugin for DebrisPlugin {
     }
 }
 
-/// Nobody sees a hole: in the frame in which the ground loses a piece, the piece is there.
+/// Spawns pieces in the frame in which the ground loses them, so that no hole shows.
 fn break_off(
     mut commands: Commands,
     settings: Res<DebrisSettings>,
     mut found: MessageReader<LoosePieceFound>,
     terrains: Query<(&Terrain, Option<&MaterialColors>)>,
     places: TransformHelper,
-    pieces: Query<(), Or<(With<Debris>, With<Shaping>)>>,
+    pieces: Query<(), With<DebrisOf>>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
 ) {
     let mut room = settings.most.saturating_sub(pieces.count());
-    // A game that takes a terrain's colours away wants none on its pieces.
+    // A terrain without colours has pieces without colours.
     let plain = MaterialColors(Vec::new());
     for found in found.read().filter(|found| found.piece.fate == PieceFate::BrokeOff) {
         let Ok((terrain, colors)) = terrains.get(found.terrain) else { continue };
@@ -128,7 +139,12 @@ fn break_off(
             surface.vertices.iter_mut().for_each(|vertex| vertex.position -= size * (SNAP / 2));
             debris_collider(&surface, scale)
         });
-        let mut piece = commands.spawn((Name::new("debris"), Shaping { debris, task }, place));
+        let mut piece = commands.spawn((
+            Name::new("debris"),
+            DebrisOf(found.terrain),
+            PendingDebris { debris, task },
+            place,
+        ));
         if let Some(meshes) = &mut meshes
             && let Some(mesh) = found.mesh(terrain, colors.unwrap_or(&plain))
         {
@@ -141,7 +157,6 @@ fn break_off(
 fn describe(found: &LoosePieceFound, half: Vec3, stay: f32) -> Debris {
     let most = found.piece.materials.iter().max_by_key(|(_, voxels)| *voxels);
     Debris {
-        terrain: found.terrain,
         tag: found.tag,
         material: most.map_or_else(MaterialId::default, |(material, _)| material),
         voxels: found.piece.voxels,
@@ -150,24 +165,25 @@ fn describe(found: &LoosePieceFound, half: Vec3, stay: f32) -> Debris {
     }
 }
 
-/// Where undo or redo put ground, there is no room for what had fallen from it.
-fn make_room(
+/// Despawns pieces where undo or redo restored ground.
+fn despawn_in_restored_ground(
     mut commands: Commands,
     mut steps: MessageReader<HistoryMoved>,
     places: TransformHelper,
-    pieces: Query<(Entity, &Debris, &Transform)>,
-    shaping: Query<(Entity, &Shaping, &Transform)>,
+    terrains: Query<&TerrainDebris>,
+    pieces: Query<(Entity, AnyOf<(&Debris, &PendingDebris)>, &Transform)>,
 ) {
     for HistoryMoved { terrain, receipt } in steps.read() {
         let Some(entity) = *terrain else { continue };
         let Ok(ground) = places.compute_global_transform(entity) else { continue };
+        let Ok(debris) = terrains.get(entity) else { continue };
         let Ok(Restored { bounds: Some(bounds), added, .. }) = &receipt.outcome else { continue };
         if added.total() == 0 {
             continue;
         }
         let local = ground.affine().inverse();
-        let shaping = shaping.iter().map(|(entity, piece, place)| (entity, &piece.debris, place));
-        for (entity, debris, place) in pieces.iter().chain(shaping) {
+        for (entity, (fallen, pending), place) in pieces.iter_many(debris.iter()) {
+            let Some(debris) = fallen.or(pending.map(|pending| &pending.debris)) else { continue };
             let middle = local.transform_point3(place.translation);
             if meets(*bounds, middle, debris.half.length() / ground.scale().x) {
                 commands.entity(entity).try_despawn();
@@ -176,18 +192,18 @@ fn make_room(
     }
 }
 
-/// Does a ball reach into a box?
+/// Whether a ball intersects a box.
 fn meets(bounds: LatticeBox, middle: Vec3, reach: f32) -> bool {
     middle.distance(middle.clamp(bounds.min.as_vec3(), bounds.max.as_vec3())) < reach
 }
 
-/// Pieces whose colliders are done become bodies.
-fn take_shape(
+/// Turns pieces whose colliders are built into bodies.
+fn become_body(
     mut commands: Commands,
     settings: Res<DebrisSettings>,
-    mut shaping: Query<(Entity, &mut Shaping)>,
+    mut pending: Query<(Entity, &mut PendingDebris)>,
 ) {
-    for (entity, mut piece) in &mut shaping {
+    for (entity, mut piece) in &mut pending {
         let Some(collider) = piece.task.finish() else { continue };
         let mut entity = commands.entity(entity);
         let Some(collider) = collider else {
@@ -195,7 +211,12 @@ fn take_shape(
             continue;
         };
         let DebrisSettings { friction, restitution, .. } = *settings;
-        entity.try_remove::<Shaping>().try_insert((piece.debris.clone(), collider, friction, restitution));
+        entity.try_remove::<PendingDebris>().try_insert((
+            piece.debris.clone(),
+            collider,
+            friction,
+            restitution,
+        ));
     }
 }
 
@@ -209,15 +230,9 @@ fn crumble(mut commands: Commands, time: Res<Time>, mut pieces: Query<(Entity, &
     }
 }
 
-/// A terrain that goes, or makes way for another one, takes along what fell from it.
-fn clear(
-    gone: On<Discard, Terrain>,
-    mut commands: Commands,
-    pieces: Query<(Entity, &Debris)>,
-    shaping: Query<(Entity, &Shaping)>,
-) {
-    let all = pieces.iter().chain(shaping.iter().map(|(entity, piece)| (entity, &piece.debris)));
-    for (entity, _) in all.filter(|(_, debris)| debris.terrain == gone.entity) {
-        commands.entity(entity).try_despawn();
+/// Despawns the pieces of a terrain that is removed or replaced.
+fn clear(gone: On<Discard, Terrain>, mut commands: Commands, terrains: Query<&TerrainDebris>) {
+    for piece in terrains.get(gone.entity).into_iter().flat_map(|pieces| pieces.iter()) {
+        commands.entity(piece).try_despawn();
     }
 }

@@ -1,4 +1,4 @@
-//! A terrain as bodies over it have it: does what they may reach soon have colliders?
+//! A terrain seen from bodies above it: whether the ground that they may soon reach has colliders.
 
 use bevy::math::bounding::{Aabb2d, AabbCast2d};
 use bevy::math::{Affine3A, Vec3A};
@@ -13,24 +13,24 @@ use crate::terrain::Terrain;
 /// How far ahead of a body ground must have colliders, in seconds: longer than any frame.
 pub(super) const AHEAD: f32 = 0.25;
 
-/// Bodies this far above all ground are not held, in metres beyond what they fall in [`AHEAD`].
+/// Bodies at least this far above all ground on their way are not held, in metres.
 const CLEARANCE: f32 = 4.0;
 
-/// How far apart the ground's height is asked on a body's way, in voxels, unless that makes more places than [`STOPS`].
+/// The distance between height samples on a body's way, in voxels, unless that takes more than [`STOPS`].
 const STRIDE: f32 = 2.0;
 
-/// Places on a body's way in which the ground's height is asked, at most, beyond the first.
+/// The most height samples on a body's way after the first.
 const STOPS: f32 = 16.0;
 
-/// A terrain, and the way from the world to it.
+/// A terrain and the transform from world space to its voxels.
 pub(super) struct TerrainFrame<'a> {
     pub terrain: Entity,
     pub model: &'a Terrain,
-    /// From the world to its voxels.
+    /// From world space to voxels.
     pub inverse: Affine3A,
-    /// Metres along a voxel's side.
+    /// The side of a voxel, in metres.
     pub size: f32,
-    /// Do its tiles and chunks show the world that it has now?
+    /// Whether its tiles and chunks show its current world.
     pub is_shown: bool,
 }
 
@@ -45,14 +45,14 @@ impl<'a> TerrainFrame<'a> {
         Self { terrain, model, inverse: place.affine().inverse(), size: voxel_size(place), is_shown }
     }
 
-    /// From a place to a column along x or z, whichever is farther, in voxels.
+    /// The distance from a place to a column along x or z, whichever is larger, in voxels.
     pub fn distance(&self, tile: TilePos, place: Vec2) -> f32 {
         let size = self.model.world().grid().size() as f32;
         let corner = Vec2::new(tile.x as f32, tile.z as f32) * size;
         (place - place.clamp(corner, corner + size)).abs().max_element()
     }
 
-    /// May a body whose box has its middle here reach ground without a collider soon?
+    /// Whether a body whose box is centred at `place` may soon reach ground without a collider.
     pub fn lacks_ground(&self, columns: &Columns, place: Vec3, velocity: Vec3, half: Vec3) -> bool {
         let grid = self.model.world().grid();
         let from = self.inverse.transform_point3(place);
@@ -72,12 +72,12 @@ impl<'a> TerrainFrame<'a> {
             let corner = Vec2::new(tile.x as f32, tile.z as f32) * grid.size() as f32;
             cast.aabb_collision_at(Aabb2d { min: corner, max: corner + grid.size() as f32 }).is_some()
         };
-        // Its front is farther ahead than its middle.
+        // The front of the box is ahead of its middle.
         let way = way + way.normalize_or_zero() * half.xz().length();
         missing.any(meets) && self.is_low(from, way, low.y)
     }
 
-    /// The columns below a box that wait for colliders.
+    /// The columns below a box that miss colliders.
     fn missing(&self, columns: &Columns, low: Vec3, high: Vec3) -> impl Iterator<Item = TilePos> {
         let grid = self.model.world().grid();
         let (first, last) = (low.floor().as_ivec3(), high.floor().as_ivec3());
@@ -85,17 +85,17 @@ impl<'a> TerrainFrame<'a> {
             Column::new(first.x.max(0), first.z.max(0)),
             Column::new(last.x.min(grid.width() - 1), last.z.min(grid.depth() - 1)),
         );
-        // A body that is off the terrain has nothing to wait for.
+        // Beside the terrain there is nothing to wait for.
         let is_over = first.x <= last.x && first.z <= last.z;
         let tiles = is_over.then(|| (grid.tile_of_cell(first), grid.tile_of_cell(last)));
         let tiles = tiles.into_iter().flat_map(|(first, last)| {
             (first.z..=last.z).flat_map(move |z| (first.x..=last.x).map(move |x| TilePos { x, z }))
         });
-        // Where the game took the tile away, nothing is to come any more.
+        // A column without a tile is loading, or the game despawned it.
         tiles.filter(move |&tile| !columns.is_ready((self.terrain, tile)).unwrap_or(self.is_shown))
     }
 
-    /// Is its lowest point near the ground somewhere on its way, or under some of it?
+    /// Whether its lowest point comes near or below the ground somewhere on its way.
     fn is_low(&self, from: Vec2, way: Vec2, low: f32) -> bool {
         let world = self.model.world();
         let end = Vec2::new(world.grid().width() as f32, world.grid().depth() as f32);

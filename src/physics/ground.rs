@@ -5,47 +5,45 @@ use bevy::prelude::*;
 
 use crate::terrain::Drawn;
 
-/// A tile's or chunk's collider: on the entity of the tile or chunk, while it has one.
+/// Marks a tile or chunk whose collider was made. The collider is on a child with a [`GroundBody`]; a surface without
+/// triangles has none.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct GroundCollider {
-    /// The entity with the [`Collider`], a child of this one; `None` for a surface without triangles.
-    #[entities]
-    pub body: Option<Entity>,
-    /// The revision of the world that it was made from.
+    /// The revision of the world that the collider was made from.
     pub revision: u64,
 }
 
-/// The body of a tile or chunk: on the entity with the [`Collider`], which stays at the origin of its parent.
+/// The static body of a tile or chunk. It is on the entity with the [`Collider`], a child of the tile or chunk that stays
+/// at its parent's origin.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
+#[require(RigidBody::Static)]
 pub struct GroundBody {
     /// The terrain's entity.
     pub terrain: Entity,
-    /// The tile's or chunk's entity.
-    pub part: Entity,
-    /// Which tile or chunk that is.
+    /// Which tile or chunk of the terrain it is.
     pub drawn: Drawn,
 }
 
-/// What ground is to bodies. A change counts for each collider from when it is made, or made anew because its ground
-/// changed; what a game puts on a [`GroundBody`] itself stays until then.
+/// The contact properties of ground. A change applies to each collider when it is next made; components that a game
+/// inserts on a [`GroundBody`] itself stay until then.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct GroundContact {
-    /// How slippery it is; `None` for avian's `DefaultFriction`.
+    /// The friction; `None` for avian's `DefaultFriction`.
     pub friction: Option<Friction>,
-    /// How bouncy it is; `None` for avian's `DefaultRestitution`.
+    /// The restitution; `None` for avian's `DefaultRestitution`.
     pub restitution: Option<Restitution>,
-    /// What collides with it.
+    /// The collision layers.
     pub layers: CollisionLayers,
 }
 
-/// The contact that a body of ground was given last.
+/// The [`GroundContact`] that was last applied to a body.
 #[derive(Component)]
 struct Applied(GroundContact);
 
 impl GroundContact {
-    /// Gives a body of ground these components, unless it was given the same before: what a game put on that body itself stays.
+    /// Inserts these components on a body, unless the same ones were inserted last: the game's own components stay.
     pub(super) fn apply(self, body: &mut EntityWorldMut) {
         if body.get::<Applied>().is_none_or(|applied| applied.0 != self) {
             body.insert(self.layers);
@@ -56,7 +54,7 @@ impl GroundContact {
     }
 }
 
-/// Puts a component on, or takes it off.
+/// Inserts or removes a component.
 fn set<C: Component>(body: &mut EntityWorldMut, component: Option<C>) {
     match component {
         Some(component) => body.insert(component),

@@ -1,4 +1,4 @@
-//! Bodies over ground that has no collider yet are held, so that they do not fall through it.
+//! Holds bodies over ground that has no collider yet, so that they do not fall through it.
 
 use avian3d::physics_transform::PhysicsTransformConfig;
 use avian3d::prelude::*;
@@ -15,48 +15,49 @@ use crate::lattice::ChunkGrid;
 use crate::plugin::TerrainEntities;
 use crate::terrain::Terrain;
 
-/// This body stands still until the ground under it has colliders: it is over a terrain that loads, or farther from all
-/// [`ColliderSource`]s than their radius.
+/// Marks a body that is held still until the ground below it has colliders, because the terrain is loading or the body is
+/// outside the radius of every [`ColliderSource`].
 ///
-/// The plugin puts it on dynamic bodies, whose axes it locks, and on [`Character`](super::Character)s, and takes it away
-/// again. Bodies high above the ground are not held, and neither are those that ground lets through: sensors, and what its
-/// [layers](super::GroundContact::layers) do not meet.
+/// The plugin inserts it on dynamic bodies, whose axes it locks, and on [`Character`](super::Character)s, and removes it
+/// again. Bodies high above the ground are not held, nor are those that do not collide with it: sensors, and bodies on other
+/// [layers](super::GroundContact::layers).
 ///
-/// The body goes on with the velocity that it had, and with its axes locked as they were, whoever takes this away. What a
-/// game changes meanwhile counts: `LockedAxes`, and a velocity that is not zero, are kept for then. To stop a held body, set
-/// the velocity here.
+/// When it is removed, by the plugin or by the game, the body gets back its velocity and its `LockedAxes`. If a game
+/// changes `LockedAxes` or sets a non-zero velocity while the body is held, those are used instead. To stop a held body, set
+/// the velocity in this component.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default)]
 #[reflect(Component, Default)]
 pub struct HeldByGround {
-    /// The velocity that it goes on with, in metres per second. Not for characters, which have a motion of their own.
+    /// The velocity after release, in metres per second. Unused for characters, which have a
+    /// [`CharacterMotion`](super::CharacterMotion).
     pub velocity: Vec3,
-    /// The angular velocity that it goes on with, in radians per second.
+    /// The angular velocity after release, in radians per second.
     pub spin: Vec3,
-    /// Are all axes locked, because it is held?
+    /// Whether the plugin locked all axes.
     is_locked: bool,
-    /// What would be locked otherwise.
+    /// The axes locked after release.
     locked: Option<LockedAxes>,
 }
 
 impl HeldByGround {
-    /// The velocity that was taken away from it, if one was.
+    /// The velocity after release, for a body whose axes are locked.
     pub(super) fn stopped(&self) -> Option<Vec3> {
         self.is_locked.then_some(self.velocity)
     }
 
-    /// Locks all axes, and remembers what was locked.
+    /// Locks all axes and stores which ones were locked.
     fn lock(&mut self, locked: Option<&LockedAxes>, entity: &mut EntityCommands) {
         (self.is_locked, self.locked) = (true, locked.copied());
         entity.try_insert(LockedAxes::ALL_LOCKED);
     }
 }
 
-/// Are all axes locked?
+/// Whether all axes are locked.
 fn locks_all(locked: Option<&LockedAxes>) -> bool {
     locked.is_some_and(|locked| locked.to_bits() == LockedAxes::ALL_LOCKED.to_bits())
 }
 
-/// A body as it can be held.
+/// A body that may be held.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(super) struct Body {
@@ -74,26 +75,26 @@ pub(super) struct Body {
 }
 
 impl BodyItem<'_, '_> {
-    /// Does it move by what holding takes away: forces and steering?
+    /// Whether holding stops it: it moves by forces or steering.
     fn can_be_held(&self) -> bool {
         self.kind.is_dynamic() || self.extent.is_character
     }
 
-    /// Does it lie where it lay, held or not?
+    /// Whether it sleeps where it was, and its hold is unchanged.
     fn rests(&self) -> bool {
-        let is_put = self.transform.as_ref().is_some_and(DetectChanges::is_changed);
-        let is_moved = is_put || self.position.is_changed() || self.velocity.is_changed();
-        let is_firm =
+        let is_placed = self.transform.as_ref().is_some_and(DetectChanges::is_changed);
+        let is_moved = is_placed || self.position.is_changed() || self.velocity.is_changed();
+        let is_unchanged =
             |hold: &Mut<HeldByGround>| !hold.is_changed() && hold.is_locked && locks_all(self.locked);
-        self.sleeps && !is_moved && self.hold.as_ref().is_none_or(is_firm)
+        self.sleeps && !is_moved && self.hold.as_ref().is_none_or(is_unchanged)
     }
 
-    /// How far it would go before ground has to have colliders, in metres; nowhere, unless it is held.
-    fn longing(&self) -> f32 {
+    /// How far a held body would move within [`AHEAD`] of its release, in metres; 0 for others.
+    fn travel(&self) -> f32 {
         self.hold.as_ref().map_or(0.0, |hold| hold.velocity.length() * AHEAD)
     }
 
-    /// Holds it, or holds on to it: what the game changed since is kept for later.
+    /// Holds it. If it is held already, changes by the game are stored for its release.
     fn hold(&mut self, commands: &mut Commands) {
         let (velocity, spin) = (self.velocity.0, self.spin.0);
         let mut entity = commands.entity(self.entity);
@@ -120,7 +121,7 @@ impl BodyItem<'_, '_> {
         }
     }
 
-    /// Lets go of it, if it is held.
+    /// Releases it if it is held.
     fn release(&self, commands: &mut Commands) {
         if self.hold.is_some() {
             commands.entity(self.entity).try_remove::<HeldByGround>();
@@ -128,8 +129,8 @@ impl BodyItem<'_, '_> {
     }
 }
 
-/// A body that is not held any more goes on as it was, whoever let go of it.
-pub(super) fn go_on(
+/// Restores the motion of a body that is no longer held.
+pub(super) fn restore_motion(
     gone: On<Remove, HeldByGround>,
     mut bodies: Query<(
         &HeldByGround,
@@ -144,14 +145,13 @@ pub(super) fn go_on(
     if !hold.is_locked {
         return;
     }
-    // Only what falls is to go on falling.
     if kind.is_dynamic() {
-        // Told so by the change, avian wakes it.
+        // The change wakes it.
         let or = |now: Vec3, then: Vec3| if now == Vec3::ZERO { then } else { now };
         velocity.0 = or(velocity.0, hold.velocity);
         spin.0 = or(spin.0, hold.spin);
     }
-    // Others are the game's own already.
+    // Otherwise the game changed them.
     if locks_all(locked) {
         let mut entity = commands.entity(gone.entity);
         match hold.locked {
@@ -161,9 +161,9 @@ pub(super) fn go_on(
     }
 }
 
-/// What of a terrain decides on bodies that rest: while all of it stays, they need no look.
+/// The state of a terrain that holding depends on. While it is unchanged, bodies at rest are not checked again.
 #[derive(PartialEq)]
-pub(super) struct Standing {
+pub(super) struct TerrainState {
     terrain: Entity,
     inverse: Affine3A,
     is_shown: bool,
@@ -171,7 +171,7 @@ pub(super) struct Standing {
     ground: u64,
 }
 
-impl Standing {
+impl TerrainState {
     fn of(frame: &TerrainFrame) -> Self {
         let TerrainFrame { terrain, model, inverse, is_shown, .. } = *frame;
         let (grid, ground) = (model.world().grid(), model.world().ground().hash());
@@ -179,38 +179,38 @@ impl Standing {
     }
 }
 
-/// What bodies are judged by in a frame.
-struct Judge<'a, 'w, 's> {
+/// Decides which bodies are held in a frame.
+struct HoldCheck<'a, 'w, 's> {
     frames: Vec<TerrainFrame<'a>>,
-    /// Do terrains stand as they stood in the last frame?
+    /// Whether all terrains are as in the last frame.
     are_same: bool,
     columns: &'a Columns,
-    /// Columns in which colliders came or went since the last frame.
-    turned: Vec<ColumnKey>,
+    /// Columns whose colliders changed since the last frame.
+    changed: Vec<ColumnKey>,
     places: &'a TransformHelper<'w, 's>,
-    /// Does physics take over where transforms put bodies?
+    /// Whether physics takes positions from transforms.
     follows_transform: bool,
 }
 
-impl Judge<'_, '_, '_> {
-    /// Is it not enough to know what a body was found to be in the last frame? Where colliders came or went near it, or near
-    /// where it was going, it is looked at even if it rests.
-    fn needs_a_look(&self, body: &BodyItem) -> bool {
-        !self.are_same || !body.rests() || self.has_turned_near(body)
+impl HoldCheck<'_, '_, '_> {
+    /// Whether the result of the last frame may be outdated.
+    fn must_check(&self, body: &BodyItem) -> bool {
+        !self.are_same || !body.rests() || self.has_changed_near(body)
     }
 
-    fn has_turned_near(&self, body: &BodyItem) -> bool {
-        let has_turned = |frame: &TerrainFrame| {
-            // Some voxels more than it reaches, for its residual speed.
-            let reach = (FARTHEST.x + body.longing()) / frame.size + 4.0;
+    /// Whether colliders changed near the body, or near where it was going.
+    fn has_changed_near(&self, body: &BodyItem) -> bool {
+        let has_changed = |frame: &TerrainFrame| {
+            // A sleeping body may have some residual speed: hence 4 voxels more.
+            let reach = (FARTHEST.x + body.travel()) / frame.size + 4.0;
             let place = frame.inverse.transform_point3(body.position.0).xz();
             let is_near = |tile| frame.distance(tile, place) <= reach;
-            self.turned.iter().any(|&(terrain, tile)| terrain == frame.terrain && is_near(tile))
+            self.changed.iter().any(|&(terrain, tile)| terrain == frame.terrain && is_near(tile))
         };
-        !self.turned.is_empty() && self.frames.iter().any(has_turned)
+        !self.changed.is_empty() && self.frames.iter().any(has_changed)
     }
 
-    /// May a body that reaches so far come to ground without a collider soon?
+    /// Whether a body of this extent may soon reach ground without a collider.
     fn lacks_ground(&self, body: &BodyItem, reach: Reach) -> bool {
         let (middle, half) = (reach.middle(), reach.half());
         let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
@@ -219,11 +219,11 @@ impl Judge<'_, '_, '_> {
                 |frame: &TerrainFrame| frame.lacks_ground(self.columns, place + middle, towards, half);
             self.frames.iter().any(lacks)
         };
-        lacks_ground_at(body.position.0) || self.put(body).is_some_and(lacks_ground_at)
+        lacks_ground_at(body.position.0) || self.placed(body).is_some_and(lacks_ground_at)
     }
 
-    /// Where a game has just put a body: physics will have it there in its next step.
-    fn put(&self, body: &BodyItem) -> Option<Vec3> {
+    /// Where a game has just moved the body by its transform. Physics takes that over in its next step.
+    fn placed(&self, body: &BodyItem) -> Option<Vec3> {
         if !self.follows_transform {
             return None;
         }
@@ -235,8 +235,8 @@ impl Judge<'_, '_, '_> {
     }
 }
 
-/// Holds bodies and lets them go.
-pub(super) fn hold(
+/// Holds bodies and releases them.
+pub(super) fn hold_bodies(
     mut commands: Commands,
     mut bodies: Query<Body, Without<super::GroundBody>>,
     places: TransformHelper,
@@ -245,7 +245,7 @@ pub(super) fn hold(
     sources: Query<(), With<ColliderSource>>,
     mut columns: ResMut<Columns>,
     solids: Solids,
-    mut known: Local<Vec<Standing>>,
+    mut known: Local<Vec<TerrainState>>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
@@ -256,21 +256,22 @@ pub(super) fn hold(
             Some(TerrainFrame::new(entity, model, entities, &place))
         })
         .collect();
-    let standing: Vec<Standing> = frames.iter().map(Standing::of).collect();
-    let are_same = *known == standing;
-    *known = standing;
-    let turned = columns.take_turned();
+    let states: Vec<TerrainState> = frames.iter().map(TerrainState::of).collect();
+    let are_same = *known == states;
+    *known = states;
+    let changed = columns.take_changed();
     let follows_transform = config.is_none_or(|config| config.transform_to_position);
-    let judge = Judge { frames, are_same, columns: &columns, turned, places: &places, follows_transform };
+    let check =
+        HoldCheck { frames, are_same, columns: &columns, changed, places: &places, follows_transform };
     let mut held = 0;
     for mut body in &mut bodies {
-        let needs_a_look = judge.needs_a_look(&body);
-        if !needs_a_look && body.hold.is_none() {
+        let must_check = check.must_check(&body);
+        if !must_check && body.hold.is_none() {
             continue;
         }
         let reach = if body.can_be_held() { solids.reach(&body.extent) } else { None };
-        // One that is not looked at is held as before.
-        if reach.is_some_and(|reach| !needs_a_look || judge.lacks_ground(&body, reach)) {
+        // Without a check, a held body stays held.
+        if reach.is_some_and(|reach| !must_check || check.lacks_ground(&body, reach)) {
             held += 1;
             body.hold(&mut commands);
         } else {
@@ -280,7 +281,7 @@ pub(super) fn hold(
     figures.held = held;
     if held > 0 && sources.is_empty() {
         warn_once!(
-            "bodies over a terrain are held still: there is no ColliderSource, so ground has no colliders"
+            "bodies above a terrain are held: the ground has no colliders, since no entity has a ColliderSource"
         );
     }
     figures.main_thread += start.elapsed();

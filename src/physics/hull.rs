@@ -6,16 +6,16 @@ use bevy::math::Vec3;
 use crate::lattice::SNAP;
 use crate::surface::SurfaceMesh;
 
-/// How much of its hull a piece may lack, as a share, to be taken for convex.
+/// The largest share of its hull that a piece may lack to count as convex.
 const HOLLOW: f32 = 0.25;
 
-/// Cells along the longest side by which a piece that is not convex is cut into convex ones.
+/// Cells along the longest side for the convex decomposition of other pieces.
 const RESOLUTION: u32 = 24;
 
-/// A collider for a body that a loose piece of ground becomes: its convex hull, or several hulls where one would be far
-/// from it. In metres from the origin of the piece's mesh, which must be closed; `None` for a piece without volume.
+/// A collider for a loose piece of ground: its convex hull, or a convex decomposition for concave pieces. In metres from the
+/// origin of the piece's mesh, which must be closed; `None` for a piece without volume.
 ///
-/// It takes milliseconds, and tens of them for a large piece that is not convex: call it in a task.
+/// It takes milliseconds, or tens of them for a large concave piece, so call it in a task.
 pub fn debris_collider(piece: &SurfaceMesh, voxel_size: f32) -> Option<Collider> {
     let scale = voxel_size / SNAP as f32;
     let vertices: Vec<Vec3> = piece.vertices.iter().map(|vertex| vertex.position.as_vec3() * scale).collect();

@@ -1,4 +1,4 @@
-//! Ground for [avian](https://docs.rs/avian3d): colliders of tiles and chunks, and a body that walks on them.
+//! Physics with [avian](https://docs.rs/avian3d): colliders for tiles and chunks, and a character that walks on them.
 //!
 //! ```no_run
 //! use avian3d::prelude::*;
@@ -16,39 +16,35 @@
 //!     .run();
 //! ```
 //!
-//! # What is where
+//! # Overview
 //!
-//! | a game wants | it uses |
+//! | for | use |
 //! | --- | --- |
-//! | ground that can be stood on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on whatever moves about |
+//! | ground to stand on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on everything that moves about |
 //! | a first-person body | [`Character`], steered by [`CharacterSteering`], moved by [`CharacterPlugin`] |
-//! | ground that breaks off to fall | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of its own |
-//! | to know whose collider was hit | [`GroundBody`] on the collider's entity |
-//! | to know what goes on | [`PhysicsFigures`] |
+//! | ground that breaks off and falls | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of your own |
+//! | finding the terrain of a collider that was hit | [`GroundBody`] on the collider's entity |
+//! | live figures | [`PhysicsFigures`] |
 //!
-//! # What holds
+//! # Guarantees
 //!
-//! - **One commit.** A collider is made from the same arrays as the mesh, in the same task, and swapped in the same frame.
-//!   It has exactly the triangles that are drawn: none where the tile is dug away, none twice. Servers without meshes have
-//!   the same colliders. Only where a source comes while a transaction is under way does the collider follow a task later.
-//!   A terrain may be moved and turned: before each step its colliders are put where its tiles and chunks are.
-//! - **No bump.** Triangles know their neighbours, those of other tiles and chunks included, see [`GroundShape`]; a body
-//!   that rolls over a border or a seam feels the surface, and not where it is cut.
-//! - **Nothing falls through.** An old collider stays until the new one takes its place; a collider that was made from an
-//!   older world than the one that is shown is thrown away. Colliders are made within the radius of a source, and where it
-//!   will be in a second. A body over ground that has no collider yet [is held](HeldByGround) until it has. Where a game
-//!   despawned the tile, there is nothing to wait for.
-//! - **Dug ground lets go.** Bodies that sleep where a surface changed, moved or went are woken. Bodies that were built over,
-//!   or get squeezed into the ground soon after it changed near them, are lifted to the nearest air above, for ground has
-//!   one side only; above is where the terrain's own y leads. So is whoever gets into the ground in another way, some
-//!   frames later. Sensors, bodies whose layers have nothing to do with the ground, and those that sleep or cannot move up
-//!   and down are left alone there.
+//! - **One commit.** A collider is built from the same arrays as the mesh, in the same task, and swapped in the same frame.
+//!   It has exactly the triangles that are drawn, each once. Servers without meshes have the same colliders. Only if a source
+//!   arrives during a transaction does the collider follow one task later. A terrain may move and rotate: its colliders are
+//!   moved to its tiles and chunks before each step.
+//! - **No bumps.** Triangles know their neighbours, including those of other tiles and chunks (see [`GroundShape`]), so a
+//!   body that rolls over a border or a seam does not feel it.
+//! - **Nothing falls through.** An old collider stays until the new one replaces it, and a collider that was built from an
+//!   outdated world is dropped. Colliders are made within the radius of a source, and around where it will be in a second. A
+//!   body over ground without a collider [is held](HeldByGround) until there is one. Where a game despawned the tile, bodies
+//!   fall.
+//! - **Dug ground releases bodies.** Sleeping bodies are woken where a surface changed, moved or disappeared. Bodies that
+//!   were built over, or are squeezed into the ground soon after it changed, are lifted to the nearest air above (along the
+//!   terrain's own y axis), since ground is one-sided. Bodies that get into the ground in another way are lifted some frames
+//!   later. Sensors, bodies on layers that ignore the ground, sleeping bodies and those locked along y are left alone.
 //!
-//! Avian optimises its trees in tasks on the pool that also runs transactions, and waits for them: a large transaction
-//! would stop the simulation. The plugin turns that off, unless the game set `ColliderTreeOptimization` otherwise.
-//!
-//! Bodies are ordinary bodies of avian, and ground is `RigidBody::Static`. Put `Friction`, `CollisionLayers` and the like
-//! into [`GroundContact`].
+//! Bodies are ordinary avian bodies, and ground is `RigidBody::Static`. [`GroundContact`] sets its `Friction`,
+//! `Restitution` and `CollisionLayers`.
 
 mod character;
 mod character_plugin;
@@ -70,7 +66,7 @@ mod walking;
 
 pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};
-pub use debris::{Debris, DebrisCrumbled, DebrisPlugin, DebrisSettings};
+pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
 pub use ground::{GroundBody, GroundCollider, GroundContact};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
@@ -85,72 +81,69 @@ use bevy::prelude::*;
 
 use crate::plugin::{BurrowSystems, SurfaceProcessors};
 
-/// Colliders for terrains. Needs avian's `PhysicsPlugins`, and the crate's own `BurrowPlugins`.
+/// Colliders for terrains. Requires avian's `PhysicsPlugins` and the crate's `BurrowPlugins`.
 ///
-/// Avian has to run in `FixedPostUpdate`, where `PhysicsPlugins::default()` puts it: what the plugin does before and after a
-/// step is in `FixedPreUpdate` and `FixedPostUpdate`, see [`TerrainPhysicsSystems`]. With `PhysicsPlugins::new` and another
-/// schedule, colliders would follow a terrain that moves, and bodies would be lifted, at other times than steps are taken: an
-/// error says so.
+/// Avian must run in `FixedPostUpdate`, where `PhysicsPlugins::default()` puts it, since this plugin's systems run right
+/// before and after its steps (see [`TerrainPhysicsSystems`]). With another schedule, colliders follow moving terrains late
+/// and bodies are lifted late; an error is logged.
 #[derive(Default)]
 pub struct TerrainPhysicsPlugin;
 
-/// What the plugin does, in this order.
+/// The plugin's systems, in the order in which they run.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TerrainPhysicsSystems {
-    /// In `Update`: where colliders are wanted.
+    /// In `Update`: finds where colliders are wanted.
     Near,
-    /// In `Update`, after commits: colliders that are missing are made in tasks, those far away removed.
+    /// In `Update`, after commits: starts tasks for missing colliders and removes those far from all sources.
     Upkeep,
-    /// In `PostUpdate`: bodies over ground without colliders are held, others let go.
+    /// In `PostUpdate`: holds bodies over ground without colliders and releases others.
     Hold,
-    /// In `FixedPreUpdate`, before a frame's first step: bodies where ground changed are woken, and lifted out of it, and so
-    /// are others that are in it. In `FixedPostUpdate`, after its last step, those that were pushed into the ground are
-    /// lifted too.
+    /// In `FixedPreUpdate`, before a frame's first step: wakes bodies where ground changed and lifts buried ones. In
+    /// `FixedPostUpdate`, after the frame's last step: lifts bodies that the steps pushed into the ground.
     Wake,
-    /// In `FixedPostUpdate`, before a step: colliders are put where their tiles and chunks are.
+    /// In `FixedPostUpdate`, before each step: moves colliders to their tiles and chunks.
     Follow,
 }
 
-/// What the plugin has, and did lately.
+/// Live figures of the plugin.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct PhysicsFigures {
     /// Tiles and chunks that have a collider.
     pub colliders: usize,
-    /// Tiles and chunks that wait for one.
+    /// Tiles and chunks that still need one.
     pub missing: usize,
-    /// Colliders swapped in so far, with commits and without.
+    /// Colliders swapped in so far.
     pub swaps: u64,
-    /// Colliders that came too late, for their surface had changed again.
+    /// Colliders dropped because their surface had changed again.
     pub stale: u64,
-    /// Tiles and chunks looked at so far, because something happened to them or a source came near or left.
+    /// Tiles and chunks checked so far, because they changed or a source arrived or left.
     pub looked_at: u64,
-    /// Tiles and chunks that changed, moved or went, and that bodies have not been told of yet.
+    /// Tiles and chunks that changed since bodies were last woken.
     pub changes: usize,
-    /// Bodies that are held.
+    /// Bodies being held.
     pub held: usize,
     /// Bodies woken so far.
     pub woken: u64,
     /// Bodies lifted out of the ground so far.
     pub lifted: u64,
-    /// What all of this took on the main thread since the frame began, but for colliders that came with commits, which
-    /// count there.
+    /// Time spent on the main thread in this frame. Colliders that are swapped in with commits count as part of those.
     pub main_thread: Duration,
 }
 
 impl Plugin for TerrainPhysicsPlugin {
     fn build(&self, app: &mut App) {
-        let grounds = colliders::Grounds::default();
+        let colliders = colliders::GroundColliders::default();
         app.init_resource::<SurfaceProcessors>()
             .init_resource::<PhysicsFigures>()
             .init_resource::<GroundContact>()
-            .init_resource::<IsAroundSteps>()
+            .init_resource::<InFixedPostUpdate>()
             .init_resource::<wake::GroundChanges>()
-            .init_resource::<wake::Watched>()
-            .init_resource::<upkeep::Work>()
+            .init_resource::<wake::WatchedBodies>()
+            .init_resource::<upkeep::ColliderTasks>()
             .init_resource::<columns::Columns>();
-        app.world_mut().resource_mut::<SurfaceProcessors>().add(grounds.clone());
-        app.insert_resource(grounds)
+        app.world_mut().resource_mut::<SurfaceProcessors>().add(colliders.clone());
+        app.insert_resource(colliders)
             .configure_sets(
                 Update,
                 (
@@ -159,16 +152,19 @@ impl Plugin for TerrainPhysicsPlugin {
                 ),
             )
             .add_observer(colliders::forget)
-            .add_observer(hold::go_on)
-            .add_observer(columns::note_new)
-            .add_observer(columns::note_gone)
+            .add_observer(hold::restore_motion)
+            .add_observer(columns::record_insert)
+            .add_observer(columns::record_remove)
             .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
             .add_systems(Update, sources::find_near.in_set(TerrainPhysicsSystems::Near))
-            .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))
-            .add_systems(PostUpdate, hold::hold.in_set(TerrainPhysicsSystems::Hold))
+            .add_systems(
+                Update,
+                (upkeep::finish, upkeep::update).chain().in_set(TerrainPhysicsSystems::Upkeep),
+            )
+            .add_systems(PostUpdate, hold::hold_bodies.in_set(TerrainPhysicsSystems::Hold))
             .add_systems(
                 FixedPreUpdate,
-                (wake::wake, wake::patrol, wake::rescue_before)
+                (wake::wake, wake::find_buried, wake::lift_before_steps)
                     .chain()
                     .run_if(wake::is_first_step)
                     .in_set(TerrainPhysicsSystems::Wake),
@@ -181,14 +177,14 @@ impl Plugin for TerrainPhysicsPlugin {
                         .after(PhysicsTransformSystems::Propagate)
                         .before(PhysicsTransformSystems::TransformToPosition)
                         .in_set(TerrainPhysicsSystems::Follow),
-                    colliders::stay
+                    colliders::reset_to_parent
                         .in_set(PhysicsSystems::Writeback)
                         .after(PhysicsTransformSystems::PositionToTransform),
-                    wake::rescue_after
+                    wake::lift_after_steps
                         .run_if(wake::is_last_step)
                         .after(PhysicsSystems::Last)
                         .in_set(TerrainPhysicsSystems::Wake),
-                    (come_to_steps.before(PhysicsSystems::First), leave_steps.after(PhysicsSystems::Last))
+                    (enter_steps.before(PhysicsSystems::First), leave_steps.after(PhysicsSystems::Last))
                         .chain(),
                 ),
             )
@@ -196,23 +192,23 @@ impl Plugin for TerrainPhysicsPlugin {
     }
 }
 
-/// Is avian's schedule the one that the plugin works around?
+/// Set while `FixedPostUpdate` runs avian's systems.
 #[derive(Resource, Default)]
-struct IsAroundSteps(bool);
+struct InFixedPostUpdate(bool);
 
-fn come_to_steps(mut is_around: ResMut<IsAroundSteps>) {
-    is_around.0 = true;
+fn enter_steps(mut inside: ResMut<InFixedPostUpdate>) {
+    inside.0 = true;
 }
 
-fn leave_steps(mut is_around: ResMut<IsAroundSteps>) {
-    is_around.0 = false;
+fn leave_steps(mut inside: ResMut<InFixedPostUpdate>) {
+    inside.0 = false;
 }
 
-fn check_schedule(is_around: Res<IsAroundSteps>) {
-    if !is_around.0 {
+fn check_schedule(inside: Res<InFixedPostUpdate>) {
+    if !inside.0 {
         error_once!(
-            "avian took a step outside `FixedPostUpdate`: colliders of terrains may follow late, and bodies may not be lifted \
-             out of the ground. Unless the game takes such steps by itself, add `PhysicsPlugins::default()`"
+            "avian took a step outside `FixedPostUpdate`: colliders may follow moving terrains late, and buried bodies may not \
+             be lifted. Add `PhysicsPlugins::default()`, unless the game runs such steps itself"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! The shape of a tile's or chunk's ground, as avian's collisions see it.
+//! The collision shape of a tile or chunk.
 
 use avian3d::parry::bounding_volume::{Aabb, BoundingSphere};
 use avian3d::parry::mass_properties::MassProperties;
@@ -14,28 +14,28 @@ use super::cone::NormalCone;
 use crate::lattice::SNAP;
 use crate::surface::SurfaceMesh;
 
-/// A triangle mesh whose triangles know their neighbours, those in other tiles and chunks included.
+/// A triangle mesh whose triangles know their neighbours, including those in other tiles and chunks.
 ///
-/// Triangles are exactly those that are drawn, in metres from the part's origin. Within the mesh a triangle's neighbours
-/// are known; across its border stands what the vertices' normals say of them, which both sides share bit by bit. So no
-/// mesh has to be made again because another one changed, and no border is felt.
+/// The triangles are exactly those that are drawn, in metres from the part's origin. Within the mesh, neighbours are looked
+/// up. Across its border, their normals are derived from the vertex normals, which are bit-equal on both sides. So bodies do
+/// not feel the border, and no mesh has to be rebuilt because another one changed.
 ///
-/// All of that is scaled with it. But avian 0.7 itself scales what looks like a mesh as a plain mesh: below a parent with a
-/// scale, ground has bumps, and a second side.
+/// Below a parent with a scale, avian 0.7 replaces the shape by a plain triangle mesh, so such ground has bumps and two
+/// sides.
 #[derive(Clone, Debug)]
 pub struct GroundShape {
     mesh: TriMesh,
-    /// For each triangle, the neighbours over its sides: a triangle's number, or a number from [`BORDER`] on.
+    /// For each triangle, the neighbours across its sides: a triangle's number, or [`BORDER`] plus an index of `beyond`.
     neighbours: Vec<[u32; 3]>,
     /// Normals of the ground across the border.
     beyond: Vec<Vector>,
 }
 
-/// From here on, numbers of neighbours count [`GroundShape::beyond`].
+/// Neighbours from here on are indices of [`GroundShape::beyond`].
 const BORDER: u32 = 1 << 31;
 
 impl GroundShape {
-    /// The shape of a surface, in metres; `None` where it has no triangles with an area.
+    /// The shape of a surface, in metres; `None` if it has no triangles with an area.
     pub fn new(surface: &SurfaceMesh, voxel_size: f32) -> Option<Self> {
         let welded = Welded::new(surface);
         let scale = voxel_size / SNAP as f32;
@@ -45,7 +45,7 @@ impl GroundShape {
         Some(Self { mesh, neighbours, beyond })
     }
 
-    /// How many triangles there are.
+    /// The number of triangles.
     pub fn triangles(&self) -> usize {
         self.neighbours.len()
     }
@@ -57,8 +57,7 @@ impl GroundShape {
             + size_of_val(self.beyond.as_slice())
     }
 
-    /// The box around all triangles that only one of two shapes has, in metres from the origin; `None` where they are
-    /// alike.
+    /// The box around all triangles that only one of two shapes has, in metres from the origin; `None` if they are equal.
     pub(super) fn difference(old: Option<&Self>, new: Option<&Self>) -> Option<(Vec3, Vec3)> {
         type Corners = [[u32; 3]; 3];
         let corners = |shape: &Self, triangle: usize| -> Corners {
@@ -139,7 +138,7 @@ impl Welded {
         Self { places, normals, triangles }
     }
 
-    /// Who lies across each triangle's sides, and the normals across the border.
+    /// The neighbours across each triangle's sides, and the normals across the border.
     fn neighbours(&self, vertices: &[Vector]) -> (Vec<[u32; 3]>, Vec<Vector>) {
         let sides = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
         let mut owners: FxHashMap<(u32, u32), u32> = FxHashMap::default();
@@ -159,13 +158,13 @@ impl Welded {
         (neighbours.collect(), beyond)
     }
 
-    /// The normal across a border: that of the triangle, mirrored at what the vertices say of the edge.
+    /// The normal across a border: the triangle's own, mirrored at the edge's normal as given by its vertices.
     fn across(&self, vertices: &[Vector], triangle: &[u32; 3], from: u32, to: u32) -> Vector {
         let [a, b, c] = triangle.map(|corner| vertices[corner as usize]);
         let face = (b - a).cross(c - a).normalize_or_zero();
         let along = (vertices[to as usize] - vertices[from as usize]).normalize_or_zero();
         let middle = self.normals[from as usize] + self.normals[to as usize];
-        // Across an edge normals only turn about the edge.
+        // Across an edge, normals only rotate about the edge.
         let middle = (middle - along * middle.dot(along)).normalize_or(face);
         middle * (2.0 * middle.dot(face)) - face
     }
@@ -178,7 +177,7 @@ impl CompositeShape for GroundShape {
         f: &mut dyn FnMut(Option<&Pose>, &dyn Shape, Option<&dyn NormalConstraints>),
     ) {
         let triangle = self.mesh.triangle(number);
-        // Too thin for a normal is too thin to stand on.
+        // Triangles too thin for a normal are skipped.
         if let Some(cone) = self.cone(number, &triangle) {
             f(None, &triangle, Some(&cone));
         }
@@ -224,7 +223,7 @@ impl Shape for GroundShape {
     }
 
     fn scale_dyn(&self, scale: Vector, _: u32) -> Option<Box<dyn Shape>> {
-        // Normals are stretched across.
+        // Normals scale inversely.
         let across = Vector::new(scale.y * scale.z, scale.z * scale.x, scale.x * scale.y);
         let beyond = self.beyond.iter().map(|normal| (normal * across).normalize_or_zero()).collect();
         let (mesh, neighbours) = (self.mesh.clone().scaled(scale), self.neighbours.clone());
@@ -235,12 +234,12 @@ impl Shape for GroundShape {
         MassProperties::new(Vector::ZERO, 0.0, Vector::ZERO)
     }
 
-    /// Not that of a mesh: by it collisions would look for a mesh's own idea of its neighbours.
+    /// Not `TriMesh`, for which collisions would use parry's own neighbour rules.
     fn shape_type(&self) -> ShapeType {
         ShapeType::Custom
     }
 
-    /// That of a mesh, for those who draw it.
+    /// A mesh, for debug drawing.
     fn as_typed_shape(&self) -> TypedShape<'_> {
         TypedShape::TriMesh(&self.mesh)
     }
@@ -267,8 +266,8 @@ mod tests {
     /// How steep the roof's slopes are: rise over run.
     const PITCH: f64 = 0.5;
 
-    /// For each triangle beside the ridge of a roof along x = `ridge`: its normal, and what it has for that of its neighbour
-    /// over the ridge. Chunks are 16 cells wide.
+    /// For each triangle at the ridge of a roof along x = `ridge`: its normal, and the one it assumes for its neighbour across
+    /// the ridge. Chunks are 16 cells wide.
     fn over_ridge(ridge: i32) -> Vec<(Vector, Vector)> {
         let height = |x: i32, _| 30.0 - PITCH * f64::from((x - ridge).abs());
         let ground = Ground::from_fn(32, 32, height).expect("valid");
@@ -292,9 +291,9 @@ mod tests {
     }
 
     #[test]
-    fn a_ridge_on_a_border_is_known_as_one_within_a_chunk_is() {
+    fn normals_across_a_border_equal_those_within_a_chunk() {
         let [within, border] = [8, 16].map(over_ridge);
-        // From both sides, cell by cell.
+        // Two triangles for each cell along the ridge.
         assert_eq!((within.len(), border.len()), (64, 64));
         for (face, beyond) in within.into_iter().chain(border) {
             let slope = Vector::new(PITCH as f32 * face.x.signum(), 1.0, 0.0).normalize();

@@ -1,5 +1,4 @@
-//! What of a body may be in the way of ground, and how far it reaches. Sensors are nowhere in the way, and neither is what
-//! the ground lets through.
+//! Which colliders of a body collide with ground, and how far the body reaches. Sensors and colliders on other layers do not.
 
 use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
@@ -9,13 +8,13 @@ use bevy::prelude::*;
 use super::character::Character;
 use super::ground::GroundContact;
 
-/// How far from its position a body reaches at most, in metres: boxes of what is fast are long.
+/// The largest distance that a body reaches from its position, in metres. Boxes of fast bodies are long.
 pub(super) const FARTHEST: Vec3 = Vec3::splat(8.0);
 
-/// How far into a collider the way through it begins, in metres: less than anything is thick.
+/// How far inside a collider a ray through it starts, in metres; less than any body's thickness.
 const SKIN: f32 = 1e-3;
 
-/// A collider as ground sees it.
+/// What decides whether a collider collides with ground.
 #[derive(QueryData)]
 pub(super) struct SolidCollider {
     bounds: Ref<'static, ColliderAabb>,
@@ -31,8 +30,9 @@ impl SolidColliderItem<'_, '_> {
         self.layers.copied().unwrap_or_default()
     }
 
-    /// How far a point is from this collider, for a body that is placed so; and a place inside the collider: the point
-    /// itself or, if it is outside, halfway through what is nearest to it, for right there a body may touch the ground.
+    /// The distance from a point to this collider, for a body at this position and rotation; and a place inside the
+    /// collider. That is the point itself, or, if it is outside, a place halfway through the nearest part, since the surface
+    /// itself may touch the ground.
     fn inside(&self, position: &Position, rotation: &Rotation, point: Vec3) -> Option<(f32, Vec3)> {
         let (shape, own) = (self.shape?, self.place.copied().unwrap_or_default());
         let (place, turn) = (position.0 + rotation * own.translation, *rotation * own.rotation);
@@ -59,7 +59,7 @@ pub(super) struct Extent {
 }
 
 impl ExtentItem<'_, '_> {
-    /// How far one of its colliders reaches.
+    /// The extent of one of its colliders.
     fn reach(&self, collider: &SolidColliderItem) -> Reach {
         let Some(position) = &self.position else { return Reach::UNKNOWN };
         let bounds = &collider.bounds;
@@ -67,7 +67,7 @@ impl ExtentItem<'_, '_> {
         if !(low.is_finite() && high.is_finite() && low.cmple(high).all()) {
             return Reach::UNKNOWN;
         }
-        // The box is as old as the last step. Whoever was put elsewhere since has it somewhere around.
+        // The box is that of the last step. If the body was moved since, its side is unknown.
         let is_put = position.is_changed_after(bounds.last_changed());
         let most = high.max(-low);
         let (low, high) = if is_put { (-most, most) } else { (low, high) };
@@ -75,7 +75,7 @@ impl ExtentItem<'_, '_> {
     }
 }
 
-/// How far a body reaches from its position along the axes of the world, in metres: lowest and highest corner.
+/// A body's bounding box relative to its position, along the axes of the world, in metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
     low: Vec3,
@@ -83,7 +83,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// That of a body whose collider, or whose collider's box, is still to come.
+    /// For a body whose collider, or the collider's box, does not exist yet.
     const UNKNOWN: Self = Self { low: Vec3::splat(-0.5), high: Vec3::splat(0.5) };
 
     fn merged(self, other: Self) -> Self {
@@ -100,13 +100,13 @@ impl Reach {
         (self.high - self.low) / 2.0
     }
 
-    /// How far it is to the box's farthest corner, along each axis.
+    /// The distance to the farthest corner along each axis.
     pub fn farthest(&self) -> Vec3 {
         self.low.abs().max(self.high.abs())
     }
 }
 
-/// Tells which colliders may be in the way of ground.
+/// Finds which colliders collide with ground.
 #[derive(SystemParam)]
 pub(super) struct Solids<'w, 's> {
     colliders: Query<'w, 's, SolidCollider>,
@@ -119,12 +119,12 @@ impl Solids<'_, '_> {
         !collider.is_sensor && !collider.is_disabled && self.ground.layers.interacts_with(collider.layers())
     }
 
-    /// The same for a walker, which looks for ground by itself: with its own collider, and where its filters say.
+    /// The same for a character, which finds ground by casting its own collider with its own filters.
     fn carries(&self, walker: &SolidColliderItem) -> bool {
         (walker.layers().filters & self.ground.layers.memberships) != LayerMask::NONE
     }
 
-    /// The box around those colliders of a body that may be in the way; `None` of a body that nothing moves.
+    /// The box around a body's colliders that collide with ground; `None` if there are none, or if the body is static.
     pub fn bounds(&self, entity: Entity, body: &RigidBody, own: &RigidBodyColliders) -> Option<ColliderAabb> {
         if !body.is_dynamic() && !self.characters.contains(entity) {
             return None;
@@ -133,8 +133,8 @@ impl Solids<'_, '_> {
         solid.map(|collider| *collider.bounds).reduce(|a, b| a.merged(b))
     }
 
-    /// A place inside those colliders of a body that may be in the way: its middle, if that is in one of them. The middle of
-    /// an arch is not, nor that of a ball which a game made heavy far below.
+    /// A place inside those colliders of a body that collide with ground: its middle, if one of them contains it. The middle
+    /// of an arch, for example, is outside.
     pub fn inside(
         &self,
         own: &RigidBodyColliders,
@@ -147,7 +147,7 @@ impl Solids<'_, '_> {
         places.min_by(|(a, _), (b, _)| a.total_cmp(b)).map_or(middle, |(_, place)| place)
     }
 
-    /// How far a body reaches with what may be in the way; `None` if ground lets all of it through.
+    /// The extent of a body's colliders that collide with ground; `None` if there are none.
     pub fn reach(&self, body: &ExtentItem) -> Option<Reach> {
         let all = body.all.map_or(&[][..], |all| &all[..]);
         let is_single = all.is_empty() || all == [body.entity];

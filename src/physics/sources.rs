@@ -5,26 +5,25 @@ use bevy::math::Vec3A;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use super::colliders::Grounds;
+use super::colliders::GroundColliders;
 use super::near::{Neighbourhood, ahead, stops, voxel_size};
 use super::solids::{Extent, Solids};
 use super::{HeldByGround, PhysicsFigures};
 use crate::terrain::Terrain;
 
-/// How far ahead of a source colliders are made, in seconds.
+/// How far ahead of a moving source colliders are made, in seconds.
 const AHEAD: f32 = 1.0;
 
-/// Ground around this entity has colliders, in all columns of chunks within its radius; elsewhere it has none.
+/// Ground has colliders in all columns of chunks within the radius of a source, and nowhere else.
 ///
-/// Put it on players and on whatever else needs ground. With a radius of `f32::INFINITY` all ground has colliders, wherever
-/// the entity is.
+/// Put it on players and on everything else that needs ground. With a radius of `f32::INFINITY` all ground has colliders.
 ///
-/// A source that comes to another voxel costs some time on the main thread for each column of chunks within its radius, and
-/// around each chunk's width of its way; one that reaches all of a terrain, only when it comes to another column. Each
-/// collider costs time in a task, and memory.
+/// A source that enters another voxel costs main-thread time for each column of chunks within its radius and on its way
+/// ahead; one that reaches the whole terrain does so only when it enters another column. Each collider costs time in a task,
+/// and memory.
 ///
-/// With a `LinearVelocity`, ground where it will be in a second, or on the next 64 chunks of its way, has colliders too.
-/// Bodies need not be sources: those too far from any are [held](super::HeldByGround).
+/// With a `LinearVelocity`, ground where the source will be in a second has colliders too, up to 64 chunks ahead. Bodies
+/// need not be sources: those too far from any are [held](super::HeldByGround).
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default)]
 #[require(Transform)]
@@ -39,9 +38,9 @@ impl Default for ColliderSource {
     }
 }
 
-/// Finds where sources are, for tasks to know.
+/// Finds where sources want colliders.
 pub(super) fn find_near(
-    grounds: Res<Grounds>,
+    colliders: Res<GroundColliders>,
     places: TransformHelper,
     terrains: Query<(Entity, &Terrain)>,
     sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
@@ -58,14 +57,14 @@ pub(super) fn find_near(
         let mut all = Vec::new();
         for (source, &ColliderSource { radius }, velocity, hold, extent) in &sources {
             let Ok(place) = places.compute_global_transform(source) else { continue };
-            // One that is held goes on as it came, once there is ground where it was going.
+            // A held body continues with the velocity that it had.
             let velocity = hold.and_then(HeldByGround::stopped).or(velocity.map(|velocity| velocity.0));
             let from = inverse.transform_point3(place.translation());
             let way = inverse.transform_vector3(velocity.unwrap_or_default() * AHEAD);
             if !(from.is_finite() && way.is_finite() && radius >= 0.0) {
                 continue;
             }
-            // No body is held for want of ground that it reaches itself.
+            // A source reaches at least its own size, or it could be held for ever.
             let reach = solids.reach(&extent).map_or(Vec3::ZERO, |reach| reach.farthest());
             let own = Vec3::from(inverse.matrix3.abs() * Vec3A::from(reach)).xz().length();
             all.extend(stops(grid, from.xz(), ahead(way, grid).xz(), (radius / size).max(own)));
@@ -73,7 +72,7 @@ pub(super) fn find_near(
         near.insert(terrain, grid, all, &known);
     }
     if !near.is(&known) {
-        grounds.set_near(near.clone());
+        colliders.set_near(near.clone());
         *known = near;
     }
     figures.main_thread += start.elapsed();

@@ -1,4 +1,4 @@
-//! Colliders that no commit brings: those of ground that a source comes near to, and those that it leaves behind.
+//! Adds colliders where a source arrives, and removes them where it leaves. Commits bring all others.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -8,41 +8,42 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::PhysicsFigures;
-use super::colliders::{Grounds, PreparedCollider, detach};
-use super::columns::{Columns, Look, Parts};
+use super::colliders::{BuiltCollider, GroundColliders, detach};
+use super::columns::{Columns, PartState, Parts};
+use super::ground::GroundBody;
 use super::near::Neighbourhood;
 use crate::plugin::{Part, TerrainEntities, ThreadTask, Threads};
 use crate::terrain::{SurfaceDraft, Terrain};
 
-/// Parts that one task makes colliders for: few, so that the nearest come soon.
+/// Colliders built by one task; few, so that the nearest ones are ready soon.
 const BATCH: usize = 16;
 
-/// How long a frame puts colliders in their places: at least one, and all of them while a body is held.
+/// Time in a frame for attaching colliders. At least one is attached, and all of them while a body is held.
 const FRAME_TIME: Duration = Duration::from_micros(150);
 
-/// The colliders under way.
+/// Colliders being built, and those to be attached.
 #[derive(Resource, Default)]
-pub(super) struct Work {
-    task: Option<ThreadTask<Vec<(Entity, PreparedCollider)>>>,
-    /// Done, and waiting for their frame.
-    done: VecDeque<(Entity, PreparedCollider)>,
+pub(super) struct ColliderTasks {
+    task: Option<ThreadTask<Vec<(Entity, BuiltCollider)>>>,
+    /// Built, but not attached yet.
+    done: VecDeque<(Entity, BuiltCollider)>,
 }
 
-/// Puts colliders that are done in their places.
-pub(super) fn finish(mut commands: Commands, mut work: ResMut<Work>) {
-    if let Some(done) = work.task.as_mut().and_then(ThreadTask::finish) {
-        (work.task, work.done) = (None, done.into());
+/// Attaches colliders that are built.
+pub(super) fn finish(mut commands: Commands, mut tasks: ResMut<ColliderTasks>) {
+    if let Some(done) = tasks.task.as_mut().and_then(ThreadTask::finish) {
+        (tasks.task, tasks.done) = (None, done.into());
     }
-    if !work.done.is_empty() {
-        commands.queue(place);
+    if !tasks.done.is_empty() {
+        commands.queue(attach);
     }
 }
 
-fn place(world: &mut World) {
+fn attach(world: &mut World) {
     let start = Instant::now();
-    while let Some((entity, prepared)) = world.resource_mut::<Work>().done.pop_front() {
+    while let Some((entity, collider)) = world.resource_mut::<ColliderTasks>().done.pop_front() {
         if let Ok(part) = world.get_entity_mut(entity) {
-            prepared.attach(part);
+            collider.attach(part);
         }
         if start.elapsed() >= FRAME_TIME && world.resource::<PhysicsFigures>().held == 0 {
             break;
@@ -51,31 +52,32 @@ fn place(world: &mut World) {
     world.resource_mut::<PhysicsFigures>().main_thread += start.elapsed();
 }
 
-/// Looks at the columns that something happened in, or that sources came to or left: removes colliders that are far from
-/// all sources, and starts to make those that are missing, the nearest first.
-pub(super) fn tend(
+/// Checks the columns that changed, or that sources entered or left. Removes colliders far from all sources, and starts to
+/// build missing ones, the nearest first.
+pub(super) fn update(
     mut commands: Commands,
-    grounds: Res<Grounds>,
+    colliders: Res<GroundColliders>,
     terrains: Query<(&Terrain, &TerrainEntities)>,
     parts: Parts,
     mut columns: ResMut<Columns>,
-    mut work: ResMut<Work>,
+    bodies: Query<(), With<GroundBody>>,
+    mut tasks: ResMut<ColliderTasks>,
     mut figures: ResMut<PhysicsFigures>,
     mut known: Local<Neighbourhood>,
 ) {
     let start = Instant::now();
-    let near = grounds.near();
-    let mut touched = columns.take_news(&parts);
+    let near = colliders.near();
+    let mut touched = columns.take_touched(&parts);
     if !near.is(&known) {
         near.changes(&known, |column| touched.extend([column]));
         *known = near;
     }
     for column in touched {
         let distance = known.distance(column);
-        // A little farther off than sources reach, what is dug out of a tile with a collider is to have one too.
+        // Slightly beyond a source's radius, a chunk in a hole of a tile with a collider needs its own.
         let has_colliders = columns.has_colliders(column);
-        let looked_at = columns.look(column, |part| {
-            let (shown, ground, ..) = parts.get(part).ok()?;
+        let checked = columns.check(column, |part| {
+            let (shown, ground, children, ..) = parts.get(part).ok()?;
             let is_outdated = ground.is_none_or(|ground| ground.revision < shown.revision);
             let goes = ground.is_some() && (distance.is_none() || is_outdated && shown.is_empty);
             if goes {
@@ -83,29 +85,30 @@ pub(super) fn tend(
             }
             let is_near = distance.is_some_and(|distance| distance <= 0.0 || has_colliders);
             let is_wanted = ground.is_some() || is_near;
-            Some(Look {
-                has_collider: !goes && ground.is_some_and(|ground| ground.body.is_some()),
+            let has_body = || children.is_some_and(|children| bodies.iter_many(children).next().is_some());
+            Some(PartState {
+                has_collider: !goes && has_body(),
                 is_missing: !goes && is_outdated && !shown.is_empty && is_wanted,
-                is_there: shown.is_empty || !goes && ground.is_some(),
+                is_ready: shown.is_empty || !goes && ground.is_some(),
             })
         });
-        figures.looked_at += looked_at as u64;
+        figures.looked_at += checked as u64;
     }
     (figures.colliders, figures.missing) = columns.counts();
-    if work.task.is_none() && work.done.is_empty() && figures.missing > 0 {
-        work.task = begin(&grounds, &terrains, &columns, &known);
+    if tasks.task.is_none() && tasks.done.is_empty() && figures.missing > 0 {
+        tasks.task = begin(&colliders, &terrains, &columns, &known);
     }
     figures.main_thread += start.elapsed();
 }
 
-/// Starts on the nearest of the missing colliders, all of one terrain. One whose world is not shown yet has to wait: its
-/// colliders would be of ground that nobody sees.
+/// Starts to build the nearest missing colliders, all of one terrain. A terrain whose current world is not shown yet has to
+/// wait, since its colliders would differ from what is drawn.
 fn begin(
-    grounds: &Grounds,
+    colliders: &GroundColliders,
     terrains: &Query<(&Terrain, &TerrainEntities)>,
     columns: &Columns,
     near: &Neighbourhood,
-) -> Option<ThreadTask<Vec<(Entity, PreparedCollider)>>> {
+) -> Option<ThreadTask<Vec<(Entity, BuiltCollider)>>> {
     let is_shown =
         |&terrain: &Entity| terrains.get(terrain).is_ok_and(|(model, entities)| entities.show(model.world()));
     let missing = columns.waiting().filter(is_shown).flat_map(|terrain| {
@@ -132,11 +135,11 @@ fn begin(
             (entity, part, world.draft(drawn))
         })
         .collect();
-    let grounds = grounds.clone();
+    let colliders = colliders.clone();
     Some(ThreadTask::start(Threads::Background, move || {
-        let prepare = |(entity, part, recipe): &(Entity, Part, SurfaceDraft)| {
-            (*entity, grounds.prepare(part, &recipe.surface()))
+        let build = |(entity, part, draft): &(Entity, Part, SurfaceDraft)| {
+            (*entity, colliders.build(part, &draft.surface()))
         };
-        batch.par_iter().map(prepare).collect()
+        batch.par_iter().map(build).collect()
     }))
 }

@@ -1,5 +1,4 @@
-//! Bodies where ground changed: those that sleep are woken, those that were built over are lifted, at once or when they are
-//! squeezed into it a moment later.
+//! Wakes sleeping bodies where ground changed, and lifts bodies that are in the ground.
 
 use avian3d::dynamics::solver::islands::WakeBody;
 use avian3d::prelude::*;
@@ -16,20 +15,20 @@ use super::{GroundBody, PhysicsFigures};
 use crate::plugin::TerrainEntities;
 use crate::terrain::{Drawn, Terrain, World as TerrainWorld};
 
-/// How far from a change a body may sleep on, in metres.
+/// Bodies within this distance of a change are woken, in metres.
 const NEAR: f32 = 0.2;
 
-/// How high above the ground a lifted body starts, in metres.
+/// The gap between the ground and a body that was lifted, in metres.
 const GAP: f32 = 0.02;
 
-/// In how many frames with steps bodies near a change are looked at: for a second as a rule. One that is built over in part
-/// is still in the air, but between what pushes it up and what pushes it down it may leave through either.
-const WATCHED: u8 = 64;
+/// For how many frames with steps a body near a change is checked; about a second. A body that was partly built over is
+/// still in the air, but the contacts may squeeze it into the ground later.
+const WATCHED_FRAMES: u8 = 64;
 
-/// In so many frames with steps every body is looked at once, wherever it is.
-const TURNS: usize = 8;
+/// Every body, wherever it is, is checked once in this many frames with steps.
+const CHECK_INTERVAL: usize = 8;
 
-/// Where a collider changed, moved or went, in world space.
+/// A box in world space in which a collider changed, moved or was removed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GroundChange {
     terrain: Entity,
@@ -38,7 +37,7 @@ pub(super) struct GroundChange {
 }
 
 impl GroundChange {
-    /// A box in metres from the origin of a part that stands at `place`.
+    /// A box in metres from the origin of a part at `place`.
     pub fn new(terrain: Entity, place: &GlobalTransform, voxel_size: f32, low: Vec3, high: Vec3) -> Self {
         let corner = |number: usize| {
             let pick = |axis: usize| if number >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -50,7 +49,7 @@ impl GroundChange {
         Self { terrain, low: low - NEAR, high: high + NEAR }
     }
 
-    /// The box around a collider that went, or around where it was and is.
+    /// The box around a collider that was removed or moved.
     pub fn around(terrain: Entity, bounds: &ColliderAabb) -> Self {
         Self { terrain, low: bounds.min - NEAR, high: bounds.max + NEAR }
     }
@@ -60,7 +59,8 @@ impl GroundChange {
     }
 }
 
-/// Changes that bodies have not been told of: one box for each tile or chunk, for much is dug while time stands still.
+/// Changes since bodies were last woken. There is one box for each tile or chunk, as many edits may happen while physics is
+/// paused.
 #[derive(Resource, Default)]
 pub(super) struct GroundChanges {
     boxes: Vec<GroundChange>,
@@ -88,15 +88,16 @@ impl GroundChanges {
     }
 }
 
-/// Bodies near which a terrain changed a moment ago, or that were found in it; and how often they will be looked at.
+/// Bodies near which a terrain changed recently, or that were found inside it, with the number of frames for which they are
+/// still checked.
 #[derive(Resource, Default)]
-pub(super) struct Watched(HashMap<(Entity, Entity), u8>);
+pub(super) struct WatchedBodies(HashMap<(Entity, Entity), u8>);
 
-/// Wakes bodies near changes, and has them watched.
+/// Wakes bodies near changes, and adds them to the watched ones.
 pub(super) fn wake(
     mut commands: Commands,
     mut changes: ResMut<GroundChanges>,
-    mut watched: ResMut<Watched>,
+    mut watched: ResMut<WatchedBodies>,
     bodies: Query<
         (Entity, &RigidBody, &RigidBodyColliders, Option<&ColliderAabb>, Has<Sleeping>),
         (Without<GroundBody>, Without<RigidBodyDisabled>),
@@ -111,7 +112,7 @@ pub(super) fn wake(
     let changes = changes.take();
     figures.changes = 0;
     for (entity, body, own, bounds, sleeps) in &bodies {
-        // Most bodies are far off, and have one collider, their own.
+        // Fast path: most bodies are far away and are their own only collider.
         let is_far = |bounds: &ColliderAabb| !changes.iter().any(|change| change.meets(bounds));
         if own[..] == [entity] && bounds.is_some_and(is_far) {
             continue;
@@ -122,15 +123,16 @@ pub(super) fn wake(
             commands.queue_silenced(WakeBody(entity));
             figures.woken += 1;
         }
-        watched.0.extend(near.map(|change| ((entity, change.terrain), WATCHED)));
+        watched.0.extend(near.map(|change| ((entity, change.terrain), WATCHED_FRAMES)));
     }
     figures.main_thread += start.elapsed();
 }
 
-/// Has bodies watched that are in the ground, some in each frame: ground has one side only, and whoever got in where nothing
-/// changed, pressed by others or put there, would fall for ever. What is to be buried sleeps, or cannot move up and down.
-pub(super) fn patrol(
-    mut watched: ResMut<Watched>,
+/// Finds bodies in the ground where nothing changed, a share of all bodies in each frame, and adds them to the watched ones.
+/// Ground is one-sided, so a body that was pushed or placed inside would fall for ever. Bodies that sleep or are locked
+/// along y are left alone.
+pub(super) fn find_buried(
+    mut watched: ResMut<WatchedBodies>,
     bodies: Query<
         (
             Entity,
@@ -149,20 +151,22 @@ pub(super) fn patrol(
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
-    *turn = (*turn + 1) % TURNS;
-    // Ground that nobody sees yet is no ground yet.
+    *turn = (*turn + 1) % CHECK_INTERVAL;
+    // Ground that is not shown yet does not count.
     let ground: Vec<_> = terrains
         .iter()
         .filter(|(_, model, _, entities)| entities.show(model.world()))
         .map(|(entity, model, place, _)| (entity, model.world(), place.affine().inverse()))
         .collect();
-    for (entity, body, own, position, rotation, center, locked) in bodies.iter().skip(*turn).step_by(TURNS) {
+    for (entity, body, own, position, rotation, center, locked) in
+        bodies.iter().skip(*turn).step_by(CHECK_INTERVAL)
+    {
         if locked.is_some_and(LockedAxes::is_translation_y_locked) {
             continue;
         }
         let middle = middle(position, rotation, center);
         let local = |inverse: &Affine3A| inverse.transform_point3(middle).as_dvec3();
-        // Terrains may be above each other: air of one is air.
+        // Terrains may overlap; a body in the air of one of them is not buried.
         let is_in_air = |(_, world, inverse): &(Entity, &TerrainWorld, Affine3A)| {
             let place = local(inverse);
             world.height(place.x, place.z).is_some() && !world.is_solid(place)
@@ -179,10 +183,10 @@ pub(super) fn patrol(
     figures.main_thread += start.elapsed();
 }
 
-/// What it takes to lift bodies that are watched out of the ground.
+/// Lifts watched bodies out of the ground.
 #[derive(SystemParam)]
-pub(super) struct Rescue<'w, 's> {
-    watched: ResMut<'w, Watched>,
+pub(super) struct BodyLifter<'w, 's> {
+    watched: ResMut<'w, WatchedBodies>,
     bodies: Query<
         'w,
         's,
@@ -204,22 +208,22 @@ pub(super) struct Rescue<'w, 's> {
     figures: ResMut<'w, PhysicsFigures>,
 }
 
-impl Rescue<'_, '_> {
-    /// Lifts whoever is in the ground; `passes` counts the look.
-    fn run(&mut self, passes: bool) {
+impl BodyLifter<'_, '_> {
+    /// Lifts all watched bodies that are in the ground. If `counts`, they are watched for one frame less.
+    fn run(&mut self, counts: bool) {
         let Self { watched, bodies, solids, terrains, figures, .. } = self;
         if watched.0.is_empty() {
             return;
         }
         let start = Instant::now();
-        // A world that is not shown yet comes with colliders that have bodies watched anew.
+        // A world that is not shown yet brings new colliders, so its bodies will be watched anew.
         let terrains: Vec<_> = terrains
             .iter()
             .filter(|(_, terrain, _, entities)| entities.show(terrain.world()))
             .map(|(entity, terrain, place, _)| (entity, terrain.world(), place, place.affine().inverse()))
             .collect();
-        watched.0.retain(|&(entity, terrain), looks| {
-            *looks -= u8::from(passes);
+        watched.0.retain(|&(entity, terrain), frames| {
+            *frames -= u8::from(counts);
             let terrain = terrains.iter().find(|known| known.0 == terrain);
             let (Ok(body), Some((_, world, place, inverse))) = (bodies.get_mut(entity), terrain) else {
                 return false;
@@ -229,64 +233,63 @@ impl Rescue<'_, '_> {
             let is_in_ground = |place: Vec3| local(place).is_finite() && world.is_solid(local(place));
             let middle = middle(&position, rotation, center);
             if !is_in_ground(middle) {
-                return *looks > 0;
+                return *frames > 0;
             }
             let Some(bounds) = solids.bounds(entity, body, own) else { return false };
             let inside = solids.inside(own, &position, rotation, middle);
             if !is_in_ground(inside) {
-                return *looks > 0;
+                return *frames > 0;
             }
             if let Some((up, lift)) = lift(world, place, local(inside), inside, &bounds) {
                 position.0 += up * lift;
                 if let Some(mut transform) = transform.filter(|_| !is_child) {
                     transform.translation += up * lift;
                 }
-                velocity.0 = rising(velocity.0, up);
+                velocity.0 = without_fall(velocity.0, up);
                 if let Some(mut motion) = motion {
-                    motion.velocity = rising(motion.velocity, up);
+                    motion.velocity = without_fall(motion.velocity, up);
                 }
                 figures.lifted += 1;
             }
-            *looks > 0
+            *frames > 0
         });
         figures.main_thread += start.elapsed();
     }
 }
 
-/// Lifts bodies that the ground was built over since the last frame.
-pub(super) fn rescue_before(mut rescue: Rescue) {
-    rescue.run(false);
+/// Lifts bodies that were built over since the last frame.
+pub(super) fn lift_before_steps(mut lifter: BodyLifter) {
+    lifter.run(false);
 }
 
-/// Lifts bodies that a step has squeezed into the ground, so that nobody sees them there.
-pub(super) fn rescue_after(mut rescue: Rescue) {
-    // While time stands still nobody is squeezed.
-    let passes = rescue.time.as_ref().is_none_or(|time| !time.is_paused());
-    rescue.run(passes);
+/// Lifts bodies that a step has squeezed into the ground, before they are drawn.
+pub(super) fn lift_after_steps(mut lifter: BodyLifter) {
+    let counts = lifter.time.as_ref().is_none_or(|time| !time.is_paused());
+    lifter.run(counts);
 }
 
-/// Run condition: the last step of a frame. What happens between two steps of one frame nobody sees.
+/// Run condition: the last step of a frame. Only its result is drawn.
 pub(super) fn is_last_step(time: Option<Res<Time<Fixed>>>) -> bool {
     time.is_none_or(|time| time.overstep() < time.timestep())
 }
 
-/// Run condition: the first step of a frame. Between two steps of one frame no ground changes.
+/// Run condition: the first step of a frame. No ground changes between the steps of a frame.
 pub(super) fn is_first_step(frame: Option<Res<FrameCount>>, mut last: Local<Option<u32>>) -> bool {
     frame.is_none_or(|frame| last.replace(frame.0) != Some(frame.0))
 }
 
-/// The middle of a body, which need not be where its shapes count from: if that is in the air, so is the body.
+/// The centre of mass of a body. If it is in the air, the body counts as in the air.
 fn middle(position: &Position, rotation: &Rotation, center: Option<&ComputedCenterOfMass>) -> Vec3 {
     position.0 + center.map_or(Vec3::ZERO, |center| rotation * center.0)
 }
 
-/// What is left of a velocity when nothing of it leads down.
-fn rising(velocity: Vec3, up: Dir3) -> Vec3 {
+/// A velocity without its downward part.
+fn without_fall(velocity: Vec3, up: Dir3) -> Vec3 {
     velocity - up * velocity.dot(*up).min(0.0)
 }
 
-/// Which way is up in a terrain, and how far up a body must go that is in the ground with a point `inside` it, which is at
-/// `local` in the terrain.
+/// The terrain's up direction, and how far along it a body must move to leave the ground. `inside` is a point of the body in
+/// the ground, and `local` the same point in voxels of the terrain.
 fn lift(
     world: &TerrainWorld,
     place: &GlobalTransform,
@@ -297,7 +300,7 @@ fn lift(
     let (up, size) = Dir3::new_and_length(place.affine().transform_vector3(Vec3::Y)).ok()?;
     let (half, size) = (up.abs().dot(bounds.size()) / 2.0, f64::from(size));
     let tall = f64::from(2.0 * half) / size;
-    // The box is as old as the last step, and somebody may have been lifted since.
+    // The box is that of the last step, and the body may have been lifted since.
     let below = f64::from(up.dot(inside - bounds.center()) + half) / size;
     let below = below.clamp(0.0, tall.max(0.0));
     let fits = |floor: f64, ceiling: Option<f64>| ceiling.is_none_or(|ceiling| ceiling - floor >= tall);

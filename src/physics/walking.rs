@@ -1,4 +1,4 @@
-//! One step of a walking body.
+//! One step of a walking character.
 
 use std::time::Duration;
 
@@ -7,19 +7,16 @@ use bevy::prelude::*;
 
 use super::character::{Character, CharacterMotion, CharacterSteering};
 
-/// The distance that is always kept from everything, in metres.
+/// The distance kept from obstacles, in metres.
 const SKIN: f32 = 0.01;
 
-/// How far a step is taken at least, in metres.
+/// The shortest forward move onto a step, in metres.
 const ONTO: f32 = 3.0 * SKIN;
 
-/// How far behind an edge, and from how far above it, the ground is looked for that a body stands on, in metres.
+/// How far behind an edge, and how far above it, the ground is searched for that a character stands on, in metres.
 const EDGE: f32 = 0.03;
 
-/// How far below the soles the ground may sink for the body to stay on it, as a share of the step height.
-const CLING: f32 = 1.0;
-
-/// A body about to walk, and what is around it.
+/// A character and what it needs to move.
 pub(super) struct Walk<'a, 'w, 's> {
     mover: &'a MoveAndSlide<'w, 's>,
     collider: &'a Collider,
@@ -30,7 +27,7 @@ pub(super) struct Walk<'a, 'w, 's> {
 }
 
 impl<'a, 'w, 's> Walk<'a, 'w, 's> {
-    /// A body that none of its `own` entities is in the way of.
+    /// A character that ignores its `own` entities.
     pub(super) fn new(
         mover: &'a MoveAndSlide<'w, 's>,
         collider: &'a Collider,
@@ -43,7 +40,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         Self { mover, collider, character, filter, level: character.steepest.clamp(0.0, 1.5).cos() }
     }
 
-    /// Where the body is after `dt` seconds, and how it moves then.
+    /// The character's place and motion after `dt` seconds.
     pub(super) fn advance(
         &self,
         from: Vec3,
@@ -77,7 +74,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
 
         let mut after = CharacterMotion { velocity, grounded: false, ground_normal: Vec3::ZERO };
         if velocity.y <= 0.0 {
-            let reach = if grounded { self.character.step_height * CLING } else { 2.0 * SKIN };
+            let reach = if grounded { self.character.step_height } else { 2.0 * SKIN };
             if let Some((down, normal)) = self.footing(place, reach) {
                 place.y -= down;
                 after.velocity.y = 0.0;
@@ -87,9 +84,9 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         (place, after)
     }
 
-    /// Along the ground, at the same speed over ground uphill and downhill; up a step where one is in the way.
+    /// Moves along the ground, at the same horizontal speed uphill and downhill, and up a step that is in the way.
     fn stride(&self, from: Vec3, velocity: Vec3, normal: Vec3, dt: f32) -> (Vec3, Vec3) {
-        // Over the ground's plane: as far as asked in x and z.
+        // Along the plane of the ground, by the wanted distance in x and z.
         let rise =
             if normal.y > 0.1 { -(normal.x * velocity.x + normal.z * velocity.z) / normal.y } else { 0.0 };
         let along = velocity.with_y(rise);
@@ -107,7 +104,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         (place, slid)
     }
 
-    /// Up, ahead and down again, if that leads onto ground to stand on.
+    /// Moves up, ahead and down again, if that ends on ground that can be stood on.
     fn step(&self, from: Vec3, velocity: Vec3, dt: f32) -> Option<(Vec3, Vec3)> {
         let height = self.character.step_height;
         let cast = |place: Vec3, way: Vec3| {
@@ -115,7 +112,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         };
         let up = cast(from, Vec3::Y * height).map_or(height, |hit| hit.distance);
         let above = from + Vec3::Y * up;
-        // Far enough to come over the edge, from which it kept its distance.
+        // Far enough to cross the edge despite the skin.
         let level = velocity.with_y(0.0);
         let least = ONTO / dt;
         let (ahead, slid) = self.slide(above, level.normalize_or_zero() * level.length().max(least), &[], dt);
@@ -123,7 +120,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         Some((ahead - Vec3::Y * down, slid.with_y(0.0).clamp_length_max(level.length())))
     }
 
-    /// Moves and slides along what is in the way. What is too steep to stand on is a wall for those on the ground.
+    /// Moves and slides along obstacles. On the ground, slopes that are too steep count as walls.
     fn slide(&self, from: Vec3, velocity: Vec3, planes: &[Dir3], dt: f32) -> (Vec3, Vec3) {
         let config = MoveAndSlideConfig { skin_width: SKIN, planes: planes.to_vec(), ..default() };
         let is_walking = !planes.is_empty();
@@ -152,14 +149,14 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
         (place, velocity)
     }
 
-    /// How far the body may sink until it stands, within `reach`, and the normal of what it stands on.
+    /// The distance down to ground that can be stood on, within `reach`, and its normal.
     fn footing(&self, place: Vec3, reach: f32) -> Option<(f32, Vec3)> {
         let way = Vec3::NEG_Y * reach;
         let hit = self.mover.cast_move(self.collider, place, Quat::IDENTITY, way, SKIN, &self.filter)?;
         if hit.normal1.y >= self.level {
             return Some((hit.distance, hit.normal1));
         }
-        // The round foot of a body that comes to an edge slowly touches that from the side. What it stands on is behind it.
+        // The round foot of the capsule touches an edge from the side. The ground that carries it is behind the edge.
         let behind = hit.point1 - hit.normal1.with_y(0.0).normalize_or_zero() * EDGE;
         let normal = self.ground_at(behind + Vec3::Y * EDGE, 2.0 * EDGE)?;
         (normal.y >= self.level).then_some((hit.distance, normal))
@@ -168,7 +165,7 @@ impl<'a, 'w, 's> Walk<'a, 'w, 's> {
     /// The normal of the ground below a place, within `reach`.
     fn ground_at(&self, place: Vec3, reach: f32) -> Option<Vec3> {
         let query = &self.mover.spatial_query;
-        // As for all that moves, sensors are air.
+        // Sensors do not count.
         let is_solid = |collider: Entity| self.mover.colliders.contains(collider);
         let hit = query.cast_ray_predicate(place, Dir3::NEG_Y, reach, true, &self.filter, &is_solid)?;
         Some(hit.normal)

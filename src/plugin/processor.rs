@@ -5,11 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use rayon::prelude::*;
 
 use super::meshes::{BuiltMesh, MeshBuilder};
 use super::{MaterialColors, ShownSurface};
-use crate::lattice::ChunkGrid;
+use crate::lattice::{ChunkGrid, ItemCost, parallel_map_into};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, SurfaceDraft, Terrain};
 
@@ -136,9 +135,6 @@ impl BuiltSurface {
     }
 }
 
-/// From how many surfaces on they are built in parallel.
-const PARALLEL_SURFACES: usize = 8;
-
 /// Builds meshes and extra data for the surfaces of one terrain, in a task.
 #[derive(Clone)]
 pub(super) struct SurfaceBuilder {
@@ -178,12 +174,9 @@ impl SurfaceBuilder {
 
     /// Builds everything for these surfaces; many are built in parallel.
     pub fn build_all(&self, drafts: Vec<(Drawn, SurfaceDraft)>) -> Vec<BuiltSurface> {
-        let build = |(drawn, draft): (Drawn, SurfaceDraft)| self.build(drawn, draft.is_empty(), || draft);
-        if drafts.len() < PARALLEL_SURFACES {
-            drafts.into_iter().map(build).collect()
-        } else {
-            drafts.into_par_iter().map(build).collect()
-        }
+        parallel_map_into(drafts, ItemCost::Surface, |(drawn, draft)| {
+            self.build(drawn, draft.is_empty(), || draft)
+        })
     }
 
     /// Builds everything for one surface. `draft` is called only if something is built from it; otherwise `is_empty` says

@@ -22,11 +22,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::lattice::{BrickPos, LatticeBox, pieces};
-
-/// With at least this many bricks, threads share work that is cheap for each: waking threads takes as long as a few hundred
-/// bricks.
-pub(super) const PARALLEL_PLACES: usize = 512;
+use crate::lattice::{BrickPos, ItemCost, LatticeBox, pieces};
 
 /// A dense table of bricks is used while it has at most this many places per box; otherwise a hash table.
 const PLACES: u64 = 64;
@@ -70,7 +66,7 @@ impl ByBrick {
         let home_x = |change: &T| reached(change).home_x;
         let slabs = home_x(first) - 1..=home_x(last) + 1;
         let all = |changes: &[T]| changes.iter().map(&reached).collect();
-        if changes.len() < PARALLEL_PLACES {
+        if !ItemCost::Lookup.is_shared(changes.len()) {
             return Self { slabs: vec![within(slabs, all(changes))] };
         }
         let slab = |x: i32| {
@@ -89,7 +85,7 @@ impl ByBrick {
     /// Collects what `work` makes of all stacks, in order; in parallel where there are many. `work` gets several whole stacks at
     /// a time.
     pub fn collect<R: Clone + Send + Sync>(&self, work: impl Fn(&[OfBrick], &mut Vec<R>) + Sync) -> Vec<R> {
-        if self.len() < PARALLEL_PLACES {
+        if !ItemCost::Lookup.is_shared(self.len()) {
             let mut found = Vec::with_capacity(self.len());
             self.slabs.iter().for_each(|slab| work(slab, &mut found));
             return found;
@@ -267,9 +263,13 @@ mod tests {
     #[test]
     fn many_boxes_are_sorted_like_few() {
         let mut rng = Rng::with_seed(5);
-        for (count, homes, height) in
-            [(40, 3, 30), (PARALLEL_PLACES, 1, 40), (700, 4, 20), (900, 60, 2000), (2000, 9, 90)]
-        {
+        for (count, homes, height) in [
+            (40, 3, 30),
+            (ItemCost::Lookup.shared_from(), 1, 40),
+            (700, 4, 20),
+            (900, 60, 2000),
+            (2000, 9, 90),
+        ] {
             let reached = |rng: &mut Rng| {
                 let home_x = rng.i32(-homes..homes);
                 let along = |rng: &mut Rng, low: i32, high: i32| {
@@ -304,7 +304,7 @@ mod tests {
                     let others =
                         others.into_iter().flat_map(|at| (0..400).map(move |y| point(at, at * 8 + 3, y)));
                     let boxes = sorted(others.chain([point(home, beside, 900)]).collect());
-                    assert!(boxes.len() >= PARALLEL_PLACES);
+                    assert!(ItemCost::Lookup.is_shared(boxes.len()));
                     let found = by_brick(&boxes);
                     assert!(found == naive(&boxes), "{beside} of {home}");
                     let own = BrickPos::of(IVec3::new(beside, 900, 4));

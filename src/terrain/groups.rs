@@ -4,11 +4,10 @@
 
 use std::borrow::Cow;
 
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use web_time::Instant;
 
-use super::by_brick::{ByBrick, PARALLEL_PLACES};
+use super::by_brick::ByBrick;
 use super::change::{Change, ChangedBrick, brick_bytes, replaced_bytes};
 use super::commit::Commit;
 use super::dirty::{dirty_cells, joined_mask};
@@ -21,9 +20,9 @@ use super::redraw;
 use super::stages::Stages;
 use super::transaction::Transaction;
 use super::world::World;
-use crate::backend::{Compute, PARALLEL_BLOCKS};
+use crate::backend::Compute;
 use crate::edits::{DraftedBrick, Drafter, EditDelta, EditEffect, MergedBricks, PreparedEdits, latest};
-use crate::lattice::{BrickPos, ChunkPos, side_by_side};
+use crate::lattice::{BrickPos, ChunkPos, ItemCost, parallel_map_into, side_by_side};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView};
 use crate::volume::{Brick, Fields};
@@ -58,9 +57,6 @@ struct EnteredGroup {
     tags: Vec<u64>,
 }
 
-/// With at least this many bricks, threads share the copying of lists.
-const LONG: usize = 1 << 13;
-
 /// A list of exactly this capacity: capacity counts as history's bytes.
 fn exact<T>(count: usize, items: impl Iterator<Item = T>) -> Vec<T> {
     let mut list = Vec::with_capacity(count);
@@ -70,11 +66,7 @@ fn exact<T>(count: usize, items: impl Iterator<Item = T>) -> Vec<T> {
 
 /// Bricks as history keeps them.
 fn changed_bricks(drafted: Vec<DraftedBrick>) -> Vec<ChangedBrick> {
-    let changed = |drafted: DraftedBrick| (drafted.pos, Some(drafted.brick));
-    if drafted.len() >= LONG {
-        return drafted.into_par_iter().map(changed).collect();
-    }
-    exact(drafted.len(), drafted.into_iter().map(changed))
+    parallel_map_into(drafted, ItemCost::Copy, |drafted| (drafted.pos, Some(drafted.brick)))
 }
 
 /// The cells that changed bricks show in.
@@ -123,7 +115,8 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     effects.push((draft.effects, pieces));
     let bricks = merged(&groups, &draft.bricks);
     let find = || Stages::time(&mut stages.meshing, || cells_of(world, &draft.bricks));
-    let (mut dirty, latest) = side_by_side(bricks.len() >= PARALLEL_PLACES, find, || latest(&bricks));
+    let (mut dirty, latest) =
+        side_by_side(ItemCost::Lookup.is_shared(bricks.len()), find, || latest(&bricks));
     let before = WorldView {
         samples: world.samples().under(&latest),
         mask: MaskView::new(&world.mask).over(&newer),
@@ -140,7 +133,8 @@ pub(super) fn edit(transaction: &Transaction, submissions: &[Submission], backen
     let meshes = || redraw::updates(world, &view, backend, &dirty, &all_mask, &mut stages);
     let all = groups.iter().map(|group| (group.submissions, &*group.bricks));
     let all = all.chain([(last, &*draft.bricks)]).zip(effects);
-    let (meshes, entered) = side_by_side(dirty.len() >= PARALLEL_BLOCKS, meshes, || enter(world, all));
+    let (meshes, entered) =
+        side_by_side(ItemCost::Brick.is_shared(dirty.len()), meshes, || enter(world, all));
 
     drop(bricks);
     groups.push(Group { submissions: last, bricks: draft.bricks, mask, sample_hash: draft.hash });

@@ -12,8 +12,8 @@ use super::surface::{ChunkSurface, Fresh, Key};
 use super::surface_draft::TileUpdate;
 use super::tiles::TileWork;
 use super::world::World;
-use crate::backend::{Compute, PARALLEL_BLOCKS};
-use crate::lattice::{ChunkPos, TilePos, order_of_places, side_by_side};
+use crate::backend::Compute;
+use crate::lattice::{ChunkPos, ItemCost, TilePos, order_of_places, side_by_side};
 use crate::surface::Mask;
 use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
@@ -27,9 +27,6 @@ pub struct MeshUpdates {
     /// Chunks whose surface changed.
     pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
 }
-
-/// With at least this many parts, threads share the chunks.
-const PARALLEL_PARTS: usize = 256;
 
 /// Every mesh that these cells change, and `newer` words of the mask.
 pub(super) fn updates(
@@ -47,7 +44,7 @@ pub(super) fn updates(
         mesh_blocks(world, view, backend, &blocks, meanwhile, meshing, assembly)
     };
     // Tiles and chunks do not depend on each other: each is made while the other leaves threads idle.
-    let chunks = if dirty.len() < PARALLEL_BLOCKS {
+    let chunks = if !ItemCost::Brick.is_shared(dirty.len()) {
         chunks(&|| {})
     } else {
         rayon::scope(|scope| {
@@ -82,7 +79,7 @@ fn mesh_blocks(
         });
     };
     Stages::time(meshing, || {
-        side_by_side(blocks.len() >= PARALLEL_BLOCKS, meshed, || {
+        side_by_side(ItemCost::Brick.is_shared(blocks.len()), meshed, || {
             order();
         })
     });
@@ -159,7 +156,7 @@ fn assemble(world: &World, blocks: &[Block], by_chunk: &ByChunk, parts: &dyn Mes
         let old = world.surfaces.get(&chunk).map_or(&nothing, Arc::as_ref);
         Some((chunk, Arc::new(old.updated(numbers.iter().filter_map(fresh))?)))
     };
-    if blocks.len() < PARALLEL_PARTS {
+    if !ItemCost::Lookup.is_shared(blocks.len()) {
         return by_chunk.iter().filter_map(|(own, numbers)| update(own.chunk, numbers)).collect();
     }
     let chunks: Vec<(&OfChunk, &[u32])> = by_chunk.iter().collect();

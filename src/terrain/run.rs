@@ -12,7 +12,6 @@
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
-use super::by_brick::PARALLEL_PLACES;
 use super::commit::Commit;
 use super::history::{HistoryReceipt, HistoryRejection};
 use super::queue::Submission;
@@ -24,7 +23,7 @@ use super::world::World;
 use super::{groups, restore};
 use crate::backend::{Compute, Cpu, Engine};
 use crate::edits::reach;
-use crate::lattice::BrickPos;
+use crate::lattice::{BrickPos, ItemCost};
 
 /// At most this many faulty edits are found. All edits after the last of them are rejected too, because the search for more
 /// would take too long.
@@ -79,9 +78,10 @@ impl Transaction {
                 let bricks = edits
                     .filter_map(|edit| reach(self.world.grid, edit))
                     .map(|reach| BrickPos::range(reach).volume());
-                bricks.fold(0, u64::saturating_add) >= PARALLEL_PLACES as u64
+                ItemCost::Lookup
+                    .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
             }
-            Work::Step(_, target) => target.change.bricks.len() >= PARALLEL_PLACES,
+            Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.bricks.len()),
         }
     }
 

@@ -8,12 +8,11 @@ use glam::IVec3;
 use rayon::Scope;
 use rayon::prelude::*;
 
-use super::by_brick::PARALLEL_PLACES;
 use super::dirty::grown_into;
 use super::stages::Stages;
 use super::surface_draft::TileUpdate;
 use super::world::World;
-use crate::lattice::{ChunkGrid, Column, LatticeBox, TilePos, sort_by_place};
+use crate::lattice::{ChunkGrid, Column, ItemCost, LatticeBox, TilePos, parallel_map, sort_by_place};
 use crate::surface::Mask;
 use crate::surface::mask::Borders;
 use crate::surface::tile::Rings;
@@ -120,10 +119,10 @@ fn touched_patches(world: &World, grid: ChunkGrid, newer: &Mask) -> Vec<Patch> {
         patches.flat_map(|(patch, _)| tiles_of(grid, patch).map(move |tile| (tile, (patch.1, patch.0))))
     };
     let words: Vec<_> = newer.words().collect();
-    let mut touched: Vec<Patch> = if words.len() < PARALLEL_PLACES {
-        words.iter().flat_map(touched_by).collect()
-    } else {
+    let mut touched: Vec<Patch> = if ItemCost::Lookup.is_shared(words.len()) {
         words.par_iter().flat_map_iter(touched_by).collect()
+    } else {
+        words.iter().flat_map(touched_by).collect()
     };
     sort_by_place(&mut touched, |(tile, _)| [tile.x, tile.z, 0]);
     touched
@@ -132,7 +131,7 @@ fn touched_patches(world: &World, grid: ChunkGrid, newer: &Mask) -> Vec<Patch> {
 /// The tiles of these patches, with their new rings and index lists.
 fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePos, TileUpdate)> {
     let tiles: Vec<_> = touched.chunk_by(|a, b| a.0 == b.0).collect();
-    let update = |touched: &&[Patch]| {
+    parallel_map(&tiles, ItemCost::Surface, |touched| {
         let tile = touched[0].0;
         let mut patches: Vec<(i32, i32)> = touched.iter().map(|&(_, patch)| patch).collect();
         patches.sort_unstable();
@@ -143,12 +142,7 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
         // Here, and not on the thread that asks for them.
         update.indices();
         (tile, update)
-    };
-    if tiles.len() < 8 {
-        tiles.iter().map(update).collect()
-    } else {
-        tiles.par_iter().with_max_len(1).map(update).collect()
-    }
+    })
 }
 
 /// The tiles that draw some of the 8x8 cells of a word.

@@ -6,7 +6,7 @@ use avian3d::parry::shape::{CompositeShape, Shape as _};
 use avian3d::prelude::*;
 use bevy::prelude::*;
 use bevy_burrow::lattice::TilePos;
-use bevy_burrow::physics::{ColliderSource, GroundBody, GroundShape};
+use bevy_burrow::physics::{ColliderSource, GroundShape};
 
 use crate::stage::{STEP, Stage, level, pit};
 
@@ -23,7 +23,7 @@ fn colliders_go_along_with_ground_that_turns_slowly() {
     assert_eq!(ground.len(), 16);
     let world = stage.app.world();
     for body in ground {
-        let part = world.get::<GroundBody>(body).expect("a body of ground").part;
+        let part = world.get::<ChildOf>(body).expect("a child of its tile or chunk").parent();
         let there = world.get::<GlobalTransform>(part).expect("parts have one").compute_transform();
         let place = world.get::<Position>(body).expect("a body has a place");
         let turn = world.get::<Rotation>(body).expect("a body has a place");

@@ -213,7 +213,7 @@ fn colliders_on_their_way_do_not_keep_the_world_from_being_edited_in_place() {
         let bodies = stage.ground();
         let world = stage.app.world_mut();
         for body in bodies {
-            let part = world.get::<GroundBody>(body).expect("a body of ground").part;
+            let part = world.get::<ChildOf>(body).expect("a child of its tile or chunk").parent();
             world.entity_mut(part).remove::<GroundCollider>();
             world.despawn(body);
         }
