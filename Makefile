@@ -39,7 +39,7 @@ export BURROW_REQUIRE ?= 1
 endif
 
 .NOTPARALLEL:
-.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper pictures bench bench-backends peers instructions ptx sanitize
+.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper figures pictures bench bench-backends peers instructions ptx sanitize
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -60,7 +60,7 @@ setup: ## Install what is missing
 
 # Model tests, in the dev profile: optimised, with overflow checks. Their examples in the documentation run with the plugin's.
 test-model:
-	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example paper
+	cargo test $(WITHOUT_BEVY) --lib --tests --example export --example figures --example paper
 
 test-plugin:
 	cargo test $(WITH_BEVY) --lib -- plugin:: view:: physics:: panel:: debug::
@@ -137,6 +137,9 @@ peers: ## Time the dense mesher beside VTK, scikit-image and PyMCubes, installed
 
 instructions: ## Count the instructions of fixed workloads; fails where they grew (ARGS=--update for a new baseline)
 	@tools/instructions.sh $(ARGS)
+
+figures: ## Draw the figures of the guide again
+	cargo run $(WITHOUT_BEVY) --example figures
 
 pictures: ## Make the still pictures of the README again
 	@tools/setup.sh run

@@ -358,6 +358,33 @@ pub mod prelude {
     pub use crate::volume::{DiggingRules, Refused, Scenario};
 }
 
+/// The programs of the README and of the guide are compiled as documentation tests.
 #[cfg(all(doctest, feature = "examples"))]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod guide {
+    macro_rules! pages {
+        ($($name:ident $page:literal)*) => {
+            $(#[doc = include_str!(concat!("../", $page))] struct $name;)*
+        };
+    }
+
+    pages! {
+        Readme "README.md"
+        GettingStarted "docs/guide/src/getting-started.md"
+        Sizes "docs/guide/src/sizes.md"
+        Brushes "docs/guide/src/brushes.md"
+        Materials "docs/guide/src/materials.md"
+        Physics "docs/guide/src/physics.md"
+        Undo "docs/guide/src/undo.md"
+        Determinism "docs/guide/src/determinism.md"
+        Servers "docs/guide/src/servers.md"
+        Cuda "docs/guide/src/cuda.md"
+        Performance "docs/guide/src/performance.md"
+        Mining "docs/guide/src/recipes/mining.md"
+        Explosions "docs/guide/src/recipes/explosions.md"
+        Journal "docs/guide/src/recipes/journal.md"
+        Foliage "docs/guide/src/recipes/foliage.md"
+        Water "docs/guide/src/recipes/water.md"
+        Navigation "docs/guide/src/recipes/navigation.md"
+        Cameras "docs/guide/src/recipes/cameras.md"
+    }
+}

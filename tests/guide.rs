@@ -1,0 +1,199 @@
+//! The README and the guide: every link leads somewhere, every page is in the summary, and every command names something
+//! that exists. Their programs are documentation tests of the crate.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The repository.
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Markdown files in a folder and those below it.
+fn pages_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut pages = Vec::new();
+    for path in entries.flatten().map(|entry| entry.path()) {
+        if path.is_dir() {
+            pages.extend(pages_in(&path));
+        } else if path.extension().is_some_and(|extension| extension == "md") {
+            pages.push(path);
+        }
+    }
+    pages.sort();
+    pages
+}
+
+fn guide() -> PathBuf {
+    root().join("docs/guide/src")
+}
+
+/// All pages that users read.
+fn documents() -> Vec<PathBuf> {
+    let mut pages = pages_in(&root().join("docs"));
+    pages.extend(["README.md", "CHANGELOG.md", "assets/README.md"].map(|name| root().join(name)));
+    pages
+}
+
+/// The lines outside code blocks, or those within.
+fn lines(text: &str, within_code: bool) -> impl Iterator<Item = &str> {
+    let mut is_code = false;
+    text.lines().filter(move |line| {
+        let is_fence = line.trim_start().starts_with("```");
+        is_code ^= is_fence;
+        !is_fence && is_code == within_code
+    })
+}
+
+/// A text without what stands between backticks.
+fn without_code(line: &str) -> String {
+    line.split('`').step_by(2).collect()
+}
+
+/// The targets of all links and pictures: `[text](target)`.
+fn links(text: &str) -> Vec<String> {
+    let prose: Vec<String> = lines(text, false).map(without_code).collect();
+    let prose = prose.join("\n");
+    let targets = prose.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    targets.map(str::to_owned).collect()
+}
+
+/// The anchor of a heading, as GitHub and mdBook make it.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim().to_lowercase();
+    let kept = kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+fn anchors(text: &str) -> BTreeSet<String> {
+    let headings =
+        lines(text, false).filter_map(|line| line.starts_with('#').then(|| line.trim_start_matches('#')));
+    headings.map(anchor).collect()
+}
+
+/// What is wrong with the links of a page.
+fn broken_links(page: &Path, text: &str) -> Vec<String> {
+    let folder = page.parent().expect("a file has a folder");
+    let is_broken = |target: &String| {
+        if target.starts_with("https://") || target.starts_with("http://") {
+            return false;
+        }
+        let (path, anchor) =
+            target.split_once('#').map_or((target.as_str(), None), |(path, own)| (path, Some(own)));
+        let path = if path.is_empty() { page.to_path_buf() } else { folder.join(path) };
+        if anchor.is_none() {
+            return !path.exists();
+        }
+        let own = path == page;
+        let text = if own { text.to_owned() } else { fs::read_to_string(&path).unwrap_or_default() };
+        !anchor.is_some_and(|anchor| anchors(&text).contains(anchor))
+    };
+    links(text).into_iter().filter(is_broken).collect()
+}
+
+/// The words after each `marker` in a text, up to the next character that no name has.
+fn named<'a>(text: &'a str, marker: &'a str) -> impl Iterator<Item = &'a str> {
+    let is_name = |c: char| c.is_alphanumeric() || "-_,".contains(c);
+    let names =
+        text.split(marker).skip(1).map(move |rest| rest.split(|c| !is_name(c)).next().unwrap_or_default());
+    names.filter(|name| !name.is_empty())
+}
+
+/// The names that a Cargo manifest gives to features, and to targets of a kind such as `[[example]]`.
+fn features(manifest: &str) -> BTreeSet<&str> {
+    let section = manifest.split("[features]").nth(1).and_then(|rest| rest.split("\n[").next());
+    let keys =
+        section.unwrap_or_default().lines().filter_map(|line| line.split_once(" = ").map(|(key, _)| key));
+    keys.filter(|key| !key.contains(' ')).collect()
+}
+
+/// Whether there is an example, a test or a benchmark of this name.
+fn has_target(folder: &str, name: &str) -> bool {
+    let folder = root().join(folder);
+    folder.join(name).join("main.rs").exists() || folder.join(format!("{name}.rs")).exists()
+}
+
+/// Names of commands in a text that mean nothing: make targets, examples, tests, benchmarks and features.
+fn unknown_names(text: &str, makefile: &str, manifest: &str) -> Vec<String> {
+    let targets: BTreeSet<&str> =
+        makefile.lines().filter_map(|line| line.split_once(':').map(|(target, _)| target)).collect();
+    let features = features(manifest);
+    let mut unknown = Vec::new();
+    let mut check = |is_known: bool, what: &str, name: &str| {
+        if !is_known {
+            unknown.push(format!("{what} {name}"));
+        }
+    };
+    // In prose `make` is a word, so only code counts.
+    let spans = lines(text, false).flat_map(|line| line.split('`').skip(1).step_by(2));
+    let code: Vec<&str> = lines(text, true).chain(spans).collect();
+    for line in code {
+        let command = line.trim_start();
+        if let Some(name) = named(command, "make ").next().filter(|_| command.starts_with("make ")) {
+            check(targets.contains(name), "make", name);
+        }
+        for (option, folder) in [("--example ", "examples"), ("--bench ", "benches"), ("--test ", "tests")] {
+            named(line, option).for_each(|name| check(has_target(folder, name), folder, name));
+        }
+        for name in named(line, "--features ").flat_map(|list| list.split(',')) {
+            check(features.contains(name), "feature", name);
+        }
+    }
+    unknown
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut count = 0;
+    for page in documents() {
+        let text = read(&page);
+        count += links(&text).len();
+        assert_eq!(broken_links(&page, &text), [""; 0], "{}", page.display());
+    }
+    assert!(count > 60, "{count} links were found");
+}
+
+#[test]
+fn the_summary_lists_every_page() {
+    let summary = guide().join("SUMMARY.md");
+    let listed: BTreeSet<PathBuf> = links(&read(&summary)).iter().map(|link| guide().join(link)).collect();
+    let pages: BTreeSet<PathBuf> = pages_in(&guide()).into_iter().filter(|page| *page != summary).collect();
+    assert_eq!(listed, pages);
+}
+
+#[test]
+fn commands_name_what_exists() {
+    let (makefile, manifest) = (read(&root().join("Makefile")), read(&root().join("Cargo.toml")));
+    for page in documents() {
+        assert_eq!(unknown_names(&read(&page), &makefile, &manifest), [""; 0], "{}", page.display());
+    }
+}
+
+#[test]
+fn pages_with_programs_are_documentation_tests() {
+    let library = read(&root().join("src/lib.rs"));
+    for page in documents() {
+        let text = read(&page);
+        let name = page.strip_prefix(root()).expect("below it").to_string_lossy().into_owned();
+        let is_tested = library.contains(&format!("\"{name}\""));
+        assert!(is_tested || !text.contains("```rust"), "{name} has programs that nothing compiles");
+        assert!(!text.contains("rust,ignore"), "{name} has a program that is not compiled");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_found() {
+    let page = root().join("README.md");
+    let text = "# A heading, with `code`\n[a](src) [b](nowhere.md) [c](#a-heading-with-code) [d](#none)\n`[e](no)`\n\
+                ```\n[f](no)\n```\n![g](docs/none.png) [h](CHANGELOG.md#changelog) [i](CHANGELOG.md#none) [j](https://k)";
+    assert_eq!(broken_links(&page, text), ["nowhere.md", "#none", "docs/none.png", "CHANGELOG.md#none"]);
+    let commands = "make it so, `make run`, `make nothing`\n```sh\ncargo run --features examples,nonsense --example none\n\
+                    cargo test --test guide --bench none\nmake test\n```";
+    let unknown = unknown_names(commands, "run: ## Run\ntest: run\n", &read(&root().join("Cargo.toml")));
+    assert_eq!(unknown, ["examples none", "feature nonsense", "benches none", "make nothing"]);
+}
