@@ -72,7 +72,7 @@ fn anchor(heading: &str) -> String {
 
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings =
-        lines(text, false).filter_map(|line| line.starts_with('#').then(|| line.trim_start_matches('#')));
+        lines(text, false).filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#'));
     headings.map(anchor).collect()
 }
 

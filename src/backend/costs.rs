@@ -54,7 +54,7 @@ impl Load {
         let jobs = work.jobs();
         let kind = if work.looks_around() {
             Kind::Stencil
-        } else if work.edits.iter().any(|tool: &PreparedEdit| tool.evaluator.is_rough()) {
+        } else if work.edits.iter().any(|record: &PreparedEdit| record.evaluator.is_rough()) {
             Kind::Rough
         } else {
             Kind::Edit

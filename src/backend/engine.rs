@@ -213,13 +213,13 @@ impl Compute for Shared {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let mut offered = cuda.edit(work, &mut choice);
-            match offered.done.take() {
-                Some(ledger) => each(&mut [ledger]),
+            let mut attempt = cuda.edit(work, &mut choice);
+            match attempt.done.take() {
+                Some(delta) => each(&mut [delta]),
                 None => Cpu.edit(work, each),
             }
             choice.took = start.elapsed();
-            cuda.learn(&choice, &offered);
+            cuda.learn(&choice, &attempt);
             return self.remember(choice);
         }
         Cpu.edit(work, each);
@@ -242,12 +242,12 @@ impl Compute for Shared {
         };
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.cuda {
-            let offered = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
-            if offered.done.is_none() {
+            let attempt = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
+            if attempt.done.is_none() {
                 Cpu.mesh(view, blocks, meanwhile, &mut then);
             }
-            choice.took = took + offered.done.unwrap_or_default();
-            cuda.learn(&choice, &offered);
+            choice.took = took + attempt.done.unwrap_or_default();
+            cuda.learn(&choice, &attempt);
             return self.remember(choice);
         }
         Cpu.mesh(view, blocks, meanwhile, &mut then);

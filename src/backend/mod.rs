@@ -48,7 +48,7 @@ pub enum Backend {
 
 /// The heavy work of a transaction. All who do it give the same bits, so a transaction need not know whom it asks.
 pub(crate) trait Compute: Send + Sync {
-    /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one ledger or as
+    /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one delta or as
     /// several, once or more often; it may take out of them what it wants.
     fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta]));
 

@@ -8,7 +8,7 @@
 //   5 launch    kernel, blocks, length, params   -> 0, or 1 where it failed
 //   6 fill      address, length, byte
 //
-// Kernels: 0 scatter, 1 edit, 2 mesh, 3 heights, 4 careful. At the end of the input it ends. Past each allocation lies
+// Kernels: 0 scatter, 1 edit, 2 mesh, 3 heights, 4 stencil_edit. At the end of the input it ends. Past each allocation lies
 // memory that nobody may touch. With BURROW_EMULATOR_SHUFFLE set to a number, the threads of a block run in another order
 // after each barrier, and some warps wait while others run on, which shows where a barrier is missing.
 
@@ -259,7 +259,7 @@ static bool launch(uint64_t number, uint64_t blocks, const std::vector<char>& pa
         case 1: return launch<EditParams, edit>(params, blocks);
         case 2: return launch<MeshParams, mesh>(params, blocks);
         case 3: return launch<HeightsParams, heights>(params, blocks);
-        case 4: return launch<CarefulParams, careful>(params, blocks);
+        case 4: return launch<StencilEditParams, stencil_edit>(params, blocks);
         default: return false;
     }
 }

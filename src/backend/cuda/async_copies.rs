@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex, Weak};
 
-use super::device::{Device, Fault, HostMemory, Launch, Mark};
+use super::device::{Device, DeviceLayer, Fault, HostMemory, Mark};
 use super::lock;
 
 /// A copy that is under way.
@@ -112,21 +112,13 @@ fn start(memory: &dyn HostMemory) -> usize {
     memory.bytes_of(0..0).expect("a place").as_ptr() as usize
 }
 
-impl Device for AsyncCopies {
-    fn name(&self) -> String {
-        self.own.name()
+impl DeviceLayer for AsyncCopies {
+    fn inner(&self) -> &dyn Device {
+        &*self.own
     }
 
-    fn free_memory(&mut self) -> usize {
-        self.own.free_memory()
-    }
-
-    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-        self.own.alloc(bytes)
-    }
-
-    fn free(&mut self, address: u64) {
-        self.own.free(address);
+    fn inner_mut(&mut self) -> &mut dyn Device {
+        &mut *self.own
     }
 
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
@@ -137,24 +129,23 @@ impl Device for AsyncCopies {
         Ok(Box::new(Watched { own, copies }))
     }
 
-    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
-        self.own.upload(from, bytes.clone(), to)?;
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.upload(from, bytes.clone(), to) }?;
         self.begin(start(from), bytes, false);
         Ok(())
     }
 
-    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
-        self.own.download(from, to, bytes.clone())?;
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.download(from, to, bytes.clone()) }?;
         self.begin(start(to), bytes, true);
         Ok(())
-    }
-
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-        self.own.copy(from, to, bytes)
-    }
-
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
-        self.own.launch(launch)
     }
 
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {

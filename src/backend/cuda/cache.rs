@@ -183,7 +183,8 @@ impl RecordCache {
         };
         if old > 0 {
             device.wait()?;
-            device.copy(self.base, base, old * self.record)?;
+            // SAFETY: both are allocations of at least so many records, and the new one is another one.
+            unsafe { device.copy(self.base, base, old * self.record) }?;
             device.wait()?;
             device.free(self.base);
         }

@@ -55,13 +55,13 @@ pub(super) enum Kernel {
     Mesh,
     /// Makes heights of noise.
     Heights,
-    /// Applies edits to bricks, among them such as look around.
-    Careful,
+    /// Applies edits to bricks, stencil edits among them.
+    StencilEdit,
 }
 
 impl Kernel {
     /// All of them, in order of their numbers.
-    pub const ALL: [Self; 5] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights, Self::Careful];
+    pub const ALL: [Self; 5] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights, Self::StencilEdit];
 
     /// Its name in the source.
     pub const fn name(self) -> &'static str {
@@ -70,7 +70,7 @@ impl Kernel {
             Self::Edit => "edit",
             Self::Mesh => "mesh",
             Self::Heights => "heights",
-            Self::Careful => "careful",
+            Self::StencilEdit => "stencil_edit",
         }
     }
 }
@@ -133,45 +133,197 @@ pub(super) trait Mark: Send + Sync {
     fn wait(&self) -> Result<(), Fault>;
 }
 
-/// A device. Copies and launches happen in the order in which they are asked for, and later: [`wait`](Self::wait) waits for
-/// all of them, and only then their faults are certain to be known.
+/// A device. Copies and launches are asynchronous and run in order; [`wait`](Self::wait) waits for all of them, and only then
+/// are their faults certain to be known.
 pub(super) trait Device: Send {
-    /// Who it is.
+    /// The name of the hardware.
     fn name(&self) -> String;
 
     /// Bytes that could still be allocated, roughly.
     fn free_memory(&mut self) -> usize;
 
-    /// Memory on the device.
+    /// Allocates memory on the device.
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault>;
 
-    /// Gives memory back.
+    /// Frees memory on the device. An address that is not allocated is ignored.
     fn free(&mut self, address: u64);
 
-    /// Memory of the host.
+    /// Allocates memory of the host.
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault>;
 
     /// Copies some bytes of the host to an address.
-    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault>;
+    ///
+    /// # Safety
+    /// `to` must have room for them in one allocation, and they must not be written before the next [`wait`](Self::wait).
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault>;
 
     /// Copies from an address to some bytes of the host.
-    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault>;
+    ///
+    /// # Safety
+    /// `from` must be so many bytes of one allocation. The bytes must be neither read nor written before the next
+    /// [`wait`](Self::wait), or before a later [`Mark`] has been waited for.
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault>;
 
     /// Copies on the device.
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault>;
+    ///
+    /// # Safety
+    /// Both addresses must be so many bytes of an allocation, and the two ranges must not overlap.
+    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault>;
 
     /// Runs a kernel.
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault>;
+    ///
+    /// # Safety
+    /// Each address in the parameters must have as many entries as the kernel reads or, by the capacities in the parameters,
+    /// writes; it must stay allocated, and memory of the host must not be accessed, before the next [`wait`](Self::wait).
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault>;
 
-    /// Marks what was asked for up to now.
+    /// Marks the current end of the queue.
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault>;
 
-    /// Of what was last waited for: how long it took from the first upload on, and the last kernel alone; zero where nobody
-    /// knows.
+    /// The times of what was last waited for: from the first upload on, and the last kernel alone; zero if unknown.
     fn times(&mut self) -> [Duration; 2] {
         [Duration::ZERO; 2]
     }
 
     /// Waits until everything is done.
     fn wait(&mut self) -> Result<(), Fault>;
+}
+
+/// A device around another one that changes some of its calls and passes the others on.
+pub(super) trait DeviceLayer: Send {
+    /// The other device.
+    fn inner(&self) -> &dyn Device;
+
+    /// The other device.
+    fn inner_mut(&mut self) -> &mut dyn Device;
+
+    /// See [`Device::alloc`].
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        self.inner_mut().alloc(bytes)
+    }
+
+    /// See [`Device::free`].
+    fn free(&mut self, address: u64) {
+        self.inner_mut().free(address);
+    }
+
+    /// See [`Device::alloc_host`].
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        self.inner_mut().alloc_host(bytes)
+    }
+
+    /// See [`Device::upload`].
+    ///
+    /// # Safety
+    /// As there.
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { self.inner_mut().upload(from, bytes, to) }
+    }
+
+    /// See [`Device::download`].
+    ///
+    /// # Safety
+    /// As there.
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { self.inner_mut().download(from, to, bytes) }
+    }
+
+    /// See [`Device::copy`].
+    ///
+    /// # Safety
+    /// As there.
+    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { self.inner_mut().copy(from, to, bytes) }
+    }
+
+    /// See [`Device::launch`].
+    ///
+    /// # Safety
+    /// As there.
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { self.inner_mut().launch(launch) }
+    }
+
+    /// See [`Device::mark`].
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        self.inner_mut().mark()
+    }
+
+    /// See [`Device::wait`].
+    fn wait(&mut self) -> Result<(), Fault> {
+        self.inner_mut().wait()
+    }
+}
+
+impl<L: DeviceLayer> Device for L {
+    fn name(&self) -> String {
+        self.inner().name()
+    }
+
+    fn free_memory(&mut self) -> usize {
+        self.inner_mut().free_memory()
+    }
+
+    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
+        DeviceLayer::alloc(self, bytes)
+    }
+
+    fn free(&mut self, address: u64) {
+        DeviceLayer::free(self, address);
+    }
+
+    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
+        DeviceLayer::alloc_host(self, bytes)
+    }
+
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { DeviceLayer::upload(self, from, bytes, to) }
+    }
+
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { DeviceLayer::download(self, from, to, bytes) }
+    }
+
+    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { DeviceLayer::copy(self, from, to, bytes) }
+    }
+
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+        // SAFETY: the caller promises the same.
+        unsafe { DeviceLayer::launch(self, launch) }
+    }
+
+    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
+        DeviceLayer::mark(self)
+    }
+
+    fn times(&mut self) -> [Duration; 2] {
+        self.inner_mut().times()
+    }
+
+    fn wait(&mut self) -> Result<(), Fault> {
+        DeviceLayer::wait(self)
+    }
 }

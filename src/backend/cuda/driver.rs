@@ -2,7 +2,6 @@
 //!
 //! All of the crate's unsafe code is here, but for what tests have (`zero_copy`). Addresses
 //! come from the driver and are handed back to it alone; what kernels do with them is bounded by the capacities they are given.
-#![allow(unsafe_code)]
 
 use std::ffi::{CString, c_void};
 use std::ops::Range;
@@ -316,7 +315,7 @@ impl Device for Card {
         Ok(Box::new(pinned))
     }
 
-    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
         self.bind()?;
         let Some(bytes) = from.bytes().get(bytes) else {
             return Err(Fault::Failed("copy out of range".into()));
@@ -328,7 +327,12 @@ impl Device for Card {
         unsafe { result::memcpy_htod_async(to, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 
-    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault> {
         self.bind()?;
         let Some(bytes) = to.bytes_of_mut(bytes) else {
             return Err(Fault::Failed("copy out of range".into()));
@@ -337,13 +341,13 @@ impl Device for Card {
         unsafe { result::memcpy_dtoh_async(bytes, from, self.stream.cu_stream()) }.map_err(failed)
     }
 
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
         self.bind()?;
         // SAFETY: both addresses are from `alloc`, with so many bytes each, and do not overlap.
         unsafe { result::memcpy_dtod_async(to, from, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
         let (blocks, params) = (launch.blocks(), launch.params());
         if blocks == 0 {
             return Ok(());

@@ -145,18 +145,23 @@ impl Device for Emulator {
         Ok(Box::new(Plain { words: vec![0; bytes.div_ceil(16)], len: bytes }))
     }
 
-    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
         self.ask(&[WRITE, to, bytes.len() as u64])?;
         self.send(&from.bytes()[bytes])
     }
 
-    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault> {
         self.ask(&[READ, from, bytes.len() as u64])?;
         let out_of_range = || Fault::Failed("copy out of range".into());
         self.receive(to.bytes_of_mut(bytes).ok_or_else(out_of_range)?)
     }
 
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
         let mut all = vec![0; bytes];
         self.ask(&[READ, from, bytes as u64])?;
         self.receive(&mut all)?;
@@ -164,7 +169,7 @@ impl Device for Emulator {
         self.send(&all)
     }
 
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
         let params = launch.params();
         self.ask(&[LAUNCH, launch.kernel() as u64, u64::from(launch.blocks()), params.len() as u64])?;
         self.send(params)?;

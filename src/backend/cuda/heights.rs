@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::device::{Device, Fault, HostMemory, Launch};
 use super::layout::{COLUMNS, HeightsParams};
 use super::session::Session;
-use super::staging::Plan;
+use super::staging::StagingLayout;
 use super::{Cuda, guarded, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
@@ -39,7 +39,7 @@ impl Cuda {
             // As transactions have it: a driver may do anything.
             let done = guarded(|| session.heights(&terms, &mut heights));
             if let Err(fault) = done {
-                self.meet(&mut place, &fault);
+                self.handle_fault(&mut place, &fault);
                 return None;
             }
             heights
@@ -74,7 +74,7 @@ impl Session {
         heights: &mut [i32],
         slice: usize,
     ) -> Result<(), Fault> {
-        let mut plan = Plan::default();
+        let mut plan = StagingLayout::default();
         let tables = plan.section::<[u8; 256]>(terms.tables.len());
         self.input.open(&mut *self.device, &plan)?;
         // Where memory is short, that must show before anything is under way.
@@ -103,8 +103,10 @@ fn fill(
     for part in heights.chunks_mut(slice) {
         params.count = part.len() as u32;
         let blocks = part.len().div_ceil(COLUMNS) as u32;
-        device.launch(Launch::new(blocks, &params))?;
-        device.download(params.heights, &mut **next, 0..size_of_val(part))?;
+        // SAFETY: the lists of the parameters are as long as the terms say, and stay until the wait.
+        unsafe { device.launch(Launch::new(blocks, &params)) }?;
+        // SAFETY: the kernel writes so many heights, and they are read after the wait.
+        unsafe { device.download(params.heights, &mut **next, 0..size_of_val(part)) }?;
         params.first += params.count;
         if let Some(part) = arrived.replace(part) {
             copy(&**last, part);

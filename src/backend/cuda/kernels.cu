@@ -2,11 +2,11 @@
 //
 // Five kernels, a block of 128 threads for each job:
 //
-//   scatter  copies what the host sent to where it belongs
-//   edit     applies edits to one brick        as volume/workpiece.rs does
-//   careful  the same, also those that sculpt  as volume/careful.rs does
-//   mesh     draws the cells of one brick      as surface/block.rs does
-//   heights  makes ground of noise              as ground/noise_heights.rs does, a block for every 1024 columns
+//   scatter       copies what the host sent to where it belongs
+//   edit          applies edits to one brick            as edits/brick_editor.rs does
+//   stencil_edit  the same, with edits that sculpt      as edits/stencil_edit.rs does
+//   mesh          meshes the cells of one brick         as surface/block.rs does
+//   heights       computes heights of noise             as ground/noise_heights.rs does, a block for 1024 columns
 //
 // All give the very bits of the CPU. Densities are integers; floats and doubles are used in the same order of exactly rounded
 // operations, which takes a compiler that fuses none of them (--fmad=false) and rounds divisions and roots exactly.
@@ -17,7 +17,7 @@
 //
 // The same sources are compiled for the CPU by tools/emulator, as plain C++, to be tested where there is no device.
 
-#include "kernels/careful.cuh"
+#include "kernels/stencil_edit.cuh"
 #include "kernels/heights.cuh"
 #include "kernels/mesh.cuh"
 

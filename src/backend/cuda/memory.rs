@@ -3,11 +3,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 
-use super::device::{Device, Fault, HostMemory, Launch, Mark};
+use super::device::{Device, DeviceLayer, Fault, HostMemory};
 use crate::backend::EngineSettings;
 
 /// Of a device's free memory, the part that is used by default; and the most of it.
@@ -112,13 +111,13 @@ impl HostMemory for Counted {
     }
 }
 
-impl Device for Budgeted {
-    fn name(&self) -> String {
-        self.own.name()
+impl DeviceLayer for Budgeted {
+    fn inner(&self) -> &dyn Device {
+        &*self.own
     }
 
-    fn free_memory(&mut self) -> usize {
-        self.own.free_memory()
+    fn inner_mut(&mut self) -> &mut dyn Device {
+        &mut *self.own
     }
 
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
@@ -140,34 +139,6 @@ impl Device for Budgeted {
         self.usage.host.fetch_add(bytes, Ordering::Relaxed);
         self.usage.host_allocations.fetch_add(1, Ordering::Relaxed);
         Ok(Box::new(Counted { own, bytes, usage: Arc::clone(&self.usage) }))
-    }
-
-    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
-        self.own.upload(from, bytes, to)
-    }
-
-    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
-        self.own.download(from, to, bytes)
-    }
-
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-        self.own.copy(from, to, bytes)
-    }
-
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
-        self.own.launch(launch)
-    }
-
-    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
-        self.own.mark()
-    }
-
-    fn times(&mut self) -> [Duration; 2] {
-        self.own.times()
-    }
-
-    fn wait(&mut self) -> Result<(), Fault> {
-        self.own.wait()
     }
 }
 

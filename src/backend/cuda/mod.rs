@@ -22,6 +22,7 @@
 //! Nothing is opened until a stage wants the card; then a thread does that, and ends. A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
 //! processor, so nobody ever waits for the device but the task that uses it. It is held until surfaces are drawn, which lie
 //! in its memory.
+#![allow(unsafe_code)]
 
 mod cache;
 mod device;
@@ -73,7 +74,7 @@ pub(super) struct Cuda {
     /// Is the faster of both taken? Else the card is, whenever it can be.
     is_auto: bool,
     /// Opens the device; nothing once that has begun.
-    opener: Mutex<Option<Opener>>,
+    pending: Mutex<Option<PendingDevice>>,
     /// The card that the game suggests where the settings leave it open.
     suggested: Mutex<Option<CardChoice>>,
     shared: Arc<Shared>,
@@ -95,15 +96,15 @@ struct Shared {
 }
 
 /// How a device is opened.
-struct Opener {
+struct PendingDevice {
     device: Box<dyn FnOnce(Option<CardChoice>) -> Result<Box<dyn Device>, Fault> + Send>,
     limits: Limits,
     /// What is compared before it is used.
     sizes: self_test::Sizes,
 }
 
-/// What became of a stage that was offered to the card.
-pub(super) struct Offered<T> {
+/// What became of a stage that the card was asked to do.
+pub(super) struct Attempt<T> {
     /// What the card made of it; else the processor has to do it.
     pub done: Option<T>,
     load: Load,
@@ -142,7 +143,7 @@ impl Cuda {
     ) -> Self {
         Self {
             is_auto,
-            opener: Mutex::new(Some(Opener { device: Box::new(device), limits, sizes })),
+            pending: Mutex::new(Some(PendingDevice { device: Box::new(device), limits, sizes })),
             suggested: Mutex::default(),
             shared: Arc::new(Shared {
                 session: Mutex::default(),
@@ -157,10 +158,10 @@ impl Cuda {
 
     /// Opens the device in the background, unless that was begun before.
     pub fn open(&self) {
-        let mut opener = lock(&self.opener);
-        let Some(own) = opener.take() else { return };
+        let mut pending = lock(&self.pending);
+        let Some(own) = pending.take() else { return };
         *lock(&self.shared.state) = EngineState::Opening;
-        drop(opener);
+        drop(pending);
         let (shared, suggested) = (Arc::clone(&self.shared), lock(&self.suggested).take());
         let open = move || {
             let start = Instant::now();
@@ -173,12 +174,12 @@ impl Cuda {
                     *place = Some(Box::new(session));
                     *lock(&shared.state) = EngineState::Cuda(name);
                 }
-                Err(fault) => shared.lose(&mut lock(&shared.session), &fault),
+                Err(fault) => shared.disable(&mut lock(&shared.session), &fault),
             }
         };
         let thread = std::thread::Builder::new().name("burrow-cuda".into()).spawn(open);
         if let Err(error) = thread {
-            self.shared.lose(&mut lock(&self.shared.session), &Fault::Failed(error.to_string()));
+            self.shared.disable(&mut lock(&self.shared.session), &Fault::Failed(error.to_string()));
         }
     }
 
@@ -207,7 +208,7 @@ impl Cuda {
             && let Some(session) = &mut *place
         {
             let trimmed = guarded(|| session.trim(Instant::now()));
-            trimmed.unwrap_or_else(|fault| self.meet(&mut place, &fault));
+            trimmed.unwrap_or_else(|fault| self.handle_fault(&mut place, &fault));
         }
     }
 
@@ -217,57 +218,57 @@ impl Cuda {
     ///
     /// So the lock is held until `then` is through, which may run other tasks of its thread pool meanwhile, even on this
     /// thread. That can't block: whoever else wants the session tries the lock and goes on without.
-    fn offer<T, R>(
+    fn attempt_stage<T, R>(
         &self,
         choice: &mut Choice,
         load: Load,
         missing: impl FnOnce(&Session) -> usize,
         work: impl FnOnce(&mut Session) -> Result<T, Fault>,
         then: impl FnOnce(&mut Session, T) -> Result<R, Fault>,
-    ) -> Offered<R> {
-        let mut offered = Offered { done: None, load, was_tried: false, has_grown: false };
+    ) -> Attempt<R> {
+        let mut attempt = Attempt { done: None, load, was_tried: false, has_grown: false };
         if load.amount == 0 {
-            return offered;
+            return attempt;
         }
         if !self.is_auto {
             self.open();
         }
         // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
-        let Some(mut place) = try_lock(&self.shared.session) else { return offered };
-        let Some(session) = &mut *place else { return offered };
+        let Some(mut place) = try_lock(&self.shared.session) else { return attempt };
+        let Some(session) = &mut *place else { return attempt };
         let trimmed = guarded(|| session.trim(Instant::now()));
         if let Err(fault) = trimmed {
-            self.meet(&mut place, &fault);
-            return offered;
+            self.handle_fault(&mut place, &fault);
+            return attempt;
         }
         // Uploads only make the card slower, so small transactions need not look for what is missing.
         if !self.is_chosen(choice, load) {
-            return offered;
+            return attempt;
         }
         choice.missing = missing(session);
-        offered.load.is_cold = choice.missing > load.amount / 2;
-        if !self.is_chosen(choice, offered.load) {
-            return offered;
+        attempt.load.is_cold = choice.missing > load.amount / 2;
+        if !self.is_chosen(choice, attempt.load) {
+            return attempt;
         }
-        offered.was_tried = true;
+        attempt.was_tried = true;
         let allocated = self.shared.usage.host_allocations();
         let done = guarded(|| work(session));
-        offered.has_grown = self.shared.usage.host_allocations() != allocated;
+        attempt.has_grown = self.shared.usage.host_allocations() != allocated;
         let times = session.times();
         // A panic in `then` is the caller's, and no fault of the device's.
         match done.and_then(|done| then(session, done)) {
             Ok(made) => {
                 choice.is_cuda = true;
                 [choice.device, choice.kernel] = times;
-                offered.done = Some(made);
+                attempt.done = Some(made);
             }
             Err(fault) => {
                 // What was lost on trying is not the processor's time.
                 choice.estimate = None;
-                self.meet(&mut place, &fault);
+                self.handle_fault(&mut place, &fault);
             }
         }
-        offered
+        attempt
     }
 
     /// Is a stage the card's?
@@ -281,20 +282,20 @@ impl Cuda {
     }
 
     /// Gives the card up, unless it is fine and only what was asked too much for it; either way with one warning.
-    fn meet(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
+    fn handle_fault(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         if !fault.is_passing() {
-            self.shared.lose(place, fault);
+            self.shared.disable(place, fault);
         } else if !self.has_passed.swap(true, Ordering::Relaxed) {
             log::warn!("bevy_burrow does without CUDA what is too much for the device: {fault}");
         }
     }
 
     /// Takes in how long a stage took, and opens the card where such stages could be worth it.
-    pub fn learn<T>(&self, choice: &Choice, offered: &Offered<T>) {
+    pub fn learn<T>(&self, choice: &Choice, attempt: &Attempt<T>) {
         if !self.is_auto || choice.amount == 0 {
             return;
         }
-        let &Offered { load, was_tried, has_grown, .. } = offered;
+        let &Attempt { load, was_tried, has_grown, .. } = attempt;
         let mut costs = lock(&self.costs);
         // Where the card failed, all of the time is its own.
         let is_chosen = choice.estimate.is_some() || was_tried;
@@ -307,10 +308,10 @@ impl Cuda {
     }
 
     /// Applies edits on the card, if that is chosen.
-    pub fn edit(&self, work: &PreparedEdits, choice: &mut Choice) -> Offered<EditDelta> {
+    pub fn edit(&self, work: &PreparedEdits, choice: &mut Choice) -> Attempt<EditDelta> {
         let load = Load::of_edits(work);
         let missing = |session: &Session| session.missing_edits(work);
-        self.offer(choice, load, missing, |session| session.edit(work), |_, ledger| Ok(ledger))
+        self.attempt_stage(choice, load, missing, |session| session.edit(work), |_, delta| Ok(delta))
     }
 
     /// Meshes blocks on the card, if that is chosen: says for how long `then` waited for their surfaces, which it got. `None`
@@ -322,11 +323,11 @@ impl Cuda {
         choice: &mut Choice,
         meanwhile: &(dyn Fn() + Sync),
         then: &mut dyn FnMut(&dyn MeshedBlocks),
-    ) -> Offered<Duration> {
+    ) -> Attempt<Duration> {
         let load = Load::of_blocks(blocks.len());
         let missing = |session: &Session| session.missing_blocks(view, blocks);
         let work = |session: &mut Session| session.mesh(view, blocks, meanwhile);
-        self.offer(choice, load, missing, work, |session, meshed| {
+        self.attempt_stage(choice, load, missing, work, |session, meshed| {
             let Session { meshes, device, .. } = session;
             let surfaces = Surfaces::new(meshes, view, blocks, meshed);
             let drawn = catch_unwind(AssertUnwindSafe(|| then(&surfaces)));
@@ -346,7 +347,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(failed)
 }
 
-impl Opener {
+impl PendingDevice {
     /// Opens the device and compares it with the processor.
     fn open(self, suggested: Option<CardChoice>, usage: &Arc<Usage>) -> Result<Session, Fault> {
         let device = (self.device)(suggested)?;
@@ -360,7 +361,7 @@ impl Opener {
 
 impl Shared {
     /// Gives the card up, with the one warning.
-    fn lose(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
+    fn disable(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         *place = None;
         *lock(&self.state) = EngineState::Lost(fault.to_string());
         log::warn!("bevy_burrow goes on without CUDA: {fault}");

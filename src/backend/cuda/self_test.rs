@@ -89,7 +89,7 @@ fn compare_edits(session: &mut Session, work: &PreparedEdits) -> Result<Vec<Draf
     let mut effects = vec![EditEffect::default(); work.edits.len()];
     enter_effects(&expected, &mut effects);
     let is_same = effects == found.effects && are_same_ledgers(&expected, &found);
-    let bricks = expected.into_iter().flat_map(|ledger| ledger.bricks).collect();
+    let bricks = expected.into_iter().flat_map(|delta| delta.bricks).collect();
     is_same.then_some(bricks).ok_or(Fault::SelfTest)
 }
 
@@ -118,9 +118,9 @@ pub(super) fn collected(blocks: &[Block], fresh: &dyn MeshedBlocks) -> Parts {
 
 /// What the processor makes of edits.
 fn ledgers_of(work: &PreparedEdits) -> Vec<EditDelta> {
-    let mut ledgers = Vec::new();
-    Cpu.edit(work, &mut |own| ledgers.extend(own.iter_mut().map(std::mem::take)));
-    ledgers
+    let mut deltas = Vec::new();
+    Cpu.edit(work, &mut |own| deltas.extend(own.iter_mut().map(std::mem::take)));
+    deltas
 }
 
 /// The blocks that changed samples show in.
@@ -212,12 +212,12 @@ fn edits(ground: &Ground, count: i32, radius: f32, is_rough: bool) -> Vec<Edit> 
     (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
 }
 
-/// Do ledgers hold the same bricks, however many they are?
+/// Do deltas hold the same bricks, however many they are?
 fn are_same_ledgers(a: &[EditDelta], b: &EditDelta) -> bool {
-    let bricks = || a.iter().flat_map(|ledger| &ledger.bricks);
+    let bricks = || a.iter().flat_map(|delta| &delta.bricks);
     let what = |drafted: &DraftedBrick| (drafted.pos, drafted.changed, drafted.is_extended);
     let mut pairs = bricks().zip(&b.bricks);
-    a.iter().fold(0u64, |hash, ledger| hash.wrapping_add(ledger.hash)) == b.hash
+    a.iter().fold(0u64, |hash, delta| hash.wrapping_add(delta.hash)) == b.hash
         && bricks().count() == b.bricks.len()
         && pairs.all(|(a, b)| what(a) == what(b) && are_same_bricks(&a.brick, &b.brick))
 }

@@ -11,7 +11,7 @@ use super::edit::output::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
 use super::lists::{cut, fill, hand_out};
 use super::mesh::output::MeshOutput;
-use super::staging::{InputBuffer, Plan, Section};
+use super::staging::{InputBuffer, Section, StagingLayout};
 use super::windows::{KeptSlabs, Windows};
 use crate::edits::PreparedEdits;
 use crate::ground::Ground;
@@ -132,7 +132,7 @@ impl<'a> Uploads<'a> {
     }
 
     /// Adds what there is to upload.
-    pub fn plan(&mut self, plan: &mut Plan) {
+    pub fn plan(&mut self, plan: &mut StagingLayout) {
         self.jobs = plan.section::<ScatterJob>(self.len());
         self.brick_list = plan.section::<u8>(self.bytes);
         self.stack_list = plan.section::<StackRecord>(self.stacks.len());
@@ -190,13 +190,14 @@ impl Session {
         let meshes = MeshOutput::new(&mut *device)?;
         let edits = EditOutput::new(&mut *device)?;
         let table = layout::table();
-        let mut plan = Plan::default();
+        let mut plan = StagingLayout::default();
         let section = plan.section::<[u16; 16]>(table.len());
         input.open(&mut *device, &plan)?;
         input.put(section, &table);
         input.send(&mut *device, &plan)?;
         let address = device.alloc(size_of_val(&table))?;
-        device.copy(input.address(section), address, size_of_val(&table))?;
+        // SAFETY: the section and the new allocation are as long as the table.
+        unsafe { device.copy(input.address(section), address, size_of_val(&table)) }?;
         device.wait()?;
         let (stacks, bricks) = (budget / STACKS_SHARE, budget - budget / STACKS_SHARE);
         Ok(Self {
@@ -328,14 +329,15 @@ impl Session {
     }
 
     /// Sends everything that was planned, and puts uploads in their slots.
-    pub(super) fn send(&mut self, plan: &Plan, uploads: &Uploads) -> Result<(), Fault> {
+    pub(super) fn send(&mut self, plan: &StagingLayout, uploads: &Uploads) -> Result<(), Fault> {
         if uploads.len() > 0 {
             uploads.write(&mut self.input);
             self.direct(uploads);
         }
         self.input.send(&mut *self.device, plan)?;
         let params = ScatterParams { jobs: self.input.address(uploads.jobs) };
-        self.device.launch(Launch::new(uploads.len() as u32, &params))
+        // SAFETY: jobs copy from sections of the input to slots that were taken for them.
+        unsafe { self.device.launch(Launch::new(uploads.len() as u32, &params)) }
     }
 
     /// Writes where uploads go.
@@ -370,7 +372,8 @@ mod tests {
     /// So many bytes of the device.
     fn read(session: &mut Session, address: u64, bytes: usize) -> Vec<u8> {
         let mut host = session.device.alloc_host(bytes).expect("memory of the host");
-        session.device.download(address, &mut *host, 0..bytes).expect("a download");
+        // SAFETY: tests read slots that exist, after the wait.
+        unsafe { session.device.download(address, &mut *host, 0..bytes) }.expect("a download");
         session.device.wait().expect("a download");
         host.bytes()[..bytes].to_vec()
     }
@@ -400,7 +403,7 @@ mod tests {
             for &stack in &stacks {
                 session.need_stack(&mut uploads, stack).expect("room for all");
             }
-            let mut plan = Plan::default();
+            let mut plan = StagingLayout::default();
             uploads.plan(&mut plan);
             session.input.open(&mut *session.device, &plan).expect("room for all");
             session.send(&plan, &uploads).expect("the device works");

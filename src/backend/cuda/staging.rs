@@ -24,12 +24,12 @@ pub(super) struct Section {
 
 /// What an [`InputBuffer`] is to hold, in order.
 #[derive(Debug, Default)]
-pub(super) struct Plan(usize);
+pub(super) struct StagingLayout(usize);
 
 /// Sections start at multiples of this.
 const ALIGNMENT: usize = 16;
 
-impl Plan {
+impl StagingLayout {
     /// Room for so many entries.
     pub fn section<T>(&mut self, count: usize) -> Section {
         let start = self.0;
@@ -68,7 +68,7 @@ impl InputBuffer {
     }
 
     /// Makes room for what was planned. What was in it is gone.
-    pub fn open(&mut self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
+    pub fn open(&mut self, device: &mut dyn Device, plan: &StagingLayout) -> Result<(), Fault> {
         self.needed = self.needed.max(plan.0);
         if plan.0 > self.len { self.replace(device, roomy(plan.0)) } else { Ok(()) }
     }
@@ -106,8 +106,9 @@ impl InputBuffer {
     }
 
     /// Sends all of it.
-    pub fn send(&self, device: &mut dyn Device, plan: &Plan) -> Result<(), Fault> {
-        device.upload(&*self.host, 0..plan.0, self.device)
+    pub fn send(&self, device: &mut dyn Device, plan: &StagingLayout) -> Result<(), Fault> {
+        // SAFETY: `open` made the device's memory as long as the plan, and callers wait before they open it again.
+        unsafe { device.upload(&*self.host, 0..plan.0, self.device) }
     }
 }
 
@@ -175,7 +176,8 @@ impl OutputList {
 
     /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
     pub fn read(&mut self, device: &mut dyn Device, from: u64, entries: usize) -> Result<(), Fault> {
-        device.download(from, &mut *self.host, 0..entries * self.entry)
+        // SAFETY: callers give a list of so many entries, and read it after a wait.
+        unsafe { device.download(from, &mut *self.host, 0..entries * self.entry) }
     }
 
     /// How many entries kernels may write.
@@ -270,7 +272,10 @@ impl OutputList {
             Some((address, _)) if !entries.is_empty() && self.is_own() => {
                 self.wrote(entries.end);
                 let bytes = entries.start * self.entry..entries.end * self.entry;
-                device.download(address + bytes.start as u64, &mut *self.host, bytes).map(|()| true)
+                // SAFETY: the list on the device has as many entries as the host's, and they are read after a wait, or after a
+                // mark that follows.
+                unsafe { device.download(address + bytes.start as u64, &mut *self.host, bytes) }
+                    .map(|()| true)
             }
             _ => Ok(false),
         }

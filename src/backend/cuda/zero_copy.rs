@@ -2,12 +2,11 @@
 //!
 //! Memory of the host has a shadow on the device. Before a launch it is copied there, and back when the device is waited
 //! for; so whoever looks too early sees nothing, and whoever writes too late is overwritten.
-#![allow(unsafe_code)]
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use super::device::{Device, Fault, HostMemory, Kernel, Launch, Mark};
+use super::device::{Device, DeviceLayer, Fault, HostMemory, Kernel, Launch};
 use super::lock;
 
 /// Memory of the host, and where its shadow is.
@@ -113,28 +112,21 @@ impl ZeroCopy {
         if std::mem::take(&mut self.is_running) {
             for piece in &mut lock(&self.all).list {
                 let (len, shadow) = (piece.len, piece.shadow);
-                self.own.download(shadow, piece, 0..len)?;
+                // SAFETY: the shadow is as long as the piece, and the emulator copies at once.
+                unsafe { self.own.download(shadow, piece, 0..len) }?;
             }
         }
         Ok(())
     }
 }
 
-impl Device for ZeroCopy {
-    fn name(&self) -> String {
-        self.own.name()
+impl DeviceLayer for ZeroCopy {
+    fn inner(&self) -> &dyn Device {
+        &*self.own
     }
 
-    fn free_memory(&mut self) -> usize {
-        self.own.free_memory()
-    }
-
-    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-        self.own.alloc(bytes)
-    }
-
-    fn free(&mut self, address: u64) {
-        self.own.free(address);
+    fn inner_mut(&mut self) -> &mut dyn Device {
+        &mut *self.own
     }
 
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
@@ -146,33 +138,29 @@ impl Device for ZeroCopy {
         Ok(Box::new(Owned { piece, words, all: Arc::clone(&self.all) }))
     }
 
-    fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
-        self.own.upload(from, bytes, to)
-    }
-
-    fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> Result<(), Fault> {
+    unsafe fn download(
+        &mut self,
+        from: u64,
+        to: &mut dyn HostMemory,
+        bytes: Range<usize>,
+    ) -> Result<(), Fault> {
         self.land()?;
-        self.own.download(from, to, bytes)
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.download(from, to, bytes) }
     }
 
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-        self.own.copy(from, to, bytes)
-    }
-
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
         if launch.kernel() != Kernel::Scatter {
             let mut all = lock(&self.all);
             all.gone.drain(..).for_each(|shadow| self.own.free(shadow));
             for piece in &all.list {
-                self.own.upload(piece, 0..piece.len, piece.shadow)?;
+                // SAFETY: the caller promises the same.
+                unsafe { self.own.upload(piece, 0..piece.len, piece.shadow) }?;
             }
             self.is_running = true;
         }
-        self.own.launch(launch)
-    }
-
-    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
-        self.own.mark()
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.launch(launch) }
     }
 
     fn wait(&mut self) -> Result<(), Fault> {

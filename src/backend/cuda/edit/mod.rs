@@ -1,22 +1,22 @@
 //! Edits on the device: one launch for all bricks that they may reach.
 //!
-//! Those that look around take another kernel, which knows the bricks around too: see [`careful`](self::careful).
-//! [`jobs`](self::jobs) lists what there is to do, and [`output`](self::output) makes ledgers of what came back.
+//! Those that look around take another kernel, which knows the bricks around too: see [`stencil`](self::stencil).
+//! [`jobs`](self::jobs) lists what there is to do, and [`output`](self::output) makes deltas of what came back.
 
-mod careful;
 mod jobs;
 pub(super) mod output;
+mod stencil;
 
 use super::cache::RecordCache;
 use super::device::{Fault, Launch};
 use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::fill;
 use super::session::{Session, Uploads};
-use super::staging::Plan;
+use super::staging::StagingLayout;
 use crate::edits::{EditDelta, EditEffect, PreparedEdit, PreparedEdits, enter_effects};
 use crate::lattice::side_by_side;
-use careful::Look;
 use output::{LONG, Target, Totals};
+use stencil::Look;
 
 /// From how many entries on plain lists are copied side by side.
 const LONG_LIST: usize = 1 << 14;
@@ -45,11 +45,11 @@ impl Session {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
         let mut jobs = std::mem::take(&mut self.edit_jobs);
-        let ledger = self.edit_bricks(work, &mut jobs);
+        let delta = self.edit_bricks(work, &mut jobs);
         if jobs.capacity() <= KEPT_JOBS {
             self.edit_jobs = jobs;
         }
-        ledger
+        delta
     }
 
     /// The same, in this memory for the jobs of all bricks.
@@ -59,8 +59,8 @@ impl Session {
         }
         // Most new ground finds its material close by.
         for look in [Look::Near, Look::Far] {
-            if let Some(ledger) = self.try_edits(work, jobs, Some(look))? {
-                return Ok(ledger);
+            if let Some(delta) = self.try_edits(work, jobs, Some(look))? {
+                return Ok(delta);
             }
         }
         Err(Fault::Failed("new ground looked too far".into()))
@@ -76,14 +76,14 @@ impl Session {
         self.begin();
         let mut uploads = Uploads::new(work.base.ground());
         let mut targets = Vec::new();
-        let ledger = self.run_edits(work, jobs, look, &mut uploads, &mut targets);
-        if ledger.is_err() {
+        let delta = self.run_edits(work, jobs, look, &mut uploads, &mut targets);
+        if delta.is_err() {
             self.give_up(&uploads);
         }
-        if !matches!(ledger, Ok(Some(_))) {
+        if !matches!(delta, Ok(Some(_))) {
             targets.iter().for_each(|&(slot, _)| self.bricks.give_back(slot));
         }
-        ledger
+        delta
     }
 
     fn run_edits<'a>(
@@ -97,22 +97,22 @@ impl Session {
         // Who looks around finds bricks among those around.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
         let mut care = look.map(|look| self.care(work, look, jobs, uploads)).transpose()?;
-        let mut plan = Plan::default();
+        let mut plan = StagingLayout::default();
         uploads.plan(&mut plan);
         let job_list = plan.section::<EditJob>(jobs.len());
-        let tool_list = plan.section::<layout::Tool>(work.edits.len());
+        let tool_list = plan.section::<layout::EditRecord>(work.edits.len());
         let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
         care.iter_mut().for_each(|care| care.plan(&mut plan));
         self.input.open(&mut *self.device, &plan)?;
-        let (all_jobs, tools, list) = self.input.entries_of(job_list, tool_list, edits);
+        let (all_jobs, edit_records, list) = self.input.entries_of(job_list, tool_list, edits);
         let are_many = jobs.len() >= LONG;
         let (bricks, device) = (&mut self.bricks, &mut self.device);
         let take = || {
             bricks.take_many(&mut **device, jobs, all_jobs, targets, |job, target| EditJob { target, ..*job })
         };
         let write_lists = || {
-            fill(&work.edits, tools, MANY, |_, own| tool(own));
+            fill(&work.edits, edit_records, MANY, |_, own| record(own));
             fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
         };
         side_by_side(are_many, take, write_lists).0?;
@@ -131,7 +131,7 @@ impl Session {
                 stacks: self.stacks.base(),
                 jobs: self.input.address(job_list),
                 list: self.input.address(edits),
-                tools: self.input.address(tool_list),
+                edit_records: self.input.address(tool_list),
                 results: self.edits.results.address(),
                 records: self.edits.records.address(),
                 materials: self.edits.materials.address(),
@@ -145,10 +145,13 @@ impl Session {
             };
             let blocks = jobs.len() as u32;
             match &care {
-                None => self.device.launch(Launch::new(blocks, &params))?,
+                // SAFETY: the parameters are sections of the input and lists of the session, with their capacities, and none
+                // of them is touched before the wait below.
+                None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
                 Some(care) => {
                     let params = care.params(params, &self.input);
-                    self.device.launch(Launch::new(blocks, &params))?;
+                    // SAFETY: as above.
+                    unsafe { self.device.launch(Launch::new(blocks, &params)) }?;
                 }
             }
             self.edits.results.fetch(&mut *self.device, jobs.len())?;
@@ -172,7 +175,7 @@ impl Session {
         Err(Fault::TooLarge(work.jobs().len()))
     }
 
-    /// What came back, as a ledger. Bricks are on their way while all else is looked through.
+    /// What came back, as a delta. Bricks are on their way while all else is looked through.
     fn take_edits(
         &mut self,
         work: &PreparedEdits,
@@ -213,6 +216,6 @@ fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Targ
     }
 }
 
-fn tool(tool: &PreparedEdit) -> layout::Tool {
-    layout::tool(tool.reach, tool.operation, &tool.evaluator)
+fn record(record: &PreparedEdit) -> layout::EditRecord {
+    layout::record(record.reach, record.operation, &record.evaluator)
 }

@@ -1,4 +1,4 @@
-//! What kernels say of edits, as ledgers.
+//! What kernels say of edits, as deltas.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ pub(super) const PIECE: usize = 256;
 /// A slot that is to hold a changed brick, with its tag.
 pub(super) type Target = (u32, u64);
 
-/// Entries of each list that one ledger adds up.
+/// Entries of each list that one delta adds up.
 const ENTRIES: usize = 1024;
 
 /// What the edit kernel writes.
@@ -140,15 +140,15 @@ impl EditOutput {
         if results.len() < LONG { results.iter().any(is) } else { results.par_iter().any(is) }
     }
 
-    /// What edits changed and counted, as ledgers: in each some entries, added up, whichever bricks those are of.
+    /// What edits changed and counted, as deltas: in each some entries, added up, whichever bricks those are of.
     pub(super) fn entries(&self, grid: ChunkGrid, jobs: &[EditJob], totals: Totals) -> Vec<EditDelta> {
         let parts = self.parts.entries::<EditPart>(totals.parts);
         let counts = self.counts.entries::<EditCount>(totals.counts);
         map_numbers(parts.len().max(counts.len()).div_ceil(ENTRIES), 2, |number| {
-            let mut ledger = EditDelta::default();
-            piece(parts, ENTRIES, number).iter().for_each(|part| add_part(grid, jobs, part, &mut ledger));
-            piece(counts, ENTRIES, number).iter().for_each(|count| add_count(count, &mut ledger));
-            ledger
+            let mut delta = EditDelta::default();
+            piece(parts, ENTRIES, number).iter().for_each(|part| add_part(grid, jobs, part, &mut delta));
+            piece(counts, ENTRIES, number).iter().for_each(|count| add_count(count, &mut delta));
+            delta
         })
     }
 
@@ -260,16 +260,16 @@ fn piece<T>(list: &[T], length: usize, number: usize) -> &[T] {
 }
 
 /// Adds what an edit changed in a chunk's part of a brick.
-fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, ledger: &mut EditDelta) {
+fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, delta: &mut EditDelta) {
     let Some(pos) = jobs.get(part.job as usize).map(EditJob::pos) else { return };
     let bounds = layout::unpack_box(part.bounds, pos.origin());
-    ledger.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
+    delta.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
 }
 
 /// Adds what became of voxels.
-fn add_count(count: &EditCount, ledger: &mut EditDelta) {
-    let [fate, material, ..] = count.fate.to_le_bytes();
-    let fate = match fate {
+fn add_count(count: &EditCount, delta: &mut EditDelta) {
+    let [outcome, material, ..] = count.outcome.to_le_bytes();
+    let outcome = match outcome {
         0 => VoxelOutcome::Removed,
         1 => VoxelOutcome::Added,
         2 => VoxelOutcome::Painted,
@@ -278,7 +278,7 @@ fn add_count(count: &EditCount, ledger: &mut EditDelta) {
         5 => VoxelOutcome::TooHard,
         _ => VoxelOutcome::Slowed,
     };
-    ledger.counts(count.edit as usize).add(fate, MaterialId(material), count.voxels.into());
+    delta.counts(count.edit as usize).add(outcome, MaterialId(material), count.voxels.into());
 }
 
 #[cfg(test)]
@@ -296,41 +296,41 @@ mod tests {
         let (mut rng, grid) = (Rng::with_seed(4), ChunkGrid::new(20, 300, 300));
         let job = |x: i32| EditJob { brick: [x, x % 3, 2], ..EditJob::default() };
         let jobs: Vec<EditJob> = (0..30).map(job).collect();
-        let (mut ledger, mut expected) = (EditDelta::default(), BTreeMap::new());
+        let (mut delta, mut expected) = (EditDelta::default(), BTreeMap::new());
         for number in 0..600 {
             let (job, edit, part) = (number / 20, rng.u32(0..3), rng.u32(0..2));
             let pos = jobs[job as usize].pos();
             let point = pos.origin() + IVec3::new(rng.i32(0..8), 3, 4);
             let bounds = layout::pack_box(LatticeBox::point(point), pos.origin());
-            add_part(grid, &jobs, &EditPart { job, edit, part, bounds }, &mut ledger);
+            add_part(grid, &jobs, &EditPart { job, edit, part, bounds }, &mut delta);
             let key = (edit as usize, layout::part_chunk(grid, pos, part));
             LatticeBox::include(expected.entry(key).or_default(), LatticeBox::point(point));
         }
         // A job that there is not says nothing.
-        add_part(grid, &jobs, &EditPart { job: 30, ..EditPart::default() }, &mut ledger);
+        add_part(grid, &jobs, &EditPart { job: 30, ..EditPart::default() }, &mut delta);
         let mut found = BTreeMap::new();
-        for part in &ledger.parts {
+        for part in &delta.parts {
             LatticeBox::include(found.entry((part.edit, part.chunk)).or_default(), part.bounds);
         }
         assert_eq!(found, expected);
-        assert!(ledger.parts.len() < 150, "{} parts", ledger.parts.len());
+        assert!(delta.parts.len() < 150, "{} parts", delta.parts.len());
     }
 
     #[test]
     fn counts_beside_each_other_come_to_one_and_no_voxel_is_left_out() {
-        let (mut rng, mut ledger, mut expected) = (Rng::with_seed(5), EditDelta::default(), BTreeMap::new());
+        let (mut rng, mut delta, mut expected) = (Rng::with_seed(5), EditDelta::default(), BTreeMap::new());
         for number in 0..900 {
-            let (edit, fate, voxels) = (number / 300, rng.u32(0..7) | rng.u32(0..2) << 8, rng.u32(1..500));
-            add_count(&EditCount { edit, fate, voxels, pad: 0 }, &mut ledger);
-            *expected.entry((edit as usize, fate)).or_insert(0) += u64::from(voxels);
+            let (edit, outcome, voxels) = (number / 300, rng.u32(0..7) | rng.u32(0..2) << 8, rng.u32(1..500));
+            add_count(&EditCount { edit, outcome, voxels, pad: 0 }, &mut delta);
+            *expected.entry((edit as usize, outcome)).or_insert(0) += u64::from(voxels);
         }
         let mut found = BTreeMap::new();
-        for count in &ledger.counts {
-            let fate = count.outcome as u32 | u32::from(count.material.0) << 8;
-            *found.entry((count.edit, fate)).or_insert(0) += count.voxels;
+        for count in &delta.counts {
+            let outcome = count.outcome as u32 | u32::from(count.material.0) << 8;
+            *found.entry((count.edit, outcome)).or_insert(0) += count.voxels;
         }
         assert_eq!(found, expected);
-        assert!(ledger.counts.len() < 600, "{} counts", ledger.counts.len());
+        assert!(delta.counts.len() < 600, "{} counts", delta.counts.len());
     }
 
     #[test]

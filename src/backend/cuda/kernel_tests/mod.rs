@@ -40,7 +40,8 @@ impl Device {
         self.allocated.push(address);
         let mut host = self.own.alloc_host(bytes.len()).expect("memory of the host");
         host.bytes_mut()[..bytes.len()].copy_from_slice(bytes);
-        self.own.upload(&*host, 0..bytes.len(), address).expect("upload");
+        // SAFETY: the memory was just allocated, and `host` is kept until the wait.
+        unsafe { self.own.upload(&*host, 0..bytes.len(), address) }.expect("upload");
         self.own.wait().expect("upload");
         address
     }
@@ -71,7 +72,8 @@ impl Device {
         let mut values = vec![T::zeroed(); len];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
         let mut host = self.own.alloc_host(bytes.len()).expect("memory of the host");
-        self.own.download(address, &mut *host, 0..bytes.len()).expect("download");
+        // SAFETY: tests read as much as they uploaded, after the wait.
+        unsafe { self.own.download(address, &mut *host, 0..bytes.len()) }.expect("download");
         self.own.wait().expect("download");
         bytes.copy_from_slice(&host.bytes()[..bytes.len()]);
         values
@@ -87,7 +89,8 @@ impl Device {
     }
 
     fn launch<P: KernelParams>(&mut self, blocks: usize, params: P) {
-        self.own.launch(Launch::new(blocks as u32, &params)).expect("the launch succeeds");
+        // SAFETY: tests upload all that the parameters point to.
+        unsafe { self.own.launch(Launch::new(blocks as u32, &params)) }.expect("the launch succeeds");
         self.own.wait().expect("the kernel succeeds");
     }
 

@@ -1,4 +1,4 @@
-// Applies edits to one brick, as volume/workpiece.rs does. Those that look around are in careful.cuh.
+// Applies edits to one brick, as edits/brick_editor.rs does. Stencil edits are in stencil_edit.cuh.
 //
 // A thread owns four samples of one column, two layers apart, from the first edit to the last. Before distances are
 // computed, bricks too far from the shape are sorted out, and samples that no distance changes: much of what brushes reach
@@ -19,7 +19,7 @@ struct Effect {
     u32 counts[256];
 };
 
-struct Workbench {
+struct EditMemory {
     Brick brick;
     Effect effect;
     // Of the edit at hand, if it is rough.
@@ -109,7 +109,7 @@ __device__ void enter_parts(const EditParams& params, u32 cuts, u32 edit, const 
 }
 
 // Enters how many voxels an edit dealt with, and clears the counts. For one warp.
-__device__ void enter_counts(const EditParams& params, u32 edit, u32 fate, u32* counts) {
+__device__ void enter_counts(const EditParams& params, u32 edit, u32 outcome, u32* counts) {
     for (u32 base = 0; base < 256; base += 32) {
         u32 material = base + lane(), voxels = counts[material];
         u32 filled = __ballot_sync(WARP, voxels != 0);
@@ -118,7 +118,7 @@ __device__ void enter_counts(const EditParams& params, u32 edit, u32 fate, u32* 
         if (lane() == 0) first = atomicAdd(&params.counters[3], __popc(filled));
         u32 at = __shfl_sync(WARP, first, 0) + __popc(filled & lanes_before());
         if (voxels != 0 && at < params.count_capacity) {
-            params.counts[at] = {edit, fate | material << 8, voxels, 0};
+            params.counts[at] = {edit, outcome | material << 8, voxels, 0};
         }
         counts[material] = 0;
     }
@@ -148,11 +148,11 @@ __device__ inline u32 resolve(u32 stored, const OwnColumn& column, i32 pristine)
 
 // Digs or adds.
 __device__ inline Outcome carve(
-    const Tool& tool, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
+    const EditRecord& record, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
 ) {
     i32 raw = sample, before = raw == PRISTINE ? pristine : raw;
     i32 depth = largest(outside, -DEPTH);
-    i32 after = tool.operation == DIG ? largest(before, -depth) : smallest(before, depth);
+    i32 after = record.operation == DIG ? largest(before, -depth) : smallest(before, depth);
     i32 stored = smallest(largest(after, -32767), 32767);
     if (outside > BAND || after == before || stored == raw) return {false, NONE};
     sample = (i16)stored;
@@ -163,20 +163,20 @@ __device__ inline Outcome carve(
         material = GROUND;
         return {true, removed};
     }
-    if (tool.operation == ADD) material = (u8)tool.material;
+    if (record.operation == ADD) material = (u8)record.material;
     return {true, resolve(material, column, pristine)};
 }
 
 // Changes the material of a solid sample inside the shape.
 __device__ inline Outcome paint(
-    const Tool& tool, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
+    const EditRecord& record, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
 ) {
     i32 raw = sample, before = raw == PRISTINE ? pristine : raw;
     u32 old = material;
-    if (outside > 0 || before >= 0 || (raw != PRISTINE && old == tool.material)) return {false, NONE};
+    if (outside > 0 || before >= 0 || (raw != PRISTINE && old == record.material)) return {false, NONE};
     if (raw == PRISTINE) sample = (i16)largest(before, -32767);
-    material = (u8)tool.material;
-    u32 painted = resolve(tool.material, column, pristine);
+    material = (u8)record.material;
+    u32 painted = resolve(record.material, column, pristine);
     return {true, painted == resolve(old, column, pristine) ? NONE : painted};
 }
 
@@ -190,7 +190,7 @@ __device__ inline void take(const Brick* base, bool has_materials, Brick& brick)
 }
 
 // Takes the brick to the bench. For the whole block.
-__device__ inline void begin(Workbench& bench, const Brick* base, bool had_materials) {
+__device__ inline void begin(EditMemory& bench, const Brick* base, bool had_materials) {
     take(base, had_materials, bench.brick);
     for (i32 i = threadIdx.x; i < 256; i += THREADS) bench.effect.counts[i] = 0;
     if (threadIdx.x == 0) {
@@ -200,12 +200,12 @@ __device__ inline void begin(Workbench& bench, const Brick* base, bool had_mater
 }
 
 // May an edit change a sample of the brick?
-__device__ inline bool may_change(const Tool& tool, const i32* low) {
+__device__ inline bool may_change(const EditRecord& record, const i32* low) {
     bool is_reached = true;
     for (i32 axis = 0; axis < 3; axis++) {
-        is_reached &= tool.min[axis] <= low[axis] + SIDE - 1 && low[axis] <= tool.max[axis];
+        is_reached &= record.min[axis] <= low[axis] + SIDE - 1 && low[axis] <= record.max[axis];
     }
-    return is_reached && !is_out_of_reach(tool, low);
+    return is_reached && !is_out_of_reach(record, low);
 }
 
 // Is a sample so far in the air, or in the solid, that the operation leaves it as it is, whatever its distance?
@@ -216,14 +216,14 @@ __device__ inline bool is_settled(u32 operation, i32 density) {
 
 // Which of the thread's samples an edit may change, a bit for each: those in its reach, and of those, unless it looks
 // around, the ones that are not settled.
-__device__ inline u32 open_samples(const Tool& tool, const OwnColumn& column, const Brick& brick, bool looks_around) {
+__device__ inline u32 open_samples(const EditRecord& record, const OwnColumn& column, const Brick& brick, bool looks_around) {
     i32 x = column.low[0] + column.x, z = column.low[2] + column.z;
-    if (x < tool.min[0] || x > tool.max[0] || z < tool.min[2] || z > tool.max[2]) return 0;
+    if (x < record.min[0] || x > record.max[0] || z < record.min[2] || z > record.max[2]) return 0;
     u32 open = 0;
     for (i32 k = 0; k < OWN; k++) {
         i32 y = column.low[1] + own_y(column, k), raw = brick.samples[own_index(k)];
         i32 density = raw == PRISTINE ? pristine_distance(column, k) : raw;
-        bool is_open = tool.min[1] <= y && y <= tool.max[1] && (looks_around || !is_settled(tool.operation, density));
+        bool is_open = record.min[1] <= y && y <= record.max[1] && (looks_around || !is_settled(record.operation, density));
         open |= (u32)is_open << k;
     }
     return open;
@@ -232,7 +232,7 @@ __device__ inline u32 open_samples(const Tool& tool, const OwnColumn& column, co
 // Applies one edit to the thread's open samples; returns which of them changed, a bit for each. `has_materials` is set
 // where a material was stored.
 __device__ inline u32 apply(
-    const Tool& tool, const OwnColumn& column, u32 open, const Noise& noise, Workbench& bench, bool& has_materials
+    const EditRecord& record, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& bench, bool& has_materials
 ) {
     Brick& brick = bench.brick;
     Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
@@ -245,13 +245,13 @@ __device__ inline u32 apply(
         Outcome outcome = {false, NONE};
         if (open >> k & 1) {
             i32 offset[3] = {column.x, y, column.z};
-            float distance = smooth_distance(tool, from_origin(tool, column.low, offset));
-            if (tool.is_rough) distance += bumps(tool, noise, bench.noise, along_x, along_y, along_z);
+            float distance = smooth_distance(record, from_origin(record, column.low, offset));
+            if (record.is_rough) distance += bumps(record, noise, bench.noise, along_x, along_y, along_z);
             i32 outside = round_distance(distance), pristine = pristine_distance(column, k);
             i16& sample = brick.samples[index];
             u8& material = brick.materials[index];
-            outcome = tool.operation == PAINT ? paint(tool, outside, column, pristine, sample, material)
-                                              : carve(tool, outside, column, pristine, sample, material);
+            outcome = record.operation == PAINT ? paint(record, outside, column, pristine, sample, material)
+                                              : carve(record, outside, column, pristine, sample, material);
             has_materials |= material != GROUND;
         }
         changed |= (u32)outcome.is_changed << k;
@@ -288,7 +288,7 @@ __device__ inline u64 hash_change(
 
 // Derives the bits of the brick and of what changed, and adds up what all threads know of it.
 __device__ inline void sum_up(
-    Workbench& bench, const OwnColumn& column, const Brick* base, bool had_materials, bool has_materials,
+    EditMemory& bench, const OwnColumn& column, const Brick* base, bool had_materials, bool has_materials,
     u32 changed
 ) {
     Brick& brick = bench.brick;
@@ -315,10 +315,10 @@ __device__ inline void sum_up(
     }
 }
 
-__device__ inline bool is_uniform(const Workbench& bench) { return !(bench.flags & NOT_UNIFORM); }
+__device__ inline bool is_uniform(const EditMemory& bench) { return !(bench.flags & NOT_UNIFORM); }
 
 // Reserves room for the brick. For one thread.
-__device__ inline void reserve(const EditParams& params, Workbench& bench) {
+__device__ inline void reserve(const EditParams& params, EditMemory& bench) {
     bench.record = bench.material = NONE;
     if (is_uniform(bench)) return;
     // Records and materials at once.
@@ -329,7 +329,7 @@ __device__ inline void reserve(const EditParams& params, Workbench& bench) {
     if (has_materials && material < params.material_capacity) bench.material = material;
 }
 
-__device__ inline EditResult result_of(const Workbench& bench) {
+__device__ inline EditResult result_of(const EditMemory& bench) {
     u32 flags = CHANGED | (bench.flags & (EXTENDED | HAS_MATERIALS | TOO_FAR)), uniform = 0;
     if (is_uniform(bench)) {
         flags |= UNIFORM;
@@ -339,7 +339,7 @@ __device__ inline EditResult result_of(const Workbench& bench) {
 }
 
 // Writes the brick to its slot, and to the entries that were reserved for it.
-__device__ inline void store(const EditParams& params, const Workbench& bench, Brick* target) {
+__device__ inline void store(const EditParams& params, const EditMemory& bench, Brick* target) {
     const u32 MATERIALS = LEN / sizeof(uint4), RECORD = sizeof(Brick) / sizeof(uint4) - MATERIALS;
     u32 piece = threadIdx.x;
     if (piece >= RECORD + MATERIALS) return;
@@ -360,7 +360,7 @@ struct NoCare {
 
 // Applies the edits of the block's job. `Care` knows how those are applied that look around.
 template <typename Care>
-__device__ inline void edit_brick(const EditParams& params, Workbench& bench, Care& care) {
+__device__ inline void edit_brick(const EditParams& params, EditMemory& bench, Care& care) {
     const EditJob job = params.jobs[blockIdx.x];
     const Brick* base = job.base == NONE ? nullptr : &params.bricks[job.base >> 1];
     const bool had_materials = base != nullptr && job.base & 1;
@@ -380,19 +380,19 @@ __device__ inline void edit_brick(const EditParams& params, Workbench& bench, Ca
     for (u32 start = 0; start < job.count; start += 32) {
         // Each lane looks at one edit; the warps all look at the same ones.
         u32 number = start + lane() < job.count ? params.list[job.first + start + lane()] : NONE;
-        u32 reaching = __ballot_sync(WARP, number != NONE && may_change(params.tools[number], column.low));
+        u32 reaching = __ballot_sync(WARP, number != NONE && may_change(params.edit_records[number], column.low));
         for (; reaching != 0; reaching &= reaching - 1) {
             u32 edit = __shfl_sync(WARP, number, __ffs(reaching) - 1);
-            const Tool& tool = params.tools[edit];
+            const EditRecord& record = params.edit_records[edit];
             if (!is_taken) begin(bench, base, had_materials);
             is_taken = true;
             bool looks_around = false;
             if constexpr (Care::LOOKS) looks_around = care.begin(job, stack, edit);
-            u32 open = open_samples(tool, column, bench.brick, looks_around);
+            u32 open = open_samples(record, column, bench.brick, looks_around);
             if (!__syncthreads_or(open != 0)) continue;
             Noise noise = {{0, 0.0f}, 0, 0};
-            if (tool.is_rough) {
-                noise = hash_noise(tool, column.low, bench.noise);
+            if (record.is_rough) {
+                noise = hash_noise(record, column.low, bench.noise);
                 __syncthreads();
             }
             if constexpr (Care::LOOKS) {
@@ -405,13 +405,13 @@ __device__ inline void edit_brick(const EditParams& params, Workbench& bench, Ca
                     continue;
                 }
             }
-            u32 own = apply(tool, column, open, noise, bench, has_materials);
+            u32 own = apply(record, column, open, noise, bench, has_materials);
             changed |= own;
             if (!__syncthreads_or(own != 0)) continue;
             is_changed = true;
             // Nobody begins with the next edit before these two warps are done.
             if (warp() == 0) enter_parts(params, job.cuts, edit, bench.effect.changed);
-            if (warp() == 1) enter_counts(params, edit, tool.operation, bench.effect.counts);
+            if (warp() == 1) enter_counts(params, edit, record.operation, bench.effect.counts);
         }
     }
     bool is_too_far = false;
@@ -432,7 +432,7 @@ __device__ inline void edit_brick(const EditParams& params, Workbench& bench, Ca
 }
 
 extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
-    __shared__ Workbench bench;
+    __shared__ EditMemory bench;
     NoCare none;
     edit_brick(params, bench, none);
 }

@@ -73,7 +73,7 @@ struct EditJob {
 
 enum Operation { DIG, ADD, PAINT };
 
-struct Tool {
+struct EditRecord {
     u32 kind, operation, material, is_rough;
     // The shape's origin: voxels, and 1/256 voxel from there.
     i32 home[3], rest[3];
@@ -84,11 +84,11 @@ struct Tool {
     u32 seed, pad;
 };
 
-// What a tool does beyond its operation: nothing, or it sculpts.
+// How an edit changes samples beside digging, adding and painting.
 enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
 
-// What a tool that looks around needs besides.
-struct Chisel {
+// What a stencil edit needs beside its EditRecord.
+struct SculptParams {
     // `material` is what new ground is made of; `NONE`: what is around says it.
     u32 stroke, material;
     // In 1/256; in 1/256 voxel.
@@ -121,7 +121,7 @@ struct EditPart {
 };
 
 struct EditCount {
-    u32 edit, fate, voxels, pad;
+    u32 edit, outcome, voxels, pad;
 };
 
 struct EditParams {
@@ -129,7 +129,7 @@ struct EditParams {
     const Stack* stacks;
     const EditJob* jobs;
     const u32* list;
-    const Tool* tools;
+    const EditRecord* edit_records;
     EditResult* results;
     // 72 and 32 to an entry.
     uint4* records;
@@ -157,11 +157,11 @@ struct Protected {
     i32 min[3], max[3];
 };
 
-struct CarefulParams {
+struct StencilEditParams {
     EditParams edit;
     const u32* windows;
-    // One for each tool.
-    const Chisel* chisels;
+    // One for each edit record.
+    const SculptParams* sculpt_params;
     const u16* images;
     // Null where there are none; protected boxes come right behind them.
     const Rules* rules;
@@ -222,8 +222,8 @@ struct HeightsParams {
 };
 
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
-static_assert(sizeof(EditJob) == 48 && sizeof(Tool) == 128 && sizeof(EditResult) == 32, "see layout/");
-static_assert(sizeof(Chisel) == 152 && sizeof(CarefulParams) == 152, "see layout/");
+static_assert(sizeof(EditJob) == 48 && sizeof(EditRecord) == 128 && sizeof(EditResult) == 32, "see layout/");
+static_assert(sizeof(SculptParams) == 152 && sizeof(StencilEditParams) == 152, "see layout/");
 static_assert(sizeof(Rules) == 296 && sizeof(Protected) == 24, "see layout/");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
 static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");

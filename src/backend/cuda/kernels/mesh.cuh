@@ -34,7 +34,7 @@ __device__ inline u32 column_above(const Brick& brick, u32 row, u32 x) {
 // Fills the columns of corners, and the signs. One warp has the 64 corners in the brick, two for each lane: a lane brings a
 // layer's half of the bits; turned around, these are what is above its corners. Another has the 17 corners in the bricks
 // beside it. For the first two warps.
-__device__ inline void gather_columns(const Site& site, MeshBench& bench) {
+__device__ inline void gather_columns(const Site& site, MeshMemory& bench) {
     const Brick* bricks = site.params.bricks;
     bool is_inner = warp() == 0, is_side = lane() < SIDE || lane() == 2 * SIDE, has_solid = false, has_air = false;
     u32 x = is_inner ? lane() % SIDE : is_side ? SIDE : lane() - SIDE;
@@ -162,7 +162,7 @@ __device__ inline ApronColumn read_column(const Site& site, const ApronPlace& pl
 }
 
 // Puts it in its place.
-__device__ inline void put_column(const Site& site, MeshBench& bench, const ApronColumn& column) {
+__device__ inline void put_column(const Site& site, MeshMemory& bench, const ApronColumn& column) {
     u32 t = threadIdx.x;
     if (t >= AREA) return;
     bench.heights[t] = column.height;
@@ -176,7 +176,7 @@ __device__ inline void put_column(const Site& site, MeshBench& bench, const Apro
 }
 
 // Numbers the edges of each level from a warp's corners. For one warp.
-__device__ inline void number_edges(MeshBench& bench) {
+__device__ inline void number_edges(MeshMemory& bench) {
     u32 own = 0, before = 0;
     if (lane() < LEVELS) {
 #pragma unroll
@@ -192,7 +192,7 @@ __device__ inline void number_edges(MeshBench& bench) {
 }
 
 // Lists the edges from the corner of a thread, a bit for each level.
-__device__ inline void list_edges(MeshBench& bench, u32 edges) {
+__device__ inline void list_edges(MeshMemory& bench, u32 edges) {
     for (u32 rest = edges; rest != 0; rest &= rest - 1) {
         i32 level = __ffs(rest) - 1;
         Run run = bench.bits.runs[level][warp()];
@@ -203,7 +203,7 @@ __device__ inline void list_edges(MeshBench& bench, u32 edges) {
 }
 
 // Counts the edges of all levels. For one warp.
-__device__ inline u32 count_edges(const MeshBench& bench) {
+__device__ inline u32 count_edges(const MeshMemory& bench) {
     u32 edges = 0;
     if (lane() < LEVELS) {
 #pragma unroll
@@ -213,7 +213,7 @@ __device__ inline u32 count_edges(const MeshBench& bench) {
 }
 
 // Lists the cubes to draw, layer by layer. For one warp.
-__device__ inline void list_cubes(const MeshParams& params, MeshBench& bench) {
+__device__ inline void list_cubes(const MeshParams& params, MeshMemory& bench) {
     // The lower half of a layer's cells, and the upper half.
     u32 corner = lane() / SIDE * 9 + lane() % SIDE, cubes = 0, indices = 0;
     u32 drawn = bench.bits.drawn[MARGIN + corner] | bench.bits.drawn[MARGIN + corner + 4 * 9] << SIDE;
@@ -245,12 +245,12 @@ __device__ inline void list_cubes(const MeshParams& params, MeshBench& bench) {
 }
 
 // Reserves room for the block: the first vertex, and the first index in the upper half. For one thread.
-__device__ inline u64 reserve(const MeshParams& params, const MeshBench& bench) {
+__device__ inline u64 reserve(const MeshParams& params, const MeshMemory& bench) {
     return atomicAdd((u64*)params.counters, bench.vertices | (u64)bench.indices << 32);
 }
 
 // Enters what was reserved. For one thread.
-__device__ inline void enter(const MeshParams& params, MeshBench& bench, u64 reserved) {
+__device__ inline void enter(const MeshParams& params, MeshMemory& bench, u64 reserved) {
     u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
     bool is_room = fits(vertex, bench.vertices, params.vertex_capacity);
     is_room &= fits(index, bench.indices, params.index_capacity);
@@ -266,7 +266,7 @@ struct Made {
 };
 
 // Makes up to 32 vertices, the first of number `base`; normals go to shared memory. For one warp.
-__device__ inline Made make_vertices(const Site& site, MeshBench& bench, u32 base) {
+__device__ inline Made make_vertices(const Site& site, MeshMemory& bench, u32 base) {
     Made made = {{0, 0}, {0, 0}};
     if (base + lane() < bench.vertices) {
         Edge edge = edge_at(bench.edges[base + lane()]);
@@ -284,7 +284,7 @@ __device__ inline Made make_vertices(const Site& site, MeshBench& bench, u32 bas
 }
 
 // Writes these vertices. Normals come from shared memory, so that what lanes write lies side by side. For one warp.
-__device__ inline void write_vertices(const MeshParams& params, const MeshBench& bench, u32 base, const Made& made) {
+__device__ inline void write_vertices(const MeshParams& params, const MeshMemory& bench, u32 base, const Made& made) {
     const float* normals = bench.output[warp()].normals;
     u32 count = smallest(bench.vertices - base, 32);
     u64 to = (u64)bench.vertex + base;
@@ -302,7 +302,7 @@ __device__ inline void write_vertices(const MeshParams& params, const MeshBench&
 
 // Writes the triangles of up to 32 cubes, the first of number `base`. For one warp; they go through shared memory, so that
 // what its lanes write lies side by side.
-__device__ inline void write_cubes(const MeshParams& params, MeshBench& bench, u32 base) {
+__device__ inline void write_cubes(const MeshParams& params, MeshMemory& bench, u32 base) {
     u16* indices = bench.output[warp()].indices;
     // Indices of the cube, and in the upper half those of cubes before these.
     u32 cube = base + lane() < bench.cubes_in_all ? bench.cubes[base + lane()] : 0, count = cube >> CUBE_BITS, counts = count;
@@ -342,7 +342,7 @@ __device__ inline void draw_nothing(const MeshParams& params) {
 }
 
 extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params) {
-    __shared__ MeshBench bench;
+    __shared__ MeshMemory bench;
     const MeshJob job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
     const Stack& stack = params.stacks[column.stack];

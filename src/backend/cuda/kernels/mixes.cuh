@@ -111,7 +111,7 @@ __device__ inline u32 stored_material(const Site& site, const Edge& edge, bool i
 }
 
 __device__ inline Mix mix_at(
-    const Site& site, const MeshBench& bench, const Edge& edge, const Crossing& crossing
+    const Site& site, const MeshMemory& bench, const Edge& edge, const Crossing& crossing
 ) {
     u32 stored = stored_material(site, edge, crossing.is_lower_solid);
     if (stored != GROUND) return pure(stored);

@@ -1,7 +1,7 @@
 // What rules say of a change, as volume/rules.rs does.
 #pragma once
 
-#include "surroundings.cuh"
+#include "padded_brick.cuh"
 
 // What edits may not change, or not at once.
 struct Judge : Surroundings {
@@ -41,17 +41,17 @@ struct Judge : Surroundings {
 
     // How much of a change is made that takes away what is solid at a sample of the brick or beside it, in 1/256; and why
     // not all, or `FATES`.
-    __device__ i32 pace(const OwnColumn& column, i32 x, i32 y, i32 z, i32 power, u32& fate) const {
+    __device__ i32 pace(const OwnColumn& column, i32 x, i32 y, i32 z, i32 power, u32& outcome) const {
         i32 at_y = column.low[1] + y, place = (z + 1) * WINDOW + x + 1;
         u32 material = stored_at(x, y, z);
         if (material == GROUND) material = ground_material(stack->columns[place], at_y * ONE - stack->heights[place]);
         i32 hardness = params.rules->hardness[material];
-        fate = UNBREAKABLE;
+        outcome = UNBREAKABLE;
         if (at_y < params.rules->bedrock || is_unbreakable(material)) return 0;
-        fate = FATES;
+        outcome = FATES;
         if (power >= hardness) return ONE;
         i32 part = largest((2 * power - hardness) * ONE / hardness, 0);
-        fate = part == 0 ? TOO_HARD : SLOWED;
+        outcome = part == 0 ? TOO_HARD : SLOWED;
         return part;
     }
 
@@ -86,16 +86,16 @@ struct Judge : Surroundings {
     }
 
     // The density that a sample may have instead of the proposed one, and why it is another one, or `FATES`.
-    __device__ i32 judged(const OwnColumn& column, const i32* at, i32 y, i32 power, i32 proposed, u32& fate) const {
+    __device__ i32 judged(const OwnColumn& column, const i32* at, i32 y, i32 power, i32 proposed, u32& outcome) const {
         const Marked* own = bench.around + around_at(column.x, y, column.z);
         i32 before = density(*own);
-        fate = PROTECTED;
+        outcome = PROTECTED;
         if (is_protected(at)) return before;
-        fate = FATES;
+        outcome = FATES;
         if (proposed <= before) return proposed;
         i32 least = ONE;
         if (before < 0) {
-            least = pace(column, column.x, y, column.z, power, fate);
+            least = pace(column, column.x, y, column.z, power, outcome);
         } else {
             // Air beside what is solid holds its surface. It is air in any case, so nobody asks why.
             for (i32 i = 0; i < 6; i++) {

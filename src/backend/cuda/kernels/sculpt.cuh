@@ -152,13 +152,13 @@ __device__ inline i32 attached(const Marked* own, i32 after) {
 }
 
 // How much of the change is made at a distance from the shape, in 1/256.
-__device__ inline i32 weight_at(const Chisel& chisel, i32 outside) {
-    i32 inside = -outside, falloff = chisel.falloff;
+__device__ inline i32 weight_at(const SculptParams& sculpt, i32 outside) {
+    i32 inside = -outside, falloff = sculpt.falloff;
     if (inside < 0 || (inside == 0 && falloff > 0)) return 0;
-    if (inside >= falloff) return chisel.strength;
+    if (inside >= falloff) return sculpt.strength;
     // 3 t^2 - 2 t^3: no kink at either end.
     i32 t = inside * ONE / falloff, faded = (t * t * (3 * ONE - 2 * t)) >> 16;
-    return (faded * chisel.strength + ONE / 2) >> 8;
+    return (faded * sculpt.strength + ONE / 2) >> 8;
 }
 
 // A part of `whole`, in 1/256, away from zero.
@@ -168,45 +168,45 @@ __device__ inline i32 part_of(i32 whole, i32 weight) {
 }
 
 // How far a point lies from a plane, on the side of its normal.
-__device__ inline i32 above_plane(const Chisel& chisel, const i32* at) {
+__device__ inline i32 above_plane(const SculptParams& sculpt, const i32* at) {
     i64 along = 0;
-    for (i32 i = 0; i < 3; i++) along += ((i64)at[i] * ONE - chisel.point[i]) * chisel.matrix[0][i];
+    for (i32 i = 0; i < 3; i++) along += ((i64)at[i] * ONE - sculpt.point[i]) * sculpt.matrix[0][i];
     // Both are integers that doubles hold exactly.
-    return within_reach((i64)rint((double)along / chisel.length));
+    return within_reach((i64)rint((double)along / sculpt.length));
 }
 
 // The grey of a stamp's image, in 1/256 of a step between samples.
-__device__ inline i64 grey_at(const Chisel& chisel, const u16* images, i64 x, i64 y) {
-    const u16* image = images + chisel.image;
-    i64 column = x >> 8, row = y >> 8, last_column = (i64)chisel.columns - 2, last_row = (i64)chisel.rows - 2;
+__device__ inline i64 grey_at(const SculptParams& sculpt, const u16* images, i64 x, i64 y) {
+    const u16* image = images + sculpt.image;
+    i64 column = x >> 8, row = y >> 8, last_column = (i64)sculpt.columns - 2, last_row = (i64)sculpt.rows - 2;
     column = column < 0 ? 0 : column > last_column ? last_column : column;
     row = row < 0 ? 0 : row > last_row ? last_row : row;
     i64 right = x - column * ONE, down = y - row * ONE;
     right = right < 0 ? 0 : right > ONE ? ONE : right;
     down = down < 0 ? 0 : down > ONE ? ONE : down;
-    const u16* upper = image + row * chisel.columns + column;
-    const u16* lower = upper + chisel.columns;
+    const u16* upper = image + row * sculpt.columns + column;
+    const u16* lower = upper + sculpt.columns;
     i64 above = upper[0] * (ONE - right) + upper[1] * right, below = lower[0] * (ONE - right) + lower[1] * right;
     return above * (ONE - down) + below * down;
 }
 
 // How far a point lies above the relief of a stamp; `beside`: how far beside its image, negative inside.
-__device__ inline i32 above_stamp(const Chisel& chisel, const u16* images, const i32* at, i32& beside) {
+__device__ inline i32 above_stamp(const SculptParams& sculpt, const u16* images, const i32* at, i32& beside) {
     const i64 WHITE = 65535ll << 16;
     i64 turned[3];
 #pragma unroll
     for (i32 i = 0; i < 3; i++) {
         i64 along = 0;
 #pragma unroll
-        for (i32 j = 0; j < 3; j++) along += chisel.matrix[j][i] * ((i64)at[j] * ONE - chisel.point[j]);
-        turned[i] = divided(along + chisel.squared / 2, chisel.squared);
+        for (i32 j = 0; j < 3; j++) along += sculpt.matrix[j][i] * ((i64)at[j] * ONE - sculpt.point[j]);
+        turned[i] = divided(along + sculpt.squared / 2, sculpt.squared);
     }
-    i64 right = turned[0], up = turned[1], down = turned[2], half_x = chisel.half[0], half_z = chisel.half[1];
+    i64 right = turned[0], up = turned[1], down = turned[2], half_x = sculpt.half[0], half_z = sculpt.half[1];
     i64 beside_x = (right < 0 ? -right : right) - half_x, beside_z = (down < 0 ? -down : down) - half_z;
     beside = within_reach(beside_x > beside_z ? beside_x : beside_z);
-    i64 x = (right + half_x) * ((i64)chisel.columns - 1) * ONE / (2 * half_x);
-    i64 y = (down + half_z) * ((i64)chisel.rows - 1) * ONE / (2 * half_z);
-    return within_reach(up - divided(grey_at(chisel, images, x, y) * chisel.height + WHITE / 2, WHITE));
+    i64 x = (right + half_x) * ((i64)sculpt.columns - 1) * ONE / (2 * half_x);
+    i64 y = (down + half_z) * ((i64)sculpt.rows - 1) * ONE / (2 * half_z);
+    return within_reach(up - divided(grey_at(sculpt, images, x, y) * sculpt.height + WHITE / 2, WHITE));
 }
 
 // A height in steps, with a riser over the middle quarter of each.
@@ -218,24 +218,24 @@ __device__ inline i32 terraced(i32 height, i32 step) {
 // The density of a sample after the operation, from its distance to the shape and what is around it; says whether there is
 // another one.
 __device__ inline bool sculpted(
-    const Chisel& chisel, const u16* images, const i32* at, i32 outside, const Marked* own, i32& after
+    const SculptParams& sculpt, const u16* images, const i32* at, i32 outside, const Marked* own, i32& after
 ) {
     if (outside > 0) return false;
     i32 target = 0;
     bool has_target = false;
-    if (chisel.stroke == FLATTEN) {
-        target = above_plane(chisel, at);
+    if (sculpt.stroke == FLATTEN) {
+        target = above_plane(sculpt, at);
         has_target = true;
-    } else if (chisel.stroke == LEVEL) {
-        target = at[1] * ONE - chisel.amounts[0];
+    } else if (sculpt.stroke == LEVEL) {
+        target = at[1] * ONE - sculpt.amounts[0];
         has_target = true;
-    } else if (chisel.stroke == STAMP) {
+    } else if (sculpt.stroke == STAMP) {
         i32 beside;
-        target = above_stamp(chisel, images, at, beside);
+        target = above_stamp(sculpt, images, at, beside);
         outside = largest(outside, beside);
         has_target = true;
     }
-    i32 weight = weight_at(chisel, outside);
+    i32 weight = weight_at(sculpt, outside);
     if (weight == 0) return false;
     i32 before = density(*own), middle;
     if (has_target) {
@@ -243,15 +243,15 @@ __device__ inline bool sculpted(
         return true;
     }
     i32 by = 0;
-    if (chisel.stroke == SHIFT) {
-        by = chisel.amounts[0];
+    if (sculpt.stroke == SHIFT) {
+        by = sculpt.amounts[0];
         return shifted(own, sign_of(by) * ((magnitude(by) * weight + ONE / 2) >> 8), after);
     }
     if (!middle_of(own, middle)) return false;
-    if (chisel.stroke == SMOOTH) {
+    if (sculpt.stroke == SMOOTH) {
         by = way_to_average(own, middle) * weight / (64 * ONE);
         after = attached(own, middle + by);
-    } else if (chisel.stroke == SHARPEN) {
+    } else if (sculpt.stroke == SHARPEN) {
         by = clamped(way_to_average(own, middle) * weight / (64 * ONE), -SHARPER, SHARPER);
         i32 low = before, high = before;
 #pragma unroll
@@ -262,7 +262,7 @@ __device__ inline bool sculpted(
         }
         after = attached(own, clamped(middle - by, low, high));
     } else {
-        i32 step = chisel.amounts[0], base = chisel.amounts[1], surface = at[1] * ONE - middle;
+        i32 step = sculpt.amounts[0], base = sculpt.amounts[1], surface = at[1] * ONE - middle;
         by = part_of(surface - (terraced(surface - base, step) + base), weight);
         after = middle + by;
     }

@@ -77,14 +77,14 @@ __device__ inline float torus(Vector p, const float* constants) {
     return length(beyond, along, 0.0f) - tube;
 }
 
-__device__ inline float smooth_distance(const Tool& tool, Vector p) {
-    switch (tool.kind) {
-        case SPHERE: return sphere(p, tool.constants);
-        case CUBOID: return cuboid(p, tool.constants);
-        case CYLINDER: return cylinder(p, tool.constants);
-        case CAPSULE: return capsule(p, tool.constants);
-        case CONE: return cone(p, tool.constants);
-        default: return torus(p, tool.constants);
+__device__ inline float smooth_distance(const EditRecord& record, Vector p) {
+    switch (record.kind) {
+        case SPHERE: return sphere(p, record.constants);
+        case CUBOID: return cuboid(p, record.constants);
+        case CYLINDER: return cylinder(p, record.constants);
+        case CAPSULE: return capsule(p, record.constants);
+        case CONE: return cone(p, record.constants);
+        default: return torus(p, record.constants);
     }
 }
 
@@ -136,9 +136,9 @@ __device__ inline i32 noise_lane(i32 axis, i32 offset) { return axis * SIDE + of
 
 // Hashes the noise points around the brick whose lowest sample is `low`. For the whole block, which waits for itself
 // before it looks at them.
-__device__ inline Noise hash_noise(const Tool& tool, const i32* low, float* points) {
+__device__ inline Noise hash_noise(const EditRecord& record, const i32* low, float* points) {
     i32 axis = lane() / SIDE, start = axis == 0 ? low[0] : axis == 1 ? low[1] : low[2];
-    Noise noise = {locate(start + (i32)lane() % SIDE, tool.scale), 0, 0};
+    Noise noise = {locate(start + (i32)lane() % SIDE, record.scale), 0, 0};
     i32 first[3], count[3];
 #pragma unroll
     for (i32 i = 0; i < 3; i++) {
@@ -151,7 +151,7 @@ __device__ inline Noise hash_noise(const Tool& tool, const i32* low, float* poin
     noise.area = count[0] * count[1];
     // Divisions of small integers by floats: half of one is much more than what those may be wrong.
     float by_row = 1.0f / (float)noise.row, by_area = 1.0f / (float)noise.area;
-    u64 seed = mix(tool.seed);
+    u64 seed = mix(record.seed);
     for (i32 i = threadIdx.x; i < noise.area * count[2]; i += THREADS) {
         i32 z = (i32)(((float)i + 0.5f) * by_area), in_area = i - z * noise.area;
         i32 y = (i32)(((float)in_area + 0.5f) * by_row), x = in_area - y * noise.row;
@@ -167,14 +167,14 @@ __device__ inline Place place_of(const Noise& noise, i32 axis, i32 offset) {
 }
 
 // Bumps at a sample: between noise points along y, then z, then x.
-__device__ inline float bumps(const Tool& tool, const Noise& noise, const float* points, Place x, Place y, Place z) {
+__device__ inline float bumps(const EditRecord& record, const Noise& noise, const float* points, Place x, Place y, Place z) {
     const float* near = points + x.cell + y.cell * noise.row + z.cell * noise.area;
     auto row = [&](const float* p) { return lerp(p[0], p[noise.row], y.t); };
     auto face = [&](const float* p) { return lerp(row(p), row(p + noise.area), z.t); };
     float value = lerp(face(near), face(near + 1), x.t);
     if (value < -1.0f) value = -1.0f;
     if (value > 1.0f) value = 1.0f;
-    return value * (float)tool.amplitude;
+    return value * (float)record.amplitude;
 }
 
 // To the nearest integer, halves to even, with an addition: next to 1.5 * 2^23, floats are the integers.
@@ -193,23 +193,23 @@ __device__ inline i32 voxels_from(i32 voxel, i32 home) {
 
 // From the shape's origin to the sample `offset` from a brick's lowest sample `low`. Rows along x begin at `low`, and only
 // their first coordinate stops at the end of all distances, as on the CPU.
-__device__ inline Vector from_origin(const Tool& tool, const i32* low, const i32* offset) {
+__device__ inline Vector from_origin(const EditRecord& record, const i32* low, const i32* offset) {
     return {
-        (float)((voxels_from(low[0], tool.home[0]) + offset[0]) * ONE - tool.rest[0]),
-        (float)(voxels_from(low[1] + offset[1], tool.home[1]) * ONE - tool.rest[1]),
-        (float)(voxels_from(low[2] + offset[2], tool.home[2]) * ONE - tool.rest[2]),
+        (float)((voxels_from(low[0], record.home[0]) + offset[0]) * ONE - record.rest[0]),
+        (float)(voxels_from(low[1] + offset[1], record.home[1]) * ONE - record.rest[1]),
+        (float)(voxels_from(low[2] + offset[2], record.home[2]) * ONE - record.rest[2]),
     };
 }
 
 // Is every sample of the brick too far outside the shape to change? Not sure means no. As `Evaluator::is_out_of_reach`:
 // no sample is farther from the brick's middle than half of the diagonal.
-__device__ inline bool is_out_of_reach(const Tool& tool, const i32* low) {
+__device__ inline bool is_out_of_reach(const EditRecord& record, const i32* low) {
     // 3.5 voxels along each axis, which times the root of 3 is less than this.
     const float HALF = 3.5f * (float)ONE;
     const i32 DIAGONAL = 1553, LOWEST[3] = {0, 0, 0};
-    Vector p = from_origin(tool, low, LOWEST);
-    i32 distance = round_distance(smooth_distance(tool, {p.x + HALF, p.y + HALF, p.z + HALF}));
+    Vector p = from_origin(record, low, LOWEST);
+    i32 distance = round_distance(smooth_distance(record, {p.x + HALF, p.y + HALF, p.z + HALF}));
     // What rounding to floats may have cost, generously.
-    i32 rounding = 16 + (distance >> 14), amplitude = tool.is_rough ? tool.amplitude : 0;
+    i32 rounding = 16 + (distance >> 14), amplitude = record.is_rough ? record.amplitude : 0;
     return distance - rounding > BAND + amplitude + DIAGONAL;
 }

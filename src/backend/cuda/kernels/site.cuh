@@ -36,7 +36,7 @@ union Output {
     u16 indices[STAGED_INDICES];
 };
 
-struct MeshBench {
+struct MeshMemory {
     i32 heights[AREA];
     Marked apron[WINDOW * AREA];
     union {

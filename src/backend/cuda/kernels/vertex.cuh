@@ -55,7 +55,7 @@ __device__ inline uint2 position_of(const Edge& edge, i32 step) {
 
 // The tile's normal on an edge that nobody edited, the one of the gradient on others.
 __device__ inline Vector normal_of(
-    const Site& site, const MeshBench& bench, const Edge& edge, const Crossing& crossing
+    const Site& site, const MeshMemory& bench, const Edge& edge, const Crossing& crossing
 ) {
     Vector normal = crossing.gradient;
     if (crossing.is_pristine && (crossing.is_stencil_pristine || is_border(site.column, edge))) {

@@ -139,17 +139,17 @@ fn every_field_is_where_the_kernels_expect_it() {
         ScatterJob is ScatterJob: to, from, bytes, pad;
         ScatterParams is ScatterParams: jobs;
         EditJob is EditJob: brick, base, target, stack, first, count, cuts, window, strides, pad;
-        Tool is Tool: kind, operation, material, is_rough, home, rest, min, max, constants, amplitude, scale, seed, pad;
-        Chisel is Chisel: stroke, material, strength, falloff, amounts, point, half, height, image, columns, rows, power,
+        EditRecord is EditRecord: kind, operation, material, is_rough, home, rest, min, max, constants, amplitude, scale, seed, pad;
+        SculptParams is SculptParams: stroke, material, strength, falloff, amounts, point, half, height, image, columns, rows, power,
             matrix, squared, length;
         EditResult is EditResult: hash, flags, record, material, bounds, uniform, pad;
         EditPart is EditPart: job, edit, part, bounds;
-        EditCount is EditCount: edit, fate, voxels, pad;
-        EditParams is EditParams: bricks, stacks, jobs, list, tools, results, records, materials, parts, counts, counters,
+        EditCount is EditCount: edit, outcome, voxels, pad;
+        EditParams is EditParams: bricks, stacks, jobs, list, edit_records, results, records, materials, parts, counts, counters,
             record_capacity, material_capacity, part_capacity, count_capacity;
         Rules is Rules: hardness, unbreakable, bedrock, boxes;
         Protected is Protected: min, max;
-        CarefulParams is CarefulParams: edit, windows, chisels, images, rules, look, last, pad;
+        StencilEditParams is StencilEditParams: edit, windows, sculpt_params, images, rules, look, last, pad;
         ColumnJob is ColumnJob: stack, x, z, pad, mask, pad2, borders;
         MeshJob is MeshJob: window, strides, column, y, cells, pad;
         MeshResult is MeshResult: vertex, vertices, index, indices;
@@ -186,7 +186,7 @@ fn every_constant_is_the_same() {
     check("UNIFORM", EditResult::UNIFORM.into());
     check("HAS_MATERIALS", EditResult::HAS_MATERIALS.into());
     check("TOO_FAR", EditResult::TOO_FAR.into());
-    // Numbers that `tool` and `chisel` write.
+    // Numbers that the record and the parameters write.
     let numbered =
         |names: &[&str]| names.iter().zip(0..).map(|(name, n)| ((*name).to_owned(), n)).collect::<Vec<_>>();
     for (name, number) in [

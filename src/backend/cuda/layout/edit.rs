@@ -23,12 +23,12 @@ pub(crate) struct EditJob {
     pub target: u32,
     /// Slot of its stack.
     pub stack: u32,
-    /// Its tools, in order: a range of `list`.
+    /// Its edits, in order: a range of `list`.
     pub first: u32,
     pub count: u32,
     /// See [`cuts`].
     pub cuts: u32,
-    /// For `careful`: its entry in the windows; from there to the next along x, and `<< 16` along z, along y it is 1.
+    /// For `stencil_edit`: its entry in the windows; from there to the next along x, and `<< 16` along z, along y it is 1.
     pub window: u32,
     pub strides: u32,
     pub pad: u32,
@@ -50,7 +50,7 @@ impl EditJob {
 /// An edit, all that is derived from it once included.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Tool {
+pub(crate) struct EditRecord {
     /// Which of the shapes, in the order of `brush/shapes/mod.rs`.
     pub kind: u32,
     /// Dig, add, paint.
@@ -107,7 +107,7 @@ impl EditResult {
 pub(crate) struct EditPart {
     /// Number of the job.
     pub job: u32,
-    /// Number of the tool.
+    /// Number of the edit record.
     pub edit: u32,
     /// See [`part_chunk`].
     pub part: u32,
@@ -115,14 +115,14 @@ pub(crate) struct EditPart {
     pub bounds: u32,
 }
 
-/// Voxels that an edit dealt with. There may be several for one edit, fate and material.
+/// Voxels that an edit dealt with. There may be several for one edit, outcome and material.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditCount {
-    /// Number of the tool.
+    /// Number of the edit record.
     pub edit: u32,
     /// Removed (0), added (1), painted (2); protected (3), unbreakable (4), too hard (5), slowed (6); and `material << 8`.
-    pub fate: u32,
+    pub outcome: u32,
     pub voxels: u32,
     pub pad: u32,
 }
@@ -136,9 +136,9 @@ pub(crate) struct EditParams {
     pub stacks: Address,
     /// [`EditJob`]s, one for each block.
     pub jobs: Address,
-    /// Numbers of tools.
+    /// Numbers of edit records.
     pub list: Address,
-    pub tools: Address,
+    pub edit_records: Address,
     /// Out: an [`EditResult`] for each job.
     pub results: Address,
     /// Out: [`RECORD_BYTES`] each.
@@ -161,12 +161,12 @@ impl KernelParams for EditParams {
 }
 
 /// An edit that reaches these samples of the world; `None`: it reaches none.
-pub(crate) fn tool(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> Tool {
+pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> EditRecord {
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
     let LatticeBox { min, max } = reach.unwrap_or(nothing);
     let (amplitude, scale, seed) = of.roughness.unwrap_or((0, 1, 0));
-    Tool {
+    EditRecord {
         kind: of.kind,
         operation: match operation {
             Kind::Dig => 0,

@@ -5,10 +5,10 @@
 
 #[cfg(test)]
 mod agreement;
-mod careful;
 mod edit;
 mod heights;
 mod mesh;
+mod stencil_edit;
 
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
@@ -18,10 +18,10 @@ use crate::ground::{ColumnMaterial, Ground, MaterialId};
 use crate::lattice::{Column, LatticeBox};
 use crate::volume::{Brick, Sample};
 
-pub(crate) use careful::*;
 pub(crate) use edit::*;
 pub(crate) use heights::*;
 pub(crate) use mesh::*;
+pub(crate) use stencil_edit::*;
 
 /// An address on the device.
 pub(crate) type Address = u64;

@@ -6,7 +6,7 @@ use super::device::{Fault, Launch};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
 use super::lists::{cut, fill, hand_out, map};
 use super::session::{Session, Stacks, Uploads, windows};
-use super::staging::Plan;
+use super::staging::StagingLayout;
 use super::windows::Windows;
 use crate::ground::Ground;
 use crate::lattice::{pieces, side_by_side};
@@ -78,7 +78,7 @@ impl Session {
         let single = ground.single_material().map(MaterialMix::pure);
         let plain = single.filter(|_| !windows.has_materials());
 
-        let mut plan = Plan::default();
+        let mut plan = StagingLayout::default();
         uploads.plan(&mut plan);
         let window_list = plan.section::<u32>(windows.len());
         let column_list = plan.section::<ColumnJob>(columns.len());
@@ -118,7 +118,9 @@ impl Session {
                 single: layout::single_mix(ground),
                 pad: 0,
             };
-            self.device.launch(Launch::new(blocks.len() as u32, &params))?;
+            // SAFETY: the parameters are sections of the input and lists of the session, with their capacities, and none of them
+            // is touched before the wait below.
+            unsafe { self.device.launch(Launch::new(blocks.len() as u32, &params)) }?;
             self.meshes.results.fetch(&mut *self.device, blocks.len())?;
             meanwhile();
             self.device.wait()?;

@@ -1,6 +1,6 @@
 //! Devices that can't be opened, or not be trusted.
 
-use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
+use super::super::device::{Device, DeviceLayer, Fault, HostMemory};
 use super::super::emulator::skip;
 use super::*;
 
@@ -144,60 +144,32 @@ fn a_thread_that_waits_for_a_slow_card_sleeps() {
 #[test]
 fn a_device_that_computes_something_else_is_not_trusted() {
     /// Turns a bit of every read.
-    struct Liar(Box<dyn Device>);
-    impl Device for Liar {
-        fn name(&self) -> String {
-            self.0.name()
+    struct BitFlipper(Box<dyn Device>);
+    impl DeviceLayer for BitFlipper {
+        fn inner(&self) -> &dyn Device {
+            &*self.0
         }
-        fn free_memory(&mut self) -> usize {
-            self.0.free_memory()
+        fn inner_mut(&mut self) -> &mut dyn Device {
+            &mut *self.0
         }
-        fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-            self.0.alloc(bytes)
-        }
-        fn free(&mut self, address: u64) {
-            self.0.free(address);
-        }
-        fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
-            self.0.alloc_host(bytes)
-        }
-        fn upload(
-            &mut self,
-            from: &dyn HostMemory,
-            bytes: std::ops::Range<usize>,
-            to: u64,
-        ) -> Result<(), Fault> {
-            self.0.upload(from, bytes, to)
-        }
-        fn download(
+        unsafe fn download(
             &mut self,
             from: u64,
             to: &mut dyn HostMemory,
             bytes: std::ops::Range<usize>,
         ) -> Result<(), Fault> {
-            self.0.download(from, to, bytes.clone())?;
+            // SAFETY: the caller promises the same.
+            unsafe { self.0.download(from, to, bytes.clone()) }?;
             // The last bit of a density, of a normal or of a hash.
             if let Some(byte) = to.bytes_of_mut(bytes).and_then(|bytes| bytes.get_mut(512)) {
                 *byte ^= 1;
             }
             Ok(())
         }
-        fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-            self.0.copy(from, to, bytes)
-        }
-        fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
-            self.0.launch(launch)
-        }
-        fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
-            self.0.mark()
-        }
-        fn wait(&mut self) -> Result<(), Fault> {
-            self.0.wait()
-        }
     }
-    // A card writes to the host's memory without a copy, so only the emulator can be made to lie here.
+    // A card writes to the host's memory without a copy, so only the emulator can be made to compute wrong bits.
     let Some(emulator) = Emulator::start() else { return };
-    let engine = engine(Box::new(Liar(Box::new(emulator))), 64 << 20);
+    let engine = engine(Box::new(BitFlipper(Box::new(emulator))), 64 << 20);
     assert_eq!(engine.state(), EngineState::Lost(Fault::SelfTest.to_string()));
 }
 

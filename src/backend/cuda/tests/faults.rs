@@ -2,18 +2,18 @@
 
 use std::sync::{Mutex, Once};
 
-use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
+use super::super::device::{Device, DeviceLayer, Fault, HostMemory, Launch, Mark};
 use super::*;
 use crate::backend::Stage;
 
 /// Calls to go until a device fails, and how. For lack of memory, only calls that ask for some count; for what is
 /// [`refused`], only those that wait for marks.
-struct Plan(Arc<Mutex<Option<(u32, Fault)>>>);
+struct FaultPlan(Arc<Mutex<Option<(u32, Fault)>>>);
 
 /// A device that fails when it is told to.
-struct Faulty {
+struct FaultyDevice {
     own: Box<dyn Device>,
-    plan: Plan,
+    plan: FaultPlan,
 }
 
 /// A fault that is a panic.
@@ -24,7 +24,7 @@ fn refused() -> Fault {
     Fault::Refused("a mark".into())
 }
 
-impl Plan {
+impl FaultPlan {
     fn call(&self) -> Result<(), Fault> {
         let is_other = matches!(&*lock(&self.0), Some((_, Fault::Memory(_) | Fault::Refused(_))));
         if is_other { Ok(()) } else { self.ask() }
@@ -48,48 +48,56 @@ impl Plan {
     }
 }
 
-impl Device for Faulty {
-    fn name(&self) -> String {
-        self.own.name()
+impl DeviceLayer for FaultyDevice {
+    fn inner(&self) -> &dyn Device {
+        &*self.own
     }
-    fn free_memory(&mut self) -> usize {
-        self.own.free_memory()
+
+    fn inner_mut(&mut self) -> &mut dyn Device {
+        &mut *self.own
     }
+
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
         self.plan.ask()?;
         self.own.alloc(bytes)
-    }
-    fn free(&mut self, address: u64) {
-        self.own.free(address);
     }
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
         self.plan.ask()?;
         self.own.alloc_host(bytes)
     }
-    fn upload(&mut self, from: &dyn HostMemory, bytes: std::ops::Range<usize>, to: u64) -> Result<(), Fault> {
+    unsafe fn upload(
+        &mut self,
+        from: &dyn HostMemory,
+        bytes: std::ops::Range<usize>,
+        to: u64,
+    ) -> Result<(), Fault> {
         self.plan.call()?;
-        self.own.upload(from, bytes, to)
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.upload(from, bytes, to) }
     }
-    fn download(
+    unsafe fn download(
         &mut self,
         from: u64,
         to: &mut dyn HostMemory,
         bytes: std::ops::Range<usize>,
     ) -> Result<(), Fault> {
         self.plan.call()?;
-        self.own.download(from, to, bytes)
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.download(from, to, bytes) }
     }
-    fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
+    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
         self.plan.call()?;
-        self.own.copy(from, to, bytes)
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.copy(from, to, bytes) }
     }
-    fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
+    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
         self.plan.call()?;
-        self.own.launch(launch)
+        // SAFETY: the caller promises the same.
+        unsafe { self.own.launch(launch) }
     }
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
         self.plan.call()?;
-        Ok(Box::new(FaultyMark { own: self.own.mark()?, plan: Plan(Arc::clone(&self.plan.0)) }))
+        Ok(Box::new(FaultyMark { own: self.own.mark()?, plan: FaultPlan(Arc::clone(&self.plan.0)) }))
     }
     fn wait(&mut self) -> Result<(), Fault> {
         self.plan.call()?;
@@ -100,7 +108,7 @@ impl Device for Faulty {
 /// A mark of such a device: waiting for it is one of the calls.
 struct FaultyMark {
     own: Box<dyn Mark>,
-    plan: Plan,
+    plan: FaultPlan,
 }
 
 impl Mark for FaultyMark {
@@ -144,7 +152,7 @@ fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_l
     for calls in 0..40 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
         assert!(matches!(engine.state(), EngineState::Cuda(_)));
         let name = format!("CUDA_ERROR_LAUNCH_FAILED after {calls}.");
         *lock(&plan) = Some((calls, Fault::Failed(name.clone())));
@@ -177,7 +185,7 @@ fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
     for calls in (0..).step_by(3) {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
         let fault = if calls % 2 == 0 { Fault::Failed("in the middle".into()) } else { PANIC };
         *lock(&plan) = Some((calls, fault));
         let mut found = terrain();
@@ -209,7 +217,7 @@ fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
     for marks in 0.. {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
         *lock(&plan) = Some((marks, refused()));
         let mut found = terrain();
         found.set_engine(engine.clone());
@@ -232,7 +240,7 @@ fn ground_is_made_by_the_processor_where_a_device_fails() {
     for calls in 0..13 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
         assert!(matches!(engine.state(), EngineState::Cuda(_)));
         *lock(&plan) = Some((calls, Fault::Failed("CUDA_ERROR_LAUNCH_FAILED".into())));
         assert_eq!(engine.ground_from_noise(width, depth, &noise), expected, "after {calls} calls");
@@ -251,7 +259,7 @@ fn a_device_without_memory_for_ground_is_kept() {
     let expected = Ground::from_noise(70, 50, &noise);
     let Some(own) = device() else { return };
     let plan = Arc::new(Mutex::new(None));
-    let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+    let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
     // Memory of the host twice, then of the device.
     for calls in 0..3 {
         *lock(&plan) = Some((calls, Fault::Memory(1 << 20)));
@@ -267,7 +275,7 @@ fn a_device_that_panics_is_given_up_and_nothing_is_lost() {
     for calls in [0, 3, 9] {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
         *lock(&plan) = Some((calls, PANIC));
         (0..2).for_each(|index| compare(&mut Rng::with_seed(8), index, &engine));
         assert!(matches!(engine.state(), EngineState::Lost(_)), "{:?}", engine.state());
@@ -280,7 +288,7 @@ fn a_device_without_memory_for_a_transaction_does_the_next_one() {
     for allocations in 0..12 {
         let Some(own) = device() else { return };
         let plan = Arc::new(Mutex::new(None));
-        let engine = engine(Box::new(Faulty { own, plan: Plan(Arc::clone(&plan)) }), 64 << 20);
+        let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
         let ground = Arc::new(Ground::flat(120, 120, 30.0).expect("valid"));
         let [mut expected, mut found] = [0, 1]
             .map(|_| Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings"));

@@ -128,6 +128,6 @@ fn a_device_that_is_lost_has_nothing_left() {
     let shared = Arc::clone(&cuda.shared);
     let mut pair = Pair::new(cuda);
     assert!(pair.play(small(0)).iter().all(|bytes| *bytes > 0));
-    shared.lose(&mut lock(&shared.session), &Fault::Failed("as planned".into()));
+    shared.disable(&mut lock(&shared.session), &Fault::Failed("as planned".into()));
     assert_eq!(pair.memory(), [0, 0]);
 }

@@ -3,13 +3,13 @@
 //! A card is used where there is one, else the emulator. Where there is no C++ compiler either, tests say so and pass; with
 //! `BURROW_REQUIRE=1` they fail. `BURROW_WORLDS` says how many random worlds.
 
-mod chosen;
+mod choice;
 mod drivers;
+mod equality;
 mod faults;
 mod memory;
 mod opening;
-mod room;
-mod same;
+mod output_lists;
 
 use std::time::Duration;
 

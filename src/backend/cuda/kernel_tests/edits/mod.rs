@@ -64,11 +64,11 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
 /// What the CPU makes of edits, brick by brick: nothing of two bricks is one entry.
 fn ledger_of(work: &PreparedEdits) -> EditDelta {
     let mut all = EditDelta::default();
-    work.run_each_brick(|mut ledger| {
-        all.bricks.append(&mut ledger.bricks);
-        all.parts.append(&mut ledger.parts);
-        all.counts.append(&mut ledger.counts);
-        all.hash = all.hash.wrapping_add(ledger.hash);
+    work.run_each_brick(|mut delta| {
+        all.bricks.append(&mut delta.bricks);
+        all.parts.append(&mut delta.parts);
+        all.counts.append(&mut delta.counts);
+        all.hash = all.hash.wrapping_add(delta.hash);
     });
     all
 }
@@ -84,17 +84,17 @@ fn compare_edits(
     let rules = worlds::random_rules(rng, samples.ground());
     let work = PreparedEdits::new(samples, grid, &edits);
     let work = work.under((rng.u32(0..3) == 0).then_some(&rules));
-    let ledger = ledger_of(&work);
+    let delta = ledger_of(&work);
     let most = EditRoom {
-        records: ledger.bricks.len(),
-        materials: ledger.bricks.iter().filter(|drafted| drafted.brick.materials().is_some()).count(),
-        parts: ledger.parts.len(),
-        counts: ledger.counts.len(),
+        records: delta.bricks.len(),
+        materials: delta.bricks.iter().filter(|drafted| drafted.brick.materials().is_some()).count(),
+        parts: delta.parts.len(),
+        counts: delta.counts.len(),
     };
     let run = EditRun::new(device, &work, rng, most, FAR);
     assert_eq!(run.counters[2..], [most.parts as u32, most.counts as u32]);
-    run.check_bricks(&ledger, true);
-    run.check_effects(&ledger, &work);
+    run.check_bricks(&delta, true);
+    run.check_effects(&delta, &work);
 
     let mut less = |room: usize| if rng.bool() { room } else { rng.usize(0..=room) };
     let room = EditRoom {
@@ -104,15 +104,15 @@ fn compare_edits(
         counts: less(most.counts),
     };
     let short = EditRun::new(device, &work, rng, room, FAR);
-    short.check_bricks(&ledger, false);
+    short.check_bricks(&delta, false);
     assert_eq!(short.counters, run.counters, "counters go on past the room");
     // Windows that end near the brick do, or it is told that they don't.
     let near = EditRun::new(device, &work, rng, most, 1);
     if near.results.iter().all(|result| result.flags & EditResult::TOO_FAR == 0) {
-        near.check_bricks(&ledger, true);
-        near.check_effects(&ledger, &work);
+        near.check_bricks(&delta, true);
+        near.check_effects(&delta, &work);
     }
-    ledger.bricks.len()
+    delta.bricks.len()
 }
 
 /// How far windows have to reach up and down that are always enough.

@@ -83,8 +83,11 @@ impl EditRun {
                 pad: 0,
             });
         }
-        let tools: Vec<Tool> =
-            work.edits.iter().map(|tool| layout::tool(tool.reach, tool.operation, &tool.evaluator)).collect();
+        let edit_records: Vec<EditRecord> = work
+            .edits
+            .iter()
+            .map(|record| layout::record(record.reach, record.operation, &record.evaluator))
+            .collect();
 
         let bricks = device.upload(&slots.bricks);
         let results = device.output::<EditResult>(jobs.len());
@@ -98,7 +101,7 @@ impl EditRun {
             stacks: device.upload(&slots.stacks),
             jobs: device.upload(&jobs),
             list: device.upload(&list),
-            tools: device.upload(&tools),
+            edit_records: device.upload(&edit_records),
             results: results.address,
             records: records.address,
             materials: materials.address,
@@ -116,16 +119,16 @@ impl EditRun {
                 images.extend_from_slice(image.samples());
                 (images.len() - image.samples().len()) as u32
             };
-            let chisel = |tool: &crate::edits::PreparedEdit| layout::chisel(tool, &mut image);
-            let chisels: Vec<Chisel> = work.edits.iter().map(chisel).collect();
+            let sculpt = |record: &crate::edits::PreparedEdit| layout::sculpt(record, &mut image);
+            let sculpt_params: Vec<SculptParams> = work.edits.iter().map(sculpt).collect();
             let rules = work.rules.as_ref().map_or(0, |rules| {
                 let (rules, boxes) = layout::rules(rules);
                 device.place(&[bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat())
             });
-            let params = CarefulParams {
+            let params = StencilEditParams {
                 edit: params,
                 windows: device.upload(&windows.refs),
-                chisels: device.upload(&chisels),
+                sculpt_params: device.upload(&sculpt_params),
                 images: device.upload(&images),
                 rules,
                 look,
@@ -166,9 +169,9 @@ impl EditRun {
     }
 
     /// Bricks, results and hash are those of the CPU. Where room is short, some entries are missing.
-    pub fn check_bricks(&self, ledger: &EditDelta, is_room: bool) {
+    pub fn check_bricks(&self, delta: &EditDelta, is_room: bool) {
         let mut expected: HashMap<BrickPos, _> =
-            ledger.bricks.iter().map(|brick| (brick.pos, brick)).collect();
+            delta.bricks.iter().map(|brick| (brick.pos, brick)).collect();
         let (mut hash, mut records, mut materials) = (0u64, 0, 0);
         for (job, result) in self.jobs.iter().zip(&self.results) {
             let pos = BrickPos(IVec3::from_array(job.brick));
@@ -204,18 +207,18 @@ impl EditRun {
             }
         }
         assert!(expected.is_empty(), "bricks without a job");
-        assert_eq!(hash, ledger.hash, "hash");
+        assert_eq!(hash, delta.hash, "hash");
         assert_eq!(self.counters[..2], [records, materials]);
     }
 
     /// What each edit changed and counted is what the CPU says.
-    pub fn check_effects(&self, ledger: &EditDelta, work: &PreparedEdits) {
+    pub fn check_effects(&self, delta: &EditDelta, work: &PreparedEdits) {
         type Part = (usize, [i32; 3], ChunkPos, [i32; 6]);
         let ends = |of: LatticeBox| {
             let ([a, b, c], [d, e, f]) = (of.min.to_array(), of.max.to_array());
             [a, b, c, d, e, f]
         };
-        let mut expected: Vec<Part> = ledger
+        let mut expected: Vec<Part> = delta
             .parts
             .iter()
             .map(|part| {
@@ -237,12 +240,12 @@ impl EditRun {
         assert_eq!(found, expected);
 
         let (mut expected, mut found) = (BTreeMap::new(), BTreeMap::new());
-        for count in &ledger.counts {
+        for count in &delta.counts {
             *expected.entry((count.edit, count.outcome as u32, count.material.0)).or_insert(0) +=
                 count.voxels;
         }
         for count in &self.counts {
-            let key = (count.edit as usize, count.fate & 0xff, (count.fate >> 8) as u8);
+            let key = (count.edit as usize, count.outcome & 0xff, (count.outcome >> 8) as u8);
             *found.entry(key).or_insert(0) += u64::from(count.voxels);
         }
         assert_eq!(found, expected);

@@ -6,7 +6,7 @@ use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
 use super::super::staging::OutputList;
 
 /// A device of so many bytes beside a host of so many more, whose memory its kernels reach.
-pub(super) struct Tight {
+pub(super) struct SmallDevice {
     left: usize,
     host_left: usize,
     /// What was asked of the device, and what of that it still holds.
@@ -14,7 +14,7 @@ pub(super) struct Tight {
     held: Vec<(u64, usize)>,
 }
 
-impl Tight {
+impl SmallDevice {
     pub fn new(left: usize, host_left: usize) -> Self {
         Self { left, host_left, asked: Vec::new(), held: Vec::new() }
     }
@@ -50,7 +50,7 @@ fn take(left: &mut usize, bytes: usize) -> Result<(), Fault> {
     Ok(())
 }
 
-impl Device for Tight {
+impl Device for SmallDevice {
     fn name(&self) -> String {
         "tight".into()
     }
@@ -72,16 +72,16 @@ impl Device for Tight {
         take(&mut self.host_left, bytes)?;
         Ok(Box::new(Reached(vec![0; bytes.div_ceil(16)])))
     }
-    fn upload(&mut self, _: &dyn HostMemory, _: Range<usize>, _: u64) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, _: &dyn HostMemory, _: Range<usize>, _: u64) -> Result<(), Fault> {
         Ok(())
     }
-    fn download(&mut self, _: u64, _: &mut dyn HostMemory, _: Range<usize>) -> Result<(), Fault> {
+    unsafe fn download(&mut self, _: u64, _: &mut dyn HostMemory, _: Range<usize>) -> Result<(), Fault> {
         Ok(())
     }
-    fn copy(&mut self, _: u64, _: u64, _: usize) -> Result<(), Fault> {
+    unsafe fn copy(&mut self, _: u64, _: u64, _: usize) -> Result<(), Fault> {
         Ok(())
     }
-    fn launch(&mut self, _: Launch<'_>) -> Result<(), Fault> {
+    unsafe fn launch(&mut self, _: Launch<'_>) -> Result<(), Fault> {
         Ok(())
     }
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
@@ -94,7 +94,7 @@ impl Device for Tight {
 
 #[test]
 fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_for() {
-    let mut device = Tight::new(10_000, 1 << 20);
+    let mut device = SmallDevice::new(10_000, 1 << 20);
     let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 100_000, false), Ok(true));
     assert_eq!((list.capacity(), list.is_mapped(), device.asked.len()), (125_000, true, 0));
@@ -110,7 +110,7 @@ fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_fo
 
 #[test]
 fn a_list_makes_room_for_itself_and_one_that_can_not_grow_does_not_ask_for_the_same_again() {
-    let mut device = Tight::new(10_000, 1 << 20);
+    let mut device = SmallDevice::new(10_000, 1 << 20);
     let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
     // No room for both.
@@ -127,7 +127,7 @@ fn a_list_makes_room_for_itself_and_one_that_can_not_grow_does_not_ask_for_the_s
 
 #[test]
 fn a_list_is_not_longer_on_the_device_than_on_the_host() {
-    let mut device = Tight::new(1 << 20, 1000);
+    let mut device = SmallDevice::new(1 << 20, 1000);
     let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 1000, true), Err(Fault::Memory(5000)));
     assert_eq!((list.capacity(), device.held()), (0, vec![]));

@@ -3,10 +3,10 @@
 use rustc_hash::FxHashMap;
 
 use super::super::device::Fault;
-use super::super::layout::{self, CarefulParams, Chisel, EditJob, EditParams};
+use super::super::layout::{self, EditJob, EditParams, SculptParams, StencilEditParams};
 use super::super::lists::in_pieces;
 use super::super::session::{Session, Uploads, windows};
-use super::super::staging::{InputBuffer, Plan, Section};
+use super::super::staging::{InputBuffer, Section, StagingLayout};
 use super::super::windows::{KeptSlabs, Windows};
 use super::output::LONG;
 use crate::edits::PreparedEdits;
@@ -37,7 +37,7 @@ pub(super) struct Care<'a> {
     /// The last columns of the world along x and z.
     last: [i32; 2],
     windows: Windows<'a>,
-    chisels: Vec<Chisel>,
+    sculpt_params: Vec<SculptParams>,
     images: Vec<u16>,
     /// Bytes of the rules, and of what is protected; none where there are no rules.
     rules: Vec<u8>,
@@ -50,8 +50,8 @@ pub(super) struct Care<'a> {
 impl<'a> Care<'a> {
     fn new(work: &PreparedEdits<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
         let mut images = Images::default();
-        let chisel = |tool| layout::chisel(tool, |image| images.first(image));
-        let chisels = work.edits.iter().map(chisel).collect();
+        let sculpt = |record| layout::sculpt(record, |image| images.first(image));
+        let sculpt_params = work.edits.iter().map(sculpt).collect();
         if images.is_full {
             return Err(Fault::TooLarge(work.jobs().len()));
         }
@@ -64,7 +64,7 @@ impl<'a> Care<'a> {
             look,
             last: [work.grid.width(), work.grid.depth()],
             windows,
-            chisels,
+            sculpt_params,
             images: images.samples,
             rules: rules.unwrap_or_default(),
             ref_list,
@@ -75,9 +75,9 @@ impl<'a> Care<'a> {
     }
 
     /// Adds what there is to send.
-    pub fn plan(&mut self, plan: &mut Plan) {
+    pub fn plan(&mut self, plan: &mut StagingLayout) {
         self.ref_list = plan.section::<u32>(self.windows.len());
-        self.chisel_list = plan.section::<Chisel>(self.chisels.len());
+        self.chisel_list = plan.section::<SculptParams>(self.sculpt_params.len());
         self.image_list = plan.section::<u16>(self.images.len());
         self.rule_list = plan.section::<u8>(self.rules.len());
     }
@@ -86,17 +86,17 @@ impl<'a> Care<'a> {
     pub fn put(&mut self, input: &mut InputBuffer, kept: &mut KeptSlabs) {
         self.windows.write(input.entries(self.ref_list));
         kept.put(std::mem::take(&mut self.windows));
-        input.put(self.chisel_list, &self.chisels);
+        input.put(self.chisel_list, &self.sculpt_params);
         input.put(self.image_list, &self.images);
         input.put(self.rule_list, &self.rules);
     }
 
     /// The parameter of the kernel.
-    pub fn params(&self, edit: EditParams, input: &InputBuffer) -> CarefulParams {
-        CarefulParams {
+    pub fn params(&self, edit: EditParams, input: &InputBuffer) -> StencilEditParams {
+        StencilEditParams {
             edit,
             windows: input.address(self.ref_list),
-            chisels: input.address(self.chisel_list),
+            sculpt_params: input.address(self.chisel_list),
             images: input.address(self.image_list),
             rules: if self.rules.is_empty() { 0 } else { input.address(self.rule_list) },
             look: self.look.bricks(),

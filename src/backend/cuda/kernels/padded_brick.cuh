@@ -1,4 +1,4 @@
-// What edits read that look around, as volume/surroundings.rs and volume/careful.rs have it.
+// What edits read that look around, as volume/surroundings.rs and edits/stencil_edit.rs have it.
 #pragma once
 
 #include "edit.cuh"
@@ -7,11 +7,11 @@
 // What became of a voxel, or would have but for a rule.
 enum Fate { REMOVED, ADDED, PAINTED, PROTECTED, UNBREAKABLE, TOO_HARD, SLOWED, FATES };
 
-struct CarefulBench {
-    Workbench work;
+struct StencilEditMemory {
+    EditMemory work;
     // The brick with one sample more on all sides, as they were before.
     Marked around[AROUND * AROUND * AROUND];
-    // Of the edit at hand: voxels of each material, for each fate.
+    // Of the edit at hand: voxels of each material, for each outcome.
     u32 counts[FATES * 256];
     // Bricks around, as `refs` of a mesh.
     u32 refs[27];
@@ -22,8 +22,8 @@ constexpr i32 LOOK = 8;
 
 // What an edit reads: the brick and what is around it, as they were before the launch.
 struct Surroundings {
-    const CarefulParams& params;
-    CarefulBench& bench;
+    const StencilEditParams& params;
+    StencilEditMemory& bench;
     // The brick's entry in the windows, and the way to its neighbours.
     const u32* window;
     i32 to_x, to_z;

@@ -9,10 +9,10 @@ use crate::edits::BatchRules;
 use crate::ground::GreyImage;
 use crate::lattice::LatticeBox;
 
-/// What a tool that looks around needs besides. See `layout.cuh`.
+/// What a stencil edit needs beside its [`EditRecord`]. See `layout.cuh`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Chisel {
+pub(crate) struct SculptParams {
     /// Plain, smooth, sharpen, flatten, level, shift, stamp, terrace.
     pub stroke: u32,
     /// Of new ground; [`NONE`] where what is around says it.
@@ -52,16 +52,16 @@ pub(crate) struct Protected {
     pub max: [i32; 3],
 }
 
-/// The parameter of `careful`.
+/// The parameter of `stencil_edit`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct CarefulParams {
+pub(crate) struct StencilEditParams {
     /// No job's target may be what another job, or an entry of `windows`, refers to.
     pub edit: EditParams,
     /// References of bricks. Of each job all 27 around must be there, and above and below as many as `look` says.
     pub windows: Address,
-    /// A [`Chisel`] for each tool.
-    pub chisels: Address,
+    /// [`SculptParams`] for each edit record.
+    pub sculpt_params: Address,
     /// Samples of images, `u16` each.
     pub images: Address,
     /// [`Rules`], or 0.
@@ -72,37 +72,37 @@ pub(crate) struct CarefulParams {
     pub pad: u32,
 }
 
-impl KernelParams for CarefulParams {
-    const KERNEL: Kernel = Kernel::Careful;
+impl KernelParams for StencilEditParams {
+    const KERNEL: Kernel = Kernel::StencilEdit;
 }
 
 /// What an edit that looks around needs besides; `image` says where the samples of an image begin.
-pub(crate) fn chisel<'a>(
-    tool: &'a crate::edits::PreparedEdit,
+pub(crate) fn sculpt<'a>(
+    record: &'a crate::edits::PreparedEdit,
     image: impl FnOnce(&'a GreyImage) -> u32,
-) -> Chisel {
-    let power = if tool.is_ruled { tool.power.into() } else { -1 };
-    let Some(of) = tool.sculptor.as_ref().and_then(SculptKernel::constants) else {
-        return Chisel { power, ..Chisel::default() };
+) -> SculptParams {
+    let power = if record.is_ruled { record.power.into() } else { -1 };
+    let Some(of) = record.sculptor.as_ref().and_then(SculptKernel::constants) else {
+        return SculptParams { power, ..SculptParams::default() };
     };
-    let chisel = |stroke| Chisel {
+    let sculpt = |stroke| SculptParams {
         power,
         stroke,
         material: of.material.map_or(NONE, |material| material.0.into()),
         strength: of.strength,
         falloff: of.falloff,
-        ..Chisel::default()
+        ..SculptParams::default()
     };
     match &of.stroke {
-        Stroke::Smooth => chisel(1),
-        Stroke::Sharpen => chisel(2),
+        Stroke::Smooth => sculpt(1),
+        Stroke::Sharpen => sculpt(2),
         &Stroke::Flatten(point, normal, length) => {
             let matrix = [normal.map(i64::from), [0; 3], [0; 3]];
-            Chisel { point, matrix, length, ..chisel(3) }
+            SculptParams { point, matrix, length, ..sculpt(3) }
         }
-        &Stroke::Level(height) => Chisel { amounts: [height, 0], ..chisel(4) },
-        &Stroke::Shift(by) => Chisel { amounts: [by, 0], ..chisel(5) },
-        Stroke::Stamp(press) => Chisel {
+        &Stroke::Level(height) => SculptParams { amounts: [height, 0], ..sculpt(4) },
+        &Stroke::Shift(by) => SculptParams { amounts: [by, 0], ..sculpt(5) },
+        Stroke::Stamp(press) => SculptParams {
             point: press.center,
             half: press.half,
             height: press.height,
@@ -111,9 +111,9 @@ pub(crate) fn chisel<'a>(
             rows: press.image.height(),
             matrix: press.rows,
             squared: press.squared,
-            ..chisel(6)
+            ..sculpt(6)
         },
-        &Stroke::Terrace(step, base) => Chisel { amounts: [step, base], ..chisel(7) },
+        &Stroke::Terrace(step, base) => SculptParams { amounts: [step, base], ..sculpt(7) },
     }
 }
 

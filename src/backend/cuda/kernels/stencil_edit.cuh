@@ -1,4 +1,4 @@
-// Applies edits that look around, as volume/careful.rs does, among others: those that sculpt, and those that rules bear on.
+// Applies batches with stencil edits (those that sculpt, and those under rules), as edits/stencil_edit.rs does.
 //
 // What an edit reads is what was there before the launch: the host sees to it that no edit of a launch reads what an
 // earlier one may change. So bricks are read where they are, and written elsewhere.
@@ -11,8 +11,8 @@ struct Care : Judge {
 
     // Does an edit look around? If so, the surroundings are brought, which the block then has to wait for.
     __device__ bool begin(const EditJob& job, const Stack& stack, u32 edit) {
-        const Chisel& chisel = params.chisels[edit];
-        if (chisel.stroke == PLAIN && chisel.power < 0) return false;
+        const SculptParams& sculpt = params.sculpt_params[edit];
+        if (sculpt.stroke == PLAIN && sculpt.power < 0) return false;
         if (has_looked) return true;
         has_boxes = __syncthreads_or(is_box_near(job.brick));
         look(job, stack);
@@ -29,56 +29,56 @@ struct Care : Judge {
         i32 before;
     };
 
-    // Paints a solid sample unless a rule is against it; says whether it changed. `counted`: the voxel's fate and material,
-    // `fate * 256 + material`.
+    // Paints a solid sample unless a rule is against it; says whether it changed. `counted`: the voxel's outcome and material,
+    // `outcome * 256 + material`.
     __device__ bool paint(
-        const Tool& tool, bool is_bound, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
+        const EditRecord& record, bool is_bound, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
         i32 pristine = sample.at[1] * ONE - column.height;
         u32 ref = bench.refs[13], old = stored(ref, sample.index);
         if (sample.outside > 0 || sample.before >= 0) return false;
         bool is_pristine = ref == NONE || params.edit.bricks[ref >> 1].samples[sample.index] == PRISTINE;
-        if (!is_pristine && old == tool.material) return false;
-        u32 own = resolve(old, column, pristine), painted = resolve(tool.material, column, pristine), fate = PAINTED;
-        if (is_bound) fate = is_protected(sample.at) ? PROTECTED : is_unbreakable(own) ? UNBREAKABLE : PAINTED;
-        if (own != painted) counted = fate * 256 + (fate == PAINTED ? painted : own);
-        if (fate != PAINTED) return false;
-        brick.materials[sample.index] = (u8)tool.material;
+        if (!is_pristine && old == record.material) return false;
+        u32 own = resolve(old, column, pristine), painted = resolve(record.material, column, pristine), outcome = PAINTED;
+        if (is_bound) outcome = is_protected(sample.at) ? PROTECTED : is_unbreakable(own) ? UNBREAKABLE : PAINTED;
+        if (own != painted) counted = outcome * 256 + (outcome == PAINTED ? painted : own);
+        if (outcome != PAINTED) return false;
+        brick.materials[sample.index] = (u8)record.material;
         brick.samples[sample.index] = (i16)storable(sample.before);
         return true;
     }
 
     // The density that an edit would give a sample; says whether there is another one.
     __device__ bool proposed(
-        const Tool& tool, const Chisel& chisel, const OwnColumn& column, const Sample& sample, i32& after
+        const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, i32& after
     ) {
         const Marked* own = bench.around + around_at(column.x, sample.y, column.z);
-        if (chisel.stroke != PLAIN) return sculpted(chisel, params.images, sample.at, sample.outside, own, after);
+        if (sculpt.stroke != PLAIN) return sculpted(sculpt, params.images, sample.at, sample.outside, own, after);
         i32 depth = largest(sample.outside, -DEPTH);
-        after = tool.operation == DIG ? largest(sample.before, -depth) : smallest(sample.before, depth);
+        after = record.operation == DIG ? largest(sample.before, -depth) : smallest(sample.before, depth);
         return sample.outside <= BAND;
     }
 
     // Gives a sample another density, as far as rules let it; otherwise as `paint`.
     __device__ bool change(
-        const Tool& tool, const Chisel& chisel, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
+        const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
         i32 before = sample.before, after = before, pristine = sample.at[1] * ONE - column.height;
-        if (!proposed(tool, chisel, column, sample, after) || storable(after) == storable(before)) return false;
+        if (!proposed(record, sculpt, column, sample, after) || storable(after) == storable(before)) return false;
         bool was_solid = before < 0, would_be_solid = after < 0;
-        u32 fate = FATES, material = GROUND;
-        if (chisel.power >= 0) after = judged(column, sample.at, sample.y, chisel.power, after, fate);
-        bool is_solid = after < 0, is_refused = fate != FATES && would_be_solid != was_solid && is_solid == was_solid;
+        u32 outcome = FATES, material = GROUND;
+        if (sculpt.power >= 0) after = judged(column, sample.at, sample.y, sculpt.power, after, outcome);
+        bool is_solid = after < 0, is_refused = outcome != FATES && would_be_solid != was_solid && is_solid == was_solid;
         if (!was_solid && (is_solid || is_refused)) {
-            if (chisel.stroke == PLAIN) {
-                material = tool.operation == ADD ? tool.material : GROUND;
+            if (sculpt.stroke == PLAIN) {
+                material = record.operation == ADD ? record.material : GROUND;
             } else {
-                material = chisel.material == NONE ? new_material(column, sample.y) : chisel.material;
+                material = sculpt.material == NONE ? new_material(column, sample.y) : sculpt.material;
             }
         }
         if (is_refused) {
             if (was_solid) material = stored(bench.refs[13], sample.index);
-            counted = fate * 256 + resolve(material, column, pristine);
+            counted = outcome * 256 + resolve(material, column, pristine);
         }
         if (storable(after) == storable(before)) return false;
         brick.samples[sample.index] = (i16)storable(after);
@@ -96,10 +96,10 @@ struct Care : Judge {
 
     // Applies one edit to the thread's open samples, as `apply` does.
     __device__ u32 apply(
-        u32 edit, const OwnColumn& column, u32 open, const Noise& noise, Workbench& work, bool& has_materials
+        u32 edit, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& work, bool& has_materials
     ) {
-        const Tool& tool = params.edit.tools[edit];
-        const Chisel& chisel = params.chisels[edit];
+        const EditRecord& record = params.edit.edit_records[edit];
+        const SculptParams& sculpt = params.sculpt_params[edit];
         Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
         u32 changed = 0;
 #pragma unroll 1
@@ -110,8 +110,8 @@ struct Care : Judge {
             u32 counted = NONE;
             if (open >> k & 1) {
                 i32 offset[3] = {column.x, y, column.z};
-                float distance = smooth_distance(tool, from_origin(tool, column.low, offset));
-                if (tool.is_rough) distance += bumps(tool, noise, work.noise, along_x, along_y, along_z);
+                float distance = smooth_distance(record, from_origin(record, column.low, offset));
+                if (record.is_rough) distance += bumps(record, noise, work.noise, along_x, along_y, along_z);
                 Sample sample = {
                     {column.low[0] + column.x, column.low[1] + y, column.low[2] + column.z},
                     y,
@@ -119,9 +119,9 @@ struct Care : Judge {
                     round_distance(distance),
                     density(bench.around[around_at(column.x, y, column.z)]),
                 };
-                is_changed = chisel.stroke == PLAIN && tool.operation == PAINT
-                    ? paint(tool, chisel.power >= 0, column, sample, work.brick, counted)
-                    : change(tool, chisel, column, sample, work.brick, counted);
+                is_changed = sculpt.stroke == PLAIN && record.operation == PAINT
+                    ? paint(record, sculpt.power >= 0, column, sample, work.brick, counted)
+                    : change(record, sculpt, column, sample, work.brick, counted);
                 has_materials |= work.brick.materials[index] != GROUND;
             }
             changed |= (u32)is_changed << k;
@@ -134,15 +134,15 @@ struct Care : Judge {
     // Enters what an edit changed, and how many voxels it dealt with; nobody begins with the next edit before.
     __device__ void enter(const EditJob& job, u32 edit) {
         if (warp() == 0) enter_parts(params.edit, job.cuts, edit, bench.work.effect.changed);
-        u32 fates = params.rules ? FATES : ADDED + 1;
-        for (u32 fate = warp(); fate < fates; fate += THREADS / 32) {
-            enter_counts(params.edit, edit, fate, bench.counts + fate * 256);
+        u32 outcomes = params.rules ? FATES : ADDED + 1;
+        for (u32 outcome = warp(); outcome < outcomes; outcome += THREADS / 32) {
+            enter_counts(params.edit, edit, outcome, bench.counts + outcome * 256);
         }
     }
 };
 
-extern "C" __global__ void __launch_bounds__(THREADS) careful(CarefulParams params) {
-    __shared__ CarefulBench bench;
+extern "C" __global__ void __launch_bounds__(THREADS) stencil_edit(StencilEditParams params) {
+    __shared__ StencilEditMemory bench;
     Care care = {{{params, bench, nullptr, 0, 0, nullptr, false, false}, false}};
     edit_brick(params.edit, bench.work, care);
 }

@@ -1,7 +1,7 @@
 //! Who does a stage: the faster of both, by what is known of them.
 
 use super::faults::logged;
-use super::room::Tight;
+use super::output_lists::SmallDevice;
 use super::*;
 use crate::backend::costs::Kind;
 use crate::backend::{Choice, Compute, Cpu, Stage};
@@ -11,8 +11,8 @@ use crate::surface::block::Parts;
 /// A device that is open and needs no card; with what both took for sixteen blocks, in microseconds.
 fn open_cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
     let own = Cuda::with_device(is_auto, limits(1 << 20), &[], |_| panic!("it is open"));
-    let session = Session::new(Box::new(Tight::new(1 << 30, 1 << 30)), 1 << 20).expect("a session");
-    *lock(&own.opener) = None;
+    let session = Session::new(Box::new(SmallDevice::new(1 << 30, 1 << 30)), 1 << 20).expect("a session");
+    *lock(&own.pending) = None;
     *lock(&own.shared.session) = Some(Box::new(session));
     *lock(&own.shared.state) = EngineState::Cuda("tight".into());
     for (is_cuda, micros) in [(false, cpu), (true, cuda)] {
@@ -26,11 +26,11 @@ fn open_cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
 }
 
 /// Is the meshing of so many blocks the device's, which would do it if it were asked? And what was written down of that.
-fn offered(cuda: &Cuda, blocks: usize, missing: usize) -> (bool, Choice) {
+fn attempt(cuda: &Cuda, blocks: usize, missing: usize) -> (bool, Choice) {
     let mut choice = Choice::of(Stage::Mesh, blocks);
     let load = Load::of_blocks(blocks);
-    let offered = cuda.offer(&mut choice, load, |_| missing, |_| Ok(()), |_, done| Ok(done));
-    assert_eq!(offered.done.is_some(), choice.is_cuda);
+    let attempt = cuda.attempt_stage(&mut choice, load, |_| missing, |_| Ok(()), |_, done| Ok(done));
+    assert_eq!(attempt.done.is_some(), choice.is_cuda);
     (choice.is_cuda, choice)
 }
 
@@ -38,31 +38,32 @@ fn offered(cuda: &Cuda, blocks: usize, missing: usize) -> (bool, Choice) {
 fn auto_takes_the_device_where_it_is_faster_and_nowhere_else() {
     for (cpu, device, is_device) in [(20, 19, true), (20, 20, false), (19, 20, false)] {
         let auto = open_cuda(true, cpu, device);
-        let (is_taken, choice) = offered(&auto, 16, 0);
+        let (is_taken, choice) = attempt(&auto, 16, 0);
         let estimate = choice.estimate.expect("both could do it");
         assert_eq!([estimate.cpu, estimate.cuda], [cpu, device].map(Duration::from_micros));
         assert_eq!(is_taken, is_device, "{cpu} beside {device}");
     }
     // A device that somebody asked for does all, but what is nothing.
     let asked = open_cuda(false, 1, 100);
-    assert!(offered(&asked, 16, 50).0);
-    assert!(!offered(&asked, 0, 0).0);
-    assert!(!offered(&open_cuda(true, 100, 1), 0, 0).0);
+    assert!(attempt(&asked, 16, 50).0);
+    assert!(!attempt(&asked, 0, 0).0);
+    assert!(!attempt(&open_cuda(true, 100, 1), 0, 0).0);
 }
 
 #[test]
 fn what_the_device_does_not_have_counts_against_it() {
     let auto = open_cuda(true, 20, 15);
     for (missing, is_device) in [(0, true), (8, true), (9, false), (90, false)] {
-        let (is_taken, choice) = offered(&auto, 16, missing);
+        let (is_taken, choice) = attempt(&auto, 16, missing);
         assert_eq!((is_taken, choice.missing), (is_device, missing));
     }
     // Where it is slower in any case, nobody looks.
     let mut choice = Choice::of(Stage::Mesh, 16);
     let slower = open_cuda(true, 10, 20);
     let load = Load::of_blocks(16);
-    let offered = slower.offer(&mut choice, load, |_| panic!("looked"), |_| Ok(()), |_, done| Ok(done));
-    assert!(offered.done.is_none() && choice.missing == 0);
+    let attempt =
+        slower.attempt_stage(&mut choice, load, |_| panic!("looked"), |_| Ok(()), |_, done| Ok(done));
+    assert!(attempt.done.is_none() && choice.missing == 0);
 }
 
 #[test]
@@ -77,13 +78,14 @@ fn a_device_is_given_up_for_what_does_not_pass() {
         for _ in 0..3 {
             let mut choice = Choice::of(Stage::Mesh, 16);
             let work = |_: &mut Session| Err::<(), Fault>(fault.clone());
-            let offered = own.offer(&mut choice, Load::of_blocks(16), |_| 0, work, |_, done| Ok(done));
+            let attempt =
+                own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, work, |_, done| Ok(done));
             // What was lost on trying is no expectation.
-            assert!(offered.done.is_none() && !choice.is_cuda && choice.estimate.is_none());
+            assert!(attempt.done.is_none() && !choice.is_cuda && choice.estimate.is_none());
             assert_eq!(logged(&fault.to_string()), 1, "one warning, and no other");
         }
         assert_eq!(matches!(own.state(), EngineState::Cuda(_)), is_kept, "{fault}");
-        assert_eq!(offered(&own, 16, 0).0, is_kept, "{fault}");
+        assert_eq!(attempt(&own, 16, 0).0, is_kept, "{fault}");
     }
 }
 
@@ -92,10 +94,10 @@ fn time_that_was_lost_on_a_device_is_the_devices() {
     let own = open_cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 16);
     let work = |_: &mut Session| Err::<(), Fault>(Fault::TooLarge(1_234_101));
-    let tried = own.offer(&mut choice, Load::of_blocks(16), |_| 0, work, |_, done| Ok(done));
+    let tried = own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, work, |_, done| Ok(done));
     choice.took = Duration::from_micros(500);
     (0..2).for_each(|_| own.learn(&choice, &tried));
-    let estimate = offered(&own, 16, 0).1.estimate.expect("both could do it");
+    let estimate = attempt(&own, 16, 0).1.estimate.expect("both could do it");
     assert_eq!([estimate.cpu, estimate.cuda], [20, 500].map(Duration::from_micros));
 }
 
@@ -104,10 +106,10 @@ fn who_panics_over_what_was_done_panics_and_the_device_is_kept() {
     let own = open_cuda(true, 20, 10);
     let mut choice = Choice::of(Stage::Mesh, 16);
     let then = |_: &mut Session, ()| -> Result<u32, Fault> { panic!("as planned") };
-    let offer = || own.offer(&mut choice, Load::of_blocks(16), |_| 0, |_| Ok(()), then);
-    assert!(catch_unwind(AssertUnwindSafe(offer)).is_err());
+    let attempt_stage = || own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, |_| Ok(()), then);
+    assert!(catch_unwind(AssertUnwindSafe(attempt_stage)).is_err());
     assert!(matches!(own.state(), EngineState::Cuda(_)));
-    assert!(offered(&own, 16, 0).0);
+    assert!(attempt(&own, 16, 0).0);
 }
 
 #[test]
@@ -141,14 +143,15 @@ fn whoever_comes_while_surfaces_are_drawn_goes_on_without_the_device() {
     let mut choice = Choice::of(Stage::Mesh, 16);
     let draw = |_: &mut Session, ()| {
         let mut other = Choice::of(Stage::Mesh, 16);
-        let offered = own.offer(&mut other, Load::of_blocks(16), |_| 0, |_| Ok(()), |_, done| Ok(done));
+        let attempt =
+            own.attempt_stage(&mut other, Load::of_blocks(16), |_| 0, |_| Ok(()), |_, done| Ok(done));
         other.took = Duration::from_micros(20);
-        own.learn(&other, &offered);
-        Ok(offered.done.is_some())
+        own.learn(&other, &attempt);
+        Ok(attempt.done.is_some())
     };
-    let first = own.offer(&mut choice, Load::of_blocks(16), |_| 0, |_| Ok(()), draw);
+    let first = own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, |_| Ok(()), draw);
     assert_eq!(first.done, Some(false));
-    assert!(offered(&own, 16, 0).0);
+    assert!(attempt(&own, 16, 0).0);
 }
 
 #[test]
