@@ -1,4 +1,4 @@
-//! Lines in a terrain's own space, and no more than allowed.
+//! A bounded buffer of lines in a terrain's space.
 
 use bevy::prelude::*;
 
@@ -9,25 +9,25 @@ pub struct Layer {
     pub width: f32,
 }
 
-/// Draws lines of a view as long as there is room.
+/// Collects the lines of a view up to a limit.
 #[derive(Clone, Debug)]
-pub struct Pen {
+pub struct LineBuffer {
     layers: Vec<Layer>,
     room: usize,
 }
 
-impl Pen {
-    /// A pen for so many lines.
+impl LineBuffer {
+    /// A buffer for at most so many lines.
     pub fn new(most_lines: usize) -> Self {
         Self { layers: Vec::new(), room: most_lines }
     }
 
-    /// The following lines have this width, in pixels.
+    /// Sets the width of the following lines, in pixels.
     pub fn width(&mut self, width: f32) {
         self.layers.push(Layer { lines: Vec::new(), width });
     }
 
-    /// May no more be drawn?
+    /// Whether the limit is reached.
     pub fn is_full(&self) -> bool {
         self.room == 0
     }
@@ -62,7 +62,7 @@ impl Pen {
         self.line(c, a, color);
     }
 
-    /// What was drawn; layers without lines are left out.
+    /// The lines by width; widths without lines are left out.
     pub fn finish(mut self) -> Vec<Layer> {
         self.layers.retain(|layer| !layer.lines.is_empty());
         self.layers

@@ -1,4 +1,4 @@
-//! Debug views: what the model holds, as gizmos (feature `debug`).
+//! Debug views of the model as gizmos (feature `debug`).
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -19,10 +19,9 @@
 //! | [`normals`](BurrowDebug::normals) | normals of vertices: golden of tiles, blue of chunks |
 //! | [`wires`](BurrowDebug::wires) | edges of triangles: golden of tiles, blue of chunks, white what both share |
 //!
-//! Views are lines below the terrain's entity, in its own space, so they move and scale along, and on its `RenderLayers`.
-//! They are made for what is near a place, at most so many lines each, and again when the world or the place has changed.
-//! Their cost depends on how far they reach, and not on how large the world is; `dirty` looks through the box of each edit
-//! as well, once, by columns of bricks. [`SeamWires`] and [`draw_shape`] are for own use.
+//! Views are lines on children of the terrain's entity, on its `RenderLayers`. They cover the surroundings of a place, up to a
+//! limit of lines, and are drawn again when the world or the place changes. Their cost depends on the radius and not on the
+//! size of the world. [`SeamWires`] and [`draw_shape`] can be used by themselves.
 
 mod lines;
 mod plugin;

@@ -1,4 +1,4 @@
-//! Draws the views below the terrains' entities, and keeps them as the world is.
+//! Draws the views as children of the terrains and keeps them up to date.
 
 use std::time::Duration;
 
@@ -7,23 +7,23 @@ use bevy::camera::visibility::RenderLayers;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
-use super::lines::{Layer, Pen};
+use super::lines::{Layer, LineBuffer};
 use super::views::{self, Dirty, Place};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
 use crate::plugin::{BrushApplied, BurrowSystems, HistoryMoved};
 use crate::terrain::{Terrain, Version};
 
-/// A view of a changing world is drawn again this often at most.
+/// The shortest time between two drawings of a view while the world changes.
 const PERIOD: Duration = Duration::from_millis(100);
-/// How far the camera sees the ground it looks at, in metres.
+/// The length of the camera's ray to the ground, in voxels.
 const SIGHT: f64 = 2000.0;
-/// Lines lie this much before the surface: z-fighting would break them.
+/// Depth bias of the lines, against z-fighting.
 const BIAS: f32 = -0.0004;
 /// Lines of a box.
 const BOX_LINES: usize = 12;
 
-/// Adds the debug views to a game that has `BurrowPlugins`; all are off until [`BurrowDebug`] says otherwise.
+/// Adds the debug views. Requires `BurrowPlugins`. All are off until switched on in [`BurrowDebug`].
 #[derive(Default)]
 pub struct BurrowDebugPlugin;
 
@@ -46,15 +46,15 @@ impl Plugin for BurrowDebugPlugin {
 #[reflect(Component)]
 #[require(Transform)]
 pub struct DebugLines {
-    /// Which one.
+    /// The view.
     pub view: DebugView,
 }
 
-/// Bricks that edits may have changed lately, and when.
+/// Bricks that edits may have changed recently, with the time.
 #[derive(Resource, Default)]
 struct DirtyBricks(HashMap<(Entity, BrickPos), Duration>);
 
-/// Takes down which stored bricks lie in the boxes of new receipts, and forgets old ones.
+/// Records the stored bricks in the bounds of new receipts, and forgets old ones.
 fn note_dirty(
     time: Res<Time>,
     debug: Res<BurrowDebug>,
@@ -95,27 +95,26 @@ fn note_dirty(
     }
 }
 
-/// What a view was drawn for.
+/// The state that a view was drawn for.
 #[derive(Clone, PartialEq)]
 struct Key {
     version: Version,
     focus: IVec3,
     settings: BurrowDebug,
-    /// Counts frames in which bricks fade.
+    /// Counts frames in which bricks fade, for the dirty view.
     fading: u64,
-    /// Those of the terrain.
     render_layers: Option<RenderLayers>,
 }
 
-/// A view as it was drawn last.
+/// The last drawing of a view.
 struct Drawing {
     key: Key,
     since: Duration,
-    /// How many entities it has; games may despawn a terrain's children.
+    /// The number of its entities. A game may despawn them.
     layers: usize,
 }
 
-/// Draws what is on and not as it should be, and takes away what is off.
+/// Draws views that are outdated, and removes those that are switched off.
 fn draw(
     mut commands: Commands,
     time: Res<Time>,
@@ -139,14 +138,14 @@ fn draw(
     if !DebugView::ALL.into_iter().any(|view| debug.shows(view)) {
         return;
     }
-    // Once more when the last one is forgotten.
+    // One more time after the last one is forgotten.
     *frames += u64::from(!dirty.0.is_empty() || *faded);
     *faded = !dirty.0.is_empty();
     let now = time.elapsed();
     for (entity, terrain, own_place, render_layers, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
         let Some(focus) = focus(&debug, terrain, own_place, &cameras) else { continue };
         let scale = own_place.scale().x.abs().max(f32::MIN_POSITIVE);
-        // In steps, so that not every move of the camera draws everything anew.
+        // Rounded, so that small moves of the camera draw nothing again.
         let step = (debug.near / scale / 4.0).max(1.0);
         let steps = (focus / step).round();
         let place = Place { focus: steps * step, radius: debug.radius / scale, near: debug.near / scale };
@@ -172,19 +171,19 @@ fn draw(
                 }
             }
             let fresh = fresh_bricks(&dirty, entity, &debug, now);
-            let mut pen = Pen::new(debug.most_lines);
+            let mut out = LineBuffer::new(debug.most_lines);
             views::draw(
                 view,
                 terrain.world(),
                 place,
                 if view == DebugView::Dirty { &fresh } else { &[] },
-                &mut pen,
+                &mut out,
             );
             own.into_iter().for_each(|old| commands.entity(old).try_despawn());
-            let layers = pen.finish();
+            let layers = out.finish();
             drawn.insert((entity, view), Drawing { key, since: now, layers: layers.len() });
             for layer in layers {
-                // They are drawn in this very frame, and nobody places them any more.
+                // They are drawn in this frame, after transforms were propagated.
                 let lines = (DebugLines { view }, gizmo(layer, &mut assets), ChildOf(entity), *own_place);
                 let mut lines = commands.spawn(lines);
                 if let Some(render_layers) = render_layers {
@@ -204,7 +203,7 @@ fn gizmo(layer: Layer, assets: &mut Assets<GizmoAsset>) -> Gizmo {
     Gizmo { handle: assets.add(asset), line_config, depth_bias: BIAS }
 }
 
-/// The bricks of a terrain with how fresh each is, in order.
+/// The dirty bricks of a terrain in order, each with its freshness.
 fn fresh_bricks(dirty: &DirtyBricks, terrain: Entity, debug: &BurrowDebug, now: Duration) -> Vec<Dirty> {
     let mut fresh: Vec<Dirty> = dirty
         .0
@@ -216,7 +215,7 @@ fn fresh_bricks(dirty: &DirtyBricks, terrain: Entity, debug: &BurrowDebug, now: 
     fresh
 }
 
-/// The place around which is drawn, in voxels of a terrain: the game's, or where a camera looks at the ground, or is.
+/// The centre of the views, in voxels of a terrain: set by the game, or where the camera looks at the ground, or its place.
 fn focus(
     debug: &BurrowDebug,
     terrain: &Terrain,

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 
 use super::DebugView;
-use super::lines::Pen;
+use super::lines::LineBuffer;
 use super::wires::{SeamWires, around};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE};
 use crate::terrain::{Drawn, World};
@@ -36,20 +36,20 @@ pub struct Place {
 }
 
 /// Draws a view.
-pub fn draw(view: DebugView, world: &World, place: Place, dirty: &[Dirty], pen: &mut Pen) {
+pub fn draw(view: DebugView, world: &World, place: Place, dirty: &[Dirty], out: &mut LineBuffer) {
     let Some(bounds) = around(place.focus, place.radius) else { return };
     match view {
-        DebugView::Chunks => chunks(world, place, bounds, pen),
-        DebugView::Fields => fields(world, bounds, pen),
-        DebugView::Mask => mask(world, bounds, pen),
-        DebugView::Rings => rings(world, bounds, pen),
-        DebugView::Dirty => bricks(dirty, bounds, pen),
-        DebugView::Normals => normals(world, place, pen),
-        DebugView::Wires => SeamWires::around(world, place.focus, place.near).draw(pen),
+        DebugView::Chunks => chunks(world, place, bounds, out),
+        DebugView::Fields => fields(world, bounds, out),
+        DebugView::Mask => mask(world, bounds, out),
+        DebugView::Rings => rings(world, bounds, out),
+        DebugView::Dirty => bricks(dirty, bounds, out),
+        DebugView::Normals => normals(world, place, out),
+        DebugView::Wires => SeamWires::around(world, place.focus, place.near).draw(out),
     }
 }
 
-fn chunks(world: &World, place: Place, bounds: LatticeBox, pen: &mut Pen) {
+fn chunks(world: &World, place: Place, bounds: LatticeBox, out: &mut LineBuffer) {
     let grid = world.grid();
     let mut chunks = world.chunks_near(bounds);
     let cells = |chunk: ChunkPos| grid.chunk_cells(chunk);
@@ -59,96 +59,96 @@ fn chunks(world: &World, place: Place, bounds: LatticeBox, pen: &mut Pen) {
         let distance = |chunk| middle(chunk).distance_squared(place.focus);
         distance(a).total_cmp(&distance(b))
     });
-    pen.width(1.5);
+    out.width(1.5);
     for tile in world.drawn_near(bounds) {
         let Drawn::Tile(tile) = tile else { continue };
         let (low, high) = grid.tile_cells(tile);
         let sides = [(1, 0, high.x - low.x), (0, 1, high.z - low.z)];
         for (dx, dz, count) in sides {
             let at = |step: i32| on_ground(world, low.offset(dx * step, dz * step));
-            (0..count).for_each(|step| pen.line(at(step), at(step + 1), TILE));
+            (0..count).for_each(|step| out.line(at(step), at(step + 1), TILE));
         }
     }
-    pen.width(2.0);
+    out.width(2.0);
     for chunk in chunks {
         let cells = cells(chunk);
-        pen.cuboid(cells.min.as_vec3(), (cells.max + 1).as_vec3(), CHUNK);
+        out.cuboid(cells.min.as_vec3(), (cells.max + 1).as_vec3(), CHUNK);
     }
 }
 
-fn fields(world: &World, bounds: LatticeBox, pen: &mut Pen) {
-    pen.width(2.5);
+fn fields(world: &World, bounds: LatticeBox, out: &mut LineBuffer) {
+    out.width(2.5);
     for field in world.fields_near(bounds) {
         let color = LinearRgba::from(Oklcha::sequential_dispersed(field.id.0 as u32));
-        pen.cuboid(field.bounds.min.as_vec3() - 0.1, field.bounds.max.as_vec3() + 0.1, color);
+        out.cuboid(field.bounds.min.as_vec3() - 0.1, field.bounds.max.as_vec3() + 0.1, color);
     }
 }
 
-fn mask(world: &World, bounds: LatticeBox, pen: &mut Pen) {
+fn mask(world: &World, bounds: LatticeBox, out: &mut LineBuffer) {
     let mut cells: Vec<Column> = world.mask_cells(Column::of(bounds.min), Column::of(bounds.max)).collect();
     cells.sort_unstable();
     let sides = |cell: Column| {
         let [a, b, c, d] = cell.corners();
         [((-1, 0), a, b), ((0, 1), b, c), ((1, 0), c, d), ((0, -1), d, a)]
     };
-    pen.width(4.0);
+    out.width(4.0);
     for &cell in &cells {
         for ((dx, dz), from, to) in sides(cell) {
             if !world.mask().contains(cell.offset(dx, dz)) {
-                pen.line(on_ground(world, from), on_ground(world, to), RIM);
+                out.line(on_ground(world, from), on_ground(world, to), RIM);
             }
         }
     }
-    pen.width(1.0);
+    out.width(1.0);
     for &cell in &cells {
         // Each line between two cells once.
         for ((dx, dz), from, to) in sides(cell) {
             if dx + dz < 0 && world.mask().contains(cell.offset(dx, dz)) {
-                pen.line(on_ground(world, from), on_ground(world, to), MASK);
+                out.line(on_ground(world, from), on_ground(world, to), MASK);
             }
         }
     }
 }
 
-fn rings(world: &World, bounds: LatticeBox, pen: &mut Pen) {
-    pen.width(2.0);
+fn rings(world: &World, bounds: LatticeBox, out: &mut LineBuffer) {
+    out.width(2.0);
     for drawn in world.drawn_near(bounds) {
         let Drawn::Tile(tile) = drawn else { continue };
         for triangle in world.ring_triangles(tile) {
             if triangle.iter().all(|corner| bounds.contains(corner.floor().as_ivec3())) {
-                pen.triangle(triangle, RING);
+                out.triangle(triangle, RING);
             }
         }
-        if pen.is_full() {
+        if out.is_full() {
             return;
         }
     }
 }
 
-fn bricks(dirty: &[Dirty], bounds: LatticeBox, pen: &mut Pen) {
-    pen.width(2.0);
+fn bricks(dirty: &[Dirty], bounds: LatticeBox, out: &mut LineBuffer) {
+    out.width(2.0);
     for &(brick, fresh) in dirty {
         let samples = brick.samples();
         if samples.intersection(bounds).is_some() {
             let fresh = fresh.clamp(0.0, 1.0);
             let color = LinearRgba::new(1.0, 0.10 + 0.55 * fresh, 0.04, fresh);
-            pen.cuboid(samples.min.as_vec3(), (samples.max + 1).as_vec3(), color);
+            out.cuboid(samples.min.as_vec3(), (samples.max + 1).as_vec3(), color);
         }
     }
 }
 
-fn normals(world: &World, place: Place, pen: &mut Pen) {
+fn normals(world: &World, place: Place, out: &mut LineBuffer) {
     let Some(near) = around(place.focus, place.near) else { return };
-    pen.width(1.5);
+    out.width(1.5);
     for drawn in world.drawn_near(near) {
-        if pen.is_full() {
+        if out.is_full() {
             return;
         }
         let origin = world.origin(drawn).as_vec3();
         let mut draw = |position: [f32; 3], normal: Vec3, color| {
             let from = origin + Vec3::from(position);
             if from.distance_squared(place.focus) < place.near * place.near {
-                pen.line(from, from + normal * NORMAL, color);
+                out.line(from, from + normal * NORMAL, color);
             }
         };
         match drawn {
@@ -200,9 +200,9 @@ mod tests {
 
     fn count(view: DebugView, terrain: &Terrain, place: Place, most: usize) -> usize {
         let bricks = terrain.world().bricks().map(|(brick, _)| (brick, 0.5)).collect::<Vec<_>>();
-        let mut pen = Pen::new(most);
-        draw(view, terrain.world(), place, &bricks, &mut pen);
-        pen.finish().iter().map(|layer| layer.lines.len()).sum()
+        let mut out = LineBuffer::new(most);
+        draw(view, terrain.world(), place, &bricks, &mut out);
+        out.finish().iter().map(|layer| layer.lines.len()).sum()
     }
 
     #[test]

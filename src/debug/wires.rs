@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use bevy::prelude::*;
 
-use super::lines::Pen;
+use super::lines::LineBuffer;
 use crate::lattice::{LatticeBox, SNAP};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, World};
@@ -50,7 +50,7 @@ impl SeamWires {
     }
 
     /// Draws them: tiles golden, chunks blue, and what they share in white, thicker.
-    pub(super) fn draw(&self, pen: &mut Pen) {
+    pub(super) fn draw(&self, out: &mut LineBuffer) {
         let sorted = |edges: &mut dyn Iterator<Item = &Edge>| {
             let mut edges: Vec<Edge> = edges.copied().collect();
             edges.sort_unstable_by_key(|edge| edge.map(|end| end.to_array()));
@@ -63,9 +63,9 @@ impl SeamWires {
             (sorted(&mut self.chunks.difference(&self.tiles)), BLUE, 1.6),
         ];
         for (edges, color, width) in layers {
-            pen.width(width);
+            out.width(width);
             for [from, to] in edges {
-                pen.line(voxels(from), voxels(to), color);
+                out.line(voxels(from), voxels(to), color);
             }
         }
     }

@@ -1,34 +1,31 @@
-//! What sliders of lengths offer: metres, as far as the chosen terrain takes them, whose limits count in voxels.
+//! Ranges of the sliders for lengths: in metres, within the limits of a brush, which are in voxels.
 
 use std::ops::RangeInclusive;
 
-/// A length of the brush in hand.
-///
-/// Its slider offers no other values than those in range. One that lies outside, as the game or another terrain left it,
-/// stays until somebody drags it.
+/// The range of a length. A value outside, set by the game or for another terrain, stays until the slider is dragged.
 pub struct Length {
-    /// Least and most of what is offered, in metres.
+    /// Least and most, in metres.
     metres: (f32, f32),
-    /// The same in voxels: within what [`brush`](crate::brush) has as limits.
+    /// Least and most that a [`brush`](crate::brush) allows, in voxels.
     voxels: (f32, f32),
 }
 
 impl Length {
-    /// What is offered, in metres, where voxels are so many metres wide.
+    /// The range in metres for this voxel size.
     pub fn range(&self, voxel: f32) -> RangeInclusive<f32> {
         let least = self.metres.0.max(self.voxels.0 * voxel);
         least..=self.metres.1.min(self.voxels.1 * voxel).max(least)
     }
 }
 
-/// Radii, and half the sides of boxes. All of the most together are within the volume that a shape may have.
+/// Radii, and half sizes of boxes. All maxima together are within the volume that a shape may have.
 pub const RADIUS: Length = Length { metres: (0.5, 32.0), voxels: (0.25, 128.0) };
-/// Of the tube of a ring.
+/// The radius of a torus' tube.
 pub const TUBE: Length = Length { metres: (0.5, 16.0), voxels: (0.25, 64.0) };
 /// Of cylinders, capsules and cones.
 pub const LENGTH: Length = Length { metres: (1.0, 64.0), voxels: (0.25, 256.0) };
 pub const FALLOFF: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
-/// How far the surface moves, or how high a stamp is.
+/// The amount of raising and lowering, or the height of a stamp.
 pub const AMOUNT: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
 pub const STEP: Length = Length { metres: (1.0, 32.0), voxels: (1.0, 256.0) };
 pub const BUMP: Length = Length { metres: (0.0, 4.0), voxels: (0.0, 8.0) };

@@ -1,4 +1,4 @@
-//! The panel: a brush to choose, settings, live figures, in two columns over the game (feature `egui`).
+//! The panel: the current brush, settings and live figures in two columns over the game (feature `egui`).
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -10,22 +10,20 @@
 //!     .add_systems(Update, dig.before(BurrowSystems::Collect).run_if(pointer_is_free));
 //! ```
 //!
-//! | resource | what it is |
+//! | resource | content |
 //! | --- | --- |
-//! | [`BrushTool`] | the brush in hand: [`brush_at`](BrushTool::brush_at) makes the [`Brush`](crate::brush::Brush) |
-//! | [`BurrowPanel`] | what is shown, names of materials, where pictures go |
-//! | [`PanelPlaces`] | where its widgets are on the screen: for tutorials that point at one, and for tests |
-//! | [`PanelInput`] | who has the pointer and the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
+//! | [`BrushTool`] | the current brush; [`brush_at`](BrushTool::brush_at) makes the [`Brush`](crate::brush::Brush) |
+//! | [`BurrowPanel`] | what is shown, names of materials, the folder for pictures |
+//! | [`PanelPlaces`] | the widgets' places on the screen, for tutorials and tests |
+//! | [`PanelInput`] | whether the panel uses the pointer or the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
 //!
-//! [`PanelAction`] messages are its buttons, for keys of the game. It is drawn by the camera that has egui's primary
-//! context: the first one, unless the game says otherwise; a camera that draws into an image is as good as one with a
-//! window. When that camera goes, another one with a window gets the context, as long as bevy_egui may create one by itself
-//! (`EguiGlobalSettings::auto_create_primary_context`). With no terrain the panel says so; with several it shows one of them
-//! at a time.
+//! [`PanelAction`] messages press its buttons, for key bindings. The panel is drawn by the camera with egui's primary context:
+//! the first one, unless the game chooses another; it may render to an image. When that camera is despawned, another one with a
+//! window gets the context, if bevy_egui may create it (`EguiGlobalSettings::auto_create_primary_context`). With several
+//! terrains, the panel shows one at a time.
 
 mod brush_column;
 mod context;
-mod customs;
 mod lengths;
 mod look_section;
 mod operations;
@@ -34,6 +32,7 @@ mod plot;
 mod rules_section;
 mod state;
 mod survey;
+mod terrain_controls;
 mod theme;
 mod tool;
 mod widgets;
@@ -53,16 +52,15 @@ use crate::plugin::{
 };
 use crate::terrain::Terrain;
 use crate::view::GroundLook;
-use customs::Customs;
 use survey::Survey;
+use terrain_controls::TerrainControls;
 use world_column::{Content, TerrainLine};
 
-/// What egui knows the columns by.
+/// The columns' egui ids.
 const BRUSH: &str = "burrow brush";
 const WORLD: &str = "burrow world";
 
-/// Adds the panel to a game that has `BurrowPlugins`, and egui if it is not there. A game that adds egui by itself does so
-/// before.
+/// Adds the panel. Requires `BurrowPlugins`. It adds `EguiPlugin` unless that was added before.
 #[derive(Default)]
 pub struct BurrowPanelPlugin;
 
@@ -98,7 +96,7 @@ impl Plugin for BurrowPanelPlugin {
     }
 }
 
-/// Does what the buttons say.
+/// Performs the actions of the buttons.
 fn act(
     mut commands: Commands,
     mut actions: MessageReader<PanelAction>,
@@ -125,8 +123,7 @@ fn act(
     }
 }
 
-/// Takes down why the terrain that the panel is about rejected the last brush, until it takes one or the panel is about
-/// another.
+/// Stores why the chosen terrain rejected the last brush, until it accepts one or another terrain is chosen.
 fn note_rejection(
     mut receipts: MessageReader<BrushApplied>,
     mut panel: ResMut<BurrowPanel>,
@@ -162,7 +159,7 @@ fn draw(
     mut commands: Commands,
 ) {
     let (true, Ok(context)) = (panel.is_open, contexts.ctx_mut()) else {
-        // Nothing of it is on the screen.
+        // No widget is shown.
         places.set_if_neq(PanelPlaces::default());
         return;
     };
@@ -170,10 +167,12 @@ fn draw(
     let chosen = survey::chosen(&panel, &terrains);
     let part = chosen.and_then(|entity| parts.get(entity).ok());
     let materials = materials(&panel, &part.and_then(|(_, colors, ..)| colors.cloned()).unwrap_or_default());
-    let customs =
-        chosen.and_then(|entity| terrains.get(entity).ok()).map_or_else(Customs::default, |(_, terrain)| {
-            Customs::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))
-        });
+    let controls = chosen.and_then(|entity| terrains.get(entity).ok()).map_or_else(
+        TerrainControls::default,
+        |(_, terrain)| {
+            TerrainControls::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))
+        },
+    );
     let mut lines: Vec<TerrainLine> = terrains
         .iter()
         .map(|(entity, terrain)| {
@@ -186,7 +185,7 @@ fn draw(
     let voxel = voxel_size(&lines, chosen);
 
     let (mut new_tool, mut new_panel, mut new_settings) = (tool.clone(), panel.clone(), settings.clone());
-    let mut new_customs = customs.clone();
+    let mut new_controls = controls.clone();
     let mut pressed = Vec::new();
     if panel.shows_brush {
         column(context, BRUSH, Align2::LEFT_TOP, "Brush", |ui| {
@@ -201,7 +200,7 @@ fn draw(
                 figures: &figures,
                 survey: &survey,
                 settings: &mut new_settings,
-                customs: &mut new_customs,
+                controls: &mut new_controls,
                 materials: &materials,
                 actions: &mut pressed,
             };
@@ -215,24 +214,24 @@ fn draw(
         });
     }
     free_keyboard(context, was_typing);
-    // Whoever watches them for changes is told of real ones only.
+    // Change detection must see real changes only.
     tool.set_if_neq(new_tool);
     panel.set_if_neq(new_panel);
     settings.set_if_neq(new_settings);
     places.set_if_neq(widgets::places(context));
     if let Some(entity) = chosen {
-        new_customs.enact(&customs, entity, &mut commands);
+        new_controls.apply(&controls, entity, &mut commands);
     }
     actions.write_batch(pressed);
 }
 
-/// Metres along the chosen terrain's voxels.
+/// The voxel size of the chosen terrain.
 fn voxel_size(lines: &[TerrainLine], chosen: Option<Entity>) -> f32 {
     lines.iter().find(|line| Some(line.entity) == chosen).map_or(1.0, |line| line.terrain.voxel_size())
 }
 
-/// Takes the keyboard from a widget of the panel in which nothing is typed: egui gives it to one when `Tab` is pressed, and
-/// keys are the game's. That one which `Tab` came to would be typed into is no reason to keep it.
+/// Takes the keyboard focus from widgets of the panel unless text is being typed. Egui moves the focus on `Tab`, but keys
+/// belong to the game.
 fn free_keyboard(context: &egui::Context, was_typing: bool) {
     let Some(focused) = context.memory(|memory| memory.focused()) else { return };
     let columns = [BRUSH, WORLD].map(|id| LayerId::new(Order::Middle, Id::new(id)));
@@ -244,7 +243,7 @@ fn free_keyboard(context: &egui::Context, was_typing: bool) {
     }
 }
 
-/// Colours and names by id, as many as there are of both.
+/// The name and colour of each material, by id.
 fn materials(panel: &BurrowPanel, colors: &MaterialColors) -> Vec<(Color32, String)> {
     let color = |at: usize| match colors.0.get(at) {
         Some(color) => {
@@ -272,7 +271,7 @@ fn column(
         let card = theme::card();
         let inside = theme::COLUMN - card.inner_margin.sum().x;
         card.show(ui, |ui| {
-            // Before anything is placed: later it would move what follows up to the top.
+            // Before any widget: later it would move those that follow to the top.
             ui.set_max_height(height - card.inner_margin.sum().y);
             ui.set_width(inside);
             ui.label(RichText::new(title).heading().color(theme::BRIGHT));

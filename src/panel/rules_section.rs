@@ -2,7 +2,7 @@
 
 use bevy_egui::egui::{Color32, RichText, Ui};
 
-use super::customs::Customs;
+use super::terrain_controls::TerrainControls;
 use super::theme::FAINT;
 use super::widgets::{count, figure, metres, section, slider, swatches, switch};
 use crate::ground::MaterialId;
@@ -12,13 +12,13 @@ use crate::volume::DiggingRules;
 /// Draws both sections; `material` is the one whose hardness is shown.
 pub fn show(
     ui: &mut Ui,
-    customs: &mut Customs,
+    controls: &mut TerrainControls,
     material: &mut usize,
     materials: &[(Color32, String)],
     voxel: f32,
 ) {
-    section(ui, "Digging rules", false, |ui| rules(ui, &mut customs.rules, material, materials, voxel));
-    section(ui, "Loose pieces", false, |ui| loose(ui, &mut customs.loose));
+    section(ui, "Digging rules", false, |ui| rules(ui, &mut controls.rules, material, materials, voxel));
+    section(ui, "Loose pieces", false, |ui| loose(ui, &mut controls.loose));
 }
 
 fn rules(

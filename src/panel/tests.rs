@@ -19,7 +19,7 @@ struct Screen {
     tool: BrushTool,
     panel: BurrowPanel,
     settings: BurrowSettings,
-    customs: Customs,
+    controls: TerrainControls,
     terrains: Vec<Terrain>,
     actions: Vec<PanelAction>,
     places: PanelPlaces,
@@ -38,7 +38,7 @@ impl Screen {
             tool: BrushTool::default(),
             panel: BurrowPanel::default(),
             settings: BurrowSettings::default(),
-            customs: Customs::default(),
+            controls: TerrainControls::default(),
             terrains: (0..terrains).map(terrain).collect(),
             actions: Vec::new(),
             places: PanelPlaces::default(),
@@ -81,7 +81,7 @@ impl Screen {
                     figures: &figures,
                     survey: &survey,
                     settings: &mut self.settings,
-                    customs: &mut self.customs,
+                    controls: &mut self.controls,
                     materials: &materials,
                     actions: &mut actions,
                 };
@@ -198,11 +198,11 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
     for section in ["Digging rules", "Loose pieces"] {
         click(&mut screen, section);
     }
-    assert_eq!(screen.customs, Customs::default());
+    assert_eq!(screen.controls, TerrainControls::default());
     for name in ["Bedrock", "Rule of Clay", "Hardness", "Unbreakable", "Found after digs", "are found"] {
         click(&mut screen, name);
     }
-    let Customs { rules, loose, .. } = screen.customs.clone();
+    let TerrainControls { rules, loose, .. } = screen.controls.clone();
     let clay = crate::ground::MaterialId(4);
     assert_eq!((rules.bedrock, rules.unbreakable.first()), (Some(0), Some(&clay)));
     assert!((100..160).contains(&rules.hardness[&clay]), "{rules:?}");
@@ -213,22 +213,22 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
     for name in ["Bedrock", "Unbreakable", "Found after digs"] {
         click(&mut screen, name);
     }
-    assert_eq!((screen.customs.rules.bedrock, screen.customs.loose), (None, None));
-    assert!(screen.customs.rules.unbreakable.is_empty());
+    assert_eq!((screen.controls.rules.bedrock, screen.controls.loose), (None, None));
+    assert!(screen.controls.rules.unbreakable.is_empty());
 }
 
 #[test]
 fn looks_are_set_where_there_is_one() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
     assert!(!screen.places.0.contains_key("Look"));
-    screen.customs.look = Some(GroundLook::default());
+    screen.controls.look = Some(GroundLook::default());
     screen.frame(Vec::new());
     for name in ["Look", "Plain", "Variety", "Beds"] {
         let at = screen.middle(name);
         screen.click(at);
         screen.frame(Vec::new());
     }
-    let GroundLook { quality, variety, strata, .. } = screen.customs.look.expect("it is there");
+    let GroundLook { quality, variety, strata, .. } = screen.controls.look.expect("it is there");
     assert_eq!(quality, crate::view::GroundQuality::Low);
     assert!((0.4..0.6).contains(&variety) && (4.0..8.0).contains(&strata.height), "{variety} {strata:?}");
 }
@@ -433,15 +433,15 @@ fn history_is_that_of_the_chosen_terrain() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
     // No whole number of MiB.
     let odd = (5 << 20) + 123;
-    screen.customs.undo_budget = odd;
+    screen.controls.undo_budget = odd;
     let at = screen.middle("Settings");
     screen.click(at);
     screen.frame(Vec::new());
-    assert_eq!(screen.customs.undo_budget, odd);
+    assert_eq!(screen.controls.undo_budget, odd);
     screen.drag("History", true);
-    assert_eq!(screen.customs.undo_budget, 1 << 30);
+    assert_eq!(screen.controls.undo_budget, 1 << 30);
     screen.drag("History", false);
-    assert_eq!(screen.customs.undo_budget, 0);
+    assert_eq!(screen.controls.undo_budget, 0);
 }
 
 /// An app with as much of the panel as draws it, and what it is drawn in.

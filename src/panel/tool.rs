@@ -1,4 +1,4 @@
-//! The brush in hand: what the panel's left column sets and games read.
+//! The current brush: the panel's left column sets it, and games read it.
 
 use std::sync::{Arc, LazyLock};
 
@@ -10,7 +10,7 @@ use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
 use crate::ground::{GreyImage, MaterialId};
 use crate::plugin::TerrainHit;
 
-/// The brush in hand, in metres of the world. The panel changes it, keys of the game may too, and the game reads it:
+/// The current brush, in metres of world space. The panel changes it, and so may the game; the game turns it into brushes:
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -26,52 +26,52 @@ use crate::plugin::TerrainHit;
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct BrushTool {
-    /// What it does.
+    /// The operation.
     pub operation: ToolOperation,
-    /// Its form.
+    /// The shape.
     pub shape: ToolShape,
-    /// Of all shapes but boxes; of a ring, from its middle to that of its tube.
+    /// Radius of all shapes but boxes; of a torus, from its centre to the centre of its tube.
     pub radius: f32,
-    /// Radius of a ring's tube; at most the ring's own radius counts.
+    /// Radius of a torus' tube, limited to `radius`.
     pub tube: f32,
-    /// Half the sides of a box.
+    /// Half sizes of a box.
     pub half: Vec3,
-    /// Of cylinders and cones; of capsules between the middles of their round ends.
+    /// Length of cylinders and cones; of capsules, the distance between the centres of their ends.
     pub length: f32,
-    /// Where its axis points.
+    /// The direction of its axis.
     pub align: ToolAlign,
-    /// Turns it about its axis, in degrees: boxes show it.
+    /// Rotation about its axis, in degrees; only boxes show it.
     pub turn: f32,
-    /// How far it is pushed into the ground: 0 half, 1 all of it, -1 not at all.
+    /// How deep it is placed: -1 on the ground, 0 half in it, 1 below the surface.
     pub sink: f32,
-    /// What it builds or paints with: a [`MaterialId`].
+    /// The [`MaterialId`] that it adds or paints.
     pub material: u8,
-    /// Do operations that sculpt make new ground of that too? Else it is what lies below it.
+    /// Whether sculpting makes new ground of that material too, instead of the one below.
     pub is_of_material: bool,
-    /// How much of its work one stroke does, 0 to 1, for operations that sculpt.
+    /// Strength of one stroke, 0 to 1, for sculpting.
     pub strength: f32,
-    /// Over how many metres from its rim inwards it fades in, for operations that sculpt.
+    /// Metres from its border inwards over which it fades in, for sculpting.
     pub falloff: f32,
-    /// How far it moves the surface, or how high a stamp is, in metres.
+    /// Metres by which it raises or lowers, or the height of a stamp.
     pub amount: f32,
-    /// The height that it levels to, in metres of the world.
+    /// The height for levelling, in metres of world space.
     pub level: f32,
     /// Height of terraces, in metres.
     pub step: f32,
-    /// What it stamps.
+    /// The image for stamping.
     #[reflect(ignore)]
     pub stamp: StampImage,
-    /// How hard the material may be that it takes away, where the terrain has rules for that; 255 takes away all.
+    /// Power against the hardness of materials, see [`Brush::power`]; 255 digs everything.
     pub power: u8,
-    /// Has it bumps on its surface?
+    /// Whether its surface has bumps.
     pub is_rough: bool,
     /// Height of the bumps.
     pub bump: f32,
     /// Width of the bumps.
     pub bump_width: f32,
-    /// Which of the patterns of bumps.
+    /// Seed of the bumps.
     pub seed: u32,
-    /// Strokes a second while a button is held; the game's clock.
+    /// Brushes per second while a button is held, for the game's timer.
     pub rate: f32,
 }
 
@@ -105,12 +105,12 @@ impl Default for BrushTool {
     }
 }
 
-/// What a [`BrushTool`] stamps: an image of heights, white is high. Without one, a ridge of the panel's own.
+/// The image of a [`BrushTool`]'s stamp, white is high. The default is a mountain with ridges.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StampImage {
     /// The heights, 2 to 256 samples a side; other images make brushes that are rejected.
     pub image: Option<Arc<GreyImage>>,
-    /// What the panel calls the image.
+    /// The name of the image in the panel.
     pub name: Option<Name>,
 }
 
@@ -120,7 +120,7 @@ impl StampImage {
         Self { image: Some(image.into()), name: Some(name.into()) }
     }
 
-    /// What the panel says: the image's name, or else its size.
+    /// The label in the panel: the image's name, or else its size.
     pub(super) fn label(&self) -> String {
         match (&self.image, &self.name) {
             (None, _) => "Ridge".into(),
@@ -129,7 +129,7 @@ impl StampImage {
         }
     }
 
-    /// The image; `None` only if there can be none at all.
+    /// The image, or the default one.
     pub(super) fn image(&self) -> Option<Arc<GreyImage>> {
         self.image.clone().or_else(|| RIDGE.clone())
     }
@@ -148,7 +148,7 @@ static RIDGE: LazyLock<Option<Arc<GreyImage>>> = LazyLock::new(|| {
     GreyImage::from_samples(SIDE, SIDE, samples).ok().map(Arc::new)
 });
 
-/// The form of a [`BrushTool`].
+/// The shape of a [`BrushTool`].
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default)]
 pub enum ToolShape {
@@ -167,14 +167,14 @@ pub enum ToolShape {
     Torus,
 }
 
-/// Where the axis of a [`BrushTool`] points.
+/// The direction of a [`BrushTool`]'s axis.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default)]
 pub enum ToolAlign {
     /// Straight up.
     #[default]
     Upright,
-    /// Away from the ground, as the surface lies.
+    /// Along the normal of the ground.
     Surface,
 }
 
@@ -183,14 +183,14 @@ impl ToolShape {
     pub const ALL: [Self; 6] =
         [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone, Self::Torus];
 
-    /// Does it have a length?
+    /// Whether it has a length.
     pub fn is_long(self) -> bool {
         matches!(self, Self::Cylinder | Self::Capsule | Self::Cone)
     }
 }
 
 impl BrushTool {
-    /// The brush that this tool makes where a ray met the ground, in world space.
+    /// The brush for a place on the ground, in world space.
     pub fn brush_at(&self, hit: &TerrainHit) -> Brush {
         let row = self.operation.row();
         let mut brush = Brush::dig(self.shape_at(hit));
@@ -204,7 +204,7 @@ impl BrushTool {
         if self.is_of_material { brush.with_material(self.material_id()) } else { brush }
     }
 
-    /// The shape of that brush alone: for a preview.
+    /// The shape of that brush, for a preview.
     pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
         let axis = self.axis(hit);
         self.shape_around(hit.position - axis * self.sink * self.reach(), axis)
@@ -226,7 +226,7 @@ impl BrushTool {
         }
     }
 
-    /// Where its axis points at a place.
+    /// The direction of its axis at a place.
     pub(super) fn axis(&self, hit: &TerrainHit) -> Vec3 {
         match self.align {
             ToolAlign::Upright => Vec3::Y,
@@ -234,22 +234,22 @@ impl BrushTool {
         }
     }
 
-    /// From its middle to its rim.
+    /// The distance from its centre to its side.
     pub(super) fn width(&self) -> f32 {
         if self.shape == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
     }
 
-    /// What it builds or paints with.
+    /// The material that it adds or paints.
     pub fn material_id(&self) -> MaterialId {
         MaterialId(self.material)
     }
 
-    /// Its bumps, if it has any.
+    /// The bumps on its surface.
     pub fn roughness(&self) -> Option<Roughness> {
         self.is_rough.then(|| Roughness::new(self.bump, self.bump_width, self.seed))
     }
 
-    /// From its middle to its end along its axis.
+    /// The distance from its centre to its end along its axis.
     fn reach(&self) -> f32 {
         match self.shape {
             ToolShape::Sphere => self.radius,
@@ -260,8 +260,8 @@ impl BrushTool {
         }
     }
 
-    /// Makes it larger or smaller by a factor, whatever its shape, within what the panel's sliders offer on a terrain with
-    /// voxels of so many metres: for a mouse wheel.
+    /// Scales its radius, or the size of a box, within the range of the panel's sliders on a terrain of this voxel size; for a
+    /// mouse wheel.
     pub fn grow(&mut self, factor: f32, voxel_size: f32) {
         let range = RADIUS.range(voxel_size);
         let grow = |size: f32| (size * factor).clamp(*range.start(), *range.end());

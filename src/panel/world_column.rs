@@ -3,9 +3,9 @@
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
 
-use super::customs::Customs;
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::survey::{Counts, Survey};
+use super::terrain_controls::TerrainControls;
 use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
 use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
 use super::{look_section, plot, rules_section};
@@ -27,7 +27,7 @@ pub struct Content<'a> {
     pub figures: &'a BurrowFigures,
     pub survey: &'a Survey,
     pub settings: &'a mut BurrowSettings,
-    pub customs: &'a mut Customs,
+    pub controls: &'a mut TerrainControls,
     pub materials: &'a [(Color32, String)],
     pub actions: &'a mut Vec<PanelAction>,
 }
@@ -47,12 +47,12 @@ pub fn show(ui: &mut Ui, panel: &mut BurrowPanel, content: &mut Content) {
     }
     if let Some(line) = chosen {
         let voxel = line.terrain.voxel_size();
-        rules_section::show(ui, content.customs, &mut panel.material, content.materials, voxel);
-        if let Some(look) = &mut content.customs.look {
+        rules_section::show(ui, content.controls, &mut panel.material, content.materials, voxel);
+        if let Some(look) = &mut content.controls.look {
             look_section::show(ui, look);
         }
     }
-    let undo_budget = chosen.is_some().then_some(&mut content.customs.undo_budget);
+    let undo_budget = chosen.is_some().then_some(&mut content.controls.undo_budget);
     section(ui, "Settings", false, |ui| settings(ui, undo_budget, content.settings));
 }
 

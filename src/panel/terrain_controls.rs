@@ -1,4 +1,4 @@
-//! What the panel sets of a terrain.
+//! The settings of a terrain that the panel changes.
 
 use bevy::ecs::system::Commands;
 use bevy::log::warn;
@@ -9,25 +9,25 @@ use crate::terrain::Terrain;
 use crate::view::GroundLook;
 use crate::volume::DiggingRules;
 
-/// What a terrain has of settings, to be changed where they are shown.
+/// The settings of a terrain.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Customs {
+pub struct TerrainControls {
     pub rules: DiggingRules,
-    /// Bytes that undo may take.
+    /// Most bytes of undo history.
     pub undo_budget: usize,
     pub loose: Option<LooseGround>,
     pub look: Option<GroundLook>,
 }
 
-impl Customs {
+impl TerrainControls {
     pub fn of(terrain: &Terrain, loose: Option<&LooseGround>, look: Option<&GroundLook>) -> Self {
         let rules = terrain.rules().cloned().unwrap_or_default();
         let undo_budget = terrain.undo_budget();
         Self { rules, undo_budget, loose: loose.copied(), look: look.cloned() }
     }
 
-    /// Hands what differs on to the terrain.
-    pub fn enact(self, before: &Self, entity: Entity, commands: &mut Commands) {
+    /// Applies what differs from `before` to the terrain.
+    pub fn apply(self, before: &Self, entity: Entity, commands: &mut Commands) {
         let Ok(mut terrain) = commands.get_entity(entity) else { return };
         if self.loose != before.loose {
             match self.loose {
@@ -69,7 +69,7 @@ mod tests {
     use crate::terrain::{History, TerrainSettings};
 
     #[test]
-    fn what_differs_and_nothing_else_is_handed_on() {
+    fn only_changes_are_applied() {
         let mut world = World::new();
         let ground = Ground::flat(64, 64, 8.0).expect("valid");
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
@@ -77,28 +77,33 @@ mod tests {
         let terrain = world.spawn((terrain, GroundLook::default())).id();
         let read = |world: &World| {
             let entity = world.entity(terrain);
-            Customs::of(entity.get().expect("it is there"), entity.get(), entity.get())
+            TerrainControls::of(entity.get().expect("it is there"), entity.get(), entity.get())
         };
         let rules = DiggingRules::default().with_bedrock(i32::MIN).with_hardness(MaterialId(3), 9);
         let loose = Some(LooseGround { crumbs: 5, ..LooseGround::default() });
         let steps = [
-            Customs { rules: rules.clone(), undo_budget: 5 << 20, loose: None, look: look.clone() },
-            Customs { rules: rules.clone(), undo_budget: 6 << 20, loose: None, look: look.clone() },
-            Customs { rules: rules.clone(), undo_budget: 6 << 20, loose, look: look.clone() },
-            Customs { rules: DiggingRules::default(), undo_budget: 6 << 20, loose, look: look.clone() },
-            Customs {
+            TerrainControls { rules: rules.clone(), undo_budget: 5 << 20, loose: None, look: look.clone() },
+            TerrainControls { rules: rules.clone(), undo_budget: 6 << 20, loose: None, look: look.clone() },
+            TerrainControls { rules: rules.clone(), undo_budget: 6 << 20, loose, look: look.clone() },
+            TerrainControls {
+                rules: DiggingRules::default(),
+                undo_budget: 6 << 20,
+                loose,
+                look: look.clone(),
+            },
+            TerrainControls {
                 look: Some(GroundLook { variety: 0.25, ..GroundLook::default() }),
-                ..Customs::default()
+                ..TerrainControls::default()
             },
         ];
         for step in steps {
             let before = read(&world);
             assert_ne!(before, step);
-            step.clone().enact(&before, terrain, &mut world.commands());
+            step.clone().apply(&before, terrain, &mut world.commands());
             world.flush();
             assert_eq!(read(&world), step);
             world.clear_trackers();
-            step.clone().enact(&step, terrain, &mut world.commands());
+            step.clone().apply(&step, terrain, &mut world.commands());
             world.flush();
             let terrain = world.entity(terrain).get_ref::<Terrain>().expect("it is there");
             assert!(!terrain.is_changed() && !terrain.is_added());
@@ -115,10 +120,10 @@ mod tests {
             world.spawn(terrain).id()
         });
         let read = |world: &World, of| world.get::<Terrain>(of).map(|of| (of.undo_budget(), of.history()));
-        let before = Customs::of(world.get(small).expect("it is there"), None, None);
+        let before = TerrainControls::of(world.get(small).expect("it is there"), None, None);
         let (at_first, of_large) = (read(&world, small), read(&world, large));
         assert!(at_first.is_some_and(|(budget, history)| budget == before.undo_budget && history.undos == 1));
-        Customs { undo_budget: 0, ..before.clone() }.enact(&before, small, &mut world.commands());
+        TerrainControls { undo_budget: 0, ..before.clone() }.apply(&before, small, &mut world.commands());
         world.flush();
         assert_eq!(read(&world, small), Some((0, History::default())));
         assert_eq!(read(&world, large), of_large);
