@@ -45,52 +45,15 @@
 //! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
 //! | `report.rs`, `tell.rs` | receipts, times and the summary; what goes on |
 
-mod amount;
-mod art;
-mod balls;
-mod bindings;
-mod body;
-mod bombs;
-mod day;
-mod debris;
 #[path = "../shared/display.rs"]
 mod display;
 mod film;
-mod form;
-mod frames;
-mod headless;
-mod held;
-mod hud;
-mod input;
-mod inventory;
-mod labels;
-mod lamps;
-mod landscape;
-mod light;
-mod menu;
 #[path = "../shared/offscreen.rs"]
 mod offscreen;
-mod panel;
-mod particles;
-mod phase;
-mod places;
 mod player;
-mod preview;
-mod report;
-mod rim;
-mod script;
-mod settings;
-mod sky;
-mod studio;
-mod tell;
-mod thrown;
 mod tools;
-mod toughness;
-mod tour;
 mod ui;
-mod veins;
-mod work;
-mod works;
+mod world;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -100,7 +63,7 @@ use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
 use clap::Parser;
 
-use crate::settings::SettingsFile;
+use crate::ui::settings::SettingsFile;
 
 /// First person on a real landscape, with a shovel.
 #[derive(Parser, Clone, Debug)]
@@ -163,10 +126,10 @@ fn main() -> ExitCode {
         if options.headless {
             println!("--tour is filmed without a window anyway, and instead of the script");
         }
-        return tour::run(&options, renderer);
+        return film::tour::run(&options, renderer);
     }
     if options.headless || !display::has_display() || renderer.is_none() {
-        return script::run(&options, renderer);
+        return film::script::run(&options, renderer);
     }
     // The one that was found knows nothing of windows: the window's app gets its own.
     drop(renderer);
@@ -181,40 +144,40 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
     app.insert_resource(engine)
         .add_plugins((
             BurrowPlugins,
-            settings::SettingsPlugin(settings),
-            input::InputPlugin,
-            phase::PhasePlugin,
-            landscape::LandscapePlugin,
-            veins::VeinsPlugin,
-            sky::SkyPlugin,
-            day::DayPlugin,
-            light::LightPlugin,
+            ui::settings::SettingsPlugin(settings),
+            player::input::InputPlugin,
+            player::game_state::PhasePlugin,
+            world::landscape::LandscapePlugin,
+            world::veins::VeinsPlugin,
+            world::sky::SkyPlugin,
+            world::day::DayPlugin,
+            world::light::LightPlugin,
         ))
         .add_plugins((
-            body::BodyPlugin,
+            player::body::BodyPlugin,
             player::PlayerPlugin,
-            thrown::ThrownPlugin,
-            rim::RimPlugin,
+            tools::thrown::ThrownPlugin,
+            player::world_edge::RimPlugin,
             tools::ToolsPlugin,
-            preview::PreviewPlugin,
-            held::HeldPlugin,
-            work::WorkPlugin,
-            toughness::ToughnessPlugin,
-            inventory::InventoryPlugin,
-            particles::ParticlesPlugin,
-            bombs::BombsPlugin,
-            balls::BallsPlugin,
-            lamps::LampsPlugin,
-            debris::RubblePlugin,
+            tools::aim::PreviewPlugin,
+            tools::tool_in_hand::HeldPlugin,
+            tools::digging::WorkPlugin,
+            tools::hardness::ToughnessPlugin,
+            tools::inventory::InventoryPlugin,
+            world::particles::ParticlesPlugin,
+            tools::bombs::BombsPlugin,
+            tools::balls::BallsPlugin,
+            tools::lamps::LampsPlugin,
+            world::debris::RubblePlugin,
         ))
         .add_plugins((
-            art::ArtPlugin,
-            ui::UiPlugin,
-            menu::MenuPlugin,
-            hud::HudPlugin,
-            frames::FramesPlugin,
-            panel::PanelPlugin,
-            report::LogbookPlugin,
+            ui::art::ArtPlugin,
+            ui::widgets::UiPlugin,
+            ui::menu::MenuPlugin,
+            ui::hud::HudPlugin,
+            film::frames::FramesPlugin,
+            ui::panel::PanelPlugin,
+            film::report::LogbookPlugin,
         ));
 }
 
@@ -225,7 +188,7 @@ fn open_window(options: &Options) -> App {
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
     if options.tell {
-        app.add_plugins(tell::TellPlugin);
+        app.add_plugins(film::event_log::TellPlugin);
     }
     app
 }
