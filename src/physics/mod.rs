@@ -23,6 +23,7 @@
 //! | ground that can be stood on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on whatever moves about |
 //! | a first-person body | [`Character`], steered by [`CharacterSteering`], moved by [`CharacterPlugin`] |
 //! | ground that breaks off to fall | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of its own |
+//! | bodies that cannot leave the terrain | [`EdgeWalls`] on the terrain |
 //! | to know whose collider was hit | [`GroundBody`] on the collider's entity |
 //! | to know what goes on | [`PhysicsFigures`] |
 //!
@@ -56,6 +57,7 @@ mod colliders;
 mod columns;
 mod cone;
 mod debris;
+mod edge_walls;
 mod frame;
 mod ground;
 mod hold;
@@ -71,6 +73,7 @@ mod walking;
 pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};
 pub use debris::{Debris, DebrisCrumbled, DebrisPlugin, DebrisSettings};
+pub use edge_walls::EdgeWalls;
 pub use ground::{GroundBody, GroundCollider, GroundContact};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
@@ -162,6 +165,9 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_observer(hold::go_on)
             .add_observer(columns::note_new)
             .add_observer(columns::note_gone)
+            .add_observer(edge_walls::build)
+            .add_observer(edge_walls::rebuild)
+            .add_observer(edge_walls::remove)
             .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
             .add_systems(Update, sources::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(Update, (upkeep::finish, upkeep::tend).chain().in_set(TerrainPhysicsSystems::Upkeep))

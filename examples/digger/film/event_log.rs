@@ -1,7 +1,7 @@
-//! Says on standard output what goes on, a line each: for programs that play the game with a real mouse and keys.
+//! Logs events to standard output, one per line, for programs that play the game with a real mouse and keyboard.
 
 #[path = "../../shared/tell.rs"]
-mod told;
+mod frame_log;
 
 use bevy::prelude::*;
 use bevy_burrow::plugin::HistoryMoved;
@@ -9,47 +9,47 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
 
 use crate::player::Player;
-use crate::player::game_state::{Page, Phase};
+use crate::player::camera::PlayerCamera;
+use crate::player::game_state::{GameState, MenuPage};
 use crate::tools::Hand;
-use crate::world::light::Eyes;
 
-/// Says what goes on.
-pub struct TellPlugin;
+/// Logs events. `tools/drive.py` reads them.
+pub struct EventLogPlugin;
 
-impl Plugin for TellPlugin {
+impl Plugin for EventLogPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(
             Last,
             (
-                (tell_page, tell_ready, tell_look, tell_brush, tell_aim, tell_edits, tell_history, tell_eyes),
-                told::tell_frame,
+                (log_page, log_ready, log_textures, log_tool, log_aim, log_edits, log_history, log_camera),
+                frame_log::tell_frame,
             )
                 .chain(),
         );
-        told::tell_pipelines(app);
+        frame_log::tell_pipelines(app);
     }
 }
 
-fn tell_page(phase: Res<State<Phase>>, page: Res<State<Page>>) {
+fn log_page(phase: Res<State<GameState>>, page: Res<State<MenuPage>>) {
     if phase.is_changed() || page.is_changed() {
         println!("page {:?} {:?}", phase.get(), page.get());
     }
 }
 
-fn tell_ready(players: Query<(), Added<Player>>) {
+fn log_ready(players: Query<(), Added<Player>>) {
     if !players.is_empty() {
         println!("ready");
     }
 }
 
-fn tell_look(painting: Res<GroundLoading>, mut is_told: Local<bool>) {
-    if !*is_told && painting.is_ready() {
-        *is_told = true;
+fn log_textures(textures: Res<GroundLoading>, mut is_logged: Local<bool>) {
+    if !*is_logged && textures.is_ready() {
+        *is_logged = true;
         println!("painted");
     }
 }
 
-fn tell_brush(hand: Res<Hand>, mut last: Local<String>) {
+fn log_tool(hand: Res<Hand>, mut last: Local<String>) {
     let now = format!("tool {} radius={:.2}", hand.tool.label(), hand.radius(hand.tool));
     if *last != now {
         println!("{now}");
@@ -57,10 +57,10 @@ fn tell_brush(hand: Res<Hand>, mut last: Local<String>) {
     }
 }
 
-/// How far away is what the tool would hit, in decimetres' precision?
-fn tell_aim(hand: Res<Hand>, eyes: Single<&Transform, With<Eyes>>, mut last: Local<String>) {
+/// Logs the distance of the aim, rounded to decimetres.
+fn log_aim(hand: Res<Hand>, eyes: Single<&Transform, With<PlayerCamera>>, mut last: Local<String>) {
     let now = match hand.aim {
-        Some(aim) => format!("aim {:.1}", aim.place.distance(eyes.translation)),
+        Some(aim) => format!("aim {:.1}", aim.point.distance(eyes.translation)),
         None => "aim none".into(),
     };
     if *last != now {
@@ -69,9 +69,9 @@ fn tell_aim(hand: Res<Hand>, eyes: Single<&Transform, With<Eyes>>, mut last: Loc
     }
 }
 
-/// Are the eyes in the air, or has ground come over them?
-fn tell_eyes(
-    eyes: Single<&Transform, With<Eyes>>,
+/// Logs whether the camera is in the air or in the ground.
+fn log_camera(
+    eyes: Single<&Transform, With<PlayerCamera>>,
     terrains: Query<&Terrain>,
     mut last: Local<Option<&'static str>>,
 ) {
@@ -83,7 +83,7 @@ fn tell_eyes(
     }
 }
 
-fn tell_edits(mut receipts: MessageReader<BrushApplied>) {
+fn log_edits(mut receipts: MessageReader<BrushApplied>) {
     for BrushApplied { receipt, .. } in receipts.read() {
         if let Ok(applied) = &receipt.outcome {
             let (removed, added) = (applied.removed.total(), applied.added.total());
@@ -92,7 +92,7 @@ fn tell_edits(mut receipts: MessageReader<BrushApplied>) {
     }
 }
 
-fn tell_history(mut steps: MessageReader<HistoryMoved>) {
+fn log_history(mut steps: MessageReader<HistoryMoved>) {
     for HistoryMoved { receipt, .. } in steps.read() {
         match &receipt.outcome {
             Ok(restored) => println!(

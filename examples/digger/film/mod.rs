@@ -1,9 +1,7 @@
-//! Plays the game without a window, for pictures and films.
+//! Plays the game by script, for pictures, films and tests: no part of the game needs it, except for [`places`].
 
-pub mod camera;
 pub mod event_log;
-pub mod frames;
-pub mod headless;
+pub mod frame_recorder;
 pub mod places;
 pub mod report;
 pub mod script;

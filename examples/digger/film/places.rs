@@ -1,6 +1,6 @@
-//! Where to dig: a steep hillside for a tunnel, a ravine for a bridge, a chunk corner for a pit.
+//! Good places to dig and build: a steep hillside for a tunnel, a ravine for a bridge, a chunk corner for a pit.
 //!
-//! They are searched for, not written down, so another survey or another scale gets its own.
+//! They are found by searching the ground, so that they fit any heightmap at any scale. The game starts at the hillside.
 
 use bevy::prelude::*;
 use bevy_burrow::ground::Ground;
@@ -11,49 +11,49 @@ use crate::world::light::SUN;
 
 /// The side of the terrain's chunks.
 pub const CHUNK: i32 = 32;
-/// From the middle of the tunnel to its wall.
+/// Radius of the tunnel.
 pub const TUNNEL_RADIUS: f32 = 2.9;
-/// From the middle of the room to its wall.
+/// Radius of the room.
 pub const ROOM_RADIUS: f32 = 8.0;
 /// Metres from the mouth to the bend, and from there to the room.
 const LEGS: (f32, f32) = (36.0, 34.0);
-/// How far it rises on each metre, so that water runs out.
+/// Slope of the tunnel.
 const GRADE: f32 = 0.03;
-/// Distance of all of it from the rim of the world.
+/// Least distance from the edge of the world.
 const MARGIN: i32 = 100;
 
-/// The places of the story.
+/// All places.
 #[derive(Resource, Clone, Debug)]
 pub struct Places {
-    /// Where the tunnel goes in.
+    /// For the tunnel.
     pub hillside: Hillside,
-    /// What the bridge spans.
+    /// For the bridge.
     pub ravine: Ravine,
-    /// The corner of four chunks, on level ground, that the pit lies around.
+    /// A corner of four chunks on level ground, for the pit.
     pub corner: Vec3,
 }
 
-/// Level ground before a steep slope with a hill behind it.
+/// Level ground in front of a steep hill.
 #[derive(Clone, Copy, Debug)]
 pub struct Hillside {
     /// The ground at the foot of the slope.
     pub mouth: Vec3,
-    /// The way into the hill, as (x, z).
+    /// The direction into the hill, as (x, z).
     pub inward: Vec2,
-    /// Where the tunnel goes on behind its bend.
+    /// The direction of the tunnel after its bend.
     pub onward: Vec2,
 }
 
-/// Two banks with lower ground between.
+/// Two banks with lower ground between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Ravine {
     /// The ground of one bank.
     pub from: Vec3,
     /// The ground of the other, along +x or +z.
     pub to: Vec3,
-    /// The ground some steps behind each bank.
+    /// The ground some metres behind each bank.
     pub behind: [Vec3; 2],
-    /// The lowest ground between.
+    /// The height of the lowest ground between.
     pub bottom: f32,
 }
 
@@ -61,7 +61,7 @@ impl Places {
     /// Searches the ground.
     ///
     /// # Errors
-    /// Says what was not found.
+    /// If a place was not found.
     pub fn find(ground: &Ground) -> Result<Self, String> {
         let relief = Relief { ground };
         let hillside = relief.hillside().ok_or("no hillside is steep and high enough for the tunnel")?;
@@ -76,12 +76,12 @@ impl Places {
 }
 
 impl Hillside {
-    /// Where the walk to the mouth begins.
+    /// Where the player starts.
     pub fn start(&self) -> Vec2 {
         self.mouth.xz() - self.inward * 44.0
     }
 
-    /// The middle of the tunnel's floor: before the mouth, at the bend, and where the room begins.
+    /// Points on the tunnel's floor: in front of the mouth, at the bend, and where the room begins.
     pub fn floor(&self) -> [Vec3; 3] {
         let rise = |xz: Vec2, along: f32| Vec3::new(xz.x, self.mouth.y + GRADE * along, xz.y);
         let mouth = self.mouth.xz();
@@ -98,24 +98,23 @@ impl Hillside {
 }
 
 impl Ravine {
-    /// How much of a bridge over it is seen from a place: points of its deck and of its arch with no ground before them.
-    /// The bridge may be there, or not yet.
-    pub fn seen_from(&self, world: &Model, eye: Vec3) -> usize {
-        /// No part of the bridge itself is farther from its middle line.
+    /// How many points on the deck and the arch of a bridge over it are visible from a place, whether or not the bridge is built.
+    pub fn points_visible_from(&self, world: &Model, eye: Vec3) -> usize {
+        /// The bridge itself is nearer to its middle line than this.
         const BRIDGE: f32 = 4.0;
         let across = (self.to - self.from).cross(Vec3::Y).normalize();
         let open = 1.0 - (BRIDGE / (eye - self.from).dot(across).abs()).min(1.0);
         let points = (1..12).map(|i| self.from.lerp(self.to, i as f32 / 12.0));
         let points = points.flat_map(|bank| [1.0, -4.0].map(|up| bank + Vec3::Y * up));
-        let is_seen = |point: &Vec3| {
+        let is_visible = |point: &Vec3| {
             let way = *point - eye;
             world.raycast(eye.as_dvec3(), way.as_dvec3(), (open * way.length()).into()).is_none()
         };
-        points.filter(is_seen).count()
+        points.filter(is_visible).count()
     }
 }
 
-/// The ground as the searches see it.
+/// The ground, with heights in metres.
 struct Relief<'a> {
     ground: &'a Ground,
 }
@@ -130,7 +129,7 @@ impl Relief<'_> {
         Vec3::new(place.x, self.height(place), place.y)
     }
 
-    /// A grid of places, away from the rim.
+    /// A grid of places, away from the edge of the world.
     fn places(&self, step: i32) -> impl Iterator<Item = Vec2> {
         let along = move |cells: i32| (MARGIN + step - 1) / step..=(cells - MARGIN) / step;
         let (width, depth) = (self.ground.width(), self.ground.depth());
@@ -138,8 +137,8 @@ impl Relief<'_> {
             .flat_map(move |z| along(width).map(move |x| Vec2::new((x * step) as f32, (z * step) as f32)))
     }
 
-    /// Where the ground rises by more than 10 within 12 voxels and by 30 behind, with a level way to it and rock enough
-    /// over a tunnel and a room. Of all those, one in the sun.
+    /// A place where the ground rises by more than 10 within 12 voxels and by 30 behind, with a level path to it, and enough rock
+    /// above a tunnel and a room. It is in the sun.
     fn hillside(&self) -> Option<Hillside> {
         let headings = (0..16).map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 16.0));
         let found = self.places(6).flat_map(|foot| {
@@ -177,12 +176,12 @@ impl Relief<'_> {
         found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, hillside)| hillside)
     }
 
-    /// Does the sun reach the ground there?
+    /// Is this ground in the sun?
     fn is_sunny(&self, place: Vec3) -> bool {
         (2..=60).map(|i| place + Vec3::Y + SUN * 3.0 * i as f32).all(|high| self.height(high.xz()) < high.y)
     }
 
-    /// Is there rock over all of the tunnel but its first metres, and around its room?
+    /// Is there rock above the tunnel, except for its first metres, and around its room?
     fn covers(&self, hillside: &Hillside) -> bool {
         let [mouth, bend, end] = hillside.floor();
         let under = |place: Vec3, ceiling: f32| self.height(place.xz()) >= place.y + ceiling + 3.0;
@@ -194,7 +193,7 @@ impl Relief<'_> {
         tunnel && around.into_iter().all(|offset| under(room + flat(offset), ROOM_RADIUS))
     }
 
-    /// Two banks of one height, along an axis so that a bridge has straight edges, over ground at least 7 lower.
+    /// Two banks of similar height over lower ground, along an axis, so that the bridge has straight edges.
     fn ravine(&self, hillside: &Hillside, allowed: impl Fn(Vec2) -> bool) -> Option<Ravine> {
         let allowed = &allowed;
         let spans = [Vec2::X, Vec2::Y]
@@ -227,7 +226,7 @@ impl Relief<'_> {
         found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, ravine)| ravine)
     }
 
-    /// A place where four chunks meet, x and z both multiples of the chunk's side, with level ground around.
+    /// A place where four chunks meet, with level ground around it.
     fn corner(&self, hillside: &Hillside, allowed: impl Fn(Vec2) -> bool) -> Option<Vec3> {
         let offsets = (0..24)
             .map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 8.0) * (6 + i / 8 * 8) as f32);
@@ -243,7 +242,7 @@ impl Relief<'_> {
     }
 }
 
-/// A level way in the world.
+/// A horizontal direction in world space.
 pub fn flat(way: Vec2) -> Vec3 {
     Vec3::new(way.x, 0.0, way.y)
 }
@@ -256,7 +255,7 @@ mod tests {
     use crate::film::scripted_brushes;
 
     #[test]
-    fn a_bridge_is_seen_past_itself_but_not_past_a_hill() {
+    fn hills_hide_a_bridge_but_the_bridge_does_not_hide_itself() {
         let height = |x: i32, z: i32| match (x, z) {
             (_, 80..90) => 40.0,
             (42..71, _) => 10.0,
@@ -268,9 +267,10 @@ mod tests {
         let ravine =
             Ravine { from: bank(41.0), to: bank(71.0), behind: [bank(29.0), bank(83.0)], bottom: 10.0 };
         let [before, behind] = [30.0, 98.0].map(|z| Vec3::new(56.0, 30.0, z));
-        let seen = |terrain: &Terrain| [before, behind].map(|eye| ravine.seen_from(terrain.world(), eye));
+        let seen =
+            |terrain: &Terrain| [before, behind].map(|eye| ravine.points_visible_from(terrain.world(), eye));
         assert_eq!(seen(&terrain), [22, 0]);
         terrain.apply(scripted_brushes::bridge(&ravine));
-        assert_eq!(seen(&terrain), [22, 0], "it does not hide itself");
+        assert_eq!(seen(&terrain), [22, 0], "the bridge does not hide itself");
     }
 }

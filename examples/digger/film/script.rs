@@ -1,4 +1,4 @@
-//! The story that is played where nobody plays: up to a hillside and into it, over a ravine, around a chunk corner.
+//! The script for `--headless`: a tunnel into a hillside, a bridge over a ravine, and a pit around a chunk corner.
 
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -12,16 +12,16 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Options;
 use crate::film::places::{Hillside, Places, Ravine, TUNNEL_RADIUS, flat};
-use crate::film::report::{Logbook, Report};
+use crate::film::report::{EditLog, Report};
 use crate::film::scripted_brushes;
 use crate::film::studio::Studio;
 use crate::tools::{Hand, Tool};
 use crate::world::landscape::CONCRETE;
 
-/// The pictures, in the order they are taken.
+/// The number of pictures.
 const PICTURES: usize = 9;
 
-/// Plays the script and prints the summary. The exit code tells whether all seams are closed and all pictures there.
+/// Plays the script and prints the summary. It fails if a seam is open or a picture is missing.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     if renderer.is_none() {
         eprintln!(
@@ -42,14 +42,14 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
         return ExitCode::FAILURE;
     }
     let complete = report.renderer.is_none() || report.pictures.len() == PICTURES;
-    if report.is_flawless() && complete {
+    if report.seams.is_flawless() && complete {
         return ExitCode::SUCCESS;
     }
     eprintln!("Seams are not flawless or pictures are missing: {}", report.seams);
     ExitCode::FAILURE
 }
 
-/// The scenes, one after the other, with a progress bar.
+/// Plays all scenes, with a progress bar.
 fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> {
     let start = Instant::now();
     let bar = ProgressBar::new_spinner().with_message("loading the landscape");
@@ -58,7 +58,7 @@ fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> 
     let ready = start.elapsed();
     let places: Places = studio.resource();
     let mut stage = Stage { studio, bar };
-    stage.prepare(&places);
+    stage.set_up_bar(&places);
 
     stage.landscape(&places)?;
     stage.hillside(&places.hillside)?;
@@ -80,8 +80,8 @@ struct Stage {
 }
 
 impl Stage {
-    /// Counts what is to be done: each brush and each picture is a step.
-    fn prepare(&mut self, places: &Places) {
+    /// Sets the length of the progress bar: each brush and each picture is a step.
+    fn set_up_bar(&mut self, places: &Places) {
         let brushes = scripted_brushes::tunnel(&places.hillside).len()
             + scripted_brushes::room(&places.hillside).len()
             + scripted_brushes::bridge(&places.ravine).len()
@@ -107,7 +107,7 @@ impl Stage {
         self.studio.shoot_from(name, eye, at)
     }
 
-    /// The land from above.
+    /// A picture of the landscape from above.
     fn landscape(&mut self, places: &Places) -> Result {
         self.bar.set_message("the landscape");
         let mouth = places.hillside.mouth;
@@ -118,7 +118,7 @@ impl Stage {
         self.shoot_from("1_landscape", eye, mouth + flat(places.hillside.inward) * 60.0)
     }
 
-    /// The walk up, with an eye for where to dig.
+    /// The player walks to the hillside and aims at it.
     fn hillside(&mut self, hillside: &Hillside) -> Result {
         self.bar.set_message("up to the hillside");
         let Hillside { mouth, inward, .. } = *hillside;
@@ -130,7 +130,7 @@ impl Stage {
         self.studio.walk_to(mouth.xz() - inward * 8.0, true)
     }
 
-    /// In with the lamp, round by round; pictures on the way out.
+    /// The player digs the tunnel and the room with the headlamp on, and takes pictures on the way out.
     fn tunnel(&mut self, hillside: &Hillside) -> Result {
         self.bar.set_message("the tunnel");
         let Hillside { mouth, inward, onward } = *hillside;
@@ -148,7 +148,7 @@ impl Stage {
         self.studio.walk_to(end - onward * 1.5, false)?;
         self.studio.look_at(hillside.room() - Vec3::Y * 1.5)?;
         self.shoot("5_room")?;
-        self.bar.set_message("back to the daylight");
+        self.bar.set_message("back to daylight");
         self.studio.walk_to(bend, true)?;
         self.studio.walk_to(bend - inward * 11.0, true)?;
         self.studio.look_at(hillside.floor()[1] + flat(onward) * 2.0 + Vec3::Y * 1.8)?;
@@ -162,7 +162,7 @@ impl Stage {
         self.shoot("3_tunnel_outside")
     }
 
-    /// Built from the air, then walked over.
+    /// The bridge is built, and the player walks over it.
     fn bridge(&mut self, ravine: &Ravine) -> Result {
         self.bar.set_message("the bridge");
         let Ravine { from, to, behind, .. } = *ravine;
@@ -170,15 +170,15 @@ impl Stage {
             self.edit(brush)?;
         }
         let along = (to - from).xz().normalize();
-        self.studio.carry_to(behind[0].xz() - along)?;
+        self.studio.move_to(behind[0].xz() - along)?;
         self.studio.walk_to(behind[1].xz() + along, true)?;
         let middle = from.midpoint(to);
         let aside = [1.0, -1.0].map(|side| middle + flat(along.perp()) * side * 34.0 - flat(along) * 9.0);
         let [left, right] = [self.above(aside[0], 9.0)?, self.above(aside[1], 9.0)?];
-        // The side from which more of it is seen, and of equals the lower one.
+        // The side from which more of it is visible; the lower one if both are equal.
         let world = self.studio.terrain()?.world();
-        let worth = |eye: Vec3| (ravine.seen_from(world, eye), -eye.y);
-        let eye = if worth(right) > worth(left) { right } else { left };
+        let score = |eye: Vec3| (ravine.points_visible_from(world, eye), -eye.y);
+        let eye = if score(right) > score(left) { right } else { left };
         self.shoot_from("7_bridge", eye, middle - Vec3::Y * 3.5)
     }
 
@@ -191,34 +191,34 @@ impl Stage {
         self.shoot_from("8_pit", eye, corner - Vec3::Y * 4.0)
     }
 
-    /// The tunnel's mouth with the edges of its triangles.
+    /// A picture of the tunnel's mouth with the edges of its triangles.
     fn seam(&mut self, hillside: &Hillside) -> Result {
         self.bar.set_message("the seam");
         let Hillside { mouth, inward, .. } = *hillside;
-        let rim = mouth + flat(inward) * 3.0 + Vec3::Y * (2.0 * TUNNEL_RADIUS);
+        let edge = mouth + flat(inward) * 3.0 + Vec3::Y * (2.0 * TUNNEL_RADIUS);
         let radius = 16.0;
-        if SeamWires::around(self.studio.terrain()?.world(), rim, radius).shared() == 0 {
+        if SeamWires::around(self.studio.terrain()?.world(), edge, radius).shared() == 0 {
             return Err("no tile and chunk share an edge at the tunnel's mouth".into());
         }
-        let lines = BurrowDebug { wires: true, focus: Some(rim), near: radius, ..default() };
+        let lines = BurrowDebug { wires: true, focus: Some(edge), near: radius, ..default() };
         self.studio.world().insert_resource(lines);
         let eye = mouth - flat(inward) * 6.0 + flat(inward.perp()) * 4.0 + Vec3::Y * 6.5;
-        self.shoot_from("9_seam", eye, rim - Vec3::Y * 1.5)
+        self.shoot_from("9_seam", eye, edge - Vec3::Y * 1.5)
     }
 
-    /// A place so many metres above the ground.
+    /// A point at a height above the ground.
     fn above(&mut self, place: Vec3, metres: f32) -> Result<Vec3> {
         let height = self.studio.terrain()?.world().height(place.x.into(), place.z.into());
         let height = height.ok_or("a picture would be taken outside the world")?;
         Ok(place.with_y(height as f32 + metres))
     }
 
-    /// The builder's ball, where it would be put.
+    /// Shows the builder's preview, or hides it.
     fn preview(&mut self, on: bool) {
         let mut hand = self.studio.world().resource_mut::<Hand>();
         hand.preview = on;
         hand.tool = if on { Tool::Builder } else { Tool::Pickaxe };
-        // There is some of it before anything was dug.
+        // The player has some concrete from the start.
         hand.material = CONCRETE;
         hand.set_radius(Tool::Builder, 3.0);
     }
@@ -227,15 +227,17 @@ impl Stage {
         let renderer = self.studio.renderer();
         let engine: BurrowEngine = self.studio.resource();
         let (engine, figures) = (engine.state(), engine.figures());
-        let logbook: Logbook = self.studio.resource();
-        let (times, pictures) = (self.studio.times.clone(), self.studio.pictures.clone());
+        let edit_log: EditLog = self.studio.resource();
+        let pictures = self.studio.pictures.clone();
+        let (transactions, receipts) = (self.studio.transactions.clone(), self.studio.receipts.clone());
         let world: &Model = self.studio.terrain()?.world();
         Ok(Report {
             renderer,
             size: (world.grid().width(), world.grid().depth()),
             tunnel: scripted_brushes::tunnel_length(&places.hillside),
-            logbook,
-            times,
+            edit_log,
+            transactions,
+            receipts,
             fields: world.fields().map(|(_, fields)| fields.iter().count()).sum(),
             chunks: world.drawn_chunks().count(),
             seams: world.check_seams(),

@@ -1,4 +1,4 @@
-//! What the script digs and builds, as brushes in world space.
+//! What the scripts dig and build, as brushes in world space.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -9,41 +9,41 @@ use crate::film::places::{Hillside, ROOM_RADIUS, Ravine, TUNNEL_RADIUS, flat};
 use crate::world::landscape::{CLAY, COAL, CONCRETE, GOLD, ROCK};
 
 /// Metres of tunnel that one brush digs.
-const ROUND: f32 = 4.0;
-/// How far the round walls reach below the floor that is walked on.
-const SUNK: f32 = 0.5;
+const STEP: f32 = 4.0;
+/// How far the tunnel reaches below its floor.
+const BELOW_FLOOR: f32 = 0.5;
 
-/// The tunnel's rounds from the mouth to the room: a brush each, and where to stand before the next one.
+/// The brushes of the tunnel from the mouth to the room, each with the place where the player stands after it.
 pub fn tunnel(hillside: &Hillside) -> Vec<(Brush, Vec2)> {
     let [mouth, bend, end] = hillside.floor();
     let first = stations(mouth, bend);
     let second = stations(bend, end);
-    let middle = Vec3::Y * (TUNNEL_RADIUS - SUNK);
+    let middle = Vec3::Y * (TUNNEL_RADIUS - BELOW_FLOOR);
     let all: Vec<Vec3> = first.chain(second.skip(1)).map(|station| station + middle).collect();
     all.windows(2)
         .enumerate()
-        .map(|(round, ends)| {
+        .map(|(number, ends)| {
             let shape = Shape::capsule(ends[0], ends[1], TUNNEL_RADIUS);
             let brush = Brush::dig(shape).with_roughness(Roughness::new(1.0, 2.6, 11));
-            let stand = if round == 0 { ends[0] } else { ends[0].lerp(ends[1], 0.5) };
+            let stand = if number == 0 { ends[0] } else { ends[0].lerp(ends[1], 0.5) };
             (brush, stand.xz())
         })
         .collect()
 }
 
-/// Places at most a round apart, both ends included.
+/// Points at most one step apart, including both ends.
 fn stations(from: Vec3, to: Vec3) -> impl Iterator<Item = Vec3> {
-    let count = (from.distance(to) / ROUND).ceil() as u32;
+    let count = (from.distance(to) / STEP).ceil() as u32;
     (0..=count).map(move |i| from.lerp(to, i as f32 / count as f32))
 }
 
-/// Length of the tunnel's middle line, the room not counted, in metres.
+/// Length of the tunnel without the room, in metres.
 pub fn tunnel_length(hillside: &Hillside) -> f32 {
     let [mouth, bend, end] = hillside.floor();
     mouth.distance(bend) + bend.distance(end)
 }
 
-/// The room: a hollow with a pillar, and veins of ore in its walls.
+/// The room: a cave with a pillar, and ore in its walls.
 pub fn room(hillside: &Hillside) -> Vec<Brush> {
     let middle = hillside.room();
     let onward = flat(hillside.onward);
@@ -54,7 +54,7 @@ pub fn room(hillside: &Hillside) -> Vec<Brush> {
     let paint = |place: Vec3, radius: f32, material| {
         Brush::paint(Shape::sphere(place, radius), material).with_roughness(Roughness::new(1.2, 2.5, 5))
     };
-    // Paint on a wall of the hollow, as parts of its radius.
+    // A point on a wall of the room, in multiples of its radius.
     let wall = |along: f32, across: f32, up: f32| {
         middle + (onward * along + aside * across + Vec3::Y * up) * ROOM_RADIUS
     };
@@ -71,7 +71,7 @@ pub fn room(hillside: &Hillside) -> Vec<Brush> {
     ]
 }
 
-/// Seams of clay and coal around the second leg of the tunnel, a little tilted, and nests of gold.
+/// Slightly tilted seams of clay and coal around the second leg of the tunnel, and pockets of gold.
 pub fn strata(hillside: &Hillside) -> Vec<Brush> {
     let [_, bend, end] = hillside.floor();
     let onward = flat(hillside.onward);
@@ -83,7 +83,7 @@ pub fn strata(hillside: &Hillside) -> Vec<Brush> {
         let shape = Shape::turned_cuboid(middle + Vec3::Y * up, half, turn);
         Brush::paint(shape, material).with_roughness(Roughness::new(0.7, 6.0, seed))
     };
-    let nest = |along: f32, across: f32, up: f32, radius: f32| {
+    let pocket = |along: f32, across: f32, up: f32, radius: f32| {
         let place = bend + onward * along + aside * across + Vec3::Y * up;
         Brush::paint(Shape::sphere(place, radius), GOLD).with_roughness(Roughness::new(0.8, 2.0, 31))
     };
@@ -91,19 +91,19 @@ pub fn strata(hillside: &Hillside) -> Vec<Brush> {
         seam(0.2, 0.8, CLAY, 7),
         seam(2.6, 0.7, COAL, 8),
         seam(4.6, 0.6, CLAY, 9),
-        nest(6.0, 2.2, 1.6, 1.0),
-        nest(10.0, -2.4, 1.0, 1.2),
-        nest(14.0, 1.8, 3.0, 1.1),
-        nest(19.0, -1.6, 2.2, 1.3),
+        pocket(6.0, 2.2, 1.6, 1.0),
+        pocket(10.0, -2.4, 1.0, 1.2),
+        pocket(14.0, 1.8, 3.0, 1.1),
+        pocket(19.0, -1.6, 2.2, 1.3),
     ]
 }
 
-/// Half the length of a seam that reaches past both ends.
+/// Half the length of a seam that is longer than the leg.
 fn onward_half(bend: Vec3, end: Vec3) -> f32 {
     bend.distance(end) / 2.0 + 6.0
 }
 
-/// An arch of blocks from bank to bank, posts on it, a deck on those, two parapets, and a ramp at either end.
+/// An arch of blocks from bank to bank, posts on it, a deck on the posts, two parapets, and a ramp at each end.
 pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
     const WIDTH: f32 = 2.6;
     let Ravine { from, to, behind, bottom } = *ravine;
@@ -119,7 +119,7 @@ pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
     };
     let level = Quat::IDENTITY;
 
-    // The arc through the crown under the deck and the springings at the banks.
+    // The circle through the crown below the deck and both ends at the banks.
     let chord = half - 1.0;
     let drop = (0.75 * (deck - bottom)).min(chord);
     let radius = (chord * chord + drop * drop) / (2.0 * drop);
@@ -159,17 +159,17 @@ pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
     arch.chain(posts).chain([slab]).chain(ramps).chain(parapets).collect()
 }
 
-/// Two trial holes, three terraces around a corner of four chunks, a ramp down, and the spoil beside.
+/// Two test holes, three terraces around a corner of four chunks, a ramp down, and heaps of what was dug.
 pub fn pit(corner: Vec3) -> Vec<Brush> {
     let rough = |brush: Brush| brush.with_roughness(Roughness::new(0.35, 3.0, 23));
-    // Both in one chunk and apart: two fields, until the first terrace merges them.
+    // They are apart in one chunk: two fields, until the first terrace merges them.
     let trials = [Vec3::new(2.0, -1.0, 3.0), Vec3::new(14.0, -1.0, 4.0)]
         .map(|offset| rough(Brush::dig(Shape::sphere(corner + offset, 2.0))));
     let terraces = [(13.0, 4.0), (9.0, 8.5), (5.0, 13.0)].map(|(radius, depth)| {
         let base = corner - Vec3::Y * depth;
         rough(Brush::dig(Shape::cylinder(base, Vec3::Y * (depth + 12.0), radius)))
     });
-    // The ramp winds down along the wall.
+    // The ramp follows the wall.
     let turns: Vec<Vec3> = (0..=7)
         .map(|i| {
             let t = i as f32 / 7.0;

@@ -1,8 +1,7 @@
-//! The studio: the game without a window, run frame by frame by a script that walks, digs and takes pictures.
+//! The game without a window, run frame by frame by a script that walks, digs and takes pictures.
 //!
-//! The script is an ordinary player: it steers the same body with the same
-//! [`CharacterSteering`] and sends the same [`Brush`]
-//! messages. While it only walks and digs, the camera is off and a frame costs next to nothing.
+//! The script plays like a player: it steers the same character with [`CharacterSteering`] and sends the same [`Brush`]
+//! messages. While it only walks and digs, the camera is off, and frames are fast.
 
 #[path = "../../shared/photo.rs"]
 mod photo;
@@ -15,6 +14,7 @@ use avian3d::prelude::Position;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy::render::settings::RenderResources;
+use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::physics::{Character, CharacterMotion, CharacterSteering, HeldByGround};
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
@@ -22,41 +22,48 @@ use photo::Photographer;
 pub use photo::{Developed, PATIENCE, pixels};
 
 use crate::Options;
-use crate::film::headless::build_app;
-use crate::film::report::{EditTime, FrameTimes, Logbook};
-use crate::player::game_state::Phase;
+use crate::film::report::{Durations, EditLog};
+use crate::offscreen;
+use crate::player::camera::{DetachedCamera, PlayerCamera};
+use crate::player::game_state::GameState;
+use crate::player::headlamp::HeadlampSwitch;
 use crate::player::input::{Action, Actions};
-use crate::player::{Drone, Player, Scripted};
+use crate::player::{Player, Scripted};
 use crate::tools::Hand;
-use crate::tools::tool_in_hand::ShowHand;
+use crate::tools::tool_in_hand::ShowTool;
 use crate::ui::hud::ShowHud;
+use crate::ui::settings::SettingsFile;
 use crate::ui::widgets::scale_for;
 use crate::world::day::Clock;
-use crate::world::light::{Eyes, LampSwitch};
 
-/// Where the player stands.
+/// Game time of a frame.
+const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
+
+/// The position of the player.
 #[derive(Clone, Copy, Debug)]
 struct Stance {
     feet: Vec3,
     eye: Vec3,
 }
 
-/// An app without a window, and what came of its edits and pictures.
+/// An app without a window, and the results of its edits and pictures.
 pub struct Studio {
     pub app: App,
     eyes: Entity,
     player: Entity,
-    /// Who takes the pictures; `None` without a renderer.
+    /// Takes the pictures; `None` without a renderer.
     pub photographer: Option<Photographer>,
-    /// Where they are written.
+    /// The folder for the pictures.
     pub folder: PathBuf,
     is_warm: bool,
-    /// Frames without a picture.
-    pub frames: FrameTimes,
-    /// Frames that were drawn.
-    pub drawn: FrameTimes,
-    /// How long each edit took.
-    pub times: Vec<EditTime>,
+    /// Times of frames without a picture.
+    pub frames: Durations,
+    /// Times of frames that were drawn.
+    pub drawn: Durations,
+    /// Time of each transaction.
+    pub transactions: Durations,
+    /// Time from each brush to its receipt.
+    pub receipts: Durations,
     /// Pictures that were written.
     pub pictures: Vec<PathBuf>,
 }
@@ -65,30 +72,33 @@ impl Studio {
     /// Builds the app and waits for the landscape.
     ///
     /// # Errors
-    /// When the folder can't be made or the landscape doesn't load.
+    /// If the folder cannot be created or the landscape does not load.
     pub fn open(options: &Options, renderer: Option<RenderResources>) -> Result<Self> {
         std::fs::create_dir_all(&options.out)
             .map_err(|error| format!("{}: {error}", options.out.display()))?;
         let renders = renderer.is_some();
         let engine = options.backend.engine();
-        // The script is not to be over before a card is found, whatever it is played for.
+        // Without this, a short script could end before a graphics card is found.
         engine.wait(PATIENCE);
-        let mut app = build_app(renderer, engine);
+        let mut app = offscreen::build(renderer, |app| {
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
+            crate::game(app, engine, SettingsFile::default());
+        });
         // One frame, for the systems that spawn the camera.
         app.update();
-        let eyes = app.world_mut().query_filtered::<Entity, With<Eyes>>().single(app.world())?;
-        // Nobody looks while the land is made.
+        let eyes = app.world_mut().query_filtered::<Entity, With<PlayerCamera>>().single(app.world())?;
+        // The camera is off until the landscape has loaded.
         let mut photographer = Photographer::new(&mut app, eyes, (options.width, options.height));
         let player = wait_for_player(&mut app, renders)?;
         let world = app.world_mut();
         world.entity_mut(player).insert(Scripted);
         world.resource_mut::<UiScale>().0 = scale_for(options.width as f32, options.height as f32, true);
-        // A bright afternoon that lasts, and no title.
+        // It stays a bright afternoon, and the title is skipped.
         world.resource_mut::<Clock>().runs = false;
         world.resource_mut::<ShowHud>().0 = false;
-        world.resource_mut::<ShowHand>().0 = false;
+        world.resource_mut::<ShowTool>().0 = false;
         world.resource_mut::<Hand>().preview = false;
-        world.resource_mut::<NextState<Phase>>().set(Phase::Playing);
+        world.resource_mut::<NextState<GameState>>().set(GameState::Playing);
         app.update();
         photographer.draws_all = options.draw_all;
         photographer.film_runs(&mut app, options.draw_all);
@@ -99,14 +109,15 @@ impl Studio {
             photographer: renders.then_some(photographer),
             folder: options.out.clone(),
             is_warm: false,
-            frames: FrameTimes::default(),
-            drawn: FrameTimes::default(),
-            times: Vec::new(),
+            frames: Durations::default(),
+            drawn: Durations::default(),
+            transactions: Durations::default(),
+            receipts: Durations::default(),
             pictures: Vec::new(),
         })
     }
 
-    /// What draws the pictures.
+    /// The name of the renderer.
     pub fn renderer(&self) -> Option<String> {
         self.app.world().get_resource::<RenderAdapterInfo>().map(|info| info.name.clone())
     }
@@ -116,7 +127,7 @@ impl Studio {
         self.app.world().resource::<R>().clone()
     }
 
-    /// The app's world, for questions that few ask.
+    /// The app's world.
     pub fn world(&mut self) -> &mut World {
         self.app.world_mut()
     }
@@ -124,7 +135,7 @@ impl Studio {
     /// The terrain's model.
     ///
     /// # Errors
-    /// When there is not exactly one.
+    /// If there is not exactly one terrain.
     pub fn terrain(&mut self) -> Result<&Terrain> {
         let world = self.app.world_mut();
         let mut terrains = world.query::<&Terrain>();
@@ -134,7 +145,7 @@ impl Studio {
     /// One frame.
     fn step(&mut self) {
         if self.is_held() {
-            // Colliders are made in tasks, and frames without pictures are faster than those.
+            // Colliders are built in tasks, which take longer than frames without pictures.
             std::thread::sleep(Duration::from_millis(1));
         }
         let start = Instant::now();
@@ -142,10 +153,10 @@ impl Studio {
         if self.photographer.as_ref().is_some_and(|photographer| photographer.draws_all) {
             photo::finish_drawing(&self.app);
         }
-        self.frames.count(start.elapsed());
+        self.frames.push(start.elapsed());
     }
 
-    /// Lets some time pass.
+    /// Runs some frames.
     pub fn wait(&mut self, frames: u32) {
         for _ in 0..frames {
             self.step();
@@ -154,18 +165,18 @@ impl Studio {
 
     /// Switches the headlamp.
     pub fn lamp(&mut self, on: bool) {
-        self.app.world_mut().resource_mut::<LampSwitch>().0 = on;
+        self.app.world_mut().resource_mut::<HeadlampSwitch>().0 = on;
     }
 
     fn body(&self) -> Result<Stance> {
         let player = self.app.world().get_entity(self.player)?;
         let parts = player.get::<Character>().zip(player.get::<Transform>());
-        let (character, place) = parts.ok_or("the player has lost its body")?;
+        let (character, place) = parts.ok_or("the player has no body")?;
         let middle = place.translation;
         Ok(Stance { feet: character.feet(middle), eye: character.eyes(middle) })
     }
 
-    /// Is there no ground for the player to stand on yet?
+    /// Does the player wait for colliders?
     fn is_held(&self) -> bool {
         self.app.world().get::<HeldByGround>(self.player).is_some()
     }
@@ -175,8 +186,8 @@ impl Studio {
         Ok(())
     }
 
-    /// Takes the player to the ground over a place, as only a script can.
-    pub fn carry_to(&mut self, place: Vec2) -> Result {
+    /// Moves the player to the ground at a place.
+    pub fn move_to(&mut self, place: Vec2) -> Result {
         let at = place.as_dvec2();
         let height = self.terrain()?.world().height(at.x, at.y).ok_or("the script left the world")?;
         self.stand_at(Vec3::new(place.x, height as f32, place.y))?;
@@ -184,17 +195,17 @@ impl Studio {
         Ok(())
     }
 
-    /// Puts the player's feet to a place, as only a script can.
+    /// Moves the player's feet to a place.
     ///
     /// # Errors
-    /// When the ground there gets no colliders.
+    /// If the ground there gets no colliders.
     pub fn stand_at(&mut self, feet: Vec3) -> Result {
         let place = Character::default().standing_at(feet);
         self.put(place)?;
-        // Physics take it over with their next step only, and between the scenes of a film no time passes.
+        // Physics would read the transform in its next step, but no time passes between the scenes of a film.
         self.put(Position(place.translation))?;
         self.put(CharacterMotion::default())?;
-        // One frame to see that there is no ground, and the others until there is.
+        // In the first frame, the plugin notices that colliders are missing.
         self.step();
         let start = Instant::now();
         while self.is_held() {
@@ -206,20 +217,20 @@ impl Studio {
         Ok(())
     }
 
-    /// Where the player's feet are.
+    /// The position of the player's feet.
     pub fn feet(&self) -> Result<Vec3> {
         Ok(self.body()?.feet)
     }
 
-    /// Where the player walks from now on, at most 1 long.
+    /// Walks in a direction from now on, at most 1 long.
     pub fn walk(&mut self, direction: Vec2) {
         if let Some(mut steering) = self.app.world_mut().get_mut::<CharacterSteering>(self.player) {
             *steering = CharacterSteering { direction, run: false, jump: false };
         }
     }
 
-    /// Turns the player's head some part of the way to a place.
-    pub fn gaze(&mut self, place: Vec3, part: f32) -> Result {
+    /// Turns the player's head towards a place by a part of the angle.
+    pub fn turn_towards(&mut self, place: Vec3, part: f32) -> Result {
         let eye = self.body()?.eye;
         let mut player = self.app.world_mut().get_mut::<Player>(self.player).ok_or("there is no player")?;
         let goal = Player::looking(eye, place);
@@ -229,25 +240,23 @@ impl Studio {
         Ok(())
     }
 
-    /// What the player holds down from now on.
+    /// Holds actions down from now on.
     pub fn hold(&mut self, actions: &[Action]) {
-        let mut held = self.app.world_mut().resource_mut::<Actions>();
-        held.puppet.clear();
-        held.puppet.extend_from_slice(actions);
+        self.app.world_mut().resource_mut::<Actions>().scripted = actions.to_vec();
     }
 
-    /// The camera leaves the player.
-    pub fn fly_to(&mut self, eye: Vec3, at: Vec3) {
+    /// Moves the camera away from the player.
+    pub fn detach_camera(&mut self, eye: Vec3, at: Vec3) {
         let place = Transform::from_translation(eye).looking_at(at, Vec3::Y);
-        self.app.world_mut().entity_mut(self.eyes).insert((Drone, place));
+        self.app.world_mut().entity_mut(self.eyes).insert((DetachedCamera, place));
     }
 
-    /// The camera is back in the player's head.
-    pub fn land(&mut self) {
-        self.app.world_mut().entity_mut(self.eyes).remove::<Drone>();
+    /// Lets the camera follow the player again.
+    pub fn attach_camera(&mut self) {
+        self.app.world_mut().entity_mut(self.eyes).remove::<DetachedCamera>();
     }
 
-    /// Turns the player's head.
+    /// Turns the player's head to a place.
     pub fn look_at(&mut self, place: Vec3) -> Result {
         let eye = self.body()?.eye;
         self.put(Player::looking(eye, place))
@@ -256,11 +265,11 @@ impl Studio {
     /// Walks straight to a place.
     ///
     /// # Errors
-    /// When something is in the way.
+    /// If something is in the way.
     pub fn walk_to(&mut self, place: Vec2, run: bool) -> Result {
         const NEAR: f32 = 0.6;
         let start = self.body()?.feet.xz();
-        // Twice as long as it should take, and some more.
+        // Somewhat more than twice the time that it should take.
         let frames = 120 + (24.0 * start.distance(place)) as u32;
         for _ in 0..frames {
             let body = self.body()?;
@@ -281,34 +290,35 @@ impl Studio {
     /// Sends a brush and waits for its receipt.
     ///
     /// # Errors
-    /// When there is none after many frames, or it says that the brush was rejected.
+    /// If the receipt does not arrive, or the brush was rejected.
     pub fn edit(&mut self, brush: Brush) -> Result {
-        let answered = self.app.world().resource::<Logbook>().answered();
+        let answered = self.app.world().resource::<EditLog>().answered();
         let start = Instant::now();
         self.app.world_mut().write_message(brush.with_tag(answered as u64 + 1));
-        while self.app.world().resource::<Logbook>().answered() == answered {
+        while self.app.world().resource::<EditLog>().answered() == answered {
             self.step();
             if start.elapsed() > PATIENCE {
                 return Err("a brush got no receipt".into());
             }
         }
         let receipt = start.elapsed();
-        let logbook = self.app.world().resource::<Logbook>();
-        if let Some(rejection) = &logbook.rejection {
+        let edit_log = self.app.world().resource::<EditLog>();
+        if let Some(rejection) = &edit_log.rejection {
             return Err(format!("a brush was rejected: {rejection}").into());
         }
         let transaction = self.app.world().resource::<BurrowFigures>().last_transaction;
-        self.times.push(EditTime { receipt, transaction });
+        self.transactions.push(transaction);
+        self.receipts.push(receipt);
         Ok(())
     }
 
     /// Takes a picture through the player's eyes.
     pub fn shoot(&mut self, name: &str) -> Result {
-        // Eyes get used to the light.
+        // The ambient light adapts slowly.
         self.wait(90);
         let Some(photographer) = &self.photographer else { return Ok(()) };
         let path = self.folder.join(name).with_extension("png");
-        // The sky comes in over some frames; later on, lights need a few to find what they shine on.
+        // Lights need a few frames after a pause in drawing, and the first picture needs more.
         let frames = if self.is_warm { 3 } else { 6 };
         self.is_warm = true;
         let drawn = &mut self.drawn;
@@ -317,31 +327,31 @@ impl Studio {
         Ok(())
     }
 
-    /// Takes a picture from anywhere.
+    /// Takes a picture from another place.
     pub fn shoot_from(&mut self, name: &str, eye: Vec3, at: Vec3) -> Result {
-        self.fly_to(eye, at);
+        self.detach_camera(eye, at);
         let shot = self.shoot(name);
-        self.land();
+        self.attach_camera();
         shot
     }
 
-    /// Does the camera draw?
-    pub fn film_runs(&mut self, runs: bool) {
+    /// Turns drawing on or off.
+    pub fn draw_frames(&mut self, runs: bool) {
         if let Some(photographer) = &self.photographer {
             photographer.film_runs(&mut self.app, runs);
         }
     }
 
-    /// One frame, drawn to its end.
+    /// Runs a frame and waits until it is drawn.
     pub fn step_and_draw(&mut self) {
         draw(&mut self.app, &mut self.drawn);
     }
 }
 
-fn draw(app: &mut App, drawn: &mut FrameTimes) {
+fn draw(app: &mut App, drawn: &mut Durations) {
     let start = Instant::now();
     photo::draw(app);
-    drawn.count(start.elapsed());
+    drawn.push(start.elapsed());
 }
 
 fn wait_for_player(app: &mut App, renders: bool) -> Result<Entity> {
@@ -349,7 +359,7 @@ fn wait_for_player(app: &mut App, renders: bool) -> Result<Entity> {
     while start.elapsed() < PATIENCE {
         app.update();
         let player = app.world_mut().query_filtered::<Entity, With<Player>>().single(app.world());
-        // Nobody is filmed on ground that is not painted yet.
+        // The ground is not drawn before its textures are there.
         if let Ok(player) = player
             && (!renders || app.world().resource::<GroundLoading>().is_ready())
         {

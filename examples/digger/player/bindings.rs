@@ -1,4 +1,4 @@
-//! Which keys, buttons and turns of the wheel mean which actions, as the page of controls and the file of settings have it.
+//! Bindings: the keys, buttons and turns of the wheel for each action, and how the settings file stores them.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fmt;
@@ -10,12 +10,11 @@ use bevy::reflect::enums::{DynamicEnum, DynamicVariant, VariantType};
 use serde::de::IntoDeserializer;
 use serde::de::value::{Error, StringDeserializer};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
 use crate::player::input::Action;
 use crate::ui::labels::Labels;
 
-/// A key, a button, or a turn of the wheel.
+/// A key, a button, or a turn of the wheel. The settings file has it as a text such as `KeyW`, `Mouse Left` or `Pad South`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Binding {
@@ -26,46 +25,28 @@ pub enum Binding {
     Pad(GamepadButton),
 }
 
-/// What a binding belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Device {
-    Keyboard,
-    Mouse,
-    Pad,
-}
-
-impl Device {
-    /// What a text was meant for, though it names nothing there.
-    fn meant_by(text: &str) -> Self {
-        match text.split_once(' ') {
-            Some(("Mouse" | "Wheel", _)) => Self::Mouse,
-            Some(("Pad", _)) => Self::Pad,
-            _ => Self::Keyboard,
-        }
-    }
-}
-
 impl Binding {
-    const fn device(self) -> Device {
-        match self {
-            Self::Key(_) => Device::Keyboard,
-            Self::Mouse(_) | Self::WheelUp | Self::WheelDown => Device::Mouse,
-            Self::Pad(_) => Device::Pad,
-        }
+    fn is_of_same_device(self, other: Self) -> bool {
+        let device = |binding: Self| match binding {
+            Self::Key(_) => 0,
+            Self::Mouse(_) | Self::WheelUp | Self::WheelDown => 1,
+            Self::Pad(_) => 2,
+        };
+        device(self) == device(other)
     }
 
-    /// Is it read again as what it was written? Keys that no layout knows have no name, but only a number on one platform.
-    pub fn can_be_kept(self) -> bool {
+    /// Can its text be read again? Keys that no layout knows have only a number of the platform.
+    pub fn can_be_saved(self) -> bool {
         Self::try_from(String::from(self)) == Ok(self)
     }
 }
 
-/// A text that names no key and no button.
+/// A text that names no key or button.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error("there is no key or button {0:?}")]
 pub struct UnknownBinding(String);
 
-/// The variant of an enum without fields that has a name, found by reflection: Bevy's keys are many.
+/// Finds the unit variant with this name by reflection, because Bevy has so many keys.
 fn variant_named<E: Typed + FromReflect>(name: &str) -> Option<E> {
     let variant = E::type_info().as_enum().ok()?.variant(name)?;
     if variant.variant_type() != VariantType::Unit {
@@ -119,155 +100,82 @@ impl fmt::Display for Binding {
     }
 }
 
-/// Which keys and buttons each action has.
+/// The bindings of each action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "BTreeMap<String, Value>", into = "BTreeMap<Action, Vec<Binding>>")]
-pub struct Bindings {
-    all: BTreeMap<Action, Vec<Binding>>,
-    /// What a file had for an action, and nobody could read; it is made good by [`complete`](Self::complete).
-    lost: Vec<(Action, Device)>,
-}
-
-impl From<BTreeMap<String, Value>> for Bindings {
-    /// Actions and keys of another version of the game are left out, and cost nobody the others.
-    fn from(file: BTreeMap<String, Value>) -> Self {
-        let mut bindings = Self { all: BTreeMap::new(), lost: Vec::new() };
-        for (name, texts) in file {
-            let name: StringDeserializer<Error> = name.into_deserializer();
-            let Ok(action) = Action::deserialize(name) else { continue };
-            let own = bindings.all.entry(action).or_default();
-            let Value::Array(texts) = texts else {
-                bindings.lost.push((action, Device::Keyboard));
-                continue;
-            };
-            for text in &texts {
-                let text = text.as_str().unwrap_or_default();
-                match Binding::try_from(text.to_owned()) {
-                    Ok(binding) => own.push(binding),
-                    Err(_) => bindings.lost.push((action, Device::meant_by(text))),
-                }
-            }
-        }
-        bindings
-    }
-}
+#[serde(from = "BTreeMap<String, Vec<String>>", into = "BTreeMap<Action, Vec<Binding>>")]
+pub struct Bindings(BTreeMap<Action, Vec<Binding>>);
 
 impl From<Bindings> for BTreeMap<Action, Vec<Binding>> {
     fn from(bindings: Bindings) -> Self {
-        bindings.all
+        bindings.0
+    }
+}
+
+impl From<BTreeMap<String, Vec<String>>> for Bindings {
+    /// Reads what a settings file has. Another version of the game may have written it, or a player by hand:
+    /// - Unknown actions are ignored. Actions that are missing, or have a text that cannot be read, get their default
+    ///   bindings, except those that another action has.
+    /// - A binding belongs to the first action that has it. Escape belongs to the pause.
+    fn from(file: BTreeMap<String, Vec<String>>) -> Self {
+        let known = file.into_iter().filter_map(|(name, texts)| {
+            let name: StringDeserializer<Error> = name.into_deserializer();
+            Some((Action::deserialize(name).ok()?, texts))
+        });
+        let known: BTreeMap<Action, Vec<String>> = known.collect();
+        let mut taken = HashSet::new();
+        let mut unreadable = HashSet::new();
+        let mut all = BTreeMap::<Action, Vec<Binding>>::new();
+        for (action, texts) in known {
+            let own = all.entry(action).or_default();
+            for text in texts {
+                match Binding::try_from(text) {
+                    Ok(Binding::Key(KeyCode::Escape)) if action != Action::Pause => {}
+                    Ok(binding) if taken.insert(binding) => own.push(binding),
+                    Ok(_) => {}
+                    Err(_) => drop(unreadable.insert(action)),
+                }
+            }
+        }
+        for (action, _, defaults) in Action::ALL {
+            let own = all.entry(action).or_default();
+            if own.is_empty() || unreadable.contains(&action) {
+                own.extend(defaults.iter().filter(|binding| taken.insert(**binding)));
+            }
+        }
+        Self(all)
     }
 }
 
 impl Default for Bindings {
     fn default() -> Self {
-        use Action as A;
-        use Binding::{Key, Mouse, Pad, WheelDown, WheelUp};
-        use GamepadButton as G;
-        use KeyCode as K;
-        let all: [(Action, &[Binding]); 30] = [
-            (A::Forward, &[Key(K::KeyW), Key(K::ArrowUp)]),
-            (A::Back, &[Key(K::KeyS), Key(K::ArrowDown)]),
-            (A::Left, &[Key(K::KeyA), Key(K::ArrowLeft)]),
-            (A::Right, &[Key(K::KeyD), Key(K::ArrowRight)]),
-            (A::Run, &[Key(K::ShiftLeft), Pad(G::LeftThumb)]),
-            (A::Jump, &[Key(K::Space), Pad(G::South)]),
-            (A::Use, &[Mouse(MouseButton::Left), Pad(G::RightTrigger2)]),
-            (A::Build, &[Mouse(MouseButton::Right), Pad(G::LeftTrigger2)]),
-            (A::Slot1, &[Key(K::Digit1)]),
-            (A::Slot2, &[Key(K::Digit2)]),
-            (A::Slot3, &[Key(K::Digit3)]),
-            (A::Slot4, &[Key(K::Digit4)]),
-            (A::Slot5, &[Key(K::Digit5)]),
-            (A::Slot6, &[Key(K::Digit6)]),
-            (A::Slot7, &[Key(K::Digit7)]),
-            (A::Slot8, &[Key(K::Digit8)]),
-            (A::NextTool, &[Pad(G::RightTrigger)]),
-            (A::PreviousTool, &[Pad(G::LeftTrigger)]),
-            (A::NextMaterial, &[Key(K::KeyE), Pad(G::DPadRight)]),
-            (A::PreviousMaterial, &[Key(K::KeyQ), Pad(G::DPadLeft)]),
-            (A::Grow, &[WheelUp, Key(K::Equal), Pad(G::DPadUp)]),
-            (A::Shrink, &[WheelDown, Key(K::Minus), Pad(G::DPadDown)]),
-            (A::Form, &[Key(K::KeyC), Pad(G::West)]),
-            (A::Headlamp, &[Key(K::KeyF), Pad(G::North)]),
-            (A::Undo, &[Key(K::KeyZ), Pad(G::East)]),
-            (A::Redo, &[Key(K::KeyY), Pad(G::RightThumb)]),
-            (A::Help, &[Key(K::KeyH), Pad(G::Select)]),
-            (A::Figures, &[Key(K::F3)]),
-            (A::Panel, &[Key(K::F1)]),
-            (A::Pause, &[Key(K::Escape), Pad(G::Start)]),
-        ];
-        let all = all.into_iter().map(|(action, bindings)| (action, bindings.to_vec())).collect();
-        Self { all, lost: Vec::new() }
+        Self(Action::ALL.iter().map(|(action, _, bindings)| (*action, bindings.to_vec())).collect())
     }
 }
 
 impl Bindings {
-    /// The keys and buttons of an action.
+    /// The bindings of an action.
     pub fn of(&self, action: Action) -> &[Binding] {
-        self.all.get(&action).map_or(&[], Vec::as_slice)
+        self.0.get(&action).map_or(&[], Vec::as_slice)
     }
 
-    /// The first key or button of an action, as it is written on the screen.
+    /// The label of an action's first binding.
     pub fn first(&self, action: Action, labels: &Labels) -> String {
         self.of(action).first().map_or_else(|| "-".into(), |binding| labels.of(*binding))
     }
 
-    /// Gives an action a key or button in place of those of the same device: a gamepad's button leaves the keys alone, and
-    /// so does the mouse. Whoever had it loses it, and is returned.
+    /// Replaces an action's bindings of the same device: a gamepad button leaves keys and mouse buttons as they are. If another
+    /// action has the binding, that action loses it and is returned.
     pub fn rebind(&mut self, action: Action, binding: Binding) -> Option<Action> {
-        let loser = self
-            .all
-            .iter()
-            .find(|(other, bindings)| **other != action && bindings.contains(&binding))
-            .map(|(other, _)| *other);
-        if let Some(bindings) = loser.and_then(|loser| self.all.get_mut(&loser)) {
+        let mut others = self.0.iter_mut().filter(|(other, _)| **other != action);
+        let loser = others.find(|(_, bindings)| bindings.contains(&binding));
+        let loser = loser.map(|(loser, bindings)| {
             bindings.retain(|other| *other != binding);
-        }
-        let own = self.all.entry(action).or_default();
-        own.retain(|old| old.device() != binding.device());
+            *loser
+        });
+        let own = self.0.entry(action).or_default();
+        own.retain(|old| !old.is_of_same_device(binding));
         own.insert(0, binding);
         loser
-    }
-
-    /// What a file leaves open: no key has two actions, the first one keeps it; and actions without any key get those
-    /// that they have by default, unless they are taken. Escape is the pause's own. Who lost a key or a button that could
-    /// not be read, and has no other of that kind, gets it back in the same way; says who did.
-    pub fn complete(&mut self) -> Vec<Action> {
-        let mut taken = HashSet::new();
-        for (action, bindings) in &mut self.all {
-            bindings.retain(|binding| {
-                (*action == Action::Pause || *binding != Binding::Key(KeyCode::Escape))
-                    && taken.insert(*binding)
-            });
-        }
-        let mut mended = Vec::new();
-        for (action, defaults) in Self::default().all {
-            let own = self.all.entry(action).or_default();
-            let mut fill = |own: &mut Vec<Binding>, belongs: &dyn Fn(&Binding) -> bool| {
-                own.extend(defaults.iter().copied().filter(|one| belongs(one) && taken.insert(*one)));
-            };
-            let before = own.len();
-            if own.is_empty() {
-                fill(own, &|_| true);
-            }
-            for &(_, device) in self.lost.iter().filter(|lost| lost.0 == action) {
-                // Nobody is left with a gamepad alone that he may not have.
-                let (is_such, is_near) = (
-                    |one: &Binding| one.device() == device,
-                    |one: &Binding| (one.device() == Device::Pad) == (device == Device::Pad),
-                );
-                if !own.iter().any(is_near) {
-                    fill(own, &is_near);
-                } else if !own.iter().any(is_such) {
-                    fill(own, &is_such);
-                }
-            }
-            if own.len() > before && self.lost.iter().any(|lost| lost.0 == action) {
-                mended.push(action);
-            }
-        }
-        self.lost.clear();
-        mended
     }
 }
 

@@ -1,4 +1,4 @@
-//! The player's body: a character of the plugin's physics, and what a script asks it.
+//! The player's body: a character of the plugin's physics.
 
 use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
@@ -7,12 +7,12 @@ use bevy_burrow::physics::{
     Character, CharacterMotion, CharacterPlugin, ColliderSource, TerrainPhysicsPlugin,
 };
 
-/// Steps of the simulation in a second.
+/// Physics steps per second.
 const HERTZ: f64 = 60.0;
-/// Metres around the player in which ground can be stood on, and bombs bounce.
-const GROUND: f32 = 64.0;
+/// Ground has colliders within this many metres of the player.
+const COLLIDER_RADIUS: f32 = 64.0;
 
-/// Ground to stand on, and bodies that do.
+/// Adds the physics: colliders for the ground, and characters.
 pub struct BodyPlugin;
 
 impl Plugin for BodyPlugin {
@@ -25,14 +25,14 @@ impl Plugin for BodyPlugin {
     }
 }
 
-/// A body that stands at a place.
+/// The components of a body whose feet are at a place.
 pub fn standing_at(feet: Vec3) -> impl Bundle {
     let character = Character::default();
     let place = character.standing_at(feet);
-    (character, place, ColliderSource { radius: GROUND }, TransformInterpolation)
+    (character, place, ColliderSource { radius: COLLIDER_RADIUS }, TransformInterpolation)
 }
 
-/// A body where it is now.
+/// Where a body is and how it moves.
 #[derive(QueryData)]
 pub struct Body {
     character: &'static Character,
@@ -41,12 +41,12 @@ pub struct Body {
 }
 
 impl BodyItem<'_, '_> {
-    /// The soles.
+    /// The position of the feet.
     pub fn feet(&self) -> Vec3 {
         self.character.feet(self.place.translation)
     }
 
-    /// Between the eyes.
+    /// The position of the eyes.
     pub fn eye(&self) -> Vec3 {
         self.character.eyes(self.place.translation)
     }

@@ -1,29 +1,27 @@
-//! Where the game stands: title, play, pause, and which page of a menu is open.
+//! The game's states: title, play or pause, and the menu page that is open.
 
 use bevy::prelude::*;
 use bevy::window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused};
 use bevy_burrow::panel::BurrowPanel;
 
-use crate::player::input::{Action, Actions, ReadsDevices};
+use crate::player::input::{Action, ActionSystems, Actions};
 
-/// What goes on.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Phase {
-    /// The landscape turns behind the menu; a game that was left stands still.
+pub enum GameState {
+    /// The camera circles over the landscape behind the menu.
     #[default]
     Title,
-    /// The player digs.
     Playing,
     /// Time stands still.
     Paused,
 }
 
-/// Which menu is open.
+/// The menu page that is open.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Page {
-    /// None: the player plays.
+pub enum MenuPage {
+    /// No page: the game is being played.
     None,
-    /// The title's menu, or that of the pause.
+    /// The menu of the title or of the pause.
     #[default]
     Menu,
     Settings,
@@ -31,68 +29,71 @@ pub enum Page {
     Help,
 }
 
-/// Goes from phase to phase; time and the mouse follow.
-pub struct PhasePlugin;
+/// Changes the states. Time and the mouse cursor follow them.
+pub struct GameStatePlugin;
 
-impl Plugin for PhasePlugin {
+impl Plugin for GameStatePlugin {
     fn build(&self, app: &mut App) {
-        app.init_state::<Phase>()
-            .init_state::<Page>()
-            .add_systems(OnEnter(Phase::Playing), (close_menus, run_time, take_mouse, listen))
-            .add_systems(OnEnter(Phase::Paused), (stop_time, leave_mouse))
-            // Behind the title, time goes on as it did: it runs before the first game, and a game that was left waits.
-            .add_systems(OnEnter(Phase::Title), leave_mouse)
-            .add_systems(PreUpdate, pause.after(ReadsDevices).run_if(in_state(Phase::Playing)));
+        app.init_state::<GameState>()
+            .init_state::<MenuPage>()
+            .add_systems(
+                OnEnter(GameState::Playing),
+                (close_menu, resume_time, capture_mouse, release_actions),
+            )
+            .add_systems(OnEnter(GameState::Paused), (pause_time, release_mouse))
+            // The title leaves time as it is: running before the first game, and paused after it.
+            .add_systems(OnEnter(GameState::Title), release_mouse)
+            .add_systems(PreUpdate, pause.after(ActionSystems).run_if(in_state(GameState::Playing)));
     }
 }
 
-fn close_menus(mut page: ResMut<NextState<Page>>) {
-    page.set(Page::None);
+fn close_menu(mut page: ResMut<NextState<MenuPage>>) {
+    page.set(MenuPage::None);
 }
 
-/// The click that chose "dig" digs nothing, and neither does one on the panel once it is closed.
-pub fn listen(mut actions: ResMut<Actions>) {
-    actions.forget();
+/// Ignores what is held down: the click that chose a menu item or closed the panel is not meant for the game.
+pub fn release_actions(mut actions: ResMut<Actions>) {
+    actions.release_all();
 }
 
-fn run_time(mut time: ResMut<Time<Virtual>>) {
+fn resume_time(mut time: ResMut<Time<Virtual>>) {
     time.unpause();
 }
 
-fn stop_time(mut time: ResMut<Time<Virtual>>) {
+fn pause_time(mut time: ResMut<Time<Virtual>>) {
     time.pause();
 }
 
-pub fn take_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
+pub fn capture_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
     for mut cursor in &mut cursors {
         (cursor.visible, cursor.grab_mode) = (false, CursorGrabMode::Locked);
     }
 }
 
-pub fn leave_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
+pub fn release_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>) {
     for mut cursor in &mut cursors {
         (cursor.visible, cursor.grab_mode) = (true, CursorGrabMode::None);
     }
 }
 
-/// The pause key, Escape whatever it is, the help key, and whatever takes the window away. While the panel is open,
-/// letters are typed into it. It looks before the states change, as menus do: the key that leads back to the game does
-/// not pause it again.
+/// Pauses on the pause key, on Escape however it is bound, on the help key, and when the window loses the focus. While the panel
+/// is open, letters are typed into it. This runs before states change, as menus do: the key that ends the pause does not begin
+/// another one.
 fn pause(
     actions: Res<Actions>,
     keys: Res<ButtonInput<KeyCode>>,
     panel: Option<Res<BurrowPanel>>,
     mut focus: MessageReader<WindowFocused>,
-    mut phase: ResMut<NextState<Phase>>,
-    mut page: ResMut<NextState<Page>>,
+    mut state: ResMut<NextState<GameState>>,
+    mut page: ResMut<NextState<MenuPage>>,
 ) {
-    let lost = focus.read().any(|event| !event.focused);
-    let plays = panel.is_none_or(|panel| !panel.is_open);
-    let help = actions.just_pressed(Action::Help) && plays;
-    let pause = actions.just_pressed(Action::Pause) && plays || keys.just_pressed(KeyCode::Escape);
-    if pause || help || lost {
-        phase.set(Phase::Paused);
-        page.set(if help { Page::Help } else { Page::Menu });
+    let lost_focus = focus.read().any(|event| !event.focused);
+    let no_panel = panel.is_none_or(|panel| !panel.is_open);
+    let help = actions.just_pressed(Action::Help) && no_panel;
+    let pause = actions.just_pressed(Action::Pause) && no_panel || keys.just_pressed(KeyCode::Escape);
+    if pause || help || lost_focus {
+        state.set(GameState::Paused);
+        page.set(if help { MenuPage::Help } else { MenuPage::Menu });
     }
 }
 

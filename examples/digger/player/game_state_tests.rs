@@ -1,136 +1,95 @@
-//! Facts about the pause.
+//! Tests of pausing.
 
 use std::time::Duration;
 
-use bevy::input::keyboard::{Key, KeyboardInput};
-use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
-use bevy::state::app::StatesPlugin;
+use bevy::input::ButtonState;
 use bevy::time::TimeUpdateStrategy;
 
 use super::*;
 use crate::player::bindings::Binding;
-use crate::player::input::InputPlugin;
+use crate::test_support::{app_with_input, go_to, hold, send_key};
 use crate::ui::settings::Settings;
-use crate::world::day::Clock;
 
 fn app() -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PhasePlugin))
-        .add_message::<WindowFocused>()
-        .init_resource::<Settings>()
-        .init_resource::<Clock>()
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)))
-        .add_systems(Update, crate::world::day::tick);
-    app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
-    app.update();
-    app.update();
+    let mut app = app_with_input();
+    app.add_plugins(GameStatePlugin)
+        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)));
+    go_to(&mut app, GameState::Playing);
     app
 }
 
-fn phase(app: &App) -> (Phase, Page) {
-    (**app.world().resource::<State<Phase>>(), **app.world().resource::<State<Page>>())
+fn state(app: &App) -> (GameState, MenuPage) {
+    (**app.world().resource::<State<GameState>>(), **app.world().resource::<State<MenuPage>>())
 }
 
-/// Holds an action for a frame, as a key would.
+/// Seconds of game time that pass in ten frames.
+fn time_in_ten_frames(app: &mut App) -> f32 {
+    let time = |app: &App| app.world().resource::<Time<Virtual>>().elapsed_secs();
+    let before = time(app);
+    (0..10).for_each(|_| app.update());
+    time(app) - before
+}
+
 fn press(app: &mut App, action: Action) {
-    app.world_mut().resource_mut::<Actions>().puppet.push(action);
-    app.update();
-    app.world_mut().resource_mut::<Actions>().puppet.clear();
-    app.update();
+    hold(app, &[action]);
+    hold(app, &[]);
 }
 
 #[test]
-fn a_pause_stops_time_and_its_end_lets_it_run() {
+fn time_stands_still_while_the_game_is_paused_or_left_for_the_title() {
     let mut app = app();
-    let hour = |app: &App| app.world().resource::<Clock>().hour;
-    let before = hour(&app);
-    app.update();
-    assert!(hour(&app) > before);
+    assert!(time_in_ten_frames(&mut app) > 0.5);
     press(&mut app, Action::Pause);
-    assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
-    let stopped = hour(&app);
-    for _ in 0..10 {
-        app.update();
-    }
-    assert_eq!(hour(&app), stopped);
-    app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
-    app.update();
-    app.update();
-    assert!(hour(&app) > stopped);
-    assert_eq!(phase(&app), (Phase::Playing, Page::None));
-}
-
-#[test]
-fn a_game_that_was_left_for_the_title_stands_still_until_it_goes_on() {
-    let mut app = app();
-    let hour = |app: &App| app.world().resource::<Clock>().hour;
-    let go = |app: &mut App, phase: Phase| {
-        app.world_mut().resource_mut::<NextState<Phase>>().set(phase);
-        app.update();
-        app.update();
-    };
-    press(&mut app, Action::Pause);
-    let stopped = hour(&app);
-    go(&mut app, Phase::Title);
-    for _ in 0..10 {
-        app.update();
-    }
-    assert_eq!(hour(&app), stopped);
-    go(&mut app, Phase::Playing);
-    assert!(hour(&app) > stopped);
+    assert_eq!(state(&app), (GameState::Paused, MenuPage::Menu));
+    assert_eq!(time_in_ten_frames(&mut app), 0.0);
+    go_to(&mut app, GameState::Title);
+    assert_eq!(time_in_ten_frames(&mut app), 0.0);
+    go_to(&mut app, GameState::Playing);
+    assert_eq!(state(&app), (GameState::Playing, MenuPage::None));
+    assert!(time_in_ten_frames(&mut app) > 0.5);
 }
 
 #[test]
 fn time_runs_before_the_first_game() {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PhasePlugin))
-        .add_message::<WindowFocused>()
-        .init_resource::<Settings>();
+    let mut app = app_with_input();
+    app.add_plugins(GameStatePlugin);
     app.update();
-    assert_eq!(phase(&app).0, Phase::Title);
+    assert_eq!(state(&app).0, GameState::Title);
     assert!(!app.world().resource::<Time<Virtual>>().is_paused());
 }
 
 #[test]
-fn help_and_a_lost_window_pause_too() {
+fn help_and_a_lost_focus_pause_too() {
     let mut app = app();
     press(&mut app, Action::Help);
-    assert_eq!(phase(&app), (Phase::Paused, Page::Help));
-    app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
-    app.update();
+    assert_eq!(state(&app), (GameState::Paused, MenuPage::Help));
+    go_to(&mut app, GameState::Playing);
     app.world_mut().write_message(WindowFocused { window: Entity::PLACEHOLDER, focused: false });
     app.update();
     app.update();
-    assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
+    assert_eq!(state(&app), (GameState::Paused, MenuPage::Menu));
 }
 
 #[test]
-fn escape_pauses_whatever_else_does() {
+fn escape_pauses_however_it_is_bound() {
     let mut app = app();
     let mut settings = app.world_mut().resource_mut::<Settings>();
     settings.bindings.rebind(Action::Pause, Binding::Key(KeyCode::KeyP));
     settings.bindings.rebind(Action::Jump, Binding::Key(KeyCode::KeyP));
-    app.world_mut().write_message(KeyboardInput {
-        key_code: KeyCode::Escape,
-        logical_key: Key::Escape,
-        state: ButtonState::Pressed,
-        text: None,
-        repeat: false,
-        window: Entity::PLACEHOLDER,
-    });
+    send_key(&mut app, KeyCode::Escape, ButtonState::Pressed);
     app.update();
     app.update();
-    assert_eq!(phase(&app), (Phase::Paused, Page::Menu));
+    assert_eq!(state(&app), (GameState::Paused, MenuPage::Menu));
 }
 
 #[test]
-fn letters_that_are_typed_into_the_panel_open_no_help() {
+fn letters_typed_into_the_panel_open_no_help() {
     let mut app = app();
-    // It is open unless told otherwise.
+    // It is open by default.
     app.init_resource::<BurrowPanel>();
     press(&mut app, Action::Help);
-    assert_eq!(phase(&app), (Phase::Playing, Page::None));
+    assert_eq!(state(&app), (GameState::Playing, MenuPage::None));
     app.world_mut().resource_mut::<BurrowPanel>().is_open = false;
     press(&mut app, Action::Help);
-    assert_eq!(phase(&app), (Phase::Paused, Page::Help));
+    assert_eq!(state(&app), (GameState::Paused, MenuPage::Help));
 }

@@ -1,20 +1,21 @@
-//! What the player wants, whatever it was said with: actions, their keys and buttons, and both sticks.
+//! The player's input as actions: what keys, mouse buttons, the wheel and gamepads mean.
 //!
-//! A device is read once a frame, into [`Actions`]; everything else asks for actions and knows no key. The
-//! [`Bindings`](crate::player::bindings::Bindings) are part of the settings, and the page of controls changes them.
+//! Devices are read once a frame, into [`Actions`]. All other code asks for actions and knows no keys. The
+//! [`Bindings`](crate::player::bindings::Bindings) are part of the settings, and the controls page changes them.
 
 use bevy::input::InputSystems;
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
+use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::player::bindings::Binding;
 use crate::ui::labels::{self, Labels};
+use crate::ui::settings::Settings;
 
-/// Something that the player can want.
+/// Something that the player can do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[repr(u8)]
 pub enum Action {
     Forward,
     Back,
@@ -38,137 +39,140 @@ pub enum Action {
     PreviousMaterial,
     Grow,
     Shrink,
-    Form,
+    BuildShape,
     Headlamp,
     Undo,
     Redo,
     Help,
-    Figures,
+    FrameTimes,
     Panel,
     Pause,
 }
 
 impl Action {
-    /// All of them, in the order of the page of controls, with what they are called there.
-    pub const ALL: [(Self, &str); 30] = [
-        (Self::Forward, "forward"),
-        (Self::Back, "back"),
-        (Self::Left, "left"),
-        (Self::Right, "right"),
-        (Self::Run, "run"),
-        (Self::Jump, "jump"),
-        (Self::Use, "use the tool"),
-        (Self::Build, "build"),
-        (Self::Grow, "larger brush"),
-        (Self::Shrink, "smaller brush"),
-        (Self::Form, "form of what is built"),
-        (Self::Headlamp, "headlamp"),
-        (Self::Slot1, "pickaxe"),
-        (Self::Slot2, "shovel"),
-        (Self::Slot3, "drill"),
-        (Self::Slot4, "builder"),
-        (Self::Slot5, "painter"),
-        (Self::Slot6, "bomb"),
-        (Self::Slot7, "lamp"),
-        (Self::Slot8, "ball"),
-        (Self::NextTool, "next tool"),
-        (Self::PreviousTool, "previous tool"),
-        (Self::NextMaterial, "next material"),
-        (Self::PreviousMaterial, "previous material"),
-        (Self::Undo, "undo"),
-        (Self::Redo, "redo"),
-        (Self::Help, "help"),
-        (Self::Figures, "frame times"),
-        (Self::Panel, "panel"),
-        (Self::Pause, "pause"),
-    ];
+    /// All actions with their labels and their default bindings, in the order of the controls page.
+    pub const ALL: [(Self, &str, &[Binding]); 30] = {
+        use Binding::{Key, Mouse, Pad, WheelDown, WheelUp};
+        use GamepadButton as G;
+        use KeyCode as K;
+        [
+            (Self::Forward, "forward", &[Key(K::KeyW), Key(K::ArrowUp)]),
+            (Self::Back, "back", &[Key(K::KeyS), Key(K::ArrowDown)]),
+            (Self::Left, "left", &[Key(K::KeyA), Key(K::ArrowLeft)]),
+            (Self::Right, "right", &[Key(K::KeyD), Key(K::ArrowRight)]),
+            (Self::Run, "run", &[Key(K::ShiftLeft), Pad(G::LeftThumb)]),
+            (Self::Jump, "jump", &[Key(K::Space), Pad(G::South)]),
+            (Self::Use, "use the tool", &[Mouse(MouseButton::Left), Pad(G::RightTrigger2)]),
+            (Self::Build, "build", &[Mouse(MouseButton::Right), Pad(G::LeftTrigger2)]),
+            (Self::Grow, "larger brush", &[WheelUp, Key(K::Equal), Pad(G::DPadUp)]),
+            (Self::Shrink, "smaller brush", &[WheelDown, Key(K::Minus), Pad(G::DPadDown)]),
+            (Self::BuildShape, "shape of what is built", &[Key(K::KeyC), Pad(G::West)]),
+            (Self::Headlamp, "headlamp", &[Key(K::KeyF), Pad(G::North)]),
+            (Self::Slot1, "pickaxe", &[Key(K::Digit1)]),
+            (Self::Slot2, "shovel", &[Key(K::Digit2)]),
+            (Self::Slot3, "drill", &[Key(K::Digit3)]),
+            (Self::Slot4, "builder", &[Key(K::Digit4)]),
+            (Self::Slot5, "painter", &[Key(K::Digit5)]),
+            (Self::Slot6, "bomb", &[Key(K::Digit6)]),
+            (Self::Slot7, "lamp", &[Key(K::Digit7)]),
+            (Self::Slot8, "ball", &[Key(K::Digit8)]),
+            (Self::NextTool, "next tool", &[Pad(G::RightTrigger)]),
+            (Self::PreviousTool, "previous tool", &[Pad(G::LeftTrigger)]),
+            (Self::NextMaterial, "next material", &[Key(K::KeyE), Pad(G::DPadRight)]),
+            (Self::PreviousMaterial, "previous material", &[Key(K::KeyQ), Pad(G::DPadLeft)]),
+            (Self::Undo, "undo", &[Key(K::KeyZ), Pad(G::East)]),
+            (Self::Redo, "redo", &[Key(K::KeyY), Pad(G::RightThumb)]),
+            (Self::Help, "help", &[Key(K::KeyH), Pad(G::Select)]),
+            (Self::FrameTimes, "frame times", &[Key(K::F3)]),
+            (Self::Panel, "panel", &[Key(K::F1)]),
+            (Self::Pause, "pause", &[Key(K::Escape), Pad(G::Start)]),
+        ]
+    };
 
-    const fn bit(self) -> u64 {
-        1 << self as u8
-    }
-
-    /// What it is called.
     pub fn label(self) -> &'static str {
-        Self::ALL.iter().find(|(action, _)| *action == self).map_or("?", |(_, label)| label)
+        Self::ALL.iter().find(|(action, ..)| *action == self).map_or("?", |(_, label, _)| label)
     }
 }
 
 /// What the player wants in this frame.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Actions {
-    held: u64,
-    just: u64,
-    /// Held since before the game began to listen; it counts only once it was let go.
-    stale: u64,
-    /// How often the wheel or the keys ask for a larger brush, or, negative, for a smaller one.
+    buttons: ButtonInput<Action>,
+    /// Held since before [`release_all`](Self::release_all). They count again once they are released.
+    ignored: HashSet<Action>,
+    /// Steps by which the brush grows, or, if negative, shrinks.
     pub growth: i32,
-    /// Right and ahead, at most 1 long.
+    /// To the right and forward, at most 1 long.
     pub walk: Vec2,
-    /// How far the head is to turn: right and down, in radians at a sensitivity of 1.
+    /// How far the head turns right and down, in radians at a sensitivity of 1.
     pub look: Vec2,
-    /// What a script holds down, beside all devices.
-    pub puppet: Vec<Action>,
+    /// Actions that a script holds down.
+    pub scripted: Vec<Action>,
 }
 
 impl Actions {
-    /// Is it held down? What is shorter than a frame is held for one.
+    /// Is it held down? A press shorter than a frame counts as held for that frame.
     pub fn pressed(&self, action: Action) -> bool {
-        self.held & action.bit() != 0
+        self.buttons.pressed(action)
     }
 
-    /// Was it not, a frame ago?
+    /// Was it pressed in this frame?
     pub fn just_pressed(&self, action: Action) -> bool {
-        self.just & action.bit() != 0
+        self.buttons.just_pressed(action)
     }
 
-    /// Whatever is held down now means nothing until it is pressed again.
-    pub fn forget(&mut self) {
-        (self.held, self.just, self.stale) = (0, 0, u64::MAX);
+    /// Ignores whatever is held down now until it is pressed again.
+    pub fn release_all(&mut self) {
+        self.buttons.reset_all();
+        self.ignored = Action::ALL.iter().map(|(action, ..)| *action).collect();
     }
 }
 
-/// In `PreUpdate`, when [`Actions`] are read. Menus come after it, and before the states change.
+/// In `PreUpdate`, when [`Actions`] are updated. Menus run after it, and before states change.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ReadsDevices;
+pub struct ActionSystems;
 
 /// Reads devices into [`Actions`].
 pub struct InputPlugin;
 
 impl Plugin for InputPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Actions>().init_resource::<Turns>().init_resource::<Labels>().add_systems(
+        app.init_resource::<Actions>().init_resource::<WheelSteps>().init_resource::<Labels>().add_systems(
             PreUpdate,
-            (labels::learn, turn_wheel, read_devices).chain().in_set(ReadsDevices).after(InputSystems),
+            (labels::learn, count_wheel_steps, update_actions)
+                .chain()
+                .in_set(ActionSystems)
+                .after(InputSystems),
         );
     }
 }
 
-/// By how many notches the wheel was turned in this frame: up, or, negative, down.
+/// Steps that the wheel turned in this frame: up, or, if negative, down.
 #[derive(Resource, Clone, Copy, Debug, Default)]
-pub struct Turns {
-    notches: i32,
-    /// What a touchpad has scrolled since its latest notch.
+pub struct WheelSteps {
+    steps: i32,
+    /// What a touchpad scrolled since the last whole step.
     rest: f32,
 }
 
-/// Pixels that a touchpad scrolls for one notch of a wheel.
-const NOTCH: f32 = 40.0;
+/// Pixels scrolled on a touchpad that count as one step of a wheel.
+const PIXELS_PER_STEP: f32 = 40.0;
 
-impl Turns {
-    /// Scrolls on, by notches and parts of them.
+impl WheelSteps {
+    /// Scrolls by steps or fractions of them.
     fn scroll(&mut self, by: f32) {
         if by * self.rest < 0.0 {
             self.rest = 0.0;
         }
         self.rest += by;
-        // Ten tenths are a whole one, though not to the last bit.
+        // Ten times 0.1 is slightly less than 1.
         let whole = (self.rest + 1e-3_f32.copysign(self.rest)).trunc();
-        (self.notches, self.rest) = (whole as i32, self.rest - whole);
+        (self.steps, self.rest) = (whole as i32, self.rest - whole);
     }
 
-    /// The wheel as a key.
+    /// The direction that the wheel turned, as a binding.
     pub fn binding(self) -> Option<Binding> {
-        match self.notches {
+        match self.steps {
             0 => None,
             1.. => Some(Binding::WheelUp),
             _ => Some(Binding::WheelDown),
@@ -176,65 +180,66 @@ impl Turns {
     }
 }
 
-fn turn_wheel(wheel: Res<AccumulatedMouseScroll>, mut turns: ResMut<Turns>) {
-    turns.scroll(match wheel.unit {
+fn count_wheel_steps(wheel: Res<AccumulatedMouseScroll>, mut steps: ResMut<WheelSteps>) {
+    steps.scroll(match wheel.unit {
         MouseScrollUnit::Line => wheel.delta.y,
-        MouseScrollUnit::Pixel => wheel.delta.y / NOTCH,
+        MouseScrollUnit::Pixel => wheel.delta.y / PIXELS_PER_STEP,
     });
 }
 
-/// Radians for each pixel that the mouse moves, and for each second with a stick pushed all the way.
-const MOUSE: f32 = 0.0024;
-const STICK: f32 = 2.6;
+/// Radians per pixel of mouse motion, and per second with a stick pushed all the way.
+const MOUSE_SPEED: f32 = 0.0024;
+const STICK_SPEED: f32 = 2.6;
 
-fn read_devices(
+fn update_actions(
     time: Res<Time<Real>>,
-    settings: Res<crate::ui::settings::Settings>,
+    settings: Res<Settings>,
     keys: Res<ButtonInput<KeyCode>>,
     mouse: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,
-    turns: Res<Turns>,
+    wheel: Res<WheelSteps>,
     pads: Query<&Gamepad>,
     mut actions: ResMut<Actions>,
 ) {
-    let is_held = |binding: &Binding| match *binding {
+    let is_pressed = |binding: &Binding| match *binding {
         Binding::Key(key) => keys.pressed(key),
         Binding::Mouse(button) => mouse.pressed(button),
-        Binding::WheelUp | Binding::WheelDown => turns.binding() == Some(*binding),
+        Binding::WheelUp | Binding::WheelDown => wheel.binding() == Some(*binding),
         Binding::Pad(button) => pads.iter().any(|pad| pad.pressed(button)),
     };
-    // Shorter than a frame: pressed and released between two of them.
-    let is_fresh = |binding: &Binding| match *binding {
+    let is_just_pressed = |binding: &Binding| match *binding {
         Binding::Key(key) => keys.just_pressed(key),
         Binding::Mouse(button) => mouse.just_pressed(button),
-        Binding::WheelUp | Binding::WheelDown => is_held(binding),
+        Binding::WheelUp | Binding::WheelDown => is_pressed(binding),
         Binding::Pad(button) => pads.iter().any(|pad| pad.just_pressed(button)),
     };
-    let before = actions.held;
-    let (mut held, mut fresh) = (0, 0);
-    for (action, _) in Action::ALL {
+    let actions = &mut *actions;
+    actions.buttons.clear();
+    for (action, ..) in Action::ALL {
         let bindings = settings.bindings.of(action);
-        let puppet = actions.puppet.contains(&action);
-        held |= if puppet || bindings.iter().any(is_held) { action.bit() } else { 0 };
-        fresh |= if bindings.iter().any(is_fresh) { action.bit() } else { 0 };
+        let just_pressed = bindings.iter().any(is_just_pressed);
+        let pressed = just_pressed || bindings.iter().any(is_pressed) || actions.scripted.contains(&action);
+        if just_pressed || !pressed {
+            actions.ignored.remove(&action);
+            // Two presses may come within two frames, without a frame between them.
+            actions.buttons.release(action);
+        }
+        if pressed && !actions.ignored.contains(&action) {
+            actions.buttons.press(action);
+        }
     }
-    held |= fresh;
-    actions.stale &= held & !fresh;
-    actions.held = held & !actions.stale;
-    actions.just = fresh | (actions.held & !before);
-    let steps = turns.notches.abs().max(1);
-    let step = |action: Action| if actions.just_pressed(action) { steps } else { 0 };
+    let step = |action: Action| if actions.just_pressed(action) { wheel.steps.abs().max(1) } else { 0 };
     actions.growth = step(Action::Grow) - step(Action::Shrink);
     let axis = |plus: Action, minus: Action| {
         f32::from(u8::from(actions.pressed(plus))) - f32::from(u8::from(actions.pressed(minus)))
     };
-    let way = Vec2::new(axis(Action::Right, Action::Left), axis(Action::Forward, Action::Back));
+    let walk = Vec2::new(axis(Action::Right, Action::Left), axis(Action::Forward, Action::Back));
     let sticks = pads.iter().map(Gamepad::left_stick).sum::<Vec2>();
-    actions.walk = (way + sticks).clamp_length_max(1.0);
-    // Sticks are gentle near their middle.
+    actions.walk = (walk + sticks).clamp_length_max(1.0);
+    // The square makes sticks precise near their middle.
     let stick = pads.iter().map(Gamepad::right_stick).sum::<Vec2>().clamp_length_max(1.0);
-    let stick = stick * stick.length() * STICK * time.delta_secs();
-    actions.look = motion.delta * MOUSE + Vec2::new(stick.x, -stick.y);
+    let stick = stick * stick.length() * STICK_SPEED * time.delta_secs();
+    actions.look = motion.delta * MOUSE_SPEED + Vec2::new(stick.x, -stick.y);
 }
 
 #[cfg(test)]

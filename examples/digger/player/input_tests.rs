@@ -1,35 +1,22 @@
-//! Facts about devices and what is made of them.
+//! Tests of devices and actions.
 
-use std::collections::HashSet;
-
+use bevy::input::ButtonState;
 use bevy::input::gamepad::{
     GamepadConnection, GamepadConnectionEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent,
     RawGamepadEvent,
 };
-use bevy::input::keyboard::{Key, KeyboardInput};
-use bevy::input::mouse::{MouseButtonInput, MouseWheel};
-use bevy::input::touch::TouchPhase;
-use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
 
 use super::*;
-use crate::ui::settings::Settings;
+use crate::test_support::{app_with_input, scroll, send_button, send_key};
 
 fn app() -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, DevicePlugin, InputPlugin)).init_resource::<Settings>();
+    let mut app = app_with_input();
     app.update();
     app
 }
 
-fn type_key(app: &mut App, key_code: KeyCode, state: ButtonState) {
-    app.world_mut().write_message(KeyboardInput {
-        key_code,
-        logical_key: Key::Space,
-        state,
-        text: None,
-        repeat: false,
-        window: Entity::PLACEHOLDER,
-    });
+fn key(app: &mut App, key: KeyCode, state: ButtonState) {
+    send_key(app, key, state);
     app.update();
 }
 
@@ -38,19 +25,13 @@ fn actions(app: &App) -> &Actions {
 }
 
 #[test]
-fn no_action_is_another_one() {
-    let bits: HashSet<u64> = Action::ALL.iter().map(|(action, _)| action.bit()).collect();
-    assert_eq!(bits.len(), Action::ALL.len());
-}
-
-#[test]
-fn a_press_is_fresh_for_one_frame_and_held_until_its_end() {
+fn a_press_is_new_for_one_frame_and_held_until_its_end() {
     let mut app = app();
-    type_key(&mut app, KeyCode::Space, ButtonState::Pressed);
+    key(&mut app, KeyCode::Space, ButtonState::Pressed);
     assert!(actions(&app).pressed(Action::Jump) && actions(&app).just_pressed(Action::Jump));
     app.update();
     assert!(actions(&app).pressed(Action::Jump) && !actions(&app).just_pressed(Action::Jump));
-    type_key(&mut app, KeyCode::Space, ButtonState::Released);
+    key(&mut app, KeyCode::Space, ButtonState::Released);
     assert!(!actions(&app).pressed(Action::Jump));
 }
 
@@ -59,8 +40,7 @@ fn a_click_shorter_than_a_frame_is_held_for_one() {
     let mut app = app();
     let click = |app: &mut App| {
         for state in [ButtonState::Pressed, ButtonState::Released] {
-            let (button, window) = (MouseButton::Left, Entity::PLACEHOLDER);
-            app.world_mut().write_message(MouseButtonInput { button, state, window });
+            send_button(app, MouseButton::Left, state);
         }
         app.update();
     };
@@ -70,9 +50,9 @@ fn a_click_shorter_than_a_frame_is_held_for_one() {
         app.update();
         assert!(!actions(&app).pressed(Action::Use) && !actions(&app).just_pressed(Action::Use));
     }
-    // Nobody waits for the end of a click that is over.
+    // A click that is over is not ignored any longer.
     click(&mut app);
-    app.world_mut().resource_mut::<Actions>().forget();
+    app.world_mut().resource_mut::<Actions>().release_all();
     assert!(!actions(&app).pressed(Action::Use));
     click(&mut app);
     assert!(actions(&app).pressed(Action::Use));
@@ -81,12 +61,12 @@ fn a_click_shorter_than_a_frame_is_held_for_one() {
 #[test]
 fn what_is_held_when_the_game_begins_counts_once_it_is_pressed_again() {
     let mut app = app();
-    type_key(&mut app, KeyCode::Space, ButtonState::Pressed);
-    app.world_mut().resource_mut::<Actions>().forget();
+    key(&mut app, KeyCode::Space, ButtonState::Pressed);
+    app.world_mut().resource_mut::<Actions>().release_all();
     app.update();
     assert!(!actions(&app).pressed(Action::Jump));
-    type_key(&mut app, KeyCode::Space, ButtonState::Released);
-    type_key(&mut app, KeyCode::Space, ButtonState::Pressed);
+    key(&mut app, KeyCode::Space, ButtonState::Released);
+    key(&mut app, KeyCode::Space, ButtonState::Pressed);
     assert!(actions(&app).just_pressed(Action::Jump));
 }
 
@@ -94,9 +74,9 @@ fn what_is_held_when_the_game_begins_counts_once_it_is_pressed_again() {
 fn keys_do_what_they_are_bound_to() {
     let mut app = app();
     app.world_mut().resource_mut::<Settings>().bindings.rebind(Action::Forward, Binding::Key(KeyCode::KeyP));
-    type_key(&mut app, KeyCode::KeyW, ButtonState::Pressed);
+    key(&mut app, KeyCode::KeyW, ButtonState::Pressed);
     assert_eq!(actions(&app).walk, Vec2::ZERO);
-    type_key(&mut app, KeyCode::KeyP, ButtonState::Pressed);
+    key(&mut app, KeyCode::KeyP, ButtonState::Pressed);
     assert_eq!(actions(&app).walk, Vec2::Y);
 }
 
@@ -122,26 +102,20 @@ fn a_gamepad_walks_looks_and_digs() {
     assert!(actions(&app).look.x > 0.0 && actions(&app).look.y == 0.0);
 }
 
-fn scroll(app: &mut App, unit: MouseScrollUnit, y: f32) -> i32 {
-    let (phase, window) = (TouchPhase::Moved, Entity::PLACEHOLDER);
-    app.world_mut().write_message(MouseWheel { unit, x: 0.0, y, window, phase });
-    app.update();
-    actions(app).growth
-}
-
 #[test]
-fn a_notch_of_the_wheel_is_a_step_and_a_touchpad_scrolls_for_one() {
+fn the_wheel_counts_in_steps_and_a_touchpad_in_fractions_of_them() {
     let mut app = app();
-    assert_eq!(scroll(&mut app, MouseScrollUnit::Line, 1.0), 1);
-    assert_eq!(scroll(&mut app, MouseScrollUnit::Line, -3.0), -3);
+    let mut growth = |unit: MouseScrollUnit, y: f32| {
+        scroll(&mut app, unit, y);
+        actions(&app).growth
+    };
+    assert_eq!(growth(MouseScrollUnit::Line, 1.0), 1);
+    assert_eq!(growth(MouseScrollUnit::Line, -3.0), -3);
     for (unit, by) in [(MouseScrollUnit::Line, 0.1), (MouseScrollUnit::Pixel, 4.0)] {
-        let steps: i32 = (0..50).map(|_| scroll(&mut app, unit, by)).sum();
-        assert_eq!(steps, 5, "{unit:?}");
-        // The other way round counts from its own begin.
-        scroll(&mut app, unit, 0.5 * by);
-        let steps: i32 = (0..20).map(|_| scroll(&mut app, unit, -by)).sum();
-        assert_eq!(steps, -2, "{unit:?}");
+        assert_eq!((0..50).map(|_| growth(unit, by)).sum::<i32>(), 5, "{unit:?}");
+        // The other direction starts from zero.
+        growth(unit, 0.5 * by);
+        assert_eq!((0..20).map(|_| growth(unit, -by)).sum::<i32>(), -2, "{unit:?}");
     }
-    app.update();
-    assert_eq!(actions(&app).growth, 0);
+    assert_eq!(growth(MouseScrollUnit::Line, 0.0), 0);
 }

@@ -1,28 +1,25 @@
-//! Facts about the player's body and eyes.
+//! Tests of the player's steering.
 
 use std::time::Duration;
 
-use bevy::input::InputPlugin as DevicePlugin;
-use bevy::state::app::StatesPlugin;
 use bevy::time::TimeUpdateStrategy;
 
 use super::*;
-use crate::player::input::InputPlugin;
+use crate::test_support::{app_with_input, hold};
 
-/// Steps of the physics that were told to jump.
+/// Physics steps in which a jump was requested.
 #[derive(Resource, Default)]
 struct Jumps(usize);
 
 #[test]
-fn a_tap_between_two_steps_of_the_physics_is_one_jump() {
-    let mut app = App::new();
+fn a_tap_between_two_physics_steps_is_one_jump() {
+    let mut app = app_with_input();
     // Ten frames for each step.
-    app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PlayerPlugin))
+    app.add_plugins(PlayerPlugin)
         .insert_resource(Time::<Fixed>::from_hz(10.0))
         .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(10)))
-        .init_resource::<Settings>()
         .init_resource::<Jumps>()
-        .insert_state(Phase::Playing)
+        .insert_state(GameState::Playing)
         .add_systems(
             FixedUpdate,
             (|players: Query<&CharacterSteering>, mut jumps: ResMut<Jumps>| {
@@ -32,11 +29,9 @@ fn a_tap_between_two_steps_of_the_physics_is_one_jump() {
         );
     app.world_mut().spawn((Player::default(), CharacterSteering::default()));
     app.update();
-    app.world_mut().resource_mut::<Actions>().puppet.push(Action::Jump);
-    app.update();
-    app.world_mut().resource_mut::<Actions>().puppet.clear();
+    hold(&mut app, &[Action::Jump]);
     for _ in 0..40 {
-        app.update();
+        hold(&mut app, &[]);
     }
     assert_eq!(app.world().resource::<Jumps>().0, 1);
 }

@@ -1,4 +1,4 @@
-//! What a tool would change, drawn on the ground.
+//! What the player aims at, and the preview of what the tool would change there.
 
 #[path = "../../shared/gizmos.rs"]
 mod gizmos;
@@ -6,113 +6,163 @@ mod gizmos;
 use bevy::prelude::*;
 use bevy_burrow::debug::draw_shape;
 use bevy_burrow::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use crate::player::Playing;
-use crate::player::game_state::Phase;
+use crate::player::PlayerControlSystems;
+use crate::player::game_state::GameState;
+use crate::tools::digging::affordable_radius;
 use crate::tools::inventory::Inventory;
-use crate::tools::shape::{Aim, Form};
-use crate::tools::voxel_cost;
-use crate::tools::{Hand, Tool};
+use crate::tools::{Hand, Tool, cycle};
 use crate::ui::settings::Settings;
 use crate::ui::widgets::RED;
 
-/// Shows what would be changed.
-pub struct PreviewPlugin;
+/// Where the camera's line of sight meets the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    pub point: Vec3,
+    /// The line of sight.
+    pub direction: Vec3,
+    /// The ground's normal.
+    pub normal: Vec3,
+}
 
-impl Plugin for PreviewPlugin {
+/// The shape of what is built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BuildShape {
+    #[default]
+    Sphere,
+    Cube,
+    /// A capsule along the line of sight.
+    Beam,
+}
+
+impl BuildShape {
+    pub fn next(self) -> Self {
+        cycle(&[Self::Sphere, Self::Cube, Self::Beam], self, 1)
+    }
+
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Sphere => "sphere",
+            Self::Cube => "cube",
+            Self::Beam => "beam",
+        }
+    }
+
+    /// The brush's shape for this aim.
+    pub fn at(self, aim: &Aim, radius: f32) -> Shape {
+        match self {
+            Self::Sphere => Shape::sphere(aim.point, radius),
+            Self::Cube => Shape::cuboid(aim.point, Vec3::splat(radius)),
+            Self::Beam => Shape::capsule(aim.point, aim.point + aim.direction * 3.0 * radius, radius),
+        }
+    }
+}
+
+/// Draws the preview.
+pub struct AimPlugin;
+
+impl Plugin for AimPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Prospect>().add_systems(Startup, gizmos::show_through_ground).add_systems(
+        app.init_resource::<Preview>().add_systems(Startup, gizmos::show_through_ground).add_systems(
             Update,
-            (foresee, show_preview).chain().in_set(Playing).run_if(in_state(Phase::Playing)),
+            (update_preview, draw_preview)
+                .chain()
+                .in_set(PlayerControlSystems)
+                .run_if(in_state(GameState::Playing)),
         );
     }
 }
 
-/// What is wished for, with all that decides how large it gets.
+/// All that decides what the preview shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Wish {
+struct PreviewInput {
     tool: Tool,
-    form: Form,
+    shape: BuildShape,
     aim: Aim,
     radius: f32,
-    /// Voxels of its material that are left; `None` where it takes none.
-    stock: Option<i64>,
+    /// Available voxels of the material; `None` if the tool uses none.
+    available: Option<i64>,
 }
 
-impl Wish {
-    fn new(hand: &Hand, aim: Aim, settings: &Settings, inventory: &Inventory) -> Self {
-        let costs = settings.survival && matches!(hand.tool, Tool::Builder | Tool::Painter);
-        let stock = costs.then(|| inventory.free(hand.material));
-        Self { tool: hand.tool, form: hand.form, aim, radius: hand.radius(hand.tool), stock }
-    }
-
-    fn shape(&self, radius: f32) -> Shape {
+impl PreviewInput {
+    fn shape_at(&self, radius: f32) -> Shape {
         match self.tool {
-            Tool::Builder => self.form.shape(&self.aim, radius),
-            _ => Shape::sphere(self.aim.place, radius),
+            Tool::Builder => self.shape.at(&self.aim, radius),
+            _ => Shape::sphere(self.aim.point, radius),
         }
     }
-
-    /// The radius that comes of it; `None` where too little is left for any.
-    fn granted(&self) -> Option<f32> {
-        let Some(stock) = self.stock else { return Some(self.radius) };
-        let afforded = voxel_cost::affordable(self.tool, self.radius, stock, |radius| self.shape(radius));
-        afforded.map(|(radius, _)| radius)
-    }
 }
 
-/// The wish in hand, and the radius that comes of it.
+/// The latest input, and the radius that the inventory allows; `None` if it allows none.
 #[derive(Resource, Default)]
-struct Prospect(Option<(Wish, Option<f32>)>);
+struct Preview(Option<(PreviewInput, Option<f32>)>);
 
-/// Voxels are counted only for another wish: a large body has thousands.
-fn foresee(
+/// Voxels are counted only if the input changed, because a large brush has thousands.
+fn update_preview(
     hand: Res<Hand>,
     settings: Res<Settings>,
     inventory: Res<Inventory>,
-    mut prospect: ResMut<Prospect>,
+    mut preview: ResMut<Preview>,
 ) {
-    let aim = hand.aim.filter(|_| hand.preview);
-    let wish = aim.map(|aim| Wish::new(&hand, aim, &settings, &inventory));
-    if prospect.0.map(|(last, _)| last) != wish {
-        prospect.0 = wish.map(|wish| (wish, wish.granted()));
+    let uses_material = settings.survival && matches!(hand.tool, Tool::Builder | Tool::Painter);
+    let input = hand.aim.filter(|_| hand.preview).map(|aim| PreviewInput {
+        tool: hand.tool,
+        shape: hand.shape,
+        aim,
+        radius: hand.radius(hand.tool),
+        available: uses_material.then(|| inventory.available(hand.material)),
+    });
+    if preview.0.map(|(last, _)| last) != input {
+        preview.0 = input.map(|input| {
+            let radius = match input.available {
+                Some(available) => {
+                    let shape = |radius| input.shape_at(radius);
+                    affordable_radius(input.tool, input.radius, available, shape).map(|(radius, _)| radius)
+                }
+                None => Some(input.radius),
+            };
+            (input, radius)
+        });
     }
 }
 
-/// The rim of what a tool would change, laid on the ground, or the body that it would build; in red what is wished for
-/// where there is nothing to make it of.
-fn show_preview(prospect: Res<Prospect>, mut gizmos: Gizmos) {
-    let Some((wish, granted)) = prospect.0 else { return };
-    let colour = if granted.is_some() { Color::srgb(1.0, 0.85, 0.25) } else { RED }.with_alpha(0.75);
-    let radius = granted.unwrap_or(wish.radius);
-    match wish.tool {
+/// Draws a circle on the ground, or the shape that would be built. It is red if there is no material for it.
+fn draw_preview(preview: Res<Preview>, mut gizmos: Gizmos) {
+    let Some((input, affordable)) = preview.0 else { return };
+    let color = if affordable.is_some() { Color::srgb(1.0, 0.85, 0.25) } else { RED }.with_alpha(0.75);
+    let radius = affordable.unwrap_or(input.radius);
+    match input.tool {
         Tool::Pickaxe | Tool::Shovel | Tool::Drill | Tool::Painter => {
-            let Aim { place, normal, .. } = wish.aim;
-            let flat = Quat::from_rotation_arc(Vec3::Z, normal.normalize_or(Vec3::Y));
-            gizmos.circle(Isometry3d::new(place + normal * 0.05, flat), radius, colour).resolution(48);
+            let Aim { point, normal, .. } = input.aim;
+            let rotation = Quat::from_rotation_arc(Vec3::Z, normal.normalize_or(Vec3::Y));
+            gizmos.circle(Isometry3d::new(point + normal * 0.05, rotation), radius, color).resolution(48);
         }
-        Tool::Builder => draw_shape(&mut gizmos, &wish.shape(radius), colour),
+        Tool::Builder => draw_shape(&mut gizmos, &input.shape_at(radius), color),
         Tool::Bomb | Tool::Lamp | Tool::Ball => {}
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use bevy_burrow::plugin::voxel_cost;
+
     use super::*;
     use crate::world::landscape::{CONCRETE, ROCK};
 
-    /// A hand that would build a large ball of concrete, of which there is some.
+    /// A builder aims a large sphere of concrete, with some concrete in the inventory.
     fn app() -> App {
         let mut app = App::new();
         app.insert_resource(Hand::new(&Settings::default()))
             .init_resource::<Settings>()
             .init_resource::<Inventory>()
-            .init_resource::<Prospect>()
-            .add_systems(Update, foresee);
+            .init_resource::<Preview>()
+            .add_systems(Update, update_preview);
         let mut hand = app.world_mut().resource_mut::<Hand>();
         hand.set_radius(Tool::Builder, 12.0);
         (hand.tool, hand.material) = (Tool::Builder, CONCRETE);
-        hand.aim = Some(Aim { place: Vec3::splat(20.0), along: Vec3::NEG_Y, normal: Vec3::Y });
+        hand.aim = Some(Aim { point: Vec3::splat(20.0), direction: Vec3::NEG_Y, normal: Vec3::Y });
         app
     }
 
@@ -120,52 +170,50 @@ mod tests {
         app.world_mut().resource_mut::<Hand>()
     }
 
-    /// What is foreseen after a frame.
-    fn granted(app: &mut App) -> Option<f32> {
+    /// The previewed radius after a frame.
+    fn radius(app: &mut App) -> Option<f32> {
         app.update();
-        app.world().resource::<Prospect>().0.and_then(|(_, radius)| radius)
+        app.world().resource::<Preview>().0.and_then(|(_, radius)| radius)
     }
 
     #[test]
-    fn what_is_seen_is_what_the_stock_allows() {
+    fn the_preview_is_as_large_as_the_inventory_allows() {
         let mut app = app();
-        let stock = app.world().resource::<Inventory>().free(CONCRETE);
+        let available = app.world().resource::<Inventory>().available(CONCRETE);
         for tool in [Tool::Builder, Tool::Painter] {
             hand(&mut app).tool = tool;
             hand(&mut app).set_radius(tool, 12.0);
-            let radius = granted(&mut app).expect("enough for a small one");
-            let voxels = voxel_cost::voxels(&Shape::sphere(Vec3::splat(20.0), radius));
-            assert!(voxels <= stock && 10 * voxels > 9 * stock, "{tool:?}: {voxels} of {stock} at {radius}");
+            let radius = radius(&mut app).expect("enough for a small one");
+            let brush = Brush::add(Shape::sphere(Vec3::splat(20.0), radius), CONCRETE);
+            let voxels = voxel_cost(&brush).expect("a valid brush") as i64;
+            assert!(voxels <= available && 10 * voxels > 8 * available, "{tool:?}: {voxels} of {available}");
         }
         hand(&mut app).material = ROCK;
-        assert_eq!(granted(&mut app), None, "there is none");
+        assert_eq!(radius(&mut app), None, "there is no rock");
         app.world_mut().resource_mut::<Settings>().survival = false;
-        assert_eq!(granted(&mut app), Some(12.0), "it costs nothing");
+        assert_eq!(radius(&mut app), Some(12.0), "it costs nothing");
         app.world_mut().resource_mut::<Settings>().survival = true;
         hand(&mut app).tool = Tool::Pickaxe;
-        assert_eq!(granted(&mut app), Some(hand(&mut app).radius(Tool::Pickaxe)), "digging costs nothing");
+        assert_eq!(radius(&mut app), Some(hand(&mut app).radius(Tool::Pickaxe)), "digging costs nothing");
     }
 
     #[test]
-    fn voxels_are_counted_for_another_wish_only() {
+    fn the_preview_is_updated_only_if_something_changed() {
         let mut app = app();
-        let mut counted = |change: fn(&mut App)| {
+        let mut last_change = |change: fn(&mut App)| {
             change(&mut app);
             app.update();
-            app.world().get_resource_change_ticks::<Prospect>().map(|ticks| ticks.changed)
+            app.world().get_resource_change_ticks::<Preview>().map(|ticks| ticks.changed)
         };
-        let first = counted(|_| {});
-        // It is aimed anew in every frame.
-        let same = counted(|app| hand(app).set_changed());
-        assert_eq!(same, first);
-        let moved = counted(|app| {
+        let first = last_change(|_| {});
+        // The aim is computed in every frame.
+        assert_eq!(last_change(|app| hand(app).set_changed()), first);
+        let moved = last_change(|app| {
             let mut hand = hand(app);
-            hand.aim = hand.aim.map(|aim| Aim { place: aim.place + Vec3::X, ..aim });
+            hand.aim = hand.aim.map(|aim| Aim { point: aim.point + Vec3::X, ..aim });
         });
         assert_ne!(moved, first);
-        let spent = counted(|app| {
-            app.world_mut().resource_mut::<Inventory>().gain(CONCRETE, -100);
-        });
+        let spent = last_change(|app| app.world_mut().resource_mut::<Inventory>().gain(CONCRETE, -100));
         assert_ne!(spent, moved);
     }
 }

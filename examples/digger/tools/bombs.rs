@@ -1,4 +1,4 @@
-//! Bombs: thrown, they bounce and roll until the fuse is down, and take a room out of the hill.
+//! Bombs: they bounce and roll until the fuse has burnt down, and blast a room into the hill.
 
 use avian3d::prelude::*;
 use bevy::light::NotShadowCaster;
@@ -6,22 +6,20 @@ use bevy::prelude::*;
 use bevy_burrow::physics::{Character, CharacterMotion};
 use bevy_burrow::prelude::*;
 
-use crate::player::Tremor;
-use crate::tools::digging::Blows;
+use crate::player::camera::CameraShake;
+use crate::tools::digging::{PendingHit, PendingHits};
 use crate::tools::inventory::Inventory;
-use crate::tools::thrown::just_thrown;
-use crate::tools::{Strike, Tool};
-use crate::world::landscape::NewGame;
-use crate::world::particles::{Burst, Matter};
+use crate::tools::thrown::thrown;
+use crate::tools::{Tool, ToolUsed};
+use crate::world::particles::{Burst, ParticleKind};
 
-/// Seconds from the throw to the blast.
+/// Seconds from the throw to the explosion.
 const FUSE: f32 = 2.4;
-/// Metres per second, along the look.
-const THROW: f32 = 14.0;
-/// Of the bomb itself.
+/// Metres per second.
+const SPEED: f32 = 14.0;
 const RADIUS: f32 = 0.16;
 
-/// A bomb on its way, and the seconds that are left to it: a ball of iron, as far as the physics are concerned.
+/// An iron ball that explodes.
 #[derive(Component, Clone, Copy, Debug)]
 #[require(
     Visibility,
@@ -33,42 +31,40 @@ const RADIUS: f32 = 0.16;
     TransformInterpolation
 )]
 pub struct Bomb {
+    /// Seconds until it explodes.
     pub fuse: f32,
 }
 
-/// A bomb went off.
+/// A bomb exploded.
 #[derive(Event, Clone, Copy, Debug)]
-pub struct Blast {
+pub struct Explosion {
     pub place: Vec3,
 }
 
-/// The light of a blast.
+/// The light of an explosion, from 1 down to 0.
 #[derive(Component)]
 struct Flash(f32);
 
-/// What bombs are made of.
 #[derive(Resource)]
-struct Foundry {
-    shell: (Handle<Mesh>, Handle<StandardMaterial>),
-    spark: (Handle<Mesh>, Handle<StandardMaterial>),
+struct BombAssets {
+    shell: (Mesh3d, MeshMaterial3d<StandardMaterial>),
+    spark: (Mesh3d, MeshMaterial3d<StandardMaterial>),
 }
 
-/// Throws bombs and lets them go off.
+/// Lets the player throw bombs.
 pub struct BombsPlugin;
 
 impl Plugin for BombsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Startup, found)
-            .add_systems(Update, burn_fuses.before(BurrowSystems::Collect))
-            .add_systems(Update, fade_flashes)
+        app.add_systems(Startup, create_assets)
+            .add_systems(Update, (burn_fuses.before(BurrowSystems::Collect), fade_flashes))
             .add_observer(throw)
-            .add_observer(defuse)
             .add_observer(explode)
-            .add_observer(shake);
+            .add_observer(push_player);
     }
 }
 
-fn found(
+fn create_assets(
     mut commands: Commands,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
@@ -80,42 +76,26 @@ fn found(
         ..default()
     };
     let glow = StandardMaterial { base_color: Color::linear_rgb(4.0, 2.2, 0.6), unlit: true, ..default() };
-    commands.insert_resource(Foundry {
-        shell: (meshes.add(Sphere::new(RADIUS)), materials.add(iron)),
-        spark: (meshes.add(Sphere::new(0.045)), materials.add(glow)),
+    commands.insert_resource(BombAssets {
+        shell: (Mesh3d(meshes.add(Sphere::new(RADIUS))), MeshMaterial3d(materials.add(iron))),
+        spark: (Mesh3d(meshes.add(Sphere::new(0.045))), MeshMaterial3d(materials.add(glow))),
     });
 }
 
-fn throw(strike: On<Strike>, mut commands: Commands, foundry: Res<Foundry>) {
-    if strike.tool != Tool::Bomb {
+fn throw(used: On<ToolUsed>, mut commands: Commands, assets: Res<BombAssets>) {
+    if used.tool != Tool::Bomb {
         return;
     }
-    let aside = strike.along.cross(Vec3::Y).normalize_or_zero();
-    // No further ahead than the thrower's own skin, so that it is never thrown into a wall.
-    let place = strike.eye + aside * 0.12 - Vec3::Y * 0.1 + strike.along * 0.2;
-    let velocity = strike.along * THROW + Vec3::Y * 2.5;
-    commands.spawn(bomb(&foundry, place, velocity));
-}
-
-/// Everything of a bomb in the air.
-fn bomb(foundry: &Foundry, place: Vec3, velocity: Vec3) -> impl Bundle {
-    let spark = (
-        Mesh3d(foundry.spark.0.clone()),
-        MeshMaterial3d(foundry.spark.1.clone()),
-        Transform::from_xyz(0.0, RADIUS + 0.06, 0.0),
-        NotShadowCaster,
-    );
-    (
+    let right = used.direction.cross(Vec3::Y).normalize_or_zero();
+    // Within the player's own body, so that it never starts in a wall.
+    let place = used.eye + right * 0.12 - Vec3::Y * 0.1 + used.direction * 0.2;
+    commands.spawn((
         Name::new("bomb"),
         Bomb { fuse: FUSE },
-        just_thrown(),
-        LinearVelocity(velocity),
-        AngularVelocity(velocity.cross(Vec3::Y) * -0.4),
-        Mesh3d(foundry.shell.0.clone()),
-        MeshMaterial3d(foundry.shell.1.clone()),
-        Transform::from_translation(place),
-        children![spark],
-    )
+        thrown(place, used.direction * SPEED + Vec3::Y * 2.5, 0.4),
+        assets.shell.clone(),
+        children![(assets.spark.clone(), Transform::from_xyz(0.0, RADIUS + 0.06, 0.0), NotShadowCaster)],
+    ));
 }
 
 fn burn_fuses(mut commands: Commands, time: Res<Time>, mut bombs: Query<(Entity, &mut Bomb, &Transform)>) {
@@ -123,34 +103,27 @@ fn burn_fuses(mut commands: Commands, time: Res<Time>, mut bombs: Query<(Entity,
         bomb.fuse -= time.delta_secs();
         if bomb.fuse <= 0.0 {
             commands.entity(entity).despawn();
-            commands.trigger(Blast { place: place.translation });
+            commands.trigger(Explosion { place: place.translation });
         }
     }
 }
 
-fn defuse(_: On<NewGame>, mut commands: Commands, bombs: Query<Entity, With<Bomb>>) {
-    for bomb in &bombs {
-        commands.entity(bomb).despawn();
-    }
-}
-
-/// The hole, the fire and the light; other bombs near it go off soon.
+/// Digs the crater, with fire and light. Other bombs nearby explode soon after.
 fn explode(
-    blast: On<Blast>,
+    explosion: On<Explosion>,
     mut commands: Commands,
     mut inventory: ResMut<Inventory>,
-    mut blows: ResMut<Blows>,
+    mut hits: ResMut<PendingHits>,
     mut brushes: MessageWriter<Brush>,
     mut bursts: MessageWriter<Burst>,
     mut bombs: Query<(&mut Bomb, &mut LinearVelocity, &Transform)>,
 ) {
-    let (place, (_, radius)) = (blast.place, Tool::Bomb.radii());
-    let tag = inventory.tag();
-    let hole = Brush::dig(Shape::sphere(place, radius)).with_roughness(Roughness::new(1.5, 3.6, 77));
-    brushes.write(hole.with_power(Tool::Bomb.power()).with_tag(tag));
-    blows.await_receipt(tag, place, Vec3::Y, 0.3);
-    let fire = Burst { place, out: Vec3::ZERO, count: 22, speed: 9.0, matter: Matter::Fire };
-    bursts.write(fire);
+    let (place, (_, radius)) = (explosion.place, Tool::Bomb.radii());
+    let tag = inventory.next_tag();
+    let crater = Brush::dig(Shape::sphere(place, radius)).with_roughness(Roughness::new(1.5, 3.6, 77));
+    brushes.write(crater.with_power(Tool::Bomb.power()).with_tag(tag));
+    hits.push(PendingHit { tag, point: place, direction: Vec3::Y, chips: 0.3 });
+    bursts.write(Burst { place, direction: Vec3::ZERO, count: 22, speed: 9.0, kind: ParticleKind::Fire });
     commands.spawn((
         Name::new("flash"),
         Flash(1.0),
@@ -166,17 +139,16 @@ fn explode(
     }
 }
 
-/// Who stands near is shaken and pushed.
-fn shake(
-    blast: On<Blast>,
-    mut tremor: ResMut<Tremor>,
+/// Shakes the camera and pushes the player, depending on the distance.
+fn push_player(
+    explosion: On<Explosion>,
+    mut shake: ResMut<CameraShake>,
     mut bodies: Query<(&Transform, &mut CharacterMotion), With<Character>>,
 ) {
     let (_, radius) = Tool::Bomb.radii();
     for (place, mut motion) in &mut bodies {
-        let away = place.translation - blast.place;
-        let near = (1.0 - away.length() / 40.0).max(0.0);
-        tremor.nudge(1.6 * near);
+        let away = place.translation - explosion.place;
+        shake.add(1.6 * (1.0 - away.length() / 40.0).max(0.0));
         let push = (1.0 - away.length() / (1.6 * radius)).max(0.0);
         if push > 0.0 {
             motion.velocity += away.normalize_or(Vec3::Y) * 11.0 * push;

@@ -1,4 +1,4 @@
-//! Lamps that stay where they are put: on floors, walls and ceilings, until the ground under them is dug away.
+//! Lamps: they stand on floors, walls and ceilings until the ground under them is dug away.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -8,53 +8,51 @@ use bevy::prelude::*;
 use bevy::time::common_conditions::on_timer;
 use bevy_burrow::prelude::*;
 
-use crate::tools::{Strike, Tool};
+use crate::tools::{Tool, ToolUsed};
 use crate::ui::hud::Hint;
-use crate::world::landscape::NewGame;
+use crate::world::landscape::DespawnOnNewGame;
 
-/// As many as can be up at once; the oldest makes way for one more.
-pub const LAMPS: usize = 24;
-/// Luminous power in lumens, as a game needs it and not as a shop sells it.
+/// The oldest lamp is removed if there would be more.
+const MAX_LAMPS: usize = 24;
+/// Luminous power in lumens, much higher than a real lamp's.
 const POWER: f32 = 2_200_000.0;
-
-/// The bulb's middle, from the foot.
+/// The middle of the bulb, seen from the foot.
 const BULB: Vec3 = Vec3::new(0.0, 0.38, 0.0);
 
-/// A lamp, and the ground it holds on to.
 #[derive(Component, Clone, Copy, Debug)]
-#[require(Transform, Visibility)]
-pub struct Lamp {
-    /// A place in the ground below it.
-    pub root: Vec3,
+#[require(Transform, Visibility, DespawnOnNewGame)]
+struct Lamp {
+    /// A point in the ground below it.
+    root: Vec3,
 }
 
 /// All lamps, the oldest first.
 #[derive(Resource, Default, Debug)]
-pub struct Lamps(pub VecDeque<Entity>);
+struct Lamps(VecDeque<Entity>);
 
-/// What lamps are made of.
 #[derive(Resource)]
-struct Workshop {
-    post: (Handle<Mesh>, Handle<StandardMaterial>),
-    bulb: (Handle<Mesh>, Handle<StandardMaterial>),
+struct LampAssets {
+    post: Handle<Mesh>,
+    bulb: Handle<Mesh>,
     cap: Handle<Mesh>,
+    iron: Handle<StandardMaterial>,
+    glow: Handle<StandardMaterial>,
 }
 
-/// Puts lamps up.
+/// Lets the player place lamps.
 pub struct LampsPlugin;
 
 impl Plugin for LampsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Lamps>()
-            .add_systems(Startup, open_workshop)
-            .add_systems(Update, fall.run_if(on_timer(Duration::from_millis(200))))
+            .add_systems(Startup, create_assets)
+            .add_systems(Update, remove_loose_lamps.run_if(on_timer(Duration::from_millis(200))))
             .add_observer(place)
-            .add_observer(take_down)
             .add_observer(forget);
     }
 }
 
-fn open_workshop(
+fn create_assets(
     mut commands: Commands,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
@@ -65,34 +63,29 @@ fn open_workshop(
         ..default()
     };
     let glow = StandardMaterial { base_color: Color::linear_rgb(3.2, 2.2, 0.9), unlit: true, ..default() };
-    commands.insert_resource(Workshop {
-        post: (meshes.add(Cylinder::new(0.035, 0.36)), materials.add(iron)),
-        bulb: (meshes.add(Sphere::new(0.10)), materials.add(glow)),
+    commands.insert_resource(LampAssets {
+        post: meshes.add(Cylinder::new(0.035, 0.36)),
+        bulb: meshes.add(Sphere::new(0.10)),
         cap: meshes.add(Cylinder::new(0.13, 0.04)),
+        iron: materials.add(iron),
+        glow: materials.add(glow),
     });
 }
 
 fn place(
-    strike: On<Strike>,
+    used: On<ToolUsed>,
     mut commands: Commands,
-    workshop: Res<Workshop>,
+    assets: Res<LampAssets>,
     mut lamps: ResMut<Lamps>,
     mut hints: MessageWriter<Hint>,
 ) {
-    let Some(aim) = strike.aim.filter(|_| strike.tool == Tool::Lamp) else { return };
-    if lamps.0.len() >= LAMPS
+    let Some(aim) = used.aim.filter(|_| used.tool == Tool::Lamp) else { return };
+    if lamps.0.len() >= MAX_LAMPS
         && let Some(oldest) = lamps.0.pop_front()
     {
-        hints.write(Hint::new(format!("{LAMPS} lamps are all there are: the first one is put up here")));
+        hints.write(Hint(format!("there are only {MAX_LAMPS} lamps: the oldest one was moved here")));
         commands.entity(oldest).despawn();
     }
-    let lamp = commands.spawn(lamp(&workshop, aim.place, aim.normal)).id();
-    lamps.0.push_back(lamp);
-}
-
-/// Everything of a lamp on the ground.
-fn lamp(workshop: &Workshop, place: Vec3, normal: Vec3) -> impl Bundle {
-    let upright = Quat::from_rotation_arc(Vec3::Y, normal.normalize_or(Vec3::Y));
     let part = |mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, y: f32| {
         (
             Mesh3d(mesh.clone()),
@@ -108,21 +101,23 @@ fn lamp(workshop: &Workshop, place: Vec3, normal: Vec3) -> impl Bundle {
         radius: 0.1,
         ..default()
     };
-    (
+    let rotation = Quat::from_rotation_arc(Vec3::Y, aim.normal.normalize_or(Vec3::Y));
+    let lamp = commands.spawn((
         Name::new("lamp"),
-        Lamp { root: place - normal * 0.4 },
-        Transform::from_translation(place).with_rotation(upright),
+        Lamp { root: aim.point - aim.normal * 0.4 },
+        Transform::from_translation(aim.point).with_rotation(rotation),
         children![
-            part(&workshop.post.0, &workshop.post.1, 0.12),
-            part(&workshop.bulb.0, &workshop.bulb.1, BULB.y),
-            part(&workshop.cap, &workshop.post.1, 0.50),
+            part(&assets.post, &assets.iron, 0.12),
+            part(&assets.bulb, &assets.glow, BULB.y),
+            part(&assets.cap, &assets.iron, 0.50),
             (light, Transform::from_xyz(0.0, 0.55, 0.0)),
         ],
-    )
+    ));
+    lamps.0.push_back(lamp.id());
 }
 
-/// What lost its ground is gone, and so is what is buried: a light in a hill would shine through it.
-fn fall(mut commands: Commands, terrains: Terrains, lamps: Query<(Entity, &Lamp, &Transform)>) {
+/// Removes lamps whose ground was dug away, and buried lamps, whose light would shine through the hill.
+fn remove_loose_lamps(mut commands: Commands, terrains: Terrains, lamps: Query<(Entity, &Lamp, &Transform)>) {
     for (entity, lamp, place) in &lamps {
         if !terrains.is_solid(lamp.root) || terrains.is_solid(place.transform_point(BULB)) {
             commands.entity(entity).despawn();
@@ -130,41 +125,29 @@ fn fall(mut commands: Commands, terrains: Terrains, lamps: Query<(Entity, &Lamp,
     }
 }
 
-/// A new game begins in the dark.
-fn take_down(_: On<NewGame>, mut commands: Commands, lamps: Query<Entity, With<Lamp>>) {
-    for lamp in &lamps {
-        commands.entity(lamp).despawn();
-    }
-}
-
-fn forget(gone: On<Remove, Lamp>, mut lamps: ResMut<Lamps>) {
-    lamps.0.retain(|lamp| *lamp != gone.entity);
+fn forget(removed: On<Remove, Lamp>, mut lamps: ResMut<Lamps>) {
+    lamps.0.retain(|lamp| *lamp != removed.entity);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_support::spawn_flat_terrain;
 
     #[test]
-    fn a_lamp_goes_with_its_ground_and_when_it_is_buried() {
+    fn lamps_in_the_air_or_in_the_ground_are_removed() {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, BurrowPlugins)).init_resource::<Lamps>().add_observer(forget);
-        app.finish();
-        app.cleanup();
-        let ground = Ground::from_fn(64, 64, |_, _| 20.0).expect("a small world");
-        app.world_mut().spawn(Terrain::new(ground, &TerrainSettings::default()).expect("default settings"));
+        spawn_flat_terrain(&mut app);
         app.update();
-        let mut stands = |foot: Vec3| {
+        for (height, stays) in [(20.0, true), (25.0, false), (12.0, false)] {
+            let foot = Vec3::new(30.0, height, 30.0);
             let lamp = (Lamp { root: foot - Vec3::Y * 0.4 }, Transform::from_translation(foot));
             let lamp = app.world_mut().spawn(lamp).id();
             app.world_mut().resource_mut::<Lamps>().0.push_back(lamp);
-            app.world_mut().run_system_cached(fall).expect("a system");
-            let stands = app.world().get_entity(lamp).is_ok();
-            assert_eq!(app.world().resource::<Lamps>().0.contains(&lamp), stands);
-            stands
-        };
-        assert!(stands(Vec3::new(30.0, 20.0, 30.0)));
-        assert!(!stands(Vec3::new(30.0, 25.0, 30.0)), "in the air");
-        assert!(!stands(Vec3::new(30.0, 12.0, 30.0)), "in the ground");
+            app.world_mut().run_system_cached(remove_loose_lamps).expect("a system");
+            assert_eq!(app.world().get_entity(lamp).is_ok(), stays, "at {height}");
+            assert_eq!(app.world().resource::<Lamps>().0.contains(&lamp), stays);
+        }
     }
 }

@@ -1,7 +1,7 @@
-//! The eight tools, and what the hand does with them: aim, choose, swing.
+//! The eight tools: choosing one, aiming it and using it.
 //!
-//! A held button swings the tool again and again; in the moment of the hit a [`Strike`] is triggered, and whoever is
-//! responsible for the tool observes it.
+//! A held button uses the tool again and again. Each use starts a [`Swing`]; in the moment of the hit, [`ToolUsed`] is triggered.
+//! The file of each tool observes it.
 
 pub mod aim;
 pub mod balls;
@@ -10,23 +10,20 @@ pub mod digging;
 pub mod hardness;
 pub mod inventory;
 pub mod lamps;
-pub mod shape;
 pub mod thrown;
 pub mod tool_in_hand;
-pub mod voxel_cost;
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
-use crate::player::Playing;
-use crate::player::game_state::Phase;
+use self::aim::{Aim, BuildShape};
+use crate::player::PlayerControlSystems;
+use crate::player::camera::PlayerCamera;
+use crate::player::game_state::GameState;
 use crate::player::input::{Action, Actions};
-use crate::tools::shape::{Aim, Form};
 use crate::ui::settings::Settings;
 use crate::world::landscape::{MATERIALS, NewGame, ROCK};
-use crate::world::light::Eyes;
 
-/// Something to hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Tool {
     #[default]
@@ -40,23 +37,25 @@ pub enum Tool {
     Ball,
 }
 
-/// How a tool is used.
-struct Manner {
+struct ToolStats {
+    /// The action that selects it.
+    slot: Action,
     label: &'static str,
     purpose: &'static str,
-    /// Seconds from swing to swing, and from its begin to the hit.
+    /// Seconds of a swing, and from its start to the hit.
     period: f32,
     hit: f32,
     /// Metres that it reaches.
     reach: f32,
-    /// Its brush: least radius, greatest, and the one it begins with.
+    /// The radius of its brush: minimum, maximum and initial value.
     radius: (f32, f32, f32),
-    /// How hard the ground may be that it breaks at once.
+    /// The hardness of material that it breaks at once, see [`DiggingRules`].
     power: u8,
 }
 
-const MANNERS: [Manner; 8] = [
-    Manner {
+const STATS: [ToolStats; 8] = [
+    ToolStats {
+        slot: Action::Slot1,
         label: "pickaxe",
         purpose: "breaks the ground, blow by blow",
         period: 0.44,
@@ -65,7 +64,8 @@ const MANNERS: [Manner; 8] = [
         radius: (1.0, 3.5, 1.8),
         power: 150,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot2,
         label: "shovel",
         purpose: "smooths what is rough",
         period: 0.36,
@@ -74,7 +74,8 @@ const MANNERS: [Manner; 8] = [
         radius: (1.5, 6.0, 3.0),
         power: 75,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot3,
         label: "drill",
         purpose: "drives a tunnel straight ahead",
         period: 0.20,
@@ -83,7 +84,8 @@ const MANNERS: [Manner; 8] = [
         radius: (1.0, 3.5, 2.1),
         power: 190,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot4,
         label: "builder",
         purpose: "puts down what was dug",
         period: 0.26,
@@ -92,7 +94,8 @@ const MANNERS: [Manner; 8] = [
         radius: (1.0, 12.0, 2.0),
         power: u8::MAX,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot5,
         label: "painter",
         purpose: "paints the ground with what was dug",
         period: 0.26,
@@ -101,7 +104,8 @@ const MANNERS: [Manner; 8] = [
         radius: (1.0, 12.0, 2.5),
         power: u8::MAX,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot6,
         label: "bomb",
         purpose: "flies, bounces, and takes a room out of a hill",
         period: 0.80,
@@ -110,17 +114,18 @@ const MANNERS: [Manner; 8] = [
         radius: (5.5, 5.5, 5.5),
         power: u8::MAX,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot7,
         label: "lamp",
         purpose: "stays where it is put, and lights a cave",
         period: 0.50,
         hit: 0.16,
-        // Across a room.
         reach: 14.0,
         radius: (0.3, 0.3, 0.3),
         power: u8::MAX,
     },
-    Manner {
+    ToolStats {
+        slot: Action::Slot8,
         label: "ball",
         purpose: "bounces, and rolls to where it is deepest",
         period: 0.50,
@@ -132,7 +137,7 @@ const MANNERS: [Manner; 8] = [
 ];
 
 impl Tool {
-    /// In the order of their slots.
+    /// All tools, in the order of their slots.
     pub const ALL: [Self; 8] = [
         Self::Pickaxe,
         Self::Shovel,
@@ -144,78 +149,68 @@ impl Tool {
         Self::Ball,
     ];
 
-    const SLOTS: [Action; 8] = [
-        Action::Slot1,
-        Action::Slot2,
-        Action::Slot3,
-        Action::Slot4,
-        Action::Slot5,
-        Action::Slot6,
-        Action::Slot7,
-        Action::Slot8,
-    ];
-
-    const fn manner(self) -> &'static Manner {
-        &MANNERS[self as usize]
+    const fn stats(self) -> &'static ToolStats {
+        &STATS[self as usize]
     }
 
     pub const fn label(self) -> &'static str {
-        self.manner().label
+        self.stats().label
     }
 
     pub const fn purpose(self) -> &'static str {
-        self.manner().purpose
+        self.stats().purpose
     }
 
-    /// The least and the greatest radius of its brush.
+    /// The minimum and maximum radius of its brush.
     pub const fn radii(self) -> (f32, f32) {
-        (self.manner().radius.0, self.manner().radius.1)
+        (self.stats().radius.0, self.stats().radius.1)
     }
 
-    /// How hard the ground may be that it breaks at once, see [`DiggingRules`].
+    /// The hardness of material that it breaks at once, see [`DiggingRules`].
     pub const fn power(self) -> u8 {
-        self.manner().power
+        self.stats().power
     }
 
-    /// The action that takes it.
+    /// The action that selects it.
     pub const fn slot(self) -> Action {
-        Self::SLOTS[self as usize]
+        self.stats().slot
     }
 
-    /// Where the look meets the ground, if the tool reaches it.
-    fn aim(self, terrains: &Terrains, eyes: &Transform) -> Option<Aim> {
-        let along = eyes.forward();
-        let hit = terrains.raycast(Ray3d::new(eyes.translation, along), self.manner().reach)?;
-        Some(Aim { place: hit.position, along: *along, normal: hit.normal })
-    }
-
-    /// The tool that lies `by` slots further.
-    fn after(self, by: usize) -> Self {
-        Self::ALL[(self as usize + by) % Self::ALL.len()]
+    /// What the camera looks at, if the tool reaches it.
+    fn aim(self, terrains: &Terrains, camera: &Transform) -> Option<Aim> {
+        let direction = camera.forward();
+        let hit = terrains.raycast(Ray3d::new(camera.translation, direction), self.stats().reach)?;
+        Some(Aim { point: hit.position, direction: *direction, normal: hit.normal })
     }
 }
 
-/// What the hand holds and what it is about to do.
+/// The element so many places after another one, in a list that goes round.
+fn cycle<T: Copy + PartialEq>(all: &[T], from: T, by: usize) -> T {
+    let at = all.iter().position(|one| *one == from).unwrap_or(0);
+    all[(at + by) % all.len()]
+}
+
+/// The player's tool, and how it is set up.
 #[derive(Resource)]
 pub struct Hand {
     pub tool: Tool,
-    pub form: Form,
+    pub shape: BuildShape,
     pub material: MaterialId,
     radii: [f32; 8],
-    /// What is aimed at, if the tool in hand reaches it; the one that swings may be another.
+    /// What the selected tool aims at, if it reaches it. During a swing, another tool may be in use.
     pub aim: Option<Aim>,
-    /// Show what a dig would take?
+    /// Show what the tool would change?
     pub preview: bool,
 }
 
 impl Hand {
-    /// Empty, with brushes as the settings have them.
+    /// The first tool, with brushes as the settings have them.
     pub fn new(settings: &Settings) -> Self {
         let radii = Tool::ALL.map(|tool| match tool {
             Tool::Pickaxe | Tool::Builder => settings.radius.clamp(tool.radii().0, tool.radii().1),
-            _ => tool.manner().radius.2,
+            _ => tool.stats().radius.2,
         });
-        Self { tool: default(), form: settings.form, material: ROCK, radii, aim: None, preview: true }
+        Self { tool: default(), shape: settings.shape, material: ROCK, radii, aim: None, preview: true }
     }
 
     /// The radius of a tool's brush.
@@ -223,45 +218,45 @@ impl Hand {
         self.radii[tool as usize]
     }
 
-    /// Sets it, as far as the tool allows.
+    /// Sets the radius of a tool's brush, within the tool's limits.
     pub fn set_radius(&mut self, tool: Tool, radius: f32) {
         let (low, high) = tool.radii();
         self.radii[tool as usize] = radius.clamp(low, high);
     }
 }
 
-/// The tool on its way: how long it has been swung, and whether it has hit.
+/// The swing of a tool.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct Swing {
     pub tool: Tool,
-    /// Seconds since it began; `None` while the hand rests.
-    since: Option<f32>,
+    /// Seconds since it began; `None` if there is none.
+    time: Option<f32>,
     has_hit: bool,
 }
 
 impl Swing {
-    /// How far it is: -1 to 0 before the hit, 0 to 1 after it; `None` at rest.
+    /// The phase of the swing: -1 to 0 before the hit, 0 to 1 after it. `None` if there is no swing.
     pub fn phase(&self) -> Option<f32> {
-        let Manner { period, hit, .. } = *self.tool.manner();
-        self.since.map(|since| if since < hit { since / hit - 1.0 } else { (since - hit) / (period - hit) })
+        let ToolStats { period, hit, .. } = *self.tool.stats();
+        self.time.map(|time| if time < hit { time / hit - 1.0 } else { (time - hit) / (period - hit) })
     }
 
-    /// Lets time pass while a tool is wanted or not, and says whether it hits now.
+    /// Advances the swing, or starts one with the wanted tool. Returns whether the tool hits in this frame.
     pub fn advance(&mut self, wanted: Option<Tool>, dt: f32) -> bool {
-        let Some(since) = &mut self.since else {
+        let Some(time) = &mut self.time else {
             if let Some(tool) = wanted {
-                *self = Self { tool, since: Some(0.0), has_hit: false };
+                *self = Self { tool, time: Some(0.0), has_hit: false };
             }
             return false;
         };
-        *since += dt;
-        let Manner { period, hit, .. } = *self.tool.manner();
-        let hits = !self.has_hit && *since >= hit;
+        *time += dt;
+        let ToolStats { period, hit, .. } = *self.tool.stats();
+        let hits = !self.has_hit && *time >= hit;
         self.has_hit |= hits;
-        if *since >= period {
-            // What is left of the frame belongs to the next swing, so that the rhythm keeps its time.
-            let rest = (*since - period).min(hit * 0.5);
-            self.since = wanted.map(|_| rest);
+        if *time >= period {
+            // The rest of the frame belongs to the next swing, so that the rate does not depend on the frame rate.
+            let rest = (*time - period).min(hit * 0.5);
+            self.time = wanted.map(|_| rest);
             self.tool = wanted.unwrap_or(self.tool);
             self.has_hit = false;
         }
@@ -269,78 +264,83 @@ impl Swing {
     }
 }
 
-/// The tool sinks, and what it was about to do it does not.
-pub fn put_down(mut swing: ResMut<Swing>) {
+/// Ends the swing without a hit.
+pub fn cancel_swing(mut swing: ResMut<Swing>) {
     *swing = default();
 }
 
 /// A tool hits.
 #[derive(Event, Clone, Copy, Debug)]
-pub struct Strike {
+pub struct ToolUsed {
     pub tool: Tool,
-    /// What is in its own reach.
+    /// What is in its reach.
     pub aim: Option<Aim>,
+    /// Position and direction of the camera.
     pub eye: Vec3,
-    pub along: Vec3,
+    pub direction: Vec3,
 }
 
-/// Aims, chooses and swings.
+/// Lets the player choose, aim and use tools.
 pub struct ToolsPlugin;
 
 impl Plugin for ToolsPlugin {
     fn build(&self, app: &mut App) {
         let hand = Hand::new(app.world().resource::<Settings>());
-        app.insert_resource(hand).init_resource::<Swing>().add_observer(begin_anew).add_systems(
-            Update,
-            (follow_settings, (aim, choose, swing).chain().in_set(Playing).run_if(in_state(Phase::Playing))),
-        );
+        app.insert_resource(hand)
+            .init_resource::<Swing>()
+            .add_observer(|_: On<NewGame>, settings: Res<Settings>, mut hand: ResMut<Hand>| {
+                *hand = Hand::new(&settings);
+            })
+            .add_systems(
+                Update,
+                (
+                    apply_settings,
+                    (aim, choose, swing)
+                        .chain()
+                        .in_set(PlayerControlSystems)
+                        .run_if(in_state(GameState::Playing)),
+                ),
+            );
     }
 }
 
-fn begin_anew(_: On<NewGame>, settings: Res<Settings>, mut hand: ResMut<Hand>) {
-    *hand = Hand::new(&settings);
+/// Applies a changed radius or shape. Other settings leave the hand as the player set it up.
+fn apply_settings(
+    settings: Res<Settings>,
+    mut hand: ResMut<Hand>,
+    mut last: Local<Option<(f32, BuildShape)>>,
+) {
+    let Some((radius, shape)) = last.replace((settings.radius, settings.shape)) else { return };
+    if radius != settings.radius {
+        hand.set_radius(Tool::Pickaxe, settings.radius);
+        hand.set_radius(Tool::Builder, settings.radius);
+    }
+    if shape != settings.shape {
+        hand.shape = settings.shape;
+    }
 }
 
-/// A radius or a form that was just set is in the hand at once; other settings leave it alone.
-fn follow_settings(settings: Res<Settings>, mut hand: ResMut<Hand>, mut last: Local<Option<(f32, Form)>>) {
-    let now = (settings.radius, settings.form);
-    let Some((radius, form)) = last.replace(now) else { return };
-    if radius != now.0 {
-        hand.set_radius(Tool::Pickaxe, now.0);
-        hand.set_radius(Tool::Builder, now.0);
-    }
-    if form != now.1 {
-        hand.form = now.1;
-    }
-}
-
-fn aim(terrains: Terrains, eyes: Single<&Transform, With<Eyes>>, mut hand: ResMut<Hand>) {
-    hand.aim = hand.tool.aim(&terrains, &eyes);
+fn aim(terrains: Terrains, camera: Single<&Transform, With<PlayerCamera>>, mut hand: ResMut<Hand>) {
+    hand.aim = hand.tool.aim(&terrains, &camera);
 }
 
 fn choose(actions: Res<Actions>, mut hand: ResMut<Hand>) {
-    let slot = Tool::SLOTS.into_iter().zip(Tool::ALL).find(|(slot, _)| actions.just_pressed(*slot));
-    if let Some((_, tool)) = slot {
+    if let Some(tool) = Tool::ALL.into_iter().find(|tool| actions.just_pressed(tool.slot())) {
         hand.tool = tool;
     }
-    if actions.just_pressed(Action::NextTool) {
-        hand.tool = hand.tool.after(1);
+    let materials = MATERIALS.map(|(material, _)| material);
+    for (action, by) in [(Action::NextTool, 1), (Action::PreviousTool, Tool::ALL.len() - 1)] {
+        if actions.just_pressed(action) {
+            hand.tool = cycle(&Tool::ALL, hand.tool, by);
+        }
     }
-    if actions.just_pressed(Action::PreviousTool) {
-        hand.tool = hand.tool.after(Tool::ALL.len() - 1);
+    for (action, by) in [(Action::NextMaterial, 1), (Action::PreviousMaterial, materials.len() - 1)] {
+        if actions.just_pressed(action) {
+            hand.material = cycle(&materials, hand.material, by);
+        }
     }
-    let further = |hand: &Hand, by: usize| {
-        let at = MATERIALS.iter().position(|(id, _)| *id == hand.material).unwrap_or(0);
-        MATERIALS[(at + by) % MATERIALS.len()].0
-    };
-    if actions.just_pressed(Action::NextMaterial) {
-        hand.material = further(&hand, 1);
-    }
-    if actions.just_pressed(Action::PreviousMaterial) {
-        hand.material = further(&hand, MATERIALS.len() - 1);
-    }
-    if actions.just_pressed(Action::Form) {
-        hand.form = hand.form.next();
+    if actions.just_pressed(Action::BuildShape) {
+        hand.shape = hand.shape.next();
     }
     if actions.growth != 0 {
         let tool = hand.tool;
@@ -355,20 +355,18 @@ fn swing(
     actions: Res<Actions>,
     hand: Res<Hand>,
     terrains: Terrains,
-    eyes: Single<&Transform, With<Eyes>>,
+    camera: Single<&Transform, With<PlayerCamera>>,
     mut swing: ResMut<Swing>,
 ) {
     let wanted = if actions.pressed(Action::Use) {
         Some(hand.tool)
-    } else if actions.pressed(Action::Build) {
-        Some(Tool::Builder)
     } else {
-        None
+        actions.pressed(Action::Build).then_some(Tool::Builder)
     };
     let tool = swing.tool;
     if swing.advance(wanted, time.delta_secs()) {
-        let aim = tool.aim(&terrains, &eyes);
-        commands.trigger(Strike { tool, aim, eye: eyes.translation, along: *eyes.forward() });
+        let aim = tool.aim(&terrains, &camera);
+        commands.trigger(ToolUsed { tool, aim, eye: camera.translation, direction: *camera.forward() });
     }
 }
 

@@ -1,4 +1,4 @@
-//! The tool that the player sees in hand: simple shapes, close to the eyes, swung as the hand swings.
+//! The model of the tool in the player's hand: simple shapes close to the camera, animated with the swing.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -7,261 +7,281 @@ use bevy::prelude::*;
 use bevy_burrow::physics::Character;
 use bevy_burrow::prelude::*;
 
-use crate::player::Drone;
+use self::PartMaterial as M;
+use self::PartMesh as P;
 use crate::player::body::Body;
-use crate::player::game_state::Phase;
+use crate::player::camera::{DetachedCamera, PlayerCamera};
+use crate::player::game_state::GameState;
 use crate::tools::{Hand, Swing, Tool};
-use crate::world::light::Eyes;
+use crate::world::landscape;
 
-/// The hand itself; each tool is a child of it.
+/// The parent of all models.
 #[derive(Component)]
-pub struct Held;
+pub struct ToolRoot;
 
-/// One of the tools in the hand; only the chosen one is seen.
+/// The model of a tool. Only the selected tool's is visible.
 #[derive(Component)]
 struct Model(Tool);
 
-/// What turns while the drill works.
+/// The part of the drill that rotates.
 #[derive(Component)]
-struct Bit;
+struct DrillBit;
 
-/// Has the colour of the chosen material.
+/// Has the colour of the selected material.
 #[derive(Component)]
-struct Sample;
+struct MaterialSample;
 
-/// Is the hand shown at all? Not on pictures of the landscape.
+/// Is the tool shown? Scripts hide it for pictures of the landscape.
 #[derive(Resource)]
-pub struct ShowHand(pub bool);
+pub struct ShowTool(pub bool);
 
 /// Shows the tool in hand.
-pub struct HeldPlugin;
+pub struct ToolInHandPlugin;
 
-impl Plugin for HeldPlugin {
+impl Plugin for ToolInHandPlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(ShowHand(true))
-            .add_systems(PostStartup, grip)
-            .add_systems(Update, (show, carry, tint).after(BurrowSystems::Propagate));
+        app.insert_resource(ShowTool(true))
+            .add_systems(PostStartup, spawn_models)
+            .add_systems(Update, (show, animate, color_sample).after(BurrowSystems::Propagate));
     }
 }
 
-/// Where the hand rests, seen from the eyes: so near that no wall comes between.
+/// The position at rest, relative to the camera. It is so close that no wall comes in between.
 const REST: Vec3 = Vec3::new(0.155, -0.165, -0.30);
 
-/// Plates of the drill's thread.
-const THREAD: usize = 16;
-
-fn grip(
-    mut commands: Commands,
-    eyes: Single<Entity, With<Eyes>>,
-    mut meshes: ResMut<Assets<Mesh>>,
-    mut materials: ResMut<Assets<StandardMaterial>>,
-) {
-    let mut dye = |color: Color, roughness: f32, metallic: f32| {
-        materials.add(StandardMaterial {
-            base_color: color,
-            perceptual_roughness: roughness,
-            metallic,
-            ..default()
-        })
-    };
-    let wood = dye(Color::srgb(0.45, 0.29, 0.16), 0.85, 0.0);
-    let steel = dye(Color::srgb(0.52, 0.55, 0.58), 0.42, 0.55);
-    // So near to the wall that the lamp would burn anything brighter.
-    let gunmetal = dye(Color::srgb(0.27, 0.28, 0.30), 0.55, 0.4);
-    let dark = dye(Color::srgb(0.10, 0.10, 0.11), 0.5, 0.3);
-    let red = dye(Color::srgb(0.66, 0.16, 0.10), 0.6, 0.0);
-    let bristle = dye(Color::srgb(0.80, 0.72, 0.52), 0.95, 0.0);
-    let rubber = dye(Color::hsl(8.0, 0.75, 0.45), 0.55, 0.0);
-    let sample = dye(Color::WHITE, 0.95, 0.0);
-    let glow = materials.add(StandardMaterial {
-        base_color: Color::linear_rgb(2.6, 1.7, 0.6),
-        unlit: true,
-        ..default()
-    });
-
-    let rod = meshes.add(Cylinder::new(0.010, 0.34));
-    let spike = meshes.add(Cone::new(0.017, 0.13));
-    let block = meshes.add(Cuboid::from_length(1.0));
-    let ball = meshes.add(Sphere::new(1.0).mesh().ico(3).unwrap_or_else(|_| Sphere::new(1.0).mesh().build()));
-    let tube = meshes.add(Cylinder::new(1.0, 1.0));
-    let cone = meshes.add(Cone::new(1.0, 1.0));
-
-    let at = Transform::from_xyz;
-    let pitch = |by: f32| Quat::from_rotation_x(by);
-    type Part = (Handle<Mesh>, Handle<StandardMaterial>, Transform);
-    let part = |mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, place: Transform| -> Part {
-        (mesh.clone(), material.clone(), place)
-    };
-    // A drum on the drill's axis, which points ahead.
-    let along = |material: &Handle<StandardMaterial>, radius: f32, length: f32, z: f32| -> Part {
-        let place = at(0.0, 0.05, z).with_rotation(pitch(FRAC_PI_2));
-        part(&tube, material, place.with_scale(Vec3::new(radius, length, radius)))
-    };
-    let models: [(Tool, Vec<Part>); 8] = [
-        (
-            Tool::Pickaxe,
-            vec![
-                part(&rod, &wood, at(0.0, 0.0, 0.0)),
-                part(&block, &steel, at(0.0, 0.155, 0.0).with_scale(Vec3::new(0.026, 0.030, 0.052))),
-                part(&spike, &steel, at(0.0, 0.146, -0.085).with_rotation(pitch(-FRAC_PI_2 - 0.16))),
-                part(&spike, &steel, at(0.0, 0.146, 0.085).with_rotation(pitch(FRAC_PI_2 + 0.16))),
-            ],
-        ),
-        (
-            Tool::Shovel,
-            vec![
-                part(&rod, &wood, at(0.0, -0.01, 0.0)),
-                part(&block, &steel, at(0.0, 0.19, 0.0).with_scale(Vec3::new(0.095, 0.12, 0.008))),
-                part(&cone, &steel, at(0.0, 0.275, 0.0).with_scale(Vec3::new(0.0475, 0.05, 0.004))),
-            ],
-        ),
-        (
-            Tool::Drill,
-            vec![
-                // Motor, its bands and vents, the gearbox, and the chuck.
-                along(&red, 0.032, 0.120, 0.020),
-                along(&dark, 0.029, 0.016, 0.086),
-                along(&steel, 0.0332, 0.006, 0.062),
-                along(&steel, 0.0332, 0.006, -0.030),
-                along(&dark, 0.026, 0.030, -0.055),
-                along(&steel, 0.019, 0.028, -0.084),
-                part(&block, &dark, at(0.0, 0.081, 0.016).with_scale(Vec3::new(0.022, 0.006, 0.060))),
-                part(&block, &dark, at(-0.031, 0.058, 0.016).with_scale(Vec3::new(0.006, 0.018, 0.060))),
-                // The grip with its trigger, and the handle for the other hand.
-                part(
-                    &block,
-                    &dark,
-                    at(0.0, -0.018, 0.052)
-                        .with_rotation(pitch(0.25))
-                        .with_scale(Vec3::new(0.028, 0.105, 0.036)),
-                ),
-                part(&block, &red, at(0.0, 0.002, 0.026).with_scale(Vec3::new(0.012, 0.024, 0.012))),
-                part(
-                    &tube,
-                    &dark,
-                    at(-0.060, 0.050, -0.052)
-                        .with_rotation(Quat::from_rotation_z(FRAC_PI_2))
-                        .with_scale(Vec3::new(0.011, 0.075, 0.011)),
-                ),
-            ],
-        ),
-        (Tool::Builder, vec![]),
-        (
-            Tool::Painter,
-            vec![
-                part(&rod, &wood, at(0.0, -0.03, 0.0)),
-                part(&block, &steel, at(0.0, 0.15, 0.0).with_scale(Vec3::new(0.075, 0.03, 0.024))),
-                part(&block, &bristle, at(0.0, 0.185, 0.0).with_scale(Vec3::new(0.072, 0.05, 0.020))),
-            ],
-        ),
-        (
-            Tool::Bomb,
-            vec![
-                part(&ball, &dark, at(0.0, 0.03, 0.0).with_scale(Vec3::splat(0.042))),
-                part(&tube, &dark, at(0.0, 0.072, 0.0).with_scale(Vec3::new(0.012, 0.014, 0.012))),
-                part(&ball, &glow, at(0.0, 0.088, 0.0).with_scale(Vec3::splat(0.008))),
-            ],
-        ),
-        (
-            Tool::Lamp,
-            vec![
-                part(&rod, &dark, at(0.0, -0.06, 0.0).with_scale(Vec3::new(0.8, 0.6, 0.8))),
-                part(&ball, &glow, at(0.0, 0.085, 0.0).with_scale(Vec3::splat(0.038))),
-                part(&tube, &dark, at(0.0, 0.13, 0.0).with_scale(Vec3::new(0.046, 0.012, 0.046))),
-            ],
-        ),
-        (Tool::Ball, vec![part(&ball, &rubber, at(0.0, 0.03, 0.0).with_scale(Vec3::splat(0.040)))]),
-    ];
-    let piece =
-        |(mesh, material, place): Part| (Mesh3d(mesh), MeshMaterial3d(material), place, NotShadowCaster);
-    commands.entity(*eyes).with_children(|eyes| {
-        eyes.spawn((Name::new("hand"), Held, Transform::from_translation(REST), Visibility::Hidden))
-            .with_children(|hand| {
-                for (tool, parts) in models {
-                    let mut model = hand.spawn((Model(tool), Transform::IDENTITY, Visibility::Hidden));
-                    model.with_children(|model| {
-                        for part in parts {
-                            model.spawn(piece(part));
-                        }
-                        if tool == Tool::Drill {
-                            // Upright as it is made: a core, a tip, and a thread of plates around it.
-                            let place = at(0.0, 0.05, -0.165).with_rotation(pitch(-FRAC_PI_2));
-                            let mut bit = model.spawn((Bit, place, Visibility::Inherited));
-                            bit.with_children(|bit| {
-                                let core = Vec3::new(0.011, 0.14, 0.011);
-                                bit.spawn(piece(part(&tube, &dark, Transform::from_scale(core))));
-                                let tip = Vec3::new(0.020, 0.050, 0.020);
-                                bit.spawn(piece(part(&cone, &gunmetal, at(0.0, 0.085, 0.0).with_scale(tip))));
-                                for step in 0..THREAD {
-                                    let turn = Quat::from_rotation_y(step as f32 * 0.55);
-                                    let y = -0.058 + 0.128 * step as f32 / THREAD as f32;
-                                    let plate = at(0.0, y, 0.0)
-                                        .with_rotation(turn * Quat::from_rotation_x(0.35))
-                                        .with_scale(Vec3::new(0.048, 0.0035, 0.012));
-                                    bit.spawn(piece(part(&block, &gunmetal, plate)));
-                                }
-                            });
-                        }
-                        if matches!(tool, Tool::Builder | Tool::Painter) {
-                            let place = match tool {
-                                Tool::Builder => at(0.0, 0.07, 0.0)
-                                    .with_scale(Vec3::splat(0.10))
-                                    .with_rotation(Quat::from_rotation_y(0.6)),
-                                _ => at(0.0, 0.21, 0.0).with_scale(Vec3::new(0.070, 0.018, 0.020)),
-                            };
-                            model.spawn((Sample, piece(part(&block, &sample, place))));
-                        }
-                    });
-                }
-            });
-    });
+/// Meshes of about unit size, except for the rod and the spike.
+#[derive(Clone, Copy)]
+enum PartMesh {
+    Rod,
+    Spike,
+    Block,
+    Ball,
+    Tube,
+    Cone,
 }
 
-/// The chosen tool, while someone plays and looks through his own eyes.
+#[derive(Clone, Copy)]
+enum PartMaterial {
+    Wood,
+    Steel,
+    Gunmetal,
+    Dark,
+    Red,
+    Bristle,
+    Rubber,
+    Sample,
+    Glow,
+}
+
+/// A part of a model: its mesh and material, its position, its rotation around x, y and z, and its scale.
+type Part = (PartMesh, PartMaterial, [f32; 3], [f32; 3], [f32; 3]);
+
+const NO_TURN: [f32; 3] = [0.0; 3];
+const FULL_SIZE: [f32; 3] = [1.0; 3];
+
+/// A cylinder along the drill's axis, which points forward.
+const fn drill_part(material: PartMaterial, radius: f32, length: f32, z: f32) -> Part {
+    (P::Tube, material, [0.0, 0.05, z], [FRAC_PI_2, 0.0, 0.0], [radius, length, radius])
+}
+
+const fn ball(material: PartMaterial, y: f32, radius: f32) -> Part {
+    (P::Ball, material, [0.0, y, 0.0], NO_TURN, [radius; 3])
+}
+
+const fn block(material: PartMaterial, place: [f32; 3], size: [f32; 3]) -> Part {
+    (P::Block, material, place, NO_TURN, size)
+}
+
+const fn rod(material: PartMaterial, y: f32) -> Part {
+    (P::Rod, material, [0.0, y, 0.0], NO_TURN, FULL_SIZE)
+}
+
+const MODELS: [(Tool, &[Part]); 8] = [
+    (
+        Tool::Pickaxe,
+        &[
+            rod(M::Wood, 0.0),
+            block(M::Steel, [0.0, 0.155, 0.0], [0.026, 0.030, 0.052]),
+            (P::Spike, M::Steel, [0.0, 0.146, -0.085], [-FRAC_PI_2 - 0.16, 0.0, 0.0], FULL_SIZE),
+            (P::Spike, M::Steel, [0.0, 0.146, 0.085], [FRAC_PI_2 + 0.16, 0.0, 0.0], FULL_SIZE),
+        ],
+    ),
+    (
+        Tool::Shovel,
+        &[
+            rod(M::Wood, -0.01),
+            block(M::Steel, [0.0, 0.19, 0.0], [0.095, 0.12, 0.008]),
+            (P::Cone, M::Steel, [0.0, 0.275, 0.0], NO_TURN, [0.0475, 0.05, 0.004]),
+        ],
+    ),
+    (
+        Tool::Drill,
+        &[
+            // Motor with its bands, gearbox and chuck.
+            drill_part(M::Red, 0.032, 0.120, 0.020),
+            drill_part(M::Dark, 0.029, 0.016, 0.086),
+            drill_part(M::Steel, 0.0332, 0.006, 0.062),
+            drill_part(M::Steel, 0.0332, 0.006, -0.030),
+            drill_part(M::Dark, 0.026, 0.030, -0.055),
+            drill_part(M::Steel, 0.019, 0.028, -0.084),
+            block(M::Dark, [0.0, 0.081, 0.016], [0.022, 0.006, 0.060]),
+            block(M::Dark, [-0.031, 0.058, 0.016], [0.006, 0.018, 0.060]),
+            // The grip with its trigger, and the handle for the other hand.
+            (P::Block, M::Dark, [0.0, -0.018, 0.052], [0.25, 0.0, 0.0], [0.028, 0.105, 0.036]),
+            block(M::Red, [0.0, 0.002, 0.026], [0.012, 0.024, 0.012]),
+            (P::Tube, M::Dark, [-0.060, 0.050, -0.052], [0.0, 0.0, FRAC_PI_2], [0.011, 0.075, 0.011]),
+        ],
+    ),
+    (Tool::Builder, &[(P::Block, M::Sample, [0.0, 0.07, 0.0], [0.0, 0.6, 0.0], [0.10; 3])]),
+    (
+        Tool::Painter,
+        &[
+            rod(M::Wood, -0.03),
+            block(M::Steel, [0.0, 0.15, 0.0], [0.075, 0.03, 0.024]),
+            block(M::Bristle, [0.0, 0.185, 0.0], [0.072, 0.05, 0.020]),
+            block(M::Sample, [0.0, 0.21, 0.0], [0.070, 0.018, 0.020]),
+        ],
+    ),
+    (
+        Tool::Bomb,
+        &[
+            ball(M::Dark, 0.03, 0.042),
+            (P::Tube, M::Dark, [0.0, 0.072, 0.0], NO_TURN, [0.012, 0.014, 0.012]),
+            ball(M::Glow, 0.088, 0.008),
+        ],
+    ),
+    (
+        Tool::Lamp,
+        &[
+            (P::Rod, M::Dark, [0.0, -0.06, 0.0], NO_TURN, [0.8, 0.6, 0.8]),
+            ball(M::Glow, 0.085, 0.038),
+            (P::Tube, M::Dark, [0.0, 0.13, 0.0], NO_TURN, [0.046, 0.012, 0.046]),
+        ],
+    ),
+    (Tool::Ball, &[ball(M::Rubber, 0.03, 0.040)]),
+];
+
+/// The drill's bit, built upright: a core, a tip, and a helix of plates.
+fn drill_bit() -> impl Iterator<Item = Part> {
+    const PLATES: usize = 16;
+    let core = (P::Tube, M::Dark, [0.0; 3], NO_TURN, [0.011, 0.14, 0.011]);
+    let tip = (P::Cone, M::Gunmetal, [0.0, 0.085, 0.0], NO_TURN, [0.020, 0.050, 0.020]);
+    let plate = |step: usize| {
+        let y = -0.058 + 0.128 * step as f32 / PLATES as f32;
+        (P::Block, M::Gunmetal, [0.0, y, 0.0], [0.35, step as f32 * 0.55, 0.0], [0.048, 0.0035, 0.012])
+    };
+    [core, tip].into_iter().chain((0..PLATES).map(plate))
+}
+
+fn spawn_models(
+    mut commands: Commands,
+    camera: Single<Entity, With<PlayerCamera>>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) -> Result {
+    // In the order of `PartMesh`.
+    let meshes: [Handle<Mesh>; 6] = [
+        meshes.add(Cylinder::new(0.010, 0.34)),
+        meshes.add(Cone::new(0.017, 0.13)),
+        meshes.add(Cuboid::from_length(1.0)),
+        meshes.add(Sphere::new(1.0).mesh().ico(3)?),
+        meshes.add(Cylinder::new(1.0, 1.0)),
+        meshes.add(Cone::new(1.0, 1.0)),
+    ];
+    // In the order of `PartMaterial`: colour, roughness and metallic. The headlamp is so close that bright colours would be
+    // overexposed.
+    let materials = [
+        (Color::srgb(0.45, 0.29, 0.16), 0.85, 0.0),
+        (Color::srgb(0.52, 0.55, 0.58), 0.42, 0.55),
+        (Color::srgb(0.27, 0.28, 0.30), 0.55, 0.4),
+        (Color::srgb(0.10, 0.10, 0.11), 0.5, 0.3),
+        (Color::srgb(0.66, 0.16, 0.10), 0.6, 0.0),
+        (Color::srgb(0.80, 0.72, 0.52), 0.95, 0.0),
+        (Color::hsl(8.0, 0.75, 0.45), 0.55, 0.0),
+        (Color::WHITE, 0.95, 0.0),
+        (Color::linear_rgb(2.6, 1.7, 0.6), 1.0, 0.0),
+    ]
+    .map(|(base_color, perceptual_roughness, metallic)| {
+        let unlit = base_color.to_linear().red > 1.0;
+        materials.add(StandardMaterial { base_color, perceptual_roughness, metallic, unlit, ..default() })
+    });
+    let spawn = |parent: &mut ChildSpawnerCommands, (mesh, material, place, turn, scale): Part| {
+        let [x, y, z] = turn;
+        let place = Transform::from_translation(place.into())
+            .with_rotation(Quat::from_euler(EulerRot::YXZ, y, x, z))
+            .with_scale(scale.into());
+        let mut part = parent.spawn((
+            Mesh3d(meshes[mesh as usize].clone()),
+            MeshMaterial3d(materials[material as usize].clone()),
+            place,
+            NotShadowCaster,
+        ));
+        if matches!(material, M::Sample) {
+            part.insert(MaterialSample);
+        }
+    };
+    let root = (Name::new("tool in hand"), ToolRoot, Transform::from_translation(REST), Visibility::Hidden);
+    commands.spawn((root, ChildOf(*camera))).with_children(|root| {
+        for (tool, parts) in MODELS {
+            root.spawn((Model(tool), Transform::IDENTITY, Visibility::Hidden)).with_children(|model| {
+                parts.iter().for_each(|part| spawn(model, *part));
+                if tool == Tool::Drill {
+                    let forward = Quat::from_rotation_x(-FRAC_PI_2);
+                    let place = Transform::from_xyz(0.0, 0.05, -0.165).with_rotation(forward);
+                    model
+                        .spawn((DrillBit, place, Visibility::Inherited))
+                        .with_children(|bit| drill_bit().for_each(|part| spawn(bit, part)));
+                }
+            });
+        }
+    });
+    Ok(())
+}
+
+/// Shows the selected tool while the camera is the player's.
 fn show(
     hand: Res<Hand>,
     swing: Res<Swing>,
-    shown: Res<ShowHand>,
-    phase: Res<State<Phase>>,
-    eyes: Single<Has<Drone>, With<Eyes>>,
-    mut held: Single<&mut Visibility, (With<Held>, Without<Model>)>,
-    mut models: Query<(&Model, &mut Visibility), Without<Held>>,
+    shown: Res<ShowTool>,
+    state: Res<State<GameState>>,
+    is_detached: Single<Has<DetachedCamera>, With<PlayerCamera>>,
+    mut root: Single<&mut Visibility, (With<ToolRoot>, Without<Model>)>,
+    mut models: Query<(&Model, &mut Visibility), Without<ToolRoot>>,
 ) {
-    let in_hand = shown.0 && !*eyes && *phase.get() != Phase::Title;
-    held.set_if_neq(if in_hand { Visibility::Inherited } else { Visibility::Hidden });
+    let is_shown = shown.0 && !*is_detached && *state.get() != GameState::Title;
+    root.set_if_neq(if is_shown { Visibility::Inherited } else { Visibility::Hidden });
     let tool = if swing.phase().is_some() { swing.tool } else { hand.tool };
     for (model, mut visibility) in &mut models {
         visibility.set_if_neq(if model.0 == tool { Visibility::Inherited } else { Visibility::Hidden });
     }
 }
 
-/// Swings, bobs with the steps, and sways behind the look.
-fn carry(
+/// Moves the tool with the swing and with the player's steps.
+fn animate(
     time: Res<Time>,
     hand: Res<Hand>,
     swing: Res<Swing>,
     bodies: Query<Body, With<Character>>,
-    mut held: Single<&mut Transform, (With<Held>, Without<Bit>, Without<Character>)>,
-    mut bits: Query<&mut Transform, (With<Bit>, Without<Character>)>,
+    mut root: Single<&mut Transform, (With<ToolRoot>, Without<DrillBit>, Without<Character>)>,
+    mut bits: Query<&mut Transform, (With<DrillBit>, Without<Character>)>,
     mut steps: Local<f32>,
-    mut sink: Local<(f32, Option<Tool>)>,
+    mut lowered: Local<(f32, Option<Tool>)>,
 ) {
     let dt = time.delta_secs();
-    let speed: f32 = bodies
-        .iter()
-        .filter(|body| body.motion.grounded)
-        .map(|body| body.motion.velocity.xz().length())
-        .sum();
+    let walking = bodies.iter().filter(|body| body.motion.grounded);
+    let speed: f32 = walking.map(|body| body.motion.velocity.xz().length()).sum();
     *steps += dt * speed * 1.35;
     let stride = (speed / 6.0).min(1.0);
     let bob = Vec3::new((*steps).sin() * 0.006, -(2.0 * *steps).sin().abs() * 0.006, 0.0) * stride;
-    // A tool that was just chosen comes up from below.
-    if sink.1 != Some(hand.tool) {
-        *sink = (1.0, Some(hand.tool));
+    // A newly selected tool comes up from below.
+    if lowered.1 != Some(hand.tool) {
+        *lowered = (1.0, Some(hand.tool));
     }
-    sink.0 *= (-9.0 * dt).exp();
-    let (turn, shift) = pose(if swing.phase().is_some() { swing.tool } else { hand.tool }, swing.phase());
-    **held = Transform::from_translation(REST + bob + shift - Vec3::Y * 0.25 * sink.0).with_rotation(turn);
+    lowered.0 *= (-9.0 * dt).exp();
+    let tool = if swing.phase().is_some() { swing.tool } else { hand.tool };
+    let (rotation, offset) = pose(tool, swing.phase());
+    let place = REST + bob + offset - Vec3::Y * 0.25 * lowered.0;
+    **root = Transform::from_translation(place).with_rotation(rotation);
     if swing.phase().is_some() && swing.tool == Tool::Drill {
         for mut bit in &mut bits {
             bit.rotate_local_y(TAU * 5.0 * dt);
@@ -269,10 +289,10 @@ fn carry(
     }
 }
 
-/// How a tool is held at a moment of its swing: turned and shifted.
+/// The rotation and offset of a tool in a phase of its swing.
 fn pose(tool: Tool, phase: Option<f32>) -> (Quat, Vec3) {
     let ease = |t: f32| t * t * (3.0 - 2.0 * t);
-    // Pulled back before the hit, through after it, and home again.
+    // The tool is pulled back before the hit, follows through after it, and returns.
     let (back, through) = match phase {
         None => (0.0, 0.0),
         Some(t) if t < -0.35 => (ease((t + 1.0) / 0.65), 0.0),
@@ -296,7 +316,7 @@ fn pose(tool: Tool, phase: Option<f32>) -> (Quat, Vec3) {
         ),
         Tool::Drill => {
             let shake = phase.map_or(0.0, |t| (t * 19.0).sin() * 0.004);
-            // Its bit leads to the middle of the view, or nobody would see it behind the motor.
+            // The bit points to the middle of the view; otherwise the motor would hide it.
             let turn = Quat::from_rotation_y(0.26) * Quat::from_rotation_x(0.10);
             (turn, Vec3::new(shake - 0.005, shake * 0.7 - 0.012, -0.07 - 0.02 * through))
         }
@@ -307,10 +327,10 @@ fn pose(tool: Tool, phase: Option<f32>) -> (Quat, Vec3) {
     }
 }
 
-/// Builder and painter show what they work with.
-fn tint(
+/// The builder and the painter show the selected material.
+fn color_sample(
     hand: Res<Hand>,
-    samples: Query<&MeshMaterial3d<StandardMaterial>, With<Sample>>,
+    samples: Query<&MeshMaterial3d<StandardMaterial>, With<MaterialSample>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
     mut last: Local<Option<MaterialId>>,
 ) {
@@ -319,7 +339,7 @@ fn tint(
     }
     for handle in &samples {
         if let Some(mut material) = materials.get_mut(&handle.0) {
-            material.base_color = crate::world::landscape::colour(hand.material).into();
+            material.base_color = landscape::colour(hand.material).into();
             *last = Some(hand.material);
         }
     }

@@ -1,4 +1,4 @@
-//! What is written over the game: crosshair, tools, materials, the hour, and what was just dug.
+//! The heads-up display: crosshair, tools, materials, time of day, hints and what was just dug.
 
 use std::collections::VecDeque;
 
@@ -6,51 +6,49 @@ use bevy::prelude::*;
 use bevy_burrow::panel::BurrowPanel;
 use bevy_burrow::prelude::*;
 
-use crate::player::Drone;
-use crate::player::game_state::Phase;
+use crate::player::camera::{DetachedCamera, PlayerCamera};
+use crate::player::game_state::GameState;
+use crate::player::headlamp::HeadlampSwitch;
 use crate::player::input::Action;
-use crate::tools::inventory::{Inventory, StockChanged};
+use crate::tools::inventory::{AmountChanged, Inventory};
 use crate::tools::{Hand, Tool};
-use crate::ui::art::Art;
+use crate::ui::images::Images;
 use crate::ui::labels::Labels;
 use crate::ui::settings::Settings;
-use crate::ui::widgets;
+use crate::ui::widgets::{self, EDGE, GOLD, GREY, RED, SHADE, WHITE, column, text};
 use crate::world::day::Clock;
 use crate::world::landscape::{self, MATERIALS};
-use crate::world::light::{Eyes, LampSwitch};
 
-/// Seconds that a hint or a find stays, the player's own: a new game begins without those of the old one.
-const STAY: f32 = 2.6;
-/// Finds that are seen at once.
-const FINDS: usize = 4;
+/// Seconds that a hint or a find is shown, in real time: also while the game is paused.
+const SHOWN: f32 = 2.6;
+/// Finds that are shown at the same time.
+const MAX_FINDS: usize = 4;
 
-/// Something to tell the player.
+/// A short text for the player.
 #[derive(Message, Clone, Debug)]
-pub struct Hint(String);
+pub struct Hint(pub String);
 
-impl Hint {
-    pub fn new(words: impl Into<String>) -> Self {
-        Self(words.into())
-    }
-
-    #[cfg(test)]
-    pub fn words(&self) -> &str {
-        &self.0
-    }
-}
-
-/// Is anything written at all? Not on pictures of the landscape.
+/// Is the display shown? Scripts hide it for pictures of the landscape.
 #[derive(Resource)]
 pub struct ShowHud(pub bool);
 
-/// Writes over the game.
+/// Shows the display.
 pub struct HudPlugin;
 
 impl Plugin for HudPlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(ShowHud(true)).add_message::<Hint>().add_systems(Startup, write_all).add_systems(
+        app.insert_resource(ShowHud(true)).add_message::<Hint>().add_systems(Startup, spawn_hud).add_systems(
             Update,
-            (show, mark_tool, count_materials, aim, tell_hour, tell_hints, tell_finds, tell_keys)
+            (
+                show_hud,
+                show_tool,
+                show_materials,
+                fade_crosshair,
+                show_time,
+                show_hints,
+                show_finds,
+                show_keys.run_if(resource_changed::<Settings>.or_else(resource_changed::<Labels>)),
+            )
                 .after(BurrowSystems::Propagate),
         );
     }
@@ -65,22 +63,23 @@ struct Crosshair;
 #[derive(Component)]
 struct Slot(Tool);
 
-/// The key that takes the tool of a slot.
+/// The label of the key that selects a tool.
 #[derive(Component)]
 struct SlotKey(Action);
 
 #[derive(Component)]
 struct ToolName;
 
-/// A material's row, and its count.
+/// The row of a material.
 #[derive(Component)]
 struct Row(MaterialId);
 
+/// The amount of a material.
 #[derive(Component)]
-struct Count(MaterialId);
+struct Amount(MaterialId);
 
 #[derive(Component)]
-struct Hour;
+struct TimeOfDay;
 
 #[derive(Component)]
 struct Hints;
@@ -88,219 +87,189 @@ struct Hints;
 #[derive(Component)]
 struct Find(usize);
 
+/// Important actions with their keys.
 #[derive(Component)]
-struct KeyLine;
+struct KeyList;
 
-fn write_all(mut commands: Commands, art: Res<Art>) {
+fn spawn_hud(mut commands: Commands, images: Res<Images>) {
+    let absolute = || Node { position_type: PositionType::Absolute, ..default() };
     commands.spawn((Hud, widgets::full(), Visibility::Hidden)).with_children(|hud| {
-        spawn_crosshair(hud);
-        spawn_slots(hud, &art);
-        spawn_materials(hud, &art);
-        let corner = Node { position_type: PositionType::Absolute, right: px(16), top: px(12), ..default() };
-        hud.spawn((corner, children![(Hour, widgets::text("", 17.0, widgets::WHITE))]));
-        let top = Node {
+        let dot = Node {
+            width: px(6),
+            height: px(6),
+            border: UiRect::all(px(1)),
+            border_radius: BorderRadius::all(px(3)),
+            ..default()
+        };
+        let colors = (BackgroundColor(WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
+        hud.spawn((widgets::centered(), children![(Crosshair, dot, colors)]));
+        let corner = Node { right: px(16), top: px(12), ..absolute() };
+        hud.spawn((corner, children![(TimeOfDay, text("", 17.0, WHITE))]));
+        let top =
+            Node { width: percent(100), top: px(92), justify_content: JustifyContent::Center, ..absolute() };
+        hud.spawn((top, children![(Hints, text("", 19.0, GOLD))]));
+        let keys = Node { left: px(14), bottom: px(12), padding: UiRect::axes(px(9), px(6)), ..absolute() };
+        hud.spawn((widgets::panel(keys), children![(KeyList, text("", 13.0, GREY))]));
+        let bottom = Node {
             position_type: PositionType::Absolute,
             width: percent(100),
-            top: px(92),
-            justify_content: JustifyContent::Center,
-            ..default()
-        };
-        hud.spawn((top, children![(Hints, widgets::text("", 19.0, widgets::GOLD))]));
-        let keys = Node {
-            position_type: PositionType::Absolute,
-            left: px(14),
             bottom: px(12),
-            padding: UiRect::axes(px(9), px(6)),
-            ..default()
+            align_items: AlignItems::Center,
+            ..column(px(6))
         };
-        hud.spawn((widgets::panel(keys), children![(KeyLine, widgets::text("", 13.0, widgets::GREY))]));
+        hud.spawn(bottom).with_children(|bottom| spawn_slots(bottom, &images));
+        let right = Node {
+            position_type: PositionType::Absolute,
+            right: px(14),
+            bottom: px(12),
+            align_items: AlignItems::End,
+            ..column(px(3))
+        };
+        hud.spawn(right).with_children(spawn_materials);
     });
 }
 
-fn spawn_crosshair(hud: &mut ChildSpawnerCommands) {
-    let centre =
-        Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..widgets::full() };
-    let dot = Node {
-        width: px(6),
-        height: px(6),
-        border: UiRect::all(px(1)),
-        border_radius: BorderRadius::all(px(3)),
-        ..default()
-    };
-    let colors = (BackgroundColor(widgets::WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
-    hud.spawn((centre, children![(Crosshair, dot, colors)]));
-}
-
-/// The tools along the lower edge, with the name of the chosen one above.
-fn spawn_slots(hud: &mut ChildSpawnerCommands, art: &Art) {
-    let bottom = Node {
-        position_type: PositionType::Absolute,
-        width: percent(100),
-        bottom: px(12),
-        flex_direction: FlexDirection::Column,
-        align_items: AlignItems::Center,
-        row_gap: px(6),
-        ..default()
-    };
-    hud.spawn(bottom).with_children(|bottom| {
-        let sign = Node { padding: UiRect::axes(px(11), px(3)), ..default() };
-        bottom.spawn((widgets::panel(sign), children![(ToolName, widgets::text("", 15.0, widgets::WHITE))]));
-        bottom.spawn(Node { column_gap: px(5), ..default() }).with_children(|bar| {
-            for (at, tool) in Tool::ALL.into_iter().enumerate() {
-                let slot = Node {
-                    width: px(52),
-                    height: px(52),
-                    border: UiRect::all(px(2)),
-                    border_radius: BorderRadius::all(px(6)),
-                    align_items: AlignItems::Center,
-                    justify_content: JustifyContent::Center,
-                    ..default()
-                };
-                let icon = Node { width: px(36), height: px(36), ..default() };
-                let number =
-                    Node { position_type: PositionType::Absolute, left: px(4), top: px(1), ..default() };
-                bar.spawn((
-                    Slot(tool),
-                    slot,
-                    BackgroundColor(widgets::SHADE),
-                    BorderColor::all(widgets::EDGE),
-                    children![
-                        (ImageNode::new(art.tools[at].clone()), icon),
-                        (number, SlotKey(tool.slot()), widgets::text("", 11.0, widgets::GREY)),
-                    ],
-                ));
-            }
-        });
-    });
-}
-
-/// What was dug, at the right, with the latest finds above.
-fn spawn_materials(hud: &mut ChildSpawnerCommands, art: &Art) {
-    let right = Node {
-        position_type: PositionType::Absolute,
-        right: px(14),
-        bottom: px(12),
-        flex_direction: FlexDirection::Column,
-        align_items: AlignItems::End,
-        row_gap: px(3),
-        ..default()
-    };
-    hud.spawn(right).with_children(|right| {
-        for at in (0..FINDS).rev() {
-            right.spawn((Find(at), widgets::text("", 15.0, widgets::WHITE)));
+/// The tools, with the name of the selected one above.
+fn spawn_slots(parent: &mut ChildSpawnerCommands, images: &Images) {
+    let sign = Node { padding: UiRect::axes(px(11), px(3)), ..default() };
+    parent.spawn((widgets::panel(sign), children![(ToolName, text("", 15.0, WHITE))]));
+    parent.spawn(Node { column_gap: px(5), ..default() }).with_children(|bar| {
+        for tool in Tool::ALL {
+            let slot = Node {
+                width: px(52),
+                height: px(52),
+                border: UiRect::all(px(2)),
+                border_radius: BorderRadius::all(px(6)),
+                align_items: AlignItems::Center,
+                justify_content: JustifyContent::Center,
+                ..default()
+            };
+            let icon = Node { width: px(36), height: px(36), ..default() };
+            let key = Node { position_type: PositionType::Absolute, left: px(4), top: px(1), ..default() };
+            bar.spawn((
+                Slot(tool),
+                slot,
+                BackgroundColor(SHADE),
+                BorderColor::all(EDGE),
+                children![(images.icon(tool), icon), (key, SlotKey(tool.slot()), text("", 11.0, GREY))],
+            ));
         }
-        let list = Node {
-            width: px(158),
-            padding: UiRect::all(px(5)),
-            margin: UiRect::top(px(4)),
-            flex_direction: FlexDirection::Column,
-            row_gap: px(1),
-            ..default()
-        };
-        right.spawn(widgets::panel(list)).with_children(|list| {
-            for (material, name) in MATERIALS {
-                let row = Node {
-                    height: px(22),
-                    padding: UiRect::horizontal(px(5)),
-                    border_radius: BorderRadius::all(px(4)),
-                    align_items: AlignItems::Center,
-                    column_gap: px(8),
-                    ..default()
-                };
-                let swatch = Node { width: px(14), height: px(14), ..default() };
-                // A light edge, without which coal could not be told from the list's own ground.
-                let frame = Node { padding: UiRect::all(px(1)), ..default() };
-                let color = Color::from(landscape::colour(material));
-                list.spawn((Row(material), row, BackgroundColor::DEFAULT)).with_children(|row| {
-                    let edge = BackgroundColor(Color::srgba(1.0, 1.0, 1.0, 0.45));
-                    let picture = ImageNode::new(art.swatch.clone()).with_color(brighter(color));
-                    row.spawn((frame, edge, children![(picture, swatch)]));
-                    let grow = Node { flex_grow: 1.0, ..default() };
-                    row.spawn((widgets::text(name, 13.0, widgets::WHITE), grow));
-                    row.spawn((Count(material), widgets::text("", 13.0, widgets::GREY)));
-                });
-            }
-        });
     });
 }
 
-/// Ground is lit by the sun, swatches by nothing.
-fn brighter(color: Color) -> Color {
-    let lit = |channel: f32| (1.9 * channel + 0.035).min(1.0);
-    let color = color.to_linear();
-    Color::linear_rgb(lit(color.red), lit(color.green), lit(color.blue))
+/// The inventory, with the latest finds above.
+fn spawn_materials(parent: &mut ChildSpawnerCommands) {
+    for at in (0..MAX_FINDS).rev() {
+        parent.spawn((Find(at), text("", 15.0, WHITE)));
+    }
+    let list =
+        Node { width: px(158), padding: UiRect::all(px(5)), margin: UiRect::top(px(4)), ..column(px(1)) };
+    parent.spawn(widgets::panel(list)).with_children(|list| {
+        for (material, name) in MATERIALS {
+            let row = Node {
+                height: px(22),
+                padding: UiRect::horizontal(px(5)),
+                border_radius: BorderRadius::all(px(4)),
+                align_items: AlignItems::Center,
+                column_gap: px(8),
+                ..default()
+            };
+            // With a light border, because coal is as dark as the list.
+            let swatch = Node { width: px(16), height: px(16), border: UiRect::all(px(1)), ..default() };
+            let grow = Node { flex_grow: 1.0, ..default() };
+            list.spawn((
+                Row(material),
+                row,
+                BackgroundColor::DEFAULT,
+                children![
+                    (
+                        swatch,
+                        BackgroundColor(swatch_color(material)),
+                        BorderColor::all(WHITE.with_alpha(0.45))
+                    ),
+                    (text(name, 13.0, WHITE), grow),
+                    (Amount(material), text("", 13.0, GREY)),
+                ],
+            ));
+        }
+    });
 }
 
-fn show(
+/// The colour of a material, brightened: the ground is lit by the sun, but a swatch is not.
+fn swatch_color(material: MaterialId) -> Color {
+    let color = landscape::colour(material);
+    let brighten = |channel: f32| (1.5 * channel + 0.03).min(1.0);
+    Color::linear_rgb(brighten(color.red), brighten(color.green), brighten(color.blue))
+}
+
+fn show_hud(
     shown: Res<ShowHud>,
-    phase: Res<State<Phase>>,
-    eyes: Single<Has<Drone>, With<Eyes>>,
+    state: Res<State<GameState>>,
+    is_detached: Single<Has<DetachedCamera>, With<PlayerCamera>>,
     panel: Res<BurrowPanel>,
     mut hud: Single<&mut Visibility, With<Hud>>,
 ) {
-    // The panel is read without anything shining through it.
-    let is_shown = shown.0 && *phase.get() == Phase::Playing && !*eyes && !panel.is_open;
+    // The display would shine through the plugin's panel.
+    let is_shown = shown.0 && *state.get() == GameState::Playing && !*is_detached && !panel.is_open;
     hud.set_if_neq(if is_shown { Visibility::Inherited } else { Visibility::Hidden });
 }
 
-fn mark_tool(
+fn show_tool(
     hand: Res<Hand>,
     mut slots: Query<(&Slot, &mut BorderColor, &mut BackgroundColor)>,
     mut name: Single<&mut Text, With<ToolName>>,
 ) {
-    for (slot, mut edge, mut ground) in &mut slots {
-        let chosen = slot.0 == hand.tool;
-        edge.set_if_neq(BorderColor::all(if chosen { widgets::GOLD } else { widgets::EDGE }));
-        let lit = Color::srgba(0.24, 0.20, 0.10, 0.82);
-        ground.set_if_neq(BackgroundColor(if chosen { lit } else { widgets::SHADE }));
+    for (slot, mut border, mut background) in &mut slots {
+        let is_selected = slot.0 == hand.tool;
+        border.set_if_neq(BorderColor::all(if is_selected { GOLD } else { EDGE }));
+        let fill = if is_selected { Color::srgba(0.24, 0.20, 0.10, 0.82) } else { SHADE };
+        background.set_if_neq(BackgroundColor(fill));
     }
-    let radius = hand.radius(hand.tool);
+    let (label, radius) = (hand.tool.label(), hand.radius(hand.tool));
+    let material = landscape::name(hand.material);
     let words = match hand.tool {
-        Tool::Builder => {
-            format!("builder  {} of {}  {radius:.2} m", hand.form.label(), landscape::name(hand.material))
-        }
-        Tool::Painter => format!("painter  {}  {radius:.2} m", landscape::name(hand.material)),
-        Tool::Bomb | Tool::Lamp | Tool::Ball => hand.tool.label().into(),
-        tool => format!("{}  {radius:.2} m", tool.label()),
+        Tool::Builder => format!("{label}  {} of {material}  {radius:.2} m", hand.shape.label()),
+        Tool::Painter => format!("{label}  {material}  {radius:.2} m"),
+        Tool::Bomb | Tool::Lamp | Tool::Ball => label.into(),
+        _ => format!("{label}  {radius:.2} m"),
     };
     name.set_if_neq(Text::new(words));
 }
 
-fn count_materials(
+fn show_materials(
     hand: Res<Hand>,
     inventory: Res<Inventory>,
     mut rows: Query<(&Row, &mut BackgroundColor)>,
-    mut counts: Query<(&Count, &mut Text, &mut TextColor)>,
+    mut amounts: Query<(&Amount, &mut Text, &mut TextColor)>,
 ) {
-    for (row, mut ground) in &mut rows {
-        let chosen = row.0 == hand.material;
-        let lit = Color::srgba(1.0, 0.80, 0.32, 0.22);
-        ground.set_if_neq(BackgroundColor(if chosen { lit } else { Color::NONE }));
+    for (row, mut background) in &mut rows {
+        let fill = if row.0 == hand.material { GOLD.with_alpha(0.22) } else { Color::NONE };
+        background.set_if_neq(BackgroundColor(fill));
     }
-    for (count, mut text, mut color) in &mut counts {
-        let stock = inventory.stock(count.0);
-        text.set_if_neq(Text::new(stock.to_string()));
-        color.set_if_neq(TextColor(match stock {
-            1.. => widgets::WHITE,
-            0 => widgets::GREY,
-            // Owed.
-            _ => widgets::RED,
+    for (material, mut text, mut color) in &mut amounts {
+        let amount = inventory.amount(material.0);
+        text.set_if_neq(Text::new(amount.to_string()));
+        color.set_if_neq(TextColor(match amount {
+            1.. => WHITE,
+            0 => GREY,
+            // In debt.
+            _ => RED,
         }));
     }
 }
 
-/// The crosshair fades where the tool does not reach.
-fn aim(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Crosshair>>) {
+/// The crosshair is faint where the tool does not reach.
+fn fade_crosshair(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Crosshair>>) {
     let reaches = hand.aim.is_some() || matches!(hand.tool, Tool::Bomb | Tool::Ball);
-    dot.set_if_neq(BackgroundColor(widgets::WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
+    dot.set_if_neq(BackgroundColor(WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
 }
 
-fn tell_hour(clock: Res<Clock>, lamp: Res<LampSwitch>, mut hour: Single<&mut Text, With<Hour>>) {
+fn show_time(clock: Res<Clock>, lamp: Res<HeadlampSwitch>, mut time: Single<&mut Text, With<TimeOfDay>>) {
     let lamp = if lamp.0 { "lamp on   " } else { "" };
-    hour.set_if_neq(Text::new(format!("{lamp}{}", clock.face())));
+    time.set_if_neq(Text::new(format!("{lamp}{}", clock.text())));
 }
 
-fn tell_hints(
+fn show_hints(
     time: Res<Time<Real>>,
     mut hints: MessageReader<Hint>,
     mut line: Single<(&mut Text, &mut TextColor), With<Hints>>,
@@ -309,54 +278,51 @@ fn tell_hints(
     let (text, color) = &mut *line;
     if let Some(hint) = hints.read().last() {
         text.set_if_neq(Text::new(hint.0.clone()));
-        *left = STAY;
+        *left = SHOWN;
     }
     *left -= time.delta_secs();
-    color.set_if_neq(TextColor(widgets::GOLD.with_alpha((2.0 * *left).clamp(0.0, 1.0))));
+    color.set_if_neq(TextColor(GOLD.with_alpha((2.0 * *left).clamp(0.0, 1.0))));
 }
 
-/// What was dug lately, the same materials added up while they keep coming.
-fn tell_finds(
+/// Shows what was gained and used lately. Changes of the same material are added up.
+fn show_finds(
     time: Res<Time<Real>>,
-    mut changes: MessageReader<StockChanged>,
+    mut changes: MessageReader<AmountChanged>,
     mut lines: Query<(&Find, &mut Text, &mut TextColor)>,
     mut finds: Local<VecDeque<(MaterialId, i64, f32)>>,
 ) {
-    for change in changes.read().filter(|change| change.by != 0) {
+    for change in changes.read() {
         let same = finds.iter_mut().find(|find| find.0 == change.material && (find.1 > 0) == (change.by > 0));
         match same {
-            Some(find) => (find.1, find.2) = (find.1 + change.by, STAY),
-            None => finds.push_front((change.material, change.by, STAY)),
+            Some(find) => (find.1, find.2) = (find.1 + change.by, SHOWN),
+            None => finds.push_front((change.material, change.by, SHOWN)),
         }
     }
     for find in finds.iter_mut() {
         find.2 -= time.delta_secs();
     }
     finds.retain(|find| find.2 > 0.0);
-    finds.truncate(FINDS);
+    finds.truncate(MAX_FINDS);
     for (line, mut text, mut color) in &mut lines {
         let (words, alpha) = finds.get(line.0).map_or((String::new(), 0.0), |&(material, by, left)| {
             (format!("{by:+} {}", landscape::name(material)), (2.0 * left).clamp(0.0, 1.0))
         });
         text.set_if_neq(Text::new(words));
-        color.set_if_neq(TextColor(widgets::WHITE.with_alpha(alpha)));
+        color.set_if_neq(TextColor(WHITE.with_alpha(alpha)));
     }
 }
 
-fn tell_keys(
+fn show_keys(
     settings: Res<Settings>,
     labels: Res<Labels>,
-    mut line: Single<&mut Text, (With<KeyLine>, Without<SlotKey>)>,
+    mut list: Single<&mut Text, (With<KeyList>, Without<SlotKey>)>,
     mut slots: Query<(&SlotKey, &mut Text)>,
 ) {
-    if !settings.is_changed() && !labels.is_changed() {
-        return;
-    }
     let lines = [Action::Help, Action::Headlamp, Action::Undo, Action::Pause]
         .map(|action| format!("{}  {}", settings.bindings.first(action, &labels), action.label()));
-    line.0 = lines.join("\n");
+    list.0 = lines.join("\n");
     for (slot, mut text) in &mut slots {
-        // There is no room for more than a short name.
+        // A slot has room for a short label only.
         let key = settings.bindings.first(slot.0, &labels);
         text.0 = if key.len() <= 5 { key } else { String::new() };
     }
@@ -371,16 +337,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hints_go_even_while_the_game_stands_still() {
+    fn hints_disappear_even_while_the_game_is_paused() {
         let mut app = App::new();
         app.add_plugins(MinimalPlugins)
             .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(500)))
             .add_message::<Hint>()
-            .add_systems(Update, tell_hints);
+            .add_systems(Update, show_hints);
         let line = app.world_mut().spawn((Hints, Text::default(), TextColor::default())).id();
         let alpha = |app: &App| app.world().get::<TextColor>(line).expect("a line").0.alpha();
         app.world_mut().resource_mut::<Time<Virtual>>().pause();
-        app.world_mut().write_message(Hint::new("look there"));
+        app.world_mut().write_message(Hint("look there".into()));
         app.update();
         assert_eq!(alpha(&app), 1.0);
         for _ in 0..6 {

@@ -1,5 +1,5 @@
-//! What stands on the keys. A key is bound by its place on the keyboard, whatever the layout; to the player it is called by
-//! its letter. Nobody tells the game the layout, but each key that is pressed tells its own letter.
+//! Labels of keys. Keys are bound by their position on the keyboard, independent of the layout, but the player should see their
+//! letters. The layout cannot be queried, so the letter of each key is learnt when the key is pressed.
 
 use std::collections::BTreeMap;
 
@@ -9,25 +9,25 @@ use bevy::prelude::*;
 
 use crate::player::bindings::Binding;
 
-/// Letters of the keys that were pressed so far.
+/// The letters of the keys that were pressed so far.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Labels(BTreeMap<KeyCode, char>);
 
 impl Labels {
-    /// A key, a button or a turn of the wheel, as it is written on the screen.
+    /// The label of a binding.
     pub fn of(&self, binding: Binding) -> String {
         let name = binding.to_string();
         let Binding::Key(key) = binding else { return name };
         if let Some(letter) = self.0.get(&key) {
             return letter.to_string();
         }
-        // Layouts exchange letters: where this one's is found elsewhere, that one's is most likely here.
+        // Layouts swap letters. If this key's letter is on another key, then that key's letter is most likely on this one.
         let other = self.0.iter().find(|(_, letter)| name == letter.to_string());
         other.map_or(name, |(other, _)| Binding::Key(*other).to_string())
     }
 }
 
-/// Only letters are learnt, and only those that the font has: digits and signs are others with Shift.
+/// Learns letters only, and only those that the font has: Shift changes digits and punctuation.
 pub fn learn(mut presses: MessageReader<KeyboardInput>, mut labels: ResMut<Labels>) {
     for press in presses.read().filter(|press| press.state == ButtonState::Pressed) {
         let Key::Character(text) = &press.logical_key else { continue };
@@ -44,7 +44,7 @@ pub fn learn(mut presses: MessageReader<KeyboardInput>, mut labels: ResMut<Label
 mod tests {
     use super::*;
 
-    /// What keys are called once some of them were pressed, each with the text that it types.
+    /// The labels after these keys were pressed, each typing a text.
     fn labels(presses: &[(KeyCode, &str)]) -> Labels {
         let mut app = App::new();
         app.init_resource::<Labels>().add_message::<KeyboardInput>().add_systems(Update, learn);
@@ -62,22 +62,22 @@ mod tests {
         app.world().resource::<Labels>().clone()
     }
 
-    fn called(labels: &Labels, key: KeyCode) -> String {
+    fn label(labels: &Labels, key: KeyCode) -> String {
         labels.of(Binding::Key(key))
     }
 
     #[test]
-    fn keys_are_called_what_stands_on_them() {
+    fn keys_are_labelled_with_their_letters() {
         let none = labels(&[]);
-        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| called(&none, key)), ["Z", "Y"]);
-        // One of the two keys of a German keyboard that are exchanged tells of the other.
+        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| label(&none, key)), ["Z", "Y"]);
+        // Y and Z are swapped on a German keyboard: one tells about the other.
         let german = labels(&[(KeyCode::KeyY, "z")]);
-        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| called(&german, key)), ["Y", "Z"]);
+        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| label(&german, key)), ["Y", "Z"]);
         let both = labels(&[(KeyCode::KeyY, "z"), (KeyCode::KeyZ, "Y")]);
-        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| called(&both, key)), ["Y", "Z"]);
-        // Who changes the layout is understood.
+        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| label(&both, key)), ["Y", "Z"]);
+        // The player changes the layout.
         let changed = labels(&[(KeyCode::KeyY, "z"), (KeyCode::KeyY, "y")]);
-        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| called(&changed, key)), ["Z", "Y"]);
+        assert_eq!([KeyCode::KeyZ, KeyCode::KeyY].map(|key| label(&changed, key)), ["Z", "Y"]);
     }
 
     #[test]
@@ -90,7 +90,7 @@ mod tests {
             (KeyCode::KeyX, "xx"),
         ]);
         let keys = [KeyCode::Digit1, KeyCode::Digit2, KeyCode::KeyW, KeyCode::KeyM, KeyCode::KeyX];
-        assert_eq!(keys.map(|key| called(&some, key)), ["1", "2", "W", "M", "X"]);
+        assert_eq!(keys.map(|key| label(&some, key)), ["1", "2", "W", "M", "X"]);
         assert_eq!(some.of(Binding::Mouse(MouseButton::Left)), "Mouse Left");
     }
 }

@@ -1,7 +1,8 @@
-//! Menus, settings, and what is drawn over the game.
+//! Menus, settings, and what is shown over the game.
 
-pub mod art;
+pub mod frame_times;
 pub mod hud;
+pub mod images;
 pub mod labels;
 pub mod menu;
 pub mod panel;

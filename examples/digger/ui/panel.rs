@@ -1,12 +1,12 @@
-//! The plugin's own panel over the game: figures, plots, seam check, debug views. While it is open the mouse is its own.
+//! The plugin's own panel over the game: figures, plots, seam check and debug views. While it is open, it gets the input.
 
 use bevy::prelude::*;
 use bevy_burrow::debug::BurrowDebugPlugin;
 use bevy_burrow::panel::{BurrowPanel, BurrowPanelPlugin};
 
-use crate::player::game_state::{self, Phase};
+use crate::player::game_state::{self, GameState};
 use crate::player::input::{Action, Actions};
-use crate::player::{self, Playing};
+use crate::player::{self, PlayerControlSystems};
 use crate::tools;
 
 /// Opens and closes the panel.
@@ -15,41 +15,42 @@ pub struct PanelPlugin;
 impl Plugin for PanelPlugin {
     fn build(&self, app: &mut App) {
         let mut panel = BurrowPanel::default();
-        // The hand has its own tools; the figures are what is missing.
+        // The game has its own tools, so the panel's brush is hidden.
         (panel.is_open, panel.shows_brush) = (false, false);
         app.insert_resource(panel).add_plugins((BurrowPanelPlugin, BurrowDebugPlugin));
-        share_input(app);
+        add_systems(app);
     }
 }
 
-/// Mouse and keys are the panel's while it is open, and the player's otherwise.
-fn share_input(app: &mut App) {
-    app.configure_sets(Update, Playing.run_if(panel_is_closed))
+fn add_systems(app: &mut App) {
+    app.configure_sets(Update, PlayerControlSystems.run_if(panel_is_closed))
         .add_systems(
             Update,
             (
-                toggle.run_if(in_state(Phase::Playing)),
-                (game_state::leave_mouse, game_state::listen, player::stand_still, tools::put_down)
-                    .run_if(panel_opened),
-                (game_state::take_mouse, game_state::listen)
-                    .run_if(panel_closed.and_then(in_state(Phase::Playing))),
+                toggle.run_if(in_state(GameState::Playing)),
+                (
+                    game_state::release_mouse,
+                    game_state::release_actions,
+                    player::stop_walking,
+                    tools::cancel_swing,
+                )
+                    .run_if(condition_changed_to(true, panel_is_open)),
+                (game_state::capture_mouse, game_state::release_actions).run_if(
+                    condition_changed_to(false, panel_is_open).and_then(in_state(GameState::Playing)),
+                ),
             )
                 .chain()
-                .before(Playing),
+                .before(PlayerControlSystems),
         )
-        .add_systems(OnExit(Phase::Playing), close);
+        .add_systems(OnExit(GameState::Playing), |mut panel: ResMut<BurrowPanel>| panel.is_open = false);
+}
+
+fn panel_is_open(panel: Res<BurrowPanel>) -> bool {
+    panel.is_open
 }
 
 fn panel_is_closed(panel: Res<BurrowPanel>) -> bool {
     !panel.is_open
-}
-
-fn panel_opened(panel: Res<BurrowPanel>, mut was_open: Local<bool>) -> bool {
-    !std::mem::replace(&mut *was_open, panel.is_open) && panel.is_open
-}
-
-fn panel_closed(panel: Res<BurrowPanel>, mut was_open: Local<bool>) -> bool {
-    std::mem::replace(&mut *was_open, panel.is_open) && !panel.is_open
 }
 
 fn toggle(actions: Res<Actions>, mut panel: ResMut<BurrowPanel>) {
@@ -58,10 +59,45 @@ fn toggle(actions: Res<Actions>, mut panel: ResMut<BurrowPanel>) {
     }
 }
 
-fn close(mut panel: ResMut<BurrowPanel>) {
-    panel.is_open = false;
-}
-
 #[cfg(test)]
-#[path = "panel_tests.rs"]
-mod tests;
+mod tests {
+    use bevy_burrow::physics::CharacterSteering;
+
+    use super::*;
+    use crate::player::game_state::{GameStatePlugin, MenuPage};
+    use crate::player::{Player, PlayerPlugin};
+    use crate::test_support::{app_with_input, go_to, hold};
+    use crate::tools::{Swing, Tool};
+
+    #[test]
+    fn while_the_panel_is_open_the_player_neither_walks_nor_swings_nor_gets_help() {
+        let mut app = app_with_input();
+        app.add_plugins((GameStatePlugin, PlayerPlugin))
+            .init_resource::<Swing>()
+            .init_resource::<BurrowPanel>();
+        app.world_mut().resource_mut::<BurrowPanel>().is_open = false;
+        add_systems(&mut app);
+        go_to(&mut app, GameState::Playing);
+        let player = app.world_mut().spawn((Player::default(), CharacterSteering::default())).id();
+        // Does the player walk and swing while these actions are held?
+        let frame = |app: &mut App, held: &[Action]| {
+            hold(app, held);
+            let direction = app.world().get::<CharacterSteering>(player).expect("a player").direction;
+            (direction != Vec2::ZERO, app.world().resource::<Swing>().phase().is_some())
+        };
+        app.world_mut().resource_mut::<Swing>().advance(Some(Tool::Drill), 0.1);
+        assert_eq!(frame(&mut app, &[Action::Forward]), (true, true));
+        assert_eq!(frame(&mut app, &[Action::Forward, Action::Panel]), (false, false));
+        assert!(app.world().resource::<BurrowPanel>().is_open);
+        assert_eq!(frame(&mut app, &[Action::Forward]), (false, false));
+        assert_eq!(frame(&mut app, &[Action::Help]), (false, false));
+        app.update();
+        assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::None);
+        // After it was closed, keys work again once they are pressed again.
+        frame(&mut app, &[]);
+        assert_eq!(frame(&mut app, &[Action::Panel]), (false, false));
+        assert!(!app.world().resource::<BurrowPanel>().is_open);
+        frame(&mut app, &[]);
+        assert_eq!(frame(&mut app, &[Action::Forward]), (true, false));
+    }
+}

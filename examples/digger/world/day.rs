@@ -1,26 +1,27 @@
-//! Day and night: where the sun and the moon stand, and the colours of sky, haze and light at every hour.
+//! Day and night: the directions of sun and moon, and the colours of sky, fog and light at every hour.
 
 use std::f32::consts::TAU;
 
 use bevy::light::light_consts::lux;
 use bevy::prelude::*;
 
+use crate::player::camera::PlayerCamera;
 use crate::ui::settings::Settings;
 use crate::world::landscape::NewGame;
-use crate::world::light::{Eyes, Skylight, Sun};
+use crate::world::light::{Skylight, Sun};
 use crate::world::sky::SkyMaterial;
 
-/// The hour at which the sun stands where the places for the script are looked for, see [`crate::world::light::SUN`].
+/// The hour at which the sun is at [`SUN`](crate::world::light::SUN), where places for the script are searched.
 pub const AFTERNOON: f32 = 14.363;
-/// Sine and cosine of the angle by which the sun's way leans to the south.
-const LEAN: (f32, f32) = (0.6187, 0.7857);
+/// Sine and cosine of the angle by which the sun's path tilts to the south.
+const TILT: (f32, f32) = (0.6187, 0.7857);
 
-/// What time it is.
+/// The time of day.
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct Clock {
     /// Hours since midnight, below 24.
     pub hour: f32,
-    /// Does time pass?
+    /// Does the time of day advance?
     pub runs: bool,
 }
 
@@ -31,31 +32,31 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// As it is written on the screen.
-    pub fn face(&self) -> String {
+    /// The time as text.
+    pub fn text(&self) -> String {
         let minutes = (self.hour * 60.0) as u32;
         format!("{:02}:{:02}", minutes / 60 % 24, minutes % 60)
     }
 
-    /// The way to the sun, of length 1.
+    /// The direction to the sun, of length 1.
     pub fn sun(&self) -> Vec3 {
         let angle = (self.hour - 12.0) / 24.0 * TAU;
-        Vec3::new(-angle.sin(), LEAN.1 * angle.cos(), LEAN.0 * angle.cos())
+        Vec3::new(-angle.sin(), TILT.1 * angle.cos(), TILT.0 * angle.cos())
     }
 
-    /// The way to the moon: across from the sun, and a little higher.
+    /// The direction to the moon: opposite the sun, and a little higher.
     pub fn moon(&self) -> Vec3 {
         (-self.sun() + Vec3::new(0.0, 0.25, 0.18)).normalize()
     }
 }
 
-/// The colours of an hour: linear, 1 is white.
+/// Linear colours at some hour; 1 is white.
 #[derive(Clone, Copy, Debug)]
 struct Colors {
     zenith: Vec3,
     horizon: Vec3,
     glow: Vec3,
-    /// How much of the glow lies on the horizon.
+    /// How much of the glow spreads along the horizon.
     spread: f32,
     cloud_light: Vec3,
     cloud_shade: Vec3,
@@ -64,8 +65,8 @@ struct Colors {
     brightness: f32,
 }
 
-/// By the height of the sun, as the sine of its angle.
-const HOURS: [(f32, Colors); 5] = [
+/// The colours by the height of the sun, as the sine of its angle.
+const COLORS: [(f32, Colors); 5] = [
     (
         -0.28,
         Colors {
@@ -134,9 +135,10 @@ const HOURS: [(f32, Colors); 5] = [
 ];
 
 impl Colors {
+    /// The colours for a height of the sun.
     fn at(height: f32) -> Self {
-        let [first, .., last] = HOURS;
-        let pair = HOURS.windows(2).find(|pair| (pair[0].0..pair[1].0).contains(&height));
+        let [first, .., last] = COLORS;
+        let pair = COLORS.windows(2).find(|pair| (pair[0].0..pair[1].0).contains(&height));
         let Some(&[(low, a), (high, b)]) = pair.and_then(|pair| pair.first_chunk()) else {
             return if height < first.0 { first.1 } else { last.1 };
         };
@@ -154,19 +156,19 @@ impl Colors {
     }
 }
 
-/// Lets the day pass.
+/// Advances the time of day, and lights and colours the world by it.
 pub struct DayPlugin;
 
 impl Plugin for DayPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Clock>()
-            .add_observer(wind_back)
-            .add_systems(Update, (tick, shine, mix_colors).chain());
+            .add_observer(reset_clock)
+            .add_systems(Update, (tick, update_light, update_colors).chain());
     }
 }
 
 /// Every game begins in the afternoon.
-fn wind_back(_: On<NewGame>, mut clock: ResMut<Clock>) {
+fn reset_clock(_: On<NewGame>, mut clock: ResMut<Clock>) {
     clock.hour = AFTERNOON;
 }
 
@@ -176,28 +178,32 @@ pub fn tick(time: Res<Time>, settings: Res<Settings>, mut clock: ResMut<Clock>) 
     }
 }
 
-/// One light for both: the sun until it is down, then the moon; each goes out before the other comes.
-fn shine(clock: Res<Clock>, mut sun: Single<(&mut DirectionalLight, &mut Transform), With<Sun>>) {
+/// One light serves for both: the sun until it has set, then the moon. It is dark when it changes over.
+fn update_light(clock: Res<Clock>, mut sun: Single<(&mut DirectionalLight, &mut Transform), With<Sun>>) {
     let (light, place) = &mut *sun;
-    let (way, moon) = (clock.sun(), clock.moon());
-    let (towards, color, power) = if way.y > -0.07 {
-        let warmth = smooth(0.0, 0.32, way.y);
+    let (sun_direction, moon) = (clock.sun(), clock.moon());
+    let (direction, color, illuminance) = if sun_direction.y > -0.07 {
+        let warmth = smooth(0.0, 0.32, sun_direction.y);
         let color = Vec3::new(1.0, 0.50, 0.22).lerp(Vec3::new(1.0, 0.87, 0.67), warmth);
-        (way, color, lux::AMBIENT_DAYLIGHT * 1.05 * smooth(-0.05, 0.22, way.y))
+        (sun_direction, color, lux::AMBIENT_DAYLIGHT * 1.05 * smooth(-0.05, 0.22, sun_direction.y))
     } else {
-        (moon, Vec3::new(0.50, 0.64, 1.0), 620.0 * smooth(0.07, 0.30, -way.y) * smooth(0.0, 0.2, moon.y))
+        (
+            moon,
+            Vec3::new(0.50, 0.64, 1.0),
+            620.0 * smooth(0.07, 0.30, -sun_direction.y) * smooth(0.0, 0.2, moon.y),
+        )
     };
     light.color = Color::linear_rgb(color.x, color.y, color.z);
-    light.illuminance = power;
-    place.look_to(-towards, Vec3::Y);
+    light.illuminance = illuminance;
+    place.look_to(-direction, Vec3::Y);
 }
 
-fn mix_colors(
+fn update_colors(
     clock: Res<Clock>,
     time: Res<Time>,
     mut skylight: ResMut<Skylight>,
     mut skies: ResMut<Assets<SkyMaterial>>,
-    mut fogs: Query<&mut DistanceFog, With<Eyes>>,
+    mut fogs: Query<&mut DistanceFog, With<PlayerCamera>>,
     mut clear: ResMut<ClearColor>,
 ) {
     let (sun, moon) = (clock.sun(), clock.moon());
@@ -223,7 +229,7 @@ fn mix_colors(
     }
 }
 
-/// 0 at `low`, 1 at `high`, and an S between; `low` may be above `high`.
+/// Smoothstep: 0 at `low`, 1 at `high`. `low` may be greater than `high`.
 pub fn smooth(low: f32, high: f32, at: f32) -> f32 {
     let t = ((at - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -235,7 +241,7 @@ mod tests {
     use crate::world::light::SUN;
 
     #[test]
-    fn in_the_afternoon_the_sun_stands_where_places_are_looked_for() {
+    fn in_the_afternoon_the_sun_is_where_places_are_searched() {
         let sun = Clock { hour: AFTERNOON, runs: true }.sun();
         assert!(sun.abs_diff_eq(SUN, 2e-3), "{sun}");
         assert!((sun.length() - 1.0).abs() < 1e-3);
@@ -250,11 +256,11 @@ mod tests {
             assert_eq!(clock.sun().y > 0.0, day, "at {hour}");
             assert!(clock.sun().y.max(clock.moon().y) > 0.0, "at {hour}");
         }
-        assert_eq!(Clock { hour: 14.5, runs: true }.face(), "14:30");
+        assert_eq!(Clock { hour: 14.5, runs: true }.text(), "14:30");
     }
 
     #[test]
-    fn colours_change_without_a_jump() {
+    fn colours_change_smoothly() {
         let brightness = |i: i32| Colors::at(-1.0 + i as f32 / 1000.0).brightness;
         assert!((0..2000).all(|i| (brightness(i) - brightness(i + 1)).abs() < 10.0));
     }

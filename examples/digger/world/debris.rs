@@ -1,25 +1,26 @@
-//! Ground that was cut off: it falls, lies about for a while, and crumbles to chips.
+//! Ground that was cut off: it falls, lies about for a while, and crumbles.
 
 use bevy::prelude::*;
 use bevy_burrow::physics::{Debris, DebrisCrumbled, DebrisPlugin};
 use bevy_burrow::prelude::*;
 
-use crate::world::particles::{Burst, Matter};
+use crate::world::particles::{Burst, ParticleKind};
 
-/// Pieces up to so many voxels vanish, others up to so many fall.
+/// Pieces of up to this many voxels vanish at once.
 const CRUMBS: u32 = 6;
+/// Larger pieces of up to this many voxels fall.
 const DEBRIS: u32 = 3000;
 
-/// Lets loose ground fall.
-pub struct RubblePlugin;
+/// Lets loose ground fall, with particles where it crumbles.
+pub struct DebrisEffectsPlugin;
 
-impl Plugin for RubblePlugin {
+impl Plugin for DebrisEffectsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins(DebrisPlugin).add_observer(look_for_pieces).add_observer(crumble);
+        app.add_plugins(DebrisPlugin).add_observer(enable_loose_ground).add_observer(crumble);
     }
 }
 
-fn look_for_pieces(ready: On<TerrainReady>, mut commands: Commands) {
+fn enable_loose_ground(ready: On<TerrainReady>, mut commands: Commands) {
     commands.entity(ready.entity).try_insert(LooseGround { crumbs: CRUMBS, debris: DEBRIS, ..default() });
 }
 
@@ -29,13 +30,13 @@ fn crumble(
     mut bursts: MessageWriter<Burst>,
 ) {
     let Ok((piece, transform)) = pieces.get(crumbled.entity) else { return };
-    let burst = Burst {
+    let burst = |count: usize, speed: f32, kind: ParticleKind| Burst {
         place: transform.translation,
-        out: Vec3::Y,
-        count: 18,
-        speed: 2.5,
-        matter: Matter::Chips(piece.material),
+        direction: Vec3::Y,
+        count,
+        speed,
+        kind,
     };
-    bursts.write(Burst { count: 4, speed: 1.0, matter: Matter::Dust(piece.material), ..burst.clone() });
-    bursts.write(burst);
+    bursts.write(burst(18, 2.5, ParticleKind::Chips(piece.material)));
+    bursts.write(burst(4, 1.0, ParticleKind::Dust(piece.material)));
 }

@@ -1,7 +1,7 @@
-//! The landscape: a survey of the Jacksboro fault in Tennessee, shrunk and made steeper, as a diggable terrain.
+//! The landscape: an elevation model of the Jacksboro fault in Tennessee, scaled down and made steeper.
 //!
-//! The picture of the heights travels inside the program and is loaded through the asset server like any other file.
-//! Everything slow happens in a task; meanwhile the app draws and answers.
+//! The heightmap is embedded in the program and loaded by the asset server like any other file. Slow work runs in a task, so the
+//! game keeps drawing meanwhile.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,6 +12,7 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_burrow::ground::OVERLAY_DEPTH;
 use bevy_burrow::lattice::ONE;
+use bevy_burrow::physics::EdgeWalls;
 use bevy_burrow::prelude::*;
 
 use crate::film::places::Places;
@@ -26,7 +27,7 @@ pub const CONCRETE: MaterialId = MaterialId(5);
 pub const COAL: MaterialId = MaterialId(6);
 pub const GOLD: MaterialId = MaterialId(7);
 
-/// The materials in the order of their ids, which is also that of the default `MaterialColors`.
+/// The materials and their names, in the order of their ids and of the default `MaterialColors`.
 pub const MATERIALS: [(MaterialId, &str); 8] = [
     (ROCK, "rock"),
     (GRASS, "turf"),
@@ -38,20 +39,20 @@ pub const MATERIALS: [(MaterialId, &str); 8] = [
     (GOLD, "gold"),
 ];
 
-/// What a material is called.
+/// The name of a material.
 pub fn name(material: MaterialId) -> &'static str {
     MATERIALS.iter().find(|(id, _)| *id == material).map_or("ground", |(_, name)| name)
 }
 
-/// What a material looks like.
+/// The colour of a material.
 pub fn colour(material: MaterialId) -> LinearRgba {
     MaterialColors::default().0.get(usize::from(material.0)).copied().unwrap_or(LinearRgba::WHITE)
 }
 
 /// Heights of 403 x 344 samples, 16 bit.
-const SURVEY: &[u8] = include_bytes!("../../../assets/jacksboro_fault.png");
-const SURVEY_PATH: &str = "digger/jacksboro_fault.png";
-const SURVEY_ASSET: &str = "embedded://digger/jacksboro_fault.png";
+const HEIGHTMAP: &[u8] = include_bytes!("../../../assets/jacksboro_fault.png");
+const HEIGHTMAP_PATH: &str = "digger/jacksboro_fault.png";
+const HEIGHTMAP_ASSET: &str = "embedded://digger/jacksboro_fault.png";
 
 /// One sample every three voxels: 1206 x 1029 cells, and 120 voxels from the lowest to the highest.
 const SCALE: ImageScale = ImageScale {
@@ -61,44 +62,49 @@ const SCALE: ImageScale = ImageScale {
     detail: Some(Detail { amplitude: 1.2, scale: 9.0, octaves: 4, seed: 17 }),
 };
 
-/// Loads the survey, makes ground of it and spawns the terrain; [`Places`] is a resource from then on.
+/// Loads the heightmap and spawns the terrain. From then on there are [`Places`].
 pub struct LandscapePlugin;
 
 impl Plugin for LandscapePlugin {
     fn build(&self, app: &mut App) {
         app.world().resource::<EmbeddedAssetRegistry>().insert_asset(
-            SURVEY_PATH.into(),
-            Path::new(SURVEY_PATH),
-            SURVEY,
+            HEIGHTMAP_PATH.into(),
+            Path::new(HEIGHTMAP_PATH),
+            HEIGHTMAP,
         );
-        app.add_observer(begin_anew)
-            .add_systems(Startup, open_survey)
-            .add_systems(Update, (shape_ground, spawn_terrain, give_up));
+        app.add_observer(replace_terrain)
+            .add_observer(despawn_on_new_game)
+            .add_systems(Startup, load_heightmap)
+            .add_systems(Update, (start_generation, spawn_terrain, exit_on_failure));
     }
 }
 
-/// The land is to be as it was at first, and so is all that a game changes. Whoever keeps some of that observes it.
+/// A new game begins: everything that play changed goes back to its start. Whoever owns such a thing observes this.
 #[derive(Event, Clone, Copy, Debug)]
 pub struct NewGame;
 
-/// The ground as nobody has dug it yet.
+/// The entity is despawned when a new game begins.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub struct DespawnOnNewGame;
+
+/// The ground without any edits, from which new games begin.
 #[derive(Resource, Clone)]
-struct Untouched(Arc<Ground>);
+struct OriginalGround(Arc<Ground>);
 
-/// The picture on its way in.
+/// The heightmap while it loads.
 #[derive(Resource)]
-struct Survey(Handle<HeightmapImage>);
+struct LoadingHeightmap(Handle<HeightmapImage>);
 
-/// The ground on its way.
+/// The task that generates the ground.
 #[derive(Resource)]
-struct Shaping(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
+struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
 
-/// What is drawn is what tools find: under turf, sand and snow as much of it as the ground has, then rock in its beds. Ore
-/// is where the ground has it, see `veins.rs`, and nowhere else.
+/// How the ground is drawn. What one sees is what one digs: turf, sand and snow are drawn as deep as the ground has them, with
+/// rock below, and ore only where `veins.rs` has put it.
 fn look() -> GroundLook {
     let mut look = GroundLook::default();
-    for skin in [SAND, SNOW] {
-        if let Some(layer) = look.layers.get_mut(usize::from(skin.0)) {
+    for overlay in [SAND, SNOW] {
+        if let Some(layer) = look.layers.get_mut(usize::from(overlay.0)) {
             layer.kind = GroundLayerKind::Body;
         }
     }
@@ -108,50 +114,63 @@ fn look() -> GroundLook {
     look
 }
 
-/// The terrain's entity is there before its terrain: its look makes the textures be painted meanwhile.
-fn open_survey(mut commands: Commands, assets: Res<AssetServer>) {
+/// Spawns the terrain's entity with its look before there is a terrain, so that the textures are made meanwhile.
+fn load_heightmap(mut commands: Commands, assets: Res<AssetServer>) {
     commands.spawn((Name::new("Jacksboro fault"), look()));
-    commands.insert_resource(Survey(assets.load(SURVEY_ASSET)));
+    commands.insert_resource(LoadingHeightmap(assets.load(HEIGHTMAP_ASSET)));
 }
 
-/// Hands the picture to a task as soon as it is there.
-fn shape_ground(mut commands: Commands, survey: Option<Res<Survey>>, images: Res<Assets<HeightmapImage>>) {
-    let Some(HeightmapImage(image)) = survey.and_then(|survey| images.get(&survey.0)) else { return };
+/// Starts the task as soon as the heightmap is loaded.
+fn start_generation(
+    mut commands: Commands,
+    loading: Option<Res<LoadingHeightmap>>,
+    images: Res<Assets<HeightmapImage>>,
+) {
+    let Some(HeightmapImage(image)) = loading.and_then(|loading| images.get(&loading.0)) else { return };
     let image = image.clone();
-    commands.insert_resource(Shaping(AsyncComputeTaskPool::get().spawn(async move { shape(&image) })));
-    commands.remove_resource::<Survey>();
+    commands.insert_resource(Generation(AsyncComputeTaskPool::get().spawn(async move { generate(&image) })));
+    commands.remove_resource::<LoadingHeightmap>();
 }
 
-/// Ground from the survey, a terrain of it, and the places worth digging at.
-fn shape(survey: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
-    let ground = Ground::from_image(survey, &SCALE)
+fn generate(heightmap: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
+    let ground = Ground::from_image(heightmap, &SCALE)
         .and_then(|ground| ground.with_materials(&vegetation()))
         .map_err(|error| error.to_string())?;
     let places = Places::find(&ground)?;
     let ground = Arc::new(ground);
-    let terrain = on(&ground).map_err(|error| error.to_string())?;
+    let terrain = new_terrain(&ground).map_err(|error| error.to_string())?;
     Ok((ground, terrain, places))
 }
 
-/// A terrain that nobody has dug yet.
-fn on(ground: &Arc<Ground>) -> Result<Terrain, BevyError> {
+/// A terrain without any edits.
+fn new_terrain(ground: &Arc<Ground>) -> Result<Terrain, BevyError> {
     let mut terrain = Terrain::new(Arc::clone(ground), &TerrainSettings { chunk_size: 32, voxel_size: 1.0 })?;
     terrain.set_rules(hardness::rules())?;
     Ok(terrain)
 }
 
-/// Old ground goes, with everything that was on its way to it; it is seen until the new one has loaded.
-fn begin_anew(
+/// Replaces the terrain and all edits on their way to it. The old one is shown until the new one has loaded.
+fn replace_terrain(
     _: On<NewGame>,
     mut commands: Commands,
-    ground: Res<Untouched>,
-    country: Single<Entity, With<GroundLook>>,
+    ground: Res<OriginalGround>,
+    terrain: Single<Entity, With<GroundLook>>,
 ) -> Result {
-    commands.entity(*country).insert(on(&ground.0)?);
+    commands.entity(*terrain).insert(new_terrain(&ground.0)?);
     Ok(())
 }
 
-/// Grass where it is flat enough, rock where it is steep, snow on the tops and sand in the valley.
+fn despawn_on_new_game(
+    _: On<NewGame>,
+    mut commands: Commands,
+    entities: Query<Entity, With<DespawnOnNewGame>>,
+) {
+    for entity in &entities {
+        commands.entity(entity).despawn();
+    }
+}
+
+/// Grass on gentle slopes, rock on steep ones, snow on the tops and sand in the valley.
 fn vegetation() -> MaterialControl {
     let everywhere = MaterialRule::default();
     let snow = MaterialRule {
@@ -174,32 +193,32 @@ fn vegetation() -> MaterialControl {
 
 fn spawn_terrain(
     mut commands: Commands,
-    shaping: Option<ResMut<Shaping>>,
-    country: Single<Entity, With<GroundLook>>,
+    generation: Option<ResMut<Generation>>,
+    terrain: Single<Entity, With<GroundLook>>,
     mut exit: MessageWriter<AppExit>,
 ) {
-    let Some(shaped) = shaping.and_then(|mut shaping| check_ready(&mut shaping.0)) else { return };
-    commands.remove_resource::<Shaping>();
-    match shaped {
-        Ok((ground, terrain, places)) => {
+    let Some(result) = generation.and_then(|mut task| check_ready(&mut task.0)) else { return };
+    commands.remove_resource::<Generation>();
+    match result {
+        Ok((ground, model, places)) => {
             commands.insert_resource(places);
-            commands.insert_resource(Untouched(ground));
-            commands.entity(*country).insert(terrain);
+            commands.insert_resource(OriginalGround(ground));
+            commands.entity(*terrain).insert((model, EdgeWalls::default()));
         }
         Err(reason) => {
-            error!("the landscape can't be made: {reason}");
+            error!("the landscape can't be generated: {reason}");
             exit.write(AppExit::error());
         }
     }
 }
 
-/// The survey is part of the program, so this means that the program is broken.
-fn give_up(
+/// The heightmap is part of the program, so a failure means that the program is broken.
+fn exit_on_failure(
     mut failures: MessageReader<AssetLoadFailedEvent<HeightmapImage>>,
     mut exit: MessageWriter<AppExit>,
 ) {
     for failure in failures.read() {
-        error!("the survey can't be read: {}", failure.error);
+        error!("the heightmap can't be read: {}", failure.error);
         exit.write(AppExit::error());
     }
 }

@@ -1,4 +1,4 @@
-//! The land, the light on it, and what flies about in it.
+//! The landscape, the light on it, and particles.
 
 pub mod day;
 pub mod debris;

@@ -1,7 +1,6 @@
-//! The sky: a dome around the eyes, whose shader draws haze, sun, moon, stars and drifting clouds.
+//! The sky: a box around the camera, whose shader draws haze, sun, moon, stars and drifting clouds.
 //!
-//! Bevy's own atmosphere needs an HDR camera and some passes more for every frame; this one needs one draw call, and
-//! looks at any hour as it should.
+//! Bevy's own atmosphere needs an HDR camera and several more passes per frame. This one is a single draw call.
 
 use std::path::Path;
 
@@ -15,10 +14,10 @@ use bevy::render::render_resource::{AsBindGroup, Extent3d, ShaderType, TextureDi
 use bevy::shader::ShaderRef;
 
 const SHADER: &str = "embedded://digger/sky.wgsl";
-/// Texels along an edge of the noise that clouds are made of.
+/// Texels along an edge of the noise for the clouds.
 const SIDE: u32 = 256;
 
-/// Puts a sky behind everything.
+/// Draws the sky behind everything.
 pub struct SkyPlugin;
 
 impl Plugin for SkyPlugin {
@@ -26,11 +25,11 @@ impl Plugin for SkyPlugin {
         let path = Path::new("digger/sky.wgsl");
         let shader = include_bytes!("sky.wgsl");
         app.world().resource::<EmbeddedAssetRegistry>().insert_asset(path.into(), path, shader);
-        app.add_plugins(MaterialPlugin::<SkyMaterial>::default()).add_systems(Startup, raise);
+        app.add_plugins(MaterialPlugin::<SkyMaterial>::default()).add_systems(Startup, spawn_sky);
     }
 }
 
-/// The look of the sky; `day.rs` changes it with the hour.
+/// The sky's material. `day.rs` updates it with the hour.
 #[derive(Asset, AsBindGroup, TypePath, Clone, Debug)]
 pub struct SkyMaterial {
     #[uniform(0)]
@@ -40,20 +39,20 @@ pub struct SkyMaterial {
     pub noise: Handle<Image>,
 }
 
-/// What `sky.wgsl` knows. Colours are linear; 1 is white.
+/// The uniforms of `sky.wgsl`. Colours are linear; 1 is white.
 #[derive(ShaderType, Clone, Copy, Debug, Default)]
 pub struct SkyLook {
-    /// The way to the sun, and how bright its disc is.
+    /// The direction to the sun, and the brightness of its disc.
     pub sun: Vec4,
-    /// The same of the moon.
+    /// The same for the moon.
     pub moon: Vec4,
     pub zenith: Vec4,
     pub horizon: Vec4,
-    /// The light around the sun, and how much of it lies on the horizon.
+    /// The glow around the sun, and how much of it spreads along the horizon.
     pub glow: Vec4,
     pub cloud_light: Vec4,
     pub cloud_shade: Vec4,
-    /// How bright stars are, how far clouds have drifted along x and z, and how far the stars have turned.
+    /// Brightness of the stars, drift of the clouds along x and z, and rotation of the stars.
     pub drift: Vec4,
 }
 
@@ -75,32 +74,27 @@ impl Material for SkyMaterial {
     }
 }
 
-fn raise(
+fn spawn_sky(
     mut commands: Commands,
     mut meshes: ResMut<Assets<Mesh>>,
     mut images: ResMut<Assets<Image>>,
     mut materials: ResMut<Assets<SkyMaterial>>,
-) {
+) -> Result {
+    // The camera is inside the box, so its triangles face inward.
+    let inside_out = Cuboid::from_length(2.0).mesh().build().with_inverted_winding()?;
     let material = SkyMaterial { look: default(), noise: images.add(noise()) };
     commands.spawn((
         Name::new("sky"),
-        Mesh3d(
-            meshes.add(
-                Cuboid::from_length(2.0)
-                    .mesh()
-                    .build()
-                    .with_inverted_winding()
-                    .unwrap_or(Cuboid::from_length(2.0).into()),
-            ),
-        ),
+        Mesh3d(meshes.add(inside_out)),
         MeshMaterial3d(materials.add(material)),
         NoFrustumCulling,
         NotShadowCaster,
         NotShadowReceiver,
     ));
+    Ok(())
 }
 
-/// Value noise in six octaves; its edges fit together.
+/// Tileable value noise in six octaves.
 fn noise() -> Image {
     let lattice = |x: u32, y: u32, octave: u32| {
         let mut bits =

@@ -1,52 +1,46 @@
-//! What hangs before the tour's camera: a curtain between scenes, and the name of the game.
+//! What is drawn over the tour: the fade between scenes, and the logo.
 
 use bevy::prelude::*;
 
-use crate::ui::art::Art;
+use crate::ui::images::Images;
 use crate::ui::widgets;
 
-/// Seconds in which one scene fades into the next.
+/// Seconds of a fade.
 pub const FADE: f32 = 0.4;
 
-/// A black sheet.
+/// A black sheet over the picture.
 #[derive(Component)]
-struct Curtain;
+struct FadeOverlay;
 
-/// The name of the game, on the first and the last frames.
+/// The name of the game, at the start and the end.
 #[derive(Component)]
-struct Signature;
+struct Logo;
 
-/// Hangs up both; of the name nothing is seen yet.
-pub fn hang(world: &mut World) {
-    let logo = ImageNode::new(world.resource::<Art>().logo.clone());
-    let middle =
-        Node { align_items: AlignItems::Center, justify_content: JustifyContent::Center, ..widgets::full() };
+/// Spawns both, invisible.
+pub fn spawn(world: &mut World) {
+    let logo = ImageNode::new(world.resource::<Images>().logo.clone()).with_color(Color::NONE);
     let size = Node { width: percent(46), ..default() };
-    world.spawn((middle, GlobalZIndex(9), children![(Signature, logo, size)]));
-    world.spawn((Curtain, widgets::full(), GlobalZIndex(10), BackgroundColor(Color::BLACK)));
-    sign(world, 0.0);
+    world.spawn((widgets::centered(), GlobalZIndex(9), children![(Logo, logo, size)]));
+    world.spawn((FadeOverlay, widgets::full(), GlobalZIndex(10), BackgroundColor(Color::NONE)));
 }
 
-/// How dark it is after a part of a scene that takes so many seconds: the curtain goes up at its begin and down at its
-/// end. Nobody begins with a black picture, so before the first scene it is up.
-pub fn shade(part: f32, seconds: f32, is_first: bool) -> f32 {
-    let hangs = if is_first { 0.0 } else { 1.0 };
-    (hangs - part * seconds / FADE).max(1.0 - (1.0 - part) * seconds / FADE).clamp(0.0, 1.0)
+/// The opacity of the overlay at a part, 0 to 1, of a scene. Scenes fade in and out, but the first one starts bright.
+pub fn opacity(part: f32, seconds: f32, is_first: bool) -> f32 {
+    let start = if is_first { 0.0 } else { 1.0 };
+    (start - part * seconds / FADE).max(1.0 - (1.0 - part) * seconds / FADE).clamp(0.0, 1.0)
 }
 
-/// How much is seen of the curtain.
-pub fn draw(world: &mut World, alpha: f32) {
-    let mut sheets = world.query_filtered::<&mut BackgroundColor, With<Curtain>>();
-    for mut sheet in sheets.iter_mut(world) {
-        sheet.0 = Color::BLACK.with_alpha(alpha);
+pub fn set_overlay(world: &mut World, opacity: f32) {
+    let mut overlays = world.query_filtered::<&mut BackgroundColor, With<FadeOverlay>>();
+    for mut overlay in overlays.iter_mut(world) {
+        overlay.0 = Color::BLACK.with_alpha(opacity);
     }
 }
 
-/// How much is seen of the name of the game.
-pub fn sign(world: &mut World, alpha: f32) {
-    let mut signatures = world.query_filtered::<&mut ImageNode, With<Signature>>();
-    for mut signature in signatures.iter_mut(world) {
-        signature.color = Color::WHITE.with_alpha(alpha);
+pub fn set_logo(world: &mut World, opacity: f32) {
+    let mut logos = world.query_filtered::<&mut ImageNode, With<Logo>>();
+    for mut logo in logos.iter_mut(world) {
+        logo.color = Color::WHITE.with_alpha(opacity);
     }
 }
 
@@ -55,10 +49,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_scene_begins_and_ends_in_the_dark_but_for_the_first_begin() {
-        for (is_first, begin) in [(true, 0.0), (false, 1.0)] {
-            assert_eq!([0.0, 0.5, 1.0].map(|part| shade(part, 8.0, is_first)), [begin, 0.0, 1.0]);
+    fn scenes_fade_in_and_out_except_for_the_first_start() {
+        for (is_first, start) in [(true, 0.0), (false, 1.0)] {
+            assert_eq!([0.0, 0.5, 1.0].map(|part| opacity(part, 8.0, is_first)), [start, 0.0, 1.0]);
         }
-        assert!((shade(0.025, 8.0, false) - 0.5).abs() < 1e-5, "half of a fade");
+        assert!((opacity(0.025, 8.0, false) - 0.5).abs() < 1e-5, "half of a fade");
     }
 }

@@ -1,4 +1,4 @@
-//! A minute of play, as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a cave.
+//! A minute of play as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a cave.
 
 mod camera_path;
 mod fade;
@@ -10,21 +10,21 @@ use std::time::{Duration, Instant};
 use bevy::prelude::*;
 use bevy::render::settings::RenderResources;
 use bevy_burrow::prelude::*;
-use camera_path::Way;
+use camera_path::CameraPath;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Options;
-use crate::film::camera::{Film, clear, join};
+use crate::film::frame_recorder::{FrameRecorder, make_video, remove_frames};
 use crate::film::places::{Hillside, Places, flat};
 use crate::film::scripted_brushes;
 use crate::film::studio::Studio;
 use crate::player::input::Action;
-use crate::tools::tool_in_hand::ShowHand;
+use crate::tools::tool_in_hand::ShowTool;
 use crate::tools::{Hand, Tool};
 use crate::ui::hud::ShowHud;
 use crate::world::day::{AFTERNOON, Clock};
 use crate::world::landscape::CONCRETE;
-use crate::world::particles::{Burst, Matter};
+use crate::world::particles::{Burst, ParticleKind};
 
 /// Seconds of each scene.
 const FLIGHT: f32 = 8.0;
@@ -37,10 +37,10 @@ const SUNSET: f32 = 4.0;
 const LAMPS: f32 = 6.5;
 const ALL: f32 = FLIGHT + PICKAXE + TUNNEL + BOMBS + BOULDER + BRIDGE + SUNSET + LAMPS;
 
-/// Makes the film, and a video of it where there is ffmpeg.
+/// Records the film, and makes a video of it if ffmpeg is installed.
 pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
     if renderer.is_none() {
-        eprintln!("There is no graphics adapter, not even in software: nothing can be filmed.");
+        eprintln!("There is no graphics adapter, not even in software: nothing can be recorded.");
         return ExitCode::FAILURE;
     }
     match film(options, renderer) {
@@ -50,7 +50,7 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
                 took.as_secs_f64(),
                 options.out.display()
             );
-            join(&options.out, (frames as f32 / ALL).clamp(1.0, options.fps as f32), frames)
+            make_video(&options.out, (frames as f32 / ALL).clamp(1.0, options.fps as f32), frames)
         }
         Err(error) => {
             eprintln!("The tour failed: {error}");
@@ -62,18 +62,19 @@ pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
 fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, Duration)> {
     let start = Instant::now();
     let studio = Studio::open(options, renderer)?;
-    clear(&options.out)?;
+    remove_frames(&options.out)?;
     let places: Places = studio.resource();
     let all = (ALL * options.fps as f32).round() as usize;
-    let film = Film::new(studio, options.fps, all, options.frames.map_or(all, |frames| frames as usize));
-    // Where a fade has hardly a frame, it is no fade but a black picture.
+    let film =
+        FrameRecorder::new(studio, options.fps, all, options.frames.map_or(all, |frames| frames as usize));
+    // With fewer frames, a fade would be a single black picture.
     let fades = film.rate() * fade::FADE >= 3.0;
     let bar = ProgressBar::new((ALL * 10.0) as u64);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {elapsed} of about {duration} {msg}") {
         bar.set_style(style);
     }
     let mut tour = Tour { film, bar, fades, is_first: true };
-    fade::hang(tour.studio().world());
+    fade::spawn(tour.studio().world());
     tour.flight(&places)?;
     tour.pickaxe(&places.hillside)?;
     tour.tunnel(&places.hillside)?;
@@ -81,17 +82,17 @@ fn film(options: &Options, renderer: Option<RenderResources>) -> Result<(usize, 
     tour.boulder(&places)?;
     tour.bridge(&places)?;
     tour.lamps(&places.hillside)?;
-    tour.film.develop(0)?;
+    tour.film.wait_for_pictures(0)?;
     tour.bar.finish_and_clear();
     Ok((tour.film.drawn(), start.elapsed()))
 }
 
 struct Tour {
-    film: Film,
+    film: FrameRecorder,
     bar: ProgressBar,
-    /// Is there a curtain between scenes?
+    /// Do scenes fade?
     fades: bool,
-    /// Has no scene been played yet?
+    /// Is the next scene the first one?
     is_first: bool,
 }
 
@@ -100,7 +101,7 @@ impl Tour {
         &mut self.film.studio
     }
 
-    /// A scene, from curtain to curtain.
+    /// Plays a scene.
     fn scene(
         &mut self,
         name: &'static str,
@@ -112,15 +113,15 @@ impl Tour {
         let (fades, is_first) = (self.fades, std::mem::take(&mut self.is_first));
         self.film.play(seconds, |studio, t| {
             direct(studio, t)?;
-            let shade = if fades { fade::shade(t, seconds, is_first) } else { 0.0 };
-            fade::draw(studio.world(), shade);
+            let opacity = if fades { fade::opacity(t, seconds, is_first) } else { 0.0 };
+            fade::set_overlay(studio.world(), opacity);
             Ok(())
         })?;
         self.bar.inc((seconds * 10.0) as u64);
         Ok(())
     }
 
-    /// Brushes that nobody watches.
+    /// Applies brushes between two scenes.
     fn prepare(&mut self, brushes: impl IntoIterator<Item = Brush>) -> Result {
         for brush in brushes {
             self.studio().world().write_message(brush);
@@ -129,17 +130,17 @@ impl Tour {
         self.film.settle()
     }
 
-    /// The player with a tool, and his hands and figures seen.
-    fn take(&mut self, tool: Tool) {
+    /// Gives the player a tool, and shows it and the display.
+    fn equip(&mut self, tool: Tool) {
         let world = self.studio().world();
         world.resource_mut::<Hand>().tool = tool;
         world.resource_mut::<Hand>().preview = true;
-        world.resource_mut::<ShowHand>().0 = true;
+        world.resource_mut::<ShowTool>().0 = true;
         world.resource_mut::<ShowHud>().0 = true;
-        self.studio().land();
+        self.studio().attach_camera();
     }
 
-    /// Over the ridges and down to the hill.
+    /// The camera flies over the ridges and down to the hill.
     fn flight(&mut self, places: &Places) -> Result {
         self.set_hour(AFTERNOON);
         let Hillside { mouth, inward, .. } = places.hillside;
@@ -151,8 +152,8 @@ impl Tour {
             (mouth - along * 80.0 + aside * 22.0, 20.0),
             (mouth - along * 38.0, 7.0),
         ];
-        let way = Way::over(self.studio().terrain()?.world(), &way)?;
-        let look = Way::through([
+        let way = CameraPath::over(self.studio().terrain()?.world(), &way)?;
+        let look = CameraPath::through([
             mouth + along * 40.0 - aside * 120.0,
             mouth + along * 60.0 - aside * 40.0,
             mouth + along * 30.0 + Vec3::Y * 6.0,
@@ -161,25 +162,25 @@ impl Tour {
         ])?;
         self.scene("the flight", FLIGHT, |studio, t| {
             let eased = t * t * (3.0 - 2.0 * t);
-            studio.fly_to(way.at(eased), look.at(eased));
-            fade::sign(studio.world(), 1.0 - ((t * FLIGHT - 2.6) / 0.7).clamp(0.0, 1.0));
+            studio.detach_camera(way.at(eased), look.at(eased));
+            fade::set_logo(studio.world(), 1.0 - ((t * FLIGHT - 2.6) / 0.7).clamp(0.0, 1.0));
             Ok(())
         })
     }
 
-    /// Blow by blow into the slope.
+    /// The pickaxe digs into the slope.
     fn pickaxe(&mut self, hillside: &Hillside) -> Result {
         let Hillside { mouth, inward, .. } = *hillside;
         self.film.settle()?;
-        self.studio().carry_to(mouth.xz() - inward * 9.0)?;
-        self.take(Tool::Pickaxe);
+        self.studio().move_to(mouth.xz() - inward * 9.0)?;
+        self.equip(Tool::Pickaxe);
         self.studio().world().resource_mut::<Hand>().set_radius(Tool::Pickaxe, 2.1);
         let wall = mouth + flat(inward) * 3.0;
         let aside = flat(inward.perp());
         self.scene("the pickaxe", PICKAXE, |studio, t| {
             let seconds = t * PICKAXE;
             let digs = seconds > 1.6;
-            // Up to the wall, then into what was dug.
+            // Up to the wall, and later into the hole.
             let pace = if seconds < 1.5 {
                 0.75
             } else if digs && seconds > 4.0 {
@@ -190,18 +191,18 @@ impl Tour {
             studio.walk(inward * pace);
             let sweep =
                 aside * ((seconds - 1.6) * 1.9).sin() * 1.3 + Vec3::Y * ((seconds * 1.3).cos() * 0.8 + 1.5);
-            studio.gaze(
+            studio.turn_towards(
                 wall + flat(inward) * (0.5 * seconds) + if digs { sweep } else { Vec3::Y * 2.4 },
                 0.12,
             )?;
             studio.hold(if digs { &[Action::Use] } else { &[] });
             Ok(())
         })?;
-        self.rest();
+        self.stop();
         Ok(())
     }
 
-    /// Straight ahead with the drill, by the headlamp, through seams of clay and coal.
+    /// The drill digs through seams of clay and coal, by the light of the headlamp.
     fn tunnel(&mut self, hillside: &Hillside) -> Result {
         let [_, bend, end] = hillside.floor();
         let onward = flat(hillside.onward);
@@ -210,7 +211,7 @@ impl Tour {
         self.prepare(scripted_brushes::strata(hillside))?;
         self.prepare(legs.into_iter().take(first).map(|(brush, _)| brush))?;
         self.studio().stand_at(bend - flat(hillside.inward) * 7.0 + Vec3::Y * 0.2)?;
-        self.take(Tool::Drill);
+        self.equip(Tool::Drill);
         self.studio().lamp(true);
         let ahead = end - bend;
         self.scene("the tunnel", TUNNEL, |studio, t| {
@@ -224,23 +225,23 @@ impl Tour {
             } else {
                 feet + onward * 9.0 + Vec3::Y * (1.75 + 9.0 * ahead.y / ahead.xz().length()) + sway
             };
-            studio.gaze(target, 0.09)?;
+            studio.turn_towards(target, 0.09)?;
             studio.hold(if seconds > 2.2 { &[Action::Use] } else { &[] });
             Ok(())
         })?;
-        self.rest();
+        self.stop();
         self.studio().lamp(false);
         Ok(())
     }
 
-    /// Three bombs into a meadow.
+    /// The player throws three bombs into a meadow.
     fn bombs(&mut self, places: &Places) -> Result {
         self.set_hour(15.6);
         let corner = places.corner;
         let way = Vec2::new(0.86, -0.51);
         self.film.settle()?;
-        self.studio().carry_to(corner.xz() - way * 17.0)?;
-        self.take(Tool::Bomb);
+        self.studio().move_to(corner.xz() - way * 17.0)?;
+        self.equip(Tool::Bomb);
         let aside = flat(way.perp());
         self.scene("the bombs", BOMBS, |studio, t| {
             let seconds = t * BOMBS;
@@ -251,17 +252,17 @@ impl Tour {
             } else {
                 corner - Vec3::Y * 0.6
             };
-            studio.gaze(target, 0.10)?;
+            studio.turn_towards(target, 0.10)?;
             let holds = throws.iter().any(|&throw| (throw..throw + 0.1).contains(&seconds));
             studio.hold(if holds { &[Action::Use] } else { &[] });
             studio.walk(if seconds > 5.4 { way * 0.7 } else { Vec2::ZERO });
             Ok(())
         })?;
-        self.rest();
+        self.stop();
         Ok(())
     }
 
-    /// A boulder on a pillar, and a drill through the pillar: what holds on to nothing falls.
+    /// The player drills through a pillar with a boulder on it, and the boulder falls.
     fn boulder(&mut self, places: &Places) -> Result {
         let way = Vec2::new(0.51, 0.86);
         let place = places.corner.xz() + way * 24.0;
@@ -269,8 +270,8 @@ impl Tour {
         let foot = Vec3::new(place.x, height.ok_or("the tour left the world")? as f32, place.y);
         let boulder = foot + Vec3::Y * 8.0 + flat(way) * 1.2;
         self.prepare(scripted_brushes::boulder(foot, boulder))?;
-        self.studio().carry_to(place - way * 9.0)?;
-        self.take(Tool::Drill);
+        self.studio().move_to(place - way * 9.0)?;
+        self.equip(Tool::Drill);
         self.scene("the boulder", BOULDER, |studio, t| {
             let seconds = t * BOULDER;
             let target = match seconds {
@@ -278,7 +279,7 @@ impl Tour {
                 ..3.3 => foot + Vec3::Y * 1.8,
                 _ => foot + Vec3::Y * 2.5 + flat(way) * 3.0,
             };
-            studio.gaze(target, 0.09)?;
+            studio.turn_towards(target, 0.09)?;
             let reaches = (studio.feet()? - foot).xz().length() < 4.5;
             studio.walk(match seconds {
                 ..2.4 if !reaches => way * 0.6,
@@ -288,11 +289,11 @@ impl Tour {
             studio.hold(if (2.4..3.3).contains(&seconds) { &[Action::Use] } else { &[] });
             Ok(())
         })?;
-        self.rest();
+        self.stop();
         Ok(())
     }
 
-    /// A bridge grows out of its arch; then the sun goes down behind it.
+    /// A bridge is built from its arch up; then the sun sets behind it.
     fn bridge(&mut self, places: &Places) -> Result {
         let ravine = places.ravine;
         let middle = ravine.from.midpoint(ravine.to);
@@ -300,13 +301,14 @@ impl Tour {
         let along = (ravine.to - ravine.from).with_y(0.0).normalize();
         let east = along.cross(Vec3::Y) * (along.cross(Vec3::Y).x + 0.01).signum();
         let world = self.studio().terrain()?.world();
-        let (east, west) = (Way::around(world, middle, east)?, Way::around(world, middle, -east)?);
-        // From the east, so that the evening is behind it, unless more of it is seen from the other side.
-        let way = if west.sight(world, &ravine) > east.sight(world, &ravine) { west } else { east };
+        let (east, west) =
+            (CameraPath::around(world, middle, east)?, CameraPath::around(world, middle, -east)?);
+        // From the east, so that the sunset is behind it, unless more of it is visible from the west.
+        let way = if west.visibility(world, &ravine) > east.visibility(world, &ravine) { west } else { east };
         let mut sent = 0;
         self.scene("the bridge", BRIDGE + SUNSET, |studio, t| {
             let seconds = t * (BRIDGE + SUNSET);
-            studio.fly_to(
+            studio.detach_camera(
                 way.at((seconds / (BRIDGE + SUNSET)).powf(0.8)),
                 middle - Vec3::Y * 3.0 + Vec3::Y * (2.0 * t),
             );
@@ -314,8 +316,13 @@ impl Tour {
             while sent < due.min(brushes.len()) {
                 let brush = brushes[sent].clone();
                 let place = centre(&brush.shape);
-                let dust =
-                    Burst { place, out: Vec3::ZERO, count: 5, speed: 2.0, matter: Matter::Dust(CONCRETE) };
+                let dust = Burst {
+                    place,
+                    direction: Vec3::ZERO,
+                    count: 5,
+                    speed: 2.0,
+                    kind: ParticleKind::Dust(CONCRETE),
+                };
                 studio.world().write_message(dust);
                 studio.world().write_message(brush);
                 sent += 1;
@@ -326,7 +333,7 @@ impl Tour {
         })
     }
 
-    /// Night, underground: one lamp after the other.
+    /// At night, the player puts lamps into a room underground.
     fn lamps(&mut self, hillside: &Hillside) -> Result {
         self.set_hour(21.0);
         self.prepare(scripted_brushes::tunnel(hillside).into_iter().map(|(brush, _)| brush))?;
@@ -335,7 +342,7 @@ impl Tour {
         let [_, _, end] = hillside.floor();
         let room = hillside.room();
         self.studio().stand_at(end - onward * 2.0 + Vec3::Y * 0.3)?;
-        self.take(Tool::Lamp);
+        self.equip(Tool::Lamp);
         let aside = onward.cross(Vec3::Y);
         let floor = end.y;
         let spots = [
@@ -348,7 +355,7 @@ impl Tour {
             let seconds = t * LAMPS;
             let at = ((seconds / 1.35) as usize).min(spots.len());
             let target = spots.get(at).copied().unwrap_or(room);
-            studio.gaze(target, 0.16)?;
+            studio.turn_towards(target, 0.16)?;
             let within = seconds - 1.35 * at as f32;
             studio.hold(if at < spots.len() && (0.75..0.85).contains(&within) {
                 &[Action::Use]
@@ -356,10 +363,10 @@ impl Tour {
                 &[]
             });
             studio.walk(if (0.6..4.6).contains(&seconds) { hillside.onward * 0.32 } else { Vec2::ZERO });
-            fade::sign(studio.world(), ((seconds - (LAMPS - 1.6)) / 0.6).clamp(0.0, 1.0));
+            fade::set_logo(studio.world(), ((seconds - (LAMPS - 1.6)) / 0.6).clamp(0.0, 1.0));
             Ok(())
         })?;
-        self.rest();
+        self.stop();
         Ok(())
     }
 
@@ -367,14 +374,14 @@ impl Tour {
         self.studio().world().resource_mut::<Clock>().hour = hour;
     }
 
-    /// Nothing is held down any more.
-    fn rest(&mut self) {
+    /// Releases all actions.
+    fn stop(&mut self) {
         self.studio().hold(&[]);
         self.studio().walk(Vec2::ZERO);
     }
 }
 
-/// Roughly the middle of a shape.
+/// The approximate middle of a shape.
 fn centre(shape: &Shape) -> Vec3 {
     match *shape {
         Shape::Sphere(Sphere { center, .. }) | Shape::Cuboid(Cuboid { center, .. }) => center,
@@ -382,6 +389,6 @@ fn centre(shape: &Shape) -> Vec3 {
             base + axis / 2.0
         }
         Shape::Capsule(Capsule { from, to, .. }) => from.midpoint(to),
-        _ => panic!("no shape of the tour's: {shape:?}"),
+        _ => panic!("the tour has no such shape: {shape:?}"),
     }
 }

@@ -1,128 +1,94 @@
-//! The menu of the pause.
+//! The pause menu.
 
 use bevy::prelude::*;
 
-use super::go_to;
-use crate::player::game_state::{Page, Phase};
-use crate::player::input::{Action, Actions, ReadsDevices};
-use crate::ui::widgets::{self, Chosen, Deaf};
+use super::{quit, spawn_common_buttons};
+use crate::player::game_state::{GameState, MenuPage};
+use crate::player::input::{Action, ActionSystems, Actions};
+use crate::ui::widgets::{self, Activated, MenuInputDisabled};
 
-/// The pause's page, and the key that leads back from every page.
+/// The pause menu, and the keys that lead back from every page.
 pub struct PausePlugin;
 
 impl Plugin for PausePlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(OnEnter(Page::Menu), open.run_if(in_state(Phase::Paused))).add_systems(
+        app.add_systems(OnEnter(MenuPage::Menu), open.run_if(in_state(GameState::Paused))).add_systems(
             PreUpdate,
             go_back
-                .after(ReadsDevices)
-                .run_if(not(in_state(Page::None)))
-                .run_if(not(resource_exists::<Deaf>)),
+                .after(ActionSystems)
+                .run_if(not(in_state(MenuPage::None)))
+                .run_if(not(resource_exists::<MenuInputDisabled>)),
         );
     }
 }
 
 fn open(mut commands: Commands) {
-    super::open(&mut commands, Page::Menu, "Pause", 330.0, |column| {
-        column.spawn(widgets::button(0, "Go on", 276.0)).observe(go_on);
-        column.spawn(widgets::button(1, "Settings", 276.0)).observe(go_to(Page::Settings));
-        column.spawn(widgets::button(2, "Controls", 276.0)).observe(go_to(Page::Controls));
-        column.spawn(widgets::button(3, "Help", 276.0)).observe(go_to(Page::Help));
-        column.spawn(widgets::button(4, "To the title", 276.0)).observe(leave);
-        column.spawn(widgets::button(5, "Quit", 276.0)).observe(quit);
+    const WIDTH: f32 = 276.0;
+    super::spawn_page(&mut commands, MenuPage::Menu, "Pause", 330.0, |column| {
+        column.spawn(widgets::button(0, "Continue", WIDTH)).observe(change_to(GameState::Playing));
+        spawn_common_buttons(column, 1, WIDTH);
+        column.spawn(widgets::button(4, "To the title", WIDTH)).observe(change_to(GameState::Title));
+        column.spawn(widgets::button(5, "Quit", WIDTH)).observe(quit);
     });
 }
 
-fn go_on(_: On<Chosen>, mut phase: ResMut<NextState<Phase>>) {
-    phase.set(Phase::Playing);
+fn change_to(state: GameState) -> impl FnMut(On<Activated>, ResMut<NextState<GameState>>) {
+    move |_, mut next| next.set(state)
 }
 
-fn leave(_: On<Chosen>, mut phase: ResMut<NextState<Phase>>) {
-    phase.set(Phase::Title);
-}
-
-fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
-    exit.write(AppExit::Success);
-}
-
-/// From a page to the menu, and from the pause's menu to the game.
+/// Leads from a page to the menu, and from the pause menu to the game.
 fn go_back(
     keys: Res<ButtonInput<KeyCode>>,
     mouse: Res<ButtonInput<MouseButton>>,
     pads: Query<&Gamepad>,
     actions: Res<Actions>,
-    now: (Res<State<Phase>>, Res<State<Page>>),
-    mut phase: ResMut<NextState<Phase>>,
-    mut page: ResMut<NextState<Page>>,
+    now: (Res<State<GameState>>, Res<State<MenuPage>>),
+    mut state: ResMut<NextState<GameState>>,
+    mut page: ResMut<NextState<MenuPage>>,
 ) {
-    let presses = |button: GamepadButton| pads.iter().any(|pad| pad.just_pressed(button));
-    // What chooses an item does nothing but that here, though it may be bound to the pause.
-    let chooses = keys.any_just_pressed(widgets::CHOOSE)
-        || presses(GamepadButton::South)
+    let is_pressed = |button: GamepadButton| pads.iter().any(|pad| pad.just_pressed(button));
+    // In menus, the keys that activate items do only that, even if they are bound to the pause.
+    let activates = keys.any_just_pressed(widgets::ACTIVATE)
+        || is_pressed(GamepadButton::South)
         || mouse.just_pressed(MouseButton::Left);
     let back = keys.just_pressed(KeyCode::Escape)
-        || actions.just_pressed(Action::Pause) && !chooses
-        || presses(GamepadButton::East);
-    let help = actions.just_pressed(Action::Help) && *now.1 == Page::Help;
+        || actions.just_pressed(Action::Pause) && !activates
+        || is_pressed(GamepadButton::East);
+    let help = actions.just_pressed(Action::Help);
     match (**now.0, **now.1) {
-        (Phase::Paused, Page::Menu) if back => phase.set(Phase::Playing),
-        (Phase::Paused, Page::Help) if help => phase.set(Phase::Playing),
-        (_, Page::Settings | Page::Controls | Page::Help) if back => page.set(Page::Menu),
+        (GameState::Paused, MenuPage::Menu) if back => state.set(GameState::Playing),
+        (GameState::Paused, MenuPage::Help) if help => state.set(GameState::Playing),
+        (_, MenuPage::Settings | MenuPage::Controls | MenuPage::Help) if back => page.set(MenuPage::Menu),
         _ => {}
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use bevy::input::keyboard::{Key, KeyboardInput};
-    use bevy::input::{ButtonState, InputPlugin as DevicePlugin};
-    use bevy::state::app::StatesPlugin;
-    use bevy::window::WindowFocused;
-
     use super::*;
     use crate::player::bindings::Binding;
-    use crate::player::game_state::PhasePlugin;
-    use crate::player::input::InputPlugin;
+    use crate::player::game_state::GameStatePlugin;
+    use crate::test_support::{app_with_input, go_to, tap_key};
     use crate::ui::settings::Settings;
 
-    /// Someone plays.
     fn app() -> App {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, StatesPlugin, DevicePlugin, InputPlugin, PhasePlugin, PausePlugin))
-            .add_message::<WindowFocused>()
-            .init_resource::<Settings>();
-        app.world_mut().resource_mut::<NextState<Phase>>().set(Phase::Playing);
-        app.update();
-        app.update();
+        let mut app = app_with_input();
+        app.add_plugins((GameStatePlugin, PausePlugin));
+        go_to(&mut app, GameState::Playing);
         app
     }
 
-    /// Presses a key for a frame.
-    fn tap(app: &mut App, key_code: KeyCode) {
-        for state in [ButtonState::Pressed, ButtonState::Released] {
-            app.world_mut().write_message(KeyboardInput {
-                key_code,
-                logical_key: Key::Escape,
-                state,
-                text: None,
-                repeat: false,
-                window: Entity::PLACEHOLDER,
-            });
-            app.update();
-        }
-    }
-
-    fn now(app: &App) -> (Phase, Page) {
-        (**app.world().resource::<State<Phase>>(), **app.world().resource::<State<Page>>())
+    fn now(app: &App) -> (GameState, MenuPage) {
+        (**app.world().resource::<State<GameState>>(), **app.world().resource::<State<MenuPage>>())
     }
 
     #[test]
-    fn the_key_that_pauses_leads_back_to_the_game() {
+    fn the_key_that_pauses_also_continues() {
         let mut app = app();
-        for (key, page) in [(KeyCode::Escape, Page::Menu), (KeyCode::KeyH, Page::Help)] {
+        for (key, page) in [(KeyCode::Escape, MenuPage::Menu), (KeyCode::KeyH, MenuPage::Help)] {
             for _ in 0..2 {
-                for expected in [(Phase::Paused, page), (Phase::Playing, Page::None)] {
-                    tap(&mut app, key);
+                for expected in [(GameState::Paused, page), (GameState::Playing, MenuPage::None)] {
+                    tap_key(&mut app, key);
                     assert_eq!(now(&app), expected, "{key:?}");
                 }
             }
@@ -130,15 +96,15 @@ mod tests {
     }
 
     #[test]
-    fn who_pauses_with_the_key_that_chooses_can_choose_with_it() {
+    fn a_key_that_activates_items_does_not_continue_even_if_it_pauses() {
         let mut app = app();
         let space = Binding::Key(KeyCode::Space);
         app.world_mut().resource_mut::<Settings>().bindings.rebind(Action::Pause, space);
         for _ in 0..2 {
-            tap(&mut app, KeyCode::Space);
-            assert_eq!(now(&app), (Phase::Paused, Page::Menu));
+            tap_key(&mut app, KeyCode::Space);
+            assert_eq!(now(&app), (GameState::Paused, MenuPage::Menu));
         }
-        tap(&mut app, KeyCode::Escape);
-        assert_eq!(now(&app), (Phase::Playing, Page::None));
+        tap_key(&mut app, KeyCode::Escape);
+        assert_eq!(now(&app), (GameState::Playing, MenuPage::None));
     }
 }

@@ -1,69 +1,68 @@
-//! The title: the name of the game and its menu, over a landscape that slowly turns.
+//! The title: the logo and its menu, over a landscape that slowly turns.
 
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::GroundLoading;
 
-use super::go_to;
-use crate::film::places::Places;
-use crate::player::game_state::{Page, Phase};
-use crate::player::{Drone, Player};
-use crate::ui::art::Art;
-use crate::ui::widgets::{self, Chosen};
+use super::{quit, spawn_common_buttons};
+use crate::film::places::{Places, flat};
+use crate::player::Player;
+use crate::player::camera::{DetachedCamera, PlayerCamera};
+use crate::player::game_state::{GameState, MenuPage};
+use crate::ui::images::Images;
+use crate::ui::widgets::{self, Activated, GOLD, GREY};
 use crate::world::landscape::NewGame;
-use crate::world::light::Eyes;
 
 /// Seconds for one turn around the landscape.
 const TURN: f32 = 150.0;
+/// Width of the buttons.
+const WIDTH: f32 = 260.0;
 
-/// The title's page and its camera.
+/// The title page and its camera.
 pub struct TitlePlugin;
 
 impl Plugin for TitlePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Start>()
-            .add_systems(OnEnter(Phase::Title), open_menu)
-            .add_systems(OnEnter(Page::Menu), open.run_if(in_state(Phase::Title)))
-            .add_systems(OnExit(Phase::Title), (land, begin))
+            .add_systems(OnEnter(GameState::Title), |mut page: ResMut<NextState<MenuPage>>| {
+                page.set(MenuPage::Menu);
+            })
+            .add_systems(OnEnter(MenuPage::Menu), open.run_if(in_state(GameState::Title)))
+            .add_systems(OnExit(GameState::Title), (attach_camera, note_start))
             .add_systems(
                 Update,
                 (
                     fly.run_if(resource_exists::<Places>),
-                    (tell_progress, play.run_if(is_there).run_if(is_watched)).chain(),
+                    show_progress,
+                    start_game.run_if(is_loaded).run_if(has_focus),
                 )
-                    .run_if(in_state(Phase::Title)),
+                    .run_if(in_state(GameState::Title)),
             );
     }
 }
 
-/// How far it is with the game.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 struct Start {
-    /// Is there one to go on with?
+    /// Is there a game to continue?
     has_begun: bool,
-    /// Does somebody want to play as soon as there is land?
+    /// Does the player want to start as soon as the landscape has loaded?
     is_wanted: bool,
 }
 
-/// Tells how far the landscape is; hidden when it is there.
+/// The progress of loading. It is hidden when everything has loaded.
 #[derive(Component)]
 struct Progress;
 
-/// What it says.
 #[derive(Component)]
-struct Words;
+struct ProgressText;
 
-/// What is filled of its bar.
+/// The filled part of the progress bar.
 #[derive(Component)]
-struct Filled;
+struct ProgressBar;
 
-fn open_menu(mut page: ResMut<NextState<Page>>) {
-    page.set(Page::Menu);
-}
-
-fn open(mut commands: Commands, art: Option<Res<Art>>, game: Res<Start>) {
-    let Some(art) = art else { return };
+fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>) {
+    let Some(images) = images else { return };
     let left = Node {
         padding: UiRect::left(px(84)),
         flex_direction: FlexDirection::Column,
@@ -71,100 +70,79 @@ fn open(mut commands: Commands, art: Option<Res<Art>>, game: Res<Start>) {
         row_gap: px(6),
         ..widgets::full()
     };
-    let shade = LinearGradient::new(
-        LinearGradient::TO_RIGHT,
-        vec![
-            ColorStop::new(Color::srgba(0.0, 0.0, 0.02, 0.78), percent(0)),
-            ColorStop::new(Color::srgba(0.0, 0.0, 0.02, 0.45), percent(36)),
-            ColorStop::new(Color::srgba(0.0, 0.0, 0.02, 0.0), percent(64)),
-        ],
-    );
-    let page = (DespawnOnExit(Page::Menu), left, BackgroundGradient::from(shade));
+    let shade = |alpha: f32, at: i32| ColorStop::new(Color::srgba(0.0, 0.0, 0.02, alpha), percent(at));
+    let shade =
+        LinearGradient::new(LinearGradient::TO_RIGHT, vec![shade(0.78, 0), shade(0.45, 36), shade(0.0, 64)]);
+    let page = (DespawnOnExit(MenuPage::Menu), left, BackgroundGradient::from(shade));
     commands.spawn(page).with_children(|left| {
         let logo = Node { width: px(424), height: px(88), margin: UiRect::bottom(px(4)), ..default() };
-        left.spawn((ImageNode::new(art.logo.clone()), logo));
+        left.spawn((ImageNode::new(images.logo.clone()), logo));
         let below = Node { margin: UiRect::bottom(px(34)), ..default() };
-        left.spawn((widgets::text("real land, and all of it can be dug", 17.0, widgets::GREY), below));
-        let mut orders = 0..;
-        let mut button =
-            |words: &'static str| widgets::button(orders.next().unwrap_or_default(), words, 260.0);
-        left.spawn(button(if game.has_begun { "Go on" } else { "Dig" })).observe(start);
+        left.spawn((widgets::text("a real landscape that you can dig", 17.0, GREY), below));
+        let first = if game.has_begun { "Continue" } else { "Dig" };
+        left.spawn(widgets::button(0, first, WIDTH)).observe(start);
         if game.has_begun {
-            left.spawn(button("New game")).observe(start_anew);
+            left.spawn(widgets::button(1, "New game", WIDTH)).observe(start_new_game);
         }
-        left.spawn(button("Settings")).observe(go_to(Page::Settings));
-        left.spawn(button("Controls")).observe(go_to(Page::Controls));
-        left.spawn(button("Help")).observe(go_to(Page::Help));
-        left.spawn(button("Quit")).observe(quit);
+        let next = 1 + usize::from(game.has_begun);
+        spawn_common_buttons(left, next, WIDTH);
+        left.spawn(widgets::button(next + 3, "Quit", WIDTH)).observe(quit);
         left.spawn(progress());
     });
 }
 
-/// The words over the bar. Hidden, it keeps its place, so that nothing moves below the mouse when the land is there.
+/// A text over a bar. While it is hidden it keeps its place, so that the buttons do not move.
 fn progress() -> impl Bundle {
-    let column = Node {
-        margin: UiRect::top(px(26)),
-        flex_direction: FlexDirection::Column,
-        row_gap: px(8),
-        ..default()
-    };
+    let column = Node { margin: UiRect::top(px(26)), ..widgets::column(px(8)) };
     let line = Node { height: px(20), ..default() };
-    let words = (Words, widgets::text("", 15.0, widgets::GOLD), line);
-    (Progress, column, Visibility::Hidden, children![words, widgets::bar(260.0, Filled)])
+    let words = (ProgressText, widgets::text("", 15.0, GOLD), line);
+    (Progress, column, Visibility::Hidden, children![words, widgets::bar(WIDTH, ProgressBar)])
 }
 
-fn start(_: On<Chosen>, mut game: ResMut<Start>) {
+fn start(_: On<Activated>, mut game: ResMut<Start>) {
     game.is_wanted = true;
 }
 
-/// All that was dug is whole again, and what was dug is lost.
-fn start_anew(_: On<Chosen>, mut commands: Commands, mut game: ResMut<Start>) {
+fn start_new_game(_: On<Activated>, mut commands: Commands, mut game: ResMut<Start>) {
     commands.trigger(NewGame);
     game.is_wanted = true;
 }
 
-/// Does somebody look at the window? Whoever has turned to another one while the land was made is waited for: the game
-/// takes the mouse, and only a window that loses the focus pauses it. Scripts have no window.
-fn is_watched(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
+/// Does the window have the focus? The game captures the mouse, so it must not start while the player uses another window.
+/// Scripts have no window.
+fn has_focus(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
     windows.iter().all(|window| window.focused)
 }
 
-/// Is there land, and someone to play on it?
-fn is_there(players: Query<(), With<Player>>, painting: Res<GroundLoading>) -> bool {
-    !players.is_empty() && painting.is_ready()
+fn is_loaded(players: Query<(), With<Player>>, textures: Res<GroundLoading>) -> bool {
+    !players.is_empty() && textures.is_ready()
 }
 
-/// Nobody is taken from a page that he has opened meanwhile: the game begins once he is back in the menu.
-fn play(game: Res<Start>, page: Res<State<Page>>, mut phase: ResMut<NextState<Phase>>) {
-    if game.is_wanted && *page.get() == Page::Menu {
-        phase.set(Phase::Playing);
+/// Starts the game if the player wants to and is on the menu page. On other pages it waits.
+fn start_game(game: Res<Start>, page: Res<State<MenuPage>>, mut state: ResMut<NextState<GameState>>) {
+    if game.is_wanted && *page.get() == MenuPage::Menu {
+        state.set(GameState::Playing);
     }
 }
 
-fn begin(mut game: ResMut<Start>) {
+fn note_start(mut game: ResMut<Start>) {
     *game = Start { has_begun: true, is_wanted: false };
 }
 
-fn quit(_: On<Chosen>, mut exit: MessageWriter<AppExit>) {
-    exit.write(AppExit::Success);
-}
-
-fn tell_progress(
+fn show_progress(
     players: Query<(), With<Player>>,
-    painting: Res<GroundLoading>,
+    textures: Res<GroundLoading>,
     mut shown: Query<&mut Visibility, With<Progress>>,
-    mut words: Query<&mut Text, With<Words>>,
-    mut bars: Query<&mut Node, With<Filled>>,
+    mut texts: Query<&mut Text, With<ProgressText>>,
+    mut bars: Query<&mut Node, With<ProgressBar>>,
 ) {
-    let done = 100.0 * painting.progress();
-    let word = word(painting.is_ready(), done, !players.is_empty());
+    let done = 100.0 * textures.progress();
+    let words = progress_text(textures.is_ready(), done, !players.is_empty());
     for mut shown in &mut shown {
-        shown.set_if_neq(if word.is_some() { Visibility::Inherited } else { Visibility::Hidden });
+        shown.set_if_neq(if words.is_some() { Visibility::Inherited } else { Visibility::Hidden });
     }
-    if let Some(word) = &word {
-        for mut text in &mut words {
-            text.set_if_neq(Text::new(word));
-        }
+    for mut text in &mut texts {
+        text.set_if_neq(Text::new(words.clone().unwrap_or_default()));
     }
     for mut bar in &mut bars {
         if bar.width != percent(done) {
@@ -173,44 +151,42 @@ fn tell_progress(
     }
 }
 
-/// What keeps the player waiting, if anything does.
-fn word(is_painted: bool, done: f32, has_player: bool) -> Option<String> {
-    match (is_painted, has_player) {
-        (false, _) => Some(format!("the ground is being painted: {done:.0} %")),
-        (true, false) => Some("the land is being surveyed ...".into()),
+/// What is loading, if anything is.
+fn progress_text(has_textures: bool, done: f32, has_player: bool) -> Option<String> {
+    match (has_textures, has_player) {
+        (false, _) => Some(format!("creating textures: {done:.0} %")),
+        (true, false) => Some("loading the landscape ...".into()),
         (true, true) => None,
     }
 }
 
-/// Around the tunnel's hill, over the ridges, while the game's own time may stand still.
+/// Moves the camera around the tunnel's hill. It uses real time, because the game may be paused.
 fn fly(
     mut commands: Commands,
     time: Res<Time<Real>>,
     places: Res<Places>,
     terrains: Terrains,
-    mut eyes: Query<(Entity, &mut Transform), With<Eyes>>,
+    mut cameras: Query<(Entity, &mut Transform), With<PlayerCamera>>,
     mut height: Local<Option<f32>>,
 ) {
     let centre = places.hillside.mouth + Vec3::Y * 12.0;
     let angle = 0.9 + std::f32::consts::TAU * time.elapsed_secs() / TURN;
-    let out = Vec2::from_angle(angle) * 190.0;
-    let place = centre + Vec3::new(out.x, 0.0, out.y);
+    let place = centre + flat(Vec2::from_angle(angle) * 190.0);
     let Some(ground) = terrains.height(place.x, place.z) else { return };
-    let wish = (ground + 34.0).max(centre.y + 30.0);
-    let height = height.get_or_insert(wish);
-    *height += (wish - *height) * (1.0 - (-0.7 * time.delta_secs()).exp());
-    // The hill is seen to the right of the menu.
+    let target = (ground + 34.0).max(centre.y + 30.0);
+    let height = height.get_or_insert(target);
+    *height += (target - *height) * (1.0 - (-0.7 * time.delta_secs()).exp());
+    // The hill is to the right of the menu.
     let aside = (centre - place).cross(Vec3::Y).normalize() * -55.0;
-    for (entity, mut eyes) in &mut eyes {
-        *eyes = Transform::from_translation(place.with_y(*height)).looking_at(centre + aside, Vec3::Y);
-        commands.entity(entity).insert_if_new(Drone);
+    for (entity, mut camera) in &mut cameras {
+        *camera = Transform::from_translation(place.with_y(*height)).looking_at(centre + aside, Vec3::Y);
+        commands.entity(entity).insert_if_new(DetachedCamera);
     }
 }
 
-/// Back into the player's head.
-fn land(mut commands: Commands, eyes: Query<Entity, With<Eyes>>) {
-    for eyes in &eyes {
-        commands.entity(eyes).remove::<Drone>();
+fn attach_camera(mut commands: Commands, camera: Query<Entity, With<PlayerCamera>>) {
+    for camera in &camera {
+        commands.entity(camera).remove::<DetachedCamera>();
     }
 }
 
@@ -219,61 +195,55 @@ mod tests {
     use bevy::ecs::system::RunSystemOnce;
 
     use super::*;
+    use crate::test_support::go_to;
 
     #[test]
-    fn who_waits_is_told_for_what() {
-        for (is_painted, done, has_player, expected) in [
-            (false, 0.0, false, Some("the ground is being painted: 0 %")),
-            (false, 41.7, true, Some("the ground is being painted: 42 %")),
-            (true, 100.0, false, Some("the land is being surveyed ...")),
+    fn the_progress_text_says_what_is_loading() {
+        for (has_textures, done, has_player, expected) in [
+            (false, 0.0, false, Some("creating textures: 0 %")),
+            (false, 41.7, true, Some("creating textures: 42 %")),
+            (true, 100.0, false, Some("loading the landscape ...")),
             (true, 100.0, true, None),
         ] {
-            assert_eq!(word(is_painted, done, has_player).as_deref(), expected);
+            assert_eq!(progress_text(has_textures, done, has_player).as_deref(), expected);
         }
     }
 
     #[test]
-    fn the_game_waits_for_who_has_turned_to_another_window() {
+    fn the_game_does_not_start_while_another_window_has_the_focus() {
         let mut world = World::new();
-        let is_watched = |world: &mut World| world.run_system_once(is_watched).expect("a system that runs");
-        assert!(is_watched(&mut world), "scripts have no window");
+        let has_focus = |world: &mut World| world.run_system_once(has_focus).expect("a system that runs");
+        assert!(has_focus(&mut world), "scripts have no window");
         let window = world.spawn((PrimaryWindow, Window { focused: false, ..default() })).id();
-        assert!(!is_watched(&mut world));
+        assert!(!has_focus(&mut world));
         world.get_mut::<Window>(window).expect("it is open").focused = true;
-        assert!(is_watched(&mut world));
+        assert!(has_focus(&mut world));
     }
 
     #[test]
-    fn nobody_is_taken_from_a_page_into_the_game() {
+    fn the_game_starts_from_the_menu_page_only() {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, bevy::state::app::StatesPlugin))
-            .init_state::<Phase>()
-            .init_state::<Page>()
+            .init_state::<GameState>()
+            .init_state::<MenuPage>()
             .insert_resource(Start { has_begun: false, is_wanted: true })
-            .add_systems(Update, play);
-        for page in [Page::Settings, Page::Controls, Page::Help, Page::Menu] {
-            app.world_mut().resource_mut::<NextState<Page>>().set(page);
-            // One more for what was wanted on it.
-            app.update();
-            app.update();
-            let expected = if page == Page::Menu { Phase::Playing } else { Phase::Title };
-            assert_eq!(**app.world().resource::<State<Phase>>(), expected, "{page:?}");
+            .add_systems(Update, start_game);
+        for page in [MenuPage::Settings, MenuPage::Controls, MenuPage::Help, MenuPage::Menu] {
+            go_to(&mut app, page);
+            let expected = if page == MenuPage::Menu { GameState::Playing } else { GameState::Title };
+            assert_eq!(**app.world().resource::<State<GameState>>(), expected, "{page:?}");
         }
     }
 
     #[test]
-    fn the_bar_shows_while_the_ground_is_painted() {
+    fn the_progress_is_shown_while_something_loads() {
         let mut app = App::new();
-        app.init_resource::<GroundLoading>().add_systems(Update, tell_progress);
+        app.init_resource::<GroundLoading>().add_systems(Update, show_progress);
         let column = app.world_mut().spawn(progress()).id();
-        let mut bars = app.world_mut().query_filtered::<&mut Node, With<Filled>>();
-        bars.single_mut(app.world_mut()).expect("one bar").width = percent(73);
         assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Hidden));
         app.update();
-        // Nothing is painted yet.
         assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Inherited));
-        assert_eq!(bars.single(app.world()).expect("one bar").width, percent(0));
-        let mut words = app.world_mut().query_filtered::<&Text, With<Words>>();
-        assert_eq!(words.single(app.world()).expect("words").0, "the ground is being painted: 0 %");
+        let mut texts = app.world_mut().query_filtered::<&Text, With<ProgressText>>();
+        assert_eq!(texts.single(app.world()).expect("a text").0, "creating textures: 0 %");
     }
 }
