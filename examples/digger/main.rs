@@ -5,8 +5,8 @@
 //! cargo run --release --features examples --example digger -- --headless --out out/digger
 //! ```
 //!
-//! The game starts with a title and a menu. `H` shows the keys, and all of them can be changed. Settings are stored in the
-//! user's configuration folder, in `bevy_burrow/digger.json`.
+//! The game starts with a title and a menu. `H` shows the keys, and all of them can be changed. Settings are stored in
+//! the user's configuration folder, in `bevy_burrow/digger.json`.
 //!
 //! | control | action |
 //! | --- | --- |
@@ -22,12 +22,12 @@
 //!
 //! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
 //!
-//! With `--features examples,gamepad`, a gamepad does all of this except for the panel and the frame times. Its sticks walk
-//! and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
+//! With `--features examples,gamepad`, a gamepad does all of this except for the panel and the frame times. Its sticks
+//! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
 //!
-//! Without a display or a graphics adapter, or with `--headless`, a script plays the game: it walks to a hillside, digs a
-//! tunnel with a bend and a room, and builds a bridge and a pit. Pictures and a summary are written to `--out`. With `--tour`,
-//! a minute of play is recorded frame by frame.
+//! Without a display or a graphics adapter, or with `--headless`, a script plays the game: it walks to a hillside, digs
+//! a tunnel with a bend and a room, and builds a bridge and a pit. Pictures and a summary are written to `--out`. With
+//! `--tour`, a minute of play is recorded frame by frame.
 //!
 //! | folder | contents |
 //! | --- | --- |

@@ -6,10 +6,11 @@ use bevy::prelude::*;
 use crate::plugin::TerrainReady;
 use crate::terrain::Terrain;
 
-/// Invisible walls along the four edges of a terrain, so that no body walks or falls off it. Insert it on the terrain's entity.
+/// Invisible walls along the four edges of a terrain, so that no body walks or falls off it. Insert it on the terrain's
+/// entity.
 ///
-/// The walls are static colliders and children of the terrain: they move with it. They are rebuilt when another terrain takes
-/// its place, and removed with this component.
+/// The walls are static colliders and children of the terrain: they move with it. They are rebuilt when another terrain
+/// takes its place, and removed with this component.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -2,12 +2,12 @@
 
 use crate::brush::{Brush, BrushError, Edit};
 
-/// Counts the voxels within a brush's shape, roughness included: the most that it digs, adds or paints. A game that charges for
-/// building checks this before it sends the brush; the receipt says what the brush really changed.
+/// Counts the voxels within a brush's shape, roughness included: the most that it digs, adds or paints. A game that
+/// charges for building checks this before it sends the brush; the receipt says what the brush really changed.
 ///
-/// The brush is in voxels of the terrain. It is in world space as well if the terrain has a voxel size of 1 and was not moved;
-/// otherwise [transform](Brush::transformed) it first. Every lattice point of the shape is visited, so this takes longer for
-/// large brushes.
+/// The brush is in voxels of the terrain. It is in world space as well if the terrain has a voxel size of 1 and was not
+/// moved; otherwise [transform](Brush::transformed) it first. Every lattice point of the shape is visited, so this
+/// takes longer for large brushes.
 ///
 /// ```
 /// use bevy::math::Vec3;

@@ -30,9 +30,9 @@ impl Plugin for EventLogPlugin {
     }
 }
 
-fn log_page(phase: Res<State<GameState>>, page: Res<State<MenuPage>>) {
-    if phase.is_changed() || page.is_changed() {
-        println!("page {:?} {:?}", phase.get(), page.get());
+fn log_page(state: Res<State<GameState>>, page: Res<State<MenuPage>>) {
+    if state.is_changed() || page.is_changed() {
+        println!("page {:?} {:?}", state.get(), page.get());
     }
 }
 
@@ -49,38 +49,34 @@ fn log_textures(textures: Res<GroundLoading>, mut is_logged: Local<bool>) {
     }
 }
 
-fn log_tool(hand: Res<Hand>, mut last: Local<String>) {
-    let now = format!("tool {} radius={:.2}", hand.tool.label(), hand.radius(hand.tool));
-    if *last != now {
-        println!("{now}");
-        *last = now;
+/// Logs a line if it differs from the last one.
+fn log_change(line: String, last: &mut String) {
+    if *last != line {
+        println!("{line}");
+        *last = line;
     }
 }
 
+fn log_tool(hand: Res<Hand>, mut last: Local<String>) {
+    log_change(format!("tool {} radius={:.2}", hand.tool.label(), hand.radius(hand.tool)), &mut last);
+}
+
 /// Logs the distance of the aim, rounded to decimetres.
-fn log_aim(hand: Res<Hand>, eyes: Single<&Transform, With<PlayerCamera>>, mut last: Local<String>) {
-    let now = match hand.aim {
-        Some(aim) => format!("aim {:.1}", aim.point.distance(eyes.translation)),
-        None => "aim none".into(),
-    };
-    if *last != now {
-        println!("{now}");
-        *last = now;
-    }
+fn log_aim(hand: Res<Hand>, camera: Single<&Transform, With<PlayerCamera>>, mut last: Local<String>) {
+    let distance = hand.aim.map(|aim| format!("{:.1}", aim.point.distance(camera.translation)));
+    log_change(format!("aim {}", distance.unwrap_or("none".into())), &mut last);
 }
 
 /// Logs whether the camera is in the air or in the ground.
 fn log_camera(
-    eyes: Single<&Transform, With<PlayerCamera>>,
+    camera: Single<&Transform, With<PlayerCamera>>,
     terrains: Query<&Terrain>,
-    mut last: Local<Option<&'static str>>,
+    mut last: Local<String>,
 ) {
     let Some(terrain) = terrains.iter().next() else { return };
-    let place = eyes.translation / terrain.voxel_size();
-    let now = if terrain.world().is_solid(place.as_dvec3()) { "ground" } else { "air" };
-    if last.replace(now) != Some(now) {
-        println!("eyes in {now}");
-    }
+    let place = camera.translation / terrain.voxel_size();
+    let medium = if terrain.world().is_solid(place.as_dvec3()) { "ground" } else { "air" };
+    log_change(format!("eyes in {medium}"), &mut last);
 }
 
 fn log_edits(mut receipts: MessageReader<BrushApplied>) {

@@ -1,5 +1,5 @@
-//! Records a film: every frame takes the same time, shows every edit that was sent before it, and is written as a picture. The
-//! same script gives the same film on every machine, however slowly it draws.
+//! Records a film: every frame takes the same time, shows every edit that was sent before it, and is written as a
+//! picture. The same script gives the same film on every machine, however slowly it draws.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -48,7 +48,8 @@ impl FrameRecorder {
         self.drawn
     }
 
-    /// Plays a scene of so many seconds. `direct` is called before each frame, with the progress of the scene from 0 to 1.
+    /// Plays a scene of so many seconds. `direct` is called before each frame, with the progress of the scene from 0 to
+    /// 1.
     ///
     /// # Errors
     /// The errors of `direct`, and those of edits and pictures that did not arrive.

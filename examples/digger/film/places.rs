@@ -1,6 +1,7 @@
 //! Good places to dig and build: a steep hillside for a tunnel, a ravine for a bridge, a chunk corner for a pit.
 //!
-//! They are found by searching the ground, so that they fit any heightmap at any scale. The game starts at the hillside.
+//! They are found by searching the ground, so that they fit any heightmap at any scale. The game starts at the
+//! hillside.
 
 use bevy::prelude::*;
 use bevy_burrow::ground::Ground;
@@ -98,7 +99,8 @@ impl Hillside {
 }
 
 impl Ravine {
-    /// How many points on the deck and the arch of a bridge over it are visible from a place, whether or not the bridge is built.
+    /// How many points on the deck and the arch of a bridge over it are visible from a place, whether or not the bridge
+    /// is built.
     pub fn points_visible_from(&self, world: &Model, eye: Vec3) -> usize {
         /// The bridge itself is nearer to its middle line than this.
         const BRIDGE: f32 = 4.0;
@@ -107,8 +109,8 @@ impl Ravine {
         let points = (1..12).map(|i| self.from.lerp(self.to, i as f32 / 12.0));
         let points = points.flat_map(|bank| [1.0, -4.0].map(|up| bank + Vec3::Y * up));
         let is_visible = |point: &Vec3| {
-            let way = *point - eye;
-            world.raycast(eye.as_dvec3(), way.as_dvec3(), (open * way.length()).into()).is_none()
+            let direction = *point - eye;
+            world.raycast(eye.as_dvec3(), direction.as_dvec3(), (open * direction.length()).into()).is_none()
         };
         points.filter(is_visible).count()
     }
@@ -137,8 +139,8 @@ impl Relief<'_> {
             .flat_map(move |z| along(width).map(move |x| Vec2::new((x * step) as f32, (z * step) as f32)))
     }
 
-    /// A place where the ground rises by more than 10 within 12 voxels and by 30 behind, with a level path to it, and enough rock
-    /// above a tunnel and a room. It is in the sun.
+    /// A place where the ground rises by more than 10 within 12 voxels and by 30 behind, with a level path to it, and
+    /// enough rock above a tunnel and a room. It is in the sun.
     fn hillside(&self) -> Option<Hillside> {
         let headings = (0..16).map(|i| Vec2::from_angle(i as f32 * std::f32::consts::TAU / 16.0));
         let found = self.places(6).flat_map(|foot| {
@@ -147,9 +149,9 @@ impl Relief<'_> {
                 let rise = |along: f32| self.height(foot + inward * along) - mouth.y;
                 let steep = rise(12.0);
                 let hill = (30..=80).step_by(5).map(|along| rise(along as f32)).fold(0.0, f32::max);
-                let way: Vec<f32> = (0..=26).map(|i| rise(-2.0 * i as f32)).collect();
-                let roughness = way.windows(2).map(|pair| (pair[0] - pair[1]).abs()).fold(0.0, f32::max);
-                let uneven = way.iter().map(|rise| rise.abs()).fold(0.0, f32::max);
+                let path: Vec<f32> = (0..=26).map(|i| rise(-2.0 * i as f32)).collect();
+                let roughness = path.windows(2).map(|pair| (pair[0] - pair[1]).abs()).fold(0.0, f32::max);
+                let uneven = path.iter().map(|rise| rise.abs()).fold(0.0, f32::max);
                 if steep <= 10.0 || hill < 30.0 || roughness > 1.6 || uneven > 8.0 {
                     return None;
                 }
@@ -243,8 +245,8 @@ impl Relief<'_> {
 }
 
 /// A horizontal direction in world space.
-pub fn flat(way: Vec2) -> Vec3 {
-    Vec3::new(way.x, 0.0, way.y)
+pub fn flat(direction: Vec2) -> Vec3 {
+    Vec3::new(direction.x, 0.0, direction.y)
 }
 
 #[cfg(test)]

@@ -62,8 +62,8 @@ fn log_receipts(mut receipts: MessageReader<BrushApplied>, mut edit_log: ResMut<
     }
 }
 
-/// Durations of the same work, shown as percentiles. The plugin's own [`Times`](bevy_burrow::plugin::Times) keep only the latest
-/// few hundred, but a script has thousands of frames.
+/// Durations of the same work, shown as percentiles. The plugin's own [`Times`](bevy_burrow::plugin::Times) keep only
+/// the latest few hundred, but a script has thousands of frames.
 #[derive(Clone, Debug, Default)]
 pub struct Durations(Vec<Duration>);
 

@@ -147,10 +147,10 @@ pub fn bridge(ravine: &Ravine) -> Vec<Brush> {
     let ramps = behind.map(|foot| {
         let top = middle + along * (half + 3.0) * (foot - middle).dot(along).signum();
         let (foot, thickness) = (foot - Vec3::Y * 0.3, 1.5);
-        let way = if (top - foot).dot(along) > 0.0 { top - foot } else { foot - top };
-        let slope = Quat::from_rotation_arc(along, way.normalize());
+        let ramp = if (top - foot).dot(along) > 0.0 { top - foot } else { foot - top };
+        let slope = Quat::from_rotation_arc(along, ramp.normalize());
         let place = top.midpoint(foot) - slope * Vec3::Y * thickness;
-        let half = Vec3::new(way.length() / 2.0 + 1.0, thickness, WIDTH);
+        let half = Vec3::new(ramp.length() / 2.0 + 1.0, thickness, WIDTH);
         Brush::add(
             Shape::turned_cuboid(place, half, slope * Quat::from_rotation_arc(Vec3::X, along)),
             CONCRETE,

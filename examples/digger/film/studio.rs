@@ -273,14 +273,14 @@ impl Studio {
         let frames = 120 + (24.0 * start.distance(place)) as u32;
         for _ in 0..frames {
             let body = self.body()?;
-            let way = place - body.feet.xz();
-            if way.length() < NEAR {
+            let to_place = place - body.feet.xz();
+            if to_place.length() < NEAR {
                 self.put(CharacterSteering::default())?;
                 self.wait(15);
                 return Ok(());
             }
             self.look_at(Vec3::new(place.x, body.eye.y, place.y))?;
-            self.put(CharacterSteering { direction: way.normalize(), run, jump: false })?;
+            self.put(CharacterSteering { direction: to_place.normalize(), run, jump: false })?;
             self.step();
         }
         let body = self.body()?;

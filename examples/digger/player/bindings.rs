@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 use crate::player::input::Action;
 use crate::ui::labels::Labels;
 
-/// A key, a button, or a turn of the wheel. The settings file has it as a text such as `KeyW`, `Mouse Left` or `Pad South`.
+/// A key, a button, or a turn of the wheel. The settings file has it as a text such as `KeyW`, `Mouse Left` or `Pad
+/// South`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Binding {
@@ -163,8 +164,8 @@ impl Bindings {
         self.of(action).first().map_or_else(|| "-".into(), |binding| labels.of(*binding))
     }
 
-    /// Replaces an action's bindings of the same device: a gamepad button leaves keys and mouse buttons as they are. If another
-    /// action has the binding, that action loses it and is returned.
+    /// Replaces an action's bindings of the same device: a gamepad button leaves keys and mouse buttons as they are. If
+    /// another action has the binding, that action loses it and is returned.
     pub fn rebind(&mut self, action: Action, binding: Binding) -> Option<Action> {
         let mut others = self.0.iter_mut().filter(|(other, _)| **other != action);
         let loser = others.find(|(_, bindings)| bindings.contains(&binding));

@@ -150,7 +150,8 @@ fn apply_settings(
     commands.entity(*sun).insert(CascadeShadowConfig::from(cascades));
     let is_cheap = settings.quality == Quality::Low || draws_in_software(adapter.as_deref());
     for mut look in &mut looks {
-        // The high quality reads some fifty texels per pixel: fast on a graphics card, but seconds per frame without one.
+        // The high quality reads some fifty texels per pixel: fast on a graphics card, but seconds per frame without
+        // one.
         look.quality = if is_cheap { GroundQuality::Low } else { GroundQuality::High };
     }
     let mut camera = commands.entity(*entity);

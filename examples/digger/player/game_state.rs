@@ -76,9 +76,9 @@ pub fn release_mouse(mut cursors: Query<&mut CursorOptions, With<PrimaryWindow>>
     }
 }
 
-/// Pauses on the pause key, on Escape however it is bound, on the help key, and when the window loses the focus. While the panel
-/// is open, letters are typed into it. This runs before states change, as menus do: the key that ends the pause does not begin
-/// another one.
+/// Pauses on the pause key, on Escape however it is bound, on the help key, and when the window loses the focus. While
+/// the panel is open, letters are typed into it. This runs before states change, as menus do: the key that ends the
+/// pause does not begin another one.
 fn pause(
     actions: Res<Actions>,
     keys: Res<ButtonInput<KeyCode>>,

@@ -32,8 +32,8 @@ pub struct Player {
 #[derive(Component)]
 pub struct Scripted;
 
-/// Systems in `Update` that turn the player's actions into movement and edits. They run before [`BurrowSystems::Collect`], so
-/// that their brushes are in this frame's transaction.
+/// Systems in `Update` that turn the player's actions into movement and edits. They run before
+/// [`BurrowSystems::Collect`], so that their brushes are in this frame's transaction.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlayerControlSystems;
 

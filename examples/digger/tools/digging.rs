@@ -126,8 +126,8 @@ fn build_or_paint(
     }
 }
 
-/// The largest radius up to the wanted one for which there are enough voxels, and the number of voxels that it needs. `None` if
-/// even the tool's smallest brush would need more.
+/// The largest radius up to the wanted one for which there are enough voxels, and the number of voxels that it needs.
+/// `None` if even the tool's smallest brush would need more.
 pub fn affordable_radius(
     tool: Tool,
     wanted: f32,

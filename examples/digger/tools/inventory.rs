@@ -1,12 +1,12 @@
 //! The inventory: what the player dug and has not used yet, in voxels of each material.
 //!
-//! A brush's receipt arrives some frames after the brush was sent. Until then, what the brush may use is reserved, so that a
-//! second brush cannot use it too. The receipt says what really changed. This change is stored under the brush's tag: undo and
-//! redo name the tags of the brushes that they undid or redid, and the inventory follows.
+//! A brush's receipt arrives some frames after the brush was sent. Until then, what the brush may use is reserved, so
+//! that a second brush cannot use it too. The receipt says what really changed. This change is stored under the brush's
+//! tag: undo and redo name the tags of the brushes that they undid or redid, and the inventory follows.
 //!
-//! The amount of a material can become negative: the player is in debt. This happens when the shovel fills more than the player
-//! carries, or when a dig is undone whose material was used. Whatever is dug next pays the debt back. So ground and inventory
-//! together always hold the same amount of material.
+//! The amount of a material can become negative: the player is in debt. This happens when the shovel fills more than
+//! the player carries, or when a dig is undone whose material was used. Whatever is dug next pays the debt back. So
+//! ground and inventory together always hold the same amount of material.
 
 use std::collections::BTreeMap;
 

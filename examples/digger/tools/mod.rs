@@ -1,7 +1,7 @@
 //! The eight tools: choosing one, aiming it and using it.
 //!
-//! A held button uses the tool again and again. Each use starts a [`Swing`]; in the moment of the hit, [`ToolUsed`] is triggered.
-//! The file of each tool observes it.
+//! A held button uses the tool again and again. Each use starts a [`Swing`]; in the moment of the hit, [`ToolUsed`] is
+//! triggered. The file of each tool observes it.
 
 pub mod aim;
 pub mod balls;

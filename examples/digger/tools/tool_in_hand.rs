@@ -188,8 +188,8 @@ fn spawn_models(
         meshes.add(Cylinder::new(1.0, 1.0)),
         meshes.add(Cone::new(1.0, 1.0)),
     ];
-    // In the order of `PartMaterial`: colour, roughness and metallic. The headlamp is so close that bright colours would be
-    // overexposed.
+    // In the order of `PartMaterial`: colour, roughness and metallic. The headlamp is so close that bright colours
+    // would be overexposed.
     let materials = [
         (Color::srgb(0.45, 0.29, 0.16), 0.85, 0.0),
         (Color::srgb(0.52, 0.55, 0.58), 0.42, 0.55),

@@ -1,5 +1,5 @@
-//! Labels of keys. Keys are bound by their position on the keyboard, independent of the layout, but the player should see their
-//! letters. The layout cannot be queried, so the letter of each key is learnt when the key is pressed.
+//! Labels of keys. Keys are bound by their position on the keyboard, independent of the layout, but the player should
+//! see their letters. The layout cannot be queried, so the letter of each key is learnt when the key is pressed.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,8 @@ impl Labels {
         if let Some(letter) = self.0.get(&key) {
             return letter.to_string();
         }
-        // Layouts swap letters. If this key's letter is on another key, then that key's letter is most likely on this one.
+        // Layouts swap letters. If this key's letter is on another key, then that key's letter is most likely on this
+        // one.
         let other = self.0.iter().find(|(_, letter)| name == letter.to_string());
         other.map_or(name, |(other, _)| Binding::Key(*other).to_string())
     }

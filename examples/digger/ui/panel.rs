@@ -1,4 +1,5 @@
-//! The plugin's own panel over the game: figures, plots, seam check and debug views. While it is open, it gets the input.
+//! The plugin's own panel over the game: figures, plots, seam check and debug views. While it is open, it gets the
+//! input.
 
 use bevy::prelude::*;
 use bevy_burrow::debug::BurrowDebugPlugin;

@@ -1,7 +1,7 @@
 //! The landscape: an elevation model of the Jacksboro fault in Tennessee, scaled down and made steeper.
 //!
-//! The heightmap is embedded in the program and loaded by the asset server like any other file. Slow work runs in a task, so the
-//! game keeps drawing meanwhile.
+//! The heightmap is embedded in the program and loaded by the asset server like any other file. Slow work runs in a
+//! task, so the game keeps drawing meanwhile.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -99,8 +99,8 @@ struct LoadingHeightmap(Handle<HeightmapImage>);
 #[derive(Resource)]
 struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
 
-/// How the ground is drawn. What one sees is what one digs: turf, sand and snow are drawn as deep as the ground has them, with
-/// rock below, and ore only where `veins.rs` has put it.
+/// How the ground is drawn. What one sees is what one digs: turf, sand and snow are drawn as deep as the ground has
+/// them, with rock below, and ore only where `veins.rs` has put it.
 fn look() -> GroundLook {
     let mut look = GroundLook::default();
     for overlay in [SAND, SNOW] {

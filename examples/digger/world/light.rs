@@ -39,8 +39,8 @@ fn spawn_sun(mut commands: Commands) {
     commands.spawn((Name::new("sun"), Sun, light, Transform::IDENTITY.looking_to(-SUN, Vec3::Y)));
 }
 
-/// Scales the ambient light by how much of the sky is open above points around the camera. The change takes some time, as if
-/// eyes adapted. It uses real time, because the title may show another place while the game is paused.
+/// Scales the ambient light by how much of the sky is open above points around the camera. The change takes some time,
+/// as if eyes adapted. It uses real time, because the title may show another place while the game is paused.
 fn darken_caves(
     time: Res<Time<Real>>,
     terrains: Terrains,

@@ -1,4 +1,5 @@
-//! Veins of coal, gold and clay in the hill before the player, painted into the ground where they cannot be seen from outside.
+//! Veins of coal, gold and clay in the hill before the player, painted into the ground where they cannot be seen from
+//! outside.
 
 use std::f32::consts::TAU;
 

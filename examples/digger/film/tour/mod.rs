@@ -1,4 +1,5 @@
-//! A minute of play as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a cave.
+//! A minute of play as a film: a flight, a pickaxe, a tunnel, bombs, a boulder, a bridge, a sunset, and lamps in a
+//! cave.
 
 mod camera_path;
 mod fade;
@@ -145,14 +146,14 @@ impl Tour {
         self.set_hour(AFTERNOON);
         let Hillside { mouth, inward, .. } = places.hillside;
         let (along, aside) = (flat(inward), flat(inward.perp()));
-        let way = [
+        let path = [
             (mouth - along * 330.0 + aside * 210.0, 75.0),
             (mouth - along * 250.0 + aside * 120.0, 55.0),
             (mouth - along * 150.0 + aside * 70.0, 38.0),
             (mouth - along * 80.0 + aside * 22.0, 20.0),
             (mouth - along * 38.0, 7.0),
         ];
-        let way = CameraPath::over(self.studio().terrain()?.world(), &way)?;
+        let path = CameraPath::over(self.studio().terrain()?.world(), &path)?;
         let look = CameraPath::through([
             mouth + along * 40.0 - aside * 120.0,
             mouth + along * 60.0 - aside * 40.0,
@@ -162,7 +163,7 @@ impl Tour {
         ])?;
         self.scene("the flight", FLIGHT, |studio, t| {
             let eased = t * t * (3.0 - 2.0 * t);
-            studio.detach_camera(way.at(eased), look.at(eased));
+            studio.detach_camera(path.at(eased), look.at(eased));
             fade::set_logo(studio.world(), 1.0 - ((t * FLIGHT - 2.6) / 0.7).clamp(0.0, 1.0));
             Ok(())
         })
@@ -217,8 +218,9 @@ impl Tour {
         self.scene("the tunnel", TUNNEL, |studio, t| {
             let seconds = t * TUNNEL;
             let feet = studio.feet()?;
-            let way = if seconds < 1.5 { (bend - feet).xz() } else { (bend + onward * 60.0 - feet).xz() };
-            studio.walk(way.normalize_or_zero() * if seconds < 1.5 { 0.8 } else { 0.42 });
+            let direction =
+                if seconds < 1.5 { (bend - feet).xz() } else { (bend + onward * 60.0 - feet).xz() };
+            studio.walk(direction.normalize_or_zero() * if seconds < 1.5 { 0.8 } else { 0.42 });
             let sway = onward.cross(Vec3::Y) * (seconds * 0.9).sin() * 1.2;
             let target = if seconds < 1.4 {
                 bend + onward * 1.5 + Vec3::Y * 1.6
@@ -238,11 +240,11 @@ impl Tour {
     fn bombs(&mut self, places: &Places) -> Result {
         self.set_hour(15.6);
         let corner = places.corner;
-        let way = Vec2::new(0.86, -0.51);
+        let direction = Vec2::new(0.86, -0.51);
         self.film.settle()?;
-        self.studio().move_to(corner.xz() - way * 17.0)?;
+        self.studio().move_to(corner.xz() - direction * 17.0)?;
         self.equip(Tool::Bomb);
-        let aside = flat(way.perp());
+        let aside = flat(direction.perp());
         self.scene("the bombs", BOMBS, |studio, t| {
             let seconds = t * BOMBS;
             let throws = [0.7f32, 1.6, 2.5];
@@ -255,7 +257,7 @@ impl Tour {
             studio.turn_towards(target, 0.10)?;
             let holds = throws.iter().any(|&throw| (throw..throw + 0.1).contains(&seconds));
             studio.hold(if holds { &[Action::Use] } else { &[] });
-            studio.walk(if seconds > 5.4 { way * 0.7 } else { Vec2::ZERO });
+            studio.walk(if seconds > 5.4 { direction * 0.7 } else { Vec2::ZERO });
             Ok(())
         })?;
         self.stop();
@@ -264,26 +266,26 @@ impl Tour {
 
     /// The player drills through a pillar with a boulder on it, and the boulder falls.
     fn boulder(&mut self, places: &Places) -> Result {
-        let way = Vec2::new(0.51, 0.86);
-        let place = places.corner.xz() + way * 24.0;
+        let direction = Vec2::new(0.51, 0.86);
+        let place = places.corner.xz() + direction * 24.0;
         let height = self.studio().terrain()?.world().height(place.x.into(), place.y.into());
         let foot = Vec3::new(place.x, height.ok_or("the tour left the world")? as f32, place.y);
-        let boulder = foot + Vec3::Y * 8.0 + flat(way) * 1.2;
+        let boulder = foot + Vec3::Y * 8.0 + flat(direction) * 1.2;
         self.prepare(scripted_brushes::boulder(foot, boulder))?;
-        self.studio().move_to(place - way * 9.0)?;
+        self.studio().move_to(place - direction * 9.0)?;
         self.equip(Tool::Drill);
         self.scene("the boulder", BOULDER, |studio, t| {
             let seconds = t * BOULDER;
             let target = match seconds {
                 ..1.4 => boulder - Vec3::Y * 2.0,
                 ..3.3 => foot + Vec3::Y * 1.8,
-                _ => foot + Vec3::Y * 2.5 + flat(way) * 3.0,
+                _ => foot + Vec3::Y * 2.5 + flat(direction) * 3.0,
             };
             studio.turn_towards(target, 0.09)?;
             let reaches = (studio.feet()? - foot).xz().length() < 4.5;
             studio.walk(match seconds {
-                ..2.4 if !reaches => way * 0.6,
-                3.4..5.0 => way * -0.6,
+                ..2.4 if !reaches => direction * 0.6,
+                3.4..5.0 => direction * -0.6,
                 _ => Vec2::ZERO,
             });
             studio.hold(if (2.4..3.3).contains(&seconds) { &[Action::Use] } else { &[] });
@@ -304,12 +306,13 @@ impl Tour {
         let (east, west) =
             (CameraPath::around(world, middle, east)?, CameraPath::around(world, middle, -east)?);
         // From the east, so that the sunset is behind it, unless more of it is visible from the west.
-        let way = if west.visibility(world, &ravine) > east.visibility(world, &ravine) { west } else { east };
+        let path =
+            if west.visibility(world, &ravine) > east.visibility(world, &ravine) { west } else { east };
         let mut sent = 0;
         self.scene("the bridge", BRIDGE + SUNSET, |studio, t| {
             let seconds = t * (BRIDGE + SUNSET);
             studio.detach_camera(
-                way.at((seconds / (BRIDGE + SUNSET)).powf(0.8)),
+                path.at((seconds / (BRIDGE + SUNSET)).powf(0.8)),
                 middle - Vec3::Y * 3.0 + Vec3::Y * (2.0 * t),
             );
             let due = ((seconds - 0.5) / (BRIDGE - 2.0) * brushes.len() as f32) as usize;

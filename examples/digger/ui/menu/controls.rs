@@ -82,8 +82,8 @@ fn row(position: usize, action: Action, label: &str) -> impl Bundle {
     (Row(action), widgets::item(position, node), texts)
 }
 
-/// Binds the first key, button or turn of the wheel after an action was chosen. Escape cancels, unless the action is the pause. A
-/// click on another item of the page cancels too, and activates that item.
+/// Binds the first key, button or turn of the wheel after an action was chosen. Escape cancels, unless the action is
+/// the pause. A click on another item of the page cancels too, and activates that item.
 fn bind(
     mut commands: Commands,
     waiting: Option<Res<Waiting>>,

@@ -26,7 +26,8 @@ impl Plugin for MenuPlugin {
     }
 }
 
-/// Spawns a page in the middle of the window, with a headline and what `fill` spawns. It is despawned when the page changes.
+/// Spawns a page in the middle of the window, with a headline and what `fill` spawns. It is despawned when the page
+/// changes.
 fn spawn_page(
     commands: &mut Commands,
     page: MenuPage,

@@ -17,7 +17,8 @@ impl Plugin for SettingsPagePlugin {
     }
 }
 
-/// A row: its label, its value as text, and how the arrows change it. Numbers stop at their limits, other values wrap around.
+/// A row: its label, its value as text, and how the arrows change it. Numbers stop at their limits, other values wrap
+/// around.
 type Row = (&'static str, fn(&Settings) -> String, fn(&mut Settings, i32));
 
 const ROWS: [Row; 9] = [

@@ -108,8 +108,8 @@ fn start_new_game(_: On<Activated>, mut commands: Commands, mut game: ResMut<Sta
     game.is_wanted = true;
 }
 
-/// Does the window have the focus? The game captures the mouse, so it must not start while the player uses another window.
-/// Scripts have no window.
+/// Does the window have the focus? The game captures the mouse, so it must not start while the player uses another
+/// window. Scripts have no window.
 fn has_focus(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
     windows.iter().all(|window| window.focused)
 }
