@@ -1,96 +1,53 @@
-//! `digger`: first person on a real landscape, with a shovel.
+//! `digger`: a small first-person game on a real landscape that can be dug.
 //!
 //! ```text
 //! cargo run --release --features examples --example digger
 //! cargo run --release --features examples --example digger -- --headless --out out/digger
 //! ```
 //!
-//! A title, a menu and a game: `H` shows its keys, and all of them can be bound anew. Settings are kept in the user's
-//! folder of settings, in `bevy_burrow/digger.json`.
+//! The game starts with a title and a menu. `H` shows the keys, and all of them can be changed. Settings are stored in
+//! the user's configuration folder, in `bevy_burrow/digger.json`.
 //!
-//! | control | does |
+//! | control | action |
 //! | --- | --- |
 //! | `W` `A` `S` `D` or arrows, `Shift`, `Space` | walk, run, jump |
-//! | left button | uses the tool in hand; held, again and again |
-//! | right button | builds with the chosen material, as far as what was dug allows |
+//! | left button | use the tool; hold to repeat |
+//! | right button | build with the chosen material, as far as there is enough of it |
 //! | wheel | size of the brush |
 //! | `1` to `8` | pickaxe, shovel, drill, builder, painter, bomb, lamp, ball |
-//! | `Q` `E`, `C` | material, form of what is built |
+//! | `Q` `E`, `C` | material, shape of what is built |
 //! | `F`, `Z` `Y` | headlamp; undo, redo |
-//! | `F1` `F3` | panel, frame times |
+//! | `F1` `F3` | the plugin's panel, frame times |
 //! | `H`, `Esc` | help, pause |
 //!
-//! Keys are bound by their place, as an American keyboard has them, and called by the letters that they turn out to have.
+//! Keys are bound by their position on an American keyboard. The menus show the letters of the player's own layout.
 //!
-//! A gamepad does that too, all but the panel and the frame times, with `--features examples,gamepad`: its sticks walk and
-//! look, its shoulders go through the tools, and its left stick or its cross through the menus.
-//! The title leads on with a game that was left, or begins a new one: fresh land, and nothing in the bag.
+//! With `--features examples,gamepad`, a gamepad does all of this except for the panel and the frame times. Its sticks
+//! walk and look, its shoulder buttons change the tool, and its left stick or D-pad selects menu items.
 //!
-//! Without a display or a graphics adapter, or with `--headless`, it plays a script instead: a walk up to a hillside, a
-//! tunnel with a bend and a room, a bridge, a pit across a chunk corner. Pictures and a summary go to `--out`. With
-//! `--tour` it films a minute of play, frame by frame.
+//! Without a display or a graphics adapter, or with `--headless`, a script plays the game: it walks to a hillside, digs
+//! a tunnel with a bend and a room, and builds a bridge and a pit. Pictures and a summary are written to `--out`. With
+//! `--tour`, a minute of play is recorded frame by frame.
 //!
-//! | file | subject |
+//! | folder | contents |
 //! | --- | --- |
-//! | `phase.rs`, `menu.rs` and `menu/`, `ui.rs`, `art.rs` | title, pause, settings, controls, help |
-//! | `input.rs`, `bindings.rs`, `labels.rs`, `settings.rs` | actions, their keys and what stands on those; what the player may set |
-//! | `player.rs`, `body.rs`, `rim.rs` | the player's eyes and body, and where the world ends |
-//! | `tools.rs`, `form.rs`, `preview.rs`, `held.rs` | the tools, what they would do, and how they look in hand |
-//! | `work.rs`, `toughness.rs`, `amount.rs`, `inventory.rs` | what they do to the ground, what resists them, and what is left of it |
-//! | `bombs.rs`, `balls.rs`, `thrown.rs`, `lamps.rs`, `debris.rs`, `particles.rs` | what flies, what bounces, what shines, what falls and crumbles |
-//! | `landscape.rs`, `veins.rs`, `sky.rs`, `day.rs`, `light.rs` | the land, and the light on it at any hour |
-//! | `hud.rs`, `frames.rs`, `panel.rs` | what is written over it all |
-//! | `places.rs`, `works.rs` | where scripts dig, and what |
-//! | `script.rs`, `tour.rs` and `tour/` | two stories |
-//! | `studio.rs`, `film.rs`, `headless.rs` | who plays and films them; the app without a window |
-//! | `report.rs`, `tell.rs` | receipts, times and the summary; what goes on |
+//! | `player` | input and bindings, the character, the camera, the headlamp, the game's states |
+//! | `tools` | what the player holds: digging, building, bombs, balls and lamps, and the inventory |
+//! | `world` | the landscape and its ore, day and night, the sky, particles and debris |
+//! | `ui` | menus, settings, and the heads-up display |
+//! | `film` | scripts that play the game for pictures and films |
 
-mod amount;
-mod art;
-mod balls;
-mod bindings;
-mod body;
-mod bombs;
-mod day;
-mod debris;
 #[path = "../shared/display.rs"]
 mod display;
 mod film;
-mod form;
-mod frames;
-mod headless;
-mod held;
-mod hud;
-mod input;
-mod inventory;
-mod labels;
-mod lamps;
-mod landscape;
-mod light;
-mod menu;
 #[path = "../shared/offscreen.rs"]
 mod offscreen;
-mod panel;
-mod particles;
-mod phase;
-mod places;
 mod player;
-mod preview;
-mod report;
-mod rim;
-mod script;
-mod settings;
-mod sky;
-mod studio;
-mod tell;
-mod thrown;
+#[cfg(test)]
+mod test_support;
 mod tools;
-mod toughness;
-mod tour;
 mod ui;
-mod veins;
-mod work;
-mod works;
+mod world;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -100,25 +57,25 @@ use bevy_burrow::backend::{Backend, Engine};
 use bevy_burrow::prelude::*;
 use clap::Parser;
 
-use crate::settings::SettingsFile;
+use crate::ui::settings::SettingsFile;
 
-/// First person on a real landscape, with a shovel.
+/// A first-person game on a landscape that can be dug.
 #[derive(Parser, Clone, Debug)]
 pub struct Options {
-    /// Play the script and write pictures, even where a window could be opened.
+    /// Play the script and write pictures, even if a window could be opened.
     #[arg(long)]
     headless: bool,
-    /// Film a minute of play instead, frame by frame.
+    /// Record a minute of play, frame by frame.
     #[arg(long)]
     tour: bool,
-    /// Frames of the tour that are drawn, evenly spread; all of them without it.
+    /// Number of frames to draw, evenly spread over the tour. All by default.
     #[arg(long, requires = "tour", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=7200))]
     frames: Option<u32>,
-    /// Frames in a second of the tour.
+    /// Frames per second of the tour.
     #[arg(long, requires = "tour", value_name = "F", default_value_t = 30)]
     #[arg(value_parser = clap::value_parser!(u32).range(10..=120))]
     fps: u32,
-    /// Folder for the script's pictures and summary.
+    /// Folder for pictures and the summary.
     #[arg(long, value_name = "DIR", default_value = "out/digger")]
     out: PathBuf,
     /// Width of the window or the pictures, in pixels.
@@ -127,18 +84,18 @@ pub struct Options {
     /// Height of the window or the pictures, in pixels.
     #[arg(long, default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=8192))]
     height: u32,
-    /// Draw every frame of the script, not only the pictures: for frame times.
+    /// Draw every frame of the script, not only the pictures, to measure frame times.
     #[arg(long, requires = "headless")]
     draw_all: bool,
-    /// Say on standard output what goes on, for programs that play the game.
+    /// Log events to standard output, for programs that play the game.
     #[arg(long)]
     tell: bool,
-    /// What edits are computed on.
+    /// Where edits are computed.
     #[arg(long, value_enum, default_value_t = Computer::Auto)]
     backend: Computer,
 }
 
-/// A [`Backend`] as the command line has it.
+/// A [`Backend`] on the command line.
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum Computer {
     Auto,
@@ -161,14 +118,14 @@ fn main() -> ExitCode {
     let renderer = offscreen::find_renderer();
     if options.tour {
         if options.headless {
-            println!("--tour is filmed without a window anyway, and instead of the script");
+            println!("--headless is ignored: --tour never opens a window");
         }
-        return tour::run(&options, renderer);
+        return film::tour::run(&options, renderer);
     }
     if options.headless || !display::has_display() || renderer.is_none() {
-        return script::run(&options, renderer);
+        return film::script::run(&options, renderer);
     }
-    // The one that was found knows nothing of windows: the window's app gets its own.
+    // It was created without a window. Bevy creates another one for the window.
     drop(renderer);
     match open_window(&options).run() {
         AppExit::Success => ExitCode::SUCCESS,
@@ -176,45 +133,48 @@ fn main() -> ExitCode {
     }
 }
 
-/// Everything of the game, in a window or not.
+/// Adds the whole game to an app with or without a window.
 pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
     app.insert_resource(engine)
+        .add_plugins((BurrowPlugins, ui::settings::SettingsPlugin(settings)))
         .add_plugins((
-            BurrowPlugins,
-            settings::SettingsPlugin(settings),
-            input::InputPlugin,
-            phase::PhasePlugin,
-            landscape::LandscapePlugin,
-            veins::VeinsPlugin,
-            sky::SkyPlugin,
-            day::DayPlugin,
-            light::LightPlugin,
-        ))
-        .add_plugins((
-            body::BodyPlugin,
+            player::input::InputPlugin,
+            player::game_state::GameStatePlugin,
+            player::body::BodyPlugin,
             player::PlayerPlugin,
-            thrown::ThrownPlugin,
-            rim::RimPlugin,
-            tools::ToolsPlugin,
-            preview::PreviewPlugin,
-            held::HeldPlugin,
-            work::WorkPlugin,
-            toughness::ToughnessPlugin,
-            inventory::InventoryPlugin,
-            particles::ParticlesPlugin,
-            bombs::BombsPlugin,
-            balls::BallsPlugin,
-            lamps::LampsPlugin,
-            debris::RubblePlugin,
+            player::camera::CameraPlugin,
+            player::headlamp::HeadlampPlugin,
+            player::world_edge::WorldEdgePlugin,
         ))
         .add_plugins((
-            art::ArtPlugin,
-            ui::UiPlugin,
-            menu::MenuPlugin,
-            hud::HudPlugin,
-            frames::FramesPlugin,
-            panel::PanelPlugin,
-            report::LogbookPlugin,
+            tools::ToolsPlugin,
+            tools::aim::AimPlugin,
+            tools::tool_in_hand::ToolInHandPlugin,
+            tools::digging::DiggingPlugin,
+            tools::hardness::HardnessPlugin,
+            tools::inventory::InventoryPlugin,
+            tools::thrown::ThrownPlugin,
+            tools::bombs::BombsPlugin,
+            tools::balls::BallsPlugin,
+            tools::lamps::LampsPlugin,
+        ))
+        .add_plugins((
+            world::landscape::LandscapePlugin,
+            world::veins::VeinsPlugin,
+            world::sky::SkyPlugin,
+            world::day::DayPlugin,
+            world::light::LightPlugin,
+            world::particles::ParticlesPlugin,
+            world::debris::DebrisEffectsPlugin,
+        ))
+        .init_resource::<ui::images::Images>()
+        .add_plugins((
+            ui::widgets::UiPlugin,
+            ui::menu::MenuPlugin,
+            ui::hud::HudPlugin,
+            ui::frame_times::FrameTimesPlugin,
+            ui::panel::PanelPlugin,
+            film::report::EditLogPlugin,
         ));
 }
 
@@ -225,7 +185,7 @@ fn open_window(options: &Options) -> App {
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     game(&mut app, options.backend.engine(), SettingsFile::of_user());
     if options.tell {
-        app.add_plugins(tell::TellPlugin);
+        app.add_plugins(film::event_log::EventLogPlugin);
     }
     app
 }
@@ -235,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_would_do_nothing_is_refused() {
+    fn options_without_effect_are_rejected() {
         for (line, is_understood) in [
             ("digger", true),
             ("digger --tour", true),

@@ -25,6 +25,7 @@
 //! | ground that breaks off and falls | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of your own |
 //! | finding the terrain of a collider that was hit | [`GroundBody`] on the collider's entity |
 //! | live figures | [`PhysicsFigures`] |
+//! | bodies that cannot leave the terrain | [`EdgeWalls`] on the terrain |
 //!
 //! # Guarantees
 //!
@@ -52,6 +53,7 @@ mod colliders;
 mod columns;
 mod cone;
 mod debris;
+mod edge_walls;
 mod frame;
 mod ground;
 mod hold;
@@ -67,6 +69,7 @@ mod walking;
 pub use character::{Character, CharacterMotion, CharacterSteering};
 pub use character_plugin::{CharacterPlugin, CharacterSystems};
 pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
+pub use edge_walls::EdgeWalls;
 pub use ground::{GroundBody, GroundCollider, GroundContact};
 pub use hold::HeldByGround;
 pub use hull::debris_collider;
@@ -155,6 +158,9 @@ impl Plugin for TerrainPhysicsPlugin {
             .add_observer(hold::restore_motion)
             .add_observer(columns::record_insert)
             .add_observer(columns::record_remove)
+            .add_observer(edge_walls::build)
+            .add_observer(edge_walls::rebuild)
+            .add_observer(edge_walls::remove)
             .add_systems(First, |mut figures: ResMut<PhysicsFigures>| figures.main_thread = Duration::ZERO)
             .add_systems(Update, sources::find_near.in_set(TerrainPhysicsSystems::Near))
             .add_systems(

@@ -5,6 +5,7 @@ mod bumps;
 mod changes;
 mod crowd;
 mod debris;
+mod edges;
 mod holding;
 mod placement;
 mod sources;

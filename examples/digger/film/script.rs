@@ -1,0 +1,254 @@
+//! The script for `--headless`: a tunnel into a hillside, a bridge over a ravine, and a pit around a chunk corner.
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use bevy::prelude::*;
+use bevy::render::settings::RenderResources;
+use bevy_burrow::debug::{BurrowDebug, SeamWires};
+use bevy_burrow::plugin::BurrowEngine;
+use bevy_burrow::terrain::World as Model;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::Options;
+use crate::film::places::{Hillside, Places, Ravine, TUNNEL_RADIUS, flat};
+use crate::film::report::{EditLog, Report};
+use crate::film::scripted_brushes;
+use crate::film::studio::Studio;
+use crate::tools::{Hand, Tool};
+use crate::world::landscape::CONCRETE;
+
+/// The number of pictures.
+const PICTURES: usize = 9;
+
+/// Plays the script and prints the summary. It fails if a seam is open or a picture is missing.
+pub fn run(options: &Options, renderer: Option<RenderResources>) -> ExitCode {
+    if renderer.is_none() {
+        eprintln!(
+            "There is no graphics adapter, not even in software: the script is played without pictures."
+        );
+    }
+    let report = match play(options, renderer) {
+        Ok(report) => report,
+        Err(error) => {
+            eprintln!("The script failed: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    println!("{report}");
+    let summary = options.out.join("summary.txt");
+    if let Err(error) = std::fs::write(&summary, format!("{report}\n")) {
+        eprintln!("{} can't be written: {error}", summary.display());
+        return ExitCode::FAILURE;
+    }
+    let complete = report.renderer.is_none() || report.pictures.len() == PICTURES;
+    if report.seams.is_flawless() && complete {
+        return ExitCode::SUCCESS;
+    }
+    eprintln!("Seams are not flawless or pictures are missing: {}", report.seams);
+    ExitCode::FAILURE
+}
+
+/// Plays all scenes, with a progress bar.
+fn play(options: &Options, renderer: Option<RenderResources>) -> Result<Report> {
+    let start = Instant::now();
+    let bar = ProgressBar::new_spinner().with_message("loading the landscape");
+    bar.enable_steady_tick(Duration::from_millis(100));
+    let studio = Studio::open(options, renderer)?;
+    let ready = start.elapsed();
+    let places: Places = studio.resource();
+    let mut stage = Stage { studio, bar };
+    stage.set_up_bar(&places);
+
+    stage.landscape(&places)?;
+    stage.hillside(&places.hillside)?;
+    stage.tunnel(&places.hillside)?;
+    stage.bridge(&places.ravine)?;
+    stage.pit(places.corner)?;
+    stage.seam(&places.hillside)?;
+    stage.bar.set_message("checking every seam");
+    let report = stage.report(&places)?;
+    let report = Report { ready, took: start.elapsed(), ..report };
+    stage.bar.finish_and_clear();
+    Ok(report)
+}
+
+/// The studio and its progress bar.
+struct Stage {
+    studio: Studio,
+    bar: ProgressBar,
+}
+
+impl Stage {
+    /// Sets the length of the progress bar: each brush and each picture is a step.
+    fn set_up_bar(&mut self, places: &Places) {
+        let brushes = scripted_brushes::tunnel(&places.hillside).len()
+            + scripted_brushes::room(&places.hillside).len()
+            + scripted_brushes::bridge(&places.ravine).len()
+            + scripted_brushes::pit(places.corner).len();
+        self.bar.set_length((brushes + PICTURES) as u64);
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} {elapsed} {msg}") {
+            self.bar.set_style(style);
+        }
+    }
+
+    fn edit(&mut self, brush: bevy_burrow::brush::Brush) -> Result {
+        self.bar.inc(1);
+        self.studio.edit(brush)
+    }
+
+    fn shoot(&mut self, name: &'static str) -> Result {
+        self.bar.inc(1);
+        self.studio.shoot(name)
+    }
+
+    fn shoot_from(&mut self, name: &'static str, eye: Vec3, at: Vec3) -> Result {
+        self.bar.inc(1);
+        self.studio.shoot_from(name, eye, at)
+    }
+
+    /// A picture of the landscape from above.
+    fn landscape(&mut self, places: &Places) -> Result {
+        self.bar.set_message("the landscape");
+        let mouth = places.hillside.mouth;
+        let eye = self.above(
+            mouth - flat(places.hillside.inward) * 170.0 + flat(places.hillside.inward.perp()) * 60.0,
+            46.0,
+        )?;
+        self.shoot_from("1_landscape", eye, mouth + flat(places.hillside.inward) * 60.0)
+    }
+
+    /// The player walks to the hillside and aims at it.
+    fn hillside(&mut self, hillside: &Hillside) -> Result {
+        self.bar.set_message("up to the hillside");
+        let Hillside { mouth, inward, .. } = *hillside;
+        self.studio.walk_to(mouth.xz() - inward * 24.0, false)?;
+        self.studio.look_at(mouth + Vec3::Y * 3.5)?;
+        self.preview(true);
+        self.shoot("2_hillside")?;
+        self.preview(false);
+        self.studio.walk_to(mouth.xz() - inward * 8.0, true)
+    }
+
+    /// The player digs the tunnel and the room with the headlamp on, and takes pictures on the way out.
+    fn tunnel(&mut self, hillside: &Hillside) -> Result {
+        self.bar.set_message("the tunnel");
+        let Hillside { mouth, inward, onward } = *hillside;
+        self.studio.lamp(true);
+        for (brush, stand) in scripted_brushes::tunnel(hillside) {
+            self.edit(brush)?;
+            self.studio.walk_to(stand, false)?;
+        }
+        let [_, bend, end] = hillside.floor();
+        let (bend, end) = (bend.xz(), end.xz());
+        self.bar.set_message("the room");
+        for brush in scripted_brushes::room(hillside) {
+            self.edit(brush)?;
+        }
+        self.studio.walk_to(end - onward * 1.5, false)?;
+        self.studio.look_at(hillside.room() - Vec3::Y * 1.5)?;
+        self.shoot("5_room")?;
+        self.bar.set_message("back to daylight");
+        self.studio.walk_to(bend, true)?;
+        self.studio.walk_to(bend - inward * 11.0, true)?;
+        self.studio.look_at(hillside.floor()[1] + flat(onward) * 2.0 + Vec3::Y * 1.8)?;
+        self.shoot("4_tunnel_inside")?;
+        self.studio.walk_to(mouth.xz() + inward * 9.0, true)?;
+        self.studio.look_at(mouth - flat(inward) * 20.0 + Vec3::Y * 2.0)?;
+        self.shoot("6_daylight")?;
+        self.studio.walk_to(mouth.xz() - inward * 13.0, true)?;
+        self.studio.look_at(mouth + Vec3::Y * 3.0)?;
+        self.studio.lamp(false);
+        self.shoot("3_tunnel_outside")
+    }
+
+    /// The bridge is built, and the player walks over it.
+    fn bridge(&mut self, ravine: &Ravine) -> Result {
+        self.bar.set_message("the bridge");
+        let Ravine { from, to, behind, .. } = *ravine;
+        for brush in scripted_brushes::bridge(ravine) {
+            self.edit(brush)?;
+        }
+        let along = (to - from).xz().normalize();
+        self.studio.move_to(behind[0].xz() - along)?;
+        self.studio.walk_to(behind[1].xz() + along, true)?;
+        let middle = from.midpoint(to);
+        let aside = [1.0, -1.0].map(|side| middle + flat(along.perp()) * side * 34.0 - flat(along) * 9.0);
+        let [left, right] = [self.above(aside[0], 9.0)?, self.above(aside[1], 9.0)?];
+        // The side from which more of it is visible; the lower one if both are equal.
+        let world = self.studio.terrain()?.world();
+        let score = |eye: Vec3| (ravine.points_visible_from(world, eye), -eye.y);
+        let eye = if score(right) > score(left) { right } else { left };
+        self.shoot_from("7_bridge", eye, middle - Vec3::Y * 3.5)
+    }
+
+    fn pit(&mut self, corner: Vec3) -> Result {
+        self.bar.set_message("the pit");
+        for brush in scripted_brushes::pit(corner) {
+            self.edit(brush)?;
+        }
+        let eye = self.above(corner + Vec3::new(-24.0, 0.0, 20.0), 18.0)?;
+        self.shoot_from("8_pit", eye, corner - Vec3::Y * 4.0)
+    }
+
+    /// A picture of the tunnel's mouth with the edges of its triangles.
+    fn seam(&mut self, hillside: &Hillside) -> Result {
+        self.bar.set_message("the seam");
+        let Hillside { mouth, inward, .. } = *hillside;
+        let edge = mouth + flat(inward) * 3.0 + Vec3::Y * (2.0 * TUNNEL_RADIUS);
+        let radius = 16.0;
+        if SeamWires::around(self.studio.terrain()?.world(), edge, radius).shared() == 0 {
+            return Err("no tile and chunk share an edge at the tunnel's mouth".into());
+        }
+        let lines = BurrowDebug { wires: true, focus: Some(edge), near: radius, ..default() };
+        self.studio.world().insert_resource(lines);
+        let eye = mouth - flat(inward) * 6.0 + flat(inward.perp()) * 4.0 + Vec3::Y * 6.5;
+        self.shoot_from("9_seam", eye, edge - Vec3::Y * 1.5)
+    }
+
+    /// A point at a height above the ground.
+    fn above(&mut self, place: Vec3, metres: f32) -> Result<Vec3> {
+        let height = self.studio.terrain()?.world().height(place.x.into(), place.z.into());
+        let height = height.ok_or("a picture would be taken outside the world")?;
+        Ok(place.with_y(height as f32 + metres))
+    }
+
+    /// Shows the builder's preview, or hides it.
+    fn preview(&mut self, on: bool) {
+        let mut hand = self.studio.world().resource_mut::<Hand>();
+        hand.preview = on;
+        hand.tool = if on { Tool::Builder } else { Tool::Pickaxe };
+        // The player has some concrete from the start.
+        hand.material = CONCRETE;
+        hand.set_radius(Tool::Builder, 3.0);
+    }
+
+    fn report(&mut self, places: &Places) -> Result<Report> {
+        let renderer = self.studio.renderer();
+        let engine: BurrowEngine = self.studio.resource();
+        let (engine, figures) = (engine.state(), engine.figures());
+        let edit_log: EditLog = self.studio.resource();
+        let pictures = self.studio.pictures.clone();
+        let (transactions, receipts) = (self.studio.transactions.clone(), self.studio.receipts.clone());
+        let world: &Model = self.studio.terrain()?.world();
+        Ok(Report {
+            renderer,
+            size: (world.grid().width(), world.grid().depth()),
+            tunnel: scripted_brushes::tunnel_length(&places.hillside),
+            edit_log,
+            transactions,
+            receipts,
+            fields: world.fields().map(|(_, fields)| fields.iter().count()).sum(),
+            chunks: world.drawn_chunks().count(),
+            seams: world.check_seams(),
+            memory: world.memory(),
+            pictures,
+            engine,
+            stages: (figures.cpu, figures.cuda),
+            frames: self.studio.frames.clone(),
+            drawn: self.studio.drawn.clone(),
+            ready: Duration::ZERO,
+            took: Duration::ZERO,
+        })
+    }
+}

@@ -1,0 +1,126 @@
+//! The player: actions steer a character, and the camera looks through its eyes.
+
+pub mod bindings;
+pub mod body;
+pub mod camera;
+pub mod game_state;
+pub mod headlamp;
+pub mod input;
+pub mod world_edge;
+
+use bevy::prelude::*;
+use bevy_burrow::physics::{CharacterSteering, CharacterSystems};
+use bevy_burrow::prelude::*;
+
+use self::game_state::GameState;
+use self::input::{Action, Actions};
+use crate::film::places::Places;
+use crate::ui::settings::Settings;
+use crate::world::landscape::DespawnOnNewGame;
+
+/// The player's body and the direction of its head.
+#[derive(Component, Clone, Copy, Debug, Default)]
+#[require(DespawnOnNewGame)]
+pub struct Player {
+    /// Angle around the vertical in radians; 0 looks along -z.
+    pub yaw: f32,
+    /// Angle above the horizon in radians.
+    pub pitch: f32,
+}
+
+/// A script steers this player: the keyboard and the mouse do not.
+#[derive(Component)]
+pub struct Scripted;
+
+/// Systems in `Update` that turn the player's actions into movement and edits. They run before
+/// [`BurrowSystems::Collect`], so that their brushes are in this frame's transaction.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PlayerControlSystems;
+
+/// Spawns the player once the terrain is ready, and steers it.
+pub struct PlayerPlugin;
+
+impl Plugin for PlayerPlugin {
+    fn build(&self, app: &mut App) {
+        app.configure_sets(Update, PlayerControlSystems.before(BurrowSystems::Collect))
+            .add_observer(spawn_player)
+            .add_systems(
+                Update,
+                (look, steer).run_if(in_state(GameState::Playing)).in_set(PlayerControlSystems),
+            )
+            .add_systems(FixedUpdate, end_jump.after(CharacterSystems))
+            .add_systems(OnExit(GameState::Playing), stop_walking);
+    }
+}
+
+impl Player {
+    /// A player who stands at one place and looks at another.
+    pub fn looking(from: Vec3, at: Vec3) -> Self {
+        let direction = at - from;
+        Self { yaw: (-direction.x).atan2(-direction.z), pitch: direction.y.atan2(direction.xz().length()) }
+    }
+
+    /// The rotation of the head.
+    pub fn rotation(&self) -> Quat {
+        Quat::from_euler(EulerRot::YXZ, self.yaw, self.pitch, 0.0)
+    }
+}
+
+fn spawn_player(
+    ready: On<TerrainReady>,
+    mut commands: Commands,
+    terrains: Query<&Terrain>,
+    places: Res<Places>,
+    players: Query<(), With<Player>>,
+) {
+    let Ok(terrain) = terrains.get(ready.entity) else { return };
+    // The event comes again whenever the terrain has loaded anew.
+    if !players.is_empty() {
+        return;
+    }
+    let height = |place: Vec2| terrain.world().height(place.x.into(), place.y.into());
+    let feet = start(&places, |place| height(place).map(|height| height as f32));
+    let hill = places.hillside.mouth + Vec3::Y * 2.5;
+    commands.spawn((Name::new("player"), Player::looking(feet, hill), body::standing_at(feet)));
+}
+
+/// Where the player starts: on the ground before the hill.
+pub fn start(places: &Places, height: impl Fn(Vec2) -> Option<f32>) -> Vec3 {
+    let start = places.hillside.start();
+    Vec3::new(start.x, height(start).unwrap_or_default(), start.y)
+}
+
+fn look(actions: Res<Actions>, settings: Res<Settings>, mut players: Query<&mut Player>) {
+    let up = if settings.invert_y { -1.0 } else { 1.0 };
+    for mut player in &mut players {
+        let turn = actions.look * settings.sensitivity;
+        player.yaw -= turn.x;
+        player.pitch = (player.pitch - up * turn.y).clamp(-1.54, 1.54);
+    }
+}
+
+fn steer(actions: Res<Actions>, mut players: Query<(&Player, &mut CharacterSteering), Without<Scripted>>) {
+    for (player, mut steering) in &mut players {
+        let walk = Vec3::new(actions.walk.x, 0.0, -actions.walk.y);
+        steering.direction = (Quat::from_rotation_y(player.yaw) * walk).xz();
+        steering.run = actions.pressed(Action::Run);
+        steering.jump |= actions.pressed(Action::Jump);
+    }
+}
+
+/// Keeps a jump requested until a physics step has seen it: not every frame has one.
+fn end_jump(mut players: Query<&mut CharacterSteering, (With<Player>, Without<Scripted>)>) {
+    for mut steering in &mut players {
+        steering.jump = false;
+    }
+}
+
+/// Stops players who are not steered by a script.
+pub fn stop_walking(mut players: Query<&mut CharacterSteering, Without<Scripted>>) {
+    for mut steering in &mut players {
+        *steering = default();
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,357 @@
+//! The heads-up display: crosshair, tools, materials, time of day, hints and what was just dug.
+
+use std::collections::VecDeque;
+
+use bevy::prelude::*;
+use bevy_burrow::panel::BurrowPanel;
+use bevy_burrow::prelude::*;
+
+use crate::player::camera::{DetachedCamera, PlayerCamera};
+use crate::player::game_state::GameState;
+use crate::player::headlamp::HeadlampSwitch;
+use crate::player::input::Action;
+use crate::tools::inventory::{AmountChanged, Inventory};
+use crate::tools::{Hand, Tool};
+use crate::ui::images::Images;
+use crate::ui::labels::Labels;
+use crate::ui::settings::Settings;
+use crate::ui::widgets::{self, EDGE, GOLD, GREY, RED, SHADE, WHITE, column, text};
+use crate::world::day::Clock;
+use crate::world::landscape::{self, MATERIALS};
+
+/// Seconds that a hint or a find is shown, in real time: also while the game is paused.
+const SHOWN: f32 = 2.6;
+/// Finds that are shown at the same time.
+const MAX_FINDS: usize = 4;
+
+/// A short text for the player.
+#[derive(Message, Clone, Debug)]
+pub struct Hint(pub String);
+
+/// Is the display shown? Scripts hide it for pictures of the landscape.
+#[derive(Resource)]
+pub struct ShowHud(pub bool);
+
+/// Shows the display.
+pub struct HudPlugin;
+
+impl Plugin for HudPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(ShowHud(true)).add_message::<Hint>().add_systems(Startup, spawn_hud).add_systems(
+            Update,
+            (
+                show_hud,
+                show_tool,
+                show_materials,
+                fade_crosshair,
+                show_time,
+                show_hints,
+                show_finds,
+                show_keys.run_if(resource_changed::<Settings>.or_else(resource_changed::<Labels>)),
+            )
+                .after(BurrowSystems::Propagate),
+        );
+    }
+}
+
+#[derive(Component)]
+struct Hud;
+
+#[derive(Component)]
+struct Crosshair;
+
+#[derive(Component)]
+struct Slot(Tool);
+
+/// The label of the key that selects a tool.
+#[derive(Component)]
+struct SlotKey(Action);
+
+#[derive(Component)]
+struct ToolName;
+
+/// The row of a material.
+#[derive(Component)]
+struct Row(MaterialId);
+
+/// The amount of a material.
+#[derive(Component)]
+struct Amount(MaterialId);
+
+#[derive(Component)]
+struct TimeOfDay;
+
+#[derive(Component)]
+struct Hints;
+
+#[derive(Component)]
+struct Find(usize);
+
+/// Important actions with their keys.
+#[derive(Component)]
+struct KeyList;
+
+fn spawn_hud(mut commands: Commands, images: Res<Images>) {
+    let absolute = || Node { position_type: PositionType::Absolute, ..default() };
+    commands.spawn((Hud, widgets::full(), Visibility::Hidden)).with_children(|hud| {
+        let dot = Node {
+            width: px(6),
+            height: px(6),
+            border: UiRect::all(px(1)),
+            border_radius: BorderRadius::all(px(3)),
+            ..default()
+        };
+        let colors = (BackgroundColor(WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
+        hud.spawn((widgets::centered(), children![(Crosshair, dot, colors)]));
+        let corner = Node { right: px(16), top: px(12), ..absolute() };
+        hud.spawn((corner, children![(TimeOfDay, text("", 17.0, WHITE))]));
+        let top =
+            Node { width: percent(100), top: px(92), justify_content: JustifyContent::Center, ..absolute() };
+        hud.spawn((top, children![(Hints, text("", 19.0, GOLD))]));
+        let keys = Node { left: px(14), bottom: px(12), padding: UiRect::axes(px(9), px(6)), ..absolute() };
+        hud.spawn((widgets::panel(keys), children![(KeyList, text("", 13.0, GREY))]));
+        let bottom = Node {
+            position_type: PositionType::Absolute,
+            width: percent(100),
+            bottom: px(12),
+            align_items: AlignItems::Center,
+            ..column(px(6))
+        };
+        hud.spawn(bottom).with_children(|bottom| spawn_slots(bottom, &images));
+        let right = Node {
+            position_type: PositionType::Absolute,
+            right: px(14),
+            bottom: px(12),
+            align_items: AlignItems::End,
+            ..column(px(3))
+        };
+        hud.spawn(right).with_children(spawn_materials);
+    });
+}
+
+/// The tools, with the name of the selected one above.
+fn spawn_slots(parent: &mut ChildSpawnerCommands, images: &Images) {
+    let sign = Node { padding: UiRect::axes(px(11), px(3)), ..default() };
+    parent.spawn((widgets::panel(sign), children![(ToolName, text("", 15.0, WHITE))]));
+    parent.spawn(Node { column_gap: px(5), ..default() }).with_children(|bar| {
+        for tool in Tool::ALL {
+            let slot = Node {
+                width: px(52),
+                height: px(52),
+                border: UiRect::all(px(2)),
+                border_radius: BorderRadius::all(px(6)),
+                align_items: AlignItems::Center,
+                justify_content: JustifyContent::Center,
+                ..default()
+            };
+            let icon = Node { width: px(36), height: px(36), ..default() };
+            let key = Node { position_type: PositionType::Absolute, left: px(4), top: px(1), ..default() };
+            bar.spawn((
+                Slot(tool),
+                slot,
+                BackgroundColor(SHADE),
+                BorderColor::all(EDGE),
+                children![(images.icon(tool), icon), (key, SlotKey(tool.slot()), text("", 11.0, GREY))],
+            ));
+        }
+    });
+}
+
+/// The inventory, with the latest finds above.
+fn spawn_materials(parent: &mut ChildSpawnerCommands) {
+    for at in (0..MAX_FINDS).rev() {
+        parent.spawn((Find(at), text("", 15.0, WHITE)));
+    }
+    let list =
+        Node { width: px(158), padding: UiRect::all(px(5)), margin: UiRect::top(px(4)), ..column(px(1)) };
+    parent.spawn(widgets::panel(list)).with_children(|list| {
+        for (material, name) in MATERIALS {
+            let row = Node {
+                height: px(22),
+                padding: UiRect::horizontal(px(5)),
+                border_radius: BorderRadius::all(px(4)),
+                align_items: AlignItems::Center,
+                column_gap: px(8),
+                ..default()
+            };
+            // With a light border, because coal is as dark as the list.
+            let swatch = Node { width: px(16), height: px(16), border: UiRect::all(px(1)), ..default() };
+            let grow = Node { flex_grow: 1.0, ..default() };
+            list.spawn((
+                Row(material),
+                row,
+                BackgroundColor::DEFAULT,
+                children![
+                    (
+                        swatch,
+                        BackgroundColor(swatch_color(material)),
+                        BorderColor::all(WHITE.with_alpha(0.45))
+                    ),
+                    (text(name, 13.0, WHITE), grow),
+                    (Amount(material), text("", 13.0, GREY)),
+                ],
+            ));
+        }
+    });
+}
+
+/// The colour of a material, brightened: the ground is lit by the sun, but a swatch is not.
+fn swatch_color(material: MaterialId) -> Color {
+    let color = landscape::colour(material);
+    let brighten = |channel: f32| (1.5 * channel + 0.03).min(1.0);
+    Color::linear_rgb(brighten(color.red), brighten(color.green), brighten(color.blue))
+}
+
+fn show_hud(
+    shown: Res<ShowHud>,
+    state: Res<State<GameState>>,
+    is_detached: Single<Has<DetachedCamera>, With<PlayerCamera>>,
+    panel: Res<BurrowPanel>,
+    mut hud: Single<&mut Visibility, With<Hud>>,
+) {
+    // The display would shine through the plugin's panel.
+    let is_shown = shown.0 && *state.get() == GameState::Playing && !*is_detached && !panel.is_open;
+    hud.set_if_neq(if is_shown { Visibility::Inherited } else { Visibility::Hidden });
+}
+
+fn show_tool(
+    hand: Res<Hand>,
+    mut slots: Query<(&Slot, &mut BorderColor, &mut BackgroundColor)>,
+    mut name: Single<&mut Text, With<ToolName>>,
+) {
+    for (slot, mut border, mut background) in &mut slots {
+        let is_selected = slot.0 == hand.tool;
+        border.set_if_neq(BorderColor::all(if is_selected { GOLD } else { EDGE }));
+        let fill = if is_selected { Color::srgba(0.24, 0.20, 0.10, 0.82) } else { SHADE };
+        background.set_if_neq(BackgroundColor(fill));
+    }
+    let (label, radius) = (hand.tool.label(), hand.radius(hand.tool));
+    let material = landscape::name(hand.material);
+    let words = match hand.tool {
+        Tool::Builder => format!("{label}  {} of {material}  {radius:.2} m", hand.shape.label()),
+        Tool::Painter => format!("{label}  {material}  {radius:.2} m"),
+        Tool::Bomb | Tool::Lamp | Tool::Ball => label.into(),
+        _ => format!("{label}  {radius:.2} m"),
+    };
+    name.set_if_neq(Text::new(words));
+}
+
+fn show_materials(
+    hand: Res<Hand>,
+    inventory: Res<Inventory>,
+    mut rows: Query<(&Row, &mut BackgroundColor)>,
+    mut amounts: Query<(&Amount, &mut Text, &mut TextColor)>,
+) {
+    for (row, mut background) in &mut rows {
+        let fill = if row.0 == hand.material { GOLD.with_alpha(0.22) } else { Color::NONE };
+        background.set_if_neq(BackgroundColor(fill));
+    }
+    for (material, mut text, mut color) in &mut amounts {
+        let amount = inventory.amount(material.0);
+        text.set_if_neq(Text::new(amount.to_string()));
+        color.set_if_neq(TextColor(match amount {
+            1.. => WHITE,
+            0 => GREY,
+            // In debt.
+            _ => RED,
+        }));
+    }
+}
+
+/// The crosshair is faint where the tool does not reach.
+fn fade_crosshair(hand: Res<Hand>, mut dot: Single<&mut BackgroundColor, With<Crosshair>>) {
+    let reaches = hand.aim.is_some() || matches!(hand.tool, Tool::Bomb | Tool::Ball);
+    dot.set_if_neq(BackgroundColor(WHITE.with_alpha(if reaches { 0.95 } else { 0.30 })));
+}
+
+fn show_time(clock: Res<Clock>, lamp: Res<HeadlampSwitch>, mut time: Single<&mut Text, With<TimeOfDay>>) {
+    let lamp = if lamp.0 { "lamp on   " } else { "" };
+    time.set_if_neq(Text::new(format!("{lamp}{}", clock.text())));
+}
+
+fn show_hints(
+    time: Res<Time<Real>>,
+    mut hints: MessageReader<Hint>,
+    mut line: Single<(&mut Text, &mut TextColor), With<Hints>>,
+    mut left: Local<f32>,
+) {
+    let (text, color) = &mut *line;
+    if let Some(hint) = hints.read().last() {
+        text.set_if_neq(Text::new(hint.0.clone()));
+        *left = SHOWN;
+    }
+    *left -= time.delta_secs();
+    color.set_if_neq(TextColor(GOLD.with_alpha((2.0 * *left).clamp(0.0, 1.0))));
+}
+
+/// Shows what was gained and used lately. Changes of the same material are added up.
+fn show_finds(
+    time: Res<Time<Real>>,
+    mut changes: MessageReader<AmountChanged>,
+    mut lines: Query<(&Find, &mut Text, &mut TextColor)>,
+    mut finds: Local<VecDeque<(MaterialId, i64, f32)>>,
+) {
+    for change in changes.read() {
+        let same = finds.iter_mut().find(|find| find.0 == change.material && (find.1 > 0) == (change.by > 0));
+        match same {
+            Some(find) => (find.1, find.2) = (find.1 + change.by, SHOWN),
+            None => finds.push_front((change.material, change.by, SHOWN)),
+        }
+    }
+    for find in finds.iter_mut() {
+        find.2 -= time.delta_secs();
+    }
+    finds.retain(|find| find.2 > 0.0);
+    finds.truncate(MAX_FINDS);
+    for (line, mut text, mut color) in &mut lines {
+        let (words, alpha) = finds.get(line.0).map_or((String::new(), 0.0), |&(material, by, left)| {
+            (format!("{by:+} {}", landscape::name(material)), (2.0 * left).clamp(0.0, 1.0))
+        });
+        text.set_if_neq(Text::new(words));
+        color.set_if_neq(TextColor(WHITE.with_alpha(alpha)));
+    }
+}
+
+fn show_keys(
+    settings: Res<Settings>,
+    labels: Res<Labels>,
+    mut list: Single<&mut Text, (With<KeyList>, Without<SlotKey>)>,
+    mut slots: Query<(&SlotKey, &mut Text)>,
+) {
+    let lines = [Action::Help, Action::Headlamp, Action::Undo, Action::Pause]
+        .map(|action| format!("{}  {}", settings.bindings.first(action, &labels), action.label()));
+    list.0 = lines.join("\n");
+    for (slot, mut text) in &mut slots {
+        // A slot has room for a short label only.
+        let key = settings.bindings.first(slot.0, &labels);
+        text.0 = if key.len() <= 5 { key } else { String::new() };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use bevy::time::TimeUpdateStrategy;
+
+    use super::*;
+
+    #[test]
+    fn hints_disappear_even_while_the_game_is_paused() {
+        let mut app = App::new();
+        app.add_plugins(MinimalPlugins)
+            .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(500)))
+            .add_message::<Hint>()
+            .add_systems(Update, show_hints);
+        let line = app.world_mut().spawn((Hints, Text::default(), TextColor::default())).id();
+        let alpha = |app: &App| app.world().get::<TextColor>(line).expect("a line").0.alpha();
+        app.world_mut().resource_mut::<Time<Virtual>>().pause();
+        app.world_mut().write_message(Hint("look there".into()));
+        app.update();
+        assert_eq!(alpha(&app), 1.0);
+        for _ in 0..6 {
+            app.update();
+        }
+        assert_eq!(alpha(&app), 0.0);
+    }
+}

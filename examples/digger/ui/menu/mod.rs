@@ -1,0 +1,86 @@
+//! The pages of the menu: title, pause, settings, controls and help.
+
+mod controls;
+mod help;
+mod pause;
+mod settings_page;
+mod title;
+
+use bevy::prelude::*;
+
+use crate::player::game_state::MenuPage;
+use crate::ui::widgets::{self, Activated, GOLD};
+
+/// All pages.
+pub struct MenuPlugin;
+
+impl Plugin for MenuPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins((
+            title::TitlePlugin,
+            pause::PausePlugin,
+            settings_page::SettingsPagePlugin,
+            controls::ControlsPlugin,
+            help::HelpPlugin,
+        ));
+    }
+}
+
+/// Spawns a page in the middle of the window, with a headline and what `fill` spawns. It is despawned when the page
+/// changes.
+fn spawn_page(
+    commands: &mut Commands,
+    page: MenuPage,
+    headline: &str,
+    width: f32,
+    fill: impl FnOnce(&mut ChildSpawnerCommands),
+) {
+    let column = Node { width: px(width), padding: UiRect::axes(px(26), px(22)), ..widgets::column(px(4)) };
+    let shade = BackgroundColor(Color::srgba(0.0, 0.0, 0.02, 0.42));
+    commands.spawn((DespawnOnExit(page), widgets::centered(), shade)).with_children(|middle| {
+        middle.spawn(widgets::panel(column)).with_children(|column| {
+            let below = Node { margin: UiRect::bottom(px(12)), ..default() };
+            column.spawn((widgets::text(headline, 30.0, GOLD), below));
+            fill(column);
+        });
+    });
+}
+
+/// Spawns the buttons that lead to other pages, and "Quit". The menus of title and pause have them in common.
+fn spawn_common_buttons(column: &mut ChildSpawnerCommands, first: usize, width: f32) {
+    for (at, (words, page)) in
+        [("Settings", MenuPage::Settings), ("Controls", MenuPage::Controls), ("Help", MenuPage::Help)]
+            .into_iter()
+            .enumerate()
+    {
+        column.spawn(widgets::button(first + at, words, width)).observe(go_to(page));
+    }
+}
+
+/// An observer for an item that leads to another page.
+fn go_to(page: MenuPage) -> impl FnMut(On<Activated>, ResMut<NextState<MenuPage>>) {
+    move |_, mut next| next.set(page)
+}
+
+fn quit(_: On<Activated>, mut exit: MessageWriter<AppExit>) {
+    exit.write(AppExit::Success);
+}
+
+/// An app with an open page, for tests.
+#[cfg(test)]
+fn app_with(plugin: impl Plugin, page: MenuPage) -> App {
+    let mut app = crate::test_support::app_with_input();
+    app.init_state::<MenuPage>()
+        .init_resource::<crate::ui::settings::DefaultSettings>()
+        .init_resource::<UiScale>()
+        .add_plugins((widgets::UiPlugin, plugin));
+    crate::test_support::go_to(&mut app, page);
+    app
+}
+
+/// The menu item at a position, for tests.
+#[cfg(test)]
+fn item_at(app: &mut App, position: usize) -> Entity {
+    let mut items = app.world_mut().query::<(Entity, &widgets::MenuItem)>();
+    items.iter(app.world()).find(|(_, item)| item.0 == position).map(|(entity, _)| entity).expect("an item")
+}

@@ -1,0 +1,249 @@
+//! The title: the logo and its menu, over a landscape that slowly turns.
+
+use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
+use bevy_burrow::prelude::*;
+use bevy_burrow::view::GroundLoading;
+
+use super::{quit, spawn_common_buttons};
+use crate::film::places::{Places, flat};
+use crate::player::Player;
+use crate::player::camera::{DetachedCamera, PlayerCamera};
+use crate::player::game_state::{GameState, MenuPage};
+use crate::ui::images::Images;
+use crate::ui::widgets::{self, Activated, GOLD, GREY};
+use crate::world::landscape::NewGame;
+
+/// Seconds for one turn around the landscape.
+const TURN: f32 = 150.0;
+/// Width of the buttons.
+const WIDTH: f32 = 260.0;
+
+/// The title page and its camera.
+pub struct TitlePlugin;
+
+impl Plugin for TitlePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Start>()
+            .add_systems(OnEnter(GameState::Title), |mut page: ResMut<NextState<MenuPage>>| {
+                page.set(MenuPage::Menu);
+            })
+            .add_systems(OnEnter(MenuPage::Menu), open.run_if(in_state(GameState::Title)))
+            .add_systems(OnExit(GameState::Title), (attach_camera, note_start))
+            .add_systems(
+                Update,
+                (
+                    fly.run_if(resource_exists::<Places>),
+                    show_progress,
+                    start_game.run_if(is_loaded).run_if(has_focus),
+                )
+                    .run_if(in_state(GameState::Title)),
+            );
+    }
+}
+
+#[derive(Resource, Clone, Copy, Debug, Default)]
+struct Start {
+    /// Is there a game to continue?
+    has_begun: bool,
+    /// Does the player want to start as soon as the landscape has loaded?
+    is_wanted: bool,
+}
+
+/// The progress of loading. It is hidden when everything has loaded.
+#[derive(Component)]
+struct Progress;
+
+#[derive(Component)]
+struct ProgressText;
+
+/// The filled part of the progress bar.
+#[derive(Component)]
+struct ProgressBar;
+
+fn open(mut commands: Commands, images: Option<Res<Images>>, game: Res<Start>) {
+    let Some(images) = images else { return };
+    let left = Node {
+        padding: UiRect::left(px(84)),
+        flex_direction: FlexDirection::Column,
+        justify_content: JustifyContent::Center,
+        row_gap: px(6),
+        ..widgets::full()
+    };
+    let shade = |alpha: f32, at: i32| ColorStop::new(Color::srgba(0.0, 0.0, 0.02, alpha), percent(at));
+    let shade =
+        LinearGradient::new(LinearGradient::TO_RIGHT, vec![shade(0.78, 0), shade(0.45, 36), shade(0.0, 64)]);
+    let page = (DespawnOnExit(MenuPage::Menu), left, BackgroundGradient::from(shade));
+    commands.spawn(page).with_children(|left| {
+        let logo = Node { width: px(424), height: px(88), margin: UiRect::bottom(px(4)), ..default() };
+        left.spawn((ImageNode::new(images.logo.clone()), logo));
+        let below = Node { margin: UiRect::bottom(px(34)), ..default() };
+        left.spawn((widgets::text("a real landscape that you can dig", 17.0, GREY), below));
+        let first = if game.has_begun { "Continue" } else { "Dig" };
+        left.spawn(widgets::button(0, first, WIDTH)).observe(start);
+        if game.has_begun {
+            left.spawn(widgets::button(1, "New game", WIDTH)).observe(start_new_game);
+        }
+        let next = 1 + usize::from(game.has_begun);
+        spawn_common_buttons(left, next, WIDTH);
+        left.spawn(widgets::button(next + 3, "Quit", WIDTH)).observe(quit);
+        left.spawn(progress());
+    });
+}
+
+/// A text over a bar. While it is hidden it keeps its place, so that the buttons do not move.
+fn progress() -> impl Bundle {
+    let column = Node { margin: UiRect::top(px(26)), ..widgets::column(px(8)) };
+    let line = Node { height: px(20), ..default() };
+    let words = (ProgressText, widgets::text("", 15.0, GOLD), line);
+    (Progress, column, Visibility::Hidden, children![words, widgets::bar(WIDTH, ProgressBar)])
+}
+
+fn start(_: On<Activated>, mut game: ResMut<Start>) {
+    game.is_wanted = true;
+}
+
+fn start_new_game(_: On<Activated>, mut commands: Commands, mut game: ResMut<Start>) {
+    commands.trigger(NewGame);
+    game.is_wanted = true;
+}
+
+/// Does the window have the focus? The game captures the mouse, so it must not start while the player uses another
+/// window. Scripts have no window.
+fn has_focus(windows: Query<&Window, With<PrimaryWindow>>) -> bool {
+    windows.iter().all(|window| window.focused)
+}
+
+fn is_loaded(players: Query<(), With<Player>>, textures: Res<GroundLoading>) -> bool {
+    !players.is_empty() && textures.is_ready()
+}
+
+/// Starts the game if the player wants to and is on the menu page. On other pages it waits.
+fn start_game(game: Res<Start>, page: Res<State<MenuPage>>, mut state: ResMut<NextState<GameState>>) {
+    if game.is_wanted && *page.get() == MenuPage::Menu {
+        state.set(GameState::Playing);
+    }
+}
+
+fn note_start(mut game: ResMut<Start>) {
+    *game = Start { has_begun: true, is_wanted: false };
+}
+
+fn show_progress(
+    players: Query<(), With<Player>>,
+    textures: Res<GroundLoading>,
+    mut shown: Query<&mut Visibility, With<Progress>>,
+    mut texts: Query<&mut Text, With<ProgressText>>,
+    mut bars: Query<&mut Node, With<ProgressBar>>,
+) {
+    let done = 100.0 * textures.progress();
+    let words = progress_text(textures.is_ready(), done, !players.is_empty());
+    for mut shown in &mut shown {
+        shown.set_if_neq(if words.is_some() { Visibility::Inherited } else { Visibility::Hidden });
+    }
+    for mut text in &mut texts {
+        text.set_if_neq(Text::new(words.clone().unwrap_or_default()));
+    }
+    for mut bar in &mut bars {
+        if bar.width != percent(done) {
+            bar.width = percent(done);
+        }
+    }
+}
+
+/// What is loading, if anything is.
+fn progress_text(has_textures: bool, done: f32, has_player: bool) -> Option<String> {
+    match (has_textures, has_player) {
+        (false, _) => Some(format!("creating textures: {done:.0} %")),
+        (true, false) => Some("loading the landscape ...".into()),
+        (true, true) => None,
+    }
+}
+
+/// Moves the camera around the tunnel's hill. It uses real time, because the game may be paused.
+fn fly(
+    mut commands: Commands,
+    time: Res<Time<Real>>,
+    places: Res<Places>,
+    terrains: Terrains,
+    mut cameras: Query<(Entity, &mut Transform), With<PlayerCamera>>,
+    mut height: Local<Option<f32>>,
+) {
+    let centre = places.hillside.mouth + Vec3::Y * 12.0;
+    let angle = 0.9 + std::f32::consts::TAU * time.elapsed_secs() / TURN;
+    let place = centre + flat(Vec2::from_angle(angle) * 190.0);
+    let Some(ground) = terrains.height(place.x, place.z) else { return };
+    let target = (ground + 34.0).max(centre.y + 30.0);
+    let height = height.get_or_insert(target);
+    *height += (target - *height) * (1.0 - (-0.7 * time.delta_secs()).exp());
+    // The hill is to the right of the menu.
+    let aside = (centre - place).cross(Vec3::Y).normalize() * -55.0;
+    for (entity, mut camera) in &mut cameras {
+        *camera = Transform::from_translation(place.with_y(*height)).looking_at(centre + aside, Vec3::Y);
+        commands.entity(entity).insert_if_new(DetachedCamera);
+    }
+}
+
+fn attach_camera(mut commands: Commands, camera: Query<Entity, With<PlayerCamera>>) {
+    for camera in &camera {
+        commands.entity(camera).remove::<DetachedCamera>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::ecs::system::RunSystemOnce;
+
+    use super::*;
+    use crate::test_support::go_to;
+
+    #[test]
+    fn the_progress_text_says_what_is_loading() {
+        for (has_textures, done, has_player, expected) in [
+            (false, 0.0, false, Some("creating textures: 0 %")),
+            (false, 41.7, true, Some("creating textures: 42 %")),
+            (true, 100.0, false, Some("loading the landscape ...")),
+            (true, 100.0, true, None),
+        ] {
+            assert_eq!(progress_text(has_textures, done, has_player).as_deref(), expected);
+        }
+    }
+
+    #[test]
+    fn the_game_does_not_start_while_another_window_has_the_focus() {
+        let mut world = World::new();
+        let has_focus = |world: &mut World| world.run_system_once(has_focus).expect("a system that runs");
+        assert!(has_focus(&mut world), "scripts have no window");
+        let window = world.spawn((PrimaryWindow, Window { focused: false, ..default() })).id();
+        assert!(!has_focus(&mut world));
+        world.get_mut::<Window>(window).expect("it is open").focused = true;
+        assert!(has_focus(&mut world));
+    }
+
+    #[test]
+    fn the_game_starts_from_the_menu_page_only() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, bevy::state::app::StatesPlugin))
+            .init_state::<GameState>()
+            .init_state::<MenuPage>()
+            .insert_resource(Start { has_begun: false, is_wanted: true })
+            .add_systems(Update, start_game);
+        for page in [MenuPage::Settings, MenuPage::Controls, MenuPage::Help, MenuPage::Menu] {
+            go_to(&mut app, page);
+            let expected = if page == MenuPage::Menu { GameState::Playing } else { GameState::Title };
+            assert_eq!(**app.world().resource::<State<GameState>>(), expected, "{page:?}");
+        }
+    }
+
+    #[test]
+    fn the_progress_is_shown_while_something_loads() {
+        let mut app = App::new();
+        app.init_resource::<GroundLoading>().add_systems(Update, show_progress);
+        let column = app.world_mut().spawn(progress()).id();
+        assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Hidden));
+        app.update();
+        assert_eq!(app.world().get::<Visibility>(column), Some(&Visibility::Inherited));
+        let mut texts = app.world_mut().query_filtered::<&Text, With<ProgressText>>();
+        assert_eq!(texts.single(app.world()).expect("a text").0, "creating textures: 0 %");
+    }
+}

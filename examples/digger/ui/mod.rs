@@ -1,0 +1,10 @@
+//! Menus, settings, and what is shown over the game.
+
+pub mod frame_times;
+pub mod hud;
+pub mod images;
+pub mod labels;
+pub mod menu;
+pub mod panel;
+pub mod settings;
+pub mod widgets;

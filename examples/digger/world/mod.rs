@@ -1,0 +1,9 @@
+//! The landscape, the light on it, and particles.
+
+pub mod day;
+pub mod debris;
+pub mod landscape;
+pub mod light;
+pub mod particles;
+pub mod sky;
+pub mod veins;

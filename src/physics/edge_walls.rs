@@ -1,0 +1,93 @@
+//! Invisible walls along a terrain's four edges.
+
+use avian3d::prelude::*;
+use bevy::prelude::*;
+
+use crate::plugin::TerrainReady;
+use crate::terrain::Terrain;
+
+/// Invisible walls along the four edges of a terrain, so that no body walks or falls off it. Insert it on the terrain's
+/// entity.
+///
+/// The walls are static colliders and children of the terrain: they move with it. They are rebuilt when another terrain
+/// takes its place, and removed with this component.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::physics::EdgeWalls;
+/// # use bevy_burrow::prelude::*;
+/// # fn spawn(mut commands: Commands, terrain: Terrain) {
+/// commands.spawn((terrain, EdgeWalls::default()));
+/// # }
+/// ```
+#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+#[reflect(Component, Default)]
+pub struct EdgeWalls {
+    /// How far the walls reach above and below the terrain's origin, in voxels.
+    pub height: f32,
+    /// How thick the walls are, in voxels. They stand outside the terrain. Fast bodies need thick walls.
+    pub thickness: f32,
+}
+
+impl Default for EdgeWalls {
+    fn default() -> Self {
+        Self { height: 1500.0, thickness: 8.0 }
+    }
+}
+
+/// One of the four walls.
+#[derive(Component)]
+pub(super) struct EdgeWall;
+
+type Walls<'w, 's> = Query<'w, 's, (Entity, &'static ChildOf), With<EdgeWall>>;
+
+pub(super) fn build(
+    new: On<Insert, EdgeWalls>,
+    commands: Commands,
+    terrains: Query<(&Terrain, &EdgeWalls)>,
+    old: Walls,
+) {
+    replace(new.entity, commands, &terrains, &old);
+}
+
+pub(super) fn rebuild(
+    ready: On<TerrainReady>,
+    commands: Commands,
+    terrains: Query<(&Terrain, &EdgeWalls)>,
+    old: Walls,
+) {
+    replace(ready.entity, commands, &terrains, &old);
+}
+
+pub(super) fn remove(gone: On<Remove, EdgeWalls>, mut commands: Commands, old: Walls) {
+    despawn(gone.entity, &mut commands, &old);
+}
+
+fn despawn(terrain: Entity, commands: &mut Commands, old: &Walls) {
+    for (wall, _) in old.iter().filter(|(_, parent)| parent.parent() == terrain) {
+        commands.entity(wall).try_despawn();
+    }
+}
+
+fn replace(entity: Entity, mut commands: Commands, terrains: &Query<(&Terrain, &EdgeWalls)>, old: &Walls) {
+    let Ok((terrain, &EdgeWalls { height, thickness })) = terrains.get(entity) else { return };
+    despawn(entity, &mut commands, old);
+    let grid = terrain.world().grid();
+    let (width, depth) = (grid.width() as f32, grid.depth() as f32);
+    let half = thickness / 2.0;
+    for (x, z, along_x, along_z) in [
+        (-half, depth / 2.0, thickness, depth),
+        (width + half, depth / 2.0, thickness, depth),
+        (width / 2.0, -half, width + 2.0 * thickness, thickness),
+        (width / 2.0, depth + half, width + 2.0 * thickness, thickness),
+    ] {
+        commands.spawn((
+            Name::new("edge wall"),
+            EdgeWall,
+            RigidBody::Static,
+            Collider::cuboid(along_x, 2.0 * height, along_z),
+            Transform::from_xyz(x, 0.0, z),
+            ChildOf(entity),
+        ));
+    }
+}
