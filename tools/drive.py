@@ -201,7 +201,7 @@ def digger(stage):
     tap(stage, "Return")
     page("Title Menu", since)
     picture(stage, "11_title", see=(60, 50, 35, 40))
-    # The first item is lit: "Go on".
+    # The first item is lit: "Continue".
     since = stage.mark()
     tap(stage, "Down")
     tap(stage, "Return")

@@ -102,7 +102,7 @@ impl Recent {
 }
 
 /// What the last times of a row say of the next one.
-type Judge = fn(&Recent) -> Option<f64>;
+type Statistic = fn(&Recent) -> Option<f64>;
 
 /// The times of one backend for one kind of stage, by powers of two of the amount.
 #[derive(Clone, Debug, Default)]
@@ -116,9 +116,9 @@ fn size(amount: usize) -> usize {
 impl Times {
     /// Seconds that an amount is expected to take. Where none was timed, no less than smaller amounts take, and no less a
     /// piece than larger ones.
-    fn at(&self, amount: usize, judge: Judge) -> f64 {
+    fn at(&self, amount: usize, statistic: Statistic) -> f64 {
         let own = size(amount);
-        let row = |at: usize| self.0.get(at).and_then(judge);
+        let row = |at: usize| self.0.get(at).and_then(statistic);
         let smaller = || (0..own).rev().find_map(row).unwrap_or_default();
         let larger =
             || (own + 1..self.0.len()).find_map(|at| Some(row(at)? / f64::powi(2.0, (at - own) as i32)));
@@ -134,7 +134,7 @@ impl Times {
     }
 }
 
-/// Who does a stage: the processor, a card that has what it needs, or one that does not.
+/// What runs a stage: the processor, a card that has its data, or one that does not.
 const CPU: usize = 0;
 const CARD: usize = 1;
 const COLD_CARD: usize = 2;
@@ -147,7 +147,7 @@ fn card(load: Load) -> usize {
 /// What both backends took.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
-    /// By kind, and by who did it.
+    /// By kind and runner.
     times: [[Times; 3]; 4],
     /// Seconds that may be lost in each row on the slower backend; negative where more were lost than that.
     credit: [Vec<f64>; 4],
@@ -169,8 +169,8 @@ impl Costs {
 
     /// Seconds on the processor and on the card. Those of edits have those of the meshing that follows: it is chosen by
     /// itself, but what was edited on the processor has to be uploaded before a card can mesh it.
-    fn expected(&self, load: Load, judge: Judge) -> [f64; 2] {
-        let own = [CPU, card(load)].map(|who| self.times[load.kind as usize][who].at(load.amount, judge));
+    fn expected(&self, load: Load, statistic: Statistic) -> [f64; 2] {
+        let own = [CPU, card(load)].map(|who| self.times[load.kind as usize][who].at(load.amount, statistic));
         if load.kind == Kind::Mesh {
             return own;
         }

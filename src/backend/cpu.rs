@@ -82,13 +82,13 @@ fn mesh(view: &WorldView, blocks: &[Block], parts: &mut Parts) {
 #[derive(Default)]
 struct Lists {
     count: AtomicUsize,
-    /// By number: those that nobody has, and that have room.
+    /// With their numbers: lists with room that no thread uses.
     open: Mutex<Vec<(usize, Parts)>>,
     full: Mutex<Vec<(usize, Parts)>>,
 }
 
 impl Lists {
-    /// A list with room that nobody has, and its number.
+    /// Takes a list with room, and its number.
     fn take(&self) -> (usize, Parts) {
         let open = lock(&self.open).pop();
         open.unwrap_or_else(|| {

@@ -1,4 +1,4 @@
-//! Who does the heavy work of a transaction, applying edits to bricks and meshing blocks: the processor, or a CUDA card.
+//! The backends that apply edits to bricks and mesh blocks: the processor, or a CUDA card.
 //!
 //! A [`Terrain`](crate::terrain::Terrain) has an [`Engine`], and whatever that runs on, the world is the same bit by bit.
 //!
@@ -46,7 +46,7 @@ pub enum Backend {
     Cuda,
 }
 
-/// The heavy work of a transaction. All who do it give the same bits, so a transaction need not know whom it asks.
+/// The heavy work of a transaction. All backends give the same bits.
 pub(crate) trait Compute: Send + Sync {
     /// Applies edits; `each` gets what they changed, brick by brick in order of their positions, as one delta or as
     /// several, once or more often; it may take out of them what it wants.

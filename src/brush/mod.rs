@@ -48,7 +48,7 @@
 //! [`Flatten`](Operation::Flatten), [`Level`](Operation::Level), [`Raise`](Operation::Raise), [`Lower`](Operation::Lower),
 //! [`Stamp`](Operation::Stamp) and [`Terrace`](Operation::Terrace) *sculpt*: they change the densities that are there,
 //! with a weight that rises from 0 at the shape's surface to the [`Blend`]'s strength over its falloff, so that nothing
-//! jumps at the rim. On ground that nobody touched a density is the height above the surface, and so all of them do what
+//! jumps at the rim. On pristine ground a density is the height above the surface, and so all of them do what
 //! the same tool does to a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls
 //! and ceilings too. A sample whose density stays as it is is not edited.
 //!

@@ -49,7 +49,7 @@ pub enum Operation {
         /// Its height in voxels.
         height: f32,
     },
-    /// Moves the surface outwards, which is up on ground that nobody dug. Where a dig or an add was, distances are known
+    /// Moves the surface outwards, which is up on pristine ground. Where a dig or an add was, distances are known
     /// to [`DEPTH`] only, and one application moves the surface by about that at most.
     ///
     /// It gives back what a [`Lower`](Self::Lower) of the same brush took, and the other way round. Samples are the same

@@ -11,7 +11,7 @@
 //! fade. Any guess may leave crumbs and holes there, so they ask for more:
 //!
 //! - What was cut off at `DEPTH` is left alone if its neighbours lie deeper. They were moved away, and it was not.
-//! - What lies at `FARTHEST`, or beyond where nobody edited, is left alone even beside the surface, unless that surface is
+//! - Samples at `FARTHEST`, and pristine ones beyond it, are left alone even beside the surface, unless that surface is
 //!   known to be beyond what nature made: of ground that was built or raised, for a raise; of air that was dug or lowered, for
 //!   a lower. So natural ground that was lowered and raised again is never higher than before, however often; and raising on
 //!   fills the pit that is left of it.
@@ -31,7 +31,7 @@ use crate::lattice::ONE;
 /// Where stored densities end, in 1/256 voxel.
 pub(crate) const FARTHEST: i32 = i16::MAX as i32;
 
-/// How far neighbours count as denser or thinner at most, in 1/256 voxel: of the far side of a cliff nobody knows more.
+/// The bound on differences between neighbours, in 1/256 voxel. Densities beyond a cliff are not known better.
 const CONTRAST: i32 = 2 * ONE;
 
 /// By how much sharpening changes a sample at most, in 1/256 voxel.
@@ -117,7 +117,7 @@ impl Stencil {
         known.map(|(other, _)| other * self.own().signum()).min()
     }
 
-    /// The density in the middle, as far as anyone knows; `None` where nobody does.
+    /// The density in the middle; `None` if it is unknown.
     fn middle(&self) -> Option<i32> {
         let own = self.own();
         if !self.is_cut(Self::MIDDLE) {
@@ -140,7 +140,7 @@ impl Stencil {
             return None;
         }
         let own = self.own();
-        // Where nobody edited, densities go on beyond, but no shift of them could be stored.
+        // Pristine densities continue beyond, but their shift could not be stored.
         let middle = if own.abs() >= FARTHEST {
             let is_moved = |index| self.moved >> index & 1 == 1 && !self.is_cut(index);
             let is_reached = by.signum() != own.signum() && self.is_beside(is_moved);
@@ -309,7 +309,7 @@ impl SculptKernel {
     }
 }
 
-/// A part of `whole`, in 1/256, away from zero: who gets a part again and again gets all of it at last.
+/// A part of `whole`, in 1/256, rounded away from zero, so that repeated strokes reach the whole.
 fn part(whole: i64, weight: i32) -> i32 {
     let part = (whole.abs() * i64::from(weight) + i64::from(ONE) - 1) >> 8;
     (part * whole.signum()) as i32

@@ -15,7 +15,7 @@ type Edge = [IVec3; 2];
 const GOLD: LinearRgba = LinearRgba::rgb(1.0, 0.47, 0.01);
 const BLUE: LinearRgba = LinearRgba::rgb(0.05, 0.52, 1.0);
 
-/// The edges around a place, by who draws them.
+/// The edges around a place, of tiles and of chunks.
 pub struct SeamWires {
     tiles: HashSet<Edge>,
     chunks: HashSet<Edge>,

@@ -60,7 +60,7 @@ mod tests {
         app.world_mut().spawn(camera).id()
     }
 
-    /// Who has a primary context in the next frame.
+    /// The camera with the primary context in the next frame.
     fn owners(app: &mut App) -> Vec<Entity> {
         app.update();
         let world = app.world_mut();

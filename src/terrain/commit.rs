@@ -29,7 +29,7 @@ pub struct Commit {
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
     pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
-    /// The world that this changes, unless nobody else holds it.
+    /// The world that this changes, if it is held elsewhere too.
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
     pub meshes: MeshUpdates,

@@ -22,7 +22,7 @@ use crate::volume::{DiggingRules, RulesError};
 /// Bytes that a terrain's history may take unless [`Terrain::set_undo_budget`] says otherwise.
 pub(super) const UNDO_BUDGET: usize = 64 << 20;
 
-/// Answers that nobody takes are kept up to this many; then the oldest are dropped.
+/// The most untaken receipts that are kept; then the oldest are dropped.
 const KEPT_ANSWERS: usize = 1 << 16;
 
 /// Keeps one more answer.
@@ -89,7 +89,7 @@ pub(super) struct InFlight {
 }
 
 impl Terrain {
-    /// A terrain that nobody has edited yet.
+    /// A terrain without edits.
     ///
     /// # Errors
     /// When the chunk size or the voxel size is out of range.

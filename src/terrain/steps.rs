@@ -101,7 +101,7 @@ impl Terrain {
         self.step_receipts.pop_back().unwrap_or_else(|| step.nothing())
     }
 
-    /// What became of steps through history that were submitted, in order; each is handed out once. Where nobody takes them,
+    /// What became of steps through history that were submitted, in order; each is returned once. If they are not taken,
     /// the latest 65,536 are kept.
     pub fn take_history_receipts(&mut self) -> Vec<HistoryReceipt> {
         std::mem::take(&mut self.step_receipts).into()

@@ -142,7 +142,7 @@ impl Terrain {
     }
 
     /// Receipts of brushes that waited when [`apply`](Self::apply) was called, and of those that there was no room for, in
-    /// order; each is handed out once. Where nobody takes them, the latest 65,536 are kept.
+    /// order; each is returned once. If they are not taken, the latest 65,536 are kept.
     pub fn take_answered(&mut self) -> Vec<Receipt> {
         std::mem::take(&mut self.answered).into()
     }

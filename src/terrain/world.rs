@@ -44,7 +44,7 @@ pub struct Memory {
     pub parts: usize,
     /// Mask, fields and where bricks are.
     pub index: usize,
-    /// What can be undone and redone, as far as nobody else holds it. A world has no history; its terrain does.
+    /// Undo history that is not shared with the world. Always 0 for a world, since history belongs to its terrain.
     pub undo: usize,
 }
 
@@ -80,7 +80,7 @@ pub struct World {
     /// Of tiles that bordered on the mask when they were last drawn; some may have none.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
-    /// With so many kinds, the pool is searched for those that nobody else holds.
+    /// With this many kinds, unused ones are removed from the pool.
     many_kinds: usize,
     pub(super) sample_hash: u64,
     pub(super) next_field: u64,

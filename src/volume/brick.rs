@@ -65,7 +65,7 @@ pub(crate) fn solid_layers(heights: &[[i32; 8]; 8], y: i32) -> Layers {
     layers
 }
 
-/// Which samples of a brick are solid while nobody has edited it.
+/// Which samples of a pristine brick are solid.
 pub(crate) fn pristine_layers(ground: &Ground, pos: BrickPos) -> Layers {
     let low = pos.origin();
     solid_layers(&ground.heights::<8>(Column::of(low)), low.y)
@@ -156,7 +156,7 @@ impl Brick {
         self.samples[BrickPos::index(point)]
     }
 
-    /// The material at a lattice point that lies in this brick; [`MaterialId::GROUND`] where nobody changed it.
+    /// The material at a lattice point that lies in this brick; [`MaterialId::GROUND`] if it was never changed.
     pub fn material(&self, point: IVec3) -> MaterialId {
         self.materials.as_ref().map_or(MaterialId::GROUND, |materials| materials[BrickPos::index(point)])
     }

@@ -121,12 +121,12 @@ impl<'a> SampleView<'a> {
         self.distance(point) < 0
     }
 
-    /// The stored material; [`MaterialId::GROUND`] where nobody changed it.
+    /// The stored material; [`MaterialId::GROUND`] if it was never changed.
     pub fn stored_material(&self, point: IVec3) -> MaterialId {
         self.brick(BrickPos::of(point)).map_or(MaterialId::GROUND, |brick| brick.material(point))
     }
 
-    /// The material at a lattice point, the ground's own where nobody changed it.
+    /// The material at a lattice point, the ground's own if it was never changed.
     pub fn material(&self, point: IVec3) -> MaterialId {
         resolve(self.ground, point, self.stored_material(point))
     }

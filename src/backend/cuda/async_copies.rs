@@ -1,10 +1,10 @@
-//! A device whose copies last until they are waited for: whoever looks at memory, or writes to it, before that panics. The
+//! The async-copy check: a device whose copies last until they are waited for. Reading or writing the memory before panics. The
 //! emulator alone is done at once, and would not tell.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, Weak};
 
-use super::device::{Device, DeviceLayer, Fault, HostMemory, Mark};
+use super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use super::lock;
 
 /// A copy that is under way.
@@ -112,14 +112,8 @@ fn start(memory: &dyn HostMemory) -> usize {
     memory.bytes_of(0..0).expect("a place").as_ptr() as usize
 }
 
-impl DeviceLayer for AsyncCopies {
-    fn inner(&self) -> &dyn Device {
-        &*self.own
-    }
-
-    fn inner_mut(&mut self) -> &mut dyn Device {
-        &mut *self.own
-    }
+impl Device for AsyncCopies {
+    forward!(own: name free_memory alloc free copy launch);
 
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
         let (own, copies) = (self.own.alloc_host(bytes)?, Arc::default());
@@ -129,19 +123,14 @@ impl DeviceLayer for AsyncCopies {
         Ok(Box::new(Watched { own, copies }))
     }
 
-    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult {
         // SAFETY: the caller promises the same.
         unsafe { self.own.upload(from, bytes.clone(), to) }?;
         self.begin(start(from), bytes, false);
         Ok(())
     }
 
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault> {
+    unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult {
         // SAFETY: the caller promises the same.
         unsafe { self.own.download(from, to, bytes.clone()) }?;
         self.begin(start(to), bytes, true);

@@ -44,6 +44,9 @@ impl Fault {
     }
 }
 
+/// What a call to a device gives.
+pub(super) type DeviceResult<T = ()> = Result<T, Fault>;
+
 /// A kernel, by its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kernel {
@@ -155,19 +158,14 @@ pub(super) trait Device: Send {
     ///
     /// # Safety
     /// `to` must have room for them in one allocation, and they must not be written before the next [`wait`](Self::wait).
-    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault>;
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult;
 
     /// Copies from an address to some bytes of the host.
     ///
     /// # Safety
     /// `from` must be so many bytes of one allocation. The bytes must be neither read nor written before the next
     /// [`wait`](Self::wait), or before a later [`Mark`] has been waited for.
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault>;
+    unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult;
 
     /// Copies on the device.
     ///
@@ -194,136 +192,43 @@ pub(super) trait Device: Send {
     fn wait(&mut self) -> Result<(), Fault>;
 }
 
-/// A device around another one that changes some of its calls and passes the others on.
-pub(super) trait DeviceLayer: Send {
-    /// The other device.
-    fn inner(&self) -> &dyn Device;
-
-    /// The other device.
-    fn inner_mut(&mut self) -> &mut dyn Device;
-
-    /// See [`Device::alloc`].
-    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-        self.inner_mut().alloc(bytes)
-    }
-
-    /// See [`Device::free`].
-    fn free(&mut self, address: u64) {
-        self.inner_mut().free(address);
-    }
-
-    /// See [`Device::alloc_host`].
-    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
-        self.inner_mut().alloc_host(bytes)
-    }
-
-    /// See [`Device::upload`].
-    ///
-    /// # Safety
-    /// As there.
-    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { self.inner_mut().upload(from, bytes, to) }
-    }
-
-    /// See [`Device::download`].
-    ///
-    /// # Safety
-    /// As there.
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { self.inner_mut().download(from, to, bytes) }
-    }
-
-    /// See [`Device::copy`].
-    ///
-    /// # Safety
-    /// As there.
-    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { self.inner_mut().copy(from, to, bytes) }
-    }
-
-    /// See [`Device::launch`].
-    ///
-    /// # Safety
-    /// As there.
-    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { self.inner_mut().launch(launch) }
-    }
-
-    /// See [`Device::mark`].
-    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
-        self.inner_mut().mark()
-    }
-
-    /// See [`Device::wait`].
-    fn wait(&mut self) -> Result<(), Fault> {
-        self.inner_mut().wait()
-    }
+/// Methods of [`Device`] that pass their calls on to the device in a field, as in `forward!(own: alloc free)`.
+macro_rules! forward {
+    ($own:tt: $($method:ident)*) => { $(forward!(@$method $own);)* };
+    (@name $own:tt) => { fn name(&self) -> String { self.$own.name() } };
+    (@free_memory $own:tt) => { fn free_memory(&mut self) -> usize { self.$own.free_memory() } };
+    (@alloc $own:tt) => { fn alloc(&mut self, bytes: usize) -> DeviceResult<u64> { self.$own.alloc(bytes) } };
+    (@free $own:tt) => { fn free(&mut self, address: u64) { self.$own.free(address); } };
+    (@alloc_host $own:tt) => {
+        fn alloc_host(&mut self, bytes: usize) -> DeviceResult<Box<dyn HostMemory>> { self.$own.alloc_host(bytes) }
+    };
+    (@upload $own:tt) => {
+        unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult {
+            // SAFETY: the caller promises the same.
+            unsafe { self.$own.upload(from, bytes, to) }
+        }
+    };
+    (@download $own:tt) => {
+        unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult {
+            // SAFETY: the caller promises the same.
+            unsafe { self.$own.download(from, to, bytes) }
+        }
+    };
+    (@copy $own:tt) => {
+        unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> DeviceResult {
+            // SAFETY: the caller promises the same.
+            unsafe { self.$own.copy(from, to, bytes) }
+        }
+    };
+    (@launch $own:tt) => {
+        unsafe fn launch(&mut self, launch: Launch<'_>) -> DeviceResult {
+            // SAFETY: the caller promises the same.
+            unsafe { self.$own.launch(launch) }
+        }
+    };
+    (@mark $own:tt) => { fn mark(&mut self) -> DeviceResult<Box<dyn Mark>> { self.$own.mark() } };
+    (@times $own:tt) => { fn times(&mut self) -> [Duration; 2] { self.$own.times() } };
+    (@wait $own:tt) => { fn wait(&mut self) -> DeviceResult { self.$own.wait() } };
 }
 
-impl<L: DeviceLayer> Device for L {
-    fn name(&self) -> String {
-        self.inner().name()
-    }
-
-    fn free_memory(&mut self) -> usize {
-        self.inner_mut().free_memory()
-    }
-
-    fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
-        DeviceLayer::alloc(self, bytes)
-    }
-
-    fn free(&mut self, address: u64) {
-        DeviceLayer::free(self, address);
-    }
-
-    fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
-        DeviceLayer::alloc_host(self, bytes)
-    }
-
-    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { DeviceLayer::upload(self, from, bytes, to) }
-    }
-
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { DeviceLayer::download(self, from, to, bytes) }
-    }
-
-    unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { DeviceLayer::copy(self, from, to, bytes) }
-    }
-
-    unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault> {
-        // SAFETY: the caller promises the same.
-        unsafe { DeviceLayer::launch(self, launch) }
-    }
-
-    fn mark(&mut self) -> Result<Box<dyn Mark>, Fault> {
-        DeviceLayer::mark(self)
-    }
-
-    fn times(&mut self) -> [Duration; 2] {
-        self.inner_mut().times()
-    }
-
-    fn wait(&mut self) -> Result<(), Fault> {
-        DeviceLayer::wait(self)
-    }
-}
+pub(super) use forward;

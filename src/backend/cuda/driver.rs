@@ -14,7 +14,7 @@ use cudarc::driver::{CudaContext, CudaEvent, CudaStream, DriverError, result};
 use rustc_hash::FxHashSet;
 use web_time::Instant;
 
-use super::device::{Device, Fault, HostMemory, Kernel, Launch, Mark};
+use super::device::{Device, DeviceResult, Fault, HostMemory, Kernel, Launch, Mark};
 use super::layout::THREADS;
 use crate::backend::CardChoice;
 
@@ -104,7 +104,7 @@ fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
 }
 
 impl Card {
-    /// Opens a card; of those that nobody chose, the one that is suggested, if CUDA has it.
+    /// Opens a card. If the settings leave the choice open, it is the suggested one, if CUDA has it.
     pub fn open(card: &CardChoice, suggested: Option<&CardChoice>) -> Result<Self, Fault> {
         Self::open_with(card, suggested, PTX)
     }
@@ -255,7 +255,7 @@ impl Mark for Passed {
     }
 }
 
-/// An event. Whoever waits for it sleeps, as it is made for that; without the flag the driver lets threads spin.
+/// An event for which threads sleep. Without the flag the driver lets them spin.
 fn event(context: &Arc<CudaContext>) -> Result<CudaEvent, Fault> {
     context.new_event(Some(sys::CUevent_flags::CU_EVENT_BLOCKING_SYNC)).map_err(failed)
 }
@@ -315,7 +315,7 @@ impl Device for Card {
         Ok(Box::new(pinned))
     }
 
-    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult {
         self.bind()?;
         let Some(bytes) = from.bytes().get(bytes) else {
             return Err(Fault::Failed("copy out of range".into()));
@@ -327,12 +327,7 @@ impl Device for Card {
         unsafe { result::memcpy_htod_async(to, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault> {
+    unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult {
         self.bind()?;
         let Some(bytes) = to.bytes_of_mut(bytes) else {
             return Err(Fault::Failed("copy out of range".into()));

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::device::{Device, Fault, HostMemory, Launch, Mark};
+use super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark};
 
 /// The process; it ends with this.
 pub(super) struct Emulator {
@@ -145,17 +145,12 @@ impl Device for Emulator {
         Ok(Box::new(Plain { words: vec![0; bytes.div_ceil(16)], len: bytes }))
     }
 
-    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult {
         self.ask(&[WRITE, to, bytes.len() as u64])?;
         self.send(&from.bytes()[bytes])
     }
 
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault> {
+    unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult {
         self.ask(&[READ, from, bytes.len() as u64])?;
         let out_of_range = || Fault::Failed("copy out of range".into());
         self.receive(to.bytes_of_mut(bytes).ok_or_else(out_of_range)?)

@@ -57,7 +57,7 @@ pub(super) fn in_pieces<T: Send, R: Send>(
 }
 
 /// Hands out the entries of a short list, side by side where it has several.
-pub(super) fn hand_out<T: Send>(list: Vec<T>, work: impl Fn(T) + Send + Sync) {
+pub(super) fn for_each_parallel<T: Send>(list: Vec<T>, work: impl Fn(T) + Send + Sync) {
     if list.len() < 2 {
         list.into_iter().for_each(work);
     } else {
@@ -84,7 +84,7 @@ mod tests {
         let mut list = [0; 10];
         let found = cut(&mut list, [3, 0, 5].into_iter());
         assert_eq!(found.iter().map(|piece| piece.len()).collect::<Vec<_>>(), [3, 0, 5]);
-        hand_out(found.into_iter().zip(1..).collect(), |(piece, number)| piece.fill(number));
+        for_each_parallel(found.into_iter().zip(1..).collect(), |(piece, number)| piece.fill(number));
         assert_eq!(list, [1, 1, 1, 3, 3, 3, 3, 3, 0, 0]);
     }
 

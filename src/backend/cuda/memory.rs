@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use rustc_hash::FxHashMap;
 
-use super::device::{Device, DeviceLayer, Fault, HostMemory};
+use super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use crate::backend::EngineSettings;
 
 /// Of a device's free memory, the part that is used by default; and the most of it.
@@ -111,14 +112,8 @@ impl HostMemory for Counted {
     }
 }
 
-impl DeviceLayer for Budgeted {
-    fn inner(&self) -> &dyn Device {
-        &*self.own
-    }
-
-    fn inner_mut(&mut self) -> &mut dyn Device {
-        &mut *self.own
-    }
+impl Device for Budgeted {
+    forward!(own: name free_memory upload download copy launch mark times wait);
 
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
         check(&self.usage.device, self.limits[0], bytes)?;

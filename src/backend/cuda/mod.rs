@@ -7,21 +7,21 @@
 //!           vertices, indices    <--what is used-
 //! ```
 //!
-//! Edits that look around, sculpting ones and those that rules bear on, take a kernel of their own, which gets windows of
-//! bricks too. They come run by run, as the processor takes them: what one run changed is on the device already when the
-//! next one reads it. A fault in the middle leaves the runs that came back as they are, and the processor does the rest.
+//! Stencil edits (those that sculpt, and those under rules) take a kernel of their own, which reads windows of neighbouring
+//! bricks. They are launched batch by batch, as on the processor: what one batch changed is on the device when the next one
+//! reads it. After a fault, batches that have come back are kept, and the processor does the rest.
 //!
 //! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
 //! - [`session`](self::session) keeps bricks and heights on it, with a budget; `cache` says where, and which go first.
 //! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
-//!   Surfaces are not unpacked: whoever draws them takes them from where they arrived, by `surfaces`.
+//!   Surfaces are not unpacked but read where they arrived, by `surfaces`.
 //! - `heights` makes new ground of noise.
 //! - `self_test` compares the device with the processor, before anything that it makes is used.
 //! - `memory` keeps to the budgets of the settings.
 //!
-//! Nothing is opened until a stage wants the card; then a thread does that, and ends. A session belongs to one transaction at a time. One that finds it taken by another terrain's does its work on the
-//! processor, so nobody ever waits for the device but the task that uses it. It is held until surfaces are drawn, which lie
-//! in its memory.
+//! The card is opened by a thread of its own when a stage first wants it. A session serves one transaction at a time. A
+//! transaction that finds it in use runs on the processor, so only the task that uses the device ever waits for it. The
+//! session is held until the surfaces, which lie in its memory, are assembled.
 #![allow(unsafe_code)]
 
 mod cache;
@@ -86,7 +86,7 @@ pub(super) struct Cuda {
 
 /// What the thread that opens a device has in common with those that use it.
 struct Shared {
-    /// Only who holds this uses the device. Nothing until it is open, and once it is lost.
+    /// Locked while the device is used. `None` until it is open, and after it is lost.
     session: Mutex<Option<Box<Session>>>,
     /// What became of opening it, to be asked at any time.
     state: Mutex<EngineState>,
@@ -114,7 +114,7 @@ pub(super) struct Attempt<T> {
     has_grown: bool,
 }
 
-/// The same, unless somebody else has it now. Poisoning is ignored, as in `lock`.
+/// Locks a mutex unless it is locked already. Poisoning is ignored, as in `lock`.
 fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
     match mutex.try_lock() {
         Ok(guard) => Some(guard),
@@ -169,7 +169,7 @@ impl Cuda {
                 Ok(session) => {
                     let name = session.name();
                     shared.opening.get_or_init(|| start.elapsed());
-                    // Nobody may lose it before it is said to be there.
+                    // Locked, so that it is not lost before the state says that it is open.
                     let mut place = lock(&shared.session);
                     *place = Some(Box::new(session));
                     *lock(&shared.state) = EngineState::Cuda(name);
@@ -217,7 +217,7 @@ impl Cuda {
     /// the end is lost.
     ///
     /// So the lock is held until `then` is through, which may run other tasks of its thread pool meanwhile, even on this
-    /// thread. That can't block: whoever else wants the session tries the lock and goes on without.
+    /// thread. That can't deadlock: others only try the lock, and go on without the card.
     fn attempt_stage<T, R>(
         &self,
         choice: &mut Choice,
@@ -233,7 +233,7 @@ impl Cuda {
         if !self.is_auto {
             self.open();
         }
-        // Whoever holds it may be busy for long; and a thread that waits here could be the one that has to finish that.
+        // The holder may take long, and this thread could be the one that has to finish its work.
         let Some(mut place) = try_lock(&self.shared.session) else { return attempt };
         let Some(session) = &mut *place else { return attempt };
         let trimmed = guarded(|| session.trim(Instant::now()));
@@ -331,7 +331,7 @@ impl Cuda {
             let Session { meshes, device, .. } = session;
             let surfaces = Surfaces::new(meshes, view, blocks, meshed);
             let drawn = catch_unwind(AssertUnwindSafe(|| then(&surfaces)));
-            // Whoever needed no more than some of them did not wait for all; and who panicked leaves the session to others.
+            // `then` may not have waited for all surfaces, and after a panic the session must stay usable.
             let is_over = surfaces.arrival.is_over();
             let waited = surfaces.arrival.end();
             let ended = if is_over { Ok(()) } else { guarded(|| device.wait()) };
@@ -341,7 +341,7 @@ impl Cuda {
     }
 }
 
-/// Does something with a device, whose driver may do anything: a panic is a fault, and somebody finishes the transaction.
+/// Calls a device. A panic counts as a fault, so that the processor finishes the transaction.
 fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     let failed = |_| Err(Fault::Failed("panic while it was used".into()));
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(failed)

@@ -9,7 +9,7 @@ use super::cache::{RecordCache, reference};
 use super::device::{Device, Fault, Launch};
 use super::edit::output::EditOutput;
 use super::layout::{self, BRICK_BYTES, EditJob, RECORD_BYTES, ScatterJob, ScatterParams, StackRecord};
-use super::lists::{cut, fill, hand_out};
+use super::lists::{cut, fill, for_each_parallel};
 use super::mesh::output::MeshOutput;
 use super::staging::{InputBuffer, Section, StagingLayout};
 use super::windows::{KeptSlabs, Windows};
@@ -143,7 +143,7 @@ impl<'a> Uploads<'a> {
         let groups = self.bricks.chunks(GROUP);
         let lengths = groups.clone().map(|group| group.iter().map(|upload| upload.bytes).sum::<usize>());
         let places = cut(input.entries::<u8>(self.brick_list), lengths);
-        hand_out(groups.zip(places).collect(), |(group, place)| {
+        for_each_parallel(groups.zip(places).collect(), |(group, place)| {
             let before = group.first().map_or(0, |upload| upload.first);
             for Upload { brick, first, bytes, .. } in group {
                 layout::brick_record(brick, &mut place[first - before..][..*bytes]);
@@ -177,7 +177,7 @@ const MANY_STACKS: usize = 64;
 /// How many bricks are looked at to see how many are missing.
 const LOOKS: usize = 128;
 
-/// How long memory stays that is not needed: long enough for a player who pauses, and to pay for allocating it again.
+/// How long unused memory is kept. A player may pause, and allocating it again costs time.
 const KEEP: Duration = Duration::from_secs(30);
 
 /// Of what a device may use, the part for stacks.
@@ -252,7 +252,7 @@ impl Session {
         self.times
     }
 
-    /// Who the device is.
+    /// The name of the device.
     pub fn name(&self) -> String {
         self.device.name()
     }

@@ -68,9 +68,9 @@ impl InputBuffer {
     }
 
     /// Makes room for what was planned. What was in it is gone.
-    pub fn open(&mut self, device: &mut dyn Device, plan: &StagingLayout) -> Result<(), Fault> {
-        self.needed = self.needed.max(plan.0);
-        if plan.0 > self.len { self.replace(device, roomy(plan.0)) } else { Ok(()) }
+    pub fn open(&mut self, device: &mut dyn Device, layout: &StagingLayout) -> Result<(), Fault> {
+        self.needed = self.needed.max(layout.0);
+        if layout.0 > self.len { self.replace(device, roomy(layout.0)) } else { Ok(()) }
     }
 
     /// Where kernels find a section.
@@ -106,9 +106,9 @@ impl InputBuffer {
     }
 
     /// Sends all of it.
-    pub fn send(&self, device: &mut dyn Device, plan: &StagingLayout) -> Result<(), Fault> {
-        // SAFETY: `open` made the device's memory as long as the plan, and callers wait before they open it again.
-        unsafe { device.upload(&*self.host, 0..plan.0, self.device) }
+    pub fn send(&self, device: &mut dyn Device, layout: &StagingLayout) -> Result<(), Fault> {
+        // SAFETY: `open` made the device's memory as long as the layout, and callers wait before they open it again.
+        unsafe { device.upload(&*self.host, 0..layout.0, self.device) }
     }
 }
 

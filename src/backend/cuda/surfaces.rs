@@ -1,4 +1,4 @@
-//! Surfaces of blocks as the mesh kernel wrote them: whoever draws them takes them from where they arrive, with no copy in
+//! Surfaces of blocks as the mesh kernel wrote them. They are read where they arrive, without a copy in
 //! between. They arrive one after the other, in the order of their blocks, while the first ones are drawn already.
 
 use std::ops::Range;

@@ -7,7 +7,7 @@ use glam::IVec3;
 
 use super::device::Fault;
 use super::layout::NONE;
-use super::lists::{cut, hand_out, map_into};
+use super::lists::{cut, for_each_parallel, map_into};
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::window::{Window, shared};
 use crate::volume::{Brick, SampleView};
@@ -59,7 +59,7 @@ struct SlabLists {
     refs: Vec<u32>,
 }
 
-/// Memory of slabs, kept from one launch to the next: who frees what other threads allocated may have to wait for them.
+/// Memory of slabs, kept from one launch to the next, since freeing what other threads allocated may wait for them.
 #[derive(Default)]
 pub(super) struct KeptSlabs(Vec<SlabLists>);
 
@@ -199,7 +199,7 @@ impl<'a> Windows<'a> {
     pub fn write(&self, out: &mut [u32]) {
         let places = cut(out, self.slabs.iter().map(|slab| slab.lists.refs.len()));
         let slabs: Vec<_> = self.slabs.iter().zip(places).collect();
-        hand_out(slabs, |(slab, place)| place.copy_from_slice(&slab.lists.refs));
+        for_each_parallel(slabs, |(slab, place)| place.copy_from_slice(&slab.lists.refs));
     }
 }
 

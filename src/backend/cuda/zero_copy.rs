@@ -6,7 +6,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use super::device::{Device, DeviceLayer, Fault, HostMemory, Kernel, Launch};
+use super::device::{Device, DeviceResult, Fault, HostMemory, Kernel, Launch, Mark, forward};
 use super::lock;
 
 /// Memory of the host, and where its shadow is.
@@ -120,14 +120,8 @@ impl ZeroCopy {
     }
 }
 
-impl DeviceLayer for ZeroCopy {
-    fn inner(&self) -> &dyn Device {
-        &*self.own
-    }
-
-    fn inner_mut(&mut self) -> &mut dyn Device {
-        &mut *self.own
-    }
+impl Device for ZeroCopy {
+    forward!(own: name free_memory alloc free upload copy mark);
 
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault> {
         let shadow = self.own.alloc(bytes)?;
@@ -138,12 +132,7 @@ impl DeviceLayer for ZeroCopy {
         Ok(Box::new(Owned { piece, words, all: Arc::clone(&self.all) }))
     }
 
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: Range<usize>,
-    ) -> Result<(), Fault> {
+    unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult {
         self.land()?;
         // SAFETY: the caller promises the same.
         unsafe { self.own.download(from, to, bytes) }

@@ -29,15 +29,7 @@ impl Shape {
     }
 }
 
-impl<N: Numbers> Capsule<N> {
-    pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Capsule<C::To>, BrushError> {
-        Ok(Capsule {
-            from: to.vector("from", Kind::Point, self.from)?,
-            to: to.vector("to", Kind::Point, self.to)?,
-            radius: to.length("radius", self.radius)?,
-        })
-    }
-}
+convert!(Capsule { from: point, to: point, radius: length });
 
 impl Capsule {
     pub(super) fn extent(&self) -> Extent {

@@ -28,15 +28,7 @@ impl Shape {
     }
 }
 
-impl<N: Numbers> Cone<N> {
-    pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Cone<C::To>, BrushError> {
-        Ok(Cone {
-            base: to.vector("base", Kind::Point, self.base)?,
-            axis: to.vector("axis", Kind::Arrow, self.axis)?,
-            radius: to.length("radius", self.radius)?,
-        })
-    }
-}
+convert!(Cone { base: point, axis: arrow, radius: length });
 
 impl Cone {
     pub(super) fn extent(&self) -> Extent {

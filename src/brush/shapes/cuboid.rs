@@ -32,15 +32,7 @@ impl Shape {
     }
 }
 
-impl<N: Numbers> Cuboid<N> {
-    pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Cuboid<C::To>, BrushError> {
-        Ok(Cuboid {
-            center: to.vector("center", Kind::Point, self.center)?,
-            half: to.vector("half", Kind::Sides, self.half)?,
-            rotation: to.turn("rotation", self.rotation)?,
-        })
-    }
-}
+convert!(Cuboid { center: point, half: sides, rotation: turn });
 
 impl Cuboid {
     pub(super) fn extent(&self) -> Extent {

@@ -28,15 +28,7 @@ impl Shape {
     }
 }
 
-impl<N: Numbers> Cylinder<N> {
-    pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Cylinder<C::To>, BrushError> {
-        Ok(Cylinder {
-            base: to.vector("base", Kind::Point, self.base)?,
-            axis: to.vector("axis", Kind::Arrow, self.axis)?,
-            radius: to.length("radius", self.radius)?,
-        })
-    }
-}
+convert!(Cylinder { base: point, axis: arrow, radius: length });
 
 impl Cylinder {
     pub(super) fn extent(&self) -> Extent {

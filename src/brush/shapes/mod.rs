@@ -4,6 +4,23 @@
 //! write its file (see the shortest, `sphere.rs`), name it in the list below, and give its distance to
 //! `kernels/shapes.cuh`.
 
+/// Converts a shape field by field, as in `convert!(Sphere { center: point, radius: length })`.
+macro_rules! convert {
+    ($shape:ident { $($field:ident: $kind:ident),* }) => {
+        impl<N: Numbers> $shape<N> {
+            pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<$shape<C::To>, BrushError> {
+                Ok($shape { $($field: convert!(@$kind to, stringify!($field), self.$field)?),* })
+            }
+        }
+    };
+    (@point $to:ident, $name:expr, $value:expr) => { $to.vector($name, Kind::Point, $value) };
+    (@arrow $to:ident, $name:expr, $value:expr) => { $to.vector($name, Kind::Arrow, $value) };
+    (@sides $to:ident, $name:expr, $value:expr) => { $to.vector($name, Kind::Sides, $value) };
+    (@turn $to:ident, $name:expr, $value:expr) => { $to.turn($name, $value) };
+    (@direction $to:ident, $name:expr, $value:expr) => { $to.direction($name, $value) };
+    (@length $to:ident, $name:expr, $value:expr) => { $to.length($name, $value) };
+}
+
 mod capsule;
 mod cone;
 mod cuboid;

@@ -25,14 +25,7 @@ impl Shape {
     }
 }
 
-impl<N: Numbers> Sphere<N> {
-    pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Sphere<C::To>, BrushError> {
-        Ok(Sphere {
-            center: to.vector("center", Kind::Point, self.center)?,
-            radius: to.length("radius", self.radius)?,
-        })
-    }
-}
+convert!(Sphere { center: point, radius: length });
 
 impl Sphere {
     pub(super) fn extent(&self) -> Extent {

@@ -30,16 +30,7 @@ impl Shape {
     }
 }
 
-impl<N: Numbers> Torus<N> {
-    pub(super) fn convert<C: Convert<From = N>>(&self, to: &mut C) -> Result<Torus<C::To>, BrushError> {
-        Ok(Torus {
-            center: to.vector("center", Kind::Point, self.center)?,
-            axis: to.direction("axis", self.axis)?,
-            radius: to.length("radius", self.radius)?,
-            tube: to.length("tube", self.tube)?,
-        })
-    }
-}
+convert!(Torus { center: point, axis: direction, radius: length, tube: length });
 
 impl Torus {
     pub(super) fn extent(&self) -> Extent {

@@ -11,7 +11,7 @@ use bevy::render::render_resource::{
 };
 use rayon::prelude::*;
 
-use super::noise::{chance, hash, octaves, solid};
+use super::noise::{chance, octaves, solid};
 use super::palette::{Point, RECIPES, Recipe, Scatter};
 
 /// Texels along a side of the solid noise.
@@ -121,7 +121,7 @@ fn paint(recipe: &Recipe, number: u32, side: u32) -> (Vec<u8>, Vec<u8>) {
         .map(|texel| (recipe.paint)(along(texel % side), along(texel / side)))
         .collect();
     if let Some(scatter) = &recipe.scatter {
-        strew(&mut points, side, scatter, number);
+        scatter_blades(&mut points, side, scatter, number);
     }
     let heights: Vec<f32> = points.iter().map(|point| point.height).collect();
     let low = blurred(&heights, side);
@@ -143,7 +143,7 @@ fn paint(recipe: &Recipe, number: u32, side: u32) -> (Vec<u8>, Vec<u8>) {
 }
 
 /// Lays blades over a layer, the later ones on top; what crosses a border comes in on the other side.
-fn strew(points: &mut [Point], side: u32, scatter: &Scatter, seed: u32) {
+fn scatter_blades(points: &mut [Point], side: u32, scatter: &Scatter, seed: u32) {
     let [length, width] = scatter.size.map(|part| part * side as f32);
     for blade in 0..scatter.count as i32 {
         let dice = |face: u32| chance(blade, face.cast_signed(), seed ^ 0xb1ad);
@@ -187,8 +187,6 @@ fn strew(points: &mut [Point], side: u32, scatter: &Scatter, seed: u32) {
             }
         }
     }
-    // Which numbers a blade has is a matter of its own; this one only keeps seeds apart.
-    debug_assert_ne!(hash(0, 0, 0, seed), hash(1, 0, 0, seed));
 }
 
 /// Heights averaged over a sixteenth of the side, by a box that runs along rows and then along columns.

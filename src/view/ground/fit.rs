@@ -116,14 +116,14 @@ pub(super) fn is_anisotropic(image: &Image) -> bool {
 
 /// Why arrays that can be drawn with are hardly what was meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Misfit {
+pub(super) enum ArrayMismatch {
     #[error("albedo has {albedo} layers, relief {relief}")]
     Unequal { albedo: u32, relief: u32 },
     #[error("they have {layers} layers, the GroundLook of {terrain} names {named}")]
     TooFew { layers: u32, terrain: Entity, named: u32 },
 }
 
-impl Misfit {
+impl ArrayMismatch {
     /// For arrays of so many layers.
     pub(super) fn find<'a>(
         [albedo, relief]: [u32; 2],
@@ -242,10 +242,10 @@ mod tests {
     fn arrays_must_be_alike_and_hold_what_looks_name() {
         let terrain = Entity::PLACEHOLDER;
         let look = GroundLook::default();
-        let find = |counts| Misfit::find(counts, [(terrain, &look)].into_iter());
-        assert_eq!(find([14, 12]), Some(Misfit::Unequal { albedo: 14, relief: 12 }));
+        let find = |counts| ArrayMismatch::find(counts, [(terrain, &look)].into_iter());
+        assert_eq!(find([14, 12]), Some(ArrayMismatch::Unequal { albedo: 14, relief: 12 }));
         // Twelve layers, and two that are seen from above.
-        assert_eq!(find([13, 13]), Some(Misfit::TooFew { layers: 13, terrain, named: 14 }));
+        assert_eq!(find([13, 13]), Some(ArrayMismatch::TooFew { layers: 13, terrain, named: 14 }));
         assert_eq!(find([14, 14]), None);
         assert_eq!(find([20, 20]), None);
     }

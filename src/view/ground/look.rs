@@ -48,7 +48,7 @@ pub struct GroundLayer {
     pub metallic: f32,
     /// Its colours are multiplied by this.
     pub tint: LinearRgba,
-    /// What it does below the surface, where it is the ground's own and nobody built it.
+    /// What it does below the surface, where it is the ground's own material and was not built.
     pub kind: GroundLayerKind,
     /// The layer of the textures that floors and ceilings show instead: for what lies in beds, whose laminae run along
     /// walls and not over floors.

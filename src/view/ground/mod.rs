@@ -57,11 +57,11 @@ impl Plugin for GroundPlugin {
         propagate_to_ground::<MeshMaterial3d<GroundMaterial>>(app);
         keep_materials(app);
         app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
-            .add_systems(Update, textures::load_textures.before(dress).after(BurrowSystems::Begin));
+            .add_systems(Update, textures::load_textures.before(add_materials).after(BurrowSystems::Begin));
     }
 
     fn finish(&self, app: &mut App) {
-        if comes_too_early(app) {
+        if is_before_renderer(app) {
             error!(
                 "no terrain with a GroundLook will be drawn: BurrowPlugins were added before Bevy's PbrPlugin. \
                  Add DefaultPlugins first"
@@ -75,8 +75,11 @@ fn keep_materials(app: &mut App) {
     app.add_systems(
         Update,
         (
-            (dress, undress).chain().after(BurrowSystems::Begin).before(BurrowSystems::Propagate),
-            (remove_inherited::<MeshMaterial3d<GroundMaterial>, GroundPiece>, pieces::dress)
+            (add_materials, remove_materials)
+                .chain()
+                .after(BurrowSystems::Begin)
+                .before(BurrowSystems::Propagate),
+            (remove_inherited::<MeshMaterial3d<GroundMaterial>, GroundPiece>, pieces::add_materials)
                 .chain()
                 .in_set(BurrowSystems::Propagate),
         ),
@@ -93,7 +96,7 @@ fn keep_materials(app: &mut App) {
 struct OwnMaterial(AssetId<GroundMaterial>);
 
 /// Gives each terrain with a look its material as soon as the textures are there, and another one when these change.
-fn dress(
+fn add_materials(
     mut commands: Commands,
     loading: Res<GroundLoading>,
     looks: Query<
@@ -129,13 +132,13 @@ fn dress(
 }
 
 /// Takes the material of a terrain that has lost its look, and has no other one by now.
-fn undress(
+fn remove_materials(
     mut commands: Commands,
     mut removed: RemovedComponents<GroundLook>,
-    dressed: Query<(&MeshMaterial3d<GroundMaterial>, &OwnMaterial), Without<GroundLook>>,
+    with_own: Query<(&MeshMaterial3d<GroundMaterial>, &OwnMaterial), Without<GroundLook>>,
 ) {
     for entity in removed.read() {
-        let Ok((material, own)) = dressed.get(entity) else { continue };
+        let Ok((material, own)) = with_own.get(entity) else { continue };
         let mut terrain = commands.entity(entity);
         terrain.try_remove::<OwnMaterial>();
         if material.0.id() == own.0 {
@@ -160,7 +163,7 @@ fn follow(
 }
 
 /// Was Bevy's renderer for materials added only after the ground?
-fn comes_too_early(app: &App) -> bool {
+fn is_before_renderer(app: &App) -> bool {
     app.is_plugin_added::<PbrPlugin>() && !app.is_plugin_added::<MaterialPlugin<GroundMaterial>>()
 }
 
@@ -187,12 +190,12 @@ mod tests {
 
     #[test]
     fn the_ground_comes_after_the_renderer_or_without_one() {
-        assert!(!comes_too_early(app().add_plugins(GroundPlugin)));
-        assert!(!comes_too_early(app().add_plugins((Renderer, GroundPlugin))));
-        assert!(comes_too_early(app().add_plugins((GroundPlugin, Renderer))));
+        assert!(!is_before_renderer(app().add_plugins(GroundPlugin)));
+        assert!(!is_before_renderer(app().add_plugins((Renderer, GroundPlugin))));
+        assert!(is_before_renderer(app().add_plugins((GroundPlugin, Renderer))));
     }
 
-    fn worn(app: &App, terrain: Entity) -> Option<MeshMaterial3d<GroundMaterial>> {
+    fn material_of(app: &App, terrain: Entity) -> Option<MeshMaterial3d<GroundMaterial>> {
         app.world().get(terrain).cloned()
     }
 
@@ -201,17 +204,17 @@ mod tests {
         let mut app = stage::app();
         let terrain = stage::spawn_terrain(&mut app);
         app.update();
-        let before = worn(&app, terrain);
+        let before = material_of(&app, terrain);
         assert!(before.is_some());
         let other = GroundLook { variety: 0.9, ..default() };
         app.world_mut().entity_mut(terrain).remove::<GroundLook>().insert(other.clone());
         app.update();
-        assert_eq!(worn(&app, terrain), before);
+        assert_eq!(material_of(&app, terrain), before);
         let uniform = GroundUniform::new(&other, &GlobalTransform::IDENTITY);
         assert_eq!(stage::extension(&app, terrain).uniform, uniform);
         app.world_mut().entity_mut(terrain).remove::<GroundLook>();
         app.update();
-        assert_eq!(worn(&app, terrain), None);
+        assert_eq!(material_of(&app, terrain), None);
     }
 
     #[test]
@@ -219,14 +222,14 @@ mod tests {
         let mut app = stage::app();
         let terrain = stage::spawn_terrain(&mut app);
         app.update();
-        let dressed = worn(&app, terrain).expect("it is dressed");
+        let with_own = material_of(&app, terrain).expect("it is with_own");
         let mut materials = app.world_mut().resource_mut::<Assets<GroundMaterial>>();
-        let copy = materials.get(&dressed.0).expect("it is there").clone();
+        let copy = materials.get(&with_own.0).expect("it is there").clone();
         let own = MeshMaterial3d(materials.add(copy));
         app.world_mut().entity_mut(terrain).insert(own.clone());
         app.update();
         app.world_mut().entity_mut(terrain).remove::<GroundLook>();
         app.update();
-        assert_eq!(worn(&app, terrain), Some(own));
+        assert_eq!(material_of(&app, terrain), Some(own));
     }
 }

@@ -13,7 +13,7 @@ fn of_piece(terrain: &GroundExtension, piece: &GroundPiece) -> GroundExtension {
 }
 
 /// Gives each new piece its material.
-pub(super) fn dress(
+pub(super) fn add_materials(
     mut commands: Commands,
     bare: Query<(Entity, &GroundPiece), Without<MeshMaterial3d<GroundMaterial>>>,
     terrains: Query<&MeshMaterial3d<GroundMaterial>, With<Terrain>>,

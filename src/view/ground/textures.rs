@@ -8,7 +8,7 @@ use bevy::render::render_resource::WgpuFeatures;
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 
 use super::bake::{Baked, Meter, bake};
-use super::fit::{GroundTexturesError, Misfit, is_anisotropic, layers};
+use super::fit::{ArrayMismatch, GroundTexturesError, is_anisotropic, layers};
 use super::look::GroundLook;
 use crate::plugin::{ThreadTask, Threads};
 
@@ -61,13 +61,13 @@ pub struct GroundLoading {
     pub(super) ready: Option<Textures>,
     /// Are those the ones that were wanted last?
     is_current: bool,
-    /// Were images there that can be drawn with when somebody last looked?
+    /// Whether usable images were there at the last check.
     was_sound: bool,
     /// Why there were none.
     failure: Option<GroundTexturesError>,
     /// What was odd about them.
-    misfit: Option<Misfit>,
-    /// What those who watch for changes know.
+    misfit: Option<ArrayMismatch>,
+    /// The state that change detection last reported.
     told: Answers,
 }
 
@@ -161,7 +161,7 @@ impl GroundLoading {
     }
 }
 
-/// Bakes or fetches what the settings say, once somebody looks.
+/// Bakes or fetches the textures of the settings once there is a look.
 pub(super) fn load_textures(
     mut loading: ResMut<GroundLoading>,
     settings: Res<GroundTextures>,
@@ -174,7 +174,7 @@ pub(super) fn load_textures(
     let renderer = Renderer::new(device.as_deref(), adapter.as_deref());
     let unseen = loading.bypass_change_detection();
     unseen.proceed(&settings, &looks, &mut images, server.as_deref(), renderer);
-    // Whoever watches it for changes is told of what can be asked.
+    // Marked as changed only if an answer of its methods changes.
     let answers = loading.answers();
     if loading.told != answers {
         loading.told = answers;
@@ -233,7 +233,7 @@ impl GroundLoading {
                     return;
                 }
                 self.is_current = true;
-                let misfit = Misfit::find([albedo, relief], looks.iter());
+                let misfit = ArrayMismatch::find([albedo, relief], looks.iter());
                 if let Some(misfit) = misfit
                     && self.misfit != Some(misfit)
                 {
@@ -378,7 +378,7 @@ mod tests {
             Some(TextureViewDescriptor { dimension: Some(dimension), ..default() });
     }
 
-    fn wears(app: &App, albedo: &Handle<Image>) -> bool {
+    fn uses(app: &App, albedo: &Handle<Image>) -> bool {
         loading(app).ready.as_ref().is_some_and(|ready| ready.albedo == *albedo)
     }
 
@@ -390,7 +390,7 @@ mod tests {
         update_until(&mut app, "a failure", |loading| loading.failure().is_some());
         assert!(matches!(loading(&app).failure(), Some(NoArray { image: "albedo", .. })));
         assert!(!loading(&app).is_ready() && loading(&app).progress() < 1.0);
-        assert!(loading(&app).ready.is_some() && !wears(&app, &albedo), "coarse ground is better than none");
+        assert!(loading(&app).ready.is_some() && !uses(&app, &albedo), "coarse ground is better than none");
 
         see(&mut app, &albedo, TextureViewDimension::D2Array);
         app.update();
@@ -398,16 +398,16 @@ mod tests {
         see(&mut app, &relief, TextureViewDimension::D2Array);
         app.update();
         assert!(
-            loading(&app).failure().is_none() && !wears(&app, &albedo),
+            loading(&app).failure().is_none() && !uses(&app, &albedo),
             "the renderer has them a frame later"
         );
         app.update();
-        assert!(loading(&app).is_ready() && wears(&app, &albedo));
+        assert!(loading(&app).is_ready() && uses(&app, &albedo));
 
         // Loaded anew, say.
         see(&mut app, &relief, TextureViewDimension::D2);
         app.update();
-        assert!(loading(&app).failure().is_some() && !loading(&app).is_ready() && !wears(&app, &albedo));
+        assert!(loading(&app).failure().is_some() && !loading(&app).is_ready() && !uses(&app, &albedo));
     }
 
     #[test]
@@ -432,7 +432,7 @@ mod tests {
     }
 
     /// Two images that can be drawn with, worn.
-    fn wear_own(app: &mut App) -> [Handle<Image>; 2] {
+    fn use_own(app: &mut App) -> [Handle<Image>; 2] {
         let own = [(); 2].map(|()| add(app, Image::default()));
         own.iter().for_each(|image| see(app, image, TextureViewDimension::D2Array));
         let [albedo, relief] = own.clone();
@@ -444,8 +444,8 @@ mod tests {
     #[test]
     fn an_image_that_is_taken_away_is_not_ready_until_it_is_back() {
         let mut app = app();
-        let [albedo, relief] = wear_own(&mut app);
-        assert!(wears(&app, &albedo));
+        let [albedo, relief] = use_own(&mut app);
+        assert!(uses(&app, &albedo));
         let mut images = app.world_mut().resource_mut::<Assets<Image>>();
         let image = images.remove(&relief).expect("it is there");
         app.update();
@@ -456,7 +456,7 @@ mod tests {
         app.update();
         assert!(!loading(&app).is_ready(), "the renderer has it a frame later");
         app.update();
-        assert!(loading(&app).is_ready() && wears(&app, &albedo));
+        assert!(loading(&app).is_ready() && uses(&app, &albedo));
     }
 
     /// How often somebody who watches was told of a change.

@@ -1,6 +1,6 @@
 //! Edits on the device: one launch for all bricks that they may reach.
 //!
-//! Those that look around take another kernel, which knows the bricks around too: see [`stencil`](self::stencil).
+//! Batches with stencil edits take another kernel, which reads neighbouring bricks too: see [`stencil`](self::stencil).
 //! [`jobs`](self::jobs) lists what there is to do, and [`output`](self::output) makes deltas of what came back.
 
 mod jobs;
@@ -39,7 +39,7 @@ const PASSES: usize = 12;
 impl Session {
     /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
     pub fn edit(&mut self, work: &PreparedEdits) -> Result<EditDelta, Fault> {
-        // Edits that look around enter twice as many counts.
+        // Stencil edits write twice as many counts.
         let most = if work.looks_around() { MOST_LIST / 2 } else { MOST_LIST };
         if work.jobs().len() > most {
             return Err(Fault::TooLarge(work.jobs().len()));
@@ -94,7 +94,7 @@ impl Session {
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
     ) -> Result<Option<EditDelta>, Fault> {
-        // Who looks around finds bricks among those around.
+        // Stencil edits find their bricks in the windows.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
         let mut care = look.map(|look| self.care(work, look, jobs, uploads)).transpose()?;
         let mut plan = StagingLayout::default();

@@ -111,7 +111,7 @@ impl EditOutput {
             self.counts.entries::<EditCount>(counts).iter().take_while(|count| count.edit != NONE).count();
         self.parts.wrote(parts);
         self.counts.wrote(counts);
-        // A list that is full may have been too short; nobody knows by how much.
+        // A list that is full may have been too short, by an unknown number of entries.
         let wanted = |count: usize, list: &OutputList| match list.capacity() as usize {
             full if full == count => 2 * count,
             _ => count,

@@ -1,4 +1,4 @@
-//! Edits that look around, sculpting ones and those that rules bear on: what they need besides.
+//! Input of the stencil-edit kernel beside that of the edit kernel.
 
 use rustc_hash::FxHashMap;
 
@@ -31,8 +31,8 @@ impl Look {
     }
 }
 
-/// What edits that look around need besides: the bricks around, numbers, images, rules.
-pub(super) struct Care<'a> {
+/// What stencil edits need besides: windows of bricks, sculpting parameters, images, rules.
+pub(super) struct StencilEditor<'a> {
     look: Look,
     /// The last columns of the world along x and z.
     last: [i32; 2],
@@ -47,7 +47,7 @@ pub(super) struct Care<'a> {
     rule_list: Section,
 }
 
-impl<'a> Care<'a> {
+impl<'a> StencilEditor<'a> {
     fn new(work: &PreparedEdits<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
         let mut images = Images::default();
         let sculpt = |record| layout::sculpt(record, |image| images.first(image));
@@ -109,7 +109,7 @@ impl<'a> Care<'a> {
 /// Most samples of the images of one launch, 32 MiB of them: 256 stamps of the largest kind that are all different.
 const MOST_SAMPLES: usize = 1 << 24;
 
-/// Samples of images, one after the other; equal ones once, whoever they belong to.
+/// Samples of images, one after the other; equal images are stored once.
 #[derive(Default)]
 struct Images<'a> {
     samples: Vec<u16>,
@@ -149,7 +149,7 @@ impl Session {
         look: Look,
         jobs: &mut [EditJob],
         uploads: &mut Uploads<'a>,
-    ) -> Result<Care<'a>, Fault> {
+    ) -> Result<StencilEditor<'a>, Fault> {
         let mut windows = windows(&self.bricks, work.base, jobs, EditJob::pos, look.bricks(), &mut self.kept);
         self.complete(uploads, &mut windows)?;
         in_pieces(jobs, LONG, |first, jobs| {
@@ -159,7 +159,7 @@ impl Session {
                 job.base = windows.reference(number);
             }
         });
-        Care::new(work, windows, look)
+        StencilEditor::new(work, windows, look)
     }
 }
 

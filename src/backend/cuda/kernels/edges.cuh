@@ -60,10 +60,10 @@ __device__ inline i32 rise_at(Marked before, Marked own, Marked after, i32 at, i
     return at == 0 || at == last ? 2 * inner : inner;
 }
 
-__device__ inline Crossing crossing_on(const Site& site, const Marked* apron, const Edge& edge) {
+__device__ inline Crossing crossing_on(const Site& site, const Marked* padding, const Edge& edge) {
     const i32 STRIDES[3] = {1, AREA, WINDOW};
     const i32 AT[3] = {site.low[0] + edge.x, 0, site.low[2] + edge.z}, LAST[3] = {site.params.width, 0, site.params.depth};
-    const Marked* p = apron + (edge.y + 1) * AREA + edge.window;
+    const Marked* p = padding + (edge.y + 1) * AREA + edge.window;
     const Marked* q = p + (edge.axis == 0 ? 1 : edge.axis == 1 ? AREA : WINDOW);
     Crossing crossing;
     crossing.is_lower_solid = *p < 0;

@@ -189,13 +189,13 @@ __device__ inline void take(const Brick* base, bool has_materials, Brick& brick)
     }
 }
 
-// Takes the brick to the bench. For the whole block.
-__device__ inline void begin(EditMemory& bench, const Brick* base, bool had_materials) {
-    take(base, had_materials, bench.brick);
-    for (i32 i = threadIdx.x; i < 256; i += THREADS) bench.effect.counts[i] = 0;
+// Takes the brick to the shared. For the whole block.
+__device__ inline void begin(EditMemory& shared, const Brick* base, bool had_materials) {
+    take(base, had_materials, shared.brick);
+    for (i32 i = threadIdx.x; i < 256; i += THREADS) shared.effect.counts[i] = 0;
     if (threadIdx.x == 0) {
-        bench.hash = 0;
-        bench.flags = 0;
+        shared.hash = 0;
+        shared.flags = 0;
     }
 }
 
@@ -232,9 +232,9 @@ __device__ inline u32 open_samples(const EditRecord& record, const OwnColumn& co
 // Applies one edit to the thread's open samples; returns which of them changed, a bit for each. `has_materials` is set
 // where a material was stored.
 __device__ inline u32 apply(
-    const EditRecord& record, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& bench, bool& has_materials
+    const EditRecord& record, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& shared, bool& has_materials
 ) {
-    Brick& brick = bench.brick;
+    Brick& brick = shared.brick;
     Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
     u32 changed = 0;
     // Not unrolled: the code is long, and other warps are there to wait for.
@@ -246,7 +246,7 @@ __device__ inline u32 apply(
         if (open >> k & 1) {
             i32 offset[3] = {column.x, y, column.z};
             float distance = smooth_distance(record, from_origin(record, column.low, offset));
-            if (record.is_rough) distance += bumps(record, noise, bench.noise, along_x, along_y, along_z);
+            if (record.is_rough) distance += bumps(record, noise, shared.noise, along_x, along_y, along_z);
             i32 outside = round_distance(distance), pristine = pristine_distance(column, k);
             i16& sample = brick.samples[index];
             u8& material = brick.materials[index];
@@ -255,8 +255,8 @@ __device__ inline u32 apply(
             has_materials |= material != GROUND;
         }
         changed |= (u32)outcome.is_changed << k;
-        store_bits(bench.effect.changed, k, outcome.is_changed);
-        count_voxels(bench.effect.counts, outcome.counted);
+        store_bits(shared.effect.changed, k, outcome.is_changed);
+        count_voxels(shared.effect.counts, outcome.counted);
     }
     return changed;
 }
@@ -288,10 +288,10 @@ __device__ inline u64 hash_change(
 
 // Derives the bits of the brick and of what changed, and adds up what all threads know of it.
 __device__ inline void sum_up(
-    EditMemory& bench, const OwnColumn& column, const Brick* base, bool had_materials, bool has_materials,
+    EditMemory& shared, const OwnColumn& column, const Brick* base, bool had_materials, bool has_materials,
     u32 changed
 ) {
-    Brick& brick = bench.brick;
+    Brick& brick = shared.brick;
     bool is_uniform = true, is_extended = false;
 #pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
@@ -299,7 +299,7 @@ __device__ inline void sum_up(
         bool is_edited = sample != PRISTINE, is_changed = changed >> k & 1;
         store_bits(brick.solid, k, (is_edited ? sample : pristine_distance(column, k)) < 0);
         store_bits(brick.edited, k, is_edited);
-        store_bits(bench.changed, k, is_changed);
+        store_bits(shared.changed, k, is_changed);
         is_uniform &= is_edited && sample == brick.samples[0] && brick.materials[index] == brick.materials[0];
         is_extended |= is_changed && (base == nullptr || base->samples[index] == PRISTINE);
     }
@@ -310,57 +310,57 @@ __device__ inline void sum_up(
     flags |= __any_sync(WARP, is_extended) ? EXTENDED : 0;
     flags |= __any_sync(WARP, has_materials) ? HAS_MATERIALS : 0;
     if (lane() == 0) {
-        atomicAdd(&bench.hash, hash);
-        atomicOr(&bench.flags, flags);
+        atomicAdd(&shared.hash, hash);
+        atomicOr(&shared.flags, flags);
     }
 }
 
-__device__ inline bool is_uniform(const EditMemory& bench) { return !(bench.flags & NOT_UNIFORM); }
+__device__ inline bool is_uniform(const EditMemory& shared) { return !(shared.flags & NOT_UNIFORM); }
 
 // Reserves room for the brick. For one thread.
-__device__ inline void reserve(const EditParams& params, EditMemory& bench) {
-    bench.record = bench.material = NONE;
-    if (is_uniform(bench)) return;
+__device__ inline void reserve(const EditParams& params, EditMemory& shared) {
+    shared.record = shared.material = NONE;
+    if (is_uniform(shared)) return;
     // Records and materials at once.
-    bool has_materials = bench.flags & HAS_MATERIALS;
+    bool has_materials = shared.flags & HAS_MATERIALS;
     u64 first = atomicAdd((u64*)params.counters, 1 | (u64)has_materials << 32);
     u32 record = (u32)first, material = (u32)(first >> 32);
-    if (record < params.record_capacity) bench.record = record;
-    if (has_materials && material < params.material_capacity) bench.material = material;
+    if (record < params.record_capacity) shared.record = record;
+    if (has_materials && material < params.material_capacity) shared.material = material;
 }
 
-__device__ inline EditResult result_of(const EditMemory& bench) {
-    u32 flags = CHANGED | (bench.flags & (EXTENDED | HAS_MATERIALS | TOO_FAR)), uniform = 0;
-    if (is_uniform(bench)) {
+__device__ inline EditResult result_of(const EditMemory& shared) {
+    u32 flags = CHANGED | (shared.flags & (EXTENDED | HAS_MATERIALS | TOO_FAR)), uniform = 0;
+    if (is_uniform(shared)) {
         flags |= UNIFORM;
-        uniform = (u16)bench.brick.samples[0] | (u32)bench.brick.materials[0] << 16;
+        uniform = (u16)shared.brick.samples[0] | (u32)shared.brick.materials[0] << 16;
     }
-    return {bench.hash, flags, bench.record, bench.material, bench.bounds, uniform, 0};
+    return {shared.hash, flags, shared.record, shared.material, shared.bounds, uniform, 0};
 }
 
 // Writes the brick to its slot, and to the entries that were reserved for it.
-__device__ inline void store(const EditParams& params, const EditMemory& bench, Brick* target) {
+__device__ inline void store(const EditParams& params, const EditMemory& shared, Brick* target) {
     const u32 MATERIALS = LEN / sizeof(uint4), RECORD = sizeof(Brick) / sizeof(uint4) - MATERIALS;
     u32 piece = threadIdx.x;
     if (piece >= RECORD + MATERIALS) return;
     bool is_record = piece < RECORD;
-    if (!is_record && !(bench.flags & HAS_MATERIALS)) return;
-    uint4 data = ((const uint4*)&bench.brick)[piece];
+    if (!is_record && !(shared.flags & HAS_MATERIALS)) return;
+    uint4 data = ((const uint4*)&shared.brick)[piece];
     ((uint4*)target)[piece] = data;
-    u64 entry = is_record ? bench.record : bench.material;
+    u64 entry = is_record ? shared.record : shared.material;
     if (entry == NONE) return;
     uint4* entries = is_record ? params.records + entry * RECORD : params.materials + entry * MATERIALS;
     entries[is_record ? piece : piece - RECORD] = data;
 }
 
-// Where no edit looks around.
-struct NoCare {
+// For jobs without stencil edits.
+struct PlainEditor {
     static constexpr bool LOOKS = false;
 };
 
-// Applies the edits of the block's job. `Care` knows how those are applied that look around.
-template <typename Care>
-__device__ inline void edit_brick(const EditParams& params, EditMemory& bench, Care& care) {
+// Applies the edits of the block's job. `StencilEditor` applies stencil edits.
+template <typename StencilEditor>
+__device__ inline void edit_brick(const EditParams& params, EditMemory& shared, StencilEditor& care) {
     const EditJob job = params.jobs[blockIdx.x];
     const Brick* base = job.base == NONE ? nullptr : &params.bricks[job.base >> 1];
     const bool had_materials = base != nullptr && job.base & 1;
@@ -384,20 +384,20 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& bench, C
         for (; reaching != 0; reaching &= reaching - 1) {
             u32 edit = __shfl_sync(WARP, number, __ffs(reaching) - 1);
             const EditRecord& record = params.edit_records[edit];
-            if (!is_taken) begin(bench, base, had_materials);
+            if (!is_taken) begin(shared, base, had_materials);
             is_taken = true;
             bool looks_around = false;
-            if constexpr (Care::LOOKS) looks_around = care.begin(job, stack, edit);
-            u32 open = open_samples(record, column, bench.brick, looks_around);
+            if constexpr (StencilEditor::LOOKS) looks_around = care.begin(job, stack, edit);
+            u32 open = open_samples(record, column, shared.brick, looks_around);
             if (!__syncthreads_or(open != 0)) continue;
             Noise noise = {{0, 0.0f}, 0, 0};
             if (record.is_rough) {
-                noise = hash_noise(record, column.low, bench.noise);
+                noise = hash_noise(record, column.low, shared.noise);
                 __syncthreads();
             }
-            if constexpr (Care::LOOKS) {
+            if constexpr (StencilEditor::LOOKS) {
                 if (looks_around) {
-                    u32 own = care.apply(edit, column, open, noise, bench, has_materials);
+                    u32 own = care.apply(edit, column, open, noise, shared, has_materials);
                     changed |= own;
                     bool has_changed = __syncthreads_or(own != 0);
                     is_changed |= has_changed;
@@ -405,34 +405,34 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& bench, C
                     continue;
                 }
             }
-            u32 own = apply(record, column, open, noise, bench, has_materials);
+            u32 own = apply(record, column, open, noise, shared, has_materials);
             changed |= own;
             if (!__syncthreads_or(own != 0)) continue;
             is_changed = true;
             // Nobody begins with the next edit before these two warps are done.
-            if (warp() == 0) enter_parts(params, job.cuts, edit, bench.effect.changed);
-            if (warp() == 1) enter_counts(params, edit, record.operation, bench.effect.counts);
+            if (warp() == 0) enter_parts(params, job.cuts, edit, shared.effect.changed);
+            if (warp() == 1) enter_counts(params, edit, record.operation, shared.effect.counts);
         }
     }
     bool is_too_far = false;
-    if constexpr (Care::LOOKS) is_too_far = __syncthreads_or(care.is_too_far);
+    if constexpr (StencilEditor::LOOKS) is_too_far = __syncthreads_or(care.is_too_far);
     if (!is_changed) {
         u32 flags = is_too_far ? (u32)TOO_FAR : 0;
         if (threadIdx.x == 0) params.results[blockIdx.x] = {0, flags, NONE, NONE, 0, 0, 0};
         return;
     }
-    sum_up(bench, column, base, had_materials, has_materials, changed);
-    if (is_too_far && threadIdx.x == 0) atomicOr(&bench.flags, TOO_FAR);
+    sum_up(shared, column, base, had_materials, has_materials, changed);
+    if (is_too_far && threadIdx.x == 0) atomicOr(&shared.flags, TOO_FAR);
     __syncthreads();
-    if (threadIdx.x == 0) reserve(params, bench);
-    if (warp() == 1 && lane() == 0) bench.bounds = bounds_of(bench.changed, ~0ull, 0, SIDE);
+    if (threadIdx.x == 0) reserve(params, shared);
+    if (warp() == 1 && lane() == 0) shared.bounds = bounds_of(shared.changed, ~0ull, 0, SIDE);
     __syncthreads();
-    store(params, bench, &params.bricks[job.target]);
-    if (threadIdx.x == THREADS - 1) params.results[blockIdx.x] = result_of(bench);
+    store(params, shared, &params.bricks[job.target]);
+    if (threadIdx.x == THREADS - 1) params.results[blockIdx.x] = result_of(shared);
 }
 
 extern "C" __global__ void __launch_bounds__(THREADS) edit(EditParams params) {
-    __shared__ EditMemory bench;
-    NoCare none;
-    edit_brick(params, bench, none);
+    __shared__ EditMemory shared;
+    PlainEditor none;
+    edit_brick(params, shared, none);
 }

@@ -15,7 +15,7 @@ constexpr u32 WARP = 0xffffffff;
 // Samples of a brick, and along one side of it.
 constexpr i32 LEN = 512;
 constexpr i32 SIDE = 8;
-// Columns along a side of the window around a stack of bricks: one before it, two after. Also samples of an apron.
+// Columns along a side of the window around a stack of bricks: one before it, two after. Also padded samples.
 constexpr i32 WINDOW = 11;
 constexpr i32 AREA = WINDOW * WINDOW;
 // Corners of 8x8 cells.
@@ -66,7 +66,7 @@ struct EditJob {
     u32 base, target, stack;
     u32 first, count;
     u32 cuts;
-    // Where edits look around: its entry in `windows`; to the next along x | along z << 16, along y it is 1.
+    // For stencil edits: its entry in `windows`; to the next along x | along z << 16, along y it is 1.
     u32 window, strides;
     u32 pad;
 };

@@ -34,7 +34,7 @@ __device__ inline u32 column_above(const Brick& brick, u32 row, u32 x) {
 // Fills the columns of corners, and the signs. One warp has the 64 corners in the brick, two for each lane: a lane brings a
 // layer's half of the bits; turned around, these are what is above its corners. Another has the 17 corners in the bricks
 // beside it. For the first two warps.
-__device__ inline void gather_columns(const Site& site, MeshMemory& bench) {
+__device__ inline void gather_columns(const Site& site, MeshMemory& shared) {
     const Brick* bricks = site.params.bricks;
     bool is_inner = warp() == 0, is_side = lane() < SIDE || lane() == 2 * SIDE, has_solid = false, has_air = false;
     u32 x = is_inner ? lane() % SIDE : is_side ? SIDE : lane() - SIDE;
@@ -73,14 +73,14 @@ __device__ inline void gather_columns(const Site& site, MeshMemory& bench) {
             u32 pristine = (1u << filled) - 1;
             if (own == NONE) column |= pristine & 0xff;
             if (above == NONE) column |= pristine & 0x100;
-            bench.bits.columns[MARGIN + rows[i] * 9 + x] = column;
+            shared.bits.columns[MARGIN + rows[i] * 9 + x] = column;
             has_solid |= (column & 0x1ff) != 0;
             has_air |= (column & 0x1ff) != 0x1ff;
         }
     }
     has_solid = __any_sync(WARP, has_solid);
     has_air = __any_sync(WARP, has_air);
-    if (lane() == 0) bench.signs[warp()] = has_solid | has_air << 1;
+    if (lane() == 0) shared.signs[warp()] = has_solid | has_air << 1;
 }
 
 // The cubes to draw over the cell of a corner, a bit for each layer: those that both signs meet in, and that have an
@@ -133,7 +133,7 @@ __device__ inline void read_samples(const Site& site, u32 ref, u32 at, i32* samp
     for (i32 i = 0; i < COUNT; i++) samples[i] = ref != NONE ? found[i * 64] : PRISTINE;
 }
 
-// Where a thread's column of the apron lies: the bricks below, own and above; the place in their layers.
+// Where a thread's column of the padding lies: the bricks below, own and above; the place in their layers.
 struct ApronPlace {
     u32 refs[3], at;
 };
@@ -145,15 +145,15 @@ __device__ inline ApronPlace apron_place(const Site& site) {
     return {{window[-1], window[0], window[1]}, z % SIDE * SIDE + x % SIDE};
 }
 
-// A column of the apron, and its height.
-struct ApronColumn {
+// A column of the padding, and its height.
+struct PaddedColumn {
     i32 samples[WINDOW], height;
 };
 
 // Reads the column of a thread; its layer 0 is the last of the brick below. Layers of cubes tell whether samples of the bricks
 // below and above are looked at.
-__device__ inline ApronColumn read_column(const Site& site, const ApronPlace& place, u32 layers) {
-    ApronColumn column;
+__device__ inline PaddedColumn read_column(const Site& site, const ApronPlace& place, u32 layers) {
+    PaddedColumn column;
     column.height = site.stack.heights[smallest(threadIdx.x, AREA - 1)];
     read_samples<0, 8>(site, place.refs[1], place.at, column.samples + 1);
     read_samples<7, 1>(site, layers & 1 ? place.refs[0] : NONE, place.at, column.samples);
@@ -162,68 +162,68 @@ __device__ inline ApronColumn read_column(const Site& site, const ApronPlace& pl
 }
 
 // Puts it in its place.
-__device__ inline void put_column(const Site& site, MeshMemory& bench, const ApronColumn& column) {
+__device__ inline void put_column(const Site& site, MeshMemory& shared, const PaddedColumn& column) {
     u32 t = threadIdx.x;
     if (t >= AREA) return;
-    bench.heights[t] = column.height;
+    shared.heights[t] = column.height;
     // Twice the density where the ground tells.
     u32 pristine = ((u32)(site.low[1] - 1) * ONE - (u32)column.height) * 2;
 #pragma unroll
     for (i32 layer = 0; layer < WINDOW; layer++) {
         i32 sample = column.samples[layer];
-        bench.apron[layer * AREA + t] = sample == PRISTINE ? (i32)(pristine + layer * ONE * 2) : sample * 2 + 1;
+        shared.padding[layer * AREA + t] = sample == PRISTINE ? (i32)(pristine + layer * ONE * 2) : sample * 2 + 1;
     }
 }
 
 // Numbers the edges of each level from a warp's corners. For one warp.
-__device__ inline void number_edges(MeshMemory& bench) {
+__device__ inline void number_edges(MeshMemory& shared) {
     u32 own = 0, before = 0;
     if (lane() < LEVELS) {
 #pragma unroll
         for (u32 i = 0; i < CORNER_WARPS; i++) {
-            u32 count = __popc(bench.bits.runs[lane()][i].crossed);
+            u32 count = __popc(shared.bits.runs[lane()][i].crossed);
             if (i < warp()) before += count;
             own += count;
         }
     }
     u32 end = running_sum(own);
-    if (lane() < LEVELS) bench.bits.runs[lane()][warp()].first = end - own + before;
+    if (lane() < LEVELS) shared.bits.runs[lane()][warp()].first = end - own + before;
     __syncwarp();
 }
 
 // Lists the edges from the corner of a thread, a bit for each level.
-__device__ inline void list_edges(MeshMemory& bench, u32 edges) {
+__device__ inline void list_edges(MeshMemory& shared, u32 edges) {
     for (u32 rest = edges; rest != 0; rest &= rest - 1) {
         i32 level = __ffs(rest) - 1;
-        Run run = bench.bits.runs[level][warp()];
+        Run run = shared.bits.runs[level][warp()];
         u32 number = run.first + __popc(run.crossed & lanes_before()), place = level * CORNERS + threadIdx.x;
-        bench.edges[number] = (u16)place;
-        bench.numbers[place] = (u16)number;
+        shared.edges[number] = (u16)place;
+        shared.numbers[place] = (u16)number;
     }
 }
 
 // Counts the edges of all levels. For one warp.
-__device__ inline u32 count_edges(const MeshMemory& bench) {
+__device__ inline u32 count_edges(const MeshMemory& shared) {
     u32 edges = 0;
     if (lane() < LEVELS) {
 #pragma unroll
-        for (u32 i = 0; i < CORNER_WARPS; i++) edges += __popc(bench.bits.runs[lane()][i].crossed);
+        for (u32 i = 0; i < CORNER_WARPS; i++) edges += __popc(shared.bits.runs[lane()][i].crossed);
     }
     return sum_of_warp(edges);
 }
 
 // Lists the cubes to draw, layer by layer. For one warp.
-__device__ inline void list_cubes(const MeshParams& params, MeshMemory& bench) {
+__device__ inline void list_cubes(const MeshParams& params, MeshMemory& shared) {
     // The lower half of a layer's cells, and the upper half.
     u32 corner = lane() / SIDE * 9 + lane() % SIDE, cubes = 0, indices = 0;
-    u32 drawn = bench.bits.drawn[MARGIN + corner] | bench.bits.drawn[MARGIN + corner + 4 * 9] << SIDE;
-    for (u32 rest = bench.layers; rest != 0; rest &= rest - 1) {
+    u32 drawn = shared.bits.drawn[MARGIN + corner] | shared.bits.drawn[MARGIN + corner + 4 * 9] << SIDE;
+    for (u32 rest = shared.layers; rest != 0; rest &= rest - 1) {
         u32 y = __ffs(rest) - 1;
 #pragma unroll
         for (u32 half = 0; half < 2; half++) {
             bool is_drawn = drawn >> (y + half * SIDE) & 1;
             u32 word = __ballot_sync(WARP, is_drawn);
-            if (is_drawn) bench.cubes[cubes + __popc(word & lanes_before())] = y * CORNERS + corner + half * 4 * 9;
+            if (is_drawn) shared.cubes[cubes + __popc(word & lanes_before())] = y * CORNERS + corner + half * 4 * 9;
             cubes += __popc(word);
         }
     }
@@ -231,32 +231,32 @@ __device__ inline void list_cubes(const MeshParams& params, MeshMemory& bench) {
     // Their cases, and how many indices they have.
 #pragma unroll 1
     for (u32 cube = lane(); cube < cubes; cube += 32) {
-        u32 place = bench.cubes[cube], kind = cube_case(bench.bits.columns + MARGIN + place % CORNERS, place / CORNERS);
+        u32 place = shared.cubes[cube], kind = cube_case(shared.bits.columns + MARGIN + place % CORNERS, place / CORNERS);
         u32 count = params.table[kind][MOST_CUBE_INDICES];
-        bench.cubes[cube] = place | kind << PLACE_BITS | count << CUBE_BITS;
+        shared.cubes[cube] = place | kind << PLACE_BITS | count << CUBE_BITS;
         indices += count;
     }
     __syncwarp();
     indices = sum_of_warp(indices);
     if (lane() == 0) {
-        bench.cubes_in_all = cubes;
-        bench.indices = indices;
+        shared.cubes_in_all = cubes;
+        shared.indices = indices;
     }
 }
 
 // Reserves room for the block: the first vertex, and the first index in the upper half. For one thread.
-__device__ inline u64 reserve(const MeshParams& params, const MeshMemory& bench) {
-    return atomicAdd((u64*)params.counters, bench.vertices | (u64)bench.indices << 32);
+__device__ inline u64 reserve(const MeshParams& params, const MeshMemory& shared) {
+    return atomicAdd((u64*)params.counters, shared.vertices | (u64)shared.indices << 32);
 }
 
 // Enters what was reserved. For one thread.
-__device__ inline void enter(const MeshParams& params, MeshMemory& bench, u64 reserved) {
+__device__ inline void enter(const MeshParams& params, MeshMemory& shared, u64 reserved) {
     u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
-    bool is_room = fits(vertex, bench.vertices, params.vertex_capacity);
-    is_room &= fits(index, bench.indices, params.index_capacity);
-    bench.vertex = is_room ? vertex : NONE;
-    bench.index = index;
-    params.results[blockIdx.x] = {bench.vertex, bench.vertices, is_room ? index : 0, bench.indices};
+    bool is_room = fits(vertex, shared.vertices, params.vertex_capacity);
+    is_room &= fits(index, shared.indices, params.index_capacity);
+    shared.vertex = is_room ? vertex : NONE;
+    shared.index = index;
+    params.results[blockIdx.x] = {shared.vertex, shared.vertices, is_room ? index : 0, shared.indices};
 }
 
 // A lane's vertex, but for its normal.
@@ -266,28 +266,28 @@ struct Made {
 };
 
 // Makes up to 32 vertices, the first of number `base`; normals go to shared memory. For one warp.
-__device__ inline Made make_vertices(const Site& site, MeshMemory& bench, u32 base) {
+__device__ inline Made make_vertices(const Site& site, MeshMemory& shared, u32 base) {
     Made made = {{0, 0}, {0, 0}};
-    if (base + lane() < bench.vertices) {
-        Edge edge = edge_at(bench.edges[base + lane()]);
-        Crossing crossing = crossing_on(site, bench.apron, edge);
-        Vector normal = normal_of(site, bench, edge, crossing);
-        float* normals = bench.output[warp()].normals + lane() * 3;
+    if (base + lane() < shared.vertices) {
+        Edge edge = edge_at(shared.edges[base + lane()]);
+        Crossing crossing = crossing_on(site, shared.padding, edge);
+        Vector normal = normal_of(site, shared, edge, crossing);
+        float* normals = shared.output[warp()].normals + lane() * 3;
         normals[0] = normal.x;
         normals[1] = normal.y;
         normals[2] = normal.z;
         made.position = position_of(edge, crossing.step);
-        if (site.params.mixes) made.mix = mix_at(site, bench, edge, crossing);
+        if (site.params.mixes) made.mix = mix_at(site, shared, edge, crossing);
     }
     __syncwarp();
     return made;
 }
 
 // Writes these vertices. Normals come from shared memory, so that what lanes write lies side by side. For one warp.
-__device__ inline void write_vertices(const MeshParams& params, const MeshMemory& bench, u32 base, const Made& made) {
-    const float* normals = bench.output[warp()].normals;
-    u32 count = smallest(bench.vertices - base, 32);
-    u64 to = (u64)bench.vertex + base;
+__device__ inline void write_vertices(const MeshParams& params, const MeshMemory& shared, u32 base, const Made& made) {
+    const float* normals = shared.output[warp()].normals;
+    u32 count = smallest(shared.vertices - base, 32);
+    u64 to = (u64)shared.vertex + base;
     if (lane() < count) {
         ((uint2*)params.positions)[to + lane()] = made.position;
         if (params.mixes) params.mixes[to + lane()] = {made.mix.ids, made.mix.weights};
@@ -302,16 +302,16 @@ __device__ inline void write_vertices(const MeshParams& params, const MeshMemory
 
 // Writes the triangles of up to 32 cubes, the first of number `base`. For one warp; they go through shared memory, so that
 // what its lanes write lies side by side.
-__device__ inline void write_cubes(const MeshParams& params, MeshMemory& bench, u32 base) {
-    u16* indices = bench.output[warp()].indices;
+__device__ inline void write_cubes(const MeshParams& params, MeshMemory& shared, u32 base) {
+    u16* indices = shared.output[warp()].indices;
     // Indices of the cube, and in the upper half those of cubes before these.
-    u32 cube = base + lane() < bench.cubes_in_all ? bench.cubes[base + lane()] : 0, count = cube >> CUBE_BITS, counts = count;
+    u32 cube = base + lane() < shared.cubes_in_all ? shared.cubes[base + lane()] : 0, count = cube >> CUBE_BITS, counts = count;
 #pragma unroll 1
-    for (u32 i = lane(); i < base; i += 32) counts += bench.cubes[i] >> CUBE_BITS << 16;
+    for (u32 i = lane(); i < base; i += 32) counts += shared.cubes[i] >> CUBE_BITS << 16;
     u32 ends = running_sum(counts), all = __shfl_sync(WARP, ends, 31), first = (ends & 0xffff) - count;
-    const u16* numbers = bench.numbers + (cube & ((1 << PLACE_BITS) - 1));
+    const u16* numbers = shared.numbers + (cube & ((1 << PLACE_BITS) - 1));
     const uint4* slots = (const uint4*)params.table[cube >> PLACE_BITS & 0xff];
-    u64 to = (u64)bench.index + (all >> 16);
+    u64 to = (u64)shared.index + (all >> 16);
 #pragma unroll 1
     for (u32 from = 0; from < (all & 0xffff); from += STAGED_INDICES) {
         if (count != 0) {
@@ -342,7 +342,7 @@ __device__ inline void draw_nothing(const MeshParams& params) {
 }
 
 extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params) {
-    __shared__ MeshMemory bench;
+    __shared__ MeshMemory shared;
     const MeshJob job = params.jobs[blockIdx.x];
     const ColumnJob& column = params.columns[job.column];
     const Stack& stack = params.stacks[column.stack];
@@ -350,12 +350,12 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     bool is_at_rim = low[0] <= 0 || low[2] <= 0 || low[0] + SIDE >= params.width || low[2] + SIDE >= params.depth;
     Site site = {params, job, column, stack, {low[0], low[1], low[2]}, is_at_rim};
     i32 t = threadIdx.x;
-    if (t < CORNERS + 20) bench.bits.drawn[t] = 0;
-    if (t == 0) bench.layers = 0;
-    if (warp() < 2) gather_columns(site, bench);
+    if (t < CORNERS + 20) shared.bits.drawn[t] = 0;
+    if (t == 0) shared.layers = 0;
+    if (warp() < 2) gather_columns(site, shared);
     __syncthreads();
     // Where all corners are solid, or none, there is no surface.
-    if ((bench.signs[0] | bench.signs[1]) != 3) {
+    if ((shared.signs[0] | shared.signs[1]) != 3) {
         draw_nothing(params);
         return;
     }
@@ -364,59 +364,59 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     // Threads of cells.
     if (t < SIDE * SIDE) {
         i32 x = t % SIDE, z = t / SIDE, corner = MARGIN + z * 9 + x;
-        u32 cubes = drawn_cubes(site, bench.bits.columns + corner, x, z);
-        bench.bits.drawn[corner] = (u16)cubes;
-        if (cubes != 0) atomicOr(&bench.layers, cubes);
+        u32 cubes = drawn_cubes(site, shared.bits.columns + corner, x, z);
+        shared.bits.drawn[corner] = (u16)cubes;
+        if (cubes != 0) atomicOr(&shared.layers, cubes);
     }
     __syncthreads();
-    u32 layers = bench.layers;
+    u32 layers = shared.layers;
     if (layers == 0) {
         draw_nothing(params);
         return;
     }
 
     // Samples are on their way while edges and cubes are told.
-    ApronColumn samples = read_column(site, place, layers);
+    PaddedColumn samples = read_column(site, place, layers);
     // Three warps turn edges to words, and list them. The fourth lists cubes, and reserves room.
     u32 edges = 0;
     if (warp() < CORNER_WARPS) {
-        if (t < CORNERS) edges = column_edges(bench.bits.columns + MARGIN + t, bench.bits.drawn + MARGIN + t);
+        if (t < CORNERS) edges = column_edges(shared.bits.columns + MARGIN + t, shared.bits.drawn + MARGIN + t);
         u32 level = transpose(edges);
-        if (lane() < LEVELS) bench.bits.runs[lane()][warp()].crossed = level;
+        if (lane() < LEVELS) shared.bits.runs[lane()][warp()].crossed = level;
     } else {
-        list_cubes(params, bench);
+        list_cubes(params, shared);
     }
-    put_column(site, bench, samples);
+    put_column(site, shared, samples);
     __syncthreads();
     u64 reserved = 0;
     if (warp() < CORNER_WARPS) {
-        number_edges(bench);
-        list_edges(bench, edges);
+        number_edges(shared);
+        list_edges(shared, edges);
     } else {
-        u32 vertices = count_edges(bench);
+        u32 vertices = count_edges(shared);
         if (lane() == 0) {
-            bench.vertices = vertices;
-            reserved = reserve(params, bench);
+            shared.vertices = vertices;
+            reserved = reserve(params, shared);
         }
     }
     __syncthreads();
 
     // Warps make their first vertices before they wait for what was reserved.
-    u32 batches = (bench.vertices + 31) / 32, all_batches = batches + (bench.cubes_in_all + 31) / 32;
+    u32 batches = (shared.vertices + 31) / 32, all_batches = batches + (shared.cubes_in_all + 31) / 32;
     bool is_entered = false;
     for (u32 batch = warp(); batch < all_batches || !is_entered; batch += THREADS / 32) {
         Made made;
-        if (batch < batches) made = make_vertices(site, bench, batch * 32);
+        if (batch < batches) made = make_vertices(site, shared, batch * 32);
         if (!is_entered) {
-            if (t == CORNER_WARPS * 32) enter(params, bench, reserved);
+            if (t == CORNER_WARPS * 32) enter(params, shared, reserved);
             __syncthreads();
-            if (bench.vertex == NONE) return;
+            if (shared.vertex == NONE) return;
             is_entered = true;
         }
         if (batch < batches) {
-            write_vertices(params, bench, batch * 32, made);
+            write_vertices(params, shared, batch * 32, made);
         } else if (batch < all_batches) {
-            write_cubes(params, bench, (batch - batches) * 32);
+            write_cubes(params, shared, (batch - batches) * 32);
         }
     }
 }

@@ -111,10 +111,10 @@ __device__ inline u32 stored_material(const Site& site, const Edge& edge, bool i
 }
 
 __device__ inline Mix mix_at(
-    const Site& site, const MeshMemory& bench, const Edge& edge, const Crossing& crossing
+    const Site& site, const MeshMemory& shared, const Edge& edge, const Crossing& crossing
 ) {
     u32 stored = stored_material(site, edge, crossing.is_lower_solid);
     if (stored != GROUND) return pure(stored);
     if (site.params.is_single) return {site.params.single_ids, site.params.single_weights};
-    return own_mix(site, bench.heights, edge, crossing.step);
+    return own_mix(site, shared.heights, edge, crossing.step);
 }

@@ -1,11 +1,11 @@
-// What edits read that look around, as volume/surroundings.rs and edits/stencil_edit.rs have it.
+// What stencil edits read, as in edits/padded_brick.rs and edits/stencil_edit.rs.
 #pragma once
 
 #include "edit.cuh"
 #include "sculpt.cuh"
 
 // What became of a voxel, or would have but for a rule.
-enum Fate { REMOVED, ADDED, PAINTED, PROTECTED, UNBREAKABLE, TOO_HARD, SLOWED, FATES };
+enum VoxelOutcome { REMOVED, ADDED, PAINTED, PROTECTED, UNBREAKABLE, TOO_HARD, SLOWED, FATES };
 
 struct StencilEditMemory {
     EditMemory work;
@@ -23,7 +23,7 @@ constexpr i32 LOOK = 8;
 // What an edit reads: the brick and what is around it, as they were before the launch.
 struct Surroundings {
     const StencilEditParams& params;
-    StencilEditMemory& bench;
+    StencilEditMemory& shared;
     // The brick's entry in the windows, and the way to its neighbours.
     const u32* window;
     i32 to_x, to_z;
@@ -39,15 +39,15 @@ struct Surroundings {
         to_x = job.strides & 0xffff;
         to_z = job.strides >> 16;
         for (i32 i = threadIdx.x; i < 27; i += THREADS) {
-            bench.refs[i] = window[brick_at(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1)];
+            shared.refs[i] = window[brick_at(i % 3 - 1, i / 9 - 1, i / 3 % 3 - 1)];
         }
-        for (i32 i = threadIdx.x; i < FATES * 256; i += THREADS) bench.counts[i] = 0;
+        for (i32 i = threadIdx.x; i < FATES * 256; i += THREADS) shared.counts[i] = 0;
         __syncthreads();
         for (i32 i = threadIdx.x; i < AROUND * AROUND * AROUND; i += THREADS) {
             // Beyond the world's rim all goes on as it is at the rim.
             i32 x = inside(i % AROUND, job.brick[0], params.last[0]);
             i32 z = inside(i / AROUND % AROUND, job.brick[2], params.last[1]), y = i / (AROUND * AROUND);
-            bench.around[i] = sample_around(x, y, z, job.brick[1] * SIDE, stack->heights[z * WINDOW + x]);
+            shared.around[i] = sample_around(x, y, z, job.brick[1] * SIDE, stack->heights[z * WINDOW + x]);
         }
     }
 
@@ -62,7 +62,7 @@ struct Surroundings {
 
     // A sample of the surroundings, counted from one before the brick's lowest.
     __device__ Marked sample_around(i32 x, i32 y, i32 z, i32 low, i32 height) const {
-        u32 ref = bench.refs[(((y + 7) >> 3) * 3 + ((z + 7) >> 3)) * 3 + ((x + 7) >> 3)];
+        u32 ref = shared.refs[(((y + 7) >> 3) * 3 + ((z + 7) >> 3)) * 3 + ((x + 7) >> 3)];
         i32 raw = ref == NONE ? PRISTINE : params.edit.bricks[ref >> 1].samples[index_at(x - 1, y - 1, z - 1)];
         i32 pristine = (low + y - 1) * ONE - height;
         return raw == PRISTINE ? pristine * 4 : marked(raw, pristine);
@@ -119,7 +119,7 @@ struct Surroundings {
         for (i32 side = 0; side < 4; side++) {
             i32 dx = side == 0 ? -1 : side == 1 ? 1 : 0, dz = side == 2 ? -1 : side == 3 ? 1 : 0;
             i32 x = column.x + dx, z = column.z + dz;
-            if (bench.around[around_at(x, y, z)] >= 0) continue;
+            if (shared.around[around_at(x, y, z)] >= 0) continue;
             return stored_at(x, y, z);
         }
         return GROUND;

@@ -4,7 +4,7 @@
 #include "padded_brick.cuh"
 
 // What edits may not change, or not at once.
-struct Judge : Surroundings {
+struct RuleChecker : Surroundings {
     // Is a protected box near?
     bool has_boxes;
 
@@ -68,7 +68,7 @@ struct Judge : Surroundings {
     __device__ i32 density_beside(i32 face, const OwnColumn& column, i32 y) const {
         i32 way[3];
         way_to(face, way);
-        return density(bench.around[around_at(column.x + way[0], y + way[1], column.z + way[2])]);
+        return density(shared.around[around_at(column.x + way[0], y + way[1], column.z + way[2])]);
     }
 
     // The pace of what is solid there; 0 where it is protected.
@@ -87,7 +87,7 @@ struct Judge : Surroundings {
 
     // The density that a sample may have instead of the proposed one, and why it is another one, or `FATES`.
     __device__ i32 judged(const OwnColumn& column, const i32* at, i32 y, i32 power, i32 proposed, u32& outcome) const {
-        const Marked* own = bench.around + around_at(column.x, y, column.z);
+        const Marked* own = shared.around + around_at(column.x, y, column.z);
         i32 before = density(*own);
         outcome = PROTECTED;
         if (is_protected(at)) return before;

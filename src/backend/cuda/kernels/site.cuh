@@ -38,7 +38,7 @@ union Output {
 
 struct MeshMemory {
     i32 heights[AREA];
-    Marked apron[WINDOW * AREA];
+    Marked padding[WINDOW * AREA];
     union {
         Bits bits;
         Output output[THREADS / 32];

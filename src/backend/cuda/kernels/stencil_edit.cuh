@@ -6,7 +6,7 @@
 
 #include "rules.cuh"
 
-struct Care : Judge {
+struct StencilEditor : RuleChecker {
     static constexpr bool LOOKS = true;
 
     // Does an edit look around? If so, the surroundings are brought, which the block then has to wait for.
@@ -35,7 +35,7 @@ struct Care : Judge {
         const EditRecord& record, bool is_bound, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
         i32 pristine = sample.at[1] * ONE - column.height;
-        u32 ref = bench.refs[13], old = stored(ref, sample.index);
+        u32 ref = shared.refs[13], old = stored(ref, sample.index);
         if (sample.outside > 0 || sample.before >= 0) return false;
         bool is_pristine = ref == NONE || params.edit.bricks[ref >> 1].samples[sample.index] == PRISTINE;
         if (!is_pristine && old == record.material) return false;
@@ -52,7 +52,7 @@ struct Care : Judge {
     __device__ bool proposed(
         const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, i32& after
     ) {
-        const Marked* own = bench.around + around_at(column.x, sample.y, column.z);
+        const Marked* own = shared.around + around_at(column.x, sample.y, column.z);
         if (sculpt.stroke != PLAIN) return sculpted(sculpt, params.images, sample.at, sample.outside, own, after);
         i32 depth = largest(sample.outside, -DEPTH);
         after = record.operation == DIG ? largest(sample.before, -depth) : smallest(sample.before, depth);
@@ -77,7 +77,7 @@ struct Care : Judge {
             }
         }
         if (is_refused) {
-            if (was_solid) material = stored(bench.refs[13], sample.index);
+            if (was_solid) material = stored(shared.refs[13], sample.index);
             counted = outcome * 256 + resolve(material, column, pristine);
         }
         if (storable(after) == storable(before)) return false;
@@ -117,7 +117,7 @@ struct Care : Judge {
                     y,
                     index,
                     round_distance(distance),
-                    density(bench.around[around_at(column.x, y, column.z)]),
+                    density(shared.around[around_at(column.x, y, column.z)]),
                 };
                 is_changed = sculpt.stroke == PLAIN && record.operation == PAINT
                     ? paint(record, sculpt.power >= 0, column, sample, work.brick, counted)
@@ -126,23 +126,23 @@ struct Care : Judge {
             }
             changed |= (u32)is_changed << k;
             store_bits(work.effect.changed, k, is_changed);
-            count_voxels(bench.counts, counted);
+            count_voxels(shared.counts, counted);
         }
         return changed;
     }
 
     // Enters what an edit changed, and how many voxels it dealt with; nobody begins with the next edit before.
     __device__ void enter(const EditJob& job, u32 edit) {
-        if (warp() == 0) enter_parts(params.edit, job.cuts, edit, bench.work.effect.changed);
+        if (warp() == 0) enter_parts(params.edit, job.cuts, edit, shared.work.effect.changed);
         u32 outcomes = params.rules ? FATES : ADDED + 1;
         for (u32 outcome = warp(); outcome < outcomes; outcome += THREADS / 32) {
-            enter_counts(params.edit, edit, outcome, bench.counts + outcome * 256);
+            enter_counts(params.edit, edit, outcome, shared.counts + outcome * 256);
         }
     }
 };
 
 extern "C" __global__ void __launch_bounds__(THREADS) stencil_edit(StencilEditParams params) {
-    __shared__ StencilEditMemory bench;
-    Care care = {{{params, bench, nullptr, 0, 0, nullptr, false, false}, false}};
-    edit_brick(params.edit, bench.work, care);
+    __shared__ StencilEditMemory shared;
+    StencilEditor care = {{{params, shared, nullptr, 0, 0, nullptr, false, false}, false}};
+    edit_brick(params.edit, shared.work, care);
 }

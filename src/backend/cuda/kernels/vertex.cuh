@@ -55,13 +55,13 @@ __device__ inline uint2 position_of(const Edge& edge, i32 step) {
 
 // The tile's normal on an edge that nobody edited, the one of the gradient on others.
 __device__ inline Vector normal_of(
-    const Site& site, const MeshMemory& bench, const Edge& edge, const Crossing& crossing
+    const Site& site, const MeshMemory& shared, const Edge& edge, const Crossing& crossing
 ) {
     Vector normal = crossing.gradient;
     if (crossing.is_pristine && (crossing.is_stencil_pristine || is_border(site.column, edge))) {
-        normal = ground_normal(site, bench.heights, edge.window);
+        normal = ground_normal(site, shared.heights, edge.window);
         if (edge.axis == 1) return normal;
-        Vector other = ground_normal(site, bench.heights, edge.window + edge.next_window);
+        Vector other = ground_normal(site, shared.heights, edge.window + edge.next_window);
         float t = (float)crossing.step / (float)SNAP;
         normal = {lerp(normal.x, other.x, t), lerp(normal.y, other.y, t), lerp(normal.z, other.z, t)};
     }

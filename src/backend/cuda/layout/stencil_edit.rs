@@ -1,4 +1,4 @@
-//! What edits that look around need besides.
+//! Parameters of the stencil-edit kernel.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -76,7 +76,7 @@ impl KernelParams for StencilEditParams {
     const KERNEL: Kernel = Kernel::StencilEdit;
 }
 
-/// What an edit that looks around needs besides; `image` says where the samples of an image begin.
+/// The sculpting parameters of an edit; `image` returns where the samples of an image begin.
 pub(crate) fn sculpt<'a>(
     record: &'a crate::edits::PreparedEdit,
     image: impl FnOnce(&'a GreyImage) -> u32,

@@ -4,7 +4,7 @@ pub(super) mod output;
 
 use super::device::{Fault, Launch};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
-use super::lists::{cut, fill, hand_out, map};
+use super::lists::{cut, fill, for_each_parallel, map};
 use super::session::{Session, Stacks, Uploads, windows};
 use super::staging::StagingLayout;
 use super::windows::Windows;
@@ -146,7 +146,7 @@ impl Session {
 /// Writes the jobs of blocks.
 fn write_jobs(view: &WorldView, windows: &Windows, pieces: &[Piece], out: &mut [MeshJob]) {
     let places = cut(out, pieces.iter().map(|piece| piece.blocks.len()));
-    hand_out(pieces.iter().zip(places).collect(), |(piece, places)| {
+    for_each_parallel(pieces.iter().zip(places).collect(), |(piece, places)| {
         let stacks = (piece.column..).zip(piece.blocks.chunk_by(is_same_stack));
         let blocks = stacks.flat_map(|(column, stack)| stack.iter().map(move |block| (column, block)));
         for ((number, (column, block)), place) in (piece.first..).zip(blocks).zip(places) {

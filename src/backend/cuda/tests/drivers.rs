@@ -1,8 +1,9 @@
 //! Devices that can't be opened, or not be trusted.
 
-use super::super::device::{Device, DeviceLayer, Fault, HostMemory};
+use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use super::super::emulator::skip;
 use super::*;
+use std::ops::Range;
 
 #[test]
 fn a_device_that_can_not_be_opened_is_no_device() {
@@ -145,19 +146,14 @@ fn a_thread_that_waits_for_a_slow_card_sleeps() {
 fn a_device_that_computes_something_else_is_not_trusted() {
     /// Turns a bit of every read.
     struct BitFlipper(Box<dyn Device>);
-    impl DeviceLayer for BitFlipper {
-        fn inner(&self) -> &dyn Device {
-            &*self.0
-        }
-        fn inner_mut(&mut self) -> &mut dyn Device {
-            &mut *self.0
-        }
+    impl Device for BitFlipper {
+        forward!(0: name free_memory alloc free alloc_host upload copy launch mark wait);
         unsafe fn download(
             &mut self,
             from: u64,
             to: &mut dyn HostMemory,
-            bytes: std::ops::Range<usize>,
-        ) -> Result<(), Fault> {
+            bytes: Range<usize>,
+        ) -> DeviceResult {
             // SAFETY: the caller promises the same.
             unsafe { self.0.download(from, to, bytes.clone()) }?;
             // The last bit of a density, of a normal or of a hash.

@@ -1,8 +1,9 @@
 //! Devices that fail when they are told to: nothing is lost.
 
+use std::ops::Range;
 use std::sync::{Mutex, Once};
 
-use super::super::device::{Device, DeviceLayer, Fault, HostMemory, Launch, Mark};
+use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use super::*;
 use crate::backend::Stage;
 
@@ -48,14 +49,8 @@ impl FaultPlan {
     }
 }
 
-impl DeviceLayer for FaultyDevice {
-    fn inner(&self) -> &dyn Device {
-        &*self.own
-    }
-
-    fn inner_mut(&mut self) -> &mut dyn Device {
-        &mut *self.own
-    }
+impl Device for FaultyDevice {
+    forward!(own: name free_memory free);
 
     fn alloc(&mut self, bytes: usize) -> Result<u64, Fault> {
         self.plan.ask()?;
@@ -65,22 +60,12 @@ impl DeviceLayer for FaultyDevice {
         self.plan.ask()?;
         self.own.alloc_host(bytes)
     }
-    unsafe fn upload(
-        &mut self,
-        from: &dyn HostMemory,
-        bytes: std::ops::Range<usize>,
-        to: u64,
-    ) -> Result<(), Fault> {
+    unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult {
         self.plan.call()?;
         // SAFETY: the caller promises the same.
         unsafe { self.own.upload(from, bytes, to) }
     }
-    unsafe fn download(
-        &mut self,
-        from: u64,
-        to: &mut dyn HostMemory,
-        bytes: std::ops::Range<usize>,
-    ) -> Result<(), Fault> {
+    unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult {
         self.plan.call()?;
         // SAFETY: the caller promises the same.
         unsafe { self.own.download(from, to, bytes) }
