@@ -358,3 +358,29 @@ fn a_brush_that_finds_nothing_to_change_has_an_empty_receipt() {
     assert!(first.removed.total() > 100 && first.added.total() == 0);
     assert_eq!(terrain.apply([&dig])[0].outcome, Ok(Applied::default()));
 }
+
+#[test]
+fn a_brush_in_the_air_adds_as_many_voxels_as_it_counts() {
+    let axis = Vec3::new(1.5, 2.0, -1.0);
+    for (number, place) in
+        [Vec3::splat(30.0), Vec3::splat(30.5), Vec3::new(30.2, 31.7, 29.4)].into_iter().enumerate()
+    {
+        for shape in [
+            Shape::sphere(place, 3.3),
+            Shape::cuboid(place, Vec3::splat(2.5)),
+            Shape::capsule(place, place + axis, 2.0),
+            Shape::torus(place, axis, 5.0, 1.5),
+        ] {
+            for roughness in [0.0, 0.8] {
+                let brush = Brush::add(shape, MaterialId(0));
+                let brush = brush.with_roughness(Roughness::new(roughness, 2.0, number as u32));
+                let ground = Ground::flat(64, 64, 5.0).expect("valid");
+                let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+                let receipts = terrain.apply([&brush]);
+                let added = receipts[0].outcome.as_ref().expect("a valid brush").added.total();
+                assert_eq!(brush.voxel_count(), Ok(added), "{shape:?}, roughness {roughness}");
+            }
+        }
+    }
+    assert!(Brush::dig(Shape::sphere(Vec3::NAN, 1.0)).voxel_count().is_err());
+}

@@ -99,6 +99,7 @@ mod roughness;
 mod sculpt_kernel;
 pub mod shapes;
 mod stamp;
+mod voxel_count;
 
 pub use blend::Blend;
 pub use edit::Edit;

@@ -37,7 +37,6 @@ mod settings;
 mod task;
 mod threads;
 mod times;
-mod voxel_cost;
 
 pub use components::{Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, Tile};
 #[cfg(feature = "avian")]
@@ -62,7 +61,6 @@ pub(crate) use threads::free_later;
 #[cfg(any(feature = "render", feature = "avian"))]
 pub(crate) use threads::{ThreadTask, Threads};
 pub use times::Times;
-pub use voxel_cost::voxel_cost;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;

@@ -146,7 +146,6 @@ fn draw_preview(preview: Res<Preview>, mut gizmos: Gizmos) {
 
 #[cfg(test)]
 mod tests {
-    use bevy_burrow::plugin::voxel_cost;
 
     use super::*;
     use crate::world::landscape::{CONCRETE, ROCK};
@@ -185,7 +184,7 @@ mod tests {
             hand(&mut app).set_radius(tool, 12.0);
             let radius = radius(&mut app).expect("enough for a small one");
             let brush = Brush::add(Shape::sphere(Vec3::splat(20.0), radius), CONCRETE);
-            let voxels = voxel_cost(&brush).expect("a valid brush") as i64;
+            let voxels = brush.voxel_count().expect("a valid brush") as i64;
             assert!(voxels <= available && 10 * voxels > 8 * available, "{tool:?}: {voxels} of {available}");
         }
         hand(&mut app).material = ROCK;

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use bevy::prelude::*;
-use bevy_burrow::plugin::voxel_cost;
 use bevy_burrow::prelude::*;
 
 use crate::player::camera::CameraShake;
@@ -136,7 +135,7 @@ pub fn affordable_radius(
 ) -> Option<(f32, i64)> {
     let mut radius = wanted;
     while radius >= 0.8 * tool.radii().0 {
-        let cost = voxel_cost(&Brush::dig(shape(radius))).ok()? as i64;
+        let cost = Brush::dig(shape(radius)).voxel_count().ok()? as i64;
         if cost <= available {
             return Some((radius, cost));
         }

@@ -59,7 +59,7 @@ fn brushes_are_as_large_as_the_inventory_allows_and_reserve_their_material() {
         while let [Brush { shape: shape @ Shape::Sphere(Sphere { radius, .. }), .. }] =
             use_tool(&mut app, tool)[..]
         {
-            left -= voxel_cost(&Brush::dig(shape)).expect("a valid brush") as i64;
+            left -= Brush::dig(shape).voxel_count().expect("a valid brush") as i64;
             assert_eq!(available(&app, CONCRETE), left);
             radii.push(radius);
         }
