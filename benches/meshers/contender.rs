@@ -25,7 +25,7 @@ pub enum Sharing {
     /// Some places have several.
     Partly,
     /// Three vertices per triangle.
-    Soup,
+    TriangleSoup,
 }
 
 /// What a contender's meshes hold. Only what holds the same is compared.

@@ -21,7 +21,7 @@ impl Contender for MarchingCubes {
     }
 
     fn class(&self) -> Class {
-        Class { shading: Shading::Unit, sharing: Sharing::Soup, dual: false }
+        Class { shading: Shading::Unit, sharing: Sharing::TriangleSoup, dual: false }
     }
 
     fn load(&mut self, grid: &Grid) {

@@ -70,12 +70,12 @@ pub fn rows(field: Field, input: Input, cells: usize, times: &[Times]) -> Vec<Ro
 const SECTIONS: [(&str, fn(&Row) -> bool, fn(&Row) -> Option<Spread>); 3] = [
     (
         "with normals, shared vertices",
-        |row| row.ratio.is_some() && row.class.sharing != Sharing::Soup,
+        |row| row.ratio.is_some() && row.class.sharing != Sharing::TriangleSoup,
         |row| row.ratio,
     ),
     (
         "with normals, three vertices per triangle; ours are shared",
-        |row| row.ratio.is_some() && row.class.sharing == Sharing::Soup,
+        |row| row.ratio.is_some() && row.class.sharing == Sharing::TriangleSoup,
         |row| row.ratio,
     ),
     ("ours without normals", |row| row.bare_ratio.is_some(), |row| row.bare_ratio),

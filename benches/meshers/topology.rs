@@ -111,7 +111,7 @@ fn welded(mesh: &Mesh, sharing: Sharing) -> Result<Vec<[usize; 3]>, TopologyErro
     }
     let number = match sharing {
         Sharing::Shared => (0..written).collect(),
-        Sharing::Partly | Sharing::Soup => weld(&mesh.positions)?,
+        Sharing::Partly | Sharing::TriangleSoup => weld(&mesh.positions)?,
     };
     let corners =
         mesh.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|index| number[index as usize]));

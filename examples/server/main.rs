@@ -20,13 +20,13 @@
 //! | file | subject |
 //! | --- | --- |
 //! | `script.rs` | where brushes come from |
-//! | `ledger.rs` | what is printed |
+//! | `report.rs` | what is printed |
 
 #[path = "../shared/brush_lines.rs"]
 mod brush_lines;
-mod ledger;
 #[path = "../shared/output.rs"]
 mod output;
+mod report;
 mod script;
 
 use std::path::PathBuf;
@@ -92,7 +92,7 @@ fn app(options: &Options, source: script::Source, terrain: Terrain) -> App {
     app.add_plugins(MinimalPlugins.set(ScheduleRunnerPlugin::run_loop(period)))
         .insert_resource(BurrowEngine(Engine::new(Backend::Cpu)))
         .add_plugins(BurrowPlugins);
-    ledger::add(&mut app, options.quiet);
+    report::add(&mut app, options.quiet);
     script::add(&mut app, source);
     app.world_mut().spawn(terrain);
     app

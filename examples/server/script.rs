@@ -13,8 +13,8 @@ use bevy_burrow::prelude::*;
 
 use crate::Options;
 use crate::brush_lines::{Line, Lines};
-use crate::ledger::Ledger;
 use crate::output::complain;
+use crate::report::Report;
 
 /// Lines that wait to be sent, at most.
 const MOST_WAITING: usize = 1024;
@@ -105,7 +105,7 @@ pub fn add(app: &mut App, source: Source) {
 fn send(
     mut source: ResMut<Source>,
     terrains: Query<&Terrain>,
-    mut ledger: ResMut<Ledger>,
+    mut report: ResMut<Report>,
     mut brushes: MessageWriter<Brush>,
     mut undos: MessageWriter<Undo>,
     mut redos: MessageWriter<Redo>,
@@ -114,7 +114,7 @@ fn send(
     let source = &mut *source;
     // One tick after the other: what waits does not grow, however long the script is.
     let is_idle = terrains.iter().all(|terrain| terrain.queued() == 0 && !terrain.is_busy());
-    if !is_idle || ledger.answered < source.sent {
+    if !is_idle || report.answered < source.sent {
         return;
     }
     let (before, due) = (source.sent, source.due());
@@ -138,7 +138,7 @@ fn send(
             }
             Some(Err(error)) => {
                 complain(format_args!("{error}"));
-                ledger.faults += 1;
+                report.faults += 1;
             }
             None => break,
         }
@@ -153,10 +153,10 @@ fn send(
         Feed::Ready(_) => {}
         // Without a number of ticks to keep to, waiting would take all of a core.
         Feed::Coming(_) => std::thread::sleep(REST),
-        Feed::Over if ledger.is_done => {}
+        Feed::Over if report.is_done => {}
         Feed::Over => {
-            ledger.is_done = true;
-            exit.write(if ledger.faults == 0 { AppExit::Success } else { AppExit::error() });
+            report.is_done = true;
+            exit.write(if report.faults == 0 { AppExit::Success } else { AppExit::error() });
         }
     }
 }

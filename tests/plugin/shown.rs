@@ -30,13 +30,13 @@ impl Shown {
 
 /// Triangles in world space.
 #[derive(Default)]
-struct Soup {
+struct TriangleSoup {
     numbers: HashMap<[u32; 3], u32>,
     places: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Soup {
+impl TriangleSoup {
     fn add(&mut self, mesh: &Mesh, place: &GlobalTransform) {
         let Some(VertexAttributeValues::Float32x3(positions)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION)
         else {
@@ -92,7 +92,7 @@ impl Stage {
         let world = self.app.world_mut();
         let mut drawn = world.query_filtered::<(&Mesh3d, &GlobalTransform, &Visibility, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
         let meshes = world.resource::<Assets<Mesh>>();
-        let mut soup = Soup::default();
+        let mut soup = TriangleSoup::default();
         for (mesh, place, visibility, parent) in drawn.iter(world) {
             if parent.parent() == terrain && *visibility != Visibility::Hidden {
                 soup.add(meshes.get(&mesh.0).expect("a shown mesh is there"), place);

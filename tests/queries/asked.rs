@@ -6,7 +6,7 @@ use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{DVec3, IVec3, Vec3};
 
-use crate::soup::Soup;
+use crate::triangles::Triangles;
 use crate::worlds::{random_brush, random_world, real_ground, world_count};
 
 /// The worlds that are asked.
@@ -87,7 +87,7 @@ pub fn point_near_surface(rng: &mut Rng, world: &World) -> IVec3 {
 }
 
 /// A vertical line anywhere: free, on lattice lines and points, on the rim, through vertices and edges.
-pub fn random_column(rng: &mut Rng, world: &World, soup: &Soup) -> (f64, f64) {
+pub fn random_column(rng: &mut Rng, world: &World, triangles: &Triangles) -> (f64, f64) {
     let (width, depth) = (world.grid().width(), world.grid().depth());
     let free = (rng.f64() * f64::from(width), rng.f64() * f64::from(depth));
     let lattice = (f64::from(rng.i32(0..=width)), f64::from(rng.i32(0..=depth)));
@@ -98,9 +98,9 @@ pub fn random_column(rng: &mut Rng, world: &World, soup: &Soup) -> (f64, f64) {
         4 => ([0.0, f64::from(width)][rng.usize(0..2)], [free.1, lattice.1][rng.usize(0..2)]),
         5 => ([free.0, lattice.0, 0.0][rng.usize(0..3)], [0.0, f64::from(depth)][rng.usize(0..2)]),
         _ => {
-            // Through what was dug; tiles come first in the soup.
-            let count = soup.triangles.len();
-            let [a, b, c] = soup.triangles[rng.usize(soup.tiles.min(count - 1)..count)];
+            // Through what was dug; tiles come first in the triangles.
+            let count = triangles.triangles.len();
+            let [a, b, c] = triangles.triangles[rng.usize(triangles.tiles.min(count - 1)..count)];
             let place = [a, (a + b) / 2.0, a.lerp(b, rng.f64()), (a + b + c) / 3.0][rng.usize(0..4)];
             (place.x, place.z)
         }

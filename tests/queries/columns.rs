@@ -5,7 +5,7 @@ use fastrand::Rng;
 use glam::DVec3;
 
 use crate::asked::{dug_landscape, dug_worlds, point_near_surface, random_column};
-use crate::soup::{NUDGE, Soup, TOLERANCE};
+use crate::triangles::{NUDGE, TOLERANCE, Triangles};
 
 /// The crossings that spans stand for, lowest first: height and whether it is a floor.
 fn as_crossings(spans: &[Span]) -> Vec<(f64, bool)> {
@@ -37,11 +37,11 @@ fn columns_cross_what_is_drawn() {
     let (mut columns, mut close_calls, mut caves, mut worst) = (0, 0, 0, 0.0f64);
     for (name, terrain) in dug_worlds().chain([("the landscape".to_string(), dug_landscape())]) {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(78));
-        let soup = Soup::of(world);
+        let triangles = Triangles::of(world);
         let (width, depth) = (f64::from(world.grid().width()), f64::from(world.grid().depth()));
         let count = if name == "the landscape" { 4000 } else { 500 };
         for _ in 0..count {
-            let (x, z) = random_column(&mut rng, world, &soup);
+            let (x, z) = random_column(&mut rng, world, &triangles);
             let what = format!("{name}: column ({x:?}, {z:?})");
             let spans = world.spans(x, z);
             columns += 1;
@@ -67,14 +67,15 @@ fn columns_cross_what_is_drawn() {
             };
             let agrees =
                 |expected: &[(f64, bool)]| difference(expected).is_some_and(|apart| apart <= TOLERANCE);
-            let expected = soup.column(x, z);
+            let expected = triangles.column(x, z);
             if agrees(&expected) {
                 worst = worst.max(difference(&expected).unwrap_or(0.0));
                 continue;
             }
             close_calls += 1;
-            let beside: Vec<Vec<(f64, bool)>> =
-                steps().map(|(dx, dz)| soup.column(inside(x + dx, width), inside(z + dz, depth))).collect();
+            let beside: Vec<Vec<(f64, bool)>> = steps()
+                .map(|(dx, dz)| triangles.column(inside(x + dx, width), inside(z + dz, depth)))
+                .collect();
             assert!(
                 beside.iter().any(|expected| agrees(expected)),
                 "{what}: {answer:?}, but brute force {expected:?}, and beside the column {beside:?}"
@@ -118,11 +119,11 @@ fn places_between_the_samples_are_solid_below_the_surface() {
     let (mut solid, mut buried) = (0, 0);
     for (name, terrain) in dug_worlds() {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(80));
-        let soup = Soup::of(world);
+        let triangles = Triangles::of(world);
         for _ in 0..500 {
             let place =
                 point_near_surface(&mut rng, world).as_dvec3() + DVec3::new(rng.f64(), rng.f64(), rng.f64());
-            let crossings = soup.column(place.x, place.z);
+            let crossings = triangles.column(place.x, place.z);
             if crossings.iter().any(|crossing| (crossing.0 - place.y).abs() < TOLERANCE)
                 || crossings.is_empty()
             {
@@ -146,11 +147,11 @@ fn the_normal_of_a_place_is_that_of_the_triangle_over_or_below_it() {
     let mut asked = 0;
     for (name, terrain) in dug_worlds() {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(81));
-        let soup = Soup::of(world);
+        let triangles = Triangles::of(world);
         let (width, depth) = (f64::from(world.grid().width()), f64::from(world.grid().depth()));
         for _ in 0..400 {
-            let (x, z) = random_column(&mut rng, world, &soup);
-            let crossings = soup.crossings(x, z);
+            let (x, z) = random_column(&mut rng, world, &triangles);
+            let crossings = triangles.crossings(x, z);
             let Some(&(y, ..)) = crossings.get(rng.usize(0..crossings.len().max(1))) else { continue };
             let place = DVec3::new(x, y + (rng.f64() - 0.5) * 0.01, z);
             let mut candidates = Vec::new();
@@ -159,12 +160,12 @@ fn the_normal_of_a_place_is_that_of_the_triangle_over_or_below_it() {
                 let fine =
                     |at: f64, step: f64| (at * f64::from(1 << 20)).round() / f64::from(1 << 20) + step / 1e4;
                 for (x, z) in [(x + dx, z + dz), (fine(x, dx), fine(z, dz))] {
-                    let crossings = soup.crossings(inside(x, width), inside(z, depth));
+                    let crossings = triangles.crossings(inside(x, width), inside(z, depth));
                     let apart = |crossing: &(f64, bool, u32)| (crossing.0 - place.y).abs();
                     let nearest = crossings.iter().map(apart).fold(f64::INFINITY, f64::min);
                     // A step of a millionth is a long way down a steep triangle.
                     let nearest = crossings.iter().filter(|crossing| apart(crossing) < nearest + 0.02);
-                    candidates.extend(nearest.map(|crossing| soup.normal(crossing.2)));
+                    candidates.extend(nearest.map(|crossing| triangles.normal(crossing.2)));
                 }
             }
             let normal = world.normal(place).map(|normal| normal.as_dvec3());

@@ -9,6 +9,6 @@ mod columns;
 mod numbers;
 mod rays;
 mod ready;
-mod soup;
+mod triangles;
 #[path = "../worlds/mod.rs"]
 mod worlds;

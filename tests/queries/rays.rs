@@ -7,7 +7,7 @@ use fastrand::Rng;
 use glam::{DVec3, IVec3, Vec3};
 
 use crate::asked::{dug_landscape, dug_worlds, point_near_surface, random_direction, small_terrain};
-use crate::soup::{NUDGE, Soup, TOLERANCE, distance_to, meet};
+use crate::triangles::{NUDGE, TOLERANCE, Triangles, distance_to, meet};
 
 /// Two directions across a ray.
 fn across(direction: DVec3) -> [DVec3; 2] {
@@ -28,7 +28,7 @@ struct Figures {
 /// Compares one ray with brute force.
 fn check_ray(
     world: &World,
-    soup: &Soup,
+    triangles: &Triangles,
     origin: DVec3,
     direction: DVec3,
     max: f64,
@@ -38,7 +38,7 @@ fn check_ray(
     let what = || format!("{what}: ray from {origin:?} along {direction:?}, at most {max}");
     let answer = world.raycast(origin, direction, max);
     let unit = direction.normalize();
-    let expected = soup.raycast(origin, unit, max);
+    let expected = triangles.raycast(origin, unit, max);
     figures.rays += 1;
     let agree = |t: Option<f64>| match (answer, t) {
         (Some(hit), Some(t)) => (hit.distance - t).abs() <= TOLERANCE,
@@ -50,12 +50,14 @@ fn check_ray(
         figures.close_calls += 1;
         let [a, b] = across(unit);
         let beside = [a, -a, b, -b, a + b, a - b, b - a, -a - b];
-        let mut answers: Vec<Option<f64>> =
-            beside.iter().map(|&d| soup.raycast(origin + d * NUDGE, unit, max).map(|hit| hit.0)).collect();
+        let mut answers: Vec<Option<f64>> = beside
+            .iter()
+            .map(|&d| triangles.raycast(origin + d * NUDGE, unit, max).map(|hit| hit.0))
+            .collect();
         // Or it starts or ends on the surface.
         for reach in [-NUDGE, NUDGE] {
-            answers.push(soup.raycast(origin + unit * reach, unit, max).map(|hit| hit.0 + reach));
-            answers.push(soup.raycast(origin, unit, max + reach).map(|hit| hit.0));
+            answers.push(triangles.raycast(origin + unit * reach, unit, max).map(|hit| hit.0 + reach));
+            answers.push(triangles.raycast(origin, unit, max + reach).map(|hit| hit.0));
         }
         // Or it runs along a triangle, and may count as hitting it anywhere.
         let range =
@@ -67,14 +69,14 @@ fn check_ray(
         let is_early = |hit: RayHit| expected.is_none_or(|(t, _)| hit.distance < t);
         let is_unsure = answers.iter().any(Option::is_none) && answers.iter().any(Option::is_some);
         let touches = |hit: RayHit| {
-            soup.near(origin, unit).into_iter().any(|number| {
-                let [a, b, c] = soup.triangles[number as usize];
+            triangles.near(origin, unit).into_iter().any(|number| {
+                let [a, b, c] = triangles.triangles[number as usize];
                 let on_edge = [(a, b), (b, c), (c, a)].into_iter().any(|(p, q)| {
                     let along = ((hit.position - p).dot(q - p) / (q - p).length_squared()).clamp(0.0, 1.0);
                     hit.position.distance(p.lerp(q, along)) <= NUDGE
                 });
                 // A ray in the plane of a triangle meets it anywhere.
-                let normal = soup.normal(number);
+                let normal = triangles.normal(number);
                 let is_around = |p: DVec3| {
                     (p + NUDGE).cmpge(a.min(b).min(c)).all() && (p - NUDGE).cmple(a.max(b).max(c)).all()
                 };
@@ -104,12 +106,12 @@ fn check_ray(
     assert_eq!(hit.from_inside, hit.normal.as_dvec3().dot(unit) > 0.0, "{}: {hit:?}", what());
 
     // The normal is that of a triangle there; more than one is there only on edges.
-    let near = soup.near(origin, unit).into_iter();
+    let near = triangles.near(origin, unit).into_iter();
     let same_place = near.filter(|&other| {
-        meet(origin, unit, &soup.triangles[other as usize], 1e-6)
+        meet(origin, unit, &triangles.triangles[other as usize], 1e-6)
             .is_some_and(|other| (other - hit.distance).abs() < 1e-4)
     });
-    let normals: Vec<DVec3> = same_place.chain([number]).map(|number| soup.normal(number)).collect();
+    let normals: Vec<DVec3> = same_place.chain([number]).map(|number| triangles.normal(number)).collect();
     let alike = |normal: &DVec3| normal.dot(hit.normal.as_dvec3()) > 1.0 - 1e-6;
     assert!(normals.iter().any(alike), "{}: {hit:?}, but the triangles' normals are {normals:?}", what());
     check_material(world, &hit, &what());
@@ -134,7 +136,7 @@ fn check_material(world: &World, hit: &RayHit, what: &str) {
 }
 
 /// A ray from anywhere: sky, side, inside the ground, caves; free or exactly on lattice lines, edges and vertices.
-fn random_ray(rng: &mut Rng, world: &World, soup: &Soup) -> (DVec3, DVec3) {
+fn random_ray(rng: &mut Rng, world: &World, triangles: &Triangles) -> (DVec3, DVec3) {
     let (width, depth) = (f64::from(world.grid().width()), f64::from(world.grid().depth()));
     let free = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
     let target = point_near_surface(rng, world).as_dvec3();
@@ -175,14 +177,14 @@ fn random_ray(rng: &mut Rng, world: &World, soup: &Soup) -> (DVec3, DVec3) {
         }
         // Exactly at a vertex, the middle of an edge or a place on an edge of what is drawn.
         7 => {
-            let [a, b, _] = soup.triangles[rng.usize(0..soup.triangles.len())];
+            let [a, b, _] = triangles.triangles[rng.usize(0..triangles.triangles.len())];
             let place = [a, (a + b) / 2.0, a.lerp(b, rng.f64())][rng.usize(0..3)];
             let direction = random_direction(rng);
             (place - direction * f64::from(rng.u32(1..40)), direction)
         }
         // At small triangles, and at large ones close to their edge.
         _ => {
-            let [a, b, c] = soup.triangles[rng.usize(0..soup.triangles.len())];
+            let [a, b, c] = triangles.triangles[rng.usize(0..triangles.triangles.len())];
             let (u, v) = (rng.f64() * 0.5, rng.f64() * [1e-9, 1e-3, 0.5][rng.usize(0..3)]);
             let place = a + (b - a) * u + (c - a) * v;
             let from = place + random_direction(rng) * 30.0;
@@ -196,15 +198,15 @@ fn rays_hit_what_is_drawn() {
     let mut figures = Figures::default();
     for (name, terrain) in dug_worlds().chain([("the landscape".to_string(), dug_landscape())]) {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(77));
-        let soup = Soup::of(world);
+        let triangles = Triangles::of(world);
         let rays = if name == "the landscape" { 4000 } else { 500 };
         for _ in 0..rays {
-            let (origin, direction) = random_ray(&mut rng, world, &soup);
+            let (origin, direction) = random_ray(&mut rng, world, &triangles);
             if direction.length() < 1e-9 {
                 continue;
             }
             let max = [f64::INFINITY, 1e6, 20.0, 3.0][rng.usize(0..4)];
-            check_ray(world, &soup, origin, direction, max, &mut figures, &name);
+            check_ray(world, &triangles, origin, direction, max, &mut figures, &name);
         }
     }
     println!("{figures:?}");
@@ -240,14 +242,14 @@ fn rays_slip_through_no_edge() {
     let mut rays = 0;
     for (name, terrain) in dug_worlds().chain([("small".to_string(), small_terrain())]) {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(12));
-        let soup = Soup::of(world);
+        let triangles = Triangles::of(world);
         let (width, depth) = (f64::from(world.grid().width()), f64::from(world.grid().depth()));
-        let heights = || soup.triangles.iter().flatten().map(|place| place.y);
+        let heights = || triangles.triangles.iter().flatten().map(|place| place.y);
         let (low, high) =
             (heights().fold(f64::MAX, f64::min) - 1.0, heights().fold(f64::MIN, f64::max) + 1.0);
         for _ in 0..1500 {
-            let first = if rng.bool() { soup.tiles.min(soup.triangles.len() - 1) } else { 0 };
-            let [a, b, _] = soup.triangles[rng.usize(first..soup.triangles.len())];
+            let first = if rng.bool() { triangles.tiles.min(triangles.triangles.len() - 1) } else { 0 };
+            let [a, b, _] = triangles.triangles[rng.usize(first..triangles.triangles.len())];
             let target = [a, (a + b) / 2.0, a.lerp(b, rng.f64()), a.lerp(b, 0.25)][rng.usize(0..4)];
             let slant = [0.0, 1e-9, 1e-3, 0.125, 1.0][rng.usize(0..5)];
             let direction = match rng.bool() {
@@ -288,17 +290,17 @@ fn rays_in_the_plane_of_a_triangle_end_on_the_surface() {
         terrain.apply([Brush::dig(Shape::sphere(place, 2.0))]);
     }
     let world = terrain.world();
-    let soup = Soup::of(world);
+    let triangles = Triangles::of(world);
     let mut hits = 0;
     for _ in 0..20_000 {
-        let [a, b, c] = soup.triangles[rng.usize(0..soup.triangles.len())];
+        let [a, b, c] = triangles.triangles[rng.usize(0..triangles.triangles.len())];
         let (p, q) = (a.lerp(b, rng.f64()), b.lerp(c, rng.f64()));
         let Some(direction) = (q - p).try_normalize() else { continue };
         let origin = p - direction * rng.f64() * 50.0;
         let Some(hit) = world.raycast(origin, direction, 1e3) else { continue };
         hits += 1;
-        let near = soup.near(hit.position, DVec3::Y).into_iter();
-        let apart = near.map(|number| distance_to(hit.position, soup.triangles[number as usize]));
+        let near = triangles.near(hit.position, DVec3::Y).into_iter();
+        let apart = near.map(|number| distance_to(hit.position, triangles.triangles[number as usize]));
         let apart = apart.fold(f64::INFINITY, f64::min);
         assert!(apart <= TOLERANCE, "ray from {origin:?} along {direction:?}: {hit:?} is {apart} voxels off");
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, larger, smaller};
 use super::sphere::ball;
-use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{difference, measure};
 
@@ -43,7 +43,7 @@ impl Capsule {
     }
 }
 
-impl Solid for Capsule<Units> {
+impl ShapeGeometry for Capsule<Units> {
     type Distance = CapsuleDistance;
 
     fn origin(&self) -> [i32; 3] {

@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, larger, length, smaller};
-use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{check_point, disc, measure, sum};
 
@@ -40,7 +40,7 @@ impl Cone {
     }
 }
 
-impl Solid for Cone<Units> {
+impl ShapeGeometry for Cone<Units> {
     type Distance = ConeDistance;
 
     fn origin(&self) -> [i32; 3] {

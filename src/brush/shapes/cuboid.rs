@@ -4,7 +4,7 @@ use glam::{IVec3, Mat3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, dot, larger, length, smaller};
-use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::matrix;
 
@@ -56,7 +56,7 @@ impl Cuboid {
     }
 }
 
-impl Solid for Cuboid<Units> {
+impl ShapeGeometry for Cuboid<Units> {
     type Distance = CuboidDistance;
 
     fn origin(&self) -> [i32; 3] {

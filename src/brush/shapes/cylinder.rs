@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, larger, length, smaller};
-use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{check_point, disc, measure, sum};
 
@@ -40,7 +40,7 @@ impl Cylinder {
     }
 }
 
-impl Solid for Cylinder<Units> {
+impl ShapeGeometry for Cylinder<Units> {
     type Distance = CylinderDistance;
 
     fn origin(&self) -> [i32; 3] {

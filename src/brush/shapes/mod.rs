@@ -52,7 +52,7 @@ use super::quantize::check_extent;
 use crate::lattice::ONE;
 
 /// What the world has to know of a shape in integers. All but `check` may rely on numbers that were checked.
-pub(super) trait Solid {
+pub(super) trait ShapeGeometry {
     /// Its distance function.
     type Distance: Distance;
 
@@ -106,7 +106,7 @@ macro_rules! shapes {
         /// A shape's distance function.
         #[derive(Clone, Debug)]
         pub(super) enum Form {
-            $($name(<$name<Units> as Solid>::Distance),)*
+            $($name(<$name<Units> as ShapeGeometry>::Distance),)*
         }
 
         /// The shapes' numbers, by which `kernels/shapes.cuh` knows them.

@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, length};
-use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 
 /// A ball.
@@ -37,7 +37,7 @@ impl Sphere {
     }
 }
 
-impl Solid for Sphere<Units> {
+impl ShapeGeometry for Sphere<Units> {
     type Distance = SphereDistance;
 
     fn origin(&self) -> [i32; 3] {

@@ -6,7 +6,7 @@ use glam::{IVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Axis, Distance, length};
-use super::{Convert, Extent, Kind, Numbers, Outline, Shape, Solid, Units, Voxels};
+use super::{Convert, Extent, Kind, Numbers, Outline, Shape, ShapeGeometry, Units, Voxels};
 use crate::brush::BrushError;
 use crate::brush::quantize::{disc, voxels};
 
@@ -50,7 +50,7 @@ impl Torus {
     }
 }
 
-impl Solid for Torus<Units> {
+impl ShapeGeometry for Torus<Units> {
     type Distance = TorusDistance;
 
     fn origin(&self) -> [i32; 3] {

@@ -21,7 +21,7 @@ struct StencilEditMemory {
 constexpr i32 LOOK = 8;
 
 // What an edit reads: the brick and what is around it, as they were before the launch.
-struct Surroundings {
+struct PaddedBrick {
     const StencilEditParams& params;
     StencilEditMemory& shared;
     // The brick's entry in the windows, and the way to its neighbours.
@@ -51,7 +51,7 @@ struct Surroundings {
         }
     }
 
-    // The nearest of the surroundings' columns along an axis that lies in the world.
+    // The nearest of the padded brick's columns along an axis that lies in the world.
     static __device__ i32 inside(i32 local, i32 brick, i32 last) {
         i32 low = brick * SIDE - 1;
         return smallest(largest(largest(local, -low), 0), largest(last - low, 0));
@@ -60,7 +60,7 @@ struct Surroundings {
     // The entry of a brick so far away.
     __device__ i32 brick_at(i32 dx, i32 dy, i32 dz) const { return dx * to_x + dy + dz * to_z; }
 
-    // A sample of the surroundings, counted from one before the brick's lowest.
+    // A sample of the padded brick, counted from one before the brick's lowest.
     __device__ Marked sample_around(i32 x, i32 y, i32 z, i32 low, i32 height) const {
         u32 ref = shared.refs[(((y + 7) >> 3) * 3 + ((z + 7) >> 3)) * 3 + ((x + 7) >> 3)];
         i32 raw = ref == NONE ? PRISTINE : params.edit.bricks[ref >> 1].samples[index_at(x - 1, y - 1, z - 1)];

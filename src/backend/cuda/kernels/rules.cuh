@@ -4,7 +4,7 @@
 #include "padded_brick.cuh"
 
 // What edits may not change, or not at once.
-struct RuleChecker : Surroundings {
+struct RuleChecker : PaddedBrick {
     // Is a protected box near?
     bool has_boxes;
 

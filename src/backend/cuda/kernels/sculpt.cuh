@@ -8,7 +8,7 @@
 // surface.
 typedef i32 Marked;
 
-// Samples of a brick's surroundings along a side: its own and one on each side. x fastest, then z, then y.
+// Samples along a side of a padded brick: its own and one on each side. x fastest, then z, then y.
 constexpr i32 AROUND = SIDE + 2;
 
 // Where stored densities end.
@@ -21,7 +21,7 @@ constexpr i32 SHARPER = ONE / 4;
 // Where distances to planes and stamps stop.
 constexpr i64 FARTHEST_PLANE = 1 << 25;
 
-// The place of one of the brick's own samples, or of one beside them, in its surroundings.
+// The place of one of the brick's own samples, or of one beside them, in the padded brick.
 __device__ inline i32 around_at(i32 x, i32 y, i32 z) { return ((y + 1) * AROUND + z + 1) * AROUND + x + 1; }
 
 __device__ inline i32 density(Marked sample) { return sample >> 2; }

@@ -9,7 +9,7 @@
 struct StencilEditor : RuleChecker {
     static constexpr bool LOOKS = true;
 
-    // Does an edit look around? If so, the surroundings are brought, which the block then has to wait for.
+    // Is there a stencil edit? If so, the padded brick is loaded, and the block has to wait for it.
     __device__ bool begin(const EditJob& job, const Stack& stack, u32 edit) {
         const SculptParams& sculpt = params.sculpt_params[edit];
         if (sculpt.stroke == PLAIN && sculpt.power < 0) return false;

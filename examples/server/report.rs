@@ -14,7 +14,7 @@ use crate::output::say;
 
 /// What happened so far.
 #[derive(Resource)]
-pub struct Ledger {
+pub struct Report {
     /// Brushes and steps that were answered.
     pub answered: u64,
     /// Lines that could not be read.
@@ -30,7 +30,7 @@ pub struct Ledger {
 
 /// Prints what comes in, and the summary when the program ends.
 pub fn add(app: &mut App, quiet: bool) {
-    let ledger = Ledger {
+    let report = Report {
         answered: 0,
         faults: 0,
         is_done: false,
@@ -40,22 +40,22 @@ pub fn add(app: &mut App, quiet: bool) {
         moved: (0, 0),
         start: Instant::now(),
     };
-    app.insert_resource(ledger)
+    app.insert_resource(report)
         .add_systems(Update, (enter_receipts, enter_steps).after(BurrowSystems::Commit))
         .add_systems(Last, sum_up.run_if(on_message::<AppExit>));
 }
 
-fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut ledger: ResMut<Ledger>) {
+fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut report: ResMut<Report>) {
     for BrushApplied { receipt, .. } in receipts.read() {
-        ledger.answered += 1;
-        ledger.scenarios.count(receipt);
+        report.answered += 1;
+        report.scenarios.count(receipt);
         let tag = receipt.tag;
         match &receipt.outcome {
             Ok(applied) => {
                 let (removed, added) = (applied.removed.total(), applied.added.total());
                 let painted = applied.painted.total();
-                ledger.moved = (ledger.moved.0 + removed, ledger.moved.1 + added);
-                if !ledger.quiet {
+                report.moved = (report.moved.0 + removed, report.moved.1 + added);
+                if !report.quiet {
                     let chunks = applied.chunks.len();
                     say(format_args!(
                         "brush {tag}: {removed} removed, {added} added, {painted} painted in {chunks} chunks"
@@ -63,8 +63,8 @@ fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut ledger: ResMut<
                 }
             }
             Err(rejection) => {
-                ledger.rejected += 1;
-                if !ledger.quiet {
+                report.rejected += 1;
+                if !report.quiet {
                     say(format_args!("brush {tag}: rejected, {rejection}"));
                 }
             }
@@ -72,26 +72,26 @@ fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut ledger: ResMut<
     }
 }
 
-fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut ledger: ResMut<Ledger>) {
+fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut report: ResMut<Report>) {
     for HistoryMoved { receipt, .. } in moves.read() {
-        ledger.answered += 1;
+        report.answered += 1;
         let name = steps::name(receipt.step);
         match &receipt.outcome {
-            Ok(restored) if !ledger.quiet => {
+            Ok(restored) if !report.quiet => {
                 say(format_args!(
                     "{name}: {} removed, {} added",
                     restored.removed.total(),
                     restored.added.total()
                 ));
             }
-            Err(why) if !ledger.quiet => say(format_args!("{name}: {why}")),
+            Err(why) if !report.quiet => say(format_args!("{name}: {why}")),
             _ => {}
         }
     }
 }
 
-fn sum_up(ledger: Res<Ledger>, figures: Res<BurrowFigures>, terrains: Query<&Terrain>) {
-    let Ledger { answered, rejected, scenarios, moved, start, .. } = &*ledger;
+fn sum_up(report: Res<Report>, figures: Res<BurrowFigures>, terrains: Query<&Terrain>) {
+    let Report { answered, rejected, scenarios, moved, start, .. } = &*report;
     say(format_args!("{answered} answered, {rejected} rejected, in {:.2} s", start.elapsed().as_secs_f64()));
     say(format_args!(
         "scenarios: {} created, {} changed, {} extended, {} merged, {} split over chunks",

@@ -11,7 +11,7 @@ pub const TOLERANCE: f64 = 1.0 / 256.0;
 pub const NUDGE: f64 = 1e-6;
 
 /// Everything drawn, sorted into squares of `SIDE` x `SIDE` voxels by the triangles' own bounds.
-pub struct Soup {
+pub struct Triangles {
     pub triangles: Vec<[DVec3; 3]>,
     /// How many triangles belong to tiles; they come first.
     pub tiles: usize,
@@ -22,22 +22,22 @@ pub struct Soup {
 
 const SIDE: i32 = 4;
 
-impl Soup {
+impl Triangles {
     pub fn of(world: &World) -> Self {
         let count = |cells: i32| cells / SIDE + 1;
         let (width, depth) = (count(world.grid().width()), count(world.grid().depth()));
         let squares = vec![Vec::new(); (width * depth) as usize];
-        let mut soup = Self { triangles: Vec::new(), tiles: 0, squares, width, depth };
+        let mut triangles = Self { triangles: Vec::new(), tiles: 0, squares, width, depth };
         for (drawn, mesh) in world.drawn() {
             let origin = world.origin(drawn).as_dvec3();
             if matches!(drawn, Drawn::Tile(_)) {
-                soup.tiles += mesh.indices.len() / 3;
+                triangles.tiles += mesh.indices.len() / 3;
             }
             for triangle in mesh.triangles() {
-                soup.add(triangle.map(|vertex| origin + vertex.position.as_dvec3() / f64::from(SNAP)));
+                triangles.add(triangle.map(|vertex| origin + vertex.position.as_dvec3() / f64::from(SNAP)));
             }
         }
-        soup
+        triangles
     }
 
     fn add(&mut self, triangle: [DVec3; 3]) {
