@@ -51,7 +51,7 @@ impl fmt::Debug for Commit {
 /// What a commit returns once it is installed.
 pub(super) struct Installed {
     pub receipts: Vec<Receipt>,
-    /// What became of a step through history, if the commit was one.
+    /// The receipt of a step through history, if the commit was one.
     pub step: Option<HistoryReceipt>,
     /// What each group replaced that replaced something.
     pub replaced: Vec<UndoDelta>,
@@ -68,7 +68,7 @@ impl Commit {
         &self.news
     }
 
-    /// What became of its edits, once this is committed.
+    /// The receipts of its edits.
     #[cfg(feature = "plugin")]
     pub(crate) fn receipts(&self) -> &[Receipt] {
         &self.receipts

@@ -1,4 +1,4 @@
-//! What the plugin asks of a terrain besides what a game may ask.
+//! The plugin's interface to a terrain, beside the public one.
 
 use super::commit::Commit;
 use super::history::{DeferredDrop, HistoryStep};

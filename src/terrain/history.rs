@@ -2,8 +2,8 @@
 //!
 //! A step holds the bricks, fields and words of the mask that one group of edits replaced: a stroke, or edits that were
 //! submitted together. Groups are independent of transactions: one transaction may hold many groups, and a stroke may take
-//! many transactions. Bricks are shared, so a step costs the bytes of those bricks that nobody else holds. Undo puts the old
-//! parts in place of the new ones, which are then what redo needs.
+//! many transactions. Bricks are shared, so a step costs only the bytes of bricks that are held by it alone. Undo swaps the old
+//! parts with the new ones, which redo then needs.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -33,20 +33,20 @@ pub struct History {
     pub bytes: usize,
 }
 
-/// What became of a step. Each one that was submitted gets exactly one.
+/// The result of a step. Each submitted step gets exactly one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HistoryReceipt {
-    /// Back or forth.
+    /// Undo or redo.
     pub step: HistoryStep,
     /// What it changed, or why it changed nothing.
     pub outcome: Result<Restored, HistoryRejection>,
 }
 
-/// What a step through history changed. Inventories that follow receipts have to follow this as well; what fell as loose
-/// pieces is among it here, though it is not among a receipt's `removed`.
+/// What a step through history changed. Inventories that follow receipts must follow this too. Loose pieces count here,
+/// although a receipt's `removed` leaves them out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Restored {
-    /// The tags of the brushes that it took back, or did again, in order; those that had changed nothing are left out.
+    /// The tags of the undone or redone brushes, in order, without those that had changed nothing.
     pub tags: Vec<u64>,
     /// Box around all samples that changed.
     pub bounds: Option<LatticeBox>,
@@ -62,10 +62,10 @@ pub struct Restored {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HistoryRejection {
-    /// Nothing was edited, all of it was undone, or the budget of bytes did not reach so far back.
+    /// Nothing was edited, everything was undone, or the budget of bytes was exceeded.
     #[error("there is nothing to undo")]
     NothingToUndo,
-    /// Nothing was undone since the last edit, or the budget of bytes had no room for it.
+    /// Nothing was undone since the last edit, or the budget of bytes was exceeded.
     #[error("there is nothing to redo")]
     NothingToRedo,
     /// The terrain was removed before the step's turn came, or the entity never had one.
@@ -74,7 +74,7 @@ pub enum HistoryRejection {
     /// Too much work [waits](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
-    /// Taking it panicked. The world is as it was before, and so is its history.
+    /// The step panicked. World and history are unchanged.
     #[error("the step panicked; this is a bug of the plugin's")]
     Panicked,
 }

@@ -1,4 +1,4 @@
-//! Queries of debug views: the parts of a world near a place, without a copy of the rest.
+//! Queries for debug views: the parts of a world near a place.
 
 use glam::{IVec3, Vec3};
 use rustc_hash::FxHashMap;

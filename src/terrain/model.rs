@@ -25,7 +25,7 @@ pub(super) const UNDO_BUDGET: usize = 64 << 20;
 /// The most untaken receipts that are kept; then the oldest are dropped.
 const KEPT_ANSWERS: usize = 1 << 16;
 
-/// Keeps one more answer.
+/// Keeps one more receipt.
 fn keep<T>(answers: &mut VecDeque<T>, answer: T) {
     if answers.len() == KEPT_ANSWERS {
         answers.pop_front();
@@ -43,13 +43,13 @@ pub struct StaleCommit;
 /// A world, the edits that wait for it, and the one transaction that may be under way.
 ///
 /// In a Bevy app it is a component, and the plugin runs its transactions: send `Brush` messages, or [`submit`](Self::submit)
-/// to it. Committing by oneself, with [`apply`](Self::apply) say, works too: what that changed is shown some frames later.
+/// to it. A game may also commit by itself, for example with [`apply`](Self::apply); the change is shown some frames later.
 ///
 /// The plugin keeps the scale of its `Transform` at the [size of its voxels](TerrainSettings::voxel_size), and overwrites
 /// any other; a parent may scale it further.
 ///
-/// To change levels, insert a new one on the same entity. Assigned through `&mut Terrain`, a new one is shown as well, but
-/// what waited in the old one goes without a receipt, and debris that fell from it stays.
+/// To change levels, insert a new one on the same entity. A terrain that is assigned through `&mut Terrain` is shown too, but
+/// edits that waited in the old one get no receipts, and its debris stays.
 pub struct Terrain {
     pub(super) world: Arc<World>,
     engine: Option<Engine>,
@@ -112,14 +112,14 @@ impl Terrain {
         })
     }
 
-    /// From now on, transactions run on this engine. The world is the same whichever it is. Without one of its own a
-    /// terrain runs on the processor, or on whatever the plugin has.
+    /// Sets the engine that runs later transactions. The result is the same on every engine. By default it is the plugin's, or
+    /// without the plugin the processor.
     pub fn set_engine(&mut self, engine: Engine) {
         self.engine = Some(engine);
     }
 
-    /// Edits that are submitted from now on obey these rules; those that wait or are under way keep theirs, and what is there
-    /// stays as it is. A journal is replayed exactly only if rules change at the same edits.
+    /// Sets the rules for edits that are submitted later. Edits that wait or are under way keep theirs. A journal is replayed
+    /// exactly only if rules change at the same edits.
     ///
     /// # Errors
     /// When the rules name [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND), which no ground has; nothing is changed
@@ -130,17 +130,17 @@ impl Terrain {
         Ok(())
     }
 
-    /// What edits may do; `None`: everything.
+    /// The rules for edits; `None` if there are none.
     pub fn rules(&self) -> Option<&DiggingRules> {
         self.rules.as_deref()
     }
 
-    /// The engine of its own, if it has one.
+    /// The engine that was set for this terrain.
     pub fn engine(&self) -> Option<&Engine> {
         self.engine.as_ref()
     }
 
-    /// Metres along a voxel's side.
+    /// The side of a voxel, in metres.
     pub fn voxel_size(&self) -> f32 {
         self.voxel_size
     }
@@ -156,13 +156,13 @@ impl Terrain {
         Arc::clone(&self.world)
     }
 
-    /// Edits that are submitted from now on look for pieces of ground that they cut off, and receipts list them; `None`
-    /// turns that off, as it is at first. A terrain whose world has to be the same elsewhere needs the same settings there.
+    /// Lets edits that are submitted later search for pieces of ground that they cut off, which receipts then list. `None`, the
+    /// default, turns that off. Terrains that must have equal worlds need equal settings.
     pub fn set_loose(&mut self, settings: Option<LooseSettings>) {
         self.loose = settings;
     }
 
-    /// What edits look for, if they do.
+    /// The settings of the search for loose pieces.
     pub fn loose(&self) -> Option<&LooseSettings> {
         self.loose.as_ref()
     }
@@ -269,8 +269,8 @@ impl Terrain {
         }
     }
 
-    /// Will no queued or running edit change these samples? A queued step through history counts as reaching all that history
-    /// reaches. Loose pieces are not foreseen: what an edit cuts off may reach farther than the edit.
+    /// Whether no queued or running edit changes these samples. A queued step counts as reaching everything in the history.
+    /// Loose pieces are not predicted: a piece may reach farther than the edit that cuts it off.
     pub fn is_ready(&self, bounds: LatticeBox) -> bool {
         let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
             Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),

@@ -1,8 +1,8 @@
-//! The law of order: what a terrain makes of what it was asked for depends on the order in which it was asked, and on nothing
-//! else: not on frames, on when transactions begin or are given up, on where they are cut, or on threads.
+//! The law of order: the result depends only on the order of submissions, and not on frames, threads, or when transactions
+//! begin, are abandoned or are split.
 //!
-//! A random script is played twice by terrains that are as irregular as can be, and once by a plain model that does one edit
-//! after the other, undoes by single edits, and groups by itself. `BURROW_WORLDS` says how many scripts.
+//! A random script is played twice with irregular transactions, and once by a simple model that applies one edit after the
+//! other, undoes single edits, and groups them itself. `BURROW_WORLDS` is the number of scripts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::ground::Ground;
 use crate::volume::DiggingRules;
 use crate::worlds;
 
-/// What a terrain is asked for.
+/// A request to a terrain.
 #[derive(Clone, Debug)]
 enum Ask {
     /// A brush, sent in a frame.
@@ -72,7 +72,7 @@ fn in_short(script: &[Ask]) -> String {
     script.iter().map(word).collect::<Vec<_>>().join(", ")
 }
 
-/// All that a terrain has to say.
+/// All results of a terrain.
 #[derive(Debug, Default, PartialEq)]
 struct Said {
     /// By tag.
@@ -91,7 +91,7 @@ impl Said {
     }
 }
 
-/// Plays a script as irregularly as can be. Returns which asks were taken, and what was said.
+/// Plays a script with irregular transactions. Returns which requests were accepted, and the results.
 fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rng) -> (Vec<Ask>, Said) {
     let (mut taken, mut said) = (Vec::new(), Said::default());
     let mut frames: BTreeMap<usize, Together> = BTreeMap::new();
@@ -154,7 +154,7 @@ fn play(mut terrain: Terrain, script: &[Ask], pools: &[ThreadPool], rng: &mut Rn
     (taken, said)
 }
 
-/// Plays a script by the book: one edit after the other, each a step by itself. A group is a list of edits that changed
+/// Plays a script with the simple model: one edit after the other, each a step by itself. A group is a list of edits that changed
 /// something.
 fn by_the_book(mut terrain: Terrain, script: &[Ask]) -> (BTreeMap<u64, Receipt>, Vec<Option<Vec<u64>>>, u64) {
     #[derive(PartialEq, Clone, Copy)]

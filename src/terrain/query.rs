@@ -1,4 +1,4 @@
-//! Questions about the ground, answered from the same triangles that are drawn, without a physics engine.
+//! Queries about the ground, answered from the triangles that are drawn, without a physics engine.
 
 use glam::{DVec3, IVec3, Vec3};
 
@@ -13,17 +13,17 @@ use crate::lattice::{Column, LIMIT, LatticeBox};
 pub struct RayHit {
     /// Voxels from the ray's origin.
     pub distance: f64,
-    /// The place, in voxels.
+    /// The position, in voxels.
     pub position: DVec3,
     /// Unit normal of the triangle, towards the air.
     pub normal: Vec3,
-    /// What the ground is made of there.
+    /// The material of the ground there.
     pub material: MaterialId,
-    /// Did the ray come from inside the ground?
+    /// Whether the ray came from inside the ground.
     pub from_inside: bool,
 }
 
-/// A stretch of air over a point: in voxels when a `World` is asked, in metres when a game asks `Terrains`.
+/// A stretch of air above a point: in voxels from a `World`, in metres from `Terrains`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
     /// The ground below it.
@@ -43,7 +43,7 @@ impl World {
     /// ground. `None` for a ray that meets none, and for one whose numbers are not finite or whose direction is
     /// zero.
     pub fn raycast(&self, origin: DVec3, direction: DVec3, max_distance: f64) -> Option<RayHit> {
-        // Scaled first: only its direction counts, not whether its length fits a number.
+        // Scaled first, so that very long and very short vectors work too.
         let direction = (direction / direction.abs().max_element()).try_normalize()?;
         if !origin.is_finite() || max_distance.is_nan() || max_distance < 0.0 {
             return None;
@@ -153,15 +153,15 @@ impl World {
         self.spans(x, z).last().map(|span| span.floor)
     }
 
-    /// Is the place inside the ground? Places outside the world are not, and neither is one that is no number.
+    /// Whether the place is inside the ground. False outside the world, and for NaN.
     pub fn is_solid(&self, place: DVec3) -> bool {
         let spans = self.spans(place.x, place.z);
         let is_open = |span: &Span| span.floor <= place.y && span.ceiling.is_none_or(|top| place.y <= top);
         !place.y.is_nan() && !spans.is_empty() && !spans.iter().any(is_open)
     }
 
-    /// Is the place in a cell of nothing but ground? Faster than [`is_solid`](Self::is_solid), which is true of it then,
-    /// and of places nearer to the surface.
+    /// Whether all samples around the place are solid. Faster than [`is_solid`](Self::is_solid), which is also true nearer to
+    /// the surface.
     pub fn is_buried(&self, place: DVec3) -> bool {
         let limit = DVec3::splat(f64::from(LIMIT));
         let cell = place.clamp(-limit, limit).floor().as_ivec3();

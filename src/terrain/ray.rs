@@ -1,4 +1,4 @@
-//! Rays against triangles, without slips.
+//! Watertight intersection of rays and triangles.
 
 use glam::DVec3;
 
@@ -8,8 +8,7 @@ pub(super) const NEAR: f64 = 1e-6;
 /// A drawn triangle, in voxels.
 pub(super) type Triangle = [DVec3; 3];
 
-/// A ray, ready to be tested against triangles so that none slips through between two, and none is met where it is
-/// not: *Watertight Ray/Triangle Intersection* (Woop, Benthin and Wald 2013). Triangles that share an edge compute the
+/// A ray prepared for watertight intersection tests, by *Watertight Ray/Triangle Intersection* (Woop, Benthin and Wald 2013). Triangles that share an edge compute the
 /// same number for it, and a distance is always a mean of those of the corners.
 pub(super) struct Ray {
     origin: DVec3,

@@ -1,11 +1,11 @@
-//! Receipts: what became of a brush.
+//! Receipts: the result of a brush.
 
 use super::loose::LoosePiece;
 use crate::brush::BrushError;
 use crate::lattice::{ChunkPos, LatticeBox};
 use crate::volume::{FieldId, MaterialCounts, Refused, Scenario};
 
-/// What became of a brush. Each one that was submitted gets exactly one receipt.
+/// The result of a brush. Each submitted brush gets exactly one receipt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Receipt {
     /// The brush's tag.
@@ -52,7 +52,7 @@ pub struct ChunkScenario {
     pub field: FieldId,
 }
 
-/// Why a brush was rejected. Nothing was changed then.
+/// Why a brush was rejected. A rejected brush changes nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Rejection {
@@ -65,7 +65,7 @@ pub enum Rejection {
     /// The brush reaches no column of the world.
     #[error("the brush lies outside the world")]
     OutsideWorld,
-    /// Too much work [waits](super::WorkLimits::waiting) already.
+    /// Too much work is [waiting](super::WorkLimits::waiting).
     #[error("too much work waits already")]
     Overloaded,
     /// Applying it panicked. The others of its transaction were applied without it.
@@ -73,7 +73,7 @@ pub enum Rejection {
     Panicked,
 }
 
-/// How often each of the paper's scenarios took place.
+/// The number of times that each of the paper's scenarios occurred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct ScenarioCounts {
     /// 1: fields created.

@@ -1,4 +1,4 @@
-//! What the surface of one tile or chunk is made from, without the rest of the world.
+//! The input for the surface of one tile or chunk, without the rest of the world.
 
 #[cfg(any(feature = "plugin", test))]
 use std::borrow::Cow;

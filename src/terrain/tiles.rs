@@ -1,4 +1,4 @@
-//! Tiles that a transaction touches: which, and what they draw now.
+//! The tiles that a transaction touches, and their new surfaces.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -139,7 +139,7 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
         let old = world.rings.get(&tile).map_or(&nothing, Arc::as_ref);
         let rings = |borders: &Borders| Arc::new(old.updated(view, tile, borders, &patches));
         let update = TileUpdate::new(world, view, tile, rings);
-        // Here, and not on the thread that asks for them.
+        // Computed here, in the task.
         update.indices();
         (tile, update)
     })

@@ -19,7 +19,7 @@ use crate::volume::{Brick, Bricks, Fields, SampleView, UniformBricks};
 /// The pool of uniform bricks is not cleaned up while it holds fewer kinds.
 const FEW_KINDS: usize = 64;
 
-/// Something that is drawn.
+/// A mesh of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Drawn {
     /// A tile of the heightmap.
@@ -204,7 +204,7 @@ impl World {
         self.surfaces.keys().copied()
     }
 
-    /// Does the chunk draw something?
+    /// Whether the chunk draws something.
     #[cfg(feature = "plugin")]
     pub(crate) fn draws(&self, chunk: ChunkPos) -> bool {
         self.surfaces.contains_key(&chunk)
@@ -236,7 +236,7 @@ impl World {
         tiles.chain(chunks.into_iter().map(|chunk| (Drawn::Chunk(chunk), self.chunk_mesh(chunk))))
     }
 
-    /// Is everything that is drawn one closed surface? Looks at each triangle of the world.
+    /// Checks that everything that is drawn is one closed surface. Visits each triangle of the world.
     pub fn check_seams(&self) -> SeamReport {
         let mut checker = SeamChecker::default();
         for (drawn, mesh) in self.drawn() {

@@ -1,4 +1,4 @@
-//! One material for a terrain, whichever it is: put it on the terrain's entity.
+//! A material of any type for a terrain.
 
 use std::marker::PhantomData;
 
@@ -6,11 +6,10 @@ use bevy::prelude::*;
 
 use crate::plugin::propagate_with_pieces;
 
-/// Hands the `MeshMaterial3d<M>` of a terrain's entity on to its tiles, chunks and
-/// [pieces](crate::plugin::GroundPiece), again whenever it changes, and takes it off with the terrain's. A piece that comes
-/// with its own keeps that until the terrain's changes.
+/// Propagates the `MeshMaterial3d<M>` of a terrain's entity to its tiles, chunks and [pieces](crate::plugin::GroundPiece), also
+/// when it changes or is removed. A piece that is spawned with its own keeps it until the terrain's changes.
 ///
-/// `BurrowPlugins` has it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
+/// `BurrowPlugins` contain it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
 /// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
 /// [`ATTRIBUTE_MATERIAL_IDS`](crate::plugin::ATTRIBUTE_MATERIAL_IDS) and
 /// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders.

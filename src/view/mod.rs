@@ -1,7 +1,7 @@
 //! How the ground looks: materials on tiles, chunks and pieces.
 //!
 //! A [`GroundLook`] on the terrain draws layers of texture, chosen by what the ground is made of, how steep it is, and how
-//! deep below the surface that was there before anyone dug. [`GroundTextures`] are painted at the start, or a game's own.
+//! deep below the pristine surface. [`GroundTextures`] are painted at the start, or are a game's own.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -18,10 +18,10 @@
 //! }
 //! ```
 //!
-//! Bevy's renderer must be there first: `add_plugins((DefaultPlugins, BurrowPlugins))`. The other way round no
-//! [`GroundLook`] is drawn, and an error says so; other materials are handed on in any order.
+//! Add Bevy's renderer first: `add_plugins((DefaultPlugins, BurrowPlugins))`. In the other order no [`GroundLook`] is drawn,
+//! and an error is logged; other materials work in any order.
 //!
-//! A game that has a material of its own puts that on the terrain instead, and adds a [`TerrainMaterialPlugin`] for it:
+//! To use a material of your own, put it on the terrain instead, and add a [`TerrainMaterialPlugin`] for its type:
 //!
 //! ```no_run
 //! # use bevy::prelude::*;

@@ -1,15 +1,15 @@
 //! Loose pieces: ground that digging cut off from the world.
 //!
-//! **What is connected.** Two solid samples that are neighbours along an axis, six for each sample. That is what the
-//! surface connects as well: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples,
+//! **Connected** are solid samples that are neighbours along an axis, six for each sample. The surface connects the same
+//! ones: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples,
 //! and separates solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a
 //! path inside the drawn surface connects them.
 //!
-//! **What is anchored.** A piece that reaches ground below everything that was ever edited. The world's sides anchor
+//! **Anchored** is a piece that reaches ground below everything that was ever edited. The world's sides anchor
 //! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further, which bounds
 //! the search; its result does not depend on the order of the search.
 //!
-//! **What is taken out.** The samples of a piece get the density of air in the middle of a dig, and so does air that touches
+//! **Removal.** The samples of a removed piece get the density of air in the middle of a dig, and so does air that touches
 //! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs to
 //! the edit that cut the piece off: it is hashed, undone and replayed with it.
 
@@ -30,10 +30,10 @@ use crate::volume::{DiggingRules, MaterialCounts, SampleView};
 use bits::{SIDES, Samples};
 use search::{Component, Solid};
 
-/// What to look for after a dig, and what to do with it.
+/// Which loose pieces to search for after a dig, and what happens to them.
 ///
-/// With these, each edit that can remove ground looks for what it cut off before the next edit applies: the world is the
-/// same however edits were batched, as long as the settings are.
+/// Each edit that can remove ground is followed by a search before the next edit applies, so the result does not depend on how
+/// edits are batched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
@@ -54,7 +54,7 @@ impl Default for LooseSettings {
 }
 
 impl LooseSettings {
-    /// What becomes of a piece of so many voxels.
+    /// The fate of a piece of so many voxels.
     fn fate(&self, voxels: u64) -> PieceFate {
         if voxels <= u64::from(self.crumbs) {
             PieceFate::Removed
@@ -66,7 +66,7 @@ impl LooseSettings {
     }
 }
 
-/// What became of a loose piece.
+/// What happened to a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PieceFate {
     /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`] protect a part.
@@ -89,7 +89,7 @@ pub struct Run {
 /// A piece of ground that is not connected to the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoosePiece {
-    /// What became of it.
+    /// What happened to it.
     pub fate: PieceFate,
     /// Box around its samples.
     pub bounds: LatticeBox,

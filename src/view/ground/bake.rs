@@ -17,7 +17,7 @@ use super::palette::{Point, RECIPES, Recipe, Scatter};
 /// Texels along a side of the solid noise.
 const SOLID: u32 = 64;
 
-/// How far a bake has come, shared with its task.
+/// The progress of a bake, shared with its task.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meter(Arc<AtomicUsize>);
 
@@ -32,7 +32,7 @@ impl Meter {
     }
 }
 
-/// What a bake gives.
+/// The result of a bake.
 pub(super) struct Baked {
     pub albedo: Image,
     pub relief: Image,
@@ -142,7 +142,7 @@ fn paint(recipe: &Recipe, number: u32, side: u32) -> (Vec<u8>, Vec<u8>) {
     (levels(albedo, side, true), levels(relief, side, false))
 }
 
-/// Lays blades over a layer, the later ones on top; what crosses a border comes in on the other side.
+/// Draws blades over a layer, later ones on top, repeating across its borders.
 fn scatter_blades(points: &mut [Point], side: u32, scatter: &Scatter, seed: u32) {
     let [length, width] = scatter.size.map(|part| part * side as f32);
     for blade in 0..scatter.count as i32 {

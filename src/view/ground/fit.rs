@@ -1,4 +1,4 @@
-//! Do a game's own images fit what the ground is drawn with?
+//! Checks whether a game's own images fit the ground's bindings.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use bevy::render::render_resource::{
 
 use super::look::{GroundLook, MAX_LAYERS};
 
-/// Why a game's own images are not used: what [`GroundLoading::failure`](super::GroundLoading::failure) tells.
+/// Why a game's own images are not used; see [`GroundLoading::failure`](super::GroundLoading::failure).
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GroundTexturesError {
@@ -23,7 +23,7 @@ pub enum GroundTexturesError {
         /// What Bevy says.
         source: Arc<AssetLoadError>,
     },
-    /// An image is no array of layers, but an ordinary picture, say.
+    /// An image is not an array of layers, but for example an ordinary picture.
     #[error("the {image} is no array of layers but {view:?}: GroundArrays makes arrays of ordinary pictures")]
     NoArray {
         /// `albedo` or `relief`.
@@ -106,7 +106,7 @@ pub(super) fn layers(
     Ok(count.unwrap_or(texture.array_layer_count().saturating_sub(first)))
 }
 
-/// Is the sampler of an image anisotropic? The app's default one may be.
+/// Whether the sampler of an image is anisotropic, as the app's default one may be.
 pub(super) fn is_anisotropic(image: &Image) -> bool {
     match &image.sampler {
         ImageSampler::Default => true,
@@ -114,7 +114,7 @@ pub(super) fn is_anisotropic(image: &Image) -> bool {
     }
 }
 
-/// Why arrays that can be drawn with are hardly what was meant.
+/// Why usable arrays are probably a mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ArrayMismatch {
     #[error("albedo has {albedo} layers, relief {relief}")]

@@ -1,12 +1,12 @@
-//! Settings: how a terrain's ground looks.
+//! The settings of a terrain's look.
 
 use bevy::prelude::*;
 
 /// Most layers of a ground; ids from the last one on share it.
 pub const MAX_LAYERS: usize = 16;
 
-/// How a terrain's ground looks: put it on the terrain's entity instead of a material, and
-/// [`GroundPlugin`](super::GroundPlugin) makes and keeps its [`GroundMaterial`](super::GroundMaterial).
+/// The look of a terrain's ground. Put it on the terrain's entity instead of a material, and
+/// [`GroundPlugin`](super::GroundPlugin) creates and updates its [`GroundMaterial`](super::GroundMaterial).
 ///
 /// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures: [`GroundTextures`](super::GroundTextures).
 /// Changes made before `PostUpdate` show in the same frame, on the terrain's pieces too.
@@ -23,16 +23,15 @@ pub const MAX_LAYERS: usize = 16;
 pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,
-    /// What lies below the ground, and shows where it is dug.
+    /// The strata below the surface, which show where it is dug.
     pub strata: GroundStrata,
-    /// Where the ground is steeper than this, the skin of grass or snow gives way to what is below: rise over run at
-    /// which it begins to, and at which none is left.
+    /// The slopes (rise over run) at which skins such as grass and snow begin to disappear, and at which they are gone.
     pub cliffs: (f32, f32),
-    /// Metres from the eye within which layers are drawn near, and beyond which they are drawn far, six times as large.
+    /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it.
     pub distance: (f32, f32),
-    /// How much tints differ from place to place, 0 to 1.
+    /// The variation of tints from place to place, 0 to 1.
     pub variety: f32,
-    /// How many texels a pixel may cost.
+    /// The texture fetches per pixel.
     pub quality: GroundQuality,
 }
 
@@ -42,16 +41,15 @@ pub struct GroundLook {
 pub struct GroundLayer {
     /// Metres that its texture covers.
     pub metres: f32,
-    /// How strong its relief is: 1 as its texture says, 0 flat.
+    /// The strength of its relief: 1 as in its texture, 0 flat.
     pub relief: f32,
     /// How metallic it is, 0 to 1.
     pub metallic: f32,
     /// Its colours are multiplied by this.
     pub tint: LinearRgba,
-    /// What it does below the surface, where it is the ground's own material and was not built.
+    /// How it continues below the surface, where the ground was not built.
     pub kind: GroundLayerKind,
-    /// The layer of the textures that floors and ceilings show instead: for what lies in beds, whose laminae run along
-    /// walls and not over floors.
+    /// The texture layer for floors and ceilings, if it differs: bedded rock shows its laminae on walls only.
     pub top: Option<u8>,
 }
 
@@ -68,20 +66,20 @@ impl Default for GroundLayer {
     }
 }
 
-/// What a layer does below the surface.
+/// How a layer continues below the surface.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default)]
 pub enum GroundLayerKind {
     /// The same all the way down.
     #[default]
     Body,
-    /// Only on the surface, like grass: below, and on cliffs, lies what the [`GroundStrata`] say.
+    /// Only on the surface, like grass. Below, and on cliffs, the [`GroundStrata`] show.
     Skin,
-    /// Stands for all that the [`GroundStrata`] say.
+    /// Replaced by the [`GroundStrata`].
     Strata,
 }
 
-/// What the ground is made of, from the surface down. Layers are given by number.
+/// The strata from the surface down. Layers are given by number.
 #[derive(Reflect, Clone, Debug, PartialEq)]
 #[reflect(Default)]
 pub struct GroundStrata {
@@ -89,17 +87,16 @@ pub struct GroundStrata {
     pub soil: (u8, f32),
     /// The layer below the soil, and how thick it is in metres.
     pub subsoil: (u8, f32),
-    /// Rock below, in beds that repeat from bottom to top: layers, each about a quarter of the whole. The first one also
-    /// crusts natural faces, here and there.
+    /// The beds of rock below: four layers of about equal thickness that repeat. The first one also appears as a crust on
+    /// natural faces.
     pub beds: [u8; 4],
-    /// Metres from one bed to its repetition.
+    /// The height in metres after which the beds repeat.
     pub height: f32,
-    /// How far beds are bent, in metres.
+    /// The amplitude by which beds are bent, in metres.
     pub bend: f32,
-    /// A thin seam that lies in the beds: its layer, how thick it is (0: there is none), and the depth in metres from which
-    /// on it is there.
+    /// A thin seam within the beds: its layer, its thickness in metres (0 for none), and the depth in metres where it begins.
     pub seam: (u8, f32, f32),
-    /// Veins that run through the rock: their layer, how thick they are (0 none, 1 much), and from which depth on.
+    /// Veins in the rock: their layer, their thickness (0 none, 1 most), and the depth in metres where they begin.
     pub vein: (u8, f32, f32),
 }
 
@@ -118,8 +115,8 @@ impl Default for GroundStrata {
     }
 }
 
-/// How many texels a pixel of the ground may cost. Each layer is laid on from all sides that show: one where the
-/// ground is level, two on most slopes.
+/// The texture fetches per pixel. Each layer is projected from every side that the surface faces: one on level ground, two on
+/// most slopes.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default)]
 pub enum GroundQuality {
@@ -131,7 +128,7 @@ pub enum GroundQuality {
 }
 
 impl Default for GroundLook {
-    /// For the textures that [`GroundTextures::Baked`](super::GroundTextures::Baked) stands for.
+    /// The look for [`GroundTextures::Baked`](super::GroundTextures::Baked).
     fn default() -> Self {
         let layer = |metres, relief, kind| GroundLayer { metres, relief, kind, ..default() };
         let body = |metres| layer(metres, 1.0, GroundLayerKind::Body);

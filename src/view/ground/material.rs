@@ -17,7 +17,7 @@ use crate::plugin::{
     ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };
 
-/// What terrains with a [`GroundLook`] are drawn with: Bevy's own material, whose colour, roughness and relief come from
+/// The material of terrains with a [`GroundLook`]: Bevy's `StandardMaterial`, whose colour, roughness and relief come from
 /// layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do there.
 ///
 /// Meshes without the attributes of a terrain show layer 0.
@@ -41,11 +41,11 @@ pub struct GroundExtension {
     #[texture(105, dimension = "3d")]
     #[sampler(106)]
     pub(super) noise: Option<Handle<Image>>,
-    /// Are albedo and relief read with the sampler of the noise, which is not anisotropic?
+    /// Whether albedo and relief are read with the sampler of the noise, which is not anisotropic.
     pub(super) without_anisotropy: bool,
 }
 
-/// What of a [`GroundExtension`] its pipeline is made for.
+/// The part of a [`GroundExtension`] that selects its pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GroundKey {
     without_anisotropy: bool,
@@ -75,7 +75,7 @@ pub(super) struct TintUniform {
     top: f32,
 }
 
-/// What the shader reads of a [`GroundLook`]; as `ground.wgsl` has it.
+/// The uniform buffer of a [`GroundLook`], as in `ground.wgsl`.
 #[derive(ShaderType, Clone, Debug, PartialEq)]
 pub(super) struct GroundUniform {
     /// From world space to metres of the terrain; of a piece, from its mesh to these metres.

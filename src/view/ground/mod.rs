@@ -1,12 +1,11 @@
-//! Ground that looks like ground: layers of texture, chosen by what was painted, by steepness, and by depth below the
-//! surface that was there before anyone dug.
+//! The look of the ground: layers of texture, chosen by material, slope, and depth below the pristine surface.
 //!
-//! | part | what it is |
+//! | part | content |
 //! | --- | --- |
 //! | [`GroundLook`] | a terrain's settings; put it on the terrain instead of a material |
 //! | [`GroundTextures`] | which textures: baked by the project, or a game's own |
-//! | [`GroundLoading`] | how far they are, and why a game's own are not used |
-//! | [`GroundMaterial`] | what comes of it |
+//! | [`GroundLoading`] | their progress, and why a game's own are not used |
+//! | [`GroundMaterial`] | the resulting material |
 //!
 //! # How layers meet
 //!

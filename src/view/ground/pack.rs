@@ -1,4 +1,4 @@
-//! A game's own pictures, packed into the arrays that the ground is drawn with.
+//! Packs a game's own pictures into the texture arrays of the ground.
 
 use bevy::image::IntoDynamicImageError;
 use bevy::prelude::*;
@@ -83,7 +83,7 @@ pub enum GroundArraysError {
     },
 }
 
-/// What [`GroundTextures::Images`] holds, made of a game's own pictures, with all mip levels.
+/// Texture arrays for [`GroundTextures::Images`], packed from a game's own pictures, with all mip levels.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! Pieces look as their terrain does: each has a material of its own, which knows where in the ground it was.
+//! Materials of pieces: each has its own, which contains the piece's origin in the ground.
 
 use bevy::prelude::*;
 
@@ -7,12 +7,12 @@ use super::material::{GroundExtension, GroundMaterial};
 use crate::plugin::{GroundPiece, Inherited};
 use crate::terrain::Terrain;
 
-/// What a piece of this terrain is drawn with.
+/// The material extension of a piece of this terrain.
 fn of_piece(terrain: &GroundExtension, piece: &GroundPiece) -> GroundExtension {
     GroundExtension { uniform: terrain.uniform.clone().of_piece(piece.origin), ..terrain.clone() }
 }
 
-/// Gives each new piece its material.
+/// Inserts the material of each new piece.
 pub(super) fn add_materials(
     mut commands: Commands,
     bare: Query<(Entity, &GroundPiece), Without<MeshMaterial3d<GroundMaterial>>>,
@@ -29,7 +29,7 @@ pub(super) fn add_materials(
     }
 }
 
-/// Pieces follow their terrain's look and textures; those of a terrain that is gone keep what they have.
+/// Updates pieces when their terrain's look or textures change. Pieces of a removed terrain keep theirs.
 pub(super) fn follow(
     changed: Query<
         &MeshMaterial3d<GroundMaterial>,
@@ -49,7 +49,7 @@ pub(super) fn follow(
         let terrain = changed.get(piece.terrain).ok().filter(|&terrain| terrain != own);
         let Some(terrain) = terrain.and_then(|terrain| materials.get(&terrain.0)) else { continue };
         let extension = of_piece(&terrain.extension, piece);
-        // Most terrains that only moved change nothing: where they are is no matter to a piece.
+        // A terrain that only moved changes nothing for its pieces.
         if let Some(mut own) = materials.get_mut(&own.0)
             && own.extension != extension
         {
