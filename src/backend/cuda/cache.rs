@@ -1,4 +1,4 @@
-//! Places for records on the device: which of them are taken, and which to give up when they run out.
+//! A cache of records on the device: which slots are in use, and which to evict when they run out.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
@@ -13,31 +13,31 @@ pub(super) struct RecordCache {
     record: usize,
     /// Where the first one is.
     base: u64,
-    /// Most slots there may be.
+    /// The largest number of slots.
     most: usize,
     slots: Vec<Slot>,
     free: Vec<u32>,
     round: u32,
-    /// Where to look next for a slot that can be given up.
+    /// Where to search next for a slot to evict.
     hand: usize,
 }
 
-/// A place. Threads put things into several at once.
+/// A slot. Threads fill several at once.
 #[derive(Default)]
 struct Slot {
-    /// What is in it, as a number that is never used again; 0 for nothing.
+    /// The tag of its content, which is never used again; 0 for none.
     stamp: AtomicU64,
-    /// In which round it was used last.
+    /// The round in which it was last used.
     used: AtomicU32,
 }
 
 /// How many slots are looked at for ones that can be given up before there may be enough.
 const PIECE: usize = 1 << 14;
 
-/// RecordCache at the start: growing takes half a millisecond of the transaction that needs more, so first digs should not.
+/// Slots at the start. Growing takes half a millisecond, so first digs should not need it.
 const FIRST: usize = 1 << 14;
 
-/// From how many slots on they are taken side by side.
+/// From how many slots on they are taken in parallel.
 const LONG: usize = 1 << 10;
 
 /// The first of so many numbers that no other record of this process has.
@@ -78,14 +78,14 @@ impl RecordCache {
         self.round = self.round.wrapping_add(1).max(1);
     }
 
-    /// The slot of a tag, if what was put there still is.
+    /// The slot of a tag, if its content is still there.
     pub fn find(&self, tag: u64) -> Option<u32> {
         let number = tag as u32 & ((1 << SLOT_BITS) - 1);
         let slot = self.slots.get(number as usize)?;
         if tag == 0 || slot.stamp.load(Ordering::Relaxed) != tag >> SLOT_BITS {
             return None;
         }
-        // Threads come to the same bricks. What they only read they need not pass on to each other.
+        // Threads find the same bricks: writing only changed rounds avoids sharing cache lines.
         if slot.used.load(Ordering::Relaxed) != self.round {
             slot.used.store(self.round, Ordering::Relaxed);
         }
@@ -101,7 +101,7 @@ impl RecordCache {
         Ok((slot, self.put(slot, stamps(1))))
     }
 
-    /// RecordCache for all entries of a list, or none: slots with their tags come into `taken`, and what `with` makes of entries and
+    /// Takes slots for all entries of a list, or none: slots with their tags come into `taken`, and what `with` makes of entries and
     /// their slots into `out`.
     pub fn take_many<T: Sync, R: Send>(
         &mut self,
@@ -127,7 +127,7 @@ impl RecordCache {
         Ok(())
     }
 
-    /// Sees to it that so many slots are free; returns how many others are.
+    /// Ensures that so many slots are free, and returns how many others are.
     fn make_room(&mut self, device: &mut dyn Device, count: usize) -> Result<usize, Fault> {
         let full = Fault::Budget(self.most * self.record);
         if count > self.most {
@@ -140,7 +140,7 @@ impl RecordCache {
         self.free.len().checked_sub(count).ok_or(full)
     }
 
-    /// Puts something into a slot; returns its tag.
+    /// Fills a slot and returns its tag.
     fn put(&self, number: u32, stamp: u64) -> u64 {
         let slot = &self.slots[number as usize];
         slot.stamp.store(stamp, Ordering::Relaxed);

@@ -1,13 +1,13 @@
-//! Lists that threads work on side by side where they are long.
+//! Lists that are processed in parallel if they are long.
 
 use rayon::prelude::*;
 
-/// Maps a list, side by side where it is long.
+/// Maps a list, in parallel if it is long.
 pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
     if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
 }
 
-/// Maps the entries of a short list, side by side where it has several.
+/// Maps the entries of a short list in parallel if it has several.
 pub(super) fn map_into<T: Send, R: Send>(list: Vec<T>, work: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
     if list.len() < 2 {
         list.into_iter().map(work).collect()
@@ -16,7 +16,7 @@ pub(super) fn map_into<T: Send, R: Send>(list: Vec<T>, work: impl Fn(T) -> R + S
     }
 }
 
-/// Maps the numbers below `end`, side by side where there are many.
+/// Maps the numbers below `end`, in parallel if there are many.
 pub(super) fn map_numbers<R: Send>(
     end: usize,
     many: usize,
@@ -25,7 +25,7 @@ pub(super) fn map_numbers<R: Send>(
     if end < many { (0..end).map(work).collect() } else { (0..end).into_par_iter().map(work).collect() }
 }
 
-/// Writes what `work` makes of each entry of a list, side by side where it is long.
+/// Writes the result of `work` for each entry of a list, in parallel if it is long.
 pub(super) fn fill<T: Sync, R: Send>(
     list: &[T],
     out: &mut [R],
@@ -42,7 +42,7 @@ pub(super) fn fill<T: Sync, R: Send>(
 /// Entries of a list that a thread works on at a time.
 const PIECE: usize = 256;
 
-/// Works on a list as a whole, or piece by piece and side by side where it is long; `work` gets the number of a piece's
+/// Works on a list as a whole, or piece by piece in parallel if it is long; `work` gets the number of a piece's
 /// first entry as well.
 pub(super) fn in_pieces<T: Send, R: Send>(
     list: &mut [T],
@@ -56,7 +56,7 @@ pub(super) fn in_pieces<T: Send, R: Send>(
     list.par_chunks_mut(PIECE).enumerate().map(piece).collect()
 }
 
-/// Hands out the entries of a short list, side by side where it has several.
+/// Calls `work` for the entries of a short list, in parallel if it has several.
 pub(super) fn for_each_parallel<T: Send>(list: Vec<T>, work: impl Fn(T) + Send + Sync) {
     if list.len() < 2 {
         list.into_iter().for_each(work);

@@ -1,4 +1,4 @@
-//! Budgets: what an engine may allocate on its device, and of pinned memory.
+//! Budgets of device memory and of pinned host memory.
 
 use std::ops::Range;
 use std::sync::Arc;

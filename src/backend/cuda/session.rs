@@ -1,4 +1,4 @@
-//! A device with what is kept on it: bricks, stacks of the ground, buffers.
+//! A device with its cached data: bricks, stacks of the ground, buffers.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
 use crate::volume::{Brick, SampleView};
 
-/// A device that works for terrains.
+/// A device and its caches.
 pub(super) struct Session {
     pub(super) device: Box<dyn Device>,
     /// How long the device took for the last launch: uploads and kernels, and the kernel alone.
@@ -52,7 +52,7 @@ pub(super) struct Stacks {
 /// Stacks along a side of a page.
 const PAGE: usize = 64;
 
-/// Most pages that are kept; all are let go of when there are more, and found again.
+/// The most pages. Beyond that all are dropped, and filled again.
 const MOST_PAGES: usize = 1 << 12;
 
 /// The page of a stack, and its number there.
@@ -90,7 +90,7 @@ impl Stacks {
     }
 }
 
-/// What a launch needs on the device and is not there yet. Its slots are taken; where it is given up, they have to be given
+/// The data of a launch that is not on the device yet. Its slots are reserved; if the launch is abandoned, they must be given
 /// back.
 pub(super) struct Uploads<'a> {
     ground: &'a Ground,
@@ -257,13 +257,13 @@ impl Session {
         self.device.name()
     }
 
-    /// How much of what edits need is not here.
+    /// The number of bricks and stacks of edits that are not on the device.
     pub fn missing_edits(&self, work: &PreparedEdits) -> usize {
         let jobs = work.jobs();
         self.missing(work.base, jobs.len(), |at| jobs[at].pos())
     }
 
-    /// How much of what blocks need is not here.
+    /// The number of bricks and stacks of blocks that are not on the device.
     pub fn missing_blocks(&self, view: &WorldView, blocks: &[Block]) -> usize {
         self.missing(view.samples, blocks.len(), |at| blocks[at].brick)
     }
@@ -287,7 +287,7 @@ impl Session {
         missing * step
     }
 
-    /// Begins a launch: what it finds or takes stays where it is until the next one.
+    /// Begins a launch. Slots that it finds or takes are not evicted before the next one.
     pub(super) fn begin(&mut self) {
         self.is_used = true;
         self.bricks.begin();
@@ -318,7 +318,7 @@ impl Session {
         windows.complete(|brick| self.need_brick(uploads, brick))
     }
 
-    /// Sees to it that a stack is there; returns its slot.
+    /// Ensures that a stack is on the device, and returns its slot.
     pub(super) fn need_stack(&mut self, uploads: &mut Uploads, place: (i32, i32)) -> Result<u32, Fault> {
         if let Some(slot) = self.stacks.find(uploads.ground, place) {
             return Ok(slot);

@@ -1,4 +1,4 @@
-//! Memory that launches read from and write to, kept from one to the next.
+//! Staging buffers of launches, kept from one launch to the next.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use bytemuck::Pod;
 
 use super::device::{Device, Fault, HostMemory};
 
-/// Everything that a launch reads, packed into one piece, so that it takes one copy.
+/// The input of a launch in one piece, so that it takes one copy.
 pub(super) struct InputBuffer {
     host: Box<dyn HostMemory>,
     device: u64,
@@ -22,7 +22,7 @@ pub(super) struct Section {
     len: usize,
 }
 
-/// What an [`InputBuffer`] is to hold, in order.
+/// The sections of an [`InputBuffer`], in order.
 #[derive(Debug, Default)]
 pub(super) struct StagingLayout(usize);
 
@@ -39,7 +39,7 @@ impl StagingLayout {
     }
 }
 
-/// Memory is shrunk where it is so many times as large as what was needed.
+/// A buffer shrinks if it is this many times as large as needed.
 const TRIMMED: usize = 4;
 
 /// Allocates with room to spare.
@@ -67,7 +67,7 @@ impl InputBuffer {
         Ok(())
     }
 
-    /// Makes room for what was planned. What was in it is gone.
+    /// Makes room for these sections. The previous content is lost.
     pub fn open(&mut self, device: &mut dyn Device, layout: &StagingLayout) -> Result<(), Fault> {
         self.needed = self.needed.max(layout.0);
         if layout.0 > self.len { self.replace(device, roomy(layout.0)) } else { Ok(()) }
@@ -112,11 +112,11 @@ impl InputBuffer {
     }
 }
 
-/// What [`OutputList::wipe`] writes: to kernels and host, the number of no entry.
+/// The byte that [`OutputList::wipe`] writes: an invalid entry for kernels and host.
 const WIPED: u8 = 0xff;
 
-/// A list that kernels write. Short ones go straight into the host's memory, where the device can do that; long ones into
-/// its own, and what is used of them is copied afterwards.
+/// A list that kernels write. Short lists are written directly to the host's memory (zero copy) if the device can; long ones
+/// to its own memory, and their used part is copied afterwards.
 pub(super) struct OutputList {
     entry: usize,
     /// How many entries there was room for at the start.
@@ -261,7 +261,7 @@ impl OutputList {
         (if self.is_own() { own } else { self.host.address() }).unwrap_or_default()
     }
 
-    /// Sees to it that so many entries are here after the next [`Device::wait`]; says whether that has to be.
+    /// Ensures that so many entries are on the host after the next [`Device::wait`], and returns whether a wait is needed.
     pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
         self.fetch_part(device, 0..entries)
     }

@@ -1,7 +1,7 @@
-//! The bricks around other bricks, as tables that kernels look them up in.
+//! Tables of neighbouring bricks for kernels.
 //!
-//! Bricks that lie close together share a window, a box of bricks around them: so each is looked up once. Where there are
-//! many, they are cut into slabs, and threads make the windows of some slabs each; bricks of two slabs share none.
+//! Bricks that are close together share a window, a box of bricks around them, so that each is looked up once. Long lists are
+//! split into slabs, whose windows are built in parallel; bricks of different slabs share no window.
 
 use glam::IVec3;
 
@@ -35,7 +35,7 @@ pub(super) struct Entry {
 #[derive(Default)]
 pub(super) struct Windows<'a> {
     slabs: Vec<Slab<'a>>,
-    /// How many of the bricks that were asked for belong to a slab; the last one may have fewer.
+    /// How many of the requested bricks belong to a slab; the last one may have fewer.
     of_a_slab: usize,
 }
 
@@ -53,7 +53,7 @@ struct Slab<'a> {
 /// Of each slab.
 #[derive(Default)]
 struct SlabLists {
-    /// Where each brick that was asked for is, counted from the slab's first entry.
+    /// The entry of each requested brick, counted from the slab's first entry.
     entries: Vec<Entry>,
     /// The references of all entries; [`NONE`] where no brick is stored.
     refs: Vec<u32>,
@@ -74,7 +74,7 @@ impl KeptSlabs {
         lists
     }
 
-    /// Takes the memory of windows that are not needed any more.
+    /// Takes back the memory of windows.
     pub fn put(&mut self, windows: Windows) {
         let lists = windows.slabs.into_iter().map(|slab| slab.lists);
         let is_small = |lists: &SlabLists| lists.refs.capacity() <= KEPT_ENTRIES;
@@ -172,14 +172,14 @@ impl<'a> Windows<'a> {
         Ok(())
     }
 
-    /// The entry of a brick that was asked for, by its number among those.
+    /// The entry of a requested brick, by its number.
     pub fn entry(&self, number: usize) -> Entry {
         let slab = &self.slabs[number / self.of_a_slab];
         let own = slab.lists.entries[number % self.of_a_slab];
         Entry { number: slab.first + own.number, ..own }
     }
 
-    /// The reference of a brick that was asked for.
+    /// The reference of a requested brick.
     pub fn reference(&self, number: usize) -> u32 {
         let slab = &self.slabs[number / self.of_a_slab];
         slab.lists.refs[slab.lists.entries[number % self.of_a_slab].number as usize]
@@ -190,7 +190,7 @@ impl<'a> Windows<'a> {
         self.slabs.iter().map(|slab| slab.lists.refs.len()).sum()
     }
 
-    /// Has any brick materials of its own?
+    /// Whether any brick has materials of its own.
     pub fn has_materials(&self) -> bool {
         self.slabs.iter().any(|slab| slab.has_materials)
     }

@@ -1,4 +1,4 @@
-//! What kernels say of edits, as deltas.
+//! The output of the edit kernels, as edit deltas.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
 use crate::volume::{Brick, VoxelOutcome};
 
-/// From how many bricks on they are dealt with side by side.
+/// From how many bricks on they are processed in parallel.
 pub(super) const LONG: usize = 1024;
 
-/// How many a thread deals with at a time then: few, so that all threads end together.
+/// How many bricks a thread takes at a time; few, so that all threads end together.
 pub(super) const PIECE: usize = 256;
 
 /// A slot that is to hold a changed brick, with its tag.

@@ -142,7 +142,7 @@ impl<'a> Images<'a> {
 }
 
 impl Session {
-    /// What jobs need whose edits look around; enters where their bricks are among those around, and what they are now.
+    /// Collects the input of jobs with stencil edits, and enters the places of their bricks in the windows.
     pub(super) fn care<'a>(
         &mut self,
         work: &PreparedEdits<'a>,

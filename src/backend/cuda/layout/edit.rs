@@ -1,4 +1,4 @@
-//! What edits are, and what became of bricks.
+//! Edits and their results on bricks.
 
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
@@ -70,7 +70,7 @@ pub(crate) struct EditRecord {
     pub pad: u32,
 }
 
-/// What became of a brick.
+/// The result for a brick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditResult {

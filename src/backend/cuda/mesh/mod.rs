@@ -1,4 +1,4 @@
-//! Meshing on the device: one launch for all blocks. [`output`](self::output) is what came of it.
+//! Meshing on the device: one launch for all blocks. [`output`](self::output) has the results.
 
 pub(super) mod output;
 
@@ -26,10 +26,10 @@ struct Piece<'b> {
 /// A stack of blocks, with its slot.
 type Column = ((i32, i32), u32);
 
-/// From how many stacks or blocks on they are dealt with side by side.
+/// From how many stacks or blocks on they are processed in parallel.
 const LONG: usize = 256;
 
-/// How many blocks a thread deals with at a time.
+/// How many blocks a thread takes at a time.
 const OF_A_THREAD: usize = 256;
 
 /// From how many blocks on their surfaces are copied, instead of written to the host's memory by the kernel.

@@ -1,4 +1,4 @@
-//! What the mesh kernel writes, and its way to the host.
+//! The output of the mesh kernel, and its transfer to the host.
 
 use std::ops::Range;
 
@@ -158,7 +158,7 @@ impl Extent {
         (self.vertices, self.indices)
     }
 
-    /// Does all of it lie in lists that are as long as that?
+    /// Whether all of it lies within lists of that length.
     pub(super) fn is_in_lists(self) -> bool {
         self.vertex_end <= self.vertices && self.index_end <= self.indices
     }
