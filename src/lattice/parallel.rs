@@ -2,8 +2,7 @@
 
 use rayon::prelude::*;
 
-/// The cost of one item of a list. It decides how long the list must be before sharing it saves more than waking threads
-/// costs, which is some 10 us.
+/// The cost of one item of a list. It decides how long the list must be before threads share it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum ItemCost {
     /// Copying it: nanoseconds.

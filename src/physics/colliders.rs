@@ -59,7 +59,7 @@ impl GroundColliders {
     }
 
     /// Builds a collider. Call it in a task.
-    pub fn build(&self, part: &Part, surface: &SurfaceMesh) -> BuiltCollider {
+    pub fn build_collider(&self, part: &Part, surface: &SurfaceMesh) -> BuiltCollider {
         let shape = GroundShape::new(surface, part.voxel_size).map(Arc::new);
         let changed = GroundShape::difference(self.shape(part).as_deref(), shape.as_deref());
         BuiltCollider { colliders: self.clone(), part: *part, shape, changed }
@@ -78,7 +78,7 @@ impl SurfaceProcessor for GroundColliders {
     }
 
     fn build(&self, part: &Part, surface: &SurfaceMesh) -> Option<CommitAction> {
-        let collider = GroundColliders::build(self, part, surface);
+        let collider = self.build_collider(part, surface);
         Some(Box::new(move |entity| {
             entity.queue_silenced(move |part: EntityWorldMut| collider.attach(part));
         }))

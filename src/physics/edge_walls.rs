@@ -10,7 +10,8 @@ use crate::terrain::Terrain;
 /// entity.
 ///
 /// The walls are static colliders and children of the terrain: they move with it. They are rebuilt when another terrain
-/// takes its place, and removed with this component.
+/// takes its place, and removed with this component. Insert it again to change it. If a size is not finite and positive, there
+/// are no walls, and an error is logged.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -72,6 +73,12 @@ fn despawn(terrain: Entity, commands: &mut Commands, old: &Walls) {
 fn replace(entity: Entity, mut commands: Commands, terrains: &Query<(&Terrain, &EdgeWalls)>, old: &Walls) {
     let Ok((terrain, &EdgeWalls { height, thickness })) = terrains.get(entity) else { return };
     despawn(entity, &mut commands, old);
+    if ![height, thickness].into_iter().all(|size| size.is_finite() && size > 0.0) {
+        error!(
+            "{entity} has no edge walls: height {height} and thickness {thickness} must be finite and positive"
+        );
+        return;
+    }
     let grid = terrain.world().grid();
     let (width, depth) = (grid.width() as f32, grid.depth() as f32);
     let half = thickness / 2.0;

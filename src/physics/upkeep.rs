@@ -138,7 +138,7 @@ fn begin(
     let colliders = colliders.clone();
     Some(ThreadTask::start(Threads::Background, move || {
         let build = |(entity, part, draft): &(Entity, Part, SurfaceDraft)| {
-            (*entity, colliders.build(part, &draft.surface()))
+            (*entity, colliders.build_collider(part, &draft.surface()))
         };
         batch.par_iter().map(build).collect()
     }))

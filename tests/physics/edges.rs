@@ -33,18 +33,34 @@ fn nobody_walks_or_jumps_off_a_terrain_with_walls() {
     }
 }
 
+/// How many walls there are, and the farthest one's x.
+fn walls_of(stage: &mut Stage) -> (usize, f32) {
+    let mut names = stage.app.world_mut().query::<(&Name, &Transform)>();
+    let walls = names.iter(stage.app.world()).filter(|(name, _)| name.as_str() == "edge wall");
+    walls.map(|(_, place)| place.translation.x).fold((0, 0.0), |(n, far), x| (n + 1, x.max(far)))
+}
+
 #[test]
 fn walls_go_with_their_component_and_follow_another_terrain() {
     let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
-    let walls = |stage: &mut Stage| {
-        let mut names = stage.app.world_mut().query::<(&Name, &Transform)>();
-        let walls = names.iter(stage.app.world()).filter(|(name, _)| name.as_str() == "edge wall");
-        walls.map(|(_, place)| place.translation.x).fold((0, 0.0), |(n, far), x| (n + 1, x.max(far)))
-    };
     stage.app.world_mut().entity_mut(terrain).insert(EdgeWalls::default());
-    assert_eq!(walls(&mut stage), (4, 68.0));
+    assert_eq!(walls_of(&mut stage), (4, 68.0));
     stage.app.world_mut().entity_mut(terrain).insert(level(128, 1.0));
-    stage.frames_until("the other terrain has walls", |stage| walls(stage) == (4, 132.0));
+    stage.frames_until("the other terrain has walls", |stage| walls_of(stage) == (4, 132.0));
     stage.app.world_mut().entity_mut(terrain).remove::<EdgeWalls>();
-    assert_eq!(walls(&mut stage).0, 0);
+    assert_eq!(walls_of(&mut stage).0, 0);
+}
+
+#[test]
+fn walls_of_impossible_sizes_are_left_out_until_they_are_possible() {
+    let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
+    for size in [f32::NAN, f32::INFINITY, 0.0, -3.0] {
+        for walls in [EdgeWalls { height: size, ..default() }, EdgeWalls { thickness: size, ..default() }] {
+            stage.app.world_mut().entity_mut(terrain).insert(walls);
+            stage.frames(2);
+            assert_eq!(walls_of(&mut stage).0, 0, "{size}");
+        }
+    }
+    stage.app.world_mut().entity_mut(terrain).insert(EdgeWalls::default());
+    assert_eq!(walls_of(&mut stage).0, 4);
 }

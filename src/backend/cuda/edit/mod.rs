@@ -96,16 +96,16 @@ impl Session {
     ) -> Result<Option<EditDelta>, Fault> {
         // Stencil edits find their bricks in the windows.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
-        let mut care = look.map(|look| self.care(work, look, jobs, uploads)).transpose()?;
+        let mut stencil = look.map(|look| self.stencil_input(work, look, jobs, uploads)).transpose()?;
         let mut plan = StagingLayout::default();
         uploads.plan(&mut plan);
         let job_list = plan.section::<EditJob>(jobs.len());
-        let tool_list = plan.section::<layout::EditRecord>(work.edits.len());
+        let record_list = plan.section::<layout::EditRecord>(work.edits.len());
         let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
-        care.iter_mut().for_each(|care| care.plan(&mut plan));
+        stencil.iter_mut().for_each(|stencil| stencil.plan(&mut plan));
         self.input.open(&mut *self.device, &plan)?;
-        let (all_jobs, edit_records, list) = self.input.entries_of(job_list, tool_list, edits);
+        let (all_jobs, edit_records, list) = self.input.entries_of(job_list, record_list, edits);
         let are_many = jobs.len() >= LONG;
         let (bricks, device) = (&mut self.bricks, &mut self.device);
         let take = || {
@@ -117,7 +117,7 @@ impl Session {
         };
         side_by_side(are_many, take, write_lists).0?;
         self.input.entries::<u32>(counters).fill(0);
-        care.iter_mut().for_each(|care| care.put(&mut self.input, &mut self.kept));
+        stencil.iter_mut().for_each(|stencil| stencil.put(&mut self.input, &mut self.kept));
         let is_long = jobs.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
         self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
@@ -131,7 +131,7 @@ impl Session {
                 stacks: self.stacks.base(),
                 jobs: self.input.address(job_list),
                 list: self.input.address(edits),
-                edit_records: self.input.address(tool_list),
+                edit_records: self.input.address(record_list),
                 results: self.edits.results.address(),
                 records: self.edits.records.address(),
                 materials: self.edits.materials.address(),
@@ -144,12 +144,12 @@ impl Session {
                 count_capacity: self.edits.counts.capacity(),
             };
             let blocks = jobs.len() as u32;
-            match &care {
+            match &stencil {
                 // SAFETY: the parameters are sections of the input and lists of the session, with their capacities, and none
                 // of them is touched before the wait below.
                 None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
-                Some(care) => {
-                    let params = care.params(params, &self.input);
+                Some(stencil) => {
+                    let params = stencil.params(params, &self.input);
                     // SAFETY: as above.
                     unsafe { self.device.launch(Launch::new(blocks, &params)) }?;
                 }
@@ -161,7 +161,7 @@ impl Session {
             self.device.wait()?;
             self.times = self.device.times();
             let totals = self.edits.totals(jobs.len());
-            if care.is_some() && self.edits.is_too_far(jobs.len()) {
+            if stencil.is_some() && self.edits.is_too_far(jobs.len()) {
                 return Ok(None);
             }
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {

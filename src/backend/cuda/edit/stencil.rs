@@ -32,7 +32,7 @@ impl Look {
 }
 
 /// What stencil edits need besides: windows of bricks, sculpting parameters, images, rules.
-pub(super) struct StencilEditor<'a> {
+pub(super) struct StencilInput<'a> {
     look: Look,
     /// The last columns of the world along x and z.
     last: [i32; 2],
@@ -42,12 +42,12 @@ pub(super) struct StencilEditor<'a> {
     /// Bytes of the rules, and of what is protected; none where there are no rules.
     rules: Vec<u8>,
     ref_list: Section,
-    chisel_list: Section,
+    sculpt_list: Section,
     image_list: Section,
     rule_list: Section,
 }
 
-impl<'a> StencilEditor<'a> {
+impl<'a> StencilInput<'a> {
     fn new(work: &PreparedEdits<'a>, windows: Windows<'a>, look: Look) -> Result<Self, Fault> {
         let mut images = Images::default();
         let sculpt = |record| layout::sculpt(record, |image| images.first(image));
@@ -59,7 +59,7 @@ impl<'a> StencilEditor<'a> {
             let (rules, boxes) = layout::rules(rules);
             [bytemuck::bytes_of(&rules), bytemuck::cast_slice(&boxes)].concat()
         });
-        let [ref_list, chisel_list, image_list, rule_list] = [Section::default(); 4];
+        let [ref_list, sculpt_list, image_list, rule_list] = [Section::default(); 4];
         Ok(Self {
             look,
             last: [work.grid.width(), work.grid.depth()],
@@ -68,7 +68,7 @@ impl<'a> StencilEditor<'a> {
             images: images.samples,
             rules: rules.unwrap_or_default(),
             ref_list,
-            chisel_list,
+            sculpt_list,
             image_list,
             rule_list,
         })
@@ -77,7 +77,7 @@ impl<'a> StencilEditor<'a> {
     /// Adds what there is to send.
     pub fn plan(&mut self, plan: &mut StagingLayout) {
         self.ref_list = plan.section::<u32>(self.windows.len());
-        self.chisel_list = plan.section::<SculptParams>(self.sculpt_params.len());
+        self.sculpt_list = plan.section::<SculptParams>(self.sculpt_params.len());
         self.image_list = plan.section::<u16>(self.images.len());
         self.rule_list = plan.section::<u8>(self.rules.len());
     }
@@ -86,7 +86,7 @@ impl<'a> StencilEditor<'a> {
     pub fn put(&mut self, input: &mut InputBuffer, kept: &mut KeptSlabs) {
         self.windows.write(input.entries(self.ref_list));
         kept.put(std::mem::take(&mut self.windows));
-        input.put(self.chisel_list, &self.sculpt_params);
+        input.put(self.sculpt_list, &self.sculpt_params);
         input.put(self.image_list, &self.images);
         input.put(self.rule_list, &self.rules);
     }
@@ -96,7 +96,7 @@ impl<'a> StencilEditor<'a> {
         StencilEditParams {
             edit,
             windows: input.address(self.ref_list),
-            sculpt_params: input.address(self.chisel_list),
+            sculpt_params: input.address(self.sculpt_list),
             images: input.address(self.image_list),
             rules: if self.rules.is_empty() { 0 } else { input.address(self.rule_list) },
             look: self.look.bricks(),
@@ -143,13 +143,13 @@ impl<'a> Images<'a> {
 
 impl Session {
     /// Collects the input of jobs with stencil edits, and enters the places of their bricks in the windows.
-    pub(super) fn care<'a>(
+    pub(super) fn stencil_input<'a>(
         &mut self,
         work: &PreparedEdits<'a>,
         look: Look,
         jobs: &mut [EditJob],
         uploads: &mut Uploads<'a>,
-    ) -> Result<StencilEditor<'a>, Fault> {
+    ) -> Result<StencilInput<'a>, Fault> {
         let mut windows = windows(&self.bricks, work.base, jobs, EditJob::pos, look.bricks(), &mut self.kept);
         self.complete(uploads, &mut windows)?;
         in_pieces(jobs, LONG, |first, jobs| {
@@ -159,7 +159,7 @@ impl Session {
                 job.base = windows.reference(number);
             }
         });
-        StencilEditor::new(work, windows, look)
+        StencilInput::new(work, windows, look)
     }
 }
 

@@ -359,8 +359,8 @@ struct PlainEditor {
 };
 
 // Applies the edits of the block's job. `StencilEditor` applies stencil edits.
-template <typename StencilEditor>
-__device__ inline void edit_brick(const EditParams& params, EditMemory& shared, StencilEditor& care) {
+template <typename Editor>
+__device__ inline void edit_brick(const EditParams& params, EditMemory& shared, Editor& editor) {
     const EditJob job = params.jobs[blockIdx.x];
     const Brick* base = job.base == NONE ? nullptr : &params.bricks[job.base >> 1];
     const bool had_materials = base != nullptr && job.base & 1;
@@ -387,7 +387,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
             if (!is_taken) begin(shared, base, had_materials);
             is_taken = true;
             bool looks_around = false;
-            if constexpr (StencilEditor::LOOKS) looks_around = care.begin(job, stack, edit);
+            if constexpr (Editor::LOOKS) looks_around = editor.begin(job, stack, edit);
             u32 open = open_samples(record, column, shared.brick, looks_around);
             if (!__syncthreads_or(open != 0)) continue;
             Noise noise = {{0, 0.0f}, 0, 0};
@@ -395,13 +395,13 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
                 noise = hash_noise(record, column.low, shared.noise);
                 __syncthreads();
             }
-            if constexpr (StencilEditor::LOOKS) {
+            if constexpr (Editor::LOOKS) {
                 if (looks_around) {
-                    u32 own = care.apply(edit, column, open, noise, shared, has_materials);
+                    u32 own = editor.apply(edit, column, open, noise, shared, has_materials);
                     changed |= own;
                     bool has_changed = __syncthreads_or(own != 0);
                     is_changed |= has_changed;
-                    if (has_changed || care.params.rules) care.enter(job, edit);
+                    if (has_changed || editor.params.rules) editor.enter(job, edit);
                     continue;
                 }
             }
@@ -415,7 +415,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
         }
     }
     bool is_too_far = false;
-    if constexpr (StencilEditor::LOOKS) is_too_far = __syncthreads_or(care.is_too_far);
+    if constexpr (Editor::LOOKS) is_too_far = __syncthreads_or(editor.is_too_far);
     if (!is_changed) {
         u32 flags = is_too_far ? (u32)TOO_FAR : 0;
         if (threadIdx.x == 0) params.results[blockIdx.x] = {0, flags, NONE, NONE, 0, 0, 0};

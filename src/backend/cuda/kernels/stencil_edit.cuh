@@ -143,6 +143,6 @@ struct StencilEditor : RuleChecker {
 
 extern "C" __global__ void __launch_bounds__(THREADS) stencil_edit(StencilEditParams params) {
     __shared__ StencilEditMemory shared;
-    StencilEditor care = {{{params, shared, nullptr, 0, 0, nullptr, false, false}, false}};
-    edit_brick(params.edit, shared.work, care);
+    StencilEditor editor = {{{params, shared, nullptr, 0, 0, nullptr, false, false}, false}};
+    edit_brick(params.edit, shared.work, editor);
 }

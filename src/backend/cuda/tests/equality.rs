@@ -127,6 +127,8 @@ fn short_and_long_transactions_take_turns() {
     let with_materials = || ground().with_materials(&control).expect("valid");
     let (Some(mapped), Some(copied)) = (zero_copy(), async_copies()) else { return };
     compare_on(ground(), 32, &[&copied], &transactions);
+    compare_on(with_materials(), 25, &[&copied], &transactions);
+    compare_on(ground(), 32, &[&mapped], &transactions);
     compare_on(with_materials(), 25, &[&mapped], &transactions);
 }
 
