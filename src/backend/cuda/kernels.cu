@@ -1,21 +1,21 @@
-// The work of a transaction on the device: bricks are brought there, edited, and meshed.
+// The CUDA kernels. Each runs one block of 128 threads per job:
 //
-// Five kernels, a block of 128 threads for each job:
+//   scatter       copies uploaded data to its destinations
+//   edit          applies edits to one brick           like edits/brick_editor.rs
+//   stencil_edit  the same, including stencil edits    like edits/stencil_edit.rs
+//   mesh          meshes the cells of one brick        like surface/block.rs
+//   heights       computes heights from noise          like ground/noise_heights.rs; one block per 1024 columns
 //
-//   scatter       copies what the host sent to where it belongs
-//   edit          applies edits to one brick            as edits/brick_editor.rs does
-//   stencil_edit  the same, with edits that sculpt      as edits/stencil_edit.rs does
-//   mesh          meshes the cells of one brick         as surface/block.rs does
-//   heights       computes heights of noise             as ground/noise_heights.rs does, a block for 1024 columns
+// All results are bit-identical to those of the CPU. Densities are integers. Floats and doubles go through the same
+// exactly rounded operations in the same order, so the compiler must not fuse operations (--fmad=false) and must
+// round divisions and square roots exactly.
 //
-// All give the very bits of the CPU. Densities are integers; floats and doubles are used in the same order of exactly rounded
-// operations, which takes a compiler that fuses none of them (--fmad=false) and rounds divisions and roots exactly.
+// Blocks share only the counters from which each one reserves space for its output. The order of blocks in the
+// output is therefore arbitrary, but the order within a block is fixed. Counters keep counting past the capacity of
+// a list, which tells the host how much space is needed. They are 32 bits wide, which limits what one launch may
+// request (see layout/).
 //
-// Blocks share nothing but counters from which each reserves room for its output, so blocks come out in any order, while
-// the order inside a block is fixed. Counters go on past the end of the room: the host then knows how much is needed.
-// They are 32 bits wide; what one launch may ask for must fit (see layout/).
-//
-// The same sources are compiled for the CPU by tools/emulator, as plain C++, to be tested where there is no device.
+// tools/emulator compiles the same sources as plain C++ for tests without a CUDA device.
 
 #include "kernels/stencil_edit.cuh"
 #include "kernels/heights.cuh"

@@ -7,9 +7,9 @@
 // A lattice edge with a vertex.
 struct Edge {
     i32 axis;
-    // Its lower end, from the brick's lowest sample.
+    // Its lower end, relative to the brick's minimum corner.
     i32 x, y, z;
-    // The lower end's column in the window of columns, and how far the other end's is.
+    // Index of the lower end's column in the window of columns, and the offset to the other end's column.
     i32 window, next_window;
 };
 
@@ -19,19 +19,19 @@ __device__ inline Edge edge_at(u32 place) {
     return {axis, x, level % 9, z, (z + 1) * WINDOW + x + 1, axis == 0 ? 1 : axis == 1 ? 0 : WINDOW};
 }
 
-// Where the surface crosses an edge between two densities, one of them negative: linear, to the nearest step of 1/4096,
-// halves up, and not at the ends.
+// Linear crossing of an edge between two densities of opposite signs, rounded to the nearest 1/4096, halves up.
+// Never at either end.
 __device__ inline i32 linear_steps(i32 p, i32 q) {
     i32 from = p < 0 ? -p : p, sum = from + (q < 0 ? -q : q), steps;
     if (sum < 1 << 17) {
-        // In integers: a quotient that is one off at most, and what it leaves.
+        // Integer path: the quotient is off by at most one, which the remainder corrects.
         i32 whole = from * (2 * SNAP) + sum, part = 2 * sum;
         steps = (i32)__fdividef((float)whole, (float)part);
         i32 rest = whole - steps * part;
         steps += (rest >= part) - (rest < 0);
     } else {
-        // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, so the
-        // bias decides halves and nothing else.
+        // Doubles near 1.5 * 2^52 have a spacing of 1. A quotient that is not a half is at least 2^-26 away from
+        // one, so the bias only decides halves.
         const double SHIFT = 6755399441055744.0, BIAS = 1.0 / (1 << 28);
         double share = (double)SNAP * (double)from / (double)sum;
         steps = __double2loint(share + BIAS + SHIFT);
@@ -39,22 +39,22 @@ __device__ inline i32 linear_steps(i32 p, i32 q) {
     return smallest(largest(steps, 1), SNAP - 1);
 }
 
-// What its samples say of an edge's crossing.
+// A surface crossing, derived from the samples around an edge.
 struct Crossing {
     // Steps of 1/4096 voxel from the lower end.
     i32 step;
     bool is_lower_solid;
-    // Is no end edited; no sample that the gradients at both ends look at?
+    // Whether both ends are unedited, and whether all samples of the gradient stencils at both ends are.
     bool is_pristine, is_stencil_pristine;
-    // The gradient there, towards the air.
+    // Density gradient at the crossing; it points towards air.
     Vector gradient;
 };
 
-// The central difference between the samples before and after.
+// Central difference.
 __device__ inline i32 rise(Marked before, Marked after) { return (after >> 1) - (before >> 1); }
 
-// The same at a sample that may be on the world's rim, the last one being number `last`: beyond it densities go on as they
-// come.
+// The same at a sample that may lie on the world's border; `last` is the last coordinate. Densities are
+// extrapolated linearly beyond it.
 __device__ inline i32 rise_at(Marked before, Marked own, Marked after, i32 at, i32 last) {
     i32 inner = rise(at == 0 ? own : before, at == last ? own : after);
     return at == 0 || at == last ? 2 * inner : inner;
@@ -68,7 +68,7 @@ __device__ inline Crossing crossing_on(const Site& site, const Marked* padding, 
     Crossing crossing;
     crossing.is_lower_solid = *p < 0;
     crossing.is_pristine = !((*p | *q) & 1);
-    // A pristine vertical edge is crossed at the height itself, its upper end included.
+    // A pristine vertical edge is crossed exactly at the column's height, which may be the upper end.
     bool is_exact = edge.axis == 1 && crossing.is_pristine;
     crossing.step = is_exact ? -(*p >> 1) * (SNAP / ONE) : linear_steps(*p >> 1, *q >> 1);
 

@@ -1,35 +1,35 @@
-// Applies edits to one brick, as edits/brick_editor.rs does. Stencil edits are in stencil_edit.cuh.
+// Applies edits to one brick, like edits/brick_editor.rs. Stencil edits are in stencil_edit.cuh.
 //
-// A thread owns four samples of one column, two layers apart, from the first edit to the last. Before distances are
-// computed, bricks too far from the shape are sorted out, and samples that no distance changes: much of what brushes reach
-// is air. Two warps enter what an edit did: which samples changed, as bits, and how many voxels of which material.
+// From the first edit to the last, a thread owns four samples of one column, two layers apart. Before distances are
+// computed, the kernel skips bricks too far from the shape, and samples that no distance could change: much of what
+// brushes reach is air. Two warps write what an edit did: the changed samples as bits, and the voxels by material.
 #pragma once
 
 #include "shapes.cuh"
 
-// How many samples a thread owns, and how many layers they are apart.
+// How many samples a thread owns, and the layers between them.
 constexpr i32 OWN = LEN / THREADS;
 constexpr i32 STEP = SIDE / OWN;
 
 // What one edit did.
 struct Effect {
-    // Samples that changed, like the bits of a brick.
+    // Changed samples, in the format of a brick's bits.
     u32 changed[16];
-    // Voxels of each material that were removed, added or painted, whichever the edit does.
+    // Voxels removed, added or painted, depending on the operation, by material.
     u32 counts[256];
 };
 
 struct EditMemory {
     Brick brick;
     Effect effect;
-    // Of the edit at hand, if it is rough.
+    // Noise of the current edit, if it is rough.
     float noise[MOST_POINTS];
     // Samples that any edit changed.
     u32 changed[16];
     u64 hash;
-    // As in `ResultFlags`, and `NOT_UNIFORM`.
+    // `ResultFlags` and `NOT_UNIFORM`.
     u32 flags;
-    // Where the brick goes, and the box around what changed, as the result has them.
+    // Entries reserved for the brick, and bounds of the changed samples, in the format of `EditResult`.
     u32 record, material, bounds;
 };
 
@@ -37,10 +37,10 @@ constexpr u32 NOT_UNIFORM = 32;
 
 // What a thread's samples have in common.
 struct OwnColumn {
-    // The brick's lowest sample.
+    // The brick's minimum corner.
     i32 low[3];
     i32 x, z;
-    // The lowest of its samples, counted from the brick's lowest.
+    // Layer of its lowest sample within the brick.
     i32 first_y;
     i32 height;
     u32 materials;
@@ -54,13 +54,14 @@ __device__ inline i32 pristine_distance(const OwnColumn& column, i32 k) {
     return (column.low[1] + own_y(column, k)) * ONE - column.height;
 }
 
-// Bits of the samples with a property, in order of the samples: each warp writes those of its own.
+// Collects one bit per sample; each warp writes the words of its own samples.
 __device__ inline void store_bits(u32* words, i32 k, bool is_set) {
     u32 word = __ballot_sync(WARP, is_set);
     if (lane() == 0) words[k * 4 + warp()] = word;
 }
 
-// The box around the samples of a mask and some layers: lo x|y<<3|z<<6 | hi x<<9|y<<12|z<<15; `NONE` where it is empty.
+// Bounds of the samples within a mask and a range of layers, packed as lo x|y<<3|z<<6 | hi x<<9|y<<12|z<<15; `NONE`
+// if empty.
 __device__ inline u32 bounds_of(const u32* words, u64 mask, i32 first_y, i32 end_y) {
     u64 all = 0;
     i32 bottom = 0, top = 0;
@@ -80,13 +81,13 @@ __device__ inline u32 bounds_of(const u32* words, u64 mask, i32 first_y, i32 end
     return low | high << 9;
 }
 
-// Of the samples along one side, those before the cut or those beyond it, as bits.
+// The samples along one side that lie before the cut, or beyond it, as bits.
 __device__ inline u32 side_bits(u32 cut, bool is_beyond) {
     u32 before = (1u << smallest(cut, SIDE)) - 1;
     return is_beyond ? 0xff & ~before : before;
 }
 
-// The samples of one part of the brick.
+// Bounds of the changed samples in one part of the brick.
 __device__ inline u32 part_bounds(const u32* changed, u32 cuts, u32 part) {
     u64 rows = side_bits(cuts & 15, part & 1) * 0x0101010101010101ull;
     u32 z = side_bits(cuts >> 8 & 15, part & 4), y = side_bits(cuts >> 4 & 15, part & 2);
@@ -96,7 +97,7 @@ __device__ inline u32 part_bounds(const u32* changed, u32 cuts, u32 part) {
     return bounds_of(changed, rows & level, __ffs(y) - 1, 32 - __clz(y));
 }
 
-// Enters what an edit changed in each part of the brick. For one warp.
+// Writes what an edit changed in each part of the brick. Called by one warp.
 __device__ void enter_parts(const EditParams& params, u32 cuts, u32 edit, const u32* changed) {
     u32 bounds = lane() < 8 ? part_bounds(changed, cuts, lane()) : NONE;
     u32 filled = __ballot_sync(WARP, bounds != NONE);
@@ -108,7 +109,7 @@ __device__ void enter_parts(const EditParams& params, u32 cuts, u32 edit, const 
     }
 }
 
-// Enters how many voxels an edit dealt with, and clears the counts. For one warp.
+// Writes how many voxels an edit affected, and clears the counts. Called by one warp.
 __device__ void enter_counts(const EditParams& params, u32 edit, u32 outcome, u32* counts) {
     for (u32 base = 0; base < 256; base += 32) {
         u32 material = base + lane(), voxels = counts[material];
@@ -124,7 +125,7 @@ __device__ void enter_counts(const EditParams& params, u32 edit, u32 outcome, u3
     }
 }
 
-// Counts a voxel of this material, or none. Lanes of one material count as one.
+// Counts a voxel of this material; `NONE` counts nothing. Lanes with the same material share one atomic.
 __device__ inline void count_voxels(u32* counts, u32 material) {
     u32 rest = __ballot_sync(WARP, material != NONE);
     while (rest != 0) {
@@ -135,10 +136,10 @@ __device__ inline void count_voxels(u32* counts, u32 material) {
     }
 }
 
-// What became of a sample.
+// The result of an edit at one sample.
 struct Outcome {
     bool is_changed;
-    // The material of a voxel to be counted, or `NONE`.
+    // The material of the voxel to count, or `NONE`.
     u32 counted;
 };
 
@@ -146,7 +147,6 @@ __device__ inline u32 resolve(u32 stored, const OwnColumn& column, i32 pristine)
     return stored == GROUND ? ground_material(column.materials, pristine) : stored;
 }
 
-// Digs or adds.
 __device__ inline Outcome carve(
     const EditRecord& record, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
 ) {
@@ -159,7 +159,7 @@ __device__ inline Outcome carve(
     if ((before < 0) == (after < 0)) return {true, NONE};
     if (after >= 0) {
         u32 removed = resolve(material, column, pristine);
-        // Air is of no material.
+        // Air has no material.
         material = GROUND;
         return {true, removed};
     }
@@ -180,7 +180,7 @@ __device__ inline Outcome paint(
     return {true, painted == resolve(old, column, pristine) ? NONE : painted};
 }
 
-// Copies the thread's samples from its brick, pristine ones where there is none.
+// Copies the thread's samples from the base brick; without one they are pristine.
 __device__ inline void take(const Brick* base, bool has_materials, Brick& brick) {
     for (i32 k = 0; k < OWN; k++) {
         i32 index = own_index(k);
@@ -189,7 +189,7 @@ __device__ inline void take(const Brick* base, bool has_materials, Brick& brick)
     }
 }
 
-// Takes the brick to the shared. For the whole block.
+// Loads the brick into shared memory. Called by the whole block.
 __device__ inline void begin(EditMemory& shared, const Brick* base, bool had_materials) {
     take(base, had_materials, shared.brick);
     for (i32 i = threadIdx.x; i < 256; i += THREADS) shared.effect.counts[i] = 0;
@@ -199,7 +199,7 @@ __device__ inline void begin(EditMemory& shared, const Brick* base, bool had_mat
     }
 }
 
-// May an edit change a sample of the brick?
+// Whether an edit may change a sample of the brick.
 __device__ inline bool may_change(const EditRecord& record, const i32* low) {
     bool is_reached = true;
     for (i32 axis = 0; axis < 3; axis++) {
@@ -208,14 +208,14 @@ __device__ inline bool may_change(const EditRecord& record, const i32* low) {
     return is_reached && !is_out_of_reach(record, low);
 }
 
-// Is a sample so far in the air, or in the solid, that the operation leaves it as it is, whatever its distance?
+// Whether the operation leaves a sample with this density unchanged, whatever its distance from the shape.
 __device__ inline bool is_settled(u32 operation, i32 density) {
     if (operation == DIG) return density >= DEPTH;
     return operation == ADD ? density <= -DEPTH : density >= 0;
 }
 
-// Which of the thread's samples an edit may change, a bit for each: those in its reach, and of those, unless it looks
-// around, the ones that are not settled.
+// Which of the thread's samples an edit may change, one bit each: those within its reach. Unless the edit reads
+// neighbours, settled samples are excluded.
 __device__ inline u32 open_samples(const EditRecord& record, const OwnColumn& column, const Brick& brick, bool looks_around) {
     i32 x = column.low[0] + column.x, z = column.low[2] + column.z;
     if (x < record.min[0] || x > record.max[0] || z < record.min[2] || z > record.max[2]) return 0;
@@ -229,15 +229,15 @@ __device__ inline u32 open_samples(const EditRecord& record, const OwnColumn& co
     return open;
 }
 
-// Applies one edit to the thread's open samples; returns which of them changed, a bit for each. `has_materials` is set
-// where a material was stored.
+// Applies one edit to the thread's open samples and returns which of them changed, one bit each. Sets
+// `has_materials` if a material was stored.
 __device__ inline u32 apply(
     const EditRecord& record, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& shared, bool& has_materials
 ) {
     Brick& brick = shared.brick;
     Place along_x = place_of(noise, 0, column.x), along_z = place_of(noise, 2, column.z);
     u32 changed = 0;
-    // Not unrolled: the code is long, and other warps are there to wait for.
+    // Not unrolled: the code is long, and other warps hide the latency.
 #pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         i32 index = own_index(k), y = own_y(column, k);
@@ -261,19 +261,19 @@ __device__ inline u32 apply(
     return changed;
 }
 
-// What a sample adds to the world's hash; a pristine one adds nothing.
+// A sample's contribution to the world's hash; 0 if it is pristine.
 __device__ inline u64 sample_hash(u64 place, i32 y, i16 sample, u8 material) {
     if (sample == PRISTINE) return 0;
     return mix(place ^ (u64)(u32)y << 32 ^ (u64)(u16)sample << 8 ^ material);
 }
 
-// By how much the thread's samples change the world's hash, if they were these before.
+// How much the thread's changed samples add to the world's hash, compared with the base brick.
 __device__ inline u64 hash_change(
     const OwnColumn& column, const Brick& now, const Brick* base, bool had_materials, u32 changed
 ) {
     u64 place = mix((u64)(u32)(column.low[0] + column.x) | (u64)(u32)(column.low[2] + column.z) << 32);
     u64 change = 0;
-    // Not unrolled, here and in `sum_up`: fetching so many instructions takes longer than the loop.
+    // Not unrolled, here and in `sum_up`: fetching the longer code costs more than the loop.
 #pragma unroll 1
     for (i32 k = 0; k < OWN; k++) {
         if (!(changed >> k & 1)) continue;
@@ -286,7 +286,7 @@ __device__ inline u64 hash_change(
     return change;
 }
 
-// Derives the bits of the brick and of what changed, and adds up what all threads know of it.
+// Derives the bits of the brick and of the changed samples, and combines hash and flags of all threads.
 __device__ inline void sum_up(
     EditMemory& shared, const OwnColumn& column, const Brick* base, bool had_materials, bool has_materials,
     u32 changed
@@ -317,11 +317,11 @@ __device__ inline void sum_up(
 
 __device__ inline bool is_uniform(const EditMemory& shared) { return !(shared.flags & NOT_UNIFORM); }
 
-// Reserves room for the brick. For one thread.
+// Reserves output entries for the brick. Called by one thread.
 __device__ inline void reserve(const EditParams& params, EditMemory& shared) {
     shared.record = shared.material = NONE;
     if (is_uniform(shared)) return;
-    // Records and materials at once.
+    // One atomic for both counters.
     bool has_materials = shared.flags & HAS_MATERIALS;
     u64 first = atomicAdd((u64*)params.counters, 1 | (u64)has_materials << 32);
     u32 record = (u32)first, material = (u32)(first >> 32);
@@ -338,7 +338,7 @@ __device__ inline EditResult result_of(const EditMemory& shared) {
     return {shared.hash, flags, shared.record, shared.material, shared.bounds, uniform, 0};
 }
 
-// Writes the brick to its slot, and to the entries that were reserved for it.
+// Writes the brick to its slot and to its reserved output entries.
 __device__ inline void store(const EditParams& params, const EditMemory& shared, Brick* target) {
     const u32 MATERIALS = LEN / sizeof(uint4), RECORD = sizeof(Brick) / sizeof(uint4) - MATERIALS;
     u32 piece = threadIdx.x;
@@ -358,7 +358,7 @@ struct PlainEditor {
     static constexpr bool LOOKS = false;
 };
 
-// Applies the edits of the block's job. `StencilEditor` applies stencil edits.
+// Applies the edits of the block's job. `StencilEditor` also applies stencil edits.
 template <typename Editor>
 __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, Editor& editor) {
     const EditJob job = params.jobs[blockIdx.x];
@@ -378,7 +378,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
     u32 changed = 0;
     bool has_materials = had_materials, is_taken = false, is_changed = false;
     for (u32 start = 0; start < job.count; start += 32) {
-        // Each lane looks at one edit; the warps all look at the same ones.
+        // Each lane tests one edit. All warps test the same ones.
         u32 number = start + lane() < job.count ? params.list[job.first + start + lane()] : NONE;
         u32 reaching = __ballot_sync(WARP, number != NONE && may_change(params.edit_records[number], column.low));
         for (; reaching != 0; reaching &= reaching - 1) {
@@ -409,7 +409,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
             changed |= own;
             if (!__syncthreads_or(own != 0)) continue;
             is_changed = true;
-            // Nobody begins with the next edit before these two warps are done.
+            // The next edit synchronises before it overwrites what these two warps read.
             if (warp() == 0) enter_parts(params, job.cuts, edit, shared.effect.changed);
             if (warp() == 1) enter_counts(params, edit, record.operation, shared.effect.counts);
         }

@@ -1,30 +1,30 @@
-// The heights of new ground: octaves of Perlin's gradient noise, summed up, to the bits of the crate `noise` that
-// ground/noise_heights.rs uses. That means its operations in its order, in doubles.
+// Heights of new ground: octaves of Perlin noise, bit-identical to the `noise` crate that ground/noise_heights.rs
+// uses. Doubles go through the same operations in the same order.
 #pragma once
 
 #include "threads.cuh"
 
-// Columns of a block; its octaves' tables are brought once for all of them.
+// Columns of a block, which loads the tables of its octaves once for all of them.
 constexpr i32 COLUMNS = 8 * THREADS;
 constexpr i32 MOST_OCTAVES = 16;
 constexpr i32 TABLE = 256;
-// Voxels from zero to which the lattice goes, and what stands for a height farther away.
+// The largest absolute height in voxels, and the value that stands for a height beyond it.
 constexpr double LIMIT = 32768.0;
 constexpr i32 REFUSED = -2147483647 - 1;
 
-// Slope 0 at both ends, and no bend.
+// Quintic fade curve: first and second derivatives are zero at both ends.
 __device__ inline double eased(double t) { return t * t * t * (t * (t * 6.0 - 15.0) + 10.0); }
 
 __device__ inline double blended(double a, double b, double t) { return b * t + a * (1.0 - t); }
 
-// The slope of a corner along one of four diagonals, so far from there.
+// Dot product of one of four diagonal gradients with the offset from its corner.
 __device__ inline double sloped(u32 hash, double x, double z) { return (hash & 1 ? -x : x) + (hash & 2 ? -z : z); }
 
 __device__ inline double clamped(double value, double low, double high) {
     return value < low ? low : value > high ? high : value;
 }
 
-// Gradient noise at a point whose coordinates are positive and have whole parts of 31 bits.
+// Gradient noise at a point with positive coordinates whose integer parts fit 31 bits.
 __device__ inline double perlin(const u8* table, double x, double z) {
     i32 column = (i32)x, row = (i32)z;
     double u = x - (double)column, v = z - (double)row;
@@ -36,7 +36,7 @@ __device__ inline double perlin(const u8* table, double x, double z) {
     return clamped(blended(at_west, at_east, eased(u)) * (2.0 / 1.41421356237309504880), -1.0, 1.0);
 }
 
-// Hills: each octave weaker than the one before.
+// Fractal noise: the amplitude decreases from octave to octave.
 __device__ inline double fractal(const HeightsParams& params, const u8 (*tables)[TABLE], double x, double z) {
     double sum = 0.0, strength = params.persistence;
     for (u32 octave = 0; octave < params.octaves; octave++) {
@@ -48,7 +48,7 @@ __device__ inline double fractal(const HeightsParams& params, const u8 (*tables)
     return sum * params.factor;
 }
 
-// Ridges where an octave is 0, each octave weighted by the one before.
+// Ridged noise: ridges where an octave is 0. Each octave is weighted by the previous one.
 __device__ inline double ridged(const HeightsParams& params, const u8 (*tables)[TABLE], double x, double z) {
     double sum = 0.0, strength = 1.0, weight = 1.0;
     for (u32 octave = 0; octave < params.octaves; octave++) {
@@ -66,7 +66,7 @@ __device__ inline double ridged(const HeightsParams& params, const u8 (*tables)[
 
 extern "C" __global__ void __launch_bounds__(THREADS) heights(HeightsParams params) {
     __shared__ u8 tables[MOST_OCTAVES][TABLE];
-    // Four numbers at a time.
+    // Four bytes at a time.
     for (u32 i = threadIdx.x; i < params.octaves * (TABLE / 4); i += THREADS) ((u32*)tables)[i] = params.tables[i];
     __syncthreads();
     u32 start = blockIdx.x * COLUMNS, end = params.count - start < COLUMNS ? params.count : start + COLUMNS;
@@ -78,7 +78,7 @@ extern "C" __global__ void __launch_bounds__(THREADS) heights(HeightsParams para
         z *= params.frequency;
         double noise = params.is_ridged ? ridged(params, tables, x, z) : fractal(params, tables, x, z);
         double height = params.base + params.amplitude * noise;
-        // Away from zero where it is halfway.
+        // Rounds halves away from zero.
         params.heights[i] = fabs(height) <= LIMIT ? (i32)round(height * ONE) : REFUSED;
     }
 }

@@ -1,4 +1,5 @@
-// What host and kernels hand each other, and the numbers of the lattice. layout/ has the same in Rust.
+// Data structures that the host and the kernels exchange, and constants of the lattice. layout/ is the Rust
+// counterpart.
 #pragma once
 
 typedef unsigned char u8;
@@ -12,31 +13,32 @@ typedef unsigned long long u64;
 constexpr i32 THREADS = 128;
 constexpr u32 WARP = 0xffffffff;
 
-// Samples of a brick, and along one side of it.
+// Samples of a brick, and along one of its sides.
 constexpr i32 LEN = 512;
 constexpr i32 SIDE = 8;
-// Columns along a side of the window around a stack of bricks: one before it, two after. Also padded samples.
+// Columns along a side of the window around a stack of bricks: one before the stack, its eight, two after. Padded
+// samples have the same side.
 constexpr i32 WINDOW = 11;
 constexpr i32 AREA = WINDOW * WINDOW;
 // Corners of 8x8 cells.
 constexpr i32 CORNERS = 81;
 
-// Units of 1/256 voxel, of 1/4096 voxel.
+// Units: one voxel in 1/256 voxel, and in 1/4096 voxel.
 constexpr i32 ONE = 256;
 constexpr i32 SNAP = 4096;
-// How far outside a shape samples still change, and how deep inside distances are told apart.
+// Samples change up to BAND outside a shape. Edits clamp densities at DEPTH inside it.
 constexpr i32 BAND = 2 * ONE;
 constexpr i32 DEPTH = 4 * ONE;
 constexpr i32 OVERLAY_DEPTH = ONE + ONE / 2;
 
-// A sample that nobody edited, and a material that nobody changed.
+// The value of an unedited sample, and of a material that was never changed.
 constexpr i32 PRISTINE = -32768;
 constexpr u32 GROUND = 255;
 
-// No brick; no entry.
+// No brick, or no entry.
 constexpr u32 NONE = 0xffffffff;
 
-// Sample (x, y, z) is at x + 8 z + 64 y; of the bits, layer y is a word of 64 bits, here two halves.
+// Sample (x, y, z) has index x + 8 z + 64 y. In the bit arrays, layer y is one 64-bit word, here as two halves.
 struct alignas(16) Brick {
     i16 samples[LEN];
     u32 solid[16];
@@ -44,7 +46,7 @@ struct alignas(16) Brick {
     u8 materials[LEN];
 };
 
-// The columns around a stack of bricks, from one before its first on, x fastest.
+// The columns around a stack of bricks, starting one before its first; x varies fastest.
 struct alignas(16) Stack {
     i32 heights[AREA];
     // base | overlay << 8 | blend << 16
@@ -66,7 +68,8 @@ struct EditJob {
     u32 base, target, stack;
     u32 first, count;
     u32 cuts;
-    // For stencil edits: its entry in `windows`; to the next along x | along z << 16, along y it is 1.
+    // Stencil edits only: the brick's entry in `windows`, and the strides to its neighbours, x | z << 16. The
+    // stride along y is 1.
     u32 window, strides;
     u32 pad;
 };
@@ -75,37 +78,37 @@ enum Operation { DIG, ADD, PAINT };
 
 struct EditRecord {
     u32 kind, operation, material, is_rough;
-    // The shape's origin: voxels, and 1/256 voxel from there.
+    // The shape's origin: whole voxels, and the remainder in 1/256 voxel.
     i32 home[3], rest[3];
-    // The lattice points that it reaches, both ends included.
+    // Inclusive bounds of the lattice points within the shape's reach.
     i32 min[3], max[3];
     float constants[12];
     i32 amplitude, scale;
     u32 seed, pad;
 };
 
-// How an edit changes samples beside digging, adding and painting.
+// How an edit changes samples, apart from digging, adding and painting (PLAIN).
 enum Stroke { PLAIN, SMOOTH, SHARPEN, FLATTEN, LEVEL, SHIFT, STAMP, TERRACE };
 
-// What a stencil edit needs beside its EditRecord.
+// What a stencil edit needs in addition to its EditRecord.
 struct SculptParams {
-    // `material` is what new ground is made of; `NONE`: what is around says it.
+    // `material` is the material of new ground, or `NONE` to derive it from the surroundings.
     u32 stroke, material;
-    // In 1/256; in 1/256 voxel.
+    // Strength in 1/256, falloff in 1/256 voxel.
     i32 strength, falloff;
-    // Level: the height. Shift: what is added to densities. Terrace: step, base.
+    // Level: the height. Shift: the amount added to densities. Terrace: step and base.
     i32 amounts[2];
-    // Flatten: of the plane. Stamp: the middle of the image.
+    // Flatten: a point on the plane. Stamp: the centre of the image.
     i32 point[3];
-    // Stamp: half its sides, and how high white is.
+    // Stamp: half extents, and the height of white.
     i32 half[2], height;
-    // Stamp: the first sample of its image in `images`, and how many there are.
+    // Stamp: index of the first sample of its image in `images`, and the image's size.
     u32 image, columns, rows;
-    // How hard a material it takes away; negative: no rule bears on it.
+    // The hardness that it can remove; negative if no rule applies.
     i32 power;
-    // Stamp: a rotation, and what to divide it by. Flatten: the first row is the normal.
+    // Stamp: a rotation, and its divisor. Flatten: the first row is the normal.
     i64 matrix[3][3], squared;
-    // Flatten: of the normal.
+    // Flatten: length of the normal.
     double length;
 };
 
@@ -131,28 +134,28 @@ struct EditParams {
     const u32* list;
     const EditRecord* edit_records;
     EditResult* results;
-    // 72 and 32 to an entry.
+    // Entries of 72 and of 32 `uint4`.
     uint4* records;
     uint4* materials;
     EditPart* parts;
     EditCount* counts;
-    // Records, materials, parts, counts.
+    // Numbers of records, materials, parts, counts.
     u32* counters;
     u32 record_capacity, material_capacity, part_capacity, count_capacity;
 };
 
-// What edits may not change, or not at once.
+// Rules that forbid or slow down edits.
 struct Rules {
-    // Of each material.
+    // By material.
     u8 hardness[256];
-    // Bits of materials that no edit takes away, nor paints over.
+    // One bit per material that no edit may remove or paint over.
     u32 unbreakable[8];
-    // Nothing solid below this height is taken away.
+    // Nothing solid below this height is removed.
     i32 bedrock;
     u32 boxes;
 };
 
-// Samples that nothing changes, both ends included.
+// Inclusive bounds of samples that no edit changes.
 struct Protected {
     i32 min[3], max[3];
 };
@@ -160,12 +163,12 @@ struct Protected {
 struct StencilEditParams {
     EditParams edit;
     const u32* windows;
-    // One for each edit record.
+    // One per edit record.
     const SculptParams* sculpt_params;
     const u16* images;
-    // Null where there are none; protected boxes come right behind them.
+    // Null if there are no rules. Protected boxes follow directly.
     const Rules* rules;
-    // How many bricks windows reach up and down.
+    // How many bricks the windows extend up and down.
     i32 look;
     // The last columns of the world along x and z.
     i32 last[2];
@@ -200,23 +203,23 @@ struct MeshParams {
     MeshResult* results;
     ushort4* positions;
     float* normals;
-    // Null where no mixes are wanted.
+    // Null if mixes are not needed.
     uint2* mixes;
     u16* indices;
-    // Vertices, indices.
+    // Numbers of vertices and indices.
     u32* counters;
     u32 vertex_capacity, index_capacity;
-    // Cells of the world.
+    // Size of the world in cells.
     i32 width, depth;
     u32 is_single, single_ids, single_weights, pad;
 };
 
 struct HeightsParams {
-    // For each octave 256 numbers of 8 bits.
+    // 256 numbers of 8 bits per octave.
     const u32* tables;
     i32* heights;
     double scale, origin[2], frequency, lacunarity, persistence, weighting, factor, peak, amplitude, base;
-    // Columns of the world, x fastest: the first one, how many, how many in a row.
+    // Columns of the world, x fastest: the first one, their number, and the length of a row.
     u32 first, count, row_len;
     u32 octaves, is_ridged, pad;
 };

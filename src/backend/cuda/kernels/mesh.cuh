@@ -1,26 +1,27 @@
-// Draws the cells of one brick, as surface/block.rs does.
+// Meshes the cells of one brick, like surface/block.rs.
 //
-// What is above each of the 9x9 corners of a brick's cells, seen from above, is held as bits, bit y for layer y. Most bricks
-// are all solid or all air, and done then. In the others each corner has a thread: a few operations on the bits tell the
-// cubes to draw, and the lattice edges with a vertex. Then:
+// Each of the 9x9 corner columns of a brick's cells is held as bits, bit y for layer y. Most bricks are all solid
+// or all air and finish early. In the others each corner column has a thread, which finds the cubes to draw and the
+// lattice edges with a vertex by a few bit operations. Then:
 //
-//   1. Edges are put in the order of their vertices: by axis, then layer, then corner. There are 27 levels of 81 edges;
-//      the bits of 32 columns, turned around, are a word for each level, and counting bits in them numbers the edges.
-//      Meanwhile one warp lists cubes.
-//   2. Samples are copied out of 27 bricks, a thread for each column.
-//   3. Edges are listed, while one thread reserves room for the output; the first vertices are made until it has it.
-//   4. Warps take 32 vertices, each as the vertex function has it (surface/crossings.rs), or the triangles of 32 cubes, which
-//      look up the numbers of their vertices by lattice edge.
+//   1. Edges are numbered in vertex order: by axis, then layer, then corner. There are 27 levels of 81 edges.
+//      Transposing the bits of 32 columns gives one word per level; population counts number the edges. Meanwhile
+//      one warp lists cubes.
+//   2. Samples are copied out of 27 bricks, one thread per column.
+//   3. Edges are listed, while one thread reserves output space. The first vertices are computed while the
+//      reservation is pending.
+//   4. Each warp takes 32 vertices (surface/crossings.rs), or the triangles of 32 cubes, which look up their vertex
+//      numbers by lattice edge.
 //
-// Edges are called by their place, as in surface/block.rs: 81 level + corner, where level = 9 axis + y and corner = 9 z + x.
+// An edge id is 81 level + corner, where level = 9 axis + y and corner = 9 z + x, as in surface/block.rs.
 #pragma once
 
 #include "vertex.cuh"
 
-// A row of eight samples of a brick, a bit for each.
+// A row of eight samples of a brick, one bit each.
 __device__ inline u32 row_of(const u32* bits, u32 row) { return ((const u8*)bits)[row]; }
 
-// What a brick has above place x of a row of its lowest layer, as in `columns`.
+// The samples above position x of a row in the brick's lowest layer, in the format of `columns`.
 __device__ inline u32 column_above(const Brick& brick, u32 row, u32 x) {
     u32 column = 0;
 #pragma unroll
@@ -31,9 +32,9 @@ __device__ inline u32 column_above(const Brick& brick, u32 row, u32 x) {
     return column;
 }
 
-// Fills the columns of corners, and the signs. One warp has the 64 corners in the brick, two for each lane: a lane brings a
-// layer's half of the bits; turned around, these are what is above its corners. Another has the 17 corners in the bricks
-// beside it. For the first two warps.
+// Fills the corner columns and the signs. Called by the first two warps. The first has the 64 corners in the brick,
+// two per lane: each lane loads half a layer of the bits, and a transpose gives the columns above its corners. The
+// second has the 17 corners in the neighbouring bricks.
 __device__ inline void gather_columns(const Site& site, MeshMemory& shared) {
     const Brick* bricks = site.params.bricks;
     bool is_inner = warp() == 0, is_side = lane() < SIDE || lane() == 2 * SIDE, has_solid = false, has_air = false;
@@ -44,7 +45,7 @@ __device__ inline void gather_columns(const Site& site, MeshMemory& shared) {
         const u32* window = window_at(site, x / SIDE, z / SIDE);
         u32 own = window[0], above = window[1], tops[2] = {0, 0};
         i32 heights[2];
-        // The second corner is four rows on; where there is none, it is the first again.
+        // The second corner is four rows further. The other warp has one corner per lane and repeats it.
         const u32 rows[2] = {z, is_inner ? z + 4 : z};
 #pragma unroll
         for (i32 i = 0; i < 2; i++) {
@@ -54,8 +55,8 @@ __device__ inline void gather_columns(const Site& site, MeshMemory& shared) {
             tops[i] = row_of(found.solid, rows[i] % SIDE) | row_of(found.edited, rows[i] % SIDE) << 16;
         }
         if (is_inner) {
-            // Four bytes: the first corner's solid samples, the second one's, the first one's edited samples, and the second
-            // one's.
+            // After the transpose, four bytes: solid samples of the first and of the second corner, then edited
+            // samples of both.
             if (own != NONE) {
                 const u32* words = lane() < 16 ? bricks[own >> 1].solid : bricks[own >> 1].edited;
                 bits = words[lane() % SIDE * 2 + lane() / SIDE % 2];
@@ -68,7 +69,7 @@ __device__ inline void gather_columns(const Site& site, MeshMemory& shared) {
         for (i32 i = 0; i < 2; i++) {
             if (i == 1 && !is_inner) break;
             u32 column = (bits >> i * SIDE & 0xff00ff) | (tops[i] >> x % SIDE & 0x10001) << SIDE;
-            // Where there is no brick, the ground tells: below its height all is solid.
+            // Without a brick, everything below the ground's height is solid.
             i32 filled = smallest(largest(((heights[i] + ONE - 1) >> 8) - site.low[1], 0), 9);
             u32 pristine = (1u << filled) - 1;
             if (own == NONE) column |= pristine & 0xff;
@@ -83,8 +84,8 @@ __device__ inline void gather_columns(const Site& site, MeshMemory& shared) {
     if (lane() == 0) shared.signs[warp()] = has_solid | has_air << 1;
 }
 
-// The cubes to draw over the cell of a corner, a bit for each layer: those that both signs meet in, and that have an
-// edited corner or belong to the mask.
+// The cubes to draw above a corner's cell, one bit per layer: those with both signs that have an edited corner or
+// belong to the mask.
 __device__ inline u32 drawn_cubes(const Site& site, const u32* columns, i32 x, i32 z) {
     u32 cells = site.job.cells;
     i32 low_x = cells & 7, low_y = cells >> 3 & 7, low_z = cells >> 6 & 7;
@@ -99,11 +100,11 @@ __device__ inline u32 drawn_cubes(const Site& site, const u32* columns, i32 x, i
     return mixed & wanted & layers & 0xff;
 }
 
-// Layers of corners below and above cubes.
+// Layers of the corners below and above cubes.
 __device__ inline u32 both_faces(u32 cubes) { return cubes | cubes << 1; }
 
-// The edges from the corners of one column that have a vertex, a bit for each level: their two ends differ, and a cube
-// beside them is drawn.
+// The edges from one corner column that have a vertex, one bit per level: their ends differ in sign, and an
+// adjacent cube is drawn.
 __device__ inline u32 column_edges(const u32* columns, const u16* drawn) {
     u32 own = columns[0];
     u32 along_x = (own ^ columns[1]) & both_faces(drawn[0] | drawn[-9]);
@@ -112,20 +113,20 @@ __device__ inline u32 column_edges(const u32* columns, const u16* drawn) {
     return along_x | along_y << 9 | along_z << 18;
 }
 
-// Two bits, the second one two places from the first, in both halves of a word.
+// Spreads two bits to positions 0 and 2, in both halves of a word.
 __device__ inline u32 spread_pairs(u32 bits) { return (bits & 0x10001) | (bits & 0x20002) << 1; }
 
-// The case of a cube, which says what corners are solid.
+// The marching cubes case of a cube: one bit per solid corner.
 __device__ inline u32 cube_case(const u32* columns, u32 y) {
-    // Two bits of each column: the lower corner's, and the upper one's two places further. Columns at z + 1 are in the upper
-    // half.
+    // Two bits from each column: the lower corner's, and the upper one's two places higher. The columns at z + 1 go
+    // to the upper half.
     u32 low = spread_pairs((columns[0] & 0x1ff | columns[9] << 16) >> y);
     u32 high = spread_pairs((columns[1] & 0x1ff | columns[10] << 16) >> y);
     u32 corners = low | high << 1;
     return (corners | corners >> 12) & 0xff;
 }
 
-// Reads samples above one another, from a layer of a brick on; without a brick nobody edited them.
+// Reads a vertical run of samples, starting at layer FIRST of a brick. Without a brick they are pristine.
 template <i32 FIRST, i32 COUNT>
 __device__ inline void read_samples(const Site& site, u32 ref, u32 at, i32* samples) {
     const i16* found = site.params.bricks[ref >> 1].samples + FIRST * 64 + at;
@@ -133,25 +134,26 @@ __device__ inline void read_samples(const Site& site, u32 ref, u32 at, i32* samp
     for (i32 i = 0; i < COUNT; i++) samples[i] = ref != NONE ? found[i * 64] : PRISTINE;
 }
 
-// Where a thread's column of the padding lies: the bricks below, own and above; the place in their layers.
+// Source of a thread's padded column: references of the bricks below, at and above it, and the index within their
+// layers.
 struct ApronPlace {
     u32 refs[3], at;
 };
 
 __device__ inline ApronPlace apron_place(const Site& site) {
-    // Row and column 0 are the last of the brick before.
+    // Row and column 0 are the last of the preceding brick.
     u32 t = smallest(threadIdx.x, AREA - 1), x = t % WINDOW + SIDE - 1, z = t / WINDOW + SIDE - 1;
     const u32* window = window_at(site, x / SIDE - 1, z / SIDE - 1);
     return {{window[-1], window[0], window[1]}, z % SIDE * SIDE + x % SIDE};
 }
 
-// A column of the padding, and its height.
+// A column of padded samples, and its height.
 struct PaddedColumn {
     i32 samples[WINDOW], height;
 };
 
-// Reads the column of a thread; its layer 0 is the last of the brick below. Layers of cubes tell whether samples of the bricks
-// below and above are looked at.
+// Reads the thread's column, starting with the last layer of the brick below. Reads from the bricks below and above
+// only if cubes in the adjacent layers need them.
 __device__ inline PaddedColumn read_column(const Site& site, const ApronPlace& place, u32 layers) {
     PaddedColumn column;
     column.height = site.stack.heights[smallest(threadIdx.x, AREA - 1)];
@@ -161,12 +163,12 @@ __device__ inline PaddedColumn read_column(const Site& site, const ApronPlace& p
     return column;
 }
 
-// Puts it in its place.
+// Stores a column in shared memory.
 __device__ inline void put_column(const Site& site, MeshMemory& shared, const PaddedColumn& column) {
     u32 t = threadIdx.x;
     if (t >= AREA) return;
     shared.heights[t] = column.height;
-    // Twice the density where the ground tells.
+    // Pristine samples have twice their distance above the ground, without the edited flag.
     u32 pristine = ((u32)(site.low[1] - 1) * ONE - (u32)column.height) * 2;
 #pragma unroll
     for (i32 layer = 0; layer < WINDOW; layer++) {
@@ -175,7 +177,7 @@ __device__ inline void put_column(const Site& site, MeshMemory& shared, const Pa
     }
 }
 
-// Numbers the edges of each level from a warp's corners. For one warp.
+// Computes the number of the first edge of each level for a warp's corners. Called by whole warps.
 __device__ inline void number_edges(MeshMemory& shared) {
     u32 own = 0, before = 0;
     if (lane() < LEVELS) {
@@ -191,7 +193,7 @@ __device__ inline void number_edges(MeshMemory& shared) {
     __syncwarp();
 }
 
-// Lists the edges from the corner of a thread, a bit for each level.
+// Lists the edges of the thread's corner; one bit per level.
 __device__ inline void list_edges(MeshMemory& shared, u32 edges) {
     for (u32 rest = edges; rest != 0; rest &= rest - 1) {
         i32 level = __ffs(rest) - 1;
@@ -202,7 +204,7 @@ __device__ inline void list_edges(MeshMemory& shared, u32 edges) {
     }
 }
 
-// Counts the edges of all levels. For one warp.
+// Counts the edges of all levels. Called by one warp.
 __device__ inline u32 count_edges(const MeshMemory& shared) {
     u32 edges = 0;
     if (lane() < LEVELS) {
@@ -212,9 +214,9 @@ __device__ inline u32 count_edges(const MeshMemory& shared) {
     return sum_of_warp(edges);
 }
 
-// Lists the cubes to draw, layer by layer. For one warp.
+// Lists the cubes to draw, layer by layer. Called by one warp.
 __device__ inline void list_cubes(const MeshParams& params, MeshMemory& shared) {
-    // The lower half of a layer's cells, and the upper half.
+    // Two half layers of cells.
     u32 corner = lane() / SIDE * 9 + lane() % SIDE, cubes = 0, indices = 0;
     u32 drawn = shared.bits.drawn[MARGIN + corner] | shared.bits.drawn[MARGIN + corner + 4 * 9] << SIDE;
     for (u32 rest = shared.layers; rest != 0; rest &= rest - 1) {
@@ -228,7 +230,7 @@ __device__ inline void list_cubes(const MeshParams& params, MeshMemory& shared) 
         }
     }
     __syncwarp();
-    // Their cases, and how many indices they have.
+    // Adds each cube's case and number of indices.
 #pragma unroll 1
     for (u32 cube = lane(); cube < cubes; cube += 32) {
         u32 place = shared.cubes[cube], kind = cube_case(shared.bits.columns + MARGIN + place % CORNERS, place / CORNERS);
@@ -244,12 +246,13 @@ __device__ inline void list_cubes(const MeshParams& params, MeshMemory& shared) 
     }
 }
 
-// Reserves room for the block: the first vertex, and the first index in the upper half. For one thread.
+// Reserves output space for the block: returns the first vertex, and the first index in the upper half. Called by
+// one thread.
 __device__ inline u64 reserve(const MeshParams& params, const MeshMemory& shared) {
     return atomicAdd((u64*)params.counters, shared.vertices | (u64)shared.indices << 32);
 }
 
-// Enters what was reserved. For one thread.
+// Publishes the reservation. Called by one thread.
 __device__ inline void enter(const MeshParams& params, MeshMemory& shared, u64 reserved) {
     u32 vertex = (u32)reserved, index = (u32)(reserved >> 32);
     bool is_room = fits(vertex, shared.vertices, params.vertex_capacity);
@@ -259,13 +262,13 @@ __device__ inline void enter(const MeshParams& params, MeshMemory& shared, u64 r
     params.results[blockIdx.x] = {shared.vertex, shared.vertices, is_room ? index : 0, shared.indices};
 }
 
-// A lane's vertex, but for its normal.
+// A lane's vertex without its normal.
 struct Made {
     uint2 position;
     Mix mix;
 };
 
-// Makes up to 32 vertices, the first of number `base`; normals go to shared memory. For one warp.
+// Computes up to 32 vertices, starting with number `base`; normals go to shared memory. Called by one warp.
 __device__ inline Made make_vertices(const Site& site, MeshMemory& shared, u32 base) {
     Made made = {{0, 0}, {0, 0}};
     if (base + lane() < shared.vertices) {
@@ -283,7 +286,7 @@ __device__ inline Made make_vertices(const Site& site, MeshMemory& shared, u32 b
     return made;
 }
 
-// Writes these vertices. Normals come from shared memory, so that what lanes write lies side by side. For one warp.
+// Writes these vertices. Normals come from shared memory, so that writes are coalesced. Called by one warp.
 __device__ inline void write_vertices(const MeshParams& params, const MeshMemory& shared, u32 base, const Made& made) {
     const float* normals = shared.output[warp()].normals;
     u32 count = smallest(shared.vertices - base, 32);
@@ -300,11 +303,11 @@ __device__ inline void write_vertices(const MeshParams& params, const MeshMemory
     __syncwarp();
 }
 
-// Writes the triangles of up to 32 cubes, the first of number `base`. For one warp; they go through shared memory, so that
-// what its lanes write lies side by side.
+// Writes the triangles of up to 32 cubes, starting with number `base`. They are staged in shared memory, so that
+// writes are coalesced. Called by one warp.
 __device__ inline void write_cubes(const MeshParams& params, MeshMemory& shared, u32 base) {
     u16* indices = shared.output[warp()].indices;
-    // Indices of the cube, and in the upper half those of cubes before these.
+    // Indices of the lane's cube; the upper half sums those of all cubes before this batch.
     u32 cube = base + lane() < shared.cubes_in_all ? shared.cubes[base + lane()] : 0, count = cube >> CUBE_BITS, counts = count;
 #pragma unroll 1
     for (u32 i = lane(); i < base; i += 32) counts += shared.cubes[i] >> CUBE_BITS << 16;
@@ -336,7 +339,7 @@ __device__ inline void write_cubes(const MeshParams& params, MeshMemory& shared,
     }
 }
 
-// Says that a block has no surface.
+// Writes an empty result.
 __device__ inline void draw_nothing(const MeshParams& params) {
     if (threadIdx.x == 0) params.results[blockIdx.x] = {0, 0, 0, 0};
 }
@@ -354,14 +357,14 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     if (t == 0) shared.layers = 0;
     if (warp() < 2) gather_columns(site, shared);
     __syncthreads();
-    // Where all corners are solid, or none, there is no surface.
+    // Without both signs there is no surface.
     if ((shared.signs[0] | shared.signs[1]) != 3) {
         draw_nothing(params);
         return;
     }
 
     ApronPlace place = apron_place(site);
-    // Threads of cells.
+    // One thread per column of cells.
     if (t < SIDE * SIDE) {
         i32 x = t % SIDE, z = t / SIDE, corner = MARGIN + z * 9 + x;
         u32 cubes = drawn_cubes(site, shared.bits.columns + corner, x, z);
@@ -375,9 +378,9 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
         return;
     }
 
-    // Samples are on their way while edges and cubes are told.
+    // The loads are in flight while edges and cubes are found.
     PaddedColumn samples = read_column(site, place, layers);
-    // Three warps turn edges to words, and list them. The fourth lists cubes, and reserves room.
+    // Three warps transpose and list edges. The fourth lists cubes and reserves output space.
     u32 edges = 0;
     if (warp() < CORNER_WARPS) {
         if (t < CORNERS) edges = column_edges(shared.bits.columns + MARGIN + t, shared.bits.drawn + MARGIN + t);
@@ -401,7 +404,7 @@ extern "C" __global__ void __launch_bounds__(THREADS, 12) mesh(MeshParams params
     }
     __syncthreads();
 
-    // Warps make their first vertices before they wait for what was reserved.
+    // Warps compute their first vertices before they wait for the reservation.
     u32 batches = (shared.vertices + 31) / 32, all_batches = batches + (shared.cubes_in_all + 31) / 32;
     bool is_entered = false;
     for (u32 batch = warp(); batch < all_batches || !is_entered; batch += THREADS / 32) {

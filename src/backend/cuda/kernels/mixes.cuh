@@ -3,7 +3,7 @@
 
 #include "edges.cuh"
 
-// Four ids, and their weights.
+// Four material ids and their weights, one byte each.
 struct Mix {
     u32 ids, weights;
 };
@@ -17,15 +17,15 @@ __device__ inline Mix column_mix(u32 column) {
     return {base | overlay << 8, (255 - blend) | blend << 8};
 }
 
-// Materials of both mixes, at most two of each, with their weights. Loops over them are unrolled, so that indices are
-// constant and all stays in registers.
+// Weights of the materials of two mixes with at most two materials each. Loops over them are unrolled, so indices
+// are constant and everything stays in registers.
 struct Shares {
     u32 ids[4];
     i32 weights[4];
     i32 count;
 };
 
-// Adds a material, if it has any weight.
+// Adds a material unless its weight is zero.
 __device__ inline void add_share(Shares& shares, u32 id, u32 weight, i32 share) {
     if (weight == 0) return;
     bool is_known = false;
@@ -44,7 +44,7 @@ __device__ inline void add_share(Shares& shares, u32 id, u32 weight, i32 share) 
     shares.count += !is_known;
 }
 
-// Sorts by weight, the largest first, then by id.
+// Sorts by descending weight, then by id.
 __device__ inline void sort_shares(Shares& shares) {
 #pragma unroll
     for (i32 pass = 0; pass < 3; pass++) {
@@ -62,7 +62,7 @@ __device__ inline void sort_shares(Shares& shares) {
     }
 }
 
-// The mix at `step` from `a` to `b`, in integers, of mixes of at most two materials.
+// Interpolates between two mixes of at most two materials each, in integers, at `step` of SNAP.
 __device__ inline Mix lerp_mix(Mix a, Mix b, i32 step) {
     if (a.ids == b.ids && a.weights == b.weights) return a;
     Shares shares = {{0, 0, 0, 0}, {0, 0, 0, 0}, 0};
@@ -89,8 +89,8 @@ __device__ inline i32 between(i32 low, i32 high, i32 step) {
     return low + (i32)(((i64)high - low) * step / SNAP);
 }
 
-// Materials where the ground shows its own, those of both columns blended as the tile does: the overlay within its depth
-// below the pristine surface, the base below.
+// Material of an unedited edge, interpolated between both columns as the heightmap does: the overlay near the
+// pristine surface, the base below OVERLAY_DEPTH.
 __device__ inline Mix own_mix(const Site& site, const i32* heights, const Edge& edge, i32 step) {
     i32 y = site.low[1] + edge.y, other = edge.window + edge.next_window;
     i32 upper = edge.axis == 1 ? y + 1 : y;

@@ -1,37 +1,37 @@
-// What stencil edits read, as in edits/padded_brick.rs and edits/stencil_edit.rs.
+// The input of stencil edits, as in edits/padded_brick.rs and edits/stencil_edit.rs.
 #pragma once
 
 #include "edit.cuh"
 #include "sculpt.cuh"
 
-// What became of a voxel, or would have but for a rule.
+// What happened to a voxel, or the rule that prevented it. `FATES` is the number of outcomes.
 enum VoxelOutcome { REMOVED, ADDED, PAINTED, PROTECTED, UNBREAKABLE, TOO_HARD, SLOWED, FATES };
 
 struct StencilEditMemory {
     EditMemory work;
-    // The brick with one sample more on all sides, as they were before.
+    // The brick with one sample of padding on all sides, as before the launch.
     Marked around[AROUND * AROUND * AROUND];
-    // Of the edit at hand: voxels of each material, for each outcome.
+    // Voxels of each material, for each outcome of the current edit.
     u32 counts[FATES * 256];
-    // Bricks around, as `refs` of a mesh.
+    // References of the 27 bricks around, x fastest, then z, then y.
     u32 refs[27];
 };
 
-// How far below and above itself new ground looks for what it is to be made of, in bricks: 64 voxels.
+// How many bricks new ground searches up and down for its material (64 voxels).
 constexpr i32 LOOK = 8;
 
-// What an edit reads: the brick and what is around it, as they were before the launch.
+// What an edit reads: the brick and its padding, as before the launch.
 struct PaddedBrick {
     const StencilEditParams& params;
     StencilEditMemory& shared;
-    // The brick's entry in the windows, and the way to its neighbours.
+    // The brick's entry in the windows, and the strides to its neighbours.
     const u32* window;
     i32 to_x, to_z;
     const Stack* stack;
-    // Are they there? Did new ground look farther than windows reach?
+    // Whether the padding is loaded. Whether the search for a material went beyond the window.
     bool has_looked, is_too_far;
 
-    // Brings them, which the block then has to wait for.
+    // Loads the padding. The block must synchronise before reading it.
     __device__ void look(const EditJob& job, const Stack& own_stack) {
         has_looked = true;
         window = params.windows + job.window;
@@ -44,23 +44,23 @@ struct PaddedBrick {
         for (i32 i = threadIdx.x; i < FATES * 256; i += THREADS) shared.counts[i] = 0;
         __syncthreads();
         for (i32 i = threadIdx.x; i < AROUND * AROUND * AROUND; i += THREADS) {
-            // Beyond the world's rim all goes on as it is at the rim.
+            // Samples beyond the world's border repeat those at the border.
             i32 x = inside(i % AROUND, job.brick[0], params.last[0]);
             i32 z = inside(i / AROUND % AROUND, job.brick[2], params.last[1]), y = i / (AROUND * AROUND);
             shared.around[i] = sample_around(x, y, z, job.brick[1] * SIDE, stack->heights[z * WINDOW + x]);
         }
     }
 
-    // The nearest of the padded brick's columns along an axis that lies in the world.
+    // Clamps a padded coordinate to the world.
     static __device__ i32 inside(i32 local, i32 brick, i32 last) {
         i32 low = brick * SIDE - 1;
         return smallest(largest(largest(local, -low), 0), largest(last - low, 0));
     }
 
-    // The entry of a brick so far away.
+    // Offset in the window to the brick at this distance.
     __device__ i32 brick_at(i32 dx, i32 dy, i32 dz) const { return dx * to_x + dy + dz * to_z; }
 
-    // A sample of the padded brick, counted from one before the brick's lowest.
+    // A sample of the padded brick; coordinates start one before the brick's minimum corner.
     __device__ Marked sample_around(i32 x, i32 y, i32 z, i32 low, i32 height) const {
         u32 ref = shared.refs[(((y + 7) >> 3) * 3 + ((z + 7) >> 3)) * 3 + ((x + 7) >> 3)];
         i32 raw = ref == NONE ? PRISTINE : params.edit.bricks[ref >> 1].samples[index_at(x - 1, y - 1, z - 1)];
@@ -68,23 +68,21 @@ struct PaddedBrick {
         return raw == PRISTINE ? pristine * 4 : marked(raw, pristine);
     }
 
-    // The index of a sample in its brick.
     static __device__ i32 index_at(i32 x, i32 y, i32 z) { return (y & 7) * 64 + (z & 7) * SIDE + (x & 7); }
 
-    // The material stored in a brick.
     __device__ u32 stored(u32 ref, i32 index) const {
         return ref == NONE || !(ref & 1) ? GROUND : params.edit.bricks[ref >> 1].materials[index];
     }
 
-    // The material stored at one of the brick's samples, or beside them.
+    // The material stored at a sample of the padded brick.
     __device__ u32 stored_at(i32 x, i32 y, i32 z) const {
         return stored(window[brick_at(x >> 3, y >> 3, z >> 3)], index_at(x, y, z));
     }
 
-    // Which samples of the column are solid in the brick so many bricks higher up: a bit for each y.
+    // Which samples of the column are solid in the brick `up` bricks higher, one bit per layer.
     __device__ u32 solid_levels(u32 ref, const OwnColumn& column, i32 up) const {
         if (ref == NONE) {
-            // As many as are below the surface.
+            // Without a brick, the samples below the ground's surface.
             i32 count = ((column.height + ONE - 1) >> 8) - (column.low[1] + up * SIDE);
             return (1u << smallest(largest(count, 0), SIDE)) - 1;
         }
@@ -94,7 +92,8 @@ struct PaddedBrick {
         return levels;
     }
 
-    // What a sample is made of that becomes solid: what lies straight below, else straight above, else beside it.
+    // The material of a sample that becomes solid: that of the nearest solid sample below, else above, else beside
+    // it.
     __device__ u32 new_material(const OwnColumn& column, i32 y) {
         for (i32 down = 0; down <= LOOK; down++) {
             if (down > params.look) {

@@ -1,17 +1,16 @@
-// What rules say of a change, as volume/rules.rs does.
+// Applies the digging rules to a change, like volume/rules.rs.
 #pragma once
 
 #include "padded_brick.cuh"
 
-// What edits may not change, or not at once.
+// Limits edits by the rules.
 struct RuleChecker : PaddedBrick {
-    // Is a protected box near?
+    // Whether a protected box is near.
     bool has_boxes;
 
-    // The protected boxes.
     __device__ const Protected* boxes() const { return (const Protected*)(params.rules + 1); }
 
-    // Does one of the thread's share of boxes touch the brick or what is around it?
+    // Whether a protected box touches the brick or its padding. Each thread checks its share of the boxes.
     __device__ bool is_box_near(const i32* brick) const {
         bool is_near = false;
         for (u32 i = threadIdx.x; params.rules && i < params.rules->boxes; i += THREADS) {
@@ -39,8 +38,8 @@ struct RuleChecker : PaddedBrick {
         return params.rules->unbreakable[material / 32] >> material % 32 & 1;
     }
 
-    // How much of a change is made that takes away what is solid at a sample of the brick or beside it, in 1/256; and why
-    // not all, or `FATES`.
+    // How fast the rules let solid ground at a sample of the padded brick be removed, in 1/256. `outcome` is the
+    // reason if that is below 256, else `FATES`.
     __device__ i32 pace(const OwnColumn& column, i32 x, i32 y, i32 z, i32 power, u32& outcome) const {
         i32 at_y = column.low[1] + y, place = (z + 1) * WINDOW + x + 1;
         u32 material = stored_at(x, y, z);
@@ -55,8 +54,8 @@ struct RuleChecker : PaddedBrick {
         return part;
     }
 
-    // Does a sample's neighbour across a face lie in the world? Beyond the rim all goes on as it is there, and nothing
-    // holds anything.
+    // Whether a face neighbour lies inside the world. The border's samples repeat beyond it, and no rules apply
+    // there.
     __device__ bool is_inside(i32 face, const i32* at) const {
         i32 way[3];
         way_to(face, way);
@@ -64,14 +63,14 @@ struct RuleChecker : PaddedBrick {
         return 0 <= x && x <= params.last[0] && 0 <= z && z <= params.last[1];
     }
 
-    // The density across a face of a sample.
+    // The density of a face neighbour.
     __device__ i32 density_beside(i32 face, const OwnColumn& column, i32 y) const {
         i32 way[3];
         way_to(face, way);
         return density(shared.around[around_at(column.x + way[0], y + way[1], column.z + way[2])]);
     }
 
-    // The pace of what is solid there; 0 where it is protected.
+    // The pace at a face neighbour; 0 if it is protected.
     __device__ i32 pace_beside(i32 face, const OwnColumn& column, const i32* at, i32 y, i32 power) const {
         i32 way[3];
         way_to(face, way);
@@ -85,7 +84,8 @@ struct RuleChecker : PaddedBrick {
         for (i32 axis = 0; axis < 3; axis++) way[axis] = axis != face / 2 ? 0 : face & 1 ? -1 : 1;
     }
 
-    // The density that a sample may have instead of the proposed one, and why it is another one, or `FATES`.
+    // The density that the rules allow instead of the proposed one. `outcome` is the reason if a rule held it back,
+    // else `FATES`.
     __device__ i32 judged(const OwnColumn& column, const i32* at, i32 y, i32 power, i32 proposed, u32& outcome) const {
         const Marked* own = shared.around + around_at(column.x, y, column.z);
         i32 before = density(*own);
@@ -97,14 +97,15 @@ struct RuleChecker : PaddedBrick {
         if (before < 0) {
             least = pace(column, column.x, y, column.z, power, outcome);
         } else {
-            // Air beside what is solid holds its surface. It is air in any case, so nobody asks why.
+            // Air samples beside solid ground also define its surface, so the neighbour's pace limits them. The
+            // voxel stays air, so no outcome is reported.
             for (i32 i = 0; i < 6; i++) {
                 if (is_inside(i, at) && density_beside(i, column, y) < 0) least = smallest(least, pace_beside(i, column, at, y, power));
             }
         }
         i32 allowed = before + (i32)((((i64)proposed - before) * least + ONE - 1) >> 8);
         if (before >= 0 || allowed < 0) return allowed;
-        // What turns to air beside ground that stays uncovers it, and takes nothing of it.
+        // A sample that turns to air beside unbreakable ground exposes it but must not move its surface.
         for (i32 i = 0; i < 6; i++) {
             i32 beside = density_beside(i, column, y);
             if (beside >= 0 || !is_inside(i, at) || pace_beside(i, column, at, y, power) != 0) continue;

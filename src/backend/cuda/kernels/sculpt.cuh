@@ -1,27 +1,27 @@
-// What operations that sculpt make of a sample, in integers: brush/sculptor.rs, brush/blend.rs, brush/deed.rs,
-// brush/stamp.rs.
+// Sculpting operations on one sample, in integers: brush/sculpt_kernel.rs, brush/blend.rs,
+// brush/quantized_operation.rs, brush/stamp.rs.
 #pragma once
 
 #include "threads.cuh"
 
-// A sample with two bits more: four times the density, one more if it was cut off, two more if it was moved away from the
+// A sample with two flags: four times the density, plus 1 if it was clamped, plus 2 if it was moved away from the
 // surface.
 typedef i32 Marked;
 
-// Samples along a side of a padded brick: its own and one on each side. x fastest, then z, then y.
+// Samples along a side of a padded brick: its own and one on each side. x varies fastest, then z, then y.
 constexpr i32 AROUND = SIDE + 2;
 
-// Where stored densities end.
+// The largest density that can be stored.
 constexpr i32 FARTHEST = 32767;
 
-// How far neighbours count as denser or thinner at most, and by how much sharpening changes a sample at most.
+// Bounds on a neighbour's density difference, and on how much sharpening changes a sample.
 constexpr i32 CONTRAST = 2 * ONE;
 constexpr i32 SHARPER = ONE / 4;
 
-// Where distances to planes and stamps stop.
+// Distances to planes and stamps are clamped here.
 constexpr i64 FARTHEST_PLANE = 1 << 25;
 
-// The place of one of the brick's own samples, or of one beside them, in the padded brick.
+// Index in the padded brick of one of the brick's samples, or of a sample beside it.
 __device__ inline i32 around_at(i32 x, i32 y, i32 z) { return ((y + 1) * AROUND + z + 1) * AROUND + x + 1; }
 
 __device__ inline i32 density(Marked sample) { return sample >> 2; }
@@ -32,20 +32,20 @@ __device__ inline bool is_moved(Marked sample) { return sample & 2; }
 
 __device__ inline i32 clamped(i32 value, i32 low, i32 high) { return smallest(largest(value, low), high); }
 
-// As it is stored.
+// The density clamped to the range that can be stored.
 __device__ inline i32 storable(i32 density) { return clamped(density, -FARTHEST, FARTHEST); }
 
 __device__ inline i32 sign_of(i32 value) { return (value > 0) - (value < 0); }
 
 __device__ inline i32 magnitude(i32 value) { return value < 0 ? -value : value; }
 
-// An edited sample, with what is to be known of it.
+// An edited sample with its flags.
 __device__ inline Marked marked(i32 density, i32 pristine) {
     i32 far = magnitude(density), by = density < 0 ? pristine - density : density - pristine;
     return density * 4 + (far == DEPTH || far == FARTHEST) + (by >= ONE) * 2;
 }
 
-// Rounded down; the divisor is positive.
+// Division rounded towards minus infinity; the divisor is positive.
 __device__ inline i64 divided(i64 value, i64 by) {
     i64 quotient = value / by;
     return quotient * by > value ? quotient - 1 : quotient;
@@ -55,13 +55,14 @@ __device__ inline i32 within_reach(i64 value) {
     return (i32)(value < -FARTHEST_PLANE ? -FARTHEST_PLANE : value > FARTHEST_PLANE ? FARTHEST_PLANE : value);
 }
 
-// From a sample to the one across a face, six of them.
+// Offset to one of the six face neighbours.
 __device__ inline i32 face(i32 number) {
     i32 step = number < 2 ? 1 : number < 4 ? AROUND : AROUND * AROUND;
     return number & 1 ? step : -step;
 }
 
-// Does any neighbour lie on the other side of the surface? Only those count that are known to be moved, if so asked.
+// Whether any face neighbour lies on the other side of the surface. With `moved_only`, only moved neighbours that
+// are not clamped count.
 __device__ inline bool is_beside(const Marked* own, bool moved_only) {
     bool is_any = false;
 #pragma unroll
@@ -72,7 +73,8 @@ __device__ inline bool is_beside(const Marked* own, bool moved_only) {
     return is_any;
 }
 
-// How near the surface the known ones of the neighbours lie, on the side of the middle; UNKNOWN where none is.
+// Smallest distance of the unclamped face neighbours from the surface, positive on the side of `sign`; UNKNOWN if
+// there is none.
 constexpr i32 UNKNOWN = 1 << 30;
 __device__ inline i32 nearest_of(const Marked* own, i32 sign) {
     i32 nearest = UNKNOWN;
@@ -84,7 +86,7 @@ __device__ inline i32 nearest_of(const Marked* own, i32 sign) {
     return nearest;
 }
 
-// The density, as far as anyone knows; says whether anyone does.
+// Computes the sample's density, extrapolated from its neighbours if it was clamped; false if it is unknown.
 __device__ inline bool middle_of(const Marked* own, i32& middle) {
     middle = density(*own);
     if (!is_cut(*own)) return true;
@@ -102,11 +104,12 @@ __device__ inline bool middle_of(const Marked* own, i32& middle) {
     return is_known;
 }
 
-// The density with an amount added, which an opposite shift takes away again; says whether there is another one.
+// Computes the density with `by` added, in a way that the opposite shift undoes; false if the sample does not
+// change.
 __device__ inline bool shifted(const Marked* own, i32 by, i32& after) {
     i32 middle = density(*own), sign = sign_of(middle);
     if (by == 0) return false;
-    // Where nobody edited, densities go on beyond, but no shift of them could be stored.
+    // Unedited densities go on beyond this limit, but a shift of them could not be stored.
     if (magnitude(middle) >= FARTHEST) {
         if (sign_of(by) == sign || !is_beside(own, true)) return false;
         middle = sign * ONE;
@@ -116,24 +119,24 @@ __device__ inline bool shifted(const Marked* own, i32 by, i32& after) {
         middle = sign * largest(nearest + ONE, DEPTH);
     }
     after = middle + by;
-    // It must not come to say that it is cut off.
+    // Avoid DEPTH, which would mark the sample as clamped.
     if (magnitude(after) == DEPTH) after += sign_of(by);
     return true;
 }
 
-// 64 times the way from the middle to the average of all.
+// 64 times the difference between the average of the neighbourhood and `middle`.
 __device__ inline i32 way_to_average(const Marked* own, i32 middle) {
     i32 sum = 0;
 #pragma unroll
     for (i32 number = 14; number < 27; number++) {
-        // The second half of the neighbours; the first half lies opposite.
+        // Iterates over one half of the neighbours; the other half lies opposite.
         i32 dx = number % 3 - 1, dz = number / 3 % 3 - 1, dy = number / 9 - 1;
         i32 along = (dx != 0) + (dy != 0) + (dz != 0);
-        // Weights of 1 2 1 along each axis, and what the way measures.
+        // Binomial weights, 1 2 1 along each axis, and the distance to the neighbour in 1/256 voxel.
         i32 weight = 8 >> along, length = along == 1 ? 256 : along == 2 ? 362 : 443;
         i32 step = (dy * AROUND + dz) * AROUND + dx;
         Marked there = own[step], opposite = own[-step];
-        // Where one side is not known, the other one has nothing to be compared with.
+        // If one side of a pair is unknown, skip both to stay balanced.
         i32 far = magnitude(middle) + length;
         if (is_cut(there) && far > magnitude(density(there))) continue;
         if (is_cut(opposite) && far > magnitude(density(opposite))) continue;
@@ -143,7 +146,7 @@ __device__ inline i32 way_to_average(const Marked* own, i32 middle) {
     return sum;
 }
 
-// A change that may make the sample solid only beside a solid one, and air only beside air.
+// Lets a sample turn solid only beside a solid one, and turn to air only beside air.
 __device__ inline i32 attached(const Marked* own, i32 after) {
     bool was_solid = *own < 0, is_solid = after < 0, has_like = was_solid == is_solid;
 #pragma unroll
@@ -151,31 +154,31 @@ __device__ inline i32 attached(const Marked* own, i32 after) {
     return has_like ? after : was_solid ? -1 : 0;
 }
 
-// How much of the change is made at a distance from the shape, in 1/256.
+// Weight of the change at this distance from the shape, in 1/256.
 __device__ inline i32 weight_at(const SculptParams& sculpt, i32 outside) {
     i32 inside = -outside, falloff = sculpt.falloff;
     if (inside < 0 || (inside == 0 && falloff > 0)) return 0;
     if (inside >= falloff) return sculpt.strength;
-    // 3 t^2 - 2 t^3: no kink at either end.
+    // Smoothstep 3 t^2 - 2 t^3: the slope is zero at both ends.
     i32 t = inside * ONE / falloff, faded = (t * t * (3 * ONE - 2 * t)) >> 16;
     return (faded * sculpt.strength + ONE / 2) >> 8;
 }
 
-// A part of `whole`, in 1/256, away from zero.
+// A fraction of `whole` in 1/256, rounded away from zero.
 __device__ inline i32 part_of(i32 whole, i32 weight) {
     i64 part = ((i64)magnitude(whole) * weight + ONE - 1) >> 8;
     return (i32)(whole < 0 ? -part : part);
 }
 
-// How far a point lies from a plane, on the side of its normal.
+// Signed distance from a plane, positive on the side of its normal.
 __device__ inline i32 above_plane(const SculptParams& sculpt, const i32* at) {
     i64 along = 0;
     for (i32 i = 0; i < 3; i++) along += ((i64)at[i] * ONE - sculpt.point[i]) * sculpt.matrix[0][i];
-    // Both are integers that doubles hold exactly.
+    // Both are integers that a double holds exactly.
     return within_reach((i64)rint((double)along / sculpt.length));
 }
 
-// The grey of a stamp's image, in 1/256 of a step between samples.
+// Bilinear sample of a stamp's image. Coordinates are in 1/256 of the spacing between samples.
 __device__ inline i64 grey_at(const SculptParams& sculpt, const u16* images, i64 x, i64 y) {
     const u16* image = images + sculpt.image;
     i64 column = x >> 8, row = y >> 8, last_column = (i64)sculpt.columns - 2, last_row = (i64)sculpt.rows - 2;
@@ -190,7 +193,7 @@ __device__ inline i64 grey_at(const SculptParams& sculpt, const u16* images, i64
     return above * (ONE - down) + below * down;
 }
 
-// How far a point lies above the relief of a stamp; `beside`: how far beside its image, negative inside.
+// Height of a point above a stamp's relief. `beside` is the distance outside its image, negative inside.
 __device__ inline i32 above_stamp(const SculptParams& sculpt, const u16* images, const i32* at, i32& beside) {
     const i64 WHITE = 65535ll << 16;
     i64 turned[3];
@@ -209,14 +212,14 @@ __device__ inline i32 above_stamp(const SculptParams& sculpt, const u16* images,
     return within_reach(up - divided(grey_at(sculpt, images, x, y) * sculpt.height + WHITE / 2, WHITE));
 }
 
-// A height in steps, with a riser over the middle quarter of each.
+// Quantises a height to steps, with a ramp over the middle quarter of each.
 __device__ inline i32 terraced(i32 height, i32 step) {
     i32 tread = (i32)divided(height, step) * step;
     return tread + clamped((height - tread - step * 3 / 8) * 4, 0, step);
 }
 
-// The density of a sample after the operation, from its distance to the shape and what is around it; says whether there is
-// another one.
+// Computes a sample's density after the operation from its distance to the shape and its neighbourhood; false if it
+// does not change.
 __device__ inline bool sculpted(
     const SculptParams& sculpt, const u16* images, const i32* at, i32 outside, const Marked* own, i32& after
 ) {

@@ -1,17 +1,17 @@
-// Signed distances from lattice points to shapes, with their roughness: brush/distance.rs, brush/roughness.rs,
+// Signed distances from lattice points to shapes, with roughness: brush/shapes/, brush/roughness.rs,
 // brush/evaluator.rs.
 #pragma once
 
 #include "threads.cuh"
 
-// In the order of brush/shapes/mod.rs.
+// In the same order as in brush/shapes/mod.rs.
 enum Kind { SPHERE, CUBOID, CYLINDER, CAPSULE, CONE, TORUS };
 
 struct Vector {
     float x, y, z;
 };
 
-// Like Rust's `if a > b { a } else { b }`; fmaxf treats zeroes otherwise.
+// Like Rust's `if a > b { a } else { b }`; fmaxf treats zeroes differently.
 __device__ inline float larger(float a, float b) { return a > b ? a : b; }
 
 __device__ inline float smaller(float a, float b) { return a < b ? a : b; }
@@ -20,7 +20,7 @@ __device__ inline float length(float x, float y, float z) { return sqrtf(x * x +
 
 __device__ inline float dot(Vector p, const float* v) { return p.x * v[0] + (p.y * v[1] + p.z * v[2]); }
 
-// From the point to the place `along` an axis.
+// Distance from the point to the position `along` an axis.
 __device__ inline float off_axis(Vector p, float along, const float* unit) {
     return length(p.x - along * unit[0], p.y - along * unit[1], p.z - along * unit[2]);
 }
@@ -58,7 +58,7 @@ __device__ inline float cone(Vector p, const float* constants) {
     float radius = constants[4], slant = constants[5], rise = constants[6], run = constants[7];
     float along = dot(p, constants);
     float beyond = off_axis(p, along, constants) - radius;
-    // Over the side's line, and how far that point is past either end of the side.
+    // Signed distance to the lateral line, and how far the projection lies past either end of the side.
     float over = beyond * rise + along * run;
     float up = along * rise - beyond * run;
     float past = up - smaller(larger(up, 0.0f), slant);
@@ -88,7 +88,7 @@ __device__ inline float smooth_distance(const EditRecord& record, Vector p) {
     }
 }
 
-// SplitMix64, as lattice/hash.rs has it.
+// SplitMix64, as in lattice/hash.rs.
 __device__ inline u64 mix(u64 value) {
     u64 z = value + 0x9E3779B97F4A7C15ull;
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
@@ -98,7 +98,7 @@ __device__ inline u64 mix(u64 value) {
 
 __device__ inline float lerp(float a, float b, float t) { return a + (b - a) * t; }
 
-// A place among noise points: the cell, and the faded position between its ends.
+// A position in the noise lattice: its cell, and the smoothed fraction within it.
 struct Place {
     i32 cell;
     float t;
@@ -107,35 +107,35 @@ struct Place {
 __device__ inline Place locate(i32 voxel, i32 scale) {
     const i32 RIM = 1 << 20;
     i32 place = smallest(largest(voxel, -RIM), RIM) * ONE;
-    // Rounded down.
+    // Round towards minus infinity.
     i32 cell = place / scale;
     if (place < cell * scale) cell--;
     float t = (float)(place - cell * scale) / (float)scale;
     return {cell, t * t * (3.0f - 2.0f * t)};
 }
 
-// The value of a noise point: 24 bits of a hash, in [-1, 1).
+// The value at a noise lattice point: 24 bits of a hash, in [-1, 1).
 __device__ inline float noise_point(i32 x, i32 y, i32 z, u64 seed) {
     u64 place = (u64)(x & 0x1fffff) << 42 | (u64)(y & 0x1fffff) << 21 | (u64)(z & 0x1fffff);
     return (float)((i32)(mix(place ^ seed) >> 40) - (1 << 23)) / (float)(1 << 23);
 }
 
-// The noise around one brick, as one edit has it. A noise cell is at least as wide as a voxel, so eight samples lie in
-// eight cells at most, between nine noise points: they are hashed once, for all samples.
+// The noise of one edit around one brick. A noise cell is at least one voxel wide, so eight samples span at most
+// eight cells with nine points. The block hashes them once for all samples.
 constexpr i32 MOST_POINTS = 9 * 9 * 9;
 
-// Where samples of a brick are among the noise points: a lane of each warp knows it for one coordinate, lanes 0 to 7
+// Positions of the brick's samples in the noise lattice. Each warp holds one coordinate per lane: lanes 0 to 7
 // along x, then along y, then along z.
 struct Noise {
     Place own;
-    // From a point to the next along y, and along z.
+    // Strides between points along y and z.
     i32 row, area;
 };
 
 __device__ inline i32 noise_lane(i32 axis, i32 offset) { return axis * SIDE + offset; }
 
-// Hashes the noise points around the brick whose lowest sample is `low`. For the whole block, which waits for itself
-// before it looks at them.
+// Hashes the noise points around the brick with minimum corner `low`. Called by the whole block, which must
+// synchronise before it reads them.
 __device__ inline Noise hash_noise(const EditRecord& record, const i32* low, float* points) {
     i32 axis = lane() / SIDE, start = axis == 0 ? low[0] : axis == 1 ? low[1] : low[2];
     Noise noise = {locate(start + (i32)lane() % SIDE, record.scale), 0, 0};
@@ -144,12 +144,12 @@ __device__ inline Noise hash_noise(const EditRecord& record, const i32* low, flo
     for (i32 i = 0; i < 3; i++) {
         first[i] = __shfl_sync(WARP, noise.own.cell, noise_lane(i, 0));
         count[i] = __shfl_sync(WARP, noise.own.cell, noise_lane(i, SIDE - 1)) - first[i] + 2;
-        // From here on, cells count from the first.
+        // From here on, cells are relative to the first one.
         if (axis == i) noise.own.cell -= first[i];
     }
     noise.row = count[0];
     noise.area = count[0] * count[1];
-    // Divisions of small integers by floats: half of one is much more than what those may be wrong.
+    // Divides small integers as floats. The error is far below the 0.5 that is added.
     float by_row = 1.0f / (float)noise.row, by_area = 1.0f / (float)noise.area;
     u64 seed = mix(record.seed);
     for (i32 i = threadIdx.x; i < noise.area * count[2]; i += THREADS) {
@@ -160,13 +160,13 @@ __device__ inline Noise hash_noise(const EditRecord& record, const i32* low, flo
     return noise;
 }
 
-// The place of one coordinate, the same axis in all lanes of a warp.
+// The position of one coordinate. All lanes of a warp must ask for the same axis.
 __device__ inline Place place_of(const Noise& noise, i32 axis, i32 offset) {
     i32 from = noise_lane(axis, offset);
     return {__shfl_sync(WARP, noise.own.cell, from), __shfl_sync(WARP, noise.own.t, from)};
 }
 
-// Bumps at a sample: between noise points along y, then z, then x.
+// Roughness at a sample: interpolates noise points along y, then z, then x.
 __device__ inline float bumps(const EditRecord& record, const Noise& noise, const float* points, Place x, Place y, Place z) {
     const float* near = points + x.cell + y.cell * noise.row + z.cell * noise.area;
     auto row = [&](const float* p) { return lerp(p[0], p[noise.row], y.t); };
@@ -177,22 +177,22 @@ __device__ inline float bumps(const EditRecord& record, const Noise& noise, cons
     return value * (float)record.amplitude;
 }
 
-// To the nearest integer, halves to even, with an addition: next to 1.5 * 2^23, floats are the integers.
+// Rounds to the nearest integer, halves to even, by an addition: floats near 1.5 * 2^23 have a spacing of 1.
 __device__ inline i32 round_distance(float distance) {
     const float SHIFT = 12582912.0f, HORIZON = 4194304.0f;
     float near = smaller(larger(distance, -HORIZON), HORIZON);
     return __float_as_int(near + SHIFT) - __float_as_int(SHIFT);
 }
 
-// Voxels from a shape's origin; they stop where no distance shows the difference. Both are less than 2^24, as the sample
-// is in the shape's reach.
+// Voxels from a shape's origin, clamped where the distance no longer matters. Both arguments are below 2^24, as the
+// sample is within the shape's reach.
 __device__ inline i32 voxels_from(i32 voxel, i32 home) {
     const i32 FARTHEST = 65000;
     return smallest(largest(voxel - home, -FARTHEST), FARTHEST);
 }
 
-// From the shape's origin to the sample `offset` from a brick's lowest sample `low`. Rows along x begin at `low`, and only
-// their first coordinate stops at the end of all distances, as on the CPU.
+// Vector from the shape's origin to the sample at `offset` from the brick's minimum corner `low`. In a row along x
+// only the coordinate of `low` is clamped, as on the CPU.
 __device__ inline Vector from_origin(const EditRecord& record, const i32* low, const i32* offset) {
     return {
         (float)((voxels_from(low[0], record.home[0]) + offset[0]) * ONE - record.rest[0]),
@@ -201,15 +201,15 @@ __device__ inline Vector from_origin(const EditRecord& record, const i32* low, c
     };
 }
 
-// Is every sample of the brick too far outside the shape to change? Not sure means no. As `Evaluator::is_out_of_reach`:
-// no sample is farther from the brick's middle than half of the diagonal.
+// Whether every sample of the brick is too far outside the shape to change; false if uncertain. Like
+// `Evaluator::is_out_of_reach`: no sample is farther from the brick's centre than half of its diagonal.
 __device__ inline bool is_out_of_reach(const EditRecord& record, const i32* low) {
-    // 3.5 voxels along each axis, which times the root of 3 is less than this.
+    // Half of the diagonal: 3.5 voxels along each axis, times the square root of 3, rounded up.
     const float HALF = 3.5f * (float)ONE;
     const i32 DIAGONAL = 1553, LOWEST[3] = {0, 0, 0};
     Vector p = from_origin(record, low, LOWEST);
     i32 distance = round_distance(smooth_distance(record, {p.x + HALF, p.y + HALF, p.z + HALF}));
-    // What rounding to floats may have cost, generously.
+    // A generous bound on the rounding error of floats.
     i32 rounding = 16 + (distance >> 14), amplitude = record.is_rough ? record.amplitude : 0;
     return distance - rounding > BAND + amplitude + DIAGONAL;
 }

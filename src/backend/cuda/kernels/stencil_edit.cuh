@@ -1,7 +1,7 @@
-// Applies batches with stencil edits (those that sculpt, and those under rules), as edits/stencil_edit.rs does.
+// Applies batches with stencil edits (sculpting, or edits under rules), like edits/stencil_edit.rs.
 //
-// What an edit reads is what was there before the launch: the host sees to it that no edit of a launch reads what an
-// earlier one may change. So bricks are read where they are, and written elsewhere.
+// Edits read the state before the launch: the host ensures that no edit of a launch reads what an earlier one may
+// write. Bricks are therefore read in place and written to other slots.
 #pragma once
 
 #include "rules.cuh"
@@ -9,7 +9,7 @@
 struct StencilEditor : RuleChecker {
     static constexpr bool LOOKS = true;
 
-    // Is there a stencil edit? If so, the padded brick is loaded, and the block has to wait for it.
+    // Whether this is a stencil edit. If so, loads the padded brick, and the block must synchronise.
     __device__ bool begin(const EditJob& job, const Stack& stack, u32 edit) {
         const SculptParams& sculpt = params.sculpt_params[edit];
         if (sculpt.stroke == PLAIN && sculpt.power < 0) return false;
@@ -19,18 +19,18 @@ struct StencilEditor : RuleChecker {
         return true;
     }
 
-    // A sample on its way through an edit.
+    // A sample during an edit.
     struct Sample {
         i32 at[3];
-        // From the brick's lowest.
+        // Layer and index within the brick.
         i32 y, index;
-        // How far outside the shape it is.
+        // Signed distance from the shape.
         i32 outside;
         i32 before;
     };
 
-    // Paints a solid sample unless a rule is against it; says whether it changed. `counted`: the voxel's outcome and material,
-    // `outcome * 256 + material`.
+    // Paints a solid sample unless a rule forbids it, and returns whether it changed. `counted` is the voxel's
+    // outcome and material, `outcome * 256 + material`.
     __device__ bool paint(
         const EditRecord& record, bool is_bound, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
@@ -48,7 +48,7 @@ struct StencilEditor : RuleChecker {
         return true;
     }
 
-    // The density that an edit would give a sample; says whether there is another one.
+    // Computes the density that an edit proposes for a sample; false if it does not change.
     __device__ bool proposed(
         const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, i32& after
     ) {
@@ -59,7 +59,7 @@ struct StencilEditor : RuleChecker {
         return sample.outside <= BAND;
     }
 
-    // Gives a sample another density, as far as rules let it; otherwise as `paint`.
+    // Changes a sample's density as far as the rules allow. Results are those of `paint`.
     __device__ bool change(
         const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
@@ -85,7 +85,7 @@ struct StencilEditor : RuleChecker {
         if (was_solid == is_solid) return true;
         if (was_solid) {
             counted = REMOVED * 256 + resolve(brick.materials[sample.index], column, pristine);
-            // Air is of no material.
+            // Air has no material.
             material = GROUND;
         } else {
             counted = ADDED * 256 + resolve(material, column, pristine);
@@ -94,7 +94,7 @@ struct StencilEditor : RuleChecker {
         return true;
     }
 
-    // Applies one edit to the thread's open samples, as `apply` does.
+    // Applies one edit to the thread's open samples, like the plain `apply`.
     __device__ u32 apply(
         u32 edit, const OwnColumn& column, u32 open, const Noise& noise, EditMemory& work, bool& has_materials
     ) {
@@ -131,7 +131,7 @@ struct StencilEditor : RuleChecker {
         return changed;
     }
 
-    // Enters what an edit changed, and how many voxels it dealt with; nobody begins with the next edit before.
+    // Writes the changed parts and voxel counts of an edit. The next edit synchronises before it overwrites them.
     __device__ void enter(const EditJob& job, u32 edit) {
         if (warp() == 0) enter_parts(params.edit, job.cuts, edit, shared.work.effect.changed);
         u32 outcomes = params.rules ? FATES : ADDED + 1;

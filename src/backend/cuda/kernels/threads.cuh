@@ -1,4 +1,4 @@
-// Small things that all kernels use: threads, counting, whole numbers.
+// Helpers for threads, counting and integers that all kernels use.
 #pragma once
 
 #include "layout.cuh"
@@ -11,10 +11,10 @@ __device__ inline u32 lane() { return threadIdx.x & 31; }
 
 __device__ inline u32 warp() { return threadIdx.x >> 5; }
 
-// Lanes of the warp before this one.
+// Mask of the lanes before this one.
 __device__ inline u32 lanes_before() { return (1u << lane()) - 1; }
 
-// Sum over this lane and those before it.
+// Inclusive prefix sum over the warp.
 __device__ inline u32 running_sum(u32 value) {
     for (i32 step = 1; step < 32; step *= 2) {
         u32 other = __shfl_up_sync(WARP, value, step);
@@ -29,8 +29,8 @@ __device__ inline u32 sum_of_warp(u32 value) {
     return value;
 }
 
-// Turns 32 words of 32 bits around: bit i of lane k becomes bit k of lane i. Swaps halves of the words, then quarters, and
-// so on to single bits.
+// Transposes a 32x32 bit matrix: bit i of lane k becomes bit k of lane i. Swaps halves of the words, then quarters,
+// down to single bits.
 __device__ inline u32 transpose(u32 bits) {
     u32 low = 0xffff;
 #pragma unroll
@@ -44,12 +44,12 @@ __device__ inline u32 transpose(u32 bits) {
     return bits;
 }
 
-// Is there room for so many entries from `first` on?
+// Whether `count` entries starting at `first` fit.
 __device__ inline bool fits(u32 first, u32 count, u32 capacity) {
     return first <= capacity && count <= capacity - first;
 }
 
-// The ground's own material, where a voxel is so far above the surface.
+// The material of unedited ground at this signed distance above the surface.
 __device__ inline u32 ground_material(u32 column, i32 distance) {
     bool is_overlay = distance >= -OVERLAY_DEPTH && column >> 16 >= 128;
     return (is_overlay ? column >> 8 : column) & 0xff;

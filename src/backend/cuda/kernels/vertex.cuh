@@ -1,21 +1,21 @@
-// The one vertex function: surface/vertex.rs, surface/crossings.rs.
+// Position and normal of a vertex: surface/vertex.rs, surface/crossings.rs.
 #pragma once
 
 #include "edges.cuh"
 #include "mixes.cuh"
 
-// What `a` divided by a positive number is, exactly rounded like any division, with the number's reciprocal at hand
-// (Markstein): twice the rest is divided, too. Here nothing comes near the ends of the range of exponents: components are
-// multiples of 2^-61, lengths lie between 2^-17 and 2^28.
+// The correctly rounded quotient of `a` and a positive number, from the number's reciprocal (Markstein), with two
+// correction steps. Exponents stay far from their limits: components are multiples of 2^-61, lengths lie between
+// 2^-17 and 2^28.
 __device__ inline float quotient(float a, float number, float reciprocal) {
     float result = a * reciprocal;
     result = fmaf(fmaf(-result, number, a), reciprocal, result);
     result = fmaf(fmaf(-result, number, a), reciprocal, result);
-    // Zeroes have a sign.
+    // Keeps the sign of zero.
     return copysignf(result, a);
 }
 
-// The vector of length 1; up where there is none. Products of its components are added in this order.
+// Normalises a vector; a zero vector gives up. The order of the sum matters for the last bit.
 __device__ inline Vector unit(Vector v) {
     float length = sqrtf(v.x * v.x + v.y * v.y + v.z * v.z);
     if (!(length > 0.0f)) return {0.0f, 1.0f, 0.0f};
@@ -23,19 +23,20 @@ __device__ inline Vector unit(Vector v) {
     return {quotient(v.x, length, reciprocal), quotient(v.y, length, reciprocal), quotient(v.z, length, reciprocal)};
 }
 
-// Does the edge lie between a cell of the mask and one of the heightmap?
+// Whether the edge lies between a masked cell and a heightmap cell.
 __device__ inline bool is_border(const ColumnJob& column, const Edge& edge) {
     i32 bit = (edge.z + 1) * 10 + edge.x + 1;
     return column.borders[edge.axis][bit / 32] >> bit % 32 & 1;
 }
 
-// By what a difference of heights around a column is a slope. Their distance is two columns, and one on the world's rim; both
-// are powers of two in 1/256 voxel, so that nothing is rounded.
+// Factor from a difference of heights around a column to a slope. The distance is two columns, or one on the
+// world's border. Both factors are powers of two, so nothing is rounded.
 __device__ inline float slope_scale(i32 at, i32 cells) {
     return at == 0 || at == cells ? 1.0f / ONE : 1.0f / (2 * ONE);
 }
 
-// The tile's normal over a column, `Ground::normal`. Beyond the rim, heights repeat, so there the differences are right.
+// The heightmap normal at a column, like `Ground::normal`. Heights repeat beyond the border, which makes these
+// one-sided differences there.
 __device__ inline Vector ground_normal(const Site& site, const i32* heights, i32 window) {
     float x = (float)(heights[window + 1] - heights[window - 1]);
     float z = (float)(heights[window + WINDOW] - heights[window - WINDOW]);
@@ -45,7 +46,7 @@ __device__ inline Vector ground_normal(const Site& site, const i32* heights, i32
     return {quotient(-x, length, reciprocal), reciprocal, quotient(-z, length, reciprocal)};
 }
 
-// As in `positions`, two to a word.
+// The format of `positions`, two coordinates per word.
 __device__ inline uint2 position_of(const Edge& edge, i32 step) {
     i32 x = edge.x * SNAP + (edge.axis == 0 ? step : 0);
     i32 y = edge.y * SNAP + (edge.axis == 1 ? step : 0);
@@ -53,7 +54,7 @@ __device__ inline uint2 position_of(const Edge& edge, i32 step) {
     return {(u16)x | (u32)(u16)y << 16, (u16)z};
 }
 
-// The tile's normal on an edge that nobody edited, the one of the gradient on others.
+// The heightmap normal on an unedited edge, else the normalised gradient.
 __device__ inline Vector normal_of(
     const Site& site, const MeshMemory& shared, const Edge& edge, const Crossing& crossing
 ) {
