@@ -1,5 +1,5 @@
-//! The async-copy check: a device whose copies last until they are waited for. Reading or writing the memory before panics. The
-//! emulator alone is done at once, and would not tell.
+//! The async-copy check: a device whose copies stay in flight until they are waited for. It panics if their memory
+//! is accessed before. The emulator alone copies synchronously and would hide such errors.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, Weak};
@@ -7,20 +7,20 @@ use std::sync::{Arc, Mutex, Weak};
 use super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use super::lock;
 
-/// A copy that is under way.
+/// A copy in flight.
 struct Copy {
-    /// Bytes of the host's memory.
+    /// Range of the host memory.
     bytes: Range<usize>,
-    /// Does it write these, or read them?
+    /// Whether it writes the range, or reads it.
     writes: bool,
-    /// How many marks there were when it was asked for.
+    /// Number of marks placed before it.
     marks: usize,
 }
 
-/// Copies under way from or to a piece of memory.
+/// Copies in flight from or to a piece of host memory.
 type Copies = Mutex<Vec<Copy>>;
 
-/// Memory that copies may be under way from or to.
+/// Host memory that checks accesses against its copies in flight.
 struct Watched {
     own: Box<dyn HostMemory>,
     copies: Arc<Copies>,
@@ -62,7 +62,7 @@ impl HostMemory for Watched {
     }
 }
 
-/// Memory that lives, by where it begins.
+/// Live host memory by start address.
 type All = Vec<(usize, Weak<Copies>)>;
 
 /// The device.
@@ -72,14 +72,14 @@ pub(super) struct AsyncCopies {
     marks: usize,
 }
 
-/// A mark of that device, with its number.
+/// A mark of this device.
 struct AsyncMark {
     own: Box<dyn Mark>,
     all: Arc<Mutex<All>>,
     number: usize,
 }
 
-/// Copies that were asked for when there were so many marks, or fewer, are done.
+/// Ends the copies that were started before mark `marks`.
 fn finish(all: &Mutex<All>, marks: usize) {
     for copies in lock(all).iter().filter_map(|(_, copies)| copies.upgrade()) {
         lock(&copies).retain(|copy| copy.marks > marks);
@@ -99,7 +99,7 @@ impl AsyncCopies {
         Self { own, all: Arc::default(), marks: 0 }
     }
 
-    /// A copy is under way.
+    /// Starts to track a copy.
     fn begin(&self, start: usize, bytes: Range<usize>, writes: bool) {
         let all = lock(&self.all);
         let found = all.iter().filter(|(own, _)| *own == start).find_map(|(_, copies)| copies.upgrade());
@@ -107,7 +107,7 @@ impl AsyncCopies {
     }
 }
 
-/// Where memory begins. Nobody looks at it.
+/// Start address of host memory, without accessing its content.
 fn start(memory: &dyn HostMemory) -> usize {
     memory.bytes_of(0..0).expect("a place").as_ptr() as usize
 }

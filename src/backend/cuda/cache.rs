@@ -1,4 +1,4 @@
-//! A cache of records on the device: which slots are in use, and which to evict when they run out.
+//! A cache of records on the device: assigns slots, and evicts old ones when they run out.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
@@ -7,50 +7,50 @@ use rayon::prelude::*;
 use super::device::{Device, Fault};
 use crate::volume::Brick;
 
-/// Records of one kind on the device.
+/// Slots for records of one kind.
 pub(super) struct RecordCache {
-    /// Bytes of a record.
+    /// Size of a record in bytes.
     record: usize,
-    /// Where the first one is.
+    /// Device address of the first slot.
     base: u64,
     /// The largest number of slots.
     most: usize,
     slots: Vec<Slot>,
     free: Vec<u32>,
     round: u32,
-    /// Where to search next for a slot to evict.
+    /// Where the search for slots to evict continues.
     hand: usize,
 }
 
-/// A slot. Threads fill several at once.
+/// A slot. Atomics, as several threads fill slots at once.
 #[derive(Default)]
 struct Slot {
-    /// The tag of its content, which is never used again; 0 for none.
+    /// The unique stamp of its content, which is never reused; 0 if empty.
     stamp: AtomicU64,
     /// The round in which it was last used.
     used: AtomicU32,
 }
 
-/// How many slots are looked at for ones that can be given up before there may be enough.
+/// How many slots eviction examines before it checks whether enough are free.
 const PIECE: usize = 1 << 14;
 
-/// Slots at the start. Growing takes half a millisecond, so first digs should not need it.
+/// Initial number of slots. Growing takes half a millisecond, which the first digs should not pay.
 const FIRST: usize = 1 << 14;
 
-/// From how many slots on they are taken in parallel.
+/// From this many slots on, they are taken in parallel.
 const LONG: usize = 1 << 10;
 
-/// The first of so many numbers that no other record of this process has.
+/// Reserves unique stamps, and returns the first.
 fn stamps(count: usize) -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(count as u64, Ordering::Relaxed)
 }
 
-/// Bits of a tag that are the slot; the rest is its stamp.
+/// A tag is a slot number in this many low bits, and a stamp above.
 const SLOT_BITS: u32 = 24;
 
 impl RecordCache {
-    /// No slots yet; all together may take `budget` bytes.
+    /// An empty cache that may use up to `budget` bytes.
     pub fn new(record: usize, budget: usize) -> Self {
         Self {
             record,
@@ -63,46 +63,50 @@ impl RecordCache {
         }
     }
 
-    /// Where the first slot is.
+    /// Device address of the first slot.
     pub fn base(&self) -> u64 {
         self.base
     }
 
-    /// Where a slot is.
+    /// Device address of a slot.
     pub fn address(&self, slot: u32) -> u64 {
         self.base + u64::from(slot) * self.record as u64
     }
 
-    /// Begins a round: what is used from now on stays until the next one.
+    /// Begins a round. Slots used in it are not evicted before the next one.
     pub fn begin(&mut self) {
         self.round = self.round.wrapping_add(1).max(1);
     }
 
-    /// The slot of a tag, if its content is still there.
+    /// The slot of a tag, if it still has that content.
     pub fn find(&self, tag: u64) -> Option<u32> {
         let number = tag as u32 & ((1 << SLOT_BITS) - 1);
         let slot = self.slots.get(number as usize)?;
         if tag == 0 || slot.stamp.load(Ordering::Relaxed) != tag >> SLOT_BITS {
             return None;
         }
-        // Threads find the same bricks: writing only changed rounds avoids sharing cache lines.
+        // Store only if the round changed: threads find the same bricks, and needless writes would contend for
+        // cache lines.
         if slot.used.load(Ordering::Relaxed) != self.round {
             slot.used.store(self.round, Ordering::Relaxed);
         }
         Some(number)
     }
 
-    /// A slot for something new, with its tag. `Budget` where all slots are in use in this round.
+    /// Takes a slot, and returns it with its tag.
     ///
-    /// May move the records, and then waits for the device.
+    /// May move the records, which waits for the device.
+    ///
+    /// # Errors
+    /// [`Fault::Budget`] if all slots are in use in this round.
     pub fn take(&mut self, device: &mut dyn Device) -> Result<(u32, u64), Fault> {
         self.make_room(device, 1)?;
         let slot = self.free.pop().ok_or(Fault::Budget(self.most * self.record))?;
         Ok((slot, self.put(slot, stamps(1))))
     }
 
-    /// Takes slots for all entries of a list, or none: slots with their tags come into `taken`, and what `with` makes of entries and
-    /// their slots into `out`.
+    /// Takes slots for all entries of a list, or for none. Appends slots and tags to `taken`, and writes the result
+    /// of `with` for each entry and its slot to `out`.
     pub fn take_many<T: Sync, R: Send>(
         &mut self,
         device: &mut dyn Device,
@@ -127,7 +131,7 @@ impl RecordCache {
         Ok(())
     }
 
-    /// Ensures that so many slots are free, and returns how many others are.
+    /// Ensures that `count` slots are free; returns how many more are.
     fn make_room(&mut self, device: &mut dyn Device, count: usize) -> Result<usize, Fault> {
         let full = Fault::Budget(self.most * self.record);
         if count > self.most {
@@ -140,7 +144,7 @@ impl RecordCache {
         self.free.len().checked_sub(count).ok_or(full)
     }
 
-    /// Fills a slot and returns its tag.
+    /// Marks a slot as filled, and returns its tag.
     fn put(&self, number: u32, stamp: u64) -> u64 {
         let slot = &self.slots[number as usize];
         slot.stamp.store(stamp, Ordering::Relaxed);
@@ -148,14 +152,14 @@ impl RecordCache {
         stamp << SLOT_BITS | u64::from(number)
     }
 
-    /// Gives all slots back.
+    /// Empties all slots.
     pub fn clear(&mut self) {
         self.slots.iter_mut().for_each(|slot| *slot.stamp.get_mut() = 0);
         self.free.clear();
         self.free.extend((0..self.slots.len() as u32).rev());
     }
 
-    /// Frees the memory of all slots; whatever was in them has to be uploaded again.
+    /// Frees the memory of all slots. Their content has to be uploaded again.
     pub fn release(&mut self, device: &mut dyn Device) {
         if !self.slots.is_empty() {
             device.free(self.base);
@@ -169,7 +173,7 @@ impl RecordCache {
         self.free.push(slot);
     }
 
-    /// Twice as many slots, and so many more at least, unless that is too many.
+    /// At least doubles the number of slots, and adds at least `more`, within the budget. Returns whether it grew.
     fn grow(&mut self, device: &mut dyn Device, more: usize) -> Result<bool, Fault> {
         let old = self.slots.len();
         let new = (old * 2).max(old + more).max(FIRST).min(self.most);
@@ -183,7 +187,7 @@ impl RecordCache {
         };
         if old > 0 {
             device.wait()?;
-            // SAFETY: both are allocations of at least so many records, and the new one is another one.
+            // SAFETY: both are allocations of at least this many records, and they are distinct.
             unsafe { device.copy(self.base, base, old * self.record) }?;
             device.wait()?;
             device.free(self.base);
@@ -194,7 +198,7 @@ impl RecordCache {
         Ok(true)
     }
 
-    /// Frees slots that were not used in this round: as many as are wanted, and an eighth of all at least.
+    /// Evicts slots that were not used in this round: as many as wanted, and at least an eighth of all.
     fn evict(&mut self, wanted: usize) {
         let all = self.slots.len();
         let (mut looked, round) = (0, self.round);
@@ -216,7 +220,7 @@ impl RecordCache {
     }
 }
 
-/// How kernels refer to a brick in a slot.
+/// A kernel's reference to a brick in a slot.
 pub(super) fn reference(slot: u32, brick: &Brick) -> u32 {
     slot << 1 | u32::from(brick.material_bytes() > 0)
 }
@@ -226,7 +230,7 @@ mod tests {
     use super::*;
     use crate::backend::cuda::tests::device;
 
-    /// So many slots at once.
+    /// Takes many slots at once.
     fn take(slots: &mut RecordCache, device: &mut dyn Device, count: usize, out: &mut Vec<(u32, u64)>) {
         let (list, mut found) = (vec![7; count], vec![0; count]);
         let taken = slots.take_many(device, &list, &mut found, out, |entry, slot| slot + entry);
@@ -242,7 +246,7 @@ mod tests {
         let mut rounds: Vec<Vec<(u32, u64)>> = Vec::new();
         for round in 0..40 {
             slots.begin();
-            // Of the round before, some are used again.
+            // Some of the previous round's slots are used again.
             let again = rounds.last().map(|taken| taken[..2000].to_vec()).unwrap_or_default();
             let kept: Vec<_> = again.into_iter().filter(|&(_, tag)| slots.find(tag).is_some()).collect();
             let mut taken = Vec::new();
@@ -259,7 +263,7 @@ mod tests {
 
     #[test]
     fn what_is_given_back_is_not_found_and_makes_room() {
-        // One after the other, and side by side.
+        // Sequentially, and in parallel.
         for count in [100, LONG] {
             let Some(mut device) = device() else { return };
             let mut slots = RecordCache::new(16, count * 16);

@@ -1,26 +1,26 @@
-//! What the host asks of a device: memory, copies, launches. One implementation drives a card, another one a process that
-//! stands for it in tests.
+//! The interface of a device: memory, copies, launches. One implementation drives a GPU, another one an emulator
+//! process for tests.
 
 use std::ops::Range;
 use std::time::Duration;
 
-/// Why a device can't be used, or can't be used any longer.
+/// Why a device cannot be used, or no longer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
     /// The driver's library is not installed.
     #[error("there is no CUDA driver")]
     NoDriver,
-    /// There is a driver and no card.
+    /// There is a driver but no device.
     #[error("there is no CUDA device: {0}")]
     NoDevice(String),
-    /// The card is older than the kernels.
+    /// The device's compute capability is too low for the kernels.
     #[error("the device is of compute capability {0}.{1}, kernels need 7.5")]
     OldDevice(i32, i32),
-    /// The driver does not take the kernels.
+    /// The driver rejects the kernels.
     #[error("the driver refuses the kernels: {0}")]
     Refused(String),
-    /// What the device computes is not what the processor does.
+    /// The device's results differ from those of the CPU.
     #[error("the device failed its self-test")]
     SelfTest,
     /// Memory ran out.
@@ -32,41 +32,41 @@ pub enum Fault {
     /// A transaction is larger than one launch can be.
     #[error("a transaction of {0} jobs is more than one launch can do")]
     TooLarge(usize),
-    /// A call failed.
+    /// A driver call failed.
     #[error("the device failed: {0}")]
     Failed(String),
 }
 
 impl Fault {
-    /// Is the device fine, and only this transaction too large for it?
+    /// Whether the device is fine and only this transaction is too large for it.
     pub(super) fn is_passing(&self) -> bool {
         matches!(self, Self::Memory(_) | Self::Budget(_) | Self::TooLarge(_))
     }
 }
 
-/// What a call to a device gives.
+/// The result of a device call.
 pub(super) type DeviceResult<T = ()> = Result<T, Fault>;
 
-/// A kernel, by its number.
+/// The kernels, numbered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kernel {
-    /// Copies pieces of memory to many places.
+    /// Copies uploaded data to its destinations.
     Scatter,
     /// Applies edits to bricks.
     Edit,
     /// Meshes blocks.
     Mesh,
-    /// Makes heights of noise.
+    /// Computes heights from noise.
     Heights,
-    /// Applies edits to bricks, stencil edits among them.
+    /// Applies edits to bricks, including stencil edits.
     StencilEdit,
 }
 
 impl Kernel {
-    /// All of them, in order of their numbers.
+    /// All kernels, ordered by number.
     pub const ALL: [Self; 5] = [Self::Scatter, Self::Edit, Self::Mesh, Self::Heights, Self::StencilEdit];
 
-    /// Its name in the source.
+    /// Its name in the CUDA source.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scatter => "scatter",
@@ -78,13 +78,13 @@ impl Kernel {
     }
 }
 
-/// A kernel's parameters. The kernel reads exactly this struct, see `layout.cuh`.
+/// Parameters of a kernel, which reads exactly this struct; see `layout.cuh`.
 pub(super) trait KernelParams: bytemuck::Pod {
-    /// The kernel that takes them.
+    /// The kernel that takes these parameters.
     const KERNEL: Kernel;
 }
 
-/// A kernel and its parameters. Only made from [`KernelParams`], so a kernel is never launched with another's.
+/// A kernel with its parameters. It can only be built from [`KernelParams`], so kernel and parameters always match.
 #[derive(Clone, Copy)]
 pub(super) struct Launch<'a> {
     kernel: Kernel,
@@ -93,7 +93,7 @@ pub(super) struct Launch<'a> {
 }
 
 impl<'a> Launch<'a> {
-    /// Launches the kernel of these parameters, a block for each of its jobs.
+    /// A launch of the kernel for these parameters, one block per job.
     pub fn new<P: KernelParams>(blocks: u32, params: &'a P) -> Self {
         Self { kernel: P::KERNEL, blocks, params: bytemuck::bytes_of(params) }
     }
@@ -112,37 +112,38 @@ impl<'a> Launch<'a> {
     }
 }
 
-/// Memory of the host that a device copies from and to.
+/// Host memory for copies to and from a device.
 pub(super) trait HostMemory: Send + Sync {
-    /// Its bytes. Not to be looked at between the start of a copy and the next [`Device::wait`].
+    /// All bytes. Do not read them between the start of a copy into them and the next [`Device::wait`].
     fn bytes(&self) -> &[u8];
 
-    /// Some of its bytes. Of a copy that was asked for before a [`Mark`], they may be looked at once that is passed.
+    /// A range of its bytes, or `None` if out of bounds. May be read once a [`Mark`] that was placed after a copy
+    /// into them has passed.
     fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]>;
 
-    /// Its bytes, to be written.
+    /// All bytes, for writing.
     fn bytes_mut(&mut self) -> &mut [u8];
 
-    /// Some of its bytes, to be written while copies to others may be under way.
+    /// A range of its bytes for writing, or `None` if out of bounds. Copies to other ranges may be in flight.
     fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]>;
 
-    /// Where kernels find it, if they can read and write it without a copy.
+    /// Address for kernels, if they can access this memory without a copy.
     fn address(&self) -> Option<u64>;
 }
 
-/// A place in what a device was asked for.
+/// A point in the device's queue of work.
 pub(super) trait Mark: Send + Sync {
-    /// Waits until all that was asked for before is done. From any thread.
+    /// Waits until all work queued before is done. May be called from any thread.
     fn wait(&self) -> Result<(), Fault>;
 }
 
-/// A device. Copies and launches are asynchronous and run in order; [`wait`](Self::wait) waits for all of them, and only then
-/// are their faults certain to be known.
+/// A device. Copies and launches are asynchronous and run in order. [`wait`](Self::wait) waits for all of them;
+/// only then are all of their faults known.
 pub(super) trait Device: Send {
     /// The name of the hardware.
     fn name(&self) -> String;
 
-    /// Bytes that could still be allocated, roughly.
+    /// Approximate number of bytes that could still be allocated.
     fn free_memory(&mut self) -> usize;
 
     /// Allocates memory on the device.
@@ -151,48 +152,50 @@ pub(super) trait Device: Send {
     /// Frees memory on the device. An address that is not allocated is ignored.
     fn free(&mut self, address: u64);
 
-    /// Allocates memory of the host.
+    /// Allocates host memory.
     fn alloc_host(&mut self, bytes: usize) -> Result<Box<dyn HostMemory>, Fault>;
 
-    /// Copies some bytes of the host to an address.
+    /// Copies a range of host memory to a device address.
     ///
     /// # Safety
-    /// `to` must have room for them in one allocation, and they must not be written before the next [`wait`](Self::wait).
+    /// `to` must have room for the bytes in one allocation, and they must not be written before the next
+    /// [`wait`](Self::wait).
     unsafe fn upload(&mut self, from: &dyn HostMemory, bytes: Range<usize>, to: u64) -> DeviceResult;
 
-    /// Copies from an address to some bytes of the host.
+    /// Copies from a device address to a range of host memory.
     ///
     /// # Safety
-    /// `from` must be so many bytes of one allocation. The bytes must be neither read nor written before the next
-    /// [`wait`](Self::wait), or before a later [`Mark`] has been waited for.
+    /// `from` must have as many bytes in one allocation. The range must be neither read nor written before the next
+    /// [`wait`](Self::wait) or before a later [`Mark`] has passed.
     unsafe fn download(&mut self, from: u64, to: &mut dyn HostMemory, bytes: Range<usize>) -> DeviceResult;
 
-    /// Copies on the device.
+    /// Copies within device memory.
     ///
     /// # Safety
-    /// Both addresses must be so many bytes of an allocation, and the two ranges must not overlap.
+    /// Both addresses must have as many bytes in one allocation, and the two ranges must not overlap.
     unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault>;
 
-    /// Runs a kernel.
+    /// Launches a kernel.
     ///
     /// # Safety
-    /// Each address in the parameters must have as many entries as the kernel reads or, by the capacities in the parameters,
-    /// writes; it must stay allocated, and memory of the host must not be accessed, before the next [`wait`](Self::wait).
+    /// Each address in the parameters must have as many entries as the kernel reads or, up to the capacities in the
+    /// parameters, writes. Until the next [`wait`](Self::wait) it must stay allocated, and host memory must not be
+    /// accessed.
     unsafe fn launch(&mut self, launch: Launch<'_>) -> Result<(), Fault>;
 
-    /// Marks the current end of the queue.
+    /// Places a mark at the current end of the queue.
     fn mark(&mut self) -> Result<Box<dyn Mark>, Fault>;
 
-    /// The times of what was last waited for: from the first upload on, and the last kernel alone; zero if unknown.
+    /// Times of the work last waited for: from the first upload, and of the last kernel alone. Zero if unknown.
     fn times(&mut self) -> [Duration; 2] {
         [Duration::ZERO; 2]
     }
 
-    /// Waits until everything is done.
+    /// Waits for all queued work.
     fn wait(&mut self) -> Result<(), Fault>;
 }
 
-/// Methods of [`Device`] that pass their calls on to the device in a field, as in `forward!(own: alloc free)`.
+/// Implements methods of [`Device`] by forwarding to the device in a field, as in `forward!(own: alloc free)`.
 macro_rules! forward {
     ($own:tt: $($method:ident)*) => { $(forward!(@$method $own);)* };
     (@name $own:tt) => { fn name(&self) -> String { self.$own.name() } };

@@ -1,7 +1,8 @@
-//! A CUDA card, through its driver.
+//! A GPU, accessed through the CUDA driver.
 //!
-//! All of the crate's unsafe code is here, but for what tests have (`zero_copy`). Addresses
-//! come from the driver and are handed back to it alone; what kernels do with them is bounded by the capacities they are given.
+//! Outside of tests, all unsafe code of the crate is in this module and its siblings that copy and launch.
+//! Addresses come from the driver and are passed only to it. Kernels stay within the capacities in their
+//! parameters.
 
 use std::ffi::{CString, c_void};
 use std::ops::Range;
@@ -18,40 +19,41 @@ use super::device::{Device, DeviceResult, Fault, HostMemory, Kernel, Launch, Mar
 use super::layout::THREADS;
 use crate::backend::CardChoice;
 
-/// The kernels, compiled ahead.
+/// The kernels as PTX, compiled in advance.
 const PTX: &str = include_str!("kernels.ptx");
 
-/// From how many blocks on a launch is timed; for small ones that would take longer than it tells.
+/// Launches with at least this many blocks are timed. For smaller ones, timing costs more than it tells.
 const TIMED: u32 = 64;
 
-/// A card with the kernels on it.
+/// A GPU with the kernels loaded.
 pub(super) struct Card {
     context: Arc<CudaContext>,
     stream: Arc<CudaStream>,
-    /// Recorded after what is to be waited for.
+    /// Recorded at the end of the work to wait for.
     done: CudaEvent,
     /// Recorded before the first upload and before a long launch.
     marks: [CudaEvent; 2],
     is_begun: bool,
-    /// Was the last launch a long one?
+    /// Whether the last launch was timed.
     is_timed: bool,
     module: sys::CUmodule,
     kernels: [CUfunction; Kernel::ALL.len()],
-    /// Memory that was not given back. The context may outlive this: all of the process have the same.
+    /// Device memory that is not freed yet. The context may outlive this struct, as it is shared by the whole
+    /// process.
     allocated: FxHashSet<u64>,
 }
 
-// SAFETY: the module and its functions belong to the context, which any thread may use once it is bound there; every
-// method binds it first.
+// SAFETY: the module and its functions belong to the context, which any thread may use once it is bound there.
+// Every method binds it first.
 unsafe impl Send for Card {}
 
-/// What the driver says of an error. Only to be called once the driver is known to be there.
+/// Converts a driver error. Call only when the driver is known to be loaded.
 fn failed(error: DriverError) -> Fault {
     let name = error.error_name().map_or("unknown error".into(), |name| name.to_string_lossy().into_owned());
     Fault::Failed(name)
 }
 
-/// The same, where so many bytes were asked for.
+/// Converts an error of an allocation of this size.
 fn no_memory(bytes: usize) -> impl Fn(DriverError) -> Fault {
     move |error| match error.0 {
         sys::CUresult::CUDA_ERROR_OUT_OF_MEMORY => Fault::Memory(bytes),
@@ -59,7 +61,7 @@ fn no_memory(bytes: usize) -> impl Fn(DriverError) -> Fault {
     }
 }
 
-/// The same, while a card is looked for.
+/// Converts an error of the search for a device.
 fn no_device(error: DriverError) -> Fault {
     match failed(error) {
         Fault::Failed(name) => Fault::NoDevice(name),
@@ -67,9 +69,10 @@ fn no_device(error: DriverError) -> Fault {
     }
 }
 
-/// The number of a card; `None` where CUDA has no such card. Only to be called once the driver is known to be there.
+/// The device ordinal of a card, or `None` if CUDA has no such card. Call only when the driver is known to be
+/// loaded.
 fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
-    // Where there is no card at all, that is what to say.
+    // Report missing devices before anything else.
     let count = CudaContext::device_count().map_err(no_device)?;
     let find = |is: &dyn Fn(sys::CUdevice) -> Result<bool, Fault>| {
         for number in 0..count {
@@ -91,7 +94,7 @@ fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
         CardChoice::PciBusId(id) => {
             let Ok(id) = CString::new(id.as_str()) else { return Ok(None) };
             let mut wanted = 0;
-            // SAFETY: the text ends with a zero byte, and `wanted` is written at most.
+            // SAFETY: the text is null-terminated, and the call writes at most `wanted`.
             match unsafe { sys::cuDeviceGetByPCIBusId(&mut wanted, id.as_ptr()) }.result() {
                 Ok(()) => find(&|device| Ok(device == wanted)),
                 Err(DriverError(
@@ -104,14 +107,14 @@ fn number_of(card: &CardChoice) -> Result<Option<usize>, Fault> {
 }
 
 impl Card {
-    /// Opens a card. If the settings leave the choice open, it is the suggested one, if CUDA has it.
+    /// Opens a card: the suggested one if the settings leave the choice open and CUDA has it.
     pub fn open(card: &CardChoice, suggested: Option<&CardChoice>) -> Result<Self, Fault> {
         Self::open_with(card, suggested, PTX)
     }
 
-    /// The same with other kernels.
+    /// Opens a card with other kernels.
     pub fn open_with(card: &CardChoice, suggested: Option<&CardChoice>, ptx: &str) -> Result<Self, Fault> {
-        // SAFETY: loads the driver's library to see whether it is there, as every later call does.
+        // SAFETY: only loads the driver's library, as every later call does.
         if !unsafe { sys::is_culib_present() } {
             return Err(Fault::NoDriver);
         }
@@ -124,7 +127,7 @@ impl Card {
         Self::open_number(number, ptx)
     }
 
-    /// Opens the card of this number. Only to be called once the driver is known to be there.
+    /// Opens the device with this ordinal. Call only when the driver is known to be loaded.
     fn open_number(number: usize, ptx: &str) -> Result<Self, Fault> {
         let context = CudaContext::new(number).map_err(no_device)?;
         let (major, minor) = context.compute_capability().map_err(failed)?;
@@ -136,7 +139,7 @@ impl Card {
             Fault::Failed(name) => Fault::Refused(name),
             fault => fault,
         };
-        // SAFETY: the image is PTX and ends with a zero byte.
+        // SAFETY: the image is null-terminated PTX.
         let module = unsafe { result::module::load_data(image.as_ptr().cast()) }.map_err(refused)?;
         let mut kernels = [std::ptr::null_mut(); Kernel::ALL.len()];
         for (function, kernel) in kernels.iter_mut().zip(Kernel::ALL) {
@@ -167,19 +170,19 @@ impl Card {
 impl Drop for Card {
     fn drop(&mut self) {
         if self.bind().is_ok() {
-            // What still runs may use the module and memory that goes next. A card that fails here is lost anyway.
+            // Running work may use the module and the memory freed next. If this fails, the device is lost anyway.
             let _ = self.context.synchronize();
             for address in self.allocated.drain() {
-                // SAFETY: nothing runs any more, and the address is from `alloc`, not freed yet.
+                // SAFETY: nothing is running, and the address came from `alloc` and is not freed yet.
                 let _ = unsafe { result::free_sync(address) };
             }
-            // SAFETY: nothing runs any more, and nobody else has the module.
+            // SAFETY: nothing is running, and the module has no other owner.
             let _ = unsafe { result::module::unload(self.module) };
         }
     }
 }
 
-/// Pinned memory, which the card sees at an address of its own.
+/// Pinned memory, mapped to a device address.
 struct Pinned {
     context: Arc<CudaContext>,
     start: *mut u8,
@@ -187,42 +190,42 @@ struct Pinned {
     address: u64,
 }
 
-// SAFETY: the memory is only reached through this owner; any thread may free it once the context is bound there.
+// SAFETY: the memory is only reached through this owner, and any thread may free it once the context is bound.
 unsafe impl Send for Pinned {}
 // SAFETY: shared references only read.
 unsafe impl Sync for Pinned {}
 
 impl Pinned {
-    /// Where some of its bytes begin, if it has them.
+    /// Start of a range of its bytes, if it is within bounds.
     fn within(&self, range: &Range<usize>) -> Option<*mut u8> {
         let is_within = range.start <= range.end && range.end <= self.len;
-        // SAFETY: `start` is `len` bytes of memory.
+        // SAFETY: `start` has `len` bytes, and the range is within them.
         is_within.then(|| unsafe { self.start.add(range.start) })
     }
 }
 
 impl HostMemory for Pinned {
     fn bytes(&self) -> &[u8] {
-        // SAFETY: `start` is `len` bytes of initialised memory, which the card does not write to now: whoever started a
-        // copy waits for it before looking.
+        // SAFETY: `start` has `len` initialised bytes. The device does not write to them now: whoever started a
+        // copy waits for it before reading.
         unsafe { std::slice::from_raw_parts(self.start, self.len) }
     }
 
     fn bytes_of(&self, range: Range<usize>) -> Option<&[u8]> {
         let start = self.within(&range)?;
-        // SAFETY: `start` is so many bytes of initialised memory, and whoever started a copy to them has waited for that one.
-        // Copies to other parts may be under way.
+        // SAFETY: `start` has this many initialised bytes, and whoever started a copy to them has waited for it.
+        // Copies to other ranges may be in flight.
         Some(unsafe { std::slice::from_raw_parts(start, range.len()) })
     }
 
     fn bytes_mut(&mut self) -> &mut [u8] {
-        // SAFETY: as in `bytes`, and nobody else has a reference.
+        // SAFETY: as in `bytes`, and the reference is unique.
         unsafe { std::slice::from_raw_parts_mut(self.start, self.len) }
     }
 
     fn bytes_of_mut(&mut self, range: Range<usize>) -> Option<&mut [u8]> {
         let start = self.within(&range)?;
-        // SAFETY: as in `bytes_of`, and nobody else has a reference.
+        // SAFETY: as in `bytes_of`, and the reference is unique.
         Some(unsafe { std::slice::from_raw_parts_mut(start, range.len()) })
     }
 
@@ -234,15 +237,15 @@ impl HostMemory for Pinned {
 impl Drop for Pinned {
     fn drop(&mut self) {
         if self.context.bind_to_thread().is_ok() {
-            // After an error copies may be under way.
+            // After an error, copies may still be in flight.
             let _ = self.context.synchronize();
-            // SAFETY: the memory is this owner's, and no copy uses it any more.
+            // SAFETY: this is the only owner, and no copy uses the memory any more.
             let _ = unsafe { result::free_host(self.start.cast()) };
         }
     }
 }
 
-/// An event in the stream.
+/// A [`Mark`]: an event recorded in the stream.
 struct Passed {
     context: Arc<CudaContext>,
     event: CudaEvent,
@@ -255,16 +258,16 @@ impl Mark for Passed {
     }
 }
 
-/// An event for which threads sleep. Without the flag the driver lets them spin.
+/// Creates an event whose waiters sleep. Without the flag, the driver makes them spin.
 fn event(context: &Arc<CudaContext>) -> Result<CudaEvent, Fault> {
     context.new_event(Some(sys::CUevent_flags::CU_EVENT_BLOCKING_SYNC)).map_err(failed)
 }
 
-/// How long a thread asks again and again before it sleeps: as long as the kernels of 512 fields take. Small transactions are
-/// done before, and in large ones being woken costs less than that.
+/// How long a thread polls before it sleeps: about as long as the kernels take for 512 bricks. Small transactions
+/// finish within it; in large ones the wake-up latency is negligible.
 const SPIN: Duration = Duration::from_micros(400);
 
-/// Waits until an event has happened.
+/// Waits for an event.
 fn wait_for(event: &CudaEvent) -> Result<(), Fault> {
     let start = Instant::now();
     while !event.try_is_complete().map_err(failed)? {
@@ -295,7 +298,7 @@ impl Device for Card {
 
     fn free(&mut self, address: u64) {
         if self.allocated.remove(&address) && self.bind().is_ok() {
-            // SAFETY: the address is from `alloc`, not freed yet; freeing waits for whatever uses it.
+            // SAFETY: the address came from `alloc` and is not freed yet. Freeing waits for work that uses it.
             let _ = unsafe { result::free_sync(address) };
         }
     }
@@ -304,12 +307,12 @@ impl Device for Card {
         self.bind()?;
         let len = bytes.max(1);
         let flags = sys::CU_MEMHOSTALLOC_PORTABLE | sys::CU_MEMHOSTALLOC_DEVICEMAP;
-        // SAFETY: a plain allocation, cleared before anyone looks at it.
+        // SAFETY: a plain allocation, zeroed before anyone reads it.
         let start = unsafe { result::malloc_host(len, flags) }.map_err(no_memory(bytes))?.cast::<u8>();
         // SAFETY: `start` has `len` bytes.
         unsafe { start.write_bytes(0, len) };
         let mut pinned = Pinned { context: Arc::clone(&self.context), start, len, address: 0 };
-        // SAFETY: the pointer is from `malloc_host`, with a mapping for the device.
+        // SAFETY: the pointer came from `malloc_host`, with a device mapping.
         let mapped = unsafe { sys::cuMemHostGetDevicePointer_v2(&mut pinned.address, start.cast(), 0) };
         mapped.result().map_err(failed)?;
         Ok(Box::new(pinned))
@@ -323,7 +326,7 @@ impl Device for Card {
         if !std::mem::replace(&mut self.is_begun, true) {
             self.marks[0].record(&self.stream).map_err(failed)?;
         }
-        // SAFETY: callers keep the memory until they have waited, and `to` has room for so many bytes.
+        // SAFETY: callers keep the memory until they have waited, and `to` has room for these bytes.
         unsafe { result::memcpy_htod_async(to, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 
@@ -332,13 +335,13 @@ impl Device for Card {
         let Some(bytes) = to.bytes_of_mut(bytes) else {
             return Err(Fault::Failed("copy out of range".into()));
         };
-        // SAFETY: callers keep the memory and do not look at it until they have waited; `from` has so many bytes.
+        // SAFETY: callers keep the memory and do not access it until they have waited, and `from` has these bytes.
         unsafe { result::memcpy_dtoh_async(bytes, from, self.stream.cu_stream()) }.map_err(failed)
     }
 
     unsafe fn copy(&mut self, from: u64, to: u64, bytes: usize) -> Result<(), Fault> {
         self.bind()?;
-        // SAFETY: both addresses are from `alloc`, with so many bytes each, and do not overlap.
+        // SAFETY: both addresses came from `alloc` with at least this size, and the ranges do not overlap.
         unsafe { result::memcpy_dtod_async(to, from, bytes, self.stream.cu_stream()) }.map_err(failed)
     }
 
@@ -352,13 +355,14 @@ impl Device for Card {
         if self.is_timed {
             self.marks[1].record(&self.stream).map_err(failed)?;
         }
-        // The driver copies the one parameter during the call; its words are 64 bits wide.
+        // The driver copies the parameter struct during the call. It needs an alignment of 8 bytes.
         let mut words = vec![0u64; params.len().div_ceil(8)];
         bytemuck::cast_slice_mut(&mut words)[..params.len()].copy_from_slice(params);
         let mut list = [words.as_mut_ptr().cast::<c_void>()];
         let (function, stream) = (self.kernels[launch.kernel() as usize], self.stream.cu_stream());
-        // SAFETY: `Launch` holds the kernel's own parameter struct, laid out as in `layout.cuh`. Its addresses are from `alloc` or from
-        // mapped memory, each with as many entries as the struct says, and live until the next `wait`.
+        // SAFETY: `Launch` holds the kernel's own parameter struct, with the layout of `layout.cuh`. Its addresses
+        // came from `alloc` or are mapped host memory, have as many entries as the struct says, and stay valid
+        // until the next `wait`.
         unsafe { result::launch_kernel(function, (blocks, 1, 1), (THREADS, 1, 1), 0, stream, &mut list) }
             .map_err(failed)
     }

@@ -1,4 +1,4 @@
-//! A process that runs the kernels on the processor, for tests where there is no card.
+//! A process that runs the kernels on the CPU, for tests without a GPU.
 
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::ops::Range;
@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark};
 
-/// The process; it ends with this.
+/// The emulator process, which ends when this is dropped.
 pub(super) struct Emulator {
     child: Child,
     input: BufWriter<ChildStdin>,
     output: BufReader<ChildStdout>,
 }
 
-/// All is done as soon as it is asked for.
+/// A mark that has always passed: the emulator works synchronously.
 struct Done;
 
 impl Mark for Done {
@@ -23,7 +23,7 @@ impl Mark for Done {
     }
 }
 
-/// Plain memory, which the process does not see.
+/// Host memory that the emulator cannot access.
 struct Plain {
     words: Vec<u128>,
     len: usize,
@@ -51,15 +51,15 @@ impl HostMemory for Plain {
     }
 }
 
-/// Says what is not tested, and why. With `BURROW_REQUIRE` in the environment that is a failure: nobody reads the lines of
-/// tests that pass.
+/// Prints what is not tested and why. If `BURROW_REQUIRE` is set in the environment, the test fails instead, since
+/// nobody reads the output of tests that pass.
 pub(super) fn skip(why: &str) {
     let is_required = std::env::var_os("BURROW_REQUIRE").is_some_and(|value| !value.is_empty());
     assert!(!is_required, "BURROW_REQUIRE is set, but {why}");
     println!("{why}");
 }
 
-/// Requests, by their numbers.
+/// Codes of requests.
 const ALLOC: u64 = 1;
 const FREE: u64 = 2;
 const WRITE: u64 = 3;
@@ -67,7 +67,8 @@ const READ: u64 = 4;
 const LAUNCH: u64 = 5;
 
 impl Emulator {
-    /// Builds the process if need be and starts it; `None`, with a line that says why, where there is no C++ compiler.
+    /// Builds the emulator if necessary and starts it. Without a C++ compiler it prints why the test is skipped,
+    /// and returns `None`.
     pub fn start() -> Option<Self> {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/emulator.sh");
         let built = Command::new(script).stderr(Stdio::inherit()).output().expect("the script can be run");
@@ -77,7 +78,7 @@ impl Emulator {
         }
         assert!(built.status.success(), "the emulator can be built");
         let path = String::from_utf8(built.stdout).expect("a path");
-        // Each orders threads in a way of its own, which can be had again.
+        // Each process runs threads in its own order, which can be reproduced.
         static STARTED: AtomicU64 = AtomicU64::new(1);
         let fresh = || STARTED.fetch_add(1, Ordering::Relaxed).to_string();
         let shuffle = std::env::var("BURROW_EMULATOR_SHUFFLE").unwrap_or_else(|_| fresh());

@@ -1,4 +1,4 @@
-//! New ground from noise: heights are computed on the device and come back slice by slice.
+//! New ground from noise: the device computes the heights, which are copied back slice by slice.
 
 use rayon::prelude::*;
 
@@ -9,20 +9,20 @@ use super::staging::StagingLayout;
 use super::{Cuda, guarded, try_lock};
 use crate::ground::{Ground, NoiseHeights, NoiseKind, NoiseTerms};
 
-/// Columns from which on the device is taken to be the faster of both: so many take 16 threads 3.3 ms, and an H200 0.7 to 2.
-/// A fourth of them take 1.0 and 0.6 ms, which a slower card may lose.
+/// From this many columns on, the device is assumed to be faster: 16 threads take 3.3 ms for them, an H200 0.7 to 2
+/// ms. For a fourth of them the times are 1.0 and 0.6 ms, and a slower GPU may lose.
 const LEAST: usize = 1 << 18;
 
-/// Most columns of one launch: 4 MiB of heights, twice on the host. Long enough for a card to be busy, short enough for
-/// copies out of pinned memory to hide behind the next launch.
+/// Maximum number of columns per launch: 4 MiB of heights, twice on the host. That keeps a GPU busy, and is short
+/// enough for copies out of pinned memory to overlap with the next launch.
 const SLICE: usize = 1 << 20;
 
-/// Columns that a thread of the host copies at once.
+/// Columns that a thread of the host copies at a time.
 const PIECE: usize = 1 << 14;
 
 impl Cuda {
-    /// Ground from noise, if the card is there and free and does it; else the processor has to. Bad parameters are its
-    /// business too.
+    /// Ground from noise if the device is available, chosen and succeeds; otherwise the CPU has to compute it. That
+    /// includes invalid parameters.
     pub fn ground(&self, width: u32, depth: u32, noise: &NoiseHeights) -> Option<Ground> {
         let terms = noise.terms(width, depth).ok()?;
         if self.is_auto && terms.columns() < LEAST {
@@ -34,9 +34,9 @@ impl Cuda {
         let heights = {
             let mut place = try_lock(&self.shared.session)?;
             let session = place.as_mut()?;
-            // Nobody touches this memory before the threads that fill it.
+            // The memory is first touched by the threads that fill it.
             let mut heights = bytemuck::allocation::try_zeroed_vec(terms.columns()).ok()?;
-            // As transactions have it: a driver may do anything.
+            // As for transactions, a panic counts as a fault.
             let done = guarded(|| session.heights(&terms, &mut heights));
             if let Err(fault) = done {
                 self.handle_fault(&mut place, &fault);
@@ -48,7 +48,7 @@ impl Cuda {
     }
 }
 
-/// Heights of one slice on the device, and two slices on the host: one that is copied from while the other is written.
+/// Heights of one slice on the device, and of two on the host: one is copied from while the other is written.
 struct Buffers {
     own: u64,
     host: [Box<dyn HostMemory>; 2],
@@ -62,12 +62,12 @@ impl Buffers {
 }
 
 impl Session {
-    /// Writes the heights of a world in 1/256 voxel, `i32::MIN` where one is beyond the lattice's limit.
+    /// Computes the heights of a world in 1/256 voxel, `i32::MIN` where one exceeds the lattice's limit.
     pub(super) fn heights(&mut self, terms: &NoiseTerms, heights: &mut [i32]) -> Result<(), Fault> {
         self.heights_in_slices(terms, heights, SLICE)
     }
 
-    /// The same, so many columns at a time.
+    /// The same in slices of `slice` columns.
     pub(super) fn heights_in_slices(
         &mut self,
         terms: &NoiseTerms,
@@ -77,20 +77,20 @@ impl Session {
         let mut plan = StagingLayout::default();
         let tables = plan.section::<[u8; 256]>(terms.tables.len());
         self.input.open(&mut *self.device, &plan)?;
-        // Where memory is short, that must show before anything is under way.
+        // Allocation failures must show before any work is in flight.
         let mut buffers = Buffers::new(&mut *self.device, heights.len().min(slice) * size_of::<i32>())?;
         self.input.put(tables, &terms.tables);
         let params = HeightsParams { heights: buffers.own, ..params(terms, self.input.address(tables)) };
         let sent = self.input.send(&mut *self.device, &plan);
         let filled = sent.and_then(|()| fill(&mut *self.device, params, &mut buffers, heights, slice));
-        // Whatever is under way goes to buffers that are freed now.
+        // Work in flight uses buffers that are freed next.
         let ended = self.device.wait();
         self.device.free(buffers.own);
         filled.and(ended)
     }
 }
 
-/// Launches slice after slice, each while the one before is copied to where it belongs.
+/// Launches slice after slice, and copies out each one during the next launch.
 fn fill(
     device: &mut dyn Device,
     mut params: HeightsParams,
@@ -103,9 +103,9 @@ fn fill(
     for part in heights.chunks_mut(slice) {
         params.count = part.len() as u32;
         let blocks = part.len().div_ceil(COLUMNS) as u32;
-        // SAFETY: the lists of the parameters are as long as the terms say, and stay until the wait.
+        // SAFETY: the buffers in the parameters are as long as the terms say, and stay allocated until the wait.
         unsafe { device.launch(Launch::new(blocks, &params)) }?;
-        // SAFETY: the kernel writes so many heights, and they are read after the wait.
+        // SAFETY: the kernel writes this many heights, and they are read after the wait.
         unsafe { device.download(params.heights, &mut **next, 0..size_of_val(part)) }?;
         params.first += params.count;
         if let Some(part) = arrived.replace(part) {
@@ -120,14 +120,14 @@ fn fill(
     Ok(())
 }
 
-/// Copies heights out of a buffer, many threads at once: most of the time goes into memory that was never touched.
+/// Copies heights out of a buffer in parallel: most of the time goes into page faults of fresh memory.
 fn copy(from: &dyn HostMemory, to: &mut [i32]) {
     let bytes = &from.bytes()[..size_of_val(to)];
     let pieces = to.par_chunks_mut(PIECE).zip(bytes.par_chunks(PIECE * size_of::<i32>()));
     pieces.for_each(|(to, from)| bytemuck::cast_slice_mut(to).copy_from_slice(from));
 }
 
-/// The parameter for the first slice, still without an address for its heights.
+/// Parameters of the first slice, without the address of the heights.
 fn params(terms: &NoiseTerms, tables: u64) -> HeightsParams {
     HeightsParams {
         tables,
@@ -150,7 +150,8 @@ mod tests {
     use super::*;
     use crate::ground::{MAX_OCTAVES, MAX_SCALE, MAX_SIZE};
 
-    /// The device's ground must be the processor's, or none where that refuses a height.
+    /// Asserts that the device's ground is the CPU's, or none if the CPU rejects a height. Returns whether there is
+    /// one.
     fn compare(
         session: &mut Session,
         (width, depth): (u32, u32),
@@ -167,7 +168,7 @@ mod tests {
 
     fn random_noise(rng: &mut Rng) -> NoiseHeights {
         let sign = |rng: &mut Rng| if rng.bool() { 1.0 } else { -1.0 };
-        // From a thousandth of a voxel to beyond the lattice's limit once there are two of them.
+        // From a thousandth of a voxel up to lengths of which two exceed the lattice's limit.
         let length = |rng: &mut Rng| match rng.u32(0..10) {
             0 => 0.0,
             1 => sign(rng) * 32_768.0,
@@ -198,7 +199,7 @@ mod tests {
         for _ in 0..worlds {
             let noise = random_noise(&mut rng);
             let size = (rng.u32(1..80), rng.u32(1..60));
-            // Slices of some rows, of parts of a row, of a column; and all at once.
+            // All at once, slices of several rows, and slices of parts of a row or column.
             let slice = [1 << 20, rng.usize(900..5000), rng.usize(30..200)][rng.usize(0..3)];
             made += u64::from(compare(&mut session, size, &noise, slice));
         }
@@ -211,7 +212,7 @@ mod tests {
         let Some(device) = device() else { return };
         let mut session = Session::new(device, 1 << 20).expect("a session");
         let mut rng = Rng::with_seed(29);
-        // So much of it that heights, which are rounded, show the last bit.
+        // Large enough for the rounded heights to show the last bit.
         let amplitude = 2.0_f64.powi(100);
         for _ in 0..worlds::world_count(40) * 50 {
             let noise = NoiseHeights { amplitude: 1.0, ..random_noise(&mut rng) };

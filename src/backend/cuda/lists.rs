@@ -1,4 +1,4 @@
-//! Lists that are processed in parallel if they are long.
+//! Helpers that process long lists in parallel.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ pub(super) fn map<T: Sync, R: Send>(list: &[T], long: usize, work: impl Fn(&T) -
     if list.len() < long { list.iter().map(work).collect() } else { list.par_iter().map(work).collect() }
 }
 
-/// Maps the entries of a short list in parallel if it has several.
+/// Maps a short list of large entries, in parallel if it has several.
 pub(super) fn map_into<T: Send, R: Send>(list: Vec<T>, work: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
     if list.len() < 2 {
         list.into_iter().map(work).collect()
@@ -39,11 +39,11 @@ pub(super) fn fill<T: Sync, R: Send>(
     }
 }
 
-/// Entries of a list that a thread works on at a time.
+/// Entries of a list that a thread takes at a time.
 const PIECE: usize = 256;
 
-/// Works on a list as a whole, or piece by piece in parallel if it is long; `work` gets the number of a piece's
-/// first entry as well.
+/// Processes a list as a whole or, if it is long, piece by piece in parallel. `work` also gets the index of the
+/// piece's first entry.
 pub(super) fn in_pieces<T: Send, R: Send>(
     list: &mut [T],
     long: usize,
@@ -56,7 +56,7 @@ pub(super) fn in_pieces<T: Send, R: Send>(
     list.par_chunks_mut(PIECE).enumerate().map(piece).collect()
 }
 
-/// Calls `work` for the entries of a short list, in parallel if it has several.
+/// Calls `work` for a short list of large entries, in parallel if it has several.
 pub(super) fn for_each_parallel<T: Send>(list: Vec<T>, work: impl Fn(T) + Send + Sync) {
     if list.len() < 2 {
         list.into_iter().for_each(work);
@@ -65,7 +65,7 @@ pub(super) fn for_each_parallel<T: Send>(list: Vec<T>, work: impl Fn(T) + Send +
     }
 }
 
-/// The first entries of a list in pieces of these lengths.
+/// Splits the front of a list into pieces of these lengths.
 pub(super) fn cut<T>(mut list: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
     let cut_off = |length: usize| {
         let (piece, others) = std::mem::take(&mut list).split_at_mut(length);

@@ -10,21 +10,21 @@ use rustc_hash::FxHashMap;
 use super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use crate::backend::EngineSettings;
 
-/// Of a device's free memory, the part that is used by default; and the most of it.
+/// Default budget: this fraction of the free device memory, as a divisor, up to a maximum.
 const SHARE: usize = 4;
 const MOST: usize = 2 << 30;
 
-/// Of the budget, the part for bricks and ground; the rest is for what launches read and write.
+/// Fraction of the budget for bricks and ground, as a divisor. The rest is for input and output of launches.
 const RECORDS: usize = 2;
 
-/// What may be allocated, in bytes.
+/// Limits of allocations, in bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// On the device; by default as much as suits it.
+    /// Device memory; `None` for the default.
     pub device: Option<usize>,
-    /// For bricks and ground on the device; by default the usual part of that.
+    /// Bricks and ground on the device; `None` for the default share.
     pub records: Option<usize>,
-    /// Of the host, pinned.
+    /// Pinned host memory.
     pub host: usize,
 }
 
@@ -33,7 +33,7 @@ impl Limits {
         Self { device: settings.device_memory, records: None, host: settings.pinned_memory }
     }
 
-    /// A device that keeps to them, and the bytes for bricks and ground.
+    /// Wraps a device to enforce the limits. Also returns the bytes for bricks and ground.
     pub fn enforce(self, mut own: Box<dyn Device>, usage: &Arc<Usage>) -> (Box<dyn Device>, usize) {
         let device = self.device.unwrap_or_else(|| (own.free_memory() / SHARE).min(MOST));
         let (usage, sizes) = (Arc::clone(usage), FxHashMap::default());
@@ -42,7 +42,7 @@ impl Limits {
     }
 }
 
-/// What is allocated. Anybody may look at it.
+/// Bytes allocated now, readable from any thread.
 #[derive(Debug, Default)]
 pub(super) struct Usage {
     device: AtomicUsize,
@@ -51,33 +51,33 @@ pub(super) struct Usage {
 }
 
 impl Usage {
-    /// Bytes on the device and of the host.
+    /// Bytes on the device, and of pinned host memory.
     pub fn bytes(&self) -> [usize; 2] {
         [&self.device, &self.host].map(|bytes| bytes.load(Ordering::Relaxed))
     }
 
-    /// How many times memory of the host was allocated, which takes a millisecond for some megabytes.
+    /// How many times host memory was allocated. An allocation of a few megabytes takes about a millisecond.
     pub fn host_allocations(&self) -> u64 {
         self.host_allocations.load(Ordering::Relaxed)
     }
 }
 
-/// A device that allocates no more than it may.
+/// A device that stays within its limits.
 struct Budgeted {
     own: Box<dyn Device>,
     limits: [usize; 2],
     usage: Arc<Usage>,
-    /// Bytes by address.
+    /// Size of each allocation by address.
     sizes: FxHashMap<u64, usize>,
 }
 
-/// Is there room for so many bytes more?
+/// Whether this many more bytes stay within the limit.
 fn check(used: &AtomicUsize, limit: usize, bytes: usize) -> Result<(), Fault> {
     let used = used.load(Ordering::Relaxed).saturating_add(bytes);
     if used > limit { Err(Fault::Budget(limit)) } else { Ok(()) }
 }
 
-/// Memory that is counted.
+/// Host memory that is counted in the usage.
 struct Counted {
     own: Box<dyn HostMemory>,
     bytes: usize,
@@ -139,7 +139,7 @@ impl Device for Budgeted {
 
 impl Drop for Budgeted {
     fn drop(&mut self) {
-        // The device frees what is left there.
+        // The inner device frees the remaining allocations.
         self.usage.device.fetch_sub(self.sizes.values().sum(), Ordering::Relaxed);
     }
 }

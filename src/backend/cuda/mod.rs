@@ -1,27 +1,29 @@
-//! CUDA: fields kept on a card, edits applied there, one launch for all that is dirty, and only what is used comes back.
+//! CUDA backend: the fields stay on the GPU, one launch edits or meshes all dirty bricks, and only used output is
+//! copied back.
 //!
 //! ```text
-//! edits  -> jobs, missing bricks ---one copy--->  edit kernel: a block for each brick
-//!           bricks, receipts     <--what changed-
-//! blocks -> windows of bricks    ---one copy--->  mesh kernel: a block for each block
+//! edits  -> jobs, missing bricks ---one copy--->  edit kernel: one thread block per brick
+//!           bricks, effects      <--what changed-
+//! blocks -> windows of bricks    ---one copy--->  mesh kernel: one thread block per block
 //!           vertices, indices    <--what is used-
 //! ```
 //!
-//! Stencil edits (those that sculpt, and those under rules) take a kernel of their own, which reads windows of neighbouring
-//! bricks. They are launched batch by batch, as on the processor: what one batch changed is on the device when the next one
-//! reads it. After a fault, batches that have come back are kept, and the processor does the rest.
+//! Stencil edits (sculpting, and edits under rules) have their own kernel, which reads windows of neighbouring
+//! bricks. They are launched batch by batch, as on the CPU: a batch sees on the device what the previous one
+//! changed. After a fault, the batches that have come back are kept and the CPU does the rest.
 //!
-//! - [`device`](self::device) says what is asked of a device; `driver` asks a card.
-//! - [`session`](self::session) keeps bricks and heights on it, with a budget; `cache` says where, and which go first.
-//! - [`edit`](self::edit) and [`mesh`](self::mesh) pack the jobs and unpack the results; `layout` is the form of both.
-//!   Surfaces are not unpacked but read where they arrived, by `surfaces`.
-//! - `heights` makes new ground of noise.
-//! - `self_test` compares the device with the processor, before anything that it makes is used.
-//! - `memory` keeps to the budgets of the settings.
+//! - [`device`](self::device) is the interface of a device; `driver` implements it for a GPU.
+//! - [`session`](self::session) keeps bricks and heights on the device within a budget; `cache` assigns and evicts
+//!   their slots.
+//! - [`edit`](self::edit) and [`mesh`](self::mesh) pack jobs and unpack results; `layout` defines the format of
+//!   both. `surfaces` reads the meshes in place.
+//! - `heights` computes new ground from noise.
+//! - `self_test` compares the device with the CPU before its results are used.
+//! - `memory` enforces the memory budgets of the settings.
 //!
-//! The card is opened by a thread of its own when a stage first wants it. A session serves one transaction at a time. A
-//! transaction that finds it in use runs on the processor, so only the task that uses the device ever waits for it. The
-//! session is held until the surfaces, which lie in its memory, are assembled.
+//! A thread opens the GPU when a stage first wants it. A session serves one transaction at a time. A transaction
+//! that finds it in use runs on the CPU, so only the task that uses the device ever waits for it. The session stays
+//! locked until the surfaces in its memory are assembled.
 #![allow(unsafe_code)]
 
 mod cache;
@@ -69,28 +71,28 @@ use memory::{Limits, Usage};
 use session::Session;
 use surfaces::Surfaces;
 
-/// A card beside the processor. It is opened when it is first wanted.
+/// A GPU as an alternative to the CPU. It is opened on first use.
 pub(super) struct Cuda {
-    /// Is the faster of both taken? Else the card is, whenever it can be.
+    /// Use the faster of the two? Otherwise the GPU is used whenever possible.
     is_auto: bool,
-    /// Opens the device; nothing once that has begun.
+    /// Opens the device; `None` once opening has begun.
     pending: Mutex<Option<PendingDevice>>,
-    /// The card that the game suggests where the settings leave it open.
+    /// The GPU that the game suggests if the settings leave the choice open.
     suggested: Mutex<Option<CardChoice>>,
     shared: Arc<Shared>,
-    /// What both took, with [`Backend::Auto`].
+    /// Measured costs of both, for [`Backend::Auto`].
     costs: Mutex<Costs>,
-    /// Was it said that something was too much for the card?
+    /// Whether it was logged that a stage was too large for the device.
     has_passed: AtomicBool,
 }
 
-/// What the thread that opens a device has in common with those that use it.
+/// State shared by the thread that opens the device and those that use it.
 struct Shared {
     /// Locked while the device is used. `None` until it is open, and after it is lost.
     session: Mutex<Option<Box<Session>>>,
-    /// What became of opening it, to be asked at any time.
+    /// The outcome of opening, readable at any time.
     state: Mutex<EngineState>,
-    /// How long opening and the self-test took, once it has passed.
+    /// How long opening and the self-test took, once the test has passed.
     opening: OnceLock<Duration>,
     usage: Arc<Usage>,
 }
@@ -99,18 +101,18 @@ struct Shared {
 struct PendingDevice {
     device: Box<dyn FnOnce(Option<CardChoice>) -> Result<Box<dyn Device>, Fault> + Send>,
     limits: Limits,
-    /// What is compared before it is used.
+    /// What the self-test compares.
     sizes: self_test::Sizes,
 }
 
-/// What became of a stage that the card was asked to do.
+/// The outcome of a stage that was offered to the device.
 pub(super) struct Attempt<T> {
-    /// What the card made of it; else the processor has to do it.
+    /// The device's result; `None` if the CPU has to do the stage.
     pub done: Option<T>,
     load: Load,
-    /// Did the card begin?
+    /// Whether the device started on it.
     was_tried: bool,
-    /// Was memory of the host allocated for the card?
+    /// Whether host memory was allocated for it.
     has_grown: bool,
 }
 
@@ -124,7 +126,7 @@ fn try_lock<T>(mutex: &Mutex<T>) -> Option<MutexGuard<'_, T>> {
 }
 
 impl Cuda {
-    /// The card of these settings, which is not opened yet.
+    /// The GPU that the settings choose, not opened yet.
     pub fn new(settings: &EngineSettings) -> Self {
         let card = settings.card.clone();
         let device = move |suggested: Option<CardChoice>| -> Result<Box<dyn Device>, Fault> {
@@ -134,7 +136,7 @@ impl Cuda {
         Self::with_device(settings.backend == Backend::Auto, limits, self_test::FULL, device)
     }
 
-    /// Some device, which is not opened yet.
+    /// A device that is not opened yet.
     fn with_device(
         is_auto: bool,
         limits: Limits,
@@ -156,7 +158,7 @@ impl Cuda {
         }
     }
 
-    /// Opens the device in the background, unless that was begun before.
+    /// Opens the device in the background, unless that has begun already.
     pub fn open(&self) {
         let mut pending = lock(&self.pending);
         let Some(own) = pending.take() else { return };
@@ -169,7 +171,7 @@ impl Cuda {
                 Ok(session) => {
                     let name = session.name();
                     shared.opening.get_or_init(|| start.elapsed());
-                    // Locked, so that it is not lost before the state says that it is open.
+                    // Keep the lock, so that the session cannot be lost before the state says that it is open.
                     let mut place = lock(&shared.session);
                     *place = Some(Box::new(session));
                     *lock(&shared.state) = EngineState::Cuda(name);
@@ -183,7 +185,7 @@ impl Cuda {
         }
     }
 
-    /// Says which card to open where the settings leave it open.
+    /// Suggests a GPU if the settings leave the choice open.
     pub fn suggest(&self, card: CardChoice) {
         *lock(&self.suggested) = Some(card);
     }
@@ -192,7 +194,7 @@ impl Cuda {
         lock(&self.shared.state).clone()
     }
 
-    /// How long opening the card and its self-test took; zero until it has passed.
+    /// How long opening the device and its self-test took; zero until the test has passed.
     pub fn opening(&self) -> Duration {
         self.shared.opening.get().copied().unwrap_or_default()
     }
@@ -202,7 +204,7 @@ impl Cuda {
         self.shared.usage.bytes()
     }
 
-    /// Frees what was not needed lately, unless the card is in use.
+    /// Frees memory that was not needed recently, unless the device is in use.
     pub fn trim(&self) {
         if let Some(mut place) = try_lock(&self.shared.session)
             && let Some(session) = &mut *place
@@ -212,12 +214,12 @@ impl Cuda {
         }
     }
 
-    /// Does a stage on the card if that is there, free and chosen; else the processor has to do it. `then` makes something
-    /// of what was done, while it still lies in the session's memory. What it made of things that the card did not bring in
-    /// the end is lost.
+    /// Runs a stage on the device if it is open, free and chosen; otherwise the CPU has to do it. `then` uses the
+    /// result while it is still in the session's memory. If the result does not arrive completely, the output of
+    /// `then` is discarded.
     ///
-    /// So the lock is held until `then` is through, which may run other tasks of its thread pool meanwhile, even on this
-    /// thread. That can't deadlock: others only try the lock, and go on without the card.
+    /// The lock is held until `then` returns. Meanwhile `then` may run other tasks of its thread pool, even on this
+    /// thread. That cannot deadlock: others only try the lock, and go on without the device.
     fn attempt_stage<T, R>(
         &self,
         choice: &mut Choice,
@@ -233,7 +235,7 @@ impl Cuda {
         if !self.is_auto {
             self.open();
         }
-        // The holder may take long, and this thread could be the one that has to finish its work.
+        // Never block here: the holder may take long, and its work may need this thread.
         let Some(mut place) = try_lock(&self.shared.session) else { return attempt };
         let Some(session) = &mut *place else { return attempt };
         let trimmed = guarded(|| session.trim(Instant::now()));
@@ -241,7 +243,8 @@ impl Cuda {
             self.handle_fault(&mut place, &fault);
             return attempt;
         }
-        // Uploads only make the card slower, so small transactions need not look for what is missing.
+        // Decide first without counting missing data: uploads only make the device slower, so most small
+        // transactions end here.
         if !self.is_chosen(choice, load) {
             return attempt;
         }
@@ -255,7 +258,7 @@ impl Cuda {
         let done = guarded(|| work(session));
         attempt.has_grown = self.shared.usage.host_allocations() != allocated;
         let times = session.times();
-        // A panic in `then` is the caller's, and no fault of the device's.
+        // A panic in `then` is the caller's and no fault of the device.
         match done.and_then(|done| then(session, done)) {
             Ok(made) => {
                 choice.is_cuda = true;
@@ -263,7 +266,7 @@ impl Cuda {
                 attempt.done = Some(made);
             }
             Err(fault) => {
-                // What was lost on trying is not the processor's time.
+                // The time lost on the attempt is not the CPU's.
                 choice.estimate = None;
                 self.handle_fault(&mut place, &fault);
             }
@@ -271,7 +274,7 @@ impl Cuda {
         attempt
     }
 
-    /// Is a stage the card's?
+    /// Whether the device does this stage.
     fn is_chosen(&self, choice: &mut Choice, load: Load) -> bool {
         if !self.is_auto {
             return true;
@@ -281,7 +284,7 @@ impl Cuda {
         is_chosen
     }
 
-    /// Gives the card up, unless it is fine and only what was asked too much for it; either way with one warning.
+    /// Handles a fault with one warning. Gives the device up unless the request was merely too large.
     fn handle_fault(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         if !fault.is_passing() {
             self.shared.disable(place, fault);
@@ -290,14 +293,14 @@ impl Cuda {
         }
     }
 
-    /// Takes in how long a stage took, and opens the card where such stages could be worth it.
+    /// Records how long a stage took, and opens the device if such stages could be worth it.
     pub fn learn<T>(&self, choice: &Choice, attempt: &Attempt<T>) {
         if !self.is_auto || choice.amount == 0 {
             return;
         }
         let &Attempt { load, was_tried, has_grown, .. } = attempt;
         let mut costs = lock(&self.costs);
-        // Where the card failed, all of the time is its own.
+        // After a failed attempt, all of the time counts as the device's.
         let is_chosen = choice.estimate.is_some() || was_tried;
         costs.learn(load, was_tried, is_chosen, choice.took, has_grown && choice.is_cuda);
         let is_wanted = !was_tried && costs.could_be_worth_a_card(load);
@@ -307,15 +310,16 @@ impl Cuda {
         }
     }
 
-    /// Applies edits on the card, if that is chosen.
+    /// Applies edits on the device, if it is chosen.
     pub fn edit(&self, work: &PreparedEdits, choice: &mut Choice) -> Attempt<EditDelta> {
         let load = Load::of_edits(work);
         let missing = |session: &Session| session.missing_edits(work);
         self.attempt_stage(choice, load, missing, |session| session.edit(work), |_, delta| Ok(delta))
     }
 
-    /// Meshes blocks on the card, if that is chosen: says for how long `then` waited for their surfaces, which it got. `None`
-    /// where the processor has to mesh them, and what `then` made of some that never came has to be forgotten.
+    /// Meshes blocks on the device, if it is chosen. `then` gets the surfaces; the result is how long it waited for
+    /// them. Without a result the CPU has to mesh the blocks, and anything that `then` made of surfaces is to be
+    /// discarded.
     pub fn mesh(
         &self,
         view: &WorldView,
@@ -331,7 +335,7 @@ impl Cuda {
             let Session { meshes, device, .. } = session;
             let surfaces = Surfaces::new(meshes, view, blocks, meshed);
             let drawn = catch_unwind(AssertUnwindSafe(|| then(&surfaces)));
-            // `then` may not have waited for all surfaces, and after a panic the session must stay usable.
+            // `then` may not have waited for all surfaces. Even after a panic the session must stay usable.
             let is_over = surfaces.arrival.is_over();
             let waited = surfaces.arrival.end();
             let ended = if is_over { Ok(()) } else { guarded(|| device.wait()) };
@@ -341,14 +345,14 @@ impl Cuda {
     }
 }
 
-/// Calls a device. A panic counts as a fault, so that the processor finishes the transaction.
+/// Calls a device. A panic counts as a fault, so that the CPU finishes the transaction.
 fn guarded<T>(work: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     let failed = |_| Err(Fault::Failed("panic while it was used".into()));
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(failed)
 }
 
 impl PendingDevice {
-    /// Opens the device and compares it with the processor.
+    /// Opens the device and runs its self-test.
     fn open(self, suggested: Option<CardChoice>, usage: &Arc<Usage>) -> Result<Session, Fault> {
         let device = (self.device)(suggested)?;
         let (device, records) = self.limits.enforce(device, usage);
@@ -360,7 +364,7 @@ impl PendingDevice {
 }
 
 impl Shared {
-    /// Gives the card up, with the one warning.
+    /// Gives the device up, with one warning.
     fn disable(&self, place: &mut Option<Box<Session>>, fault: &Fault) {
         *place = None;
         *lock(&self.state) = EngineState::Lost(fault.to_string());

@@ -1,5 +1,5 @@
-//! What a device has to pass before it is trusted: ground is made of noise, and a piece of ground is dug and sculpted, on it
-//! and on the processor. Every bit is compared.
+//! Checks a device before it is used: computes ground from noise, digs and sculpts it, and compares every bit with
+//! the CPU.
 
 use std::sync::Arc;
 
@@ -19,25 +19,25 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, Vertex};
 use crate::volume::{Brick, Bricks, DiggingRules, SampleView};
 
-/// Cells along a side of the ground.
+/// Side of the test ground, in cells.
 const SIDE: i32 = 256;
 
-/// Brushes at once, and their radius, smallest first.
+/// Numbers of brushes and their radius, smallest first.
 pub(super) type Sizes = &'static [(i32, f32)];
 
-/// One brush, to some that fill the lists of all kernels.
+/// From a single brush to enough to fill the lists of all kernels.
 pub(super) const FULL: Sizes = &[(1, 1.0), (1, 4.0), (4, 6.0), (16, 6.0), (64, 6.0)];
 
-/// Compares a device with the processor.
+/// Compares a device with the CPU.
 ///
 /// # Errors
-/// Where it fails, or differs from the processor in a single bit; or has too little memory for the smallest size.
+/// If the device fails, or differs from the CPU in a single bit, or has too little memory for the smallest size.
 pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<(), Fault> {
     compare_heights(session)?;
     let ground = ground()?;
     for (number, &(count, radius)) in sizes.iter().enumerate() {
         match compare(session, &ground, count, radius) {
-            // It may be used for what is no more than that.
+            // Transactions of the smaller sizes still work.
             Err(fault) if fault.is_passing() && number > 0 => return Ok(()),
             other => other?,
         }
@@ -45,7 +45,7 @@ pub(super) fn run(session: &mut Session, sizes: Sizes) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Compares what so many brushes do.
+/// Compares the effects of `count` brushes.
 fn compare(session: &mut Session, ground: &Ground, count: i32, radius: f32) -> Result<(), Fault> {
     let none = Bricks::default();
     let (samples, grid) = (SampleView::new(ground, &none), ChunkGrid::new(32, SIDE, SIDE));
@@ -68,7 +68,7 @@ fn compare(session: &mut Session, ground: &Ground, count: i32, radius: f32) -> R
     compare_meshes(session, &view, &dirty(grid, &drafted))
 }
 
-/// Ground of noise on both, larger than a block of threads and not of whole ones.
+/// Compares ground from noise. It has more columns than one thread block, and no whole number of blocks.
 fn compare_heights(session: &mut Session) -> Result<(), Fault> {
     for kind in [NoiseKind::Fractal, NoiseKind::Ridged] {
         let noise = NoiseHeights { kind, seed: 3, scale: 21.5, ..NoiseHeights::default() };
@@ -83,7 +83,7 @@ fn compare_heights(session: &mut Session) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Edits on both, and the bricks that they change.
+/// Compares the results of edits, and returns the bricks that they change.
 fn compare_edits(session: &mut Session, work: &PreparedEdits) -> Result<Vec<DraftedBrick>, Fault> {
     let (expected, found) = (ledgers_of(work), session.edit(work)?);
     let mut effects = vec![EditEffect::default(); work.edits.len()];
@@ -93,7 +93,7 @@ fn compare_edits(session: &mut Session, work: &PreparedEdits) -> Result<Vec<Draf
     is_same.then_some(bricks).ok_or(Fault::SelfTest)
 }
 
-/// Blocks meshed on both.
+/// Compares the meshes of blocks.
 fn compare_meshes(session: &mut Session, view: &WorldView, blocks: &[Block]) -> Result<(), Fault> {
     let mut expected = Parts::default();
     Cpu.mesh(view, blocks, &|| {}, &mut |fresh| expected = collected(blocks, fresh));
@@ -104,7 +104,7 @@ fn compare_meshes(session: &mut Session, view: &WorldView, blocks: &[Block]) -> 
     same(&expected, &found).then_some(()).ok_or(Fault::SelfTest)
 }
 
-/// The surfaces of blocks as parts.
+/// Collects the surfaces of blocks.
 pub(super) fn collected(blocks: &[Block], fresh: &dyn MeshedBlocks) -> Parts {
     let mut parts = Parts::default();
     for (number, &block) in blocks.iter().enumerate() {
@@ -116,14 +116,14 @@ pub(super) fn collected(blocks: &[Block], fresh: &dyn MeshedBlocks) -> Parts {
     parts
 }
 
-/// What the processor makes of edits.
+/// The deltas that the CPU computes.
 fn ledgers_of(work: &PreparedEdits) -> Vec<EditDelta> {
     let mut deltas = Vec::new();
     Cpu.edit(work, &mut |own| deltas.extend(own.iter_mut().map(std::mem::take)));
     deltas
 }
 
-/// The blocks that changed samples show in.
+/// The blocks whose surface depends on changed samples.
 fn dirty(grid: ChunkGrid, drafted: &[DraftedBrick]) -> Vec<Block> {
     let near = |drafted: &DraftedBrick| {
         let around = LatticeBox { min: drafted.changed.min - 2, max: drafted.changed.max + 1 };
@@ -139,7 +139,7 @@ fn dirty(grid: ChunkGrid, drafted: &[DraftedBrick]) -> Vec<Block> {
     bricks.into_iter().map(block).collect()
 }
 
-/// Hills, and a slope steep enough for several cubes in a column.
+/// Hills, and a slope so steep that a column has several cubes.
 fn ground() -> Result<Ground, Fault> {
     let height = |x: i32, z: i32| {
         let (x, z) = (f64::from(x), f64::from(z));
@@ -149,14 +149,14 @@ fn ground() -> Result<Ground, Fault> {
     made.map_err(|error| Fault::Failed(error.to_string()))
 }
 
-/// The middle of a brush at the surface; they lie side by side.
+/// The centre of a brush near the surface. The centres form a grid.
 fn place(ground: &Ground, i: i32, radius: f32) -> Vec3 {
     let (x, z) = (12 + i % 8 * 31, 12 + i / 8 * 29);
     let height = ground.height(Column::new(x, z)) as f32 / ONE as f32;
     Vec3::new(x as f32 - 0.3, height - 0.2 * radius, z as f32 - 0.4)
 }
 
-/// Rules of every kind.
+/// Rules of each kind.
 fn rules() -> DiggingRules {
     let box_at = |x: i32| LatticeBox { min: IVec3::new(x, -99, 9), max: IVec3::new(x + 2, 99, 18) };
     DiggingRules::default()
@@ -167,7 +167,7 @@ fn rules() -> DiggingRules {
         .with_protected(box_at(50))
 }
 
-/// Brushes of every kind that sculpts, where others dug. None reads what another one changes.
+/// Brushes of each sculpting kind, where others dug. None reads what another one changes.
 fn sculpting_edits(ground: &Ground, count: i32, radius: f32) -> Vec<Edit> {
     let relief = GreyImage::from_samples(3, 2, vec![0, 40_000, 9_000, 65_535, 20_000, 1]).ok().map(Arc::new);
     let brush = |i: i32| {
@@ -193,7 +193,7 @@ fn sculpting_edits(ground: &Ground, count: i32, radius: f32) -> Vec<Edit> {
     (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
 }
 
-/// Brushes at the surface, side by side.
+/// A grid of brushes near the surface.
 fn edits(ground: &Ground, count: i32, radius: f32, is_rough: bool) -> Vec<Edit> {
     let brush = |i: i32| match (i % 7, place(ground, i, radius)) {
         (2, base) => Brush::add(Shape::cone(base, Vec3::new(1.0, radius * 1.5, 2.0), radius), MaterialId(3)),
@@ -212,7 +212,7 @@ fn edits(ground: &Ground, count: i32, radius: f32, is_rough: bool) -> Vec<Edit> 
     (0..count).filter_map(|i| Edit::quantize(&brush(i)).ok()).collect()
 }
 
-/// Do deltas hold the same bricks, however many they are?
+/// Whether deltas hold the same bricks in total.
 fn are_same_ledgers(a: &[EditDelta], b: &EditDelta) -> bool {
     let bricks = || a.iter().flat_map(|delta| &delta.bricks);
     let what = |drafted: &DraftedBrick| (drafted.pos, drafted.changed, drafted.is_extended);
@@ -222,13 +222,13 @@ fn are_same_ledgers(a: &[EditDelta], b: &EditDelta) -> bool {
         && pairs.all(|(a, b)| what(a) == what(b) && are_same_bricks(&a.brick, &b.brick))
 }
 
-/// Do bricks hold the same, bits included, and materials stored where the other has them?
+/// Whether bricks are equal, including bits and whether materials are stored.
 pub(super) fn are_same_bricks(a: &Brick, b: &Brick) -> bool {
     a.samples() == b.samples()
         && (a.solid(), a.edited(), a.materials()) == (b.solid(), b.edited(), b.materials())
 }
 
-/// Are these the same parts, bit by bit?
+/// Whether the parts are equal, bit by bit.
 fn same(a: &Parts, b: &Parts) -> bool {
     let mut others = b.iter();
     let is_next = |(block, vertices, indices): (Block, &[Vertex], &[u16])| {

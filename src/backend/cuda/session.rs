@@ -1,4 +1,4 @@
-//! A device with its cached data: bricks, stacks of the ground, buffers.
+//! A device with its caches: bricks, ground stacks, staging buffers.
 
 use std::time::Duration;
 
@@ -23,39 +23,39 @@ use crate::volume::{Brick, SampleView};
 /// A device and its caches.
 pub(super) struct Session {
     pub(super) device: Box<dyn Device>,
-    /// How long the device took for the last launch: uploads and kernels, and the kernel alone.
+    /// Device time of the last launch: uploads and kernels, and the kernel alone.
     pub(super) times: [Duration; 2],
     pub(super) bricks: RecordCache,
     pub(super) stacks: Stacks,
     pub(super) input: InputBuffer,
     pub(super) meshes: MeshOutput,
     pub(super) edits: EditOutput,
-    /// Memory for the jobs and windows of the next launch.
+    /// Memory reused for the jobs and windows of the next launch.
     pub(super) edit_jobs: Vec<EditJob>,
     pub(super) kept: KeptSlabs,
-    /// Where the table of cases is.
+    /// Address of the table of marching cubes cases.
     pub(super) table: u64,
-    /// When it was trimmed last, and whether anything was launched since.
+    /// When memory was last trimmed, and whether anything was launched since.
     trimmed: Instant,
     is_used: bool,
-    /// How long memory that is not needed stays.
+    /// How long unused memory is kept.
     pub(super) keep: Duration,
 }
 
-/// Stacks of the ground on the device. They never change.
+/// Cached stacks of the ground. They never change.
 pub(super) struct Stacks {
     slots: RecordCache,
-    /// Tags by place, in pages of each ground.
+    /// Tags of the stacks, in pages by ground and position.
     pages: FxHashMap<(u64, i32, i32), Box<[u64; PAGE * PAGE]>>,
 }
 
-/// Stacks along a side of a page.
+/// Side of a page, in stacks.
 const PAGE: usize = 64;
 
-/// The most pages. Beyond that all are dropped, and filled again.
+/// Maximum number of pages. Beyond it, all are dropped.
 const MOST_PAGES: usize = 1 << 12;
 
-/// The page of a stack, and its number there.
+/// The page of a stack, and its index within the page.
 fn page(ground: &Ground, (x, z): (i32, i32)) -> ((u64, i32, i32), usize) {
     let side = PAGE as i32;
     let number = z.rem_euclid(side) * side + x.rem_euclid(side);
@@ -67,18 +67,18 @@ impl Stacks {
         Self { slots: RecordCache::new(size_of::<StackRecord>(), budget), pages: FxHashMap::default() }
     }
 
-    /// Where the first one is.
+    /// Device address of the first slot.
     pub fn base(&self) -> u64 {
         self.slots.base()
     }
 
-    /// The slot of a stack that is there.
+    /// The slot of a cached stack.
     pub fn find(&self, ground: &Ground, place: (i32, i32)) -> Option<u32> {
         let (page, number) = page(ground, place);
         self.slots.find(self.pages.get(&page)?[number])
     }
 
-    /// A slot for a stack that is not there.
+    /// Takes a slot for a stack that is not cached.
     fn take(&mut self, device: &mut dyn Device, ground: &Ground, place: (i32, i32)) -> Result<u32, Fault> {
         let (slot, tag) = self.slots.take(device)?;
         if self.pages.len() > MOST_PAGES {
@@ -90,12 +90,12 @@ impl Stacks {
     }
 }
 
-/// The data of a launch that is not on the device yet. Its slots are reserved; if the launch is abandoned, they must be given
-/// back.
+/// Data of a launch that is not on the device yet. Slots are reserved for it and must be given back if the launch
+/// is abandoned.
 pub(super) struct Uploads<'a> {
     ground: &'a Ground,
     bricks: Vec<Upload<'a>>,
-    /// Bytes of their records.
+    /// Total bytes of the brick records.
     bytes: usize,
     stacks: Vec<((i32, i32), u32)>,
     jobs: Section,
@@ -103,23 +103,22 @@ pub(super) struct Uploads<'a> {
     stack_list: Section,
 }
 
-/// A brick on its way to a slot.
+/// A brick to upload, and its slot.
 struct Upload<'a> {
     brick: &'a Brick,
     slot: u32,
-    /// Where its record begins among those of all bricks, and how long it is.
+    /// Offset and length of its record within the section of brick records.
     first: usize,
     bytes: usize,
 }
 
 impl<'a> Uploads<'a> {
-    /// Nothing yet.
     pub fn new(ground: &'a Ground) -> Self {
         let [jobs, brick_list, stack_list] = [Section::default(); 3];
         Self { ground, bricks: Vec::new(), bytes: 0, stacks: Vec::new(), jobs, brick_list, stack_list }
     }
 
-    /// How many bricks and stacks.
+    /// Number of bricks and stacks.
     pub fn len(&self) -> usize {
         self.bricks.len() + self.stacks.len()
     }
@@ -131,7 +130,7 @@ impl<'a> Uploads<'a> {
         self.bytes += bytes;
     }
 
-    /// Adds what there is to upload.
+    /// Reserves staging sections for the uploads.
     pub fn plan(&mut self, plan: &mut StagingLayout) {
         self.jobs = plan.section::<ScatterJob>(self.len());
         self.brick_list = plan.section::<u8>(self.bytes);
@@ -154,11 +153,11 @@ impl<'a> Uploads<'a> {
     }
 }
 
-/// Bricks that one thread writes records of.
+/// Bricks whose records a thread writes at a time.
 const GROUP: usize = 256;
 
-/// The bricks around these, which are at `pos` and sorted by stacks, and so many up and down. Those that have no slot are to be
-/// [completed](Session::complete).
+/// Windows around these bricks, which are sorted by stack, extending `up_and_down` bricks vertically. Bricks
+/// without a slot are still to be [completed](Session::complete).
 pub(super) fn windows<'a, T: Sync>(
     slots: &RecordCache,
     view: SampleView<'a>,
@@ -171,20 +170,20 @@ pub(super) fn windows<'a, T: Sync>(
     Windows::around(view, bricks, pos, up_and_down, find, kept)
 }
 
-/// From how many stacks on their records are written side by side; each looks at 121 columns.
+/// From this many stacks on, their records are written in parallel. Each reads 121 columns.
 const MANY_STACKS: usize = 64;
 
-/// How many bricks are looked at to see how many are missing.
+/// How many bricks are sampled to estimate how many are missing.
 const LOOKS: usize = 128;
 
-/// How long unused memory is kept. A player may pause, and allocating it again costs time.
+/// How long unused memory is kept. Players pause, and reallocating costs time.
 const KEEP: Duration = Duration::from_secs(30);
 
-/// Of what a device may use, the part for stacks.
+/// Fraction of the budget for stacks, as a divisor.
 const STACKS_SHARE: usize = 8;
 
 impl Session {
-    /// A session that may keep so many bytes of bricks and ground on the device.
+    /// A session that may keep `budget` bytes of bricks and ground on the device.
     pub fn new(mut device: Box<dyn Device>, budget: usize) -> Result<Self, Fault> {
         let mut input = InputBuffer::new(&mut *device)?;
         let meshes = MeshOutput::new(&mut *device)?;
@@ -217,20 +216,21 @@ impl Session {
         })
     }
 
-    /// Forgets all bricks and stacks: what comes now has their room.
+    /// Empties both caches.
     pub fn forget(&mut self) {
         self.bricks.clear();
         self.stacks.slots.clear();
         self.stacks.pages.clear();
     }
 
-    /// Frees memory that was not needed for some time: lists shrink to what was, and bricks go if nothing was launched.
+    /// Frees memory that was not needed for some time: lists shrink to what was used, and the caches are released
+    /// if nothing was launched.
     pub fn trim(&mut self, now: Instant) -> Result<(), Fault> {
         if now.saturating_duration_since(self.trimmed) < self.keep {
             return Ok(());
         }
         self.trimmed = now;
-        // After a fault something may be under way.
+        // After a fault, work may still be in flight.
         self.device.wait()?;
         let device = &mut *self.device;
         let trimmed = self
@@ -243,11 +243,11 @@ impl Session {
             self.stacks.slots.release(device);
             self.stacks.pages = FxHashMap::default();
         }
-        // Without memory for shorter lists, long ones stay.
+        // Without memory for shorter lists, the long ones stay.
         trimmed.or_else(|fault| if fault.is_passing() { Ok(()) } else { Err(fault) })
     }
 
-    /// How long the device took for what was done last: uploads and kernels, and the kernel alone.
+    /// Device time of the last launch: uploads and kernels, and the kernel alone.
     pub fn times(&self) -> [Duration; 2] {
         self.times
     }
@@ -257,19 +257,19 @@ impl Session {
         self.device.name()
     }
 
-    /// The number of bricks and stacks of edits that are not on the device.
+    /// Estimated number of bricks and stacks of these edits that are not on the device.
     pub fn missing_edits(&self, work: &PreparedEdits) -> usize {
         let jobs = work.jobs();
         self.missing(work.base, jobs.len(), |at| jobs[at].pos())
     }
 
-    /// The number of bricks and stacks of blocks that are not on the device.
+    /// Estimated number of bricks and stacks of these blocks that are not on the device.
     pub fn missing_blocks(&self, view: &WorldView, blocks: &[Block]) -> usize {
         self.missing(view.samples, blocks.len(), |at| blocks[at].brick)
     }
 
-    /// How many of so many bricks, sorted by place, are not here, with the stacks that they belong to; judged by some of
-    /// them. One that is needed several times counts where it comes first.
+    /// Estimates from a sample how many of `count` bricks, sorted by stack, and of their stacks are not on the
+    /// device. A brick or stack that occurs several times in a row counts once.
     fn missing(&self, view: SampleView, count: usize, pos: impl Fn(usize) -> BrickPos) -> usize {
         let step = count.div_ceil(LOOKS).max(1);
         let stack = |pos: BrickPos| (pos.0.x, pos.0.z);
@@ -287,14 +287,14 @@ impl Session {
         missing * step
     }
 
-    /// Begins a launch. Slots that it finds or takes are not evicted before the next one.
+    /// Begins a launch. Slots found or taken from now on are not evicted before the next launch.
     pub(super) fn begin(&mut self) {
         self.is_used = true;
         self.bricks.begin();
         self.stacks.slots.begin();
     }
 
-    /// The reference to a brick, which is uploaded if it has to be.
+    /// The reference of a brick. Queues an upload if it is not on the device.
     pub(super) fn need_brick<'a>(
         &mut self,
         uploads: &mut Uploads<'a>,
@@ -309,7 +309,7 @@ impl Session {
         Ok(reference(slot, brick))
     }
 
-    /// Enters the bricks of windows that have no reference yet; they are uploaded.
+    /// Fills in the references of window entries without one, and queues their uploads.
     pub(super) fn complete<'a>(
         &mut self,
         uploads: &mut Uploads<'a>,
@@ -318,7 +318,7 @@ impl Session {
         windows.complete(|brick| self.need_brick(uploads, brick))
     }
 
-    /// Ensures that a stack is on the device, and returns its slot.
+    /// The slot of a stack. Queues an upload if it is not on the device.
     pub(super) fn need_stack(&mut self, uploads: &mut Uploads, place: (i32, i32)) -> Result<u32, Fault> {
         if let Some(slot) = self.stacks.find(uploads.ground, place) {
             return Ok(slot);
@@ -328,7 +328,7 @@ impl Session {
         Ok(slot)
     }
 
-    /// Sends everything that was planned, and puts uploads in their slots.
+    /// Sends the planned input, and moves uploads into their slots.
     pub(super) fn send(&mut self, plan: &StagingLayout, uploads: &Uploads) -> Result<(), Fault> {
         if uploads.len() > 0 {
             uploads.write(&mut self.input);
@@ -340,7 +340,7 @@ impl Session {
         unsafe { self.device.launch(Launch::new(uploads.len() as u32, &params)) }
     }
 
-    /// Writes where uploads go.
+    /// Writes the scatter jobs of uploads.
     fn direct(&mut self, uploads: &Uploads) {
         let Self { input, bricks, stacks, .. } = self;
         let (brick_list, stack_list) = (input.address(uploads.brick_list), input.address(uploads.stack_list));
@@ -356,7 +356,7 @@ impl Session {
         }
     }
 
-    /// Gives slots back whose data was never sent.
+    /// Gives back the slots of uploads that were never sent.
     pub(super) fn give_up(&mut self, uploads: &Uploads) {
         uploads.bricks.iter().for_each(|upload| self.bricks.give_back(upload.slot));
         uploads.stacks.iter().for_each(|&(_, slot)| self.stacks.slots.give_back(slot));
@@ -369,7 +369,7 @@ mod tests {
     use super::*;
     use crate::ground::MaterialId;
 
-    /// So many bytes of the device.
+    /// Reads bytes of the device.
     fn read(session: &mut Session, address: u64, bytes: usize) -> Vec<u8> {
         let mut host = session.device.alloc_host(bytes).expect("memory of the host");
         // SAFETY: tests read slots that exist, after the wait.
@@ -389,7 +389,7 @@ mod tests {
     #[test]
     fn what_is_uploaded_is_in_its_slot() {
         let ground = Ground::from_fn(200, 200, |x, z| f64::from(x * z % 31)).expect("finite heights");
-        // Written by one thread, and by several.
+        // A count for one thread, and one for several.
         for count in [3, 2 * GROUP as i32 + 5] {
             let Some(device) = device() else { return };
             let mut session = Session::new(device, 8 << 20).expect("a session");

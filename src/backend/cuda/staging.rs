@@ -1,4 +1,4 @@
-//! Staging buffers of launches, kept from one launch to the next.
+//! Staging buffers for launches, reused from one launch to the next.
 
 use std::ops::Range;
 
@@ -6,31 +6,31 @@ use bytemuck::Pod;
 
 use super::device::{Device, Fault, HostMemory};
 
-/// The input of a launch in one piece, so that it takes one copy.
+/// The whole input of a launch in one buffer, so that one copy uploads it.
 pub(super) struct InputBuffer {
     host: Box<dyn HostMemory>,
     device: u64,
     len: usize,
-    /// Bytes that were needed since it was trimmed.
+    /// Largest size needed since the last trim, in bytes.
     needed: usize,
 }
 
-/// Where something is in an [`InputBuffer`]: offset and length in bytes.
+/// A part of an [`InputBuffer`]: offset and length in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Section {
     start: usize,
     len: usize,
 }
 
-/// The sections of an [`InputBuffer`], in order.
+/// Lays out the sections of an [`InputBuffer`], in order.
 #[derive(Debug, Default)]
 pub(super) struct StagingLayout(usize);
 
-/// Sections start at multiples of this.
+/// Sections are aligned to this many bytes.
 const ALIGNMENT: usize = 16;
 
 impl StagingLayout {
-    /// Room for so many entries.
+    /// Reserves a section of `count` entries.
     pub fn section<T>(&mut self, count: usize) -> Section {
         let start = self.0;
         let len = count * size_of::<T>();
@@ -39,10 +39,10 @@ impl StagingLayout {
     }
 }
 
-/// A buffer shrinks if it is this many times as large as needed.
+/// A buffer shrinks if it is at least this many times as large as needed.
 const TRIMMED: usize = 4;
 
-/// Allocates with room to spare.
+/// Rounds a length up to leave spare room.
 fn roomy(len: usize) -> usize {
     len.next_power_of_two().max(1 << 16)
 }
@@ -54,7 +54,7 @@ impl InputBuffer {
         Ok(Self { host, device: device.alloc(len)?, len, needed: 0 })
     }
 
-    /// Shrinks it if it is much larger than what was needed since the last time. Nothing may be under way.
+    /// Shrinks the buffer if it is much larger than was needed since the last trim. No work may be in flight.
     pub fn trim(&mut self, device: &mut dyn Device) -> Result<(), Fault> {
         let len = roomy(std::mem::take(&mut self.needed));
         if len <= self.len / TRIMMED { self.replace(device, len) } else { Ok(()) }
@@ -67,24 +67,24 @@ impl InputBuffer {
         Ok(())
     }
 
-    /// Makes room for these sections. The previous content is lost.
+    /// Makes room for the layout. The previous content is lost.
     pub fn open(&mut self, device: &mut dyn Device, layout: &StagingLayout) -> Result<(), Fault> {
         self.needed = self.needed.max(layout.0);
         if layout.0 > self.len { self.replace(device, roomy(layout.0)) } else { Ok(()) }
     }
 
-    /// Where kernels find a section.
+    /// Device address of a section.
     pub fn address(&self, section: Section) -> u64 {
         self.device + section.start as u64
     }
 
-    /// A section's entries, to be written.
+    /// Entries of a section, for writing.
     pub fn entries<T: Pod>(&mut self, section: Section) -> &mut [T] {
         let bytes = &mut self.host.bytes_mut()[section.start..section.start + section.len];
         bytemuck::cast_slice_mut(bytes)
     }
 
-    /// The entries of three sections at once, to be written; they must be in the order in which they were planned.
+    /// Entries of three sections for writing. The sections must be in the order of the layout.
     pub fn entries_of<A: Pod, B: Pod, C: Pod>(
         &mut self,
         a: Section,
@@ -105,9 +105,10 @@ impl InputBuffer {
         self.entries(section).copy_from_slice(entries);
     }
 
-    /// Sends all of it.
+    /// Uploads all sections.
     pub fn send(&self, device: &mut dyn Device, layout: &StagingLayout) -> Result<(), Fault> {
-        // SAFETY: `open` made the device's memory as long as the layout, and callers wait before they open it again.
+        // SAFETY: `open` made the device memory at least as long as the layout, and callers wait before they open
+        // it again.
         unsafe { device.upload(&*self.host, 0..layout.0, self.device) }
     }
 }
@@ -115,30 +116,30 @@ impl InputBuffer {
 /// The byte that [`OutputList::wipe`] writes: an invalid entry for kernels and host.
 const WIPED: u8 = 0xff;
 
-/// A list that kernels write. Short lists are written directly to the host's memory (zero copy) if the device can; long ones
-/// to its own memory, and their used part is copied afterwards.
+/// A list that kernels write. A short list is written directly to host memory (zero copy) if the device supports
+/// that. A long list is written to device memory, and its used part is copied afterwards.
 pub(super) struct OutputList {
     entry: usize,
-    /// How many entries there was room for at the start.
+    /// The initial capacity, in entries.
     first: usize,
     host: Box<dyn HostMemory>,
     capacity: usize,
-    /// Address, and how many entries there is room for, never more than in the host's memory; none at first.
+    /// Address and capacity in device memory, if allocated. The capacity never exceeds that of the host memory.
     own: Option<(u64, usize)>,
     is_long: bool,
-    /// Entries at the front of the host's memory that are not wiped.
+    /// Entries at the front of the host memory that have been written since they were wiped.
     stale: usize,
-    /// Entries that were needed since it was trimmed: in all, and on the device.
+    /// Largest numbers of entries needed since the last trim: in total, and on the device.
     needed: [usize; 2],
 }
 
-/// So many entries and a fourth more; kernels count them in 32 bits.
+/// Adds slack of a fourth. Kernels count entries in 32 bits.
 fn with_slack(entries: usize) -> usize {
     entries.saturating_add(entries / 4).min(u32::MAX as usize)
 }
 
 impl OutputList {
-    /// A list of entries of so many bytes, with room for some.
+    /// A list of entries of `entry` bytes.
     pub fn new(device: &mut dyn Device, entry: usize, capacity: usize) -> Result<Self, Fault> {
         let host = device.alloc_host(entry * capacity)?;
         Ok(Self {
@@ -153,8 +154,8 @@ impl OutputList {
         })
     }
 
-    /// Shrinks it if it is much longer than what was needed since the last time. Nothing may be under way, and what was in it
-    /// is gone then.
+    /// Shrinks the list if it is much longer than was needed since the last trim. No work may be in flight, and the
+    /// content is lost.
     pub fn trim(&mut self, device: &mut dyn Device) -> Result<(), Fault> {
         let [room, own] = std::mem::take(&mut self.needed).map(|needed| with_slack(needed).max(self.first));
         if let Some((address, _)) =
@@ -163,10 +164,10 @@ impl OutputList {
             device.free(address);
         }
         if room <= self.capacity / TRIMMED {
-            // Before memory of that length is there, the old one stays.
+            // Keep the old memory until the new one is allocated.
             let host = device.alloc_host(room * self.entry)?;
             (self.host, self.capacity, self.stale) = (host, room, room);
-            // It may not be longer than the host's.
+            // The device list must not be longer than the host's.
             if let Some((address, _)) = self.own.take_if(|(_, capacity)| *capacity > room) {
                 device.free(address);
             }
@@ -174,24 +175,24 @@ impl OutputList {
         Ok(())
     }
 
-    /// Reads entries from elsewhere on the device; they are here after the next [`Device::wait`].
+    /// Starts to read entries from another device address. They arrive with the next [`Device::wait`].
     pub fn read(&mut self, device: &mut dyn Device, from: u64, entries: usize) -> Result<(), Fault> {
         // SAFETY: callers give a list of so many entries, and read it after a wait.
         unsafe { device.download(from, &mut *self.host, 0..entries * self.entry) }
     }
 
-    /// How many entries kernels may write.
+    /// How many entries the next kernel may write.
     pub fn capacity(&self) -> u32 {
         let own = self.own.map_or(0, |(_, capacity)| capacity);
         (if self.is_own() { own } else { self.capacity }) as u32
     }
 
-    /// Does the next kernel write it straight into the host's memory?
+    /// Whether the next kernel writes directly to host memory.
     pub fn is_mapped(&self) -> bool {
         !self.is_own()
     }
 
-    /// Wipes whatever was written, before the next launch, if that writes here.
+    /// Marks entries as unwritten before the next launch, if that writes to host memory.
     pub fn wipe(&mut self) {
         if self.is_own() {
             return;
@@ -200,18 +201,19 @@ impl OutputList {
         self.stale = 0;
     }
 
-    /// So many entries at the front are said to be written.
+    /// Notes that this many entries at the front are written.
     pub fn wrote(&mut self, entries: usize) {
         self.stale = self.stale.max(entries.min(self.capacity));
     }
 
-    /// Is it written on the device?
+    /// Whether it is written to device memory.
     fn is_own(&self) -> bool {
         self.is_long || self.host.address().is_none()
     }
 
-    /// Room for so many entries, of a list that will be long or not; says whether there was too little. What was in it is
-    /// gone then. Where memory ran out, it is as large as it was or, on the device, not there until there is some again.
+    /// Makes room for `entries`, in device memory if `is_long`, and returns whether there was too little; then the
+    /// content is lost. If memory runs out, the host list keeps its size; the device list may be freed until a
+    /// later call succeeds.
     pub fn reserve(&mut self, device: &mut dyn Device, entries: usize, is_long: bool) -> Result<bool, Fault> {
         self.is_long = is_long;
         let is_own = usize::from(self.is_own());
@@ -220,7 +222,7 @@ impl OutputList {
         if !is_short && (!self.is_own() || self.own.is_some()) {
             return Ok(false);
         }
-        // What the host has room for says nothing of the device, which may have much less.
+        // The host's capacity says nothing about the device, which may have much less memory.
         let room = with_slack(entries).max(self.first);
         let own = if self.is_own() { Some(self.alloc_own(device, room)?) } else { None };
         if room > self.capacity {
@@ -242,7 +244,7 @@ impl OutputList {
         Ok(is_short)
     }
 
-    /// A list on the device. Where there is no room for it beside the one that it takes the place of, that one goes first.
+    /// Allocates device memory. If it does not fit beside the present allocation, frees that one first.
     fn alloc_own(&mut self, device: &mut dyn Device, room: usize) -> Result<u64, Fault> {
         match device.alloc(room * self.entry) {
             Err(Fault::Memory(_) | Fault::Budget(_)) if self.own.is_some() => {
@@ -255,25 +257,26 @@ impl OutputList {
         }
     }
 
-    /// Where kernels write.
+    /// Address that the next kernel writes to.
     pub fn address(&self) -> u64 {
         let own = self.own.map(|(address, _)| address);
         (if self.is_own() { own } else { self.host.address() }).unwrap_or_default()
     }
 
-    /// Ensures that so many entries are on the host after the next [`Device::wait`], and returns whether a wait is needed.
+    /// Ensures that these entries are on the host after the next [`Device::wait`]; returns whether a wait is
+    /// needed.
     pub fn fetch(&mut self, device: &mut dyn Device, entries: usize) -> Result<bool, Fault> {
         self.fetch_part(device, 0..entries)
     }
 
-    /// The same for some entries.
+    /// The same for a range of entries.
     pub fn fetch_part(&mut self, device: &mut dyn Device, entries: Range<usize>) -> Result<bool, Fault> {
         match self.own {
             Some((address, _)) if !entries.is_empty() && self.is_own() => {
                 self.wrote(entries.end);
                 let bytes = entries.start * self.entry..entries.end * self.entry;
-                // SAFETY: the list on the device has as many entries as the host's, and they are read after a wait, or after a
-                // mark that follows.
+                // SAFETY: the device list has no more entries than the host's. They are read after a wait, or after
+                // a mark that follows.
                 unsafe { device.download(address + bytes.start as u64, &mut *self.host, bytes) }
                     .map(|()| true)
             }
@@ -286,7 +289,7 @@ impl OutputList {
         bytemuck::cast_slice(&self.host.bytes()[..count * size_of::<T>()])
     }
 
-    /// Some entries, while others may still be on their way.
+    /// A range of entries, while others may still be in flight.
     pub fn part<T: Pod>(&self, entries: Range<usize>) -> Option<&[T]> {
         let bytes = entries.start.checked_mul(size_of::<T>())?..entries.end.checked_mul(size_of::<T>())?;
         self.host.bytes_of(bytes).map(bytemuck::cast_slice)

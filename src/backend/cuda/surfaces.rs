@@ -1,5 +1,5 @@
-//! Surfaces of blocks as the mesh kernel wrote them. They are read where they arrive, without a copy in
-//! between. They arrive one after the other, in the order of their blocks, while the first ones are drawn already.
+//! Surfaces of blocks as the mesh kernel wrote them, read in place without another copy. They arrive in the order
+//! of their blocks, so the first ones can be processed while later ones are in flight.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -18,21 +18,20 @@ use crate::surface::block::Block;
 use crate::surface::meshed_blocks::{BlockVertices, MeshedBlock, MeshedBlocks, PackedMixes, PackedVertices};
 use crate::surface::vertex::WorldView;
 
-/// What a launch wrote for some blocks.
+/// The surfaces of some blocks.
 pub(super) struct Surfaces<'a> {
     pub grid: ChunkGrid,
     pub blocks: &'a [Block],
-    /// Where the surface of each block is.
+    /// The location of each block's surface.
     pub results: &'a [MeshResult],
-    /// Those of all blocks together. Positions count from the lowest sample of a block's brick.
+    /// Vertices and indices of all blocks. Positions are relative to the minimum corner of a block's brick.
     pub lists: &'a MeshLists,
-    /// What all vertices are made of, where that is the same; else each has its own.
+    /// The material mix of all vertices, if it is uniform; otherwise each vertex has its own.
     pub plain: Option<MaterialMix>,
     pub arrival: Arrival,
 }
 
 impl<'a> Surfaces<'a> {
-    /// What was written for these blocks.
     pub fn new(output: &'a MeshOutput, view: &WorldView, blocks: &'a [Block], meshed: Meshed) -> Self {
         Self {
             grid: view.grid,
@@ -45,24 +44,23 @@ impl<'a> Surfaces<'a> {
     }
 }
 
-/// Copies on their way, each with the surfaces of so many blocks more.
+/// Copies in flight, each with the surfaces of [`PIECE`] more blocks.
 pub(super) struct Arrival {
-    /// None where nothing had to be copied.
+    /// One mark per copy; empty if nothing had to be copied.
     marks: Vec<Box<dyn Mark>>,
-    /// How many copies are here.
+    /// How many copies have arrived.
     here: AtomicUsize,
     fault: OnceLock<Fault>,
-    /// Nanoseconds that were waited.
+    /// Nanoseconds spent waiting.
     waited: AtomicU64,
 }
 
 impl Arrival {
-    /// After these marks.
     pub fn new(marks: Vec<Box<dyn Mark>>) -> Self {
         Self { marks, here: AtomicUsize::new(0), fault: OnceLock::new(), waited: AtomicU64::new(0) }
     }
 
-    /// Waits for the surfaces of the first blocks; tells how many are here.
+    /// Waits for the surfaces of the first blocks; returns for how many blocks they have arrived.
     fn wait_for(&self, blocks: usize) -> usize {
         let wanted = blocks.div_ceil(PIECE).min(self.marks.len());
         let here = self.here.load(Ordering::Acquire);
@@ -77,7 +75,7 @@ impl Arrival {
         }
     }
 
-    /// Waits for copies, from one to another; for none behind one that failed.
+    /// Waits for a range of copies. Stops at the first one that fails.
     fn pass(&self, here: usize, wanted: usize) {
         for (number, mark) in (here..).zip(&self.marks[here..wanted]) {
             if let Err(fault) = guarded(|| mark.wait()) {
@@ -88,12 +86,12 @@ impl Arrival {
         }
     }
 
-    /// Is all here?
+    /// Whether all copies have arrived.
     pub fn is_over(&self) -> bool {
         self.here.load(Ordering::Acquire) == self.marks.len()
     }
 
-    /// How long was waited; or the fault, where some never came.
+    /// How long was waited, or the fault if some copies failed.
     pub fn end(self) -> Result<Duration, Fault> {
         match self.fault.into_inner() {
             Some(fault) => Err(fault),
@@ -113,7 +111,7 @@ impl MeshedBlocks for Surfaces<'_> {
 
     fn part(&self, number: usize) -> Option<MeshedBlock<'_>> {
         let (block, result) = (self.blocks.get(number)?, self.results.get(number)?);
-        // What is looked at has to be here.
+        // Wait until the surface has arrived.
         (number < self.wait_for(number + 1)).then_some(())?;
         let own = range(result.vertex, result.vertices);
         let vertices = PackedVertices {

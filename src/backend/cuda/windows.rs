@@ -1,7 +1,7 @@
 //! Tables of neighbouring bricks for kernels.
 //!
-//! Bricks that are close together share a window, a box of bricks around them, so that each is looked up once. Long lists are
-//! split into slabs, whose windows are built in parallel; bricks of different slabs share no window.
+//! Bricks that are close together share a window, a box of bricks around them, so that each is looked up once. Long
+//! lists are split into slabs, whose windows are built in parallel. Bricks of different slabs share no window.
 
 use glam::IVec3;
 
@@ -12,69 +12,70 @@ use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::window::{Window, shared};
 use crate::volume::{Brick, SampleView};
 
-/// From how many bricks on they are cut into slabs.
+/// From this many bricks on, lists are split into slabs.
 const LONG: usize = 256;
 
-/// How many slabs there should be, so that all threads end together.
+/// Target number of slabs, enough to balance the load of threads.
 const SLABS: usize = 64;
 
-/// Bricks of a slab, at least and at most: few share few windows, and many keep other threads waiting. Of windows that are
-/// higher, fewer make one.
+/// Minimum and maximum bricks of a slab: too few share few windows, too many keep other threads waiting. The
+/// minimum is divided by the height of the windows.
 const OF_A_SLAB: [usize; 2] = [128, 1024];
 
-/// Where a brick is in the tables.
+/// The position of a brick in the tables.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    /// Its number.
+    /// Its index.
     pub number: u32,
-    /// Entries to the next brick along x, and `<< 16` along z; along y it is 1.
+    /// Strides to the next brick: along x, and along z `<< 16`. Along y it is 1.
     pub strides: u32,
 }
 
-/// The windows of many bricks, as references.
+/// The windows of many bricks, as brick references.
 #[derive(Default)]
 pub(super) struct Windows<'a> {
     slabs: Vec<Slab<'a>>,
-    /// How many of the requested bricks belong to a slab; the last one may have fewer.
+    /// Number of requested bricks per slab; the last one may have fewer.
     of_a_slab: usize,
 }
 
-/// The windows of some bricks that follow each other.
+/// The windows of some consecutive bricks.
 #[derive(Default)]
 struct Slab<'a> {
-    /// Entries of all slabs before.
+    /// Number of entries in all previous slabs.
     first: u32,
     lists: SlabLists,
-    /// Bricks that have no reference yet, with their entries.
+    /// Bricks without a reference yet, by entry.
     missing: Vec<(usize, &'a Brick)>,
     has_materials: bool,
 }
 
-/// Of each slab.
+/// The tables of a slab.
 #[derive(Default)]
 struct SlabLists {
-    /// The entry of each requested brick, counted from the slab's first entry.
+    /// The entry of each requested brick, relative to the slab's first.
     entries: Vec<Entry>,
     /// The references of all entries; [`NONE`] where no brick is stored.
     refs: Vec<u32>,
 }
 
-/// Memory of slabs, kept from one launch to the next, since freeing what other threads allocated may wait for them.
+/// Memory of slabs, reused by the next launch, since freeing memory that other threads allocated may contend with
+/// them.
 #[derive(Default)]
 pub(super) struct KeptSlabs(Vec<SlabLists>);
 
-/// Most entries of a slab whose memory is kept.
+/// Slabs with more entries are freed.
 const KEPT_ENTRIES: usize = 1 << 14;
 
 impl KeptSlabs {
-    /// Lists for so many slabs.
+    /// Takes memory for this many slabs.
     fn take(&mut self, slabs: usize) -> Vec<SlabLists> {
         let mut lists = self.0.split_off(self.0.len().saturating_sub(slabs));
         lists.resize_with(slabs, SlabLists::default);
         lists
     }
 
-    /// Takes back the memory of windows.
+    /// Gives back the memory of windows.
     pub fn put(&mut self, windows: Windows) {
         let lists = windows.slabs.into_iter().map(|slab| slab.lists);
         let is_small = |lists: &SlabLists| lists.refs.capacity() <= KEPT_ENTRIES;
@@ -84,8 +85,8 @@ impl KeptSlabs {
 }
 
 impl<'a> Slab<'a> {
-    /// The windows around bricks, `more` bricks higher and deeper than one, in these lists; `find` says how kernels refer to a
-    /// brick.
+    /// Builds the windows around bricks, `more` bricks higher and deeper than the usual one, in the given lists.
+    /// `find` returns the reference of a brick.
     fn new(
         mut lists: SlabLists,
         view: &SampleView<'a>,
@@ -104,7 +105,7 @@ impl<'a> Slab<'a> {
         slab
     }
 
-    /// Enters a window and the bricks that share it.
+    /// Adds a window and the bricks that share it.
     fn enter(
         &mut self,
         window: &Window<'a>,
@@ -133,8 +134,9 @@ impl<'a> Slab<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Windows around bricks, sorted by stacks, which are at `pos`: one brick more to all sides, and so many up and down.
-    /// `find` says how kernels refer to a brick; those that it does not know are [`complete`](Self::complete)d afterwards.
+    /// Builds windows around bricks, which are sorted by stack: one more brick on each side, and `up_and_down`
+    /// vertically. `find` returns the reference of a brick. Bricks without one must be
+    /// [`complete`](Self::complete)d afterwards.
     pub fn around<T: Sync>(
         view: SampleView<'a>,
         bricks: &[T],
@@ -162,7 +164,7 @@ impl<'a> Windows<'a> {
         Self { slabs, of_a_slab }
     }
 
-    /// Enters the references of bricks that had none.
+    /// Fills in the references of bricks that had none.
     pub fn complete(&mut self, mut need: impl FnMut(&'a Brick) -> Result<u32, Fault>) -> Result<(), Fault> {
         for slab in &mut self.slabs {
             for (number, brick) in std::mem::take(&mut slab.missing) {
@@ -172,20 +174,20 @@ impl<'a> Windows<'a> {
         Ok(())
     }
 
-    /// The entry of a requested brick, by its number.
+    /// The entry of a requested brick, by its index.
     pub fn entry(&self, number: usize) -> Entry {
         let slab = &self.slabs[number / self.of_a_slab];
         let own = slab.lists.entries[number % self.of_a_slab];
         Entry { number: slab.first + own.number, ..own }
     }
 
-    /// The reference of a requested brick.
+    /// The reference of a requested brick, by its index.
     pub fn reference(&self, number: usize) -> u32 {
         let slab = &self.slabs[number / self.of_a_slab];
         slab.lists.refs[slab.lists.entries[number % self.of_a_slab].number as usize]
     }
 
-    /// How many entries there are.
+    /// Number of entries.
     pub fn len(&self) -> usize {
         self.slabs.iter().map(|slab| slab.lists.refs.len()).sum()
     }
@@ -212,7 +214,7 @@ mod tests {
     use crate::ground::Ground;
     use crate::volume::Bricks;
 
-    /// A reference that says where its brick is.
+    /// A reference that encodes the brick's position.
     fn code(pos: IVec3) -> u32 {
         (pos.x + 20 + (pos.y + 20) * 40 + (pos.z + 20) * 1600) as u32
     }
@@ -222,13 +224,13 @@ mod tests {
         BrickPos(IVec3::new(x, y, z))
     }
 
-    /// Every brick around those that are asked for must be found from there.
+    /// Checks that every brick around the requested ones is found from there.
     fn check(stored: &Bricks, asked: &[(i32, i32, i32)]) {
         let ground = Ground::flat(8, 8, 0.0).unwrap();
         let own = |brick: &Brick| brick.tag.get() as u32;
         let known = |brick: &Brick| Some(own(brick)).filter(|code| !code.is_multiple_of(3));
         let (view, mut kept) = (SampleView::new(&ground, stored), KeptSlabs::default());
-        // In the memory of others.
+        // Windows for other bricks first, so that their memory is reused.
         let others = Windows::around(view, &[(0, 0, 0), (5, 6, 7)], pos, 8, known, &mut kept);
         kept.put(others);
         let mut windows = Windows::around(view, asked, pos, 8, known, &mut kept);
@@ -264,12 +266,12 @@ mod tests {
             brick.tag.set(code(at.0).into());
             stored.insert(at, Arc::new(brick));
         }
-        // In one slab, and in several.
+        // One slab, and several.
         for count in [60, 2 * LONG] {
             let asked: BTreeSet<_> = (0..count).map(|_| place(&mut rng)).collect();
             check(&stored, &asked.into_iter().collect::<Vec<_>>());
         }
-        // Bricks may be asked for more than once, as blocks of several chunks lie in one.
+        // A brick may be requested several times, as it can hold blocks of several chunks.
         check(&stored, &[(1, 2, 3); 2 * LONG]);
     }
 

@@ -1,7 +1,7 @@
-//! The emulator as a card whose kernels reach the host's memory: for the path that the emulator alone does not take.
+//! Wraps the emulator as a device that maps host memory, to test the zero-copy path.
 //!
-//! Memory of the host has a shadow on the device. Before a launch it is copied there, and back when the device is waited
-//! for; so whoever looks too early sees nothing, and whoever writes too late is overwritten.
+//! Each piece of host memory has a shadow on the device. It is copied there before a launch, and back when the
+//! device is waited for. Code that reads too early sees nothing, and what it writes too late is overwritten.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 use super::device::{Device, DeviceResult, Fault, HostMemory, Kernel, Launch, Mark, forward};
 use super::lock;
 
-/// Memory of the host, and where its shadow is.
+/// Host memory and the address of its shadow.
 #[derive(Clone, Copy)]
 struct Piece {
     start: *mut u8,
@@ -17,14 +17,14 @@ struct Piece {
     shadow: u64,
 }
 
-// SAFETY: whoever has a piece has it from the list below, which is locked while it is used, or owns it.
+// SAFETY: a piece is only used by its owner, or through the locked list below.
 unsafe impl Send for Piece {}
 // SAFETY: as above.
 unsafe impl Sync for Piece {}
 
 impl HostMemory for Piece {
     fn bytes(&self) -> &[u8] {
-        // SAFETY: the memory lives until its owner is dropped, who takes it from the list before.
+        // SAFETY: the owner removes the piece from the list before it frees the memory.
         unsafe { std::slice::from_raw_parts(self.start, self.len) }
     }
 
@@ -46,7 +46,7 @@ impl HostMemory for Piece {
     }
 }
 
-/// Every piece that lives, and shadows of those that do not any more.
+/// All live pieces, and the shadows of dropped ones.
 #[derive(Default)]
 struct Pieces {
     list: Vec<Piece>,
@@ -87,14 +87,14 @@ impl Drop for Owned {
         let mut all = lock(&self.all);
         all.list.retain(|piece| piece.shadow != self.piece.shadow);
         all.gone.push(self.piece.shadow);
-        // SAFETY: it was leaked as a box of so many words, and nobody else knows it any more.
+        // SAFETY: the memory was leaked as a box of this many words, and nothing else refers to it any more.
         drop(unsafe {
             Box::from_raw(std::ptr::slice_from_raw_parts_mut(self.piece.start.cast::<u128>(), self.words))
         });
     }
 }
 
-/// A device that maps the host's memory.
+/// A device that maps host memory.
 pub(super) struct ZeroCopy {
     own: Box<dyn Device>,
     all: Arc<Mutex<Pieces>>,
@@ -102,17 +102,17 @@ pub(super) struct ZeroCopy {
 }
 
 impl ZeroCopy {
-    /// Another device that maps.
+    /// Wraps a device.
     pub fn new(own: Box<dyn Device>) -> Self {
         Self { own, all: Arc::default(), is_running: false }
     }
 
-    /// What kernels wrote becomes visible.
+    /// Makes the kernels' writes visible to the host.
     fn land(&mut self) -> Result<(), Fault> {
         if std::mem::take(&mut self.is_running) {
             for piece in &mut lock(&self.all).list {
                 let (len, shadow) = (piece.len, piece.shadow);
-                // SAFETY: the shadow is as long as the piece, and the emulator copies at once.
+                // SAFETY: the shadow is as long as the piece, and the emulator copies synchronously.
                 unsafe { self.own.download(shadow, piece, 0..len) }?;
             }
         }
