@@ -1,4 +1,5 @@
-//! Jobs of the edit kernels: the bricks that edits may reach, each with its edits, its stack and what it is now.
+//! Lists the jobs of the edit kernels: each brick that edits may reach, with its edits, its ground stack and its
+//! current content.
 
 use super::super::cache::reference;
 use super::super::device::Fault;
@@ -10,11 +11,11 @@ use crate::edits::{Job, PreparedEdits};
 use crate::lattice::{ChunkGrid, pieces};
 use crate::volume::Brick;
 
-/// A job for each brick that edits may reach, in order: where the brick is, which edits it takes, how chunks cut it. They
-/// take the place of what the list holds. `complete` gets those of some bricks that follow each other, and the number of the
-/// first; what it makes of them comes back in order.
+/// Replaces the list by one job for each brick that edits may reach, in order, with its position, edits and chunk
+/// cuts. `complete` gets consecutive jobs and the number of the first; its results are returned in order.
 ///
 /// # Errors
+/// [`Fault::TooLarge`] if there are more jobs than a launch may have.
 /// More jobs than a launch may have.
 pub(super) fn list<R: Send>(
     work: &PreparedEdits,
@@ -46,7 +47,7 @@ pub(super) fn list<R: Send>(
     }))
 }
 
-/// The jobs of a piece of a list of edits, which begins with this number.
+/// The jobs for a piece of the list of edits that starts at this number.
 fn list_from(first: usize, piece: &[Job], grid: ChunkGrid) -> impl Iterator<Item = EditJob> {
     let mut first = first as u32;
     piece.chunk_by(Job::is_same_brick).map(move |of_brick| {
@@ -57,7 +58,7 @@ fn list_from(first: usize, piece: &[Job], grid: ChunkGrid) -> impl Iterator<Item
     })
 }
 
-/// What jobs need and the device does not have, by the jobs' numbers.
+/// Data that jobs need and the device does not have, by job number.
 #[derive(Default)]
 struct Missing<'a> {
     stacks: Vec<usize>,
@@ -65,7 +66,7 @@ struct Missing<'a> {
 }
 
 impl Session {
-    /// Lists jobs with their stacks and, `with_bricks`, with what their bricks are now; what is missing is uploaded.
+    /// Lists jobs with their stacks and, if `with_bricks`, their current bricks. Missing data is queued for upload.
     pub(super) fn list_edits<'a>(
         &mut self,
         work: &PreparedEdits<'a>,

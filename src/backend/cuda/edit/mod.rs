@@ -1,7 +1,8 @@
 //! Edits on the device: one launch for all bricks that they may reach.
 //!
-//! Batches with stencil edits take another kernel, which reads neighbouring bricks too: see [`stencil`](self::stencil).
-//! [`jobs`](self::jobs) lists what there is to do, and [`output`](self::output) makes deltas of what came back.
+//! Batches with stencil edits use another kernel, which also reads neighbouring bricks: see
+//! [`stencil`](self::stencil). [`jobs`](self::jobs) lists the work, and [`output`](self::output) turns the results
+//! into deltas.
 
 mod jobs;
 pub(super) mod output;
@@ -18,26 +19,27 @@ use crate::lattice::side_by_side;
 use output::{LONG, Target, Totals};
 use stencil::Look;
 
-/// From how many entries on plain lists are copied side by side.
+/// From this many entries on, plain lists are copied in parallel.
 const LONG_LIST: usize = 1 << 14;
 
-/// From how many edits on they are written side by side.
+/// From this many edits on, their records are written in parallel.
 const MANY: usize = 128;
 
-/// From how many bricks on they are copied, instead of written to the host's memory by the kernel.
+/// From this many bricks on, kernels write to device memory and results are copied, instead of written to host
+/// memory.
 const COPIED: usize = 256;
 
-/// The same by jobs: many edits of few bricks write long lists too, and how long they got only the device can say.
+/// The same by jobs: many edits of few bricks write long lists too, whose length only the device knows.
 const COPIED_JOBS: usize = 1 << 12;
 
-/// Most jobs whose memory is kept for the next transaction.
+/// Larger job lists are not kept for the next transaction.
 const KEPT_JOBS: usize = 1 << 16;
 
-/// Most passes: each gives twice the room where it is not known how much is needed.
+/// Maximum number of passes. Each one doubles lists whose required length is unknown.
 const PASSES: usize = 12;
 
 impl Session {
-    /// Applies edits: what they changed, brick by brick. They must be such that none reads what an earlier one may change.
+    /// Applies edits and returns what they changed, brick by brick. No edit may read what an earlier one may write.
     pub fn edit(&mut self, work: &PreparedEdits) -> Result<EditDelta, Fault> {
         // Stencil edits write twice as many counts.
         let most = if work.looks_around() { MOST_LIST / 2 } else { MOST_LIST };
@@ -52,12 +54,12 @@ impl Session {
         delta
     }
 
-    /// The same, in this memory for the jobs of all bricks.
+    /// The same, with memory for the jobs.
     fn edit_bricks(&mut self, work: &PreparedEdits, jobs: &mut Vec<EditJob>) -> Result<EditDelta, Fault> {
         if !work.looks_around() {
             return self.try_edits(work, jobs, None).map(Option::unwrap_or_default);
         }
-        // Most new ground finds its material close by.
+        // Most new ground finds its material nearby.
         for look in [Look::Near, Look::Far] {
             if let Some(delta) = self.try_edits(work, jobs, Some(look))? {
                 return Ok(delta);
@@ -66,7 +68,7 @@ impl Session {
         Err(Fault::Failed("new ground looked too far".into()))
     }
 
-    /// The same, where edits look no farther than that; `None` where they did.
+    /// The same, with a limited search for material; `None` if an edit had to search farther.
     fn try_edits(
         &mut self,
         work: &PreparedEdits,
@@ -94,7 +96,7 @@ impl Session {
         uploads: &mut Uploads<'a>,
         targets: &mut Vec<Target>,
     ) -> Result<Option<EditDelta>, Fault> {
-        // Stencil edits find their bricks in the windows.
+        // Stencil edits look up their bricks in the windows instead.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
         let mut stencil = look.map(|look| self.stencil_input(work, look, jobs, uploads)).transpose()?;
         let mut plan = StagingLayout::default();
@@ -145,8 +147,8 @@ impl Session {
             };
             let blocks = jobs.len() as u32;
             match &stencil {
-                // SAFETY: the parameters are sections of the input and lists of the session, with their capacities, and none
-                // of them is touched before the wait below.
+                // SAFETY: the parameters are sections of the input and lists of the session with their capacities.
+                // None of them is accessed before the wait below.
                 None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
                 Some(stencil) => {
                     let params = stencil.params(params, &self.input);
@@ -165,17 +167,18 @@ impl Session {
                 return Ok(None);
             }
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
-                // It gives slots back itself. Where it fails, the device is lost, and all slots with it.
+                // `take_edits` gives unused slots back itself. If it fails, the device is lost, and all slots with
+                // it.
                 let targets = std::mem::take(targets);
                 return self.take_edits(work, jobs, &targets, totals).map(Some);
             }
-            // Once more, with room for all.
+            // Another pass, with enough room.
         }
-        // The device is fine: lists that double each time were still too short.
+        // The device works, but lists that doubled in each pass were still too short.
         Err(Fault::TooLarge(work.jobs().len()))
     }
 
-    /// What came back, as a delta. Bricks are on their way while all else is looked through.
+    /// Converts the results to a delta. Bricks are copied while everything else is processed.
     fn take_edits(
         &mut self,
         work: &PreparedEdits,
@@ -207,7 +210,7 @@ impl Session {
     }
 }
 
-/// Gives slots back that no brick of its own will be in: of bricks that did not change, or are all alike.
+/// Gives back the slots of bricks that did not change or are uniform, and so need none.
 fn free_targets(slots: &mut RecordCache, results: &[EditResult], targets: &[Target]) {
     for (result, &(slot, _)) in results.iter().zip(targets) {
         if result.flags & EditResult::CHANGED == 0 || result.flags & EditResult::UNIFORM != 0 {

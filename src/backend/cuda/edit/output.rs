@@ -1,4 +1,4 @@
-//! The output of the edit kernels, as edit deltas.
+//! Converts the output of the edit kernels to edit deltas.
 
 use std::sync::Arc;
 
@@ -16,19 +16,19 @@ use crate::ground::MaterialId;
 use crate::lattice::ChunkGrid;
 use crate::volume::{Brick, VoxelOutcome};
 
-/// From how many bricks on they are processed in parallel.
+/// From this many bricks on, they are processed in parallel.
 pub(super) const LONG: usize = 1024;
 
-/// How many bricks a thread takes at a time; few, so that all threads end together.
+/// Bricks that a thread takes at a time; few enough to balance the load.
 pub(super) const PIECE: usize = 256;
 
-/// A slot that is to hold a changed brick, with its tag.
+/// The slot for a changed brick, and its tag.
 pub(super) type Target = (u32, u64);
 
-/// Entries of each list that one delta adds up.
+/// Entries of each list that are summed in one delta.
 const ENTRIES: usize = 1024;
 
-/// What the edit kernel writes.
+/// The output lists of the edit kernels.
 pub(in super::super) struct EditOutput {
     pub results: OutputList,
     pub records: OutputList,
@@ -38,7 +38,7 @@ pub(in super::super) struct EditOutput {
     pub totals: OutputList,
 }
 
-/// How many entries of each list the kernel wanted to write.
+/// How many entries of each list the kernel needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Totals {
     records: usize,
@@ -47,7 +47,7 @@ pub(super) struct Totals {
     counts: usize,
 }
 
-/// Entries that there is room for at the start.
+/// Initial capacity in entries.
 const FIRST: usize = 1 << 8;
 
 impl EditOutput {
@@ -62,13 +62,13 @@ impl EditOutput {
         })
     }
 
-    /// All lists whose length depends on what there is to do.
+    /// All lists whose length depends on the work.
     pub fn lists_mut(&mut self) -> [&mut OutputList; 5] {
         let Self { results, records, materials, parts, counts, totals: _ } = self;
         [results, records, materials, parts, counts]
     }
 
-    /// Room for all that; says whether there was too little.
+    /// Makes room for these totals, and returns whether there was too little.
     pub(super) fn reserve(
         &mut self,
         device: &mut dyn Device,
@@ -82,22 +82,23 @@ impl EditOutput {
         Ok(grown)
     }
 
-    /// Copies what is not here yet of what edits changed and counted.
+    /// Copies parts and counts to the host unless they are there already.
     pub(super) fn fetch_entries(&mut self, device: &mut dyn Device, totals: Totals) -> Result<(), Fault> {
         let mut is_copied = self.parts.fetch(device, totals.parts)?;
         is_copied |= self.counts.fetch(device, totals.counts)?;
         if is_copied { device.wait() } else { Ok(()) }
     }
 
-    /// Begins to copy what is not here yet of what bricks are made of; says whether that has to be waited for.
+    /// Starts to copy brick records and materials unless they are on the host already; returns whether to wait for
+    /// them.
     pub(super) fn begin_bricks(&mut self, device: &mut dyn Device, totals: Totals) -> Result<bool, Fault> {
         let mut is_copied = self.records.fetch(device, totals.records)?;
         is_copied |= self.materials.fetch(device, totals.materials)?;
         Ok(is_copied)
     }
 
-    /// How much of each list was written. Asking the device takes longer than a small launch; so where lists are in the
-    /// host's memory, they are wiped before, and end where no entry stands.
+    /// How many entries of each list were written. Reading counters from the device takes longer than a small
+    /// launch. Lists in host memory are therefore wiped before the launch, and end at the first wiped entry.
     pub(super) fn totals(&mut self, results: usize) -> Totals {
         if !self.parts.is_mapped() {
             let mut totals = [0; 4];
@@ -111,7 +112,7 @@ impl EditOutput {
             self.counts.entries::<EditCount>(counts).iter().take_while(|count| count.edit != NONE).count();
         self.parts.wrote(parts);
         self.counts.wrote(counts);
-        // A list that is full may have been too short, by an unknown number of entries.
+        // A full list may have been too short by an unknown number of entries.
         let wanted = |count: usize, list: &OutputList| match list.capacity() as usize {
             full if full == count => 2 * count,
             _ => count,
@@ -133,14 +134,14 @@ impl EditOutput {
 }
 
 impl EditOutput {
-    /// Did new ground look farther for its material than windows reach?
+    /// Whether new ground had to search beyond the windows for its material.
     pub fn is_too_far(&self, results: usize) -> bool {
         let is = |result: &EditResult| result.flags & EditResult::TOO_FAR != 0;
         let results = self.results.entries::<EditResult>(results);
         if results.len() < LONG { results.iter().any(is) } else { results.par_iter().any(is) }
     }
 
-    /// What edits changed and counted, as deltas: in each some entries, added up, whichever bricks those are of.
+    /// Parts and counts as deltas, each of which sums some entries of any bricks.
     pub(super) fn entries(&self, grid: ChunkGrid, jobs: &[EditJob], totals: Totals) -> Vec<EditDelta> {
         let parts = self.parts.entries::<EditPart>(totals.parts);
         let counts = self.counts.entries::<EditCount>(totals.counts);
@@ -183,7 +184,7 @@ impl EditOutput {
         Ok(all)
     }
 
-    /// These bricks, in order.
+    /// Builds these bricks, in order.
     pub(super) fn bricks(
         &self,
         changed: &Changed,
@@ -217,17 +218,17 @@ impl EditOutput {
     }
 }
 
-/// Is what a brick is made of in the lists?
+/// Whether the entries of a result lie within the lists.
 fn is_there(result: &EditResult, totals: Totals) -> bool {
     let has_materials = result.flags & EditResult::HAS_MATERIALS != 0;
     (result.record as usize) < totals.records
         && (!has_materials || (result.material as usize) < totals.materials)
 }
 
-/// What a brick is that is all alike.
+/// The content of a uniform brick.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Uniform {
-    /// As results have it.
+    /// Sample and material, in the format of results.
     of: u32,
     has_materials: bool,
 }
@@ -248,25 +249,25 @@ impl Uniform {
 #[derive(Default)]
 pub(super) struct Changed {
     numbers: Vec<u32>,
-    /// By how much the world's hash did.
+    /// Change of the world's hash.
     hash: u64,
-    /// What those are that are all alike, some kinds several times.
+    /// The kinds of uniform bricks, possibly with duplicates.
     uniform: Vec<Uniform>,
 }
 
-/// So many entries of a list, those of this number; fewer or none at its end.
+/// The piece with this number; shorter or empty at the end of the list.
 fn piece<T>(list: &[T], length: usize, number: usize) -> &[T] {
     list.chunks(length).nth(number).unwrap_or_default()
 }
 
-/// Adds what an edit changed in a chunk's part of a brick.
+/// Adds the bounds that an edit changed in one chunk's part of a brick.
 fn add_part(grid: ChunkGrid, jobs: &[EditJob], part: &EditPart, delta: &mut EditDelta) {
     let Some(pos) = jobs.get(part.job as usize).map(EditJob::pos) else { return };
     let bounds = layout::unpack_box(part.bounds, pos.origin());
     delta.reach(part.edit as usize, layout::part_chunk(grid, pos, part.part), bounds);
 }
 
-/// Adds what became of voxels.
+/// Adds a count of voxels.
 fn add_count(count: &EditCount, delta: &mut EditDelta) {
     let [outcome, material, ..] = count.outcome.to_le_bytes();
     let outcome = match outcome {
@@ -306,7 +307,7 @@ mod tests {
             let key = (edit as usize, layout::part_chunk(grid, pos, part));
             LatticeBox::include(expected.entry(key).or_default(), LatticeBox::point(point));
         }
-        // A job that there is not says nothing.
+        // A part of an unknown job is ignored.
         add_part(grid, &jobs, &EditPart { job: 30, ..EditPart::default() }, &mut delta);
         let mut found = BTreeMap::new();
         for part in &delta.parts {

@@ -1,4 +1,4 @@
-//! Input of the stencil-edit kernel beside that of the edit kernel.
+//! Additional input of the stencil-edit kernel.
 
 use rustc_hash::FxHashMap;
 
@@ -12,17 +12,17 @@ use super::output::LONG;
 use crate::edits::PreparedEdits;
 use crate::ground::GreyImage;
 
-/// How far new ground looks for its material.
+/// How far new ground searches for its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Look {
-    /// In the bricks around its own.
+    /// In adjacent bricks.
     Near,
-    /// As far as it ever does: 64 voxels.
+    /// Up to the limit of 64 voxels.
     Far,
 }
 
 impl Look {
-    /// Bricks up and down.
+    /// The distance in bricks, up and down.
     fn bricks(self) -> i32 {
         match self {
             Self::Near => 1,
@@ -31,7 +31,7 @@ impl Look {
     }
 }
 
-/// What stencil edits need besides: windows of bricks, sculpting parameters, images, rules.
+/// Additional input of stencil edits: windows of bricks, sculpting parameters, images, rules.
 pub(super) struct StencilInput<'a> {
     look: Look,
     /// The last columns of the world along x and z.
@@ -39,7 +39,7 @@ pub(super) struct StencilInput<'a> {
     windows: Windows<'a>,
     sculpt_params: Vec<SculptParams>,
     images: Vec<u16>,
-    /// Bytes of the rules, and of what is protected; none where there are no rules.
+    /// The rules followed by the protected boxes, as bytes; empty without rules.
     rules: Vec<u8>,
     ref_list: Section,
     sculpt_list: Section,
@@ -74,7 +74,7 @@ impl<'a> StencilInput<'a> {
         })
     }
 
-    /// Adds what there is to send.
+    /// Reserves staging sections for the input.
     pub fn plan(&mut self, plan: &mut StagingLayout) {
         self.ref_list = plan.section::<u32>(self.windows.len());
         self.sculpt_list = plan.section::<SculptParams>(self.sculpt_params.len());
@@ -82,7 +82,7 @@ impl<'a> StencilInput<'a> {
         self.rule_list = plan.section::<u8>(self.rules.len());
     }
 
-    /// Writes it, and gives the windows back.
+    /// Writes the input, and gives back the memory of the windows.
     pub fn put(&mut self, input: &mut InputBuffer, kept: &mut KeptSlabs) {
         self.windows.write(input.entries(self.ref_list));
         kept.put(std::mem::take(&mut self.windows));
@@ -91,7 +91,7 @@ impl<'a> StencilInput<'a> {
         input.put(self.rule_list, &self.rules);
     }
 
-    /// The parameter of the kernel.
+    /// The kernel's parameters.
     pub fn params(&self, edit: EditParams, input: &InputBuffer) -> StencilEditParams {
         StencilEditParams {
             edit,
@@ -106,23 +106,23 @@ impl<'a> StencilInput<'a> {
     }
 }
 
-/// Most samples of the images of one launch, 32 MiB of them: 256 stamps of the largest kind that are all different.
+/// Maximum number of image samples of one launch (32 MiB): 256 different stamps of the largest size.
 const MOST_SAMPLES: usize = 1 << 24;
 
-/// Samples of images, one after the other; equal images are stored once.
+/// Image samples, one image after the other. Equal images are stored once.
 #[derive(Default)]
 struct Images<'a> {
     samples: Vec<u16>,
-    /// Where they begin, by what they are.
+    /// Index of the first sample, by content.
     first: FxHashMap<&'a [u16], u32>,
-    /// The same by whose they are: most edits of a stroke share one image, which need not be read for each.
+    /// The same by identity: most edits of a stroke share an image, which then need not be compared.
     known: FxHashMap<*const GreyImage, u32>,
-    /// Were there too many?
+    /// Whether there were too many samples.
     is_full: bool,
 }
 
 impl<'a> Images<'a> {
-    /// Where an image begins.
+    /// Index of an image's first sample.
     fn first(&mut self, image: &'a GreyImage) -> u32 {
         if let Some(&first) = self.known.get(&std::ptr::from_ref(image)) {
             return first;
@@ -142,7 +142,7 @@ impl<'a> Images<'a> {
 }
 
 impl Session {
-    /// Collects the input of jobs with stencil edits, and enters the places of their bricks in the windows.
+    /// Builds the input of jobs with stencil edits, and sets their window entries.
     pub(super) fn stencil_input<'a>(
         &mut self,
         work: &PreparedEdits<'a>,

@@ -15,7 +15,7 @@ use crate::surface::vertex::WorldView;
 use crate::surface::{MaterialMix, pristine};
 use crate::terrain::{Terrain, TerrainSettings};
 
-/// Every block that could draw something, and some more.
+/// Every block that could have a surface, and some more.
 fn blocks_around(view: &WorldView, world: &crate::terrain::World) -> Vec<Block> {
     let mut bricks: Vec<BrickPos> = world
         .bricks()
@@ -40,7 +40,7 @@ fn blocks_around(view: &WorldView, world: &crate::terrain::World) -> Vec<Block> 
     blocks
 }
 
-/// A launch of `mesh`, and what came out.
+/// A launch of `mesh`, and its output.
 struct MeshRun {
     results: Vec<MeshResult>,
     positions: Vec<[u16; 4]>,
@@ -64,7 +64,7 @@ impl MeshRun {
         for block in blocks {
             let (pos, window) = (block.brick, windows.len() as u32);
             let around = LatticeBox::point(IVec3::ZERO).grown(1);
-            // Along y, then z, then x.
+            // Ordered by y, then z, then x.
             let mut steps: Vec<IVec3> = around.points().collect();
             steps.sort_unstable_by_key(|step| (step.x, step.z, step.y));
             windows.extend(steps.iter().map(|&step| slots.reference(view.samples, BrickPos(pos.0 + step))));
@@ -123,7 +123,7 @@ impl MeshRun {
         run
     }
 
-    /// A vertex as its chunk has it.
+    /// A vertex in the coordinates of its chunk.
     fn vertex(&self, at: usize, base: IVec3, single: Option<MaterialMix>) -> Vertex {
         let [x, y, z, rest] = self.positions[at].map(i32::from);
         assert_eq!(rest, 0);
@@ -138,7 +138,7 @@ impl MeshRun {
         }
     }
 
-    /// Blocks are those of the CPU; returns how many were written.
+    /// Asserts that blocks equal those of the CPU; returns how many were written.
     fn check(&self, view: &WorldView, parts: &Parts) -> usize {
         let single = view.samples.ground().single_material().map(MaterialMix::pure);
         let (mut written, mut vertices_in_all, mut indices_in_all) = (0, 0, 0);
@@ -167,7 +167,7 @@ impl MeshRun {
     }
 }
 
-/// Meshes a world on both sides, with room enough and then without; returns how many blocks there are.
+/// Meshes a world on both sides, first with enough room and then without; returns the number of blocks.
 fn compare_meshes(device: &mut Device, world: &crate::terrain::World, rng: &mut Rng) -> usize {
     let view = world.view();
     let blocks = blocks_around(&view, world);
@@ -201,7 +201,7 @@ fn meshes_are_those_of_the_cpu() {
 fn a_brick_of_noise_is_meshed_like_on_the_cpu() {
     let Some(mut device) = Device::start() else { return };
     for (seed, mut rng) in seeds(8) {
-        // The roughest brushes there are: many samples change sides, so bricks have as many vertices as they can.
+        // The roughest brushes possible: many samples change sign, so bricks have as many vertices as possible.
         let mut terrain =
             Terrain::new(Ground::flat(40, 40, 20.0).expect("flat"), &TerrainSettings::default())
                 .expect("a terrain");
@@ -221,7 +221,7 @@ fn a_brick_of_noise_is_meshed_like_on_the_cpu() {
 fn cliffs_are_meshed_like_on_the_cpu() {
     let Some(mut device) = Device::start() else { return };
     for (seed, mut rng) in seeds(6) {
-        // Between columns 32 voxels apart, crossings lie in the middle of two steps, which are rounded up.
+        // Between columns 32 or more voxels apart, crossings lie halfway between two steps and are rounded up.
         let step = f64::from(1 << rng.u32(5..8));
         let rises: Vec<f64> = (0..41).map(|_| f64::from(rng.i32(0..512)) / 256.0).collect();
         let height = |x: i32, z: i32| rises[z as usize] + if (x + z / 3) & 1 == 0 { step } else { 0.0 };

@@ -1,6 +1,6 @@
-//! Kernels give what the CPU gives, bit for bit: random worlds on a card, or on the emulator where there is none.
+//! Kernels equal the CPU bit for bit, on random worlds. Tests use a GPU if there is one, else the emulator.
 //!
-//! `BURROW_WORLDS` says how many worlds to try.
+//! `BURROW_WORLDS` sets the number of worlds.
 
 mod edits;
 mod meshes;
@@ -17,24 +17,24 @@ use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::volume::{Brick, SampleView};
 
-/// A device, and what is allocated there.
+/// A device and its allocations.
 struct Device {
     own: Box<dyn device::Device>,
     allocated: Vec<Address>,
 }
 
-/// Memory behind every output that no kernel may touch.
+/// Guard bytes behind every output, which no kernel may write.
 const MARGIN: usize = 64;
-/// What it is filled with.
+/// Fill value of guard bytes and unused slots.
 const RUBBISH: u8 = 0xa5;
 
 impl Device {
-    /// `None` where there is none; the test is skipped then.
+    /// `None` skips the test.
     fn start() -> Option<Self> {
         Some(Self { own: tests::device()?, allocated: Vec::new() })
     }
 
-    /// Copies bytes to memory of the device.
+    /// Copies bytes to new device memory.
     fn place(&mut self, bytes: &[u8]) -> Address {
         let address = self.own.alloc(bytes.len()).expect("memory of the device");
         self.allocated.push(address);
@@ -51,14 +51,14 @@ impl Device {
         self.place(bytemuck::cast_slice(values))
     }
 
-    /// Room for an output of so many values.
+    /// Allocates an output of `len` values.
     fn output<T: Pod>(&mut self, len: usize) -> Output<T> {
         let bytes = (len * size_of::<T>()).next_multiple_of(16) + MARGIN;
         let address = self.place(&vec![RUBBISH; bytes]);
         Output { address, len, of: std::marker::PhantomData }
     }
 
-    /// Counters that are zero.
+    /// Allocates counters, initially zero.
     fn counters(&mut self, len: usize) -> Output<u32> {
         let address = self.upload(&vec![0u32; len.max(4)]);
         Output { address, len, of: std::marker::PhantomData }
@@ -72,14 +72,14 @@ impl Device {
         let mut values = vec![T::zeroed(); len];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
         let mut host = self.own.alloc_host(bytes.len()).expect("memory of the host");
-        // SAFETY: tests read as much as they uploaded, after the wait.
+        // SAFETY: tests read no more than they uploaded, after the wait.
         unsafe { self.own.download(address, &mut *host, 0..bytes.len()) }.expect("download");
         self.own.wait().expect("download");
         bytes.copy_from_slice(&host.bytes()[..bytes.len()]);
         values
     }
 
-    /// Reads an output, behind which nothing may have been written.
+    /// Reads an output, and asserts that nothing was written past its end.
     fn read_checked<T: Pod>(&mut self, output: &Output<T>) -> Vec<T> {
         let bytes = output.len * size_of::<T>();
         let behind = bytes.next_multiple_of(16) + MARGIN - bytes;
@@ -89,7 +89,7 @@ impl Device {
     }
 
     fn launch<P: KernelParams>(&mut self, blocks: usize, params: P) {
-        // SAFETY: tests upload all that the parameters point to.
+        // SAFETY: tests upload everything that the parameters refer to.
         unsafe { self.own.launch(Launch::new(blocks as u32, &params)) }.expect("the launch succeeds");
         self.own.wait().expect("the kernel succeeds");
     }
@@ -116,7 +116,7 @@ struct Slots {
 }
 
 impl Slots {
-    /// A slot for a brick; `None` leaves rubbish in it.
+    /// Adds a slot for a brick; `None` leaves it filled with guard bytes.
     fn brick(&mut self, brick: Option<&Brick>) -> u32 {
         let slot = self.bricks.len() / BRICK_BYTES;
         self.bricks.resize(self.bricks.len() + BRICK_BYTES, RUBBISH);
@@ -147,7 +147,7 @@ impl Slots {
     }
 }
 
-/// Are both bricks the same, materials included?
+/// Asserts that bricks are equal, including materials.
 fn assert_same(found: &Brick, expected: &Brick, what: impl std::fmt::Debug) {
     assert_eq!(found.samples(), expected.samples(), "samples of {what:?}");
     assert_eq!(found.solid(), expected.solid(), "solid bits of {what:?}");

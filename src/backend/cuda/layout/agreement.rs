@@ -7,7 +7,7 @@ use super::*;
 
 const HEADER: &str = include_str!("../kernels/layout.cuh");
 
-/// A field: name, offset, bytes.
+/// A field: its name, offset and size in bytes.
 type Field = (String, usize, usize);
 
 #[derive(Default)]
@@ -22,7 +22,7 @@ fn code() -> String {
     HEADER.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join(" ")
 }
 
-/// The value of a product or sum of numbers and constants.
+/// Evaluates a product or sum of numbers and constants.
 fn value(text: &str, constants: &HashMap<String, i64>) -> i64 {
     let term = |text: &str| -> i64 {
         let factor = |text: &str| match text.strip_prefix("0x") {
@@ -37,7 +37,7 @@ fn value(text: &str, constants: &HashMap<String, i64>) -> i64 {
     text.split('+').map(|text| term(text.trim())).sum()
 }
 
-/// The constants, and the numbers of enumerations.
+/// The constants, and the values of enumerators.
 fn constants(code: &str) -> HashMap<String, i64> {
     let mut found = HashMap::new();
     for statement in code.split(';') {
@@ -59,7 +59,7 @@ fn constants(code: &str) -> HashMap<String, i64> {
     found
 }
 
-/// The structs, laid out by the rules of C.
+/// The structs with the offsets of C's layout rules.
 fn structs(code: &str, constants: &HashMap<String, i64>) -> HashMap<String, Struct> {
     let mut all = HashMap::<String, Struct>::new();
     for text in code.split("struct ").skip(1) {
@@ -110,7 +110,7 @@ fn bytes_of_field<T, F>(_: fn(&T) -> &F) -> usize {
 fn every_field_is_where_the_kernels_expect_it() {
     let code = code();
     let mut structs = structs(&code, &constants(&code));
-    // A slot holds materials behind the record.
+    // In a slot, materials follow the record.
     let brick = structs.get_mut("Brick").expect("bricks");
     assert_eq!(brick.bytes, BRICK_BYTES);
     assert_eq!(brick.fields.pop(), Some(("materials".into(), RECORD_BYTES, MATERIAL_BYTES)));
@@ -186,7 +186,7 @@ fn every_constant_is_the_same() {
     check("UNIFORM", EditResult::UNIFORM.into());
     check("HAS_MATERIALS", EditResult::HAS_MATERIALS.into());
     check("TOO_FAR", EditResult::TOO_FAR.into());
-    // Numbers that the record and the parameters write.
+    // Enumerators that the host writes as numbers.
     let numbered =
         |names: &[&str]| names.iter().zip(0..).map(|(name, n)| ((*name).to_owned(), n)).collect::<Vec<_>>();
     for (name, number) in [

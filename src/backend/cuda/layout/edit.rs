@@ -1,4 +1,4 @@
-//! Edits and their results on bricks.
+//! Input and output of the edit kernels.
 
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
@@ -8,59 +8,59 @@ use crate::backend::cuda::device::{Kernel, KernelParams};
 use crate::brush::{Evaluator, Kind};
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox};
 
-/// Most numbers in the `list` of one `edit` launch. Each may enter 256 counts and 8 parts.
+/// Maximum length of `list` in one `edit` launch. Each entry may write 256 counts and 8 parts.
 pub(crate) const MOST_LIST: usize = 1 << 23;
 
-/// A brick to be edited.
+/// A brick to edit.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditJob {
     /// Its [`BrickPos`].
     pub brick: [i32; 3],
-    /// Reference of what it is now.
+    /// Reference of the current brick.
     pub base: u32,
-    /// Slot for what it becomes; may be the one of `base`.
+    /// Slot for the edited brick; may be the one of `base`.
     pub target: u32,
-    /// Slot of its stack.
+    /// Slot of its ground stack.
     pub stack: u32,
-    /// Its edits, in order: a range of `list`.
+    /// Its edits in order, a range of `list`.
     pub first: u32,
     pub count: u32,
     /// See [`cuts`].
     pub cuts: u32,
-    /// For `stencil_edit`: its entry in the windows; from there to the next along x, and `<< 16` along z, along y it is 1.
+    /// `stencil_edit` only: its entry in the windows, and the strides along x and along z `<< 16`; along y it is 1.
     pub window: u32,
     pub strides: u32,
     pub pad: u32,
 }
 
 impl EditJob {
-    /// Which brick it is about.
+    /// The brick's position.
     pub fn pos(&self) -> BrickPos {
         BrickPos(IVec3::from_array(self.brick))
     }
 
-    /// The stack that the brick belongs to.
+    /// The position of the brick's stack.
     pub fn place(&self) -> (i32, i32) {
         let [x, _, z] = self.brick;
         (x, z)
     }
 }
 
-/// An edit, all that is derived from it once included.
+/// A quantised edit with its derived constants.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditRecord {
-    /// Which of the shapes, in the order of `brush/shapes/mod.rs`.
+    /// Index of the shape, in the order of `brush/shapes/mod.rs`.
     pub kind: u32,
-    /// Dig, add, paint.
+    /// 0 dig, 1 add, 2 paint.
     pub operation: u32,
     pub material: u32,
     pub is_rough: u32,
-    /// The shape's origin: voxels, and 1/256 voxel from there.
+    /// The shape's origin: whole voxels, and the remainder in 1/256 voxel.
     pub home: [i32; 3],
     pub rest: [i32; 3],
-    /// The lattice points that it reaches in the world, both ends included.
+    /// Inclusive bounds of the lattice points of the world within its reach.
     pub min: [i32; 3],
     pub max: [i32; 3],
     pub constants: [f32; 12],
@@ -74,14 +74,14 @@ pub(crate) struct EditRecord {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditResult {
-    /// By how much the hash of the world's samples changes.
+    /// Change of the hash of the world's samples.
     pub hash: u64,
-    /// See the constants.
+    /// A combination of the constants below.
     pub flags: u32,
-    /// Entries of `records` and `materials`, [`NONE`] where nothing was written, also for lack of room.
+    /// Entries of `records` and `materials`; [`NONE`] if nothing was written, possibly for lack of room.
     pub record: u32,
     pub material: u32,
-    /// The box around the samples that changed.
+    /// Packed bounds of the changed samples.
     pub bounds: u32,
     /// `sample | material << 16` of a uniform brick.
     pub uniform: u32,
@@ -89,19 +89,20 @@ pub(crate) struct EditResult {
 }
 
 impl EditResult {
-    /// Some sample changed; the brick is in its target slot. Without this flag nothing else is said.
+    /// Some sample changed, and the brick is in its target slot. Without this flag, all other values are
+    /// meaningless, apart from `TOO_FAR`.
     pub const CHANGED: u32 = 1;
-    /// Some sample is edited now that had not been.
+    /// Some pristine sample became edited.
     pub const EXTENDED: u32 = 2;
-    /// All samples are edited and alike; no record was written.
+    /// All samples are edited and equal; no record was written.
     pub const UNIFORM: u32 = 4;
     /// The brick has materials.
     pub const HAS_MATERIALS: u32 = 8;
-    /// New ground looked farther for its material than windows reach. All that is said of the brick may be wrong.
+    /// New ground had to search beyond the windows for its material, so the result may be wrong.
     pub const TOO_FAR: u32 = 16;
 }
 
-/// What an edit changed in one chunk's part of a brick.
+/// What an edit changed in the part of a brick that belongs to one chunk.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditPart {
@@ -111,44 +112,45 @@ pub(crate) struct EditPart {
     pub edit: u32,
     /// See [`part_chunk`].
     pub part: u32,
-    /// The box around the samples that changed.
+    /// Packed bounds of the changed samples.
     pub bounds: u32,
 }
 
-/// Voxels that an edit dealt with. There may be several for one edit, outcome and material.
+/// Voxels affected by an edit. Several entries may have the same edit, outcome and material.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditCount {
     /// Number of the edit record.
     pub edit: u32,
-    /// Removed (0), added (1), painted (2); protected (3), unbreakable (4), too hard (5), slowed (6); and `material << 8`.
+    /// 0 removed, 1 added, 2 painted, 3 protected, 4 unbreakable, 5 too hard, 6 slowed; plus `material << 8`.
     pub outcome: u32,
     pub voxels: u32,
     pub pad: u32,
 }
 
-/// The parameter of `edit`.
+/// Parameters of `edit`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditParams {
-    /// Caches of bricks, of stacks.
+    /// First slots of the caches of bricks and stacks.
     pub bricks: Address,
     pub stacks: Address,
-    /// [`EditJob`]s, one for each block.
+    /// [`EditJob`]s, one per block.
     pub jobs: Address,
     /// Numbers of edit records.
     pub list: Address,
     pub edit_records: Address,
-    /// Out: an [`EditResult`] for each job.
+    /// Output: an [`EditResult`] per job.
     pub results: Address,
-    /// Out: [`RECORD_BYTES`] each.
+    /// Output: [`RECORD_BYTES`] each.
     pub records: Address,
-    /// Out: [`MATERIAL_BYTES`] each.
+    /// Output: [`MATERIAL_BYTES`] each.
     pub materials: Address,
-    /// Out: [`EditPart`]s, [`EditCount`]s, in any order.
+    /// Output: [`EditPart`]s and [`EditCount`]s, in any order.
     pub parts: Address,
     pub counts: Address,
-    /// Records, materials, parts, counts: four `u32`, zero at the start, which go on past the capacities.
+    /// Numbers of records, materials, parts and counts: four `u32`, initially zero. They keep counting past the
+    /// capacities.
     pub counters: Address,
     pub record_capacity: u32,
     pub material_capacity: u32,
@@ -160,7 +162,7 @@ impl KernelParams for EditParams {
     const KERNEL: Kernel = Kernel::Edit;
 }
 
-/// An edit that reaches these samples of the world; `None`: it reaches none.
+/// The record of an edit with this reach in the world; `None` if it reaches no sample.
 pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Evaluator) -> EditRecord {
     let of = evaluator.constants();
     let nothing = LatticeBox { min: IVec3::MAX, max: IVec3::MIN };
@@ -187,8 +189,8 @@ pub(crate) fn record(reach: Option<LatticeBox>, operation: Kind, evaluator: &Eva
     }
 }
 
-/// How many of a brick's samples along x (`<< 4`: y, `<< 8`: z) belong to the chunk of its lowest one; the rest, if any,
-/// belongs to the next.
+/// How many of a brick's samples along x belong to the chunk of its minimum corner, and likewise along y `<< 4` and
+/// z `<< 8`. Any others belong to the next chunk.
 pub(crate) fn cuts(grid: ChunkGrid, brick: BrickPos) -> u32 {
     let low = brick.origin();
     let own = grid.chunk_samples(grid.chunk_of(low)).max.saturating_sub(low).saturating_add(IVec3::ONE);
@@ -196,7 +198,7 @@ pub(crate) fn cuts(grid: ChunkGrid, brick: BrickPos) -> u32 {
     (x | y << 4 | z << 8) as u32
 }
 
-/// The chunk that a part of a brick belongs to: bits 0, 1, 2 of the part are set beyond the cut along x, y, z.
+/// The chunk of one part of a brick. Bits 0, 1, 2 of `part` are set beyond the cut along x, y, z.
 pub(crate) fn part_chunk(grid: ChunkGrid, brick: BrickPos, part: u32) -> ChunkPos {
     let beyond = [0, 1, 2].map(|axis| (part >> axis & 1) as i32);
     ChunkPos::from_ivec3(grid.chunk_of(brick.origin()).as_ivec3() + IVec3::from_array(beyond))

@@ -1,4 +1,4 @@
-//! What blocks are to be meshed, and where their surfaces are.
+//! Input and output of the mesh kernel.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -8,82 +8,84 @@ use crate::ground::Ground;
 use crate::surface::vertex::WorldView;
 use crate::surface::{MaterialMix, block};
 
-/// What blocks of one stack of bricks share.
+/// Data shared by the blocks of one stack of bricks.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ColumnJob {
-    /// Its slot.
+    /// Slot of its ground stack.
     pub stack: u32,
-    /// Which stack of bricks.
+    /// Position of the stack of bricks.
     pub x: i32,
     pub z: i32,
     pub pad: u32,
-    /// Cells of the mask, bit `z * 8 + x`.
+    /// Masked cells, bit `z * 8 + x`.
     pub mask: u64,
     pub pad2: u64,
-    /// Lattice edges on the mask's border, as [`border_edges`](crate::surface::MaskView::border_edges) has them: for each axis 128 bits.
+    /// Lattice edges on the mask's border, 128 bits per axis, as in
+    /// [`border_edges`](crate::surface::MaskView::border_edges).
     pub borders: [[u32; 4]; 3],
 }
 
-/// A block to be meshed.
+/// A block to mesh.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MeshJob {
-    /// Entry of its brick in `windows`.
+    /// The entry of its brick in `windows`.
     pub window: u32,
-    /// From there to the next brick along x, and `<< 16` along z; along y it is 1. All 27 around must be there.
+    /// Strides to the next brick: along x, and along z `<< 16`. Along y it is 1. All 27 bricks around must be in
+    /// the window.
     pub strides: u32,
     /// Number of its [`ColumnJob`].
     pub column: u32,
-    /// The brick's height.
+    /// The brick's y coordinate.
     pub y: i32,
-    /// The cells to draw.
+    /// Packed box of the cells to draw.
     pub cells: u32,
     pub pad: u32,
 }
 
-/// Where the surface of a block is.
+/// The location of a block's surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MeshResult {
-    /// First vertex, and how many. The first is [`NONE`] where there was no room and nothing was written.
+    /// First vertex and number of vertices. The first is [`NONE`] if there was no room, and nothing was written.
     pub vertex: u32,
     pub vertices: u32,
-    /// First index, and how many.
+    /// First index and number of indices.
     pub index: u32,
     pub indices: u32,
 }
 
-/// The parameter of `mesh`.
+/// Parameters of `mesh`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct MeshParams {
-    /// Caches of bricks, of stacks.
+    /// First slots of the caches of bricks and stacks.
     pub bricks: Address,
     pub stacks: Address,
     /// References of bricks.
     pub windows: Address,
     /// [`ColumnJob`]s.
     pub columns: Address,
-    /// [`MeshJob`]s, one for each block.
+    /// [`MeshJob`]s, one per block.
     pub jobs: Address,
-    /// What [`table`] gives.
+    /// The content of [`table`].
     pub table: Address,
-    /// Out: a [`MeshResult`] for each job.
+    /// Output: a [`MeshResult`] per job.
     pub results: Address,
-    /// Out: four `u16` each: x, y, z in 1/4096 voxel from the brick's lowest sample, 0.
+    /// Output: four `u16` each: x, y, z in 1/4096 voxel from the brick's minimum corner, and 0.
     pub positions: Address,
-    /// Out: three `f32` each.
+    /// Output: three `f32` each.
     pub normals: Address,
-    /// Out: eight `u8` each, ids and weights of a [`MaterialMix`]. 0: none are wanted.
+    /// Output: eight `u8` each, ids and weights of a [`MaterialMix`]. 0 if mixes are not needed.
     pub mixes: Address,
-    /// Out: `u16` each, counted within the block.
+    /// Output: `u16` each, relative to the block's first vertex.
     pub indices: Address,
-    /// Vertices, indices: two `u32`, zero at the start, which go on past the capacities.
+    /// Numbers of vertices and indices: two `u32`, initially zero. They keep counting past the capacities.
     pub counters: Address,
     pub vertex_capacity: u32,
     pub index_capacity: u32,
-    /// Cells of the world.
+    /// Size of the world in cells.
     pub width: i32,
     pub depth: i32,
     /// See [`single_mix`].
@@ -91,11 +93,11 @@ pub(crate) struct MeshParams {
     pub pad: u32,
 }
 
-/// The mix of all ground, where it is the same everywhere.
+/// The material mix of the ground if it is uniform.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct SingleMix {
-    /// 1 where it is; 0 otherwise.
+    /// 1 if it is uniform, else 0.
     pub is_single: u32,
     /// Four `u8` each.
     pub ids: u32,
@@ -106,7 +108,7 @@ impl KernelParams for MeshParams {
     const KERNEL: Kernel = Kernel::Mesh;
 }
 
-/// The stack of bricks (x, z) as blocks see it, whose record is in slot `stack`.
+/// The job for the blocks of the stack of bricks at (x, z), whose record is in slot `stack`.
 pub(crate) fn column_job(view: &WorldView, (x, z): (i32, i32), stack: u32) -> ColumnJob {
     let mask = view.mask.word((x, z));
     let borders = view.mask.border_edges(view.grid, (x, z));
@@ -114,7 +116,7 @@ pub(crate) fn column_job(view: &WorldView, (x, z): (i32, i32), stack: u32) -> Co
     ColumnJob { stack, x, z, pad: 0, mask, pad2: 0, borders }
 }
 
-/// The mix of all ground, where it is the same everywhere.
+/// The material mix of the ground if it is uniform.
 pub(crate) fn single_mix(ground: &Ground) -> SingleMix {
     ground.single_material().map(MaterialMix::pure).map_or(SingleMix::default(), |mix| SingleMix {
         is_single: 1,
@@ -123,8 +125,8 @@ pub(crate) fn single_mix(ground: &Ground) -> SingleMix {
     })
 }
 
-/// The triangles of all cases: for each up to 15 places of edges, counted from the cube's lowest corner, as
-/// `729 axis + 81 y + 9 z + x`; the last number is how many there are.
+/// The triangles of all marching cubes cases: up to 15 edge ids relative to the cube's minimum corner, `729 axis +
+/// 81 y + 9 z + x`. The last number is their count.
 pub(crate) fn table() -> [[u16; 16]; 256] {
     *block::SLOTS
 }

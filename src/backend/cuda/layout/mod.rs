@@ -1,7 +1,8 @@
-//! What host and kernels hand each other: the other half of `kernels.cu`.
+//! Data structures that the host and the kernels exchange, the counterpart of `kernels/layout.cuh`.
 //!
-//! All numbers are little-endian. Bricks on the device are called by a *reference*, `slot << 1 | has_materials`, or
-//! [`NONE`]. Samples of a brick are numbered `x + 8 z + 64 y`. Boxes inside a brick are one word, see [`pack_box`].
+//! All numbers are little-endian. Kernels identify a brick by a *reference*, `slot << 1 | has_materials`, or
+//! [`NONE`]. Sample (x, y, z) of a brick has index `x + 8 z + 64 y`. A box within a brick is packed into one word,
+//! see [`pack_box`].
 
 #[cfg(test)]
 mod agreement;
@@ -23,16 +24,16 @@ pub(crate) use heights::*;
 pub(crate) use mesh::*;
 pub(crate) use stencil_edit::*;
 
-/// An address on the device.
+/// A device address.
 pub(crate) type Address = u64;
 
-/// No brick; no entry.
+/// No brick, or no entry.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Threads of a block, whichever the kernel.
+/// Threads per block, for all kernels.
 pub(crate) const THREADS: u32 = 128;
 
-/// Most jobs of one launch. Each block may ask for 7680 indices, and counters have 32 bits.
+/// Maximum number of jobs per launch. Each block may request 7680 indices, and counters have 32 bits.
 pub(crate) const MOST_JOBS: usize = 1 << 19;
 
 /// Bytes of a brick's slot: a record, then materials.
@@ -44,29 +45,29 @@ pub(crate) const RECORD_BYTES: usize = size_of::<BrickRecord>();
 /// Bytes of a brick's materials.
 pub(crate) const MATERIAL_BYTES: usize = 512;
 
-/// A brick without its materials.
+/// A brick without materials.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct BrickRecord {
     /// Densities in 1/256 voxel, `i16::MIN` for pristine samples.
     pub samples: [i16; 512],
-    /// A word for each y, bit `z * 8 + x`.
+    /// One word per layer y, with bit `z * 8 + x`.
     pub solid: [u64; 8],
     pub edited: [u64; 8],
 }
 
-/// The columns around a stack of bricks, from one before its first on, 11 x 11 of them, x fastest.
+/// The 11 x 11 columns around a stack of bricks, starting one before its first; x varies fastest.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct StackRecord {
-    /// In 1/256 voxel.
+    /// In units of 1/256 voxel.
     pub heights: [i32; 121],
     /// `base | overlay << 8 | blend << 16`.
     pub columns: [u32; 121],
     pub pad: [u32; 2],
 }
 
-/// Bytes to be copied; addresses and size are multiples of 16.
+/// A copy. Addresses and size are multiples of 16.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ScatterJob {
@@ -76,11 +77,11 @@ pub(crate) struct ScatterJob {
     pub pad: u32,
 }
 
-/// The parameter of `scatter`.
+/// Parameters of `scatter`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ScatterParams {
-    /// [`ScatterJob`]s, one for each block.
+    /// [`ScatterJob`]s, one per block.
     pub jobs: Address,
 }
 
@@ -88,7 +89,7 @@ impl KernelParams for ScatterParams {
     const KERNEL: Kernel = Kernel::Scatter;
 }
 
-/// Writes a brick as it is in a slot: [`BRICK_BYTES`], or [`RECORD_BYTES`] where `out` has no room for materials.
+/// Writes a brick in the format of a slot: [`BRICK_BYTES`], or [`RECORD_BYTES`] if `out` has no room for materials.
 pub(crate) fn brick_record(brick: &Brick, out: &mut [u8]) {
     let record = BrickRecord {
         samples: brick.samples().map(Sample::bits),
@@ -104,12 +105,12 @@ pub(crate) fn brick_record(brick: &Brick, out: &mut [u8]) {
     }
 }
 
-/// The brick of a record and its materials, if it has any.
+/// Builds a brick from its record, and its materials if it has any.
 pub(crate) fn brick_of(record: &BrickRecord, materials: Option<&[u8; MATERIAL_BYTES]>) -> Brick {
     Brick::of_parts(&record.samples, record.solid, record.edited, materials)
 }
 
-/// The columns around the stack of bricks (x, z).
+/// The record for the stack of bricks at (x, z).
 pub(crate) fn stack_record(ground: &Ground, (x, z): (i32, i32)) -> StackRecord {
     let low = Column::new(x * 8 - 1, z * 8 - 1);
     let word = |material: ColumnMaterial| {
@@ -129,8 +130,8 @@ pub(crate) fn stack_record(ground: &Ground, (x, z): (i32, i32)) -> StackRecord {
     record
 }
 
-/// A box inside a brick, both ends included, as one word: lowest `x | y << 3 | z << 6`, and the same of the highest
-/// `<< 9`. `from` is the brick's lowest sample.
+/// Packs a box within a brick, with inclusive ends, into one word: the minimum `x | y << 3 | z << 6`, and the
+/// maximum likewise `<< 9`. `from` is the brick's minimum corner.
 pub(crate) fn pack_box(cells: LatticeBox, from: IVec3) -> u32 {
     let pack = |at: IVec3| {
         let IVec3 { x, y, z } = (at - from) & 7;
@@ -139,7 +140,7 @@ pub(crate) fn pack_box(cells: LatticeBox, from: IVec3) -> u32 {
     pack(cells.min) | pack(cells.max) << 9
 }
 
-/// What [`pack_box`] made of it.
+/// The inverse of [`pack_box`].
 pub(crate) fn unpack_box(word: u32, from: IVec3) -> LatticeBox {
     let unpack = |word: u32| from + IVec3::new(word as i32 & 7, word as i32 >> 3 & 7, word as i32 >> 6 & 7);
     LatticeBox { min: unpack(word), max: unpack(word >> 9) }

@@ -1,4 +1,4 @@
-//! Parameters of the stencil-edit kernel.
+//! Input of the stencil-edit kernel.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -9,13 +9,13 @@ use crate::edits::BatchRules;
 use crate::ground::GreyImage;
 use crate::lattice::LatticeBox;
 
-/// What a stencil edit needs beside its [`EditRecord`]. See `layout.cuh`.
+/// What a stencil edit needs in addition to its [`EditRecord`](super::EditRecord). See `layout.cuh` for the fields.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct SculptParams {
-    /// Plain, smooth, sharpen, flatten, level, shift, stamp, terrace.
+    /// 0 plain, 1 smooth, 2 sharpen, 3 flatten, 4 level, 5 shift, 6 stamp, 7 terrace.
     pub stroke: u32,
-    /// Of new ground; [`NONE`] where what is around says it.
+    /// Material of new ground, or [`NONE`] to derive it from the surroundings.
     pub material: u32,
     pub strength: i32,
     pub falloff: i32,
@@ -26,25 +26,25 @@ pub(crate) struct SculptParams {
     pub image: u32,
     pub columns: u32,
     pub rows: u32,
-    /// Negative: no rule bears on it.
+    /// The hardness that it can remove; negative if no rule applies.
     pub power: i32,
     pub matrix: [[i64; 3]; 3],
     pub squared: i64,
     pub length: f64,
 }
 
-/// What edits may not change, or not at once; [`Protected`] boxes come right behind.
+/// Rules that forbid or slow down edits. The [`Protected`] boxes follow directly.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Rules {
     pub hardness: [u8; 256],
     pub unbreakable: [u32; 8],
     pub bedrock: i32,
-    /// How many.
+    /// Number of protected boxes.
     pub boxes: u32,
 }
 
-/// Samples that nothing changes, both ends included.
+/// Inclusive bounds of samples that no edit changes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Protected {
@@ -52,17 +52,17 @@ pub(crate) struct Protected {
     pub max: [i32; 3],
 }
 
-/// The parameter of `stencil_edit`.
+/// Parameters of `stencil_edit`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct StencilEditParams {
-    /// No job's target may be what another job, or an entry of `windows`, refers to.
+    /// No job's target may be referred to by another job or by `windows`.
     pub edit: EditParams,
-    /// References of bricks. Of each job all 27 around must be there, and above and below as many as `look` says.
+    /// References of bricks. For each job they include all 27 bricks around, and `look` bricks above and below.
     pub windows: Address,
-    /// [`SculptParams`] for each edit record.
+    /// One [`SculptParams`] per edit record.
     pub sculpt_params: Address,
-    /// Samples of images, `u16` each.
+    /// Image samples, `u16` each.
     pub images: Address,
     /// [`Rules`], or 0.
     pub rules: Address,
@@ -76,7 +76,7 @@ impl KernelParams for StencilEditParams {
     const KERNEL: Kernel = Kernel::StencilEdit;
 }
 
-/// The sculpting parameters of an edit; `image` returns where the samples of an image begin.
+/// The sculpting parameters of an edit. `image` returns the index of an image's first sample.
 pub(crate) fn sculpt<'a>(
     record: &'a crate::edits::PreparedEdit,
     image: impl FnOnce(&'a GreyImage) -> u32,
@@ -117,7 +117,7 @@ pub(crate) fn sculpt<'a>(
     }
 }
 
-/// Rules, and what is protected.
+/// The rules and the protected boxes.
 pub(crate) fn rules(run: &BatchRules) -> (Rules, Vec<Protected>) {
     let boxes = |samples: &LatticeBox| Protected { min: samples.min.to_array(), max: samples.max.to_array() };
     let (of, boxes): (_, Vec<Protected>) = (run.rules, run.protected.iter().map(boxes).collect());

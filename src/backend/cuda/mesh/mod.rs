@@ -1,4 +1,4 @@
-//! Meshing on the device: one launch for all blocks. [`output`](self::output) has the results.
+//! Meshing on the device: one launch for all blocks. [`output`](self::output) holds the results.
 
 pub(super) mod output;
 
@@ -15,29 +15,30 @@ use crate::surface::block::Block;
 use crate::surface::vertex::WorldView;
 use output::Meshed;
 
-/// Blocks of some stacks that one thread deals with.
+/// Consecutive blocks that one thread processes, all blocks of some stacks.
 struct Piece<'b> {
     blocks: &'b [Block],
-    /// The numbers of the first block, and of its stack.
+    /// Number of the first block, and of its stack.
     first: usize,
     column: u32,
 }
 
-/// A stack of blocks, with its slot.
+/// A stack of bricks by position, and its slot.
 type Column = ((i32, i32), u32);
 
-/// From how many stacks or blocks on they are processed in parallel.
+/// From this many blocks or stacks on, they are processed in parallel.
 const LONG: usize = 256;
 
-/// How many blocks a thread takes at a time.
+/// Blocks that a thread takes at a time.
 const OF_A_THREAD: usize = 256;
 
-/// From how many blocks on their surfaces are copied, instead of written to the host's memory by the kernel.
+/// From this many blocks on, the kernel writes to device memory and surfaces are copied, instead of written to host
+/// memory.
 const COPIED: usize = 512;
 
 impl Session {
-    /// Meshes blocks. Their [`surfaces`](MeshOutput::surfaces) are in this session's memory until the next launch, or on their
-    /// way there. `meanwhile` is called when the device is at work.
+    /// Meshes blocks. Their surfaces are in this session's memory until the next launch; copies may still be in
+    /// flight. `meanwhile` is called while the device works.
     pub fn mesh(
         &mut self,
         view: &WorldView,
@@ -53,8 +54,8 @@ impl Session {
         meshed
     }
 
-    /// Meshes blocks. When this returns, their [`MeshResult`](layout::MeshResult)s have arrived; the surfaces may still be on
-    /// their way.
+    /// Meshes blocks. On return, the [`MeshResult`](layout::MeshResult)s have arrived; the surfaces may still be in
+    /// flight.
     fn run_mesh<'a>(
         &mut self,
         view: &WorldView<'a>,
@@ -62,7 +63,6 @@ impl Session {
         uploads: &mut Uploads<'a>,
         meanwhile: &(dyn Fn() + Sync),
     ) -> Result<Meshed, Fault> {
-        // Written on the device, to be copied, instead of straight to the host's memory.
         let is_long = blocks.len() >= COPIED;
         if blocks.len() > MOST_JOBS {
             return Err(Fault::TooLarge(blocks.len()));
@@ -118,8 +118,8 @@ impl Session {
                 single: layout::single_mix(ground),
                 pad: 0,
             };
-            // SAFETY: the parameters are sections of the input and lists of the session, with their capacities, and none of them
-            // is touched before the wait below.
+            // SAFETY: the parameters are sections of the input and lists of the session with their capacities. None
+            // of them is accessed before the wait below.
             unsafe { self.device.launch(Launch::new(blocks.len() as u32, &params)) }?;
             self.meshes.results.fetch(&mut *self.device, blocks.len())?;
             meanwhile();
@@ -129,7 +129,7 @@ impl Session {
             let all = extents.last().copied().unwrap_or_default();
             let lists = &mut self.meshes.lists;
             if !lists.reserve(&mut *self.device, all.totals(), is_long)? {
-                // Surfaces are read where results say they are.
+                // Results locate the surfaces, so check them before use.
                 if !all.is_in_lists() {
                     return Err(Fault::Failed("surfaces beyond the ends of their lists".into()));
                 }
@@ -137,7 +137,7 @@ impl Session {
                 self.kept.put(windows);
                 return Ok(Meshed { plain, marks });
             }
-            // A second pass, with room for all.
+            // A second pass, with enough room.
         }
         Err(Fault::Failed("results changed from one pass to the next".into()))
     }
@@ -168,7 +168,7 @@ fn mesh_job(view: &WorldView, windows: &Windows, number: usize, block: &Block, c
     }
 }
 
-/// A box of cells that holds none.
+/// A packed box without cells.
 const NO_CELLS: u32 = 7;
 
 /// The stack of bricks that a block belongs to.
@@ -176,13 +176,13 @@ fn place(block: &Block) -> (i32, i32) {
     (block.brick.0.x, block.brick.0.z)
 }
 
-/// Do both blocks belong to the same stack?
+/// Whether both blocks belong to the same stack.
 fn is_same_stack(a: &Block, b: &Block) -> bool {
     place(a) == place(b)
 }
 
 impl Session {
-    /// These blocks in pieces, and their stacks, which are uploaded where they have to be.
+    /// Numbers the stacks of these blocks. Missing stacks are queued for upload.
     fn columns<'b>(
         &mut self,
         found: Vec<FoundStacks<'b>>,
@@ -202,10 +202,10 @@ impl Session {
     }
 }
 
-/// Blocks of some stacks, and for each of these the slot that it has, if any.
+/// The blocks of some stacks, and for each stack its slot, if it is cached.
 type FoundStacks<'b> = (&'b [Block], Vec<((i32, i32), Option<u32>)>);
 
-/// The stacks of blocks, in pieces.
+/// Looks up the stacks of blocks, in pieces.
 fn stacks_of<'b>(stacks: &Stacks, ground: &Ground, blocks: &'b [Block]) -> Vec<FoundStacks<'b>> {
     let find = |stack: &[Block]| (place(&stack[0]), stacks.find(ground, place(&stack[0])));
     let lists = pieces(blocks, OF_A_THREAD, is_same_stack);

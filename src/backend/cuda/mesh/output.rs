@@ -8,13 +8,13 @@ use super::super::lists::map;
 use super::super::staging::OutputList;
 use crate::surface::MaterialMix;
 
-/// What the mesh kernel writes.
+/// The output lists of the mesh kernel.
 pub(in super::super) struct MeshOutput {
     pub(in super::super) results: OutputList,
     pub(in super::super) lists: MeshLists,
 }
 
-/// Surfaces of all blocks.
+/// The surfaces of all blocks.
 pub(in super::super) struct MeshLists {
     pub positions: OutputList,
     pub normals: OutputList,
@@ -22,13 +22,13 @@ pub(in super::super) struct MeshLists {
     pub indices: OutputList,
 }
 
-/// Vertices that there is room for at the start; indices are six times as many.
+/// Initial capacity in vertices.
 const FIRST_VERTICES: usize = 1 << 14;
 
-/// Indices for each vertex: two triangles, as surfaces have.
+/// Indices per vertex: a typical surface has two triangles per vertex.
 const INDICES: usize = 6;
 
-/// How many blocks' surfaces are copied at a time; few in tests, so that there are several such pieces.
+/// Blocks whose surfaces are copied at a time; few in tests, so that there are several pieces.
 pub(in super::super) const PIECE: usize = if cfg!(test) { 150 } else { 1 << 12 };
 
 impl MeshOutput {
@@ -50,7 +50,7 @@ impl MeshOutput {
         [results, positions, normals, mixes, indices]
     }
 
-    /// What the kernel wanted to write for the blocks of each piece and all before it.
+    /// For each piece of blocks, the extent of its output and that of all pieces before.
     pub(super) fn extents(&self, blocks: usize) -> Vec<Extent> {
         let of = |results: &&[MeshResult]| results.iter().fold(Extent::default(), Extent::with);
         let pieces: Vec<&[MeshResult]> = self.results.entries::<MeshResult>(blocks).chunks(PIECE).collect();
@@ -65,7 +65,7 @@ impl MeshOutput {
 }
 
 impl MeshLists {
-    /// Room for so many vertices and indices; says whether there was too little.
+    /// Makes room for these numbers of vertices and indices, and returns whether there was too little.
     pub(super) fn reserve(
         &mut self,
         device: &mut dyn Device,
@@ -80,7 +80,7 @@ impl MeshLists {
         Ok(grown)
     }
 
-    /// Begins to copy some vertices and indices, where they are not written straight to the host's memory.
+    /// Starts to copy ranges of vertices and indices, unless they were written to host memory.
     fn fetch(
         &mut self,
         device: &mut dyn Device,
@@ -97,7 +97,8 @@ impl MeshLists {
         Ok(())
     }
 
-    /// Begins to copy all, piece by piece: each goes as far as its extent, and has a mark. None where nothing is to be copied.
+    /// Starts to copy all surfaces piece by piece, and places a mark after each. Returns no marks if nothing has to
+    /// be copied.
     pub(super) fn begin_fetch(
         &mut self,
         device: &mut dyn Device,
@@ -122,7 +123,7 @@ impl MeshLists {
     }
 }
 
-/// How much blocks have together, and where the last of it ends.
+/// Total size of some blocks' output, and where it ends in the lists.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Extent {
     vertices: usize,
@@ -132,7 +133,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// With one block more.
+    /// Adds one block.
     fn with(self, result: &MeshResult) -> Self {
         let end = |first: u32, count: u32| (first as usize).saturating_add(count as usize);
         self.join(Self {
@@ -143,7 +144,7 @@ impl Extent {
         })
     }
 
-    /// Of both.
+    /// The union of both.
     fn join(self, other: Self) -> Self {
         Self {
             vertices: self.vertices + other.vertices,
@@ -153,22 +154,22 @@ impl Extent {
         }
     }
 
-    /// Vertices and indices.
+    /// Numbers of vertices and indices.
     pub(super) fn totals(self) -> (usize, usize) {
         (self.vertices, self.indices)
     }
 
-    /// Whether all of it lies within lists of that length.
+    /// Whether everything lies within lists of the total length.
     pub(super) fn is_in_lists(self) -> bool {
         self.vertex_end <= self.vertices && self.index_end <= self.indices
     }
 }
 
-/// What a launch wrote.
+/// The outcome of a launch.
 pub(in super::super) struct Meshed {
-    /// What all vertices are made of, if it is the same everywhere; their mixes are not written then.
+    /// The material mix of all vertices if it is uniform; then no mixes are written.
     pub(in super::super) plain: Option<MaterialMix>,
-    /// Copies to the host that are under way, one for each [`PIECE`] of blocks.
+    /// Marks of the copies in flight, one for each [`PIECE`] of blocks.
     pub(in super::super) marks: Vec<Box<dyn Mark>>,
 }
 

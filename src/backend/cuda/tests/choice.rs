@@ -1,4 +1,4 @@
-//! Who does a stage: the faster of both, by what is known of them.
+//! Which backend runs a stage: the one expected to be faster.
 
 use super::faults::logged;
 use super::output_lists::SmallDevice;
@@ -8,7 +8,7 @@ use crate::backend::{Choice, Compute, Cpu, Stage};
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::surface::block::Parts;
 
-/// A device that is open and needs no card; with what both took for sixteen blocks, in microseconds.
+/// A simulated device that is open, with measured times for sixteen blocks in microseconds.
 fn open_cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
     let own = Cuda::with_device(is_auto, limits(1 << 20), &[], |_| panic!("it is open"));
     let session = Session::new(Box::new(SmallDevice::new(1 << 30, 1 << 30)), 1 << 20).expect("a session");
@@ -25,7 +25,8 @@ fn open_cuda(is_auto: bool, cpu: u64, cuda: u64) -> Cuda {
     own
 }
 
-/// Is the meshing of so many blocks the device's, which would do it if it were asked? And what was written down of that.
+/// Offers a mesh stage of this many blocks to the device; returns whether it ran there, and the record of the
+/// choice.
 fn attempt(cuda: &Cuda, blocks: usize, missing: usize) -> (bool, Choice) {
     let mut choice = Choice::of(Stage::Mesh, blocks);
     let load = Load::of_blocks(blocks);
@@ -43,7 +44,7 @@ fn auto_takes_the_device_where_it_is_faster_and_nowhere_else() {
         assert_eq!([estimate.cpu, estimate.cuda], [cpu, device].map(Duration::from_micros));
         assert_eq!(is_taken, is_device, "{cpu} beside {device}");
     }
-    // A device that somebody asked for does all, but what is nothing.
+    // A device that was requested explicitly does every stage that has any work.
     let asked = open_cuda(false, 1, 100);
     assert!(attempt(&asked, 16, 50).0);
     assert!(!attempt(&asked, 0, 0).0);
@@ -57,7 +58,7 @@ fn what_the_device_does_not_have_counts_against_it() {
         let (is_taken, choice) = attempt(&auto, 16, missing);
         assert_eq!((is_taken, choice.missing), (is_device, missing));
     }
-    // Where it is slower in any case, nobody looks.
+    // If the device is slower in any case, missing data is not counted.
     let mut choice = Choice::of(Stage::Mesh, 16);
     let slower = open_cuda(true, 10, 20);
     let load = Load::of_blocks(16);
@@ -80,7 +81,7 @@ fn a_device_is_given_up_for_what_does_not_pass() {
             let work = |_: &mut Session| Err::<(), Fault>(fault.clone());
             let attempt =
                 own.attempt_stage(&mut choice, Load::of_blocks(16), |_| 0, work, |_, done| Ok(done));
-            // What was lost on trying is no expectation.
+            // A failed attempt leaves no estimate.
             assert!(attempt.done.is_none() && !choice.is_cuda && choice.estimate.is_none());
             assert_eq!(logged(&fault.to_string()), 1, "one warning, and no other");
         }

@@ -1,4 +1,4 @@
-/* A driver's library with three cards that compute nothing. What is recorded in a stream is done 60 ms later. */
+/* A driver library with three cards that compute nothing. Recorded events complete after 60 ms. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,7 +41,7 @@ int cuDeviceGetName(char* name, int length, int device) {
     return 0;
 }
 
-/* Capability 9.0. */
+/* Compute capability 9.0. */
 int cuDeviceGetAttribute(int* value, int attribute, int device) {
     (void)device;
     *value = attribute == 75 ? 9 : 0;
@@ -77,7 +77,7 @@ int cuEventRecord(struct event* event, void* stream) {
 
 int cuEventQuery(struct event* event) { return now() < event->done ? NOT_READY : 0; }
 
-/* Sleeps where the event was made for that, and spins where it was not, as drivers do. */
+/* Sleeps if the event was created with the blocking flag, else spins, as drivers do. */
 int cuEventSynchronize(struct event* event) {
     struct timespec nap = {0, 1000000};
     while (cuEventQuery(event))

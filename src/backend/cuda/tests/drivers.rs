@@ -1,4 +1,4 @@
-//! Devices that can't be opened, or not be trusted.
+//! Devices that cannot be opened or not be trusted.
 
 use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark, forward};
 use super::super::emulator::skip;
@@ -33,7 +33,7 @@ fn a_device_passes_the_whole_self_test() {
     assert_eq!(engine.wait(Duration::from_secs(600)), EngineState::Cuda(name));
 }
 
-/// What the test below starts in a process of its own.
+/// Runs in a process of its own, started by the test below.
 #[test]
 #[ignore = "looks at the machine's driver"]
 fn tell_what_the_driver_says() {
@@ -42,8 +42,8 @@ fn tell_what_the_driver_says() {
     compare(&mut Rng::with_seed(3), 3, &engine);
 }
 
-/// Compiles a driver's library, and runs an ignored test of this file in a process that finds it: what that says, if there is
-/// a C compiler.
+/// Compiles a driver library, and runs an ignored test of this file in a process that loads it. Returns the test's
+/// output, or `None` without a C compiler.
 fn with_driver(name: &str, source: &str, test: &str) -> Option<String> {
     let folder = std::env::temp_dir().join(format!("burrow-driver-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for the library");
@@ -72,7 +72,7 @@ fn with_driver(name: &str, source: &str, test: &str) -> Option<String> {
 #[test]
 fn a_driver_without_a_device_is_no_device() {
     for (code, name) in [(100, "CUDA_ERROR_NO_DEVICE"), (35, "CUDA_ERROR_INSUFFICIENT_DRIVER")] {
-        // A library that knows errors only, each with its code.
+        // A library that only returns this error, and knows its name.
         let source = format!(
             "int cuInit(unsigned flags) {{ (void)flags; return {code}; }}\n\
              int cuGetErrorName(int code, const char** name) {{ (void)code; *name = \"{name}\"; return 0; }}\n"
@@ -82,7 +82,7 @@ fn a_driver_without_a_device_is_no_device() {
     }
 }
 
-/// What the test below starts.
+/// Runs in a process of its own, started by the test below.
 #[test]
 #[ignore = "needs a driver with three cards"]
 fn open_each_of_three_cards() {
@@ -98,7 +98,7 @@ fn open_each_of_three_cards() {
         let all = [CardChoice::Ordinal(number), CardChoice::Uuid([70 + number as u8; 16])];
         for card in all.into_iter().chain([bus(&format!("0000:0{}:00.0", number + 1))]) {
             assert_eq!(open(&card, None), name);
-            // Only where nobody chose one.
+            // The suggestion counts only if no card was chosen.
             assert_eq!(open(&card, Some(&CardChoice::Ordinal(1))), name);
             assert_eq!(open(&default, Some(&card)), name);
         }
@@ -116,13 +116,13 @@ fn a_card_is_chosen_by_number_by_uuid_and_by_its_place_on_the_bus() {
     with_driver("cards", include_str!("driver.c"), "open_each_of_three_cards");
 }
 
-/// How long this thread has had a processor, where the system tells.
+/// CPU time of this thread, where the system provides it.
 fn processor_time() -> Option<Duration> {
     let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     stat.split(' ').next()?.parse().ok().map(Duration::from_nanos)
 }
 
-/// What the test below starts.
+/// Runs in a process of its own, started by the test below.
 #[test]
 #[ignore = "needs a driver that takes its time"]
 fn wait_for_a_slow_card() {
@@ -133,7 +133,7 @@ fn wait_for_a_slow_card() {
     let mark = card.mark().expect("a mark");
     mark.wait().expect("the card works");
     let (took, busy) = (start.elapsed(), processor_time().expect("as before") - before);
-    // A thread that spins is busy all the time.
+    // A spinning thread would be busy all the time.
     assert!(took > Duration::from_millis(120) && busy < took / 4, "{busy:?} busy of {took:?}");
 }
 
@@ -144,7 +144,7 @@ fn a_thread_that_waits_for_a_slow_card_sleeps() {
 
 #[test]
 fn a_device_that_computes_something_else_is_not_trusted() {
-    /// Turns a bit of every read.
+    /// A device that flips a bit in every download.
     struct BitFlipper(Box<dyn Device>);
     impl Device for BitFlipper {
         forward!(0: name free_memory alloc free alloc_host upload copy launch mark wait);
@@ -156,14 +156,14 @@ fn a_device_that_computes_something_else_is_not_trusted() {
         ) -> DeviceResult {
             // SAFETY: the caller promises the same.
             unsafe { self.0.download(from, to, bytes.clone()) }?;
-            // The last bit of a density, of a normal or of a hash.
+            // The last bit of a density, a normal or a hash.
             if let Some(byte) = to.bytes_of_mut(bytes).and_then(|bytes| bytes.get_mut(512)) {
                 *byte ^= 1;
             }
             Ok(())
         }
     }
-    // A card writes to the host's memory without a copy, so only the emulator can be made to compute wrong bits.
+    // A GPU writes to host memory without a copy, so only the emulator can be made to return wrong bits.
     let Some(emulator) = Emulator::start() else { return };
     let engine = engine(Box::new(BitFlipper(Box::new(emulator))), 64 << 20);
     assert_eq!(engine.state(), EngineState::Lost(Fault::SelfTest.to_string()));
@@ -186,6 +186,6 @@ fn ground_that_can_not_be_made_gives_the_same_error_on_a_device() {
         assert!(expected.is_err());
         assert_eq!(engine.ground_from_noise(width, 30, &noise), expected);
     }
-    // Refused heights are no fault of the device.
+    // Rejected heights are no fault of the device.
     assert_eq!(engine.state(), EngineState::Cuda(name));
 }

@@ -1,4 +1,4 @@
-//! Worlds of a device are those of the processor.
+//! Worlds computed on the device equal those of the CPU.
 
 use crate::brush::shapes::Cuboid;
 use glam::IVec3;
@@ -54,7 +54,7 @@ fn history_and_loose_pieces_of_a_device_are_those_of_the_processor() {
 #[test]
 fn a_small_budget_is_kept_and_nothing_is_lost() {
     let Some(device) = device() else { return };
-    // Bricks for a handful of brushes; larger transactions go to the processor.
+    // The device has room for the bricks of a handful of brushes; larger transactions go to the CPU.
     let engine = engine(device, 1 << 20);
     let mut rng = Rng::with_seed(5);
     (0..worlds::world_count(40) / 4).for_each(|index| compare(&mut rng, index, &engine));
@@ -67,7 +67,7 @@ fn a_small_budget_is_kept_and_nothing_is_lost() {
     compare_on(Ground::flat(160, 160, 30.0).expect("valid"), 32, &[&engine], &transactions);
     let figures = engine.figures();
     assert!(figures.cuda > 0, "{figures:?}");
-    // What the processor took is not expected of it, where the card was tried before.
+    // After a failed attempt, the CPU's choice has no estimate.
     let mut given_up =
         figures.choices.iter().filter(|choice| !choice.is_cuda && choice.amount > 0).peekable();
     assert!(given_up.peek().is_some() && given_up.all(|choice| choice.estimate.is_none()), "{figures:?}");
@@ -107,7 +107,7 @@ fn short_and_long_transactions_take_turns() {
         let cuboid = Shape::Cuboid(Cuboid { center, half, rotation: Default::default() });
         Brush::dig(cuboid).with_roughness(Roughness::new(2.0, 3.0, 5))
     };
-    // Many edits of few bricks: short lists that overflow, and such as are long for that alone.
+    // Many edits of few bricks: short lists that overflow, and lists that are long only because of the edits.
     let many = |n: i32| (0..n).flat_map(|i| small(i % 9)).collect::<Vec<_>>();
     let transactions = [
         small(0).to_vec(),
@@ -168,7 +168,7 @@ fn sculpting_of_any_kind_is_that_of_the_processor() {
     let mut rng = Rng::with_seed(31);
     for index in 0..worlds::world_count(40).div_ceil(2) {
         let (ground, chunk_size) = worlds::random_ground(&mut rng, index);
-        // Many in one place, so that most read what others change.
+        // Many brushes in one place, so that most read what others change.
         let brushes = |rng: &mut Rng| {
             let place = worlds::random_sculpting_brush(rng, &ground).shape;
             let near = |rng: &mut Rng| match rng.u32(0..3) {
@@ -200,7 +200,7 @@ fn ground_lowered_and_raised_far_is_that_of_the_processor() {
         let count = rng.usize(1..6);
         let mut transactions = vec![vec![worlds::any_random_brush(&mut rng, &ground)]];
         transactions.extend(brushes.iter().flat_map(|brush| vec![vec![brush.clone()]; count]));
-        // What is left of it, sculpted.
+        // Sculpt what is left.
         transactions.push(vec![Brush { operation: Operation::Smooth, ..brushes[0].clone() }; 2]);
         transactions.push(vec![worlds::sculpting_brush(&mut rng, brushes[0].shape, glam::Vec3::splat(20.0))]);
         compare_on(ground, chunk_size, &[&first, &second], &transactions);
@@ -230,7 +230,7 @@ fn new_ground_far_from_all_other_finds_its_material() {
         vec![Brush::level(all(0.0, 46.0), 24.0)],
         vec![Brush::dig(all(-12.0, 9.0)), Brush::dig(all(12.0, 4.0))],
         vec![Brush::flatten(all(0.0, 70.0), at(11.0, 40.0, 10.0), at(0.2, 1.0, 0.1))],
-        // Down from a roof, and in the open where nothing is within reach.
+        // Below a roof, and in the open where nothing is within reach.
         vec![
             Brush::dig(all(-20.0, 50.0)),
             Brush::lower(all(0.0, 90.0), 3.0),
@@ -239,7 +239,8 @@ fn new_ground_far_from_all_other_finds_its_material() {
         vec![Brush::raise(all(20.0, 110.0), 6.0)],
     ];
     compare_on(ground, 32, &[&first, &second], &transactions);
-    // Between a floor and a roof: within reach of the one, of the other, of neither; there between walls, one voxel apart.
+    // Between a floor and a roof: within reach of one, of the other, or of neither. In the last case between walls
+    // one voxel apart.
     let slab = |y: f32, material| Brush::add(all(y, 2.0), MaterialId(material));
     let between = Brush::flatten(all(70.0, 20.0), at(11.0, 70.0, 10.0), at(0.5, 1.0, 0.2)).with_falloff(0.0);
     let wall = |x: f32, z: f32, half: [f32; 2], material| {
@@ -252,7 +253,7 @@ fn new_ground_far_from_all_other_finds_its_material() {
     let transactions = [first_ones, vec![between]];
     let flat = || Ground::flat(22, 20, -100.0).expect("valid");
     compare_on(flat(), 25, &[&first, &second], &transactions);
-    // What is refused is counted by the material that it would have had.
+    // Prevented changes are counted by the material that the voxel would have had.
     let samples = LatticeBox { min: IVec3::new(-9, 20, -9), max: IVec3::new(99, 120, 99) };
     let rules = DiggingRules::default().with_protected(samples);
     compare_under(rules, flat(), 25, &[&first, &second], &transactions);

@@ -1,4 +1,4 @@
-//! Devices that fail when they are told to: nothing is lost.
+//! Devices that fail on command: no edit is lost.
 
 use std::ops::Range;
 use std::sync::{Mutex, Once};
@@ -7,20 +7,20 @@ use super::super::device::{Device, DeviceResult, Fault, HostMemory, Launch, Mark
 use super::*;
 use crate::backend::Stage;
 
-/// Calls to go until a device fails, and how. For lack of memory, only calls that ask for some count; for what is
-/// [`refused`], only those that wait for marks.
+/// Number of calls until a device fails, and the fault. Only allocations count for [`Fault::Memory`]; only waits
+/// for marks count for [`refused`].
 struct FaultPlan(Arc<Mutex<Option<(u32, Fault)>>>);
 
-/// A device that fails when it is told to.
+/// A device that fails as planned.
 struct FaultyDevice {
     own: Box<dyn Device>,
     plan: FaultPlan,
 }
 
-/// A fault that is a panic.
+/// Stands for a panic.
 const PANIC: Fault = Fault::SelfTest;
 
-/// The fault of marks alone.
+/// A fault of marks only.
 fn refused() -> Fault {
     Fault::Refused("a mark".into())
 }
@@ -90,7 +90,7 @@ impl Device for FaultyDevice {
     }
 }
 
-/// A mark of such a device: waiting for it is one of the calls.
+/// A mark of such a device. Waiting for it counts as a call.
 struct FaultyMark {
     own: Box<dyn Mark>,
     plan: FaultPlan,
@@ -103,7 +103,7 @@ impl Mark for FaultyMark {
     }
 }
 
-/// Keeps what is logged.
+/// Collects log messages.
 struct Log(Mutex<Vec<String>>);
 
 impl log::Log for Log {
@@ -120,7 +120,7 @@ impl log::Log for Log {
 
 static LOG: Log = Log(Mutex::new(Vec::new()));
 
-/// How many lines that were logged so far hold something; from the first call on, all are kept.
+/// How many messages so far contain this text. Messages are collected from the first call on.
 pub(super) fn logged(what: &str) -> usize {
     static KEPT: Once = Once::new();
     KEPT.call_once(|| {
@@ -148,13 +148,13 @@ fn a_device_that_fails_at_any_call_is_given_up_with_one_warning_and_nothing_is_l
         assert_eq!(warnings, usize::from(is_lost), "after {calls} calls");
         lost += warnings;
     }
-    // Two worlds may take fewer calls than the last ones here wait for.
+    // Two worlds may make fewer calls than the last faults wait for.
     assert!(lost > 20, "{lost}");
 }
 
 #[test]
 fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
-    // Each reads what the one before may change.
+    // Each edit reads what the previous one may change.
     let shape = |i: i32| Shape::sphere(glam::Vec3::new(30.0 + 3.0 * i as f32, 31.0, 30.0), 6.0);
     let brush = |i: i32| match i % 3 {
         0 => Brush::dig(shape(i)),
@@ -184,7 +184,7 @@ fn a_transaction_of_several_runs_survives_a_device_that_fails_in_its_middle() {
             break;
         }
     }
-    // None, some, all of seven.
+    // None, some, and all seven.
     assert!(runs_done.is_sorted() && runs_done.first() == Some(&0), "{runs_done:?}");
     assert!((0..=7).all(|runs| runs_done.contains(&runs)), "{runs_done:?}");
 }
@@ -218,7 +218,7 @@ fn surfaces_that_never_come_are_drawn_by_the_processor_with_all_others() {
 
 #[test]
 fn ground_is_made_by_the_processor_where_a_device_fails() {
-    // Two slices, the second one short.
+    // Two slices, of which the second is short.
     let (width, depth, noise) = (1030, 1020, NoiseHeights { octaves: 1, ..NoiseHeights::default() });
     let expected = Ground::from_noise(width, depth, &noise);
     let mut failed = 0;
@@ -245,7 +245,7 @@ fn a_device_without_memory_for_ground_is_kept() {
     let Some(own) = device() else { return };
     let plan = Arc::new(Mutex::new(None));
     let engine = engine(Box::new(FaultyDevice { own, plan: FaultPlan(Arc::clone(&plan)) }), 64 << 20);
-    // Memory of the host twice, then of the device.
+    // Host memory twice, then device memory.
     for calls in 0..3 {
         *lock(&plan) = Some((calls, Fault::Memory(1 << 20)));
         assert_eq!(engine.ground_from_noise(70, 50, &noise), expected, "after {calls} calls");

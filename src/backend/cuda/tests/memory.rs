@@ -1,4 +1,4 @@
-//! What a device and the host allocate: no more than they may, and for no longer than it is needed.
+//! Memory of device and host stays within its limits, and is freed when no longer needed.
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn small(number: usize) -> Brush {
     Brush::dig(Shape::sphere(glam::Vec3::new(20.0 + 6.0 * number as f32, 22.0, 70.0), 4.0))
 }
 
-/// The same on the processor and on an engine.
+/// The same world on the CPU and on an engine.
 struct Pair {
     expected: Terrain,
     found: Terrain,
@@ -34,13 +34,13 @@ impl Pair {
         Self { expected, found, engine }
     }
 
-    /// Plays a brush on both; returns the bytes on the device and of the host then.
+    /// Applies a brush to both; returns the bytes allocated on the device and of host memory.
     fn play(&mut self, brush: Brush) -> [usize; 2] {
         assert_eq!(self.expected.apply([&brush]), self.found.apply([&brush]));
         self.memory()
     }
 
-    /// Plays small brushes.
+    /// Applies small brushes.
     fn play_small(&mut self, numbers: std::ops::Range<usize>) -> [usize; 2] {
         numbers.map(|number| self.play(small(number))).last().unwrap_or_default()
     }
@@ -56,7 +56,7 @@ impl Pair {
     }
 }
 
-/// A device on which all that is not needed in one stage may go in the next.
+/// A device that frees memory after one stage without it.
 fn hasty(device: Box<dyn Device>) -> (Pair, Arc<Shared>) {
     let cuda = cuda(device, limits(64 << 20));
     let shared = Arc::clone(&cuda.shared);
@@ -76,10 +76,10 @@ fn memory_shrinks_after_a_large_transaction() {
         let most = pair.play(large());
         assert!(most[0] + most[1] > before[0] + before[1] + (4 << 20), "{before:?}, {most:?}");
         let after = pair.play_small(4..10);
-        // Bricks stay; all else is as it was, but for what is not much longer than it has to be.
+        // Bricks stay. Everything else is about as large as before.
         assert!(after[1] <= before[1] + (1 << 20), "{before:?}, {most:?}, {after:?}");
         assert!(after[0] <= before[0] + (1 << 20), "{before:?}, {most:?}, {after:?}");
-        // And may grow again.
+        // It can grow again.
         pair.play(large());
         pair.end();
     }
@@ -90,7 +90,7 @@ fn a_device_that_is_not_used_gives_its_bricks_back_and_gets_them_again() {
     let Some(device) = device() else { return };
     let (mut pair, shared) = hasty(device);
     pair.play(large());
-    // Nothing goes before its time.
+    // Nothing is freed before its time.
     lock(&shared.session).as_mut().expect("it is open").keep = Duration::from_secs(3600);
     let full = pair.memory();
     (0..3).for_each(|_| pair.engine.trim());

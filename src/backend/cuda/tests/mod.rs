@@ -1,7 +1,7 @@
-//! The device against the processor, bit by bit, and whatever can go wrong with it.
+//! Compares the device with the CPU bit by bit, and tests faults.
 //!
-//! A card is used where there is one, else the emulator. Where there is no C++ compiler either, tests say so and pass; with
-//! `BURROW_REQUIRE=1` they fail. `BURROW_WORLDS` says how many random worlds.
+//! Tests use a GPU if there is one, else the emulator. Without a C++ compiler they print so and pass, or fail if
+//! `BURROW_REQUIRE=1` is set. `BURROW_WORLDS` sets the number of random worlds.
 
 mod choice;
 mod drivers;
@@ -28,7 +28,7 @@ use crate::terrain::{Drawn, World};
 
 pub(super) use crate::worlds;
 
-/// A device to test, if there is any. A card that is there is tested, or nothing is.
+/// A device to test, if any. If there is a GPU that cannot be opened, the test fails.
 pub(super) fn device() -> Option<Box<dyn Device>> {
     match Card::open(&CardChoice::Default, None) {
         Ok(card) => Some(Box::new(card)),
@@ -37,24 +37,24 @@ pub(super) fn device() -> Option<Box<dyn Device>> {
     }
 }
 
-/// Bricks and ground may take so many bytes, and all else as much as it wants.
+/// Limits only the memory for bricks and ground.
 pub(super) fn limits(records: usize) -> Limits {
     Limits { device: Some(usize::MAX), records: Some(records), host: usize::MAX }
 }
 
-/// A device that does everything, small as it may be.
+/// A device that does every stage, whatever its size.
 fn cuda(device: Box<dyn Device>, limits: Limits) -> Cuda {
     Cuda::with_device(false, limits, &[(4, 3.0)], |_| Ok(device))
 }
 
-/// An engine that does everything on a device, which is open.
+/// An engine that does every stage on this device, which is open.
 fn engine(device: Box<dyn Device>, records: usize) -> Engine {
     let engine = Engine::from_cuda(cuda(device, limits(records)));
     engine.wait(Duration::from_secs(60));
     engine
 }
 
-/// Everything that is drawn, as bits.
+/// All drawn meshes, as bits.
 fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Indices)> {
     let bits = |vertex: &crate::surface::Vertex| {
         let mut bytes = Vec::with_capacity(32);
@@ -68,7 +68,8 @@ fn drawn(world: &World) -> Vec<(Drawn, Vec<u8>, Indices)> {
     all.map(|(drawn, mesh)| (drawn, mesh.vertices.iter().flat_map(bits).collect(), mesh.indices)).collect()
 }
 
-/// The same brushes on the processor and on an engine, in the same transactions; in every fourth world under rules.
+/// Applies the same transactions on the CPU and on an engine, and compares the worlds. Every fourth world has
+/// rules.
 fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
     let seed = rng.u64(..);
     let (ground, chunk_size) = worlds::random_ground(&mut Rng::with_seed(seed), index);
@@ -93,11 +94,11 @@ fn compare(rng: &mut Rng, index: u64, engine: &Engine) {
     assert_same(expected.world(), found.world(), index);
 }
 
-/// Worlds are the same, bit by bit.
+/// Asserts that worlds are equal, bit by bit.
 fn assert_same(expected: &World, found: &World, index: u64) {
     assert_eq!(expected.hash(), found.hash(), "world {index}");
     assert!(drawn(expected) == drawn(found), "world {index}");
-    // What bricks hold, bits and materials included; and as much memory.
+    // Bricks are equal, including bits and materials, and use as much memory.
     let [own, others] = [expected, found].map(|world| {
         let mut all: Vec<_> = world.bricks().collect();
         all.sort_unstable_by_key(|(pos, _)| pos.0.to_array());
@@ -111,7 +112,7 @@ fn assert_same(expected: &World, found: &World, index: u64) {
     assert_eq!(expected.memory().materials, found.memory().materials, "world {index}");
 }
 
-/// Transactions on the processor and on engines that take turns, on ground that is given.
+/// Applies transactions to this ground, on the CPU and on engines in turn.
 fn compare_on(ground: Ground, chunk_size: u32, engines: &[&Engine], transactions: &[Vec<Brush>]) {
     compare_under(DiggingRules::default(), ground, chunk_size, engines, transactions);
 }
@@ -141,12 +142,12 @@ fn compare_under(
     }
 }
 
-/// An engine that panics where something is used while a copy is under way.
+/// An engine that panics if memory is accessed while a copy is in flight.
 fn async_copies() -> Option<Engine> {
     Some(engine(Box::new(AsyncCopies::new(device()?)), 64 << 20))
 }
 
-/// An engine whose kernels write short lists to the host's memory, as those of a card do.
+/// An engine whose kernels write short lists to host memory, as on a GPU.
 fn zero_copy() -> Option<Engine> {
     Some(engine(Box::new(ZeroCopy::new(Box::new(Emulator::start()?))), 64 << 20))
 }

@@ -1,11 +1,11 @@
-//! When a device is opened, and by whom.
+//! When a device is opened, and what triggers it.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::backend::{Backend, EngineSettings};
 
-/// A device that can't be opened; how often somebody tried is counted.
+/// An engine whose device cannot be opened, and the number of attempts.
 fn counted(is_auto: bool) -> (Engine, Arc<AtomicUsize>) {
     let opened = Arc::new(AtomicUsize::new(0));
     let own = Arc::clone(&opened);
@@ -27,7 +27,7 @@ fn dig(radius: f32) -> [Brush; 1] {
     [Brush::dig(Shape::sphere(glam::Vec3::new(48.0, 30.0, 48.0), radius))]
 }
 
-/// Threads of this process.
+/// Number of threads of this process.
 fn threads() -> Option<usize> {
     Some(std::fs::read_dir("/proc/self/task").ok()?.count())
 }
@@ -43,7 +43,7 @@ fn an_engine_that_nobody_uses_opens_no_card() {
     assert_eq!(Engine::new(Backend::Cpu).state(), EngineState::Cpu);
 }
 
-/// What the next test starts in a process of its own, where nobody else starts threads.
+/// Runs in a process of its own, where no other test starts threads.
 #[test]
 #[ignore = "counts the threads of its process"]
 fn count_threads_of_engines() {
@@ -88,7 +88,7 @@ fn a_large_transaction_opens_the_card_once_and_does_not_wait_for_it() {
 fn an_engine_that_is_to_use_a_card_opens_it_for_its_first_transaction() {
     let (engine, opened) = counted(false);
     let mut terrain = terrain(&engine);
-    // Nothing to do is no transaction.
+    // An empty transaction does not count.
     terrain.apply::<Brush>([]);
     assert_eq!(engine.state(), EngineState::Unopened);
     terrain.apply(dig(2.0));

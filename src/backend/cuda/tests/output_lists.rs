@@ -1,15 +1,15 @@
-//! The room of lists that kernels write, on a device that has little.
+//! Capacities of output lists, on a device with little memory.
 
 use std::ops::Range;
 
 use super::super::device::{Device, Fault, HostMemory, Launch, Mark};
 use super::super::staging::OutputList;
 
-/// A device of so many bytes beside a host of so many more, whose memory its kernels reach.
+/// A device with little memory, whose kernels access host memory.
 pub(super) struct SmallDevice {
     left: usize,
     host_left: usize,
-    /// What was asked of the device, and what of that it still holds.
+    /// All allocation requests, and the live allocations.
     asked: Vec<usize>,
     held: Vec<(u64, usize)>,
 }
@@ -44,7 +44,7 @@ impl HostMemory for Reached {
     }
 }
 
-/// Takes bytes from what is left.
+/// Takes bytes from those that are left.
 fn take(left: &mut usize, bytes: usize) -> Result<(), Fault> {
     *left = left.checked_sub(bytes).ok_or(Fault::Memory(bytes))?;
     Ok(())
@@ -98,12 +98,12 @@ fn a_list_on_the_device_is_as_long_as_it_has_to_be_whatever_the_host_has_room_fo
     let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 100_000, false), Ok(true));
     assert_eq!((list.capacity(), list.is_mapped(), device.asked.len()), (125_000, true, 0));
-    // Not 125 000 of them.
+    // Device memory is not sized by the host's capacity of 125 000.
     assert_eq!(list.reserve(&mut device, 0, true), Ok(false));
     assert_eq!((list.capacity(), list.is_mapped(), device.held()), (16, false, vec![64]));
     assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
     assert_eq!((list.capacity(), device.held()), (1250, vec![5000]));
-    // A short one is where it was.
+    // The short list is still in host memory.
     assert_eq!(list.reserve(&mut device, 125_000, false), Ok(false));
     assert_eq!((list.capacity(), list.address()), (125_000, 1));
 }
@@ -113,12 +113,12 @@ fn a_list_makes_room_for_itself_and_one_that_can_not_grow_does_not_ask_for_the_s
     let mut device = SmallDevice::new(10_000, 1 << 20);
     let mut list = OutputList::new(&mut device, 4, 16).expect("room for 16");
     assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
-    // No room for both.
+    // The old and the new list do not fit together.
     assert_eq!(list.reserve(&mut device, 2000, true), Ok(true));
     assert_eq!((list.capacity(), device.held()), (2500, vec![10_000]));
     assert_eq!(list.reserve(&mut device, 4000, true), Err(Fault::Memory(20_000)));
     assert_eq!((list.capacity(), device.held()), (0, vec![]));
-    // And does what it did before.
+    // The list still works with its previous size.
     assert_eq!(list.reserve(&mut device, 1000, true), Ok(true));
     assert_eq!((list.capacity(), device.held()), (1250, vec![5000]));
     assert_eq!(list.fetch(&mut device, 1250), Ok(true));

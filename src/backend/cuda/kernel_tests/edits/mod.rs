@@ -17,7 +17,8 @@ use crate::terrain::{Terrain, TerrainSettings};
 use crate::volume::{Brick, Bricks, SampleView};
 use run::{EditRoom, EditRun};
 
-/// Edits of all kinds: those of the worlds, larger ones that leave bricks all alike, and such as give ground its look back.
+/// Edits of all kinds: random ones, larger ones that leave uniform bricks, and ones that restore the look of the
+/// ground.
 fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
     let sculpts = rng.bool();
     let mut brushes = Vec::new();
@@ -61,7 +62,7 @@ fn random_edits(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Vec<Edit> {
     brushes.iter().filter_map(|brush| Edit::quantize(brush).ok()).collect()
 }
 
-/// What the CPU makes of edits, brick by brick: nothing of two bricks is one entry.
+/// The delta of the CPU. Brick by brick, as no entry of a kernel spans two bricks.
 fn ledger_of(work: &PreparedEdits) -> EditDelta {
     let mut all = EditDelta::default();
     work.run_each_brick(|mut delta| {
@@ -73,7 +74,7 @@ fn ledger_of(work: &PreparedEdits) -> EditDelta {
     all
 }
 
-/// Applies edits to a world on both sides, with room enough and then without; returns how many bricks changed.
+/// Applies edits on both sides, first with enough room and then without; returns how many bricks changed.
 fn compare_edits(
     device: &mut Device,
     (samples, grid): (SampleView, ChunkGrid),
@@ -106,7 +107,7 @@ fn compare_edits(
     let short = EditRun::new(device, &work, rng, room, FAR);
     short.check_bricks(&delta, false);
     assert_eq!(short.counters, run.counters, "counters go on past the room");
-    // Windows that end near the brick do, or it is told that they don't.
+    // Small windows either suffice, or the kernel reports that they do not.
     let near = EditRun::new(device, &work, rng, most, 1);
     if near.results.iter().all(|result| result.flags & EditResult::TOO_FAR == 0) {
         near.check_bricks(&delta, true);
@@ -115,7 +116,7 @@ fn compare_edits(
     delta.bricks.len()
 }
 
-/// How far windows have to reach up and down that are always enough.
+/// Vertical reach of windows that always suffices, in bricks.
 const FAR: i32 = 8;
 
 #[test]
@@ -155,9 +156,9 @@ fn edits_at_the_ends_of_the_lattice_are_those_of_the_cpu() {
     }
 }
 
-/// A brick that no brush would leave behind: any density beside any other, many of them cut off.
+/// A brick that no brush would leave behind: arbitrary densities side by side, many of them clamped.
 fn noise_brick(rng: &mut Rng) -> Brick {
-    // Some are so deep that what was cut off is nearer the surface than all around it.
+    // Some are so deep that a clamped sample is nearer the surface than all of its neighbours.
     let deep = [0, 0, 1, -1][rng.usize(0..4)];
     let mut sample = || match rng.u32(0..6) {
         kind if deep != 0 => deep * if kind == 0 { DEPTH as i16 } else { rng.i16(900..1500) },

@@ -1,4 +1,4 @@
-//! A launch of edits, and whether what came out is right.
+//! Launches edits, and checks the output.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -12,7 +12,7 @@ use crate::ground::GreyImage;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox};
 use crate::volume::{Brick, SampleView, UniformKind};
 
-/// What room there is for output.
+/// Capacities of the output lists.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EditRoom {
     pub records: usize,
@@ -21,7 +21,7 @@ pub(super) struct EditRoom {
     pub counts: usize,
 }
 
-/// A launch of `edit`, and what came out.
+/// A launch of `edit`, and its output.
 pub(super) struct EditRun {
     jobs: Vec<EditJob>,
     pub results: Vec<EditResult>,
@@ -30,19 +30,19 @@ pub(super) struct EditRun {
     parts: Vec<EditPart>,
     counts: Vec<EditCount>,
     pub counters: Vec<u32>,
-    /// All slots before, and after.
+    /// Content of all slots before and after.
     before: Vec<u8>,
     after: Vec<u8>,
 }
 
-/// The bricks around jobs, as edits look at them.
+/// The bricks around jobs, for stencil edits.
 struct Stencil {
     look: i32,
     refs: Vec<u32>,
 }
 
 impl Stencil {
-    /// The entry of a brick, and its strides. Each has a window of its own.
+    /// The window entry of a brick, and its strides. Each brick has its own window.
     fn around(&mut self, slots: &mut Slots, samples: SampleView, pos: BrickPos) -> (u32, u32) {
         let first = self.refs.len() as u32;
         for (x, z) in (-1..=1).flat_map(|x| (-1..=1).map(move |z| (x, z))) {
@@ -61,7 +61,7 @@ impl EditRun {
         for of_brick in work.bricks() {
             let Some(pos) = of_brick.first().map(|job| job.pos()) else { continue };
             let base = slots.reference(work.base, pos);
-            // In place, or to another slot; where edits look around, always to another one.
+            // The target is the same slot or another one. Stencil edits need another one.
             let is_in_place = base != NONE && !work.looks_around() && rng.bool();
             let target = if is_in_place { base >> 1 } else { slots.brick(None) };
             let (window, strides) =
@@ -154,7 +154,7 @@ impl EditRun {
         run
     }
 
-    /// The brick that an entry holds.
+    /// The brick stored in the output entries of a result.
     fn brick_in_entries(&self, result: &EditResult) -> Option<Brick> {
         let record = self.records.get(result.record as usize)?;
         let materials = match result.flags & EditResult::HAS_MATERIALS {
@@ -168,7 +168,8 @@ impl EditRun {
         &slots[job.target as usize * BRICK_BYTES..][..BRICK_BYTES]
     }
 
-    /// Bricks, results and hash are those of the CPU. Where room is short, some entries are missing.
+    /// Asserts that bricks, results and hash equal those of the CPU. Without enough room, some entries may be
+    /// missing.
     pub fn check_bricks(&self, delta: &EditDelta, is_room: bool) {
         let mut expected: HashMap<BrickPos, _> =
             delta.bricks.iter().map(|brick| (brick.pos, brick)).collect();
@@ -211,7 +212,7 @@ impl EditRun {
         assert_eq!(self.counters[..2], [records, materials]);
     }
 
-    /// What each edit changed and counted is what the CPU says.
+    /// Asserts that parts and counts equal those of the CPU.
     pub fn check_effects(&self, delta: &EditDelta, work: &PreparedEdits) {
         type Part = (usize, [i32; 3], ChunkPos, [i32; 6]);
         let ends = |of: LatticeBox| {
