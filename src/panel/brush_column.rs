@@ -1,4 +1,4 @@
-//! The left column: operation, shape, sizes, material, surface of the brush.
+//! The left column: operation, shape, size, material and roughness of the brush.
 
 use bevy::math::{EulerRot, Quat, Vec3};
 use bevy_egui::egui::{self, Color32, Pos2, Rect, Shape, Stroke, Ui, Vec2};
@@ -9,7 +9,8 @@ use super::theme::{ACCENT, BAD, FAINT};
 use super::widgets::{choice, figure, metres, note, percent, section, slider, swatches, switch, tiles};
 use super::{BrushTool, ToolAlign, ToolOperation, ToolShape};
 
-/// Draws the column, for a terrain whose voxels are `voxel` metres wide; `rejection` is why it refused the last brush.
+/// Draws the column for a terrain whose voxels are `voxel` metres wide. `rejection` is why the last brush was
+/// rejected.
 pub fn show(
     ui: &mut Ui,
     tool: &mut BrushTool,
@@ -142,7 +143,7 @@ fn surface(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     }
 }
 
-/// Draws a shape in the middle of a rectangle: its outline, seen from the front and a little above.
+/// Draws the outline of a shape in the middle of a rectangle, seen from the front and slightly above.
 fn draw_shape(ui: &Ui, shape: ToolShape, rect: Rect, stroke: Stroke) {
     let tool = BrushTool {
         shape,

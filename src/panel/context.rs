@@ -1,4 +1,4 @@
-//! Which camera draws the panel: another one when the first is gone.
+//! Keeps egui's primary context on a camera: reassigns it when its camera is gone.
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
@@ -7,11 +7,12 @@ use bevy_egui::{
     EguiContext, EguiGlobalSettings, EguiPreUpdateSet, PrimaryEguiContext, setup_primary_egui_context_system,
 };
 
-/// Has egui's primary context handed on where bevy_egui may create it, and before it looks at what is new.
-pub(super) fn keep(app: &mut App) {
+/// Adds the system that reassigns the primary context, if bevy_egui may create it. It runs before bevy_egui handles
+/// new contexts.
+pub(super) fn add_reassignment(app: &mut App) {
     app.add_systems(
         PreUpdate,
-        hand_on
+        reassign_primary_context
             .run_if(|settings: Res<EguiGlobalSettings>| settings.auto_create_primary_context)
             .after(setup_primary_egui_context_system)
             .before(WindowToEguiContextMap::on_egui_context_added_system)
@@ -19,9 +20,9 @@ pub(super) fn keep(app: &mut App) {
     );
 }
 
-/// Gives the primary context to another camera when the one that had it is gone. The first is left to bevy_egui, which
-/// gives it once and never again, and can't do with two.
-fn hand_on(
+/// Gives the primary context to another camera when its camera is gone. The first assignment is left to bevy_egui,
+/// which does it only once and does not support two primary contexts.
+fn reassign_primary_context(
     mut commands: Commands,
     contexts: Query<(), With<PrimaryEguiContext>>,
     cameras: Query<(Entity, &Camera, &RenderTarget), Without<EguiContext>>,
@@ -44,7 +45,7 @@ fn hand_on(
 mod tests {
     use super::*;
 
-    /// An app with as much of bevy_egui as gives a camera its context.
+    /// An app with the part of bevy_egui that assigns the context.
     fn app() -> App {
         let mut app = App::new();
         app.init_resource::<EguiGlobalSettings>().add_systems(
@@ -52,7 +53,7 @@ mod tests {
             setup_primary_egui_context_system
                 .run_if(|settings: Res<EguiGlobalSettings>| settings.auto_create_primary_context),
         );
-        keep(&mut app);
+        add_reassignment(&mut app);
         app
     }
 
@@ -60,7 +61,7 @@ mod tests {
         app.world_mut().spawn(camera).id()
     }
 
-    /// The camera with the primary context in the next frame.
+    /// The cameras with the primary context after the next frame.
     fn owners(app: &mut App) -> Vec<Entity> {
         app.update();
         let world = app.world_mut();

@@ -1,12 +1,13 @@
-//! Ranges of the sliders for lengths: in metres, within the limits of a brush, which are in voxels.
+//! Slider ranges for lengths: in metres, within the limits of a brush, which are in voxels.
 
 use std::ops::RangeInclusive;
 
-/// The range of a length. A value outside, set by the game or for another terrain, stays until the slider is dragged.
+/// The range of a length. A value outside, which the game or another terrain's range may have set, stays until the
+/// slider is dragged.
 pub struct Length {
-    /// Least and most, in metres.
+    /// Minimum and maximum in metres.
     metres: (f32, f32),
-    /// Least and most that a [`brush`](crate::brush) allows, in voxels.
+    /// Minimum and maximum that a [`brush`](crate::brush) allows, in voxels.
     voxels: (f32, f32),
 }
 
@@ -18,14 +19,14 @@ impl Length {
     }
 }
 
-/// Radii, and half sizes of boxes. All maxima together are within the volume that a shape may have.
+/// Radii, and half extents of boxes. Even with all maxima, a shape stays within its maximum volume.
 pub const RADIUS: Length = Length { metres: (0.5, 32.0), voxels: (0.25, 128.0) };
-/// The radius of a torus' tube.
+/// Radius of a torus's tube.
 pub const TUBE: Length = Length { metres: (0.5, 16.0), voxels: (0.25, 64.0) };
-/// Of cylinders, capsules and cones.
+/// Length of cylinders, capsules and cones.
 pub const LENGTH: Length = Length { metres: (1.0, 64.0), voxels: (0.25, 256.0) };
 pub const FALLOFF: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
-/// The amount of raising and lowering, or the height of a stamp.
+/// Amount to raise or lower, or height of a stamp.
 pub const AMOUNT: Length = Length { metres: (0.0, 16.0), voxels: (0.0, 64.0) };
 pub const STEP: Length = Length { metres: (1.0, 32.0), voxels: (1.0, 256.0) };
 pub const BUMP: Length = Length { metres: (0.0, 4.0), voxels: (0.0, 8.0) };
@@ -41,7 +42,7 @@ mod tests {
             for length in [RADIUS, TUBE, LENGTH, FALLOFF, AMOUNT, STEP, BUMP, BUMP_WIDTH] {
                 let range = length.range(voxel);
                 assert!(range.start() < range.end(), "{range:?} at {voxel}");
-                // Sliders show tenths: their ends are none that rounding carries beyond the limits.
+                // Sliders show tenths. Rounding to tenths must not move an end beyond the limits.
                 for end in [range.start(), range.end()] {
                     assert_eq!((end * 10.0).round() / 10.0, *end, "{range:?} at {voxel}");
                 }

@@ -1,4 +1,4 @@
-//! How the chosen terrain looks, where it has a `GroundLook`.
+//! The look of the chosen terrain, if it has a `GroundLook`.
 
 use bevy_egui::egui::Ui;
 

@@ -1,4 +1,4 @@
-//! The panel: the current brush, settings and live figures in two columns over the game (feature `egui`).
+//! The panel: the current brush, settings and live statistics in two columns over the game (feature `egui`).
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -14,13 +14,13 @@
 //! | --- | --- |
 //! | [`BrushTool`] | the current brush; [`brush_at`](BrushTool::brush_at) makes the [`Brush`](crate::brush::Brush) |
 //! | [`BurrowPanel`] | what is shown, names of materials, the folder for pictures |
-//! | [`PanelPlaces`] | the widgets' places on the screen, for tutorials and tests |
+//! | [`PanelPlaces`] | the widgets' positions on the screen, for tutorials and tests |
 //! | [`PanelInput`] | whether the panel uses the pointer or the keyboard; run conditions [`pointer_is_free`], [`keyboard_is_free`] |
 //!
-//! [`PanelAction`] messages press its buttons, for key bindings. The panel is drawn by the camera with egui's primary context:
-//! the first one, unless the game chooses another; it may render to an image. When that camera is despawned, another one with a
-//! window gets the context, if bevy_egui may create it (`EguiGlobalSettings::auto_create_primary_context`). With several
-//! terrains, the panel shows one at a time.
+//! [`PanelAction`] messages trigger its buttons, for key bindings. The panel is drawn by the camera with egui's
+//! primary context: the first one, unless the game chooses another. That camera may render to an image. When it is
+//! despawned, another camera with a window gets the context, if bevy_egui may create it
+//! (`EguiGlobalSettings::auto_create_primary_context`). With several terrains, the panel shows one at a time.
 
 mod brush_column;
 mod context;
@@ -56,11 +56,11 @@ use survey::Survey;
 use terrain_controls::TerrainControls;
 use world_column::{Content, TerrainLine};
 
-/// The columns' egui ids.
+/// Egui ids of the columns.
 const BRUSH: &str = "burrow brush";
 const WORLD: &str = "burrow world";
 
-/// Adds the panel. Requires `BurrowPlugins`. It adds `EguiPlugin` unless that was added before.
+/// Adds the panel. Requires `BurrowPlugins`. Adds `EguiPlugin` if necessary.
 #[derive(Default)]
 pub struct BurrowPanelPlugin;
 
@@ -69,7 +69,7 @@ impl Plugin for BurrowPanelPlugin {
         if !app.is_plugin_added::<EguiPlugin>() {
             app.add_plugins(EguiPlugin::default());
         }
-        context::keep(app);
+        context::add_reassignment(app);
         app.init_resource::<BrushTool>()
             .init_resource::<BurrowPanel>()
             .init_resource::<PanelInput>()
@@ -86,7 +86,7 @@ impl Plugin for BurrowPanelPlugin {
                     survey::finish_seam_check,
                     picture::finish,
                     picture::give_up,
-                    act,
+                    perform_actions,
                     note_rejection,
                 )
                     .chain()
@@ -96,8 +96,8 @@ impl Plugin for BurrowPanelPlugin {
     }
 }
 
-/// Performs the actions of the buttons.
-fn act(
+/// Performs the buttons' actions.
+fn perform_actions(
     mut commands: Commands,
     mut actions: MessageReader<PanelAction>,
     mut panel: ResMut<BurrowPanel>,
@@ -159,7 +159,7 @@ fn draw(
     mut commands: Commands,
 ) {
     let (true, Ok(context)) = (panel.is_open, contexts.ctx_mut()) else {
-        // No widget is shown.
+        // No widgets are shown.
         places.set_if_neq(PanelPlaces::default());
         return;
     };
@@ -214,7 +214,7 @@ fn draw(
         });
     }
     free_keyboard(context, was_typing);
-    // Change detection must see real changes only.
+    // Only real changes may trigger change detection.
     tool.set_if_neq(new_tool);
     panel.set_if_neq(new_panel);
     settings.set_if_neq(new_settings);
@@ -230,8 +230,8 @@ fn voxel_size(lines: &[TerrainLine], chosen: Option<Entity>) -> f32 {
     lines.iter().find(|line| Some(line.entity) == chosen).map_or(1.0, |line| line.terrain.voxel_size())
 }
 
-/// Takes the keyboard focus from widgets of the panel unless text is being typed. Egui moves the focus on `Tab`, but keys
-/// belong to the game.
+/// Takes the keyboard focus from the panel's widgets unless text is being typed. Egui moves the focus on `Tab`, but
+/// keys belong to the game.
 fn free_keyboard(context: &egui::Context, was_typing: bool) {
     let Some(focused) = context.memory(|memory| memory.focused()) else { return };
     let columns = [BRUSH, WORLD].map(|id| LayerId::new(Order::Middle, Id::new(id)));
@@ -255,7 +255,7 @@ fn materials(panel: &BurrowPanel, colors: &MaterialColors) -> Vec<(Color32, Stri
     panel.materials.iter().enumerate().map(|(at, name)| (color(at), name.clone())).collect()
 }
 
-/// A card along one side of the window, as high as its content or the window.
+/// A framed column along one side of the window, at most as high as the window.
 fn column(
     context: &egui::Context,
     id: &'static str,
@@ -271,7 +271,7 @@ fn column(
         let card = theme::card();
         let inside = theme::COLUMN - card.inner_margin.sum().x;
         card.show(ui, |ui| {
-            // Before any widget: later it would move those that follow to the top.
+            // Must precede all widgets: later it would move the following ones to the top.
             ui.set_max_height(height - card.inner_margin.sum().y);
             ui.set_width(inside);
             ui.label(RichText::new(title).heading().color(theme::BRIGHT));

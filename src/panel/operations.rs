@@ -1,4 +1,4 @@
-//! The operations of the panel: one table, a row for each.
+//! The table of the panel's operations.
 
 use bevy::prelude::*;
 
@@ -6,36 +6,36 @@ use super::BrushTool;
 use crate::brush::{Operation, Stamp};
 use crate::plugin::TerrainHit;
 
-/// What a [`BrushTool`] does.
+/// The operation of a [`BrushTool`].
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Default)]
 pub enum ToolOperation {
-    /// Takes ground away.
+    /// Removes ground.
     #[default]
     Dig,
     /// Fills its shape with ground.
     Add,
-    /// Changes the material.
+    /// Changes the material of the ground.
     Paint,
-    /// Evens out bumps and edges.
+    /// Smooths bumps and edges.
     Smooth,
-    /// Deepens bumps and edges.
+    /// Accentuates bumps and edges.
     Sharpen,
-    /// Makes a plane through where the stroke is, as the surface lies there.
+    /// Flattens the ground to a plane that is tangent to the surface at the brush.
     Flatten,
-    /// Makes the ground level at [`BrushTool::level`].
+    /// Levels the ground at height [`BrushTool::level`].
     Level,
     /// Moves the surface outwards by [`BrushTool::amount`].
     Raise,
     /// Moves the surface inwards by [`BrushTool::amount`].
     Lower,
-    /// Presses [`BrushTool::stamp`] onto the ground, [`BrushTool::amount`] high.
+    /// Presses the image [`BrushTool::stamp`] onto the ground, with a height of [`BrushTool::amount`].
     Stamp,
-    /// Cuts slopes into steps of [`BrushTool::step`].
+    /// Cuts slopes into terraces of height [`BrushTool::step`].
     Terrace,
 }
 
-/// A setting that some operations have.
+/// A setting that only some operations use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Need {
     Material,
@@ -47,13 +47,13 @@ pub(super) enum Need {
 }
 use Need::{Amount, Falloff, Level, Material, Step, Strength};
 
-/// A row of the table.
+/// A row of the table: an operation.
 pub(super) struct Row {
     pub tool: ToolOperation,
     pub name: &'static str,
     pub help: &'static str,
     pub needs: &'static [Need],
-    /// The ground's height before and after, from left (0) to right (1): its icon.
+    /// The icon: the ground's height before and after, in 0 to 1, from left (0) to right (1).
     pub profile: fn(f32) -> (f32, f32),
     make: fn(&BrushTool, &TerrainHit) -> Operation,
 }
@@ -63,13 +63,13 @@ impl Row {
         (self.make)(tool, hit)
     }
 
-    /// Does it fade, and do a part of its work?
+    /// Whether it is a sculpting operation, which has a strength and a falloff.
     pub fn sculpts(&self) -> bool {
         self.needs.contains(&Strength)
     }
 }
 
-/// Every operation, in the panel's order. That of [`ToolOperation`] itself is the same.
+/// Every operation, in the panel's order, which is also the order of [`ToolOperation`].
 #[rustfmt::skip]
 pub(super) const OPERATIONS: &[Row] = &[
     Row { tool: ToolOperation::Dig, name: "Dig", help: "Takes ground away", needs: &[],
@@ -79,9 +79,9 @@ pub(super) const OPERATIONS: &[Row] = &[
     Row { tool: ToolOperation::Paint, name: "Paint", help: "Changes the material of ground that is there", needs: &[Material],
         profile: |x| (0.25, 0.5 + 0.12 * (x * 6.0).sin()), make: |tool, _| Operation::Paint { material: tool.material_id() } },
     Row { tool: ToolOperation::Smooth, name: "Smooth", help: "Evens out bumps and edges", needs: &[Strength, Falloff],
-        profile: |x| (0.5 + 0.3 * saw(x * 4.0), 0.5 + 0.08 * (x * 12.0).sin()), make: |_, _| Operation::Smooth },
+        profile: |x| (0.5 + 0.3 * triangle_wave(x * 4.0), 0.5 + 0.08 * (x * 12.0).sin()), make: |_, _| Operation::Smooth },
     Row { tool: ToolOperation::Sharpen, name: "Sharpen", help: "Deepens bumps and edges", needs: &[Strength, Falloff],
-        profile: |x| (0.5 + 0.1 * (x * 12.0).sin(), 0.5 + 0.4 * saw(x * 3.0)), make: |_, _| Operation::Sharpen },
+        profile: |x| (0.5 + 0.1 * (x * 12.0).sin(), 0.5 + 0.4 * triangle_wave(x * 3.0)), make: |_, _| Operation::Sharpen },
     Row { tool: ToolOperation::Flatten, name: "Flatten", help: "Makes a plane, as the surface lies", needs: &[Strength, Falloff],
         profile: |x| (0.2 + 0.6 * x + 0.15 * (x * 14.0).sin(), 0.2 + 0.6 * x),
         make: |_, hit| Operation::Flatten { point: hit.position, normal: hit.normal } },
@@ -98,22 +98,22 @@ pub(super) const OPERATIONS: &[Row] = &[
         make: |tool, _| Operation::Terrace { step: tool.step, base: 0.0 } },
 ];
 
-/// Half an ellipse in the middle.
+/// A half ellipse in the middle.
 fn bowl(x: f32) -> f32 {
     (1.0 - ((x - 0.5) / 0.32).powi(2)).max(0.0).sqrt()
 }
 
-/// A soft hill in the middle.
+/// A Gaussian bell curve in the middle.
 fn bell(x: f32) -> f32 {
     (-((x - 0.5) / 0.18).powi(2)).exp()
 }
 
-/// Teeth between -1 and 1, one for each whole number.
-fn saw(x: f32) -> f32 {
+/// A triangle wave between -1 and 1, of period 1.
+fn triangle_wave(x: f32) -> f32 {
     ((x - x.floor()) * 4.0 - 2.0).abs() - 1.0
 }
 
-/// The tool's image over its radius, lying as the tool does.
+/// A stamp of the tool's image, as large as the tool and oriented like it.
 fn stamp(tool: &BrushTool, hit: &TerrainHit) -> Operation {
     let (size, turn) = (Vec2::splat(2.0 * tool.width()), Quat::from_rotation_y(tool.turn.to_radians()));
     let tilt = Quat::from_rotation_arc(Vec3::Y, tool.axis(hit));
@@ -126,7 +126,7 @@ fn stamp(tool: &BrushTool, hit: &TerrainHit) -> Operation {
 }
 
 impl ToolOperation {
-    /// All of them, in the panel's order.
+    /// All operations, in the panel's order.
     pub fn all() -> impl Iterator<Item = Self> {
         OPERATIONS.iter().map(|row| row.tool)
     }

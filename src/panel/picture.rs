@@ -1,4 +1,4 @@
-//! Pictures of what the camera with the panel sees.
+//! Screenshots of the camera that draws the panel.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -13,24 +13,24 @@ use image::ImageFormat;
 
 use super::state::{BurrowPanel, Note};
 
-/// Pictures of one folder that are numbered; when all are there, there are no more.
-const MOST: u32 = 9999;
+/// Maximum number of pictures in a folder.
+const MAX_PICTURES: u32 = 9999;
 
-/// What the panel says while it waits for a picture.
-const TAKING: &str = "taking a picture ...";
+/// Note that is shown until a picture is captured.
+const CAPTURING_NOTE: &str = "taking a picture ...";
 
-/// How many frames a picture may be waited for; most come after a few.
-const PATIENCE: u32 = 300;
+/// How many frames to wait for a picture. Most are captured after a few.
+const MAX_WAIT_FRAMES: u32 = 300;
 
-/// A picture that the panel asked for.
+/// Marks a screenshot that the panel requested.
 #[derive(Component)]
-pub(super) struct Asked;
+pub(super) struct RequestedPicture;
 
-/// Pictures on their way to the disk.
+/// Tasks that write pictures to disk.
 #[derive(Resource, Default)]
 pub(super) struct Saving(Vec<Task<io::Result<PathBuf>>>);
 
-/// Asks for a picture of a camera's target, and saves it in a task when it comes.
+/// Takes a screenshot of a camera's target. When it is captured, a task saves it.
 pub(super) fn save(commands: &mut Commands, panel: &mut BurrowPanel, target: Option<&RenderTarget>) {
     let screenshot = match target {
         Some(RenderTarget::Image(image)) => Screenshot::image(image.handle.clone()),
@@ -41,16 +41,16 @@ pub(super) fn save(commands: &mut Commands, panel: &mut BurrowPanel, target: Opt
             return;
         }
     };
-    panel.note = Some(Note::Busy(TAKING.into()));
+    panel.note = Some(Note::Busy(CAPTURING_NOTE.into()));
     let folder = panel.pictures.clone();
-    let develop = move |mut shot: On<ScreenshotCaptured>, mut saving: ResMut<Saving>| {
+    let save_captured = move |mut shot: On<ScreenshotCaptured>, mut saving: ResMut<Saving>| {
         let (image, folder) = (std::mem::take(&mut shot.image), folder.clone());
         saving.0.push(IoTaskPool::get().spawn(async move { write(image, &folder) }));
     };
-    commands.spawn((screenshot, Asked)).observe(develop);
+    commands.spawn((screenshot, RequestedPicture)).observe(save_captured);
 }
 
-/// Says what became of pictures.
+/// Reports which pictures were saved or failed.
 pub(super) fn finish(mut saving: ResMut<Saving>, mut panel: ResMut<BurrowPanel>) {
     if saving.0.is_empty() {
         return;
@@ -65,24 +65,24 @@ pub(super) fn finish(mut saving: ResMut<Saving>, mut panel: ResMut<BurrowPanel>)
     });
 }
 
-/// Waits no longer for a picture that does not come, as of a window that is gone.
+/// Stops waiting for a picture that is never captured, such as one of a closed window.
 pub(super) fn give_up(
     mut commands: Commands,
     mut panel: ResMut<BurrowPanel>,
     saving: Res<Saving>,
-    asked: Query<Entity, (With<Asked>, Without<Capturing>)>,
+    requested: Query<Entity, (With<RequestedPicture>, Without<Capturing>)>,
     mut waited: Local<u32>,
 ) {
-    let is_waiting = matches!(&panel.note, Some(Note::Busy(text)) if text == TAKING);
+    let is_waiting = matches!(&panel.note, Some(Note::Busy(text)) if text == CAPTURING_NOTE);
     *waited = if is_waiting && saving.0.is_empty() { *waited + 1 } else { 0 };
-    if *waited > PATIENCE {
+    if *waited > MAX_WAIT_FRAMES {
         panel.note = Some(Note::Bad("no picture came".into()));
-        // Not those that Bevy has begun: it looks for them when they come after all, and they are saved then.
-        asked.iter().for_each(|picture| commands.entity(picture).try_despawn());
+        // Keep those that Bevy is capturing: it still looks for the entity, and a late picture is saved.
+        requested.iter().for_each(|picture| commands.entity(picture).try_despawn());
     }
 }
 
-/// Writes a picture into a folder, which is made if it is not there, under the first free name.
+/// Writes a picture to a folder under the first free name. Creates the folder if necessary.
 fn write(image: Image, folder: &Path) -> io::Result<PathBuf> {
     let picture = image.try_into_dynamic().map_err(io::Error::other)?.into_rgb8();
     fs::create_dir_all(folder)?;
@@ -92,7 +92,7 @@ fn write(image: Image, folder: &Path) -> io::Result<PathBuf> {
     match written.and_then(|()| file.flush()) {
         Ok(()) => Ok(path),
         Err(error) => {
-            // A torn picture is none.
+            // Leave no incomplete file.
             drop(file);
             let _ = fs::remove_file(&path);
             Err(error)
@@ -100,16 +100,16 @@ fn write(image: Image, folder: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// A new file under the first free name of a folder.
+/// Creates a file under the first free name of a folder.
 fn create(folder: &Path) -> io::Result<(PathBuf, File)> {
-    for number in 1..=MOST {
+    for number in 1..=MAX_PICTURES {
         let path = folder.join(format!("burrow_{number:04}.png"));
         match File::create_new(&path) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             file => return Ok((path, file?)),
         }
     }
-    Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{MOST} pictures are there already")))
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{MAX_PICTURES} pictures are there already")))
 }
 
 #[cfg(test)]
@@ -141,8 +141,8 @@ mod tests {
         fs::remove_file(&file).expect("removed");
     }
 
-    /// What the panel says at last of a picture that it asks for and that does not come.
-    fn last_word(is_begun: bool) -> (Option<Note>, usize) {
+    /// The final note about a picture that is never captured, and how many screenshots are left.
+    fn final_note(is_begun: bool) -> (Option<Note>, usize) {
         let mut app = App::new();
         app.init_resource::<BurrowPanel>().init_resource::<Saving>().add_systems(Update, (finish, give_up));
         let mut panel = BurrowPanel::default();
@@ -154,10 +154,10 @@ mod tests {
             let picture = pictures.single(app.world()).expect("asked for");
             app.world_mut().entity_mut(picture).insert(Capturing);
         }
-        for frame in 0..PATIENCE {
+        for frame in 0..MAX_WAIT_FRAMES {
             app.update();
             let note = &app.world().resource::<BurrowPanel>().note;
-            assert_eq!(*note, Some(Note::Busy(TAKING.into())), "after {frame} frames");
+            assert_eq!(*note, Some(Note::Busy(CAPTURING_NOTE.into())), "after {frame} frames");
         }
         app.update();
         let note = app.world().resource::<BurrowPanel>().note.clone();
@@ -167,8 +167,8 @@ mod tests {
     #[test]
     fn a_picture_that_does_not_come_is_given_up() {
         let given_up = Some(Note::Bad("no picture came".into()));
-        assert_eq!(last_word(false), (given_up.clone(), 0));
-        assert_eq!(last_word(true), (given_up, 1), "Bevy may have it in hand");
+        assert_eq!(final_note(false), (given_up.clone(), 0));
+        assert_eq!(final_note(true), (given_up, 1), "Bevy may have it in hand");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Small plots: a line of the latest values, and a bar of parts.
+//! Small plots: a line chart of the latest values, and a stacked bar.
 
 use std::collections::VecDeque;
 
@@ -7,10 +7,10 @@ use bevy_egui::egui::{Align2, Color32, CornerRadius, FontId, Pos2, Rect, Sense, 
 use super::theme::{BRIGHT, FAINT, SLATE};
 use super::widgets::note;
 
-/// Values that a line keeps.
+/// Number of values in a line chart.
 const KEPT: usize = 180;
 
-/// The latest values of something, one for each frame or event.
+/// The latest values of a line chart, one per frame or event.
 #[derive(Clone, Debug, Default)]
 pub struct Line(VecDeque<f32>);
 
@@ -27,8 +27,8 @@ impl Line {
     }
 }
 
-/// Draws values from left to right over the full width, the newest at the right; 0 is at the bottom, and the top is the
-/// largest value or `least_top`. Says `label` at the left and `now` at the right.
+/// Draws a line chart over the full width, the newest value at the right. The vertical range is from 0 to the
+/// largest value or `least_top`. Shows `label` at the left and `now` at the right.
 pub fn line(
     ui: &mut Ui,
     values: impl ExactSizeIterator<Item = f32>,
@@ -53,7 +53,7 @@ pub fn line(
             Pos2::new(start + step * at as f32, inner.bottom() - inner.height() * 0.52 * value / top)
         })
         .collect();
-    // The area below, as one thin line for each value: exact whatever the shape.
+    // Fill the area below with one thin line per value, since it need not be convex.
     for point in &points {
         painter.vline(
             point.x,
@@ -69,7 +69,7 @@ pub fn line(
     painter.text(Pos2::new(rect.right() - 7.0, rect.top() + 4.0), Align2::RIGHT_TOP, now, small, BRIGHT);
 }
 
-/// Draws parts of a whole side by side.
+/// Draws a stacked bar.
 pub fn parts(ui: &mut Ui, parts: &[(usize, Color32)]) {
     let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 8.0), Sense::hover());
     let painter = ui.painter_at(rect);

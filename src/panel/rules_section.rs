@@ -1,4 +1,4 @@
-//! What brushes may do to the chosen terrain: digging rules, loose pieces.
+//! Sections for the chosen terrain's digging rules and loose pieces.
 
 use bevy_egui::egui::{Color32, RichText, Ui};
 
@@ -9,7 +9,7 @@ use crate::ground::MaterialId;
 use crate::plugin::LooseGround;
 use crate::volume::DiggingRules;
 
-/// Draws both sections; `material` is the one whose hardness is shown.
+/// Draws both sections. `material` is the index of the material whose rules are shown.
 pub fn show(
     ui: &mut Ui,
     controls: &mut TerrainControls,
@@ -35,7 +35,7 @@ fn rules(
     if let Some(bedrock) = &mut rules.bedrock {
         let mut height = *bedrock as f32 * voxel;
         let below = slider(ui, "Below", &mut height, -128.0..=256.0, metres);
-        // Only then: not every height comes back from metres as it was.
+        // Write only on change, as not every height survives the conversion to metres.
         if below.on_hover_text("Nothing solid below this height is taken away").changed() {
             *bedrock = (height / voxel).round() as i32;
         }

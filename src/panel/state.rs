@@ -1,4 +1,4 @@
-//! What the panel shows and where the pointer is: resources and run conditions.
+//! Resources and run conditions: what the panel shows, and whether it uses the input.
 
 use std::path::PathBuf;
 
@@ -8,33 +8,33 @@ use bevy_egui::EguiContext;
 
 use crate::terrain::World;
 
-/// The panel itself; [`BrushTool`](super::BrushTool) holds what it sets.
+/// The state of the panel. [`BrushTool`](super::BrushTool) holds the brush that it edits.
 #[derive(Resource, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct BurrowPanel {
-    /// Is it shown?
+    /// Whether the panel is shown.
     pub is_open: bool,
-    /// The left column: the brush.
+    /// Whether the left column, the brush, is shown.
     pub shows_brush: bool,
-    /// The right column: terrain and figures.
+    /// Whether the right column, terrain and statistics, is shown.
     pub shows_world: bool,
-    /// The terrain that the right column is about; the first one without, or when it is gone.
+    /// The terrain that the right column shows. Without one, or if it is gone, that is the first terrain.
     pub terrain: Option<Entity>,
-    /// What materials are called, by id. The panel offers these; their colours are those of the terrain's
-    /// [`MaterialColors`](crate::plugin::MaterialColors).
+    /// Names of the materials by id. The panel offers these materials; the terrain's
+    /// [`MaterialColors`](crate::plugin::MaterialColors) give their colours.
     pub materials: Vec<String>,
-    /// Where pictures are saved, as `burrow_0001.png` and so on.
+    /// Folder in which pictures are saved, as `burrow_0001.png` and so on.
     pub pictures: PathBuf,
-    /// The material whose hardness is shown.
+    /// Index of the material whose rules are shown.
     pub(super) material: usize,
-    /// What the panel has to say: the last seam check, the last picture.
+    /// The current message: the last seam check or picture.
     pub(super) note: Option<Note>,
     /// Why the last brush was rejected, if it was.
     pub(super) rejection: Option<String>,
 }
 
 impl Default for BurrowPanel {
-    /// Open, with the materials of the plugin's own look of the ground.
+    /// Open, with the materials of the plugin's default ground look.
     fn default() -> Self {
         let names = [
             "Rock",
@@ -64,29 +64,30 @@ impl Default for BurrowPanel {
     }
 }
 
-/// A line that the panel shows.
+/// A message in the panel.
 #[derive(Reflect, Clone, Debug, PartialEq, Eq)]
 pub(super) enum Note {
     Good(String),
     Bad(String),
     Busy(String),
-    /// What a seam check found.
+    /// The result of a seam check.
     Seams(Verdict),
 }
 
-/// What a seam check found: of a terrain as it was then.
+/// The result of a seam check of a terrain at one revision.
 #[derive(Reflect, Clone, Debug, PartialEq, Eq)]
 pub(super) struct Verdict {
     pub terrain: Entity,
     pub revision: u64,
-    /// Of the world that was checked.
+    /// Hash of the world that was checked.
     pub hash: u64,
     pub is_flawless: bool,
     pub text: String,
 }
 
 impl Verdict {
-    /// What it says of a terrain: nothing of another one, and of one that has changed since, when that was.
+    /// The text for a terrain. `None` for another terrain than the checked one. Names the revision if the terrain
+    /// has changed since.
     pub fn about(&self, terrain: Entity, world: &World) -> Option<String> {
         if terrain != self.terrain {
             return None;
@@ -96,54 +97,56 @@ impl Verdict {
     }
 }
 
-/// A button of the panel. Games may send these too, from keys say.
+/// A button of the panel. Games may send these messages too, for example on key presses.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PanelAction {
-    /// Looks at every triangle of the terrain, in a task, and shows whether all seams are closed.
+    /// Checks in a task that all seams of the terrain are closed, and shows the result.
     CheckSeams,
     /// Undoes the last transaction of the terrain.
     Undo,
-    /// Does again what was undone last.
+    /// Redoes the transaction that was undone last.
     Redo,
-    /// Saves what the camera with the panel sees, the panel included.
+    /// Saves a screenshot of the camera that draws the panel, including the panel.
     SavePicture,
 }
 
-/// Does the panel, or anything else of egui, have the pointer or the keyboard in this frame? Contexts of all cameras count.
-/// Known from `PreUpdate` on.
+/// Whether the panel, or any other egui context, uses the pointer or the keyboard in this frame. Contexts of all
+/// cameras count. Updated in `PreUpdate`.
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct PanelInput {
-    /// The pointer is over it, or drags something of it.
+    /// The pointer is over a widget or drags one.
     pub has_pointer: bool,
-    /// Something is being typed into it.
+    /// Text is being typed into a widget.
     pub has_keyboard: bool,
 }
 
-/// Where the panel's widgets were drawn in the last frame, by name, in logical pixels from the window's upper left corner.
-/// Of a slider it is the rail, of a section its heading, of a figure its line. Empty while the panel is closed.
+/// Positions of the panel's widgets in the last frame, by name, in logical pixels from the window's upper left
+/// corner. For a slider it is the rail, for a section the heading, for a value its line. Empty while the panel is
+/// closed.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct PanelPlaces(pub HashMap<String, Rect>);
 
-/// Run condition: nothing of egui has the pointer, so that a click means the world. Without the panel it always holds.
+/// Run condition: egui does not use the pointer, so a click is meant for the world. Always true without the panel.
 pub fn pointer_is_free(input: Option<Res<PanelInput>>) -> bool {
     input.is_none_or(|input| !input.has_pointer)
 }
 
-/// Run condition: nothing is being typed into egui, so that a key means the game. Without the panel it always holds.
+/// Run condition: no text is typed into egui, so keys are meant for the game. Always true without the panel.
 pub fn keyboard_is_free(input: Option<Res<PanelInput>>) -> bool {
     input.is_none_or(|input| !input.has_keyboard)
 }
 
-/// Asks egui, each of its contexts, after it has read the frame's input and before anyone acts on it.
+/// Reads whether any egui context uses the input. Runs after egui has processed the frame's input and before
+/// systems that act on it.
 pub(super) fn read_input(mut contexts: Query<&mut EguiContext>, mut input: ResMut<PanelInput>) {
     let mut now = PanelInput::default();
     for mut context in &mut contexts {
         let context = context.get_mut();
         now.has_pointer |= context.is_pointer_over_egui() || context.egui_is_using_pointer();
-        // A widget that has the focus is not typed into for that.
+        // Keyboard focus alone does not count as typing.
         now.has_keyboard |= context.text_edit_focused();
     }
     input.set_if_neq(now);

@@ -1,4 +1,4 @@
-//! What the right column says about terrains: counted in tasks, so that no frame waits for it.
+//! Collects the statistics of the right column. Terrains are counted in tasks, so that no frame waits.
 
 use std::time::Duration;
 
@@ -11,32 +11,32 @@ use crate::plugin::{BurrowEngine, BurrowFigures, ThreadTask, Threads};
 use crate::surface::SeamReport;
 use crate::terrain::{Memory, Terrain, Version, World};
 
-/// How often a terrain is looked at, and the engine.
+/// How often the terrain and the engine are examined.
 const PERIOD: Duration = Duration::from_millis(500);
 
-/// What was counted of the terrain that the panel is about.
+/// Statistics of the chosen terrain.
 #[derive(Clone, Debug, Default)]
 pub struct Counts {
     pub fields: usize,
     pub chunks: usize,
     pub bricks: usize,
-    /// Cells that marching cubes draws.
+    /// Cells that are meshed by marching cubes.
     pub cells: usize,
     pub memory: Memory,
     pub hash: u64,
 }
 
-/// The figures on the panel.
+/// All statistics on the panel.
 #[derive(Resource, Default)]
 pub struct Survey {
-    /// Whose counts these are, and of which commit.
+    /// The terrain and the commit that `counts` belong to.
     of: Option<(Entity, Version)>,
     counting: Option<(Entity, Version, ThreadTask<Counts>)>,
     since: Duration,
     pub counts: Option<Counts>,
-    /// The engine: its state, stages on processor and card, the last choice.
+    /// The engine's state, its stages on CPU and GPU, and its last choice.
     pub engine: Option<(EngineState, [u64; 2], Option<Choice>)>,
-    /// One value for each frame.
+    /// One value per frame.
     pub frame_ms: Line,
     pub swaps: Line,
     pub main_thread_us: Line,
@@ -45,13 +45,13 @@ pub struct Survey {
     last_swaps: u64,
 }
 
-/// The terrain that the panel is about: the chosen one, or else the first.
+/// The terrain that the panel shows: the chosen one, or else the first.
 pub fn chosen(panel: &BurrowPanel, terrains: &Query<(Entity, &Terrain)>) -> Option<Entity> {
     let is_there = |&entity: &Entity| terrains.contains(entity);
     panel.terrain.filter(is_there).or_else(|| terrains.iter().map(|(entity, _)| entity).min())
 }
 
-/// Takes down the figures of a frame.
+/// Records the statistics of a frame.
 pub(super) fn follow_frames(
     time: Res<Time<Real>>,
     figures: Res<BurrowFigures>,
@@ -67,7 +67,7 @@ pub(super) fn follow_frames(
     survey.main_thread_us.push(figures.main_thread.as_secs_f32() * 1e6);
 }
 
-/// Counts what the chosen terrain holds, in a task, when it has changed and at most twice a second.
+/// Counts the content of the chosen terrain in a task, if it has changed, and at most twice a second.
 pub(super) fn count_terrain(
     time: Res<Time<Real>>,
     panel: Res<BurrowPanel>,
@@ -115,11 +115,11 @@ fn count(world: &World) -> Counts {
     }
 }
 
-/// A seam check under way.
+/// A running seam check.
 #[derive(Resource)]
 pub(super) struct SeamCheck(ThreadTask<Verdict>);
 
-/// Starts a check of a terrain as it is now.
+/// Starts a seam check of a snapshot of the terrain.
 pub(super) fn start_seam_check(
     commands: &mut Commands,
     panel: &mut BurrowPanel,
@@ -132,7 +132,7 @@ pub(super) fn start_seam_check(
     commands.insert_resource(SeamCheck(task));
 }
 
-/// Says what a check found.
+/// Reports the result of a seam check.
 pub(super) fn finish_seam_check(
     mut commands: Commands,
     check: Option<ResMut<SeamCheck>>,

@@ -1,4 +1,4 @@
-//! The settings of a terrain that the panel changes.
+//! Settings of a terrain that the panel can change.
 
 use bevy::ecs::system::Commands;
 use bevy::log::warn;
@@ -9,11 +9,11 @@ use crate::terrain::Terrain;
 use crate::view::GroundLook;
 use crate::volume::DiggingRules;
 
-/// The settings of a terrain.
+/// The settings that the panel shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TerrainControls {
     pub rules: DiggingRules,
-    /// Most bytes of undo history.
+    /// Maximum size of the undo history, in bytes.
     pub undo_budget: usize,
     pub loose: Option<LooseGround>,
     pub look: Option<GroundLook>,
@@ -26,7 +26,7 @@ impl TerrainControls {
         Self { rules, undo_budget, loose: loose.copied(), look: look.cloned() }
     }
 
-    /// Applies what differs from `before` to the terrain.
+    /// Applies the settings that differ from `before` to the terrain.
     pub fn apply(self, before: &Self, entity: Entity, commands: &mut Commands) {
         let Ok(mut terrain) = commands.get_entity(entity) else { return };
         if self.loose != before.loose {

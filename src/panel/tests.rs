@@ -1,4 +1,4 @@
-//! The panel on a screen of its own, without an app.
+//! Tests of the panel on a simulated screen, mostly without an app.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use crate::ground::{Ground, MaterialId};
 use crate::plugin::TerrainHit;
 use crate::terrain::{Applied, Receipt, Rejection, TerrainSettings};
 
-/// The panel on a screen of its own, without an app.
+/// A simulated screen with the panel, without an app.
 struct Screen {
     context: egui::Context,
     size: Vec2,
@@ -113,7 +113,7 @@ impl Screen {
         self.frame(vec![Self::button(at, false)]);
     }
 
-    /// Drags a slider beyond its lower or its upper end.
+    /// Drags a slider past its lower or upper end.
     fn drag(&mut self, name: &str, is_up: bool) {
         let (from, rail) = (self.middle(name), self.places.0[name]);
         let to = Pos2::new(if is_up { rail.max.x + 30.0 } else { rail.min.x - 30.0 }, from.y);
@@ -274,7 +274,7 @@ fn egui_has_the_pointer_over_a_column_only() {
 #[test]
 fn tab_is_left_to_the_game() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
-    // The last widgets are sliders with numbers that could be typed.
+    // The last widgets are sliders with numbers that can be typed.
     let at = screen.middle("Settings");
     screen.click(at);
     screen.frame(Vec::new());
@@ -378,7 +378,7 @@ fn a_rejection_is_seen_until_a_brush_is_accepted() {
         (Ok(Applied::default()), false),
     ] {
         app.world_mut().write_message(BrushApplied { terrain: None, receipt: Receipt { tag: 0, outcome } });
-        // Until something else is heard.
+        // The message stays until there is another result.
         for _ in 0..3 {
             app.update();
             screen.panel = app.world().resource::<BurrowPanel>().clone();
@@ -388,7 +388,7 @@ fn a_rejection_is_seen_until_a_brush_is_accepted() {
     }
 }
 
-/// Does the panel know of a rejection after a frame, in which one of these terrains rejects a brush?
+/// Whether the panel shows a rejection after a frame in which this terrain, if any, rejects a brush.
 fn is_rejected(app: &mut App, by: Option<Entity>) -> bool {
     if by.is_some() {
         let receipt = Receipt { tag: 0, outcome: Err(Rejection::OutsideWorld) };
@@ -431,7 +431,7 @@ fn history_is_that_of_the_chosen_terrain() {
     screen.frame(Vec::new());
     assert!(!screen.places.0.contains_key("History"), "there is no terrain");
     let mut screen = Screen::new(1280.0, 1600.0, 1);
-    // No whole number of MiB.
+    // Not a whole number of MiB.
     let odd = (5 << 20) + 123;
     screen.controls.undo_budget = odd;
     let at = screen.middle("Settings");
@@ -444,7 +444,7 @@ fn history_is_that_of_the_chosen_terrain() {
     assert_eq!(screen.controls.undo_budget, 0);
 }
 
-/// An app with as much of the panel as draws it, and what it is drawn in.
+/// An app with the systems that draw the panel, and its egui context.
 fn app_and_context() -> (App, egui::Context) {
     let mut app = App::new();
     app.init_resource::<BrushTool>()
@@ -462,7 +462,7 @@ fn app_and_context() -> (App, egui::Context) {
     (app, context)
 }
 
-/// Where widgets are after some frames.
+/// Positions of the widgets after some frames.
 fn places_in<'a>(app: &'a mut App, context: &egui::Context) -> &'a PanelPlaces {
     for _ in 0..3 {
         let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 1600.0));
@@ -503,7 +503,7 @@ fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
         .add_message::<PanelAction>()
         .add_message::<Undo>()
         .add_message::<Redo>()
-        .add_systems(Update, (act, survey::finish_seam_check).chain());
+        .add_systems(Update, (perform_actions, survey::finish_seam_check).chain());
     let [checked, other] = [(); 2].map(|()| app.world_mut().spawn(flat()).id());
     app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(checked);
     app.world_mut().write_message(PanelAction::CheckSeams);
@@ -534,7 +534,7 @@ fn what_a_seam_check_found_is_said_of_the_ground_that_was_checked() {
 fn any_context_of_egui_may_have_the_pointer() {
     let mut app = App::new();
     app.init_resource::<PanelInput>().add_systems(Update, state::read_input);
-    // Of another camera than the panel's.
+    // The context of another camera than the panel's.
     let camera = app.world_mut().spawn(EguiContext::default()).id();
     let mut camera = app.world_mut().entity_mut(camera);
     let context = camera.get_mut::<EguiContext>().expect("it is there").get_mut().clone();

@@ -1,4 +1,5 @@
-//! How the panel looks: colours, spacing, text. Only the panel's own widgets have it; a game's egui keeps its own.
+//! The look of the panel: colours, spacing, text. It only applies to the panel's own widgets; a game's egui style
+//! is unchanged.
 
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use bevy_egui::egui::{
 
 /// Width of a column.
 pub const COLUMN: f32 = 272.0;
-/// From the window's rim to a column.
+/// Distance from the window's border to a column.
 pub const GAP: f32 = 12.0;
 
 const NIGHT: Color32 = Color32::from_rgb(23, 26, 31);
@@ -19,12 +20,12 @@ const EDGE: Color32 = Color32::from_rgb(58, 65, 76);
 pub const TEXT: Color32 = Color32::from_rgb(216, 220, 226);
 pub const FAINT: Color32 = Color32::from_rgb(134, 143, 156);
 pub const BRIGHT: Color32 = Color32::from_rgb(250, 251, 252);
-/// Ochre: what is chosen.
+/// Ochre, for the chosen option.
 pub const ACCENT: Color32 = Color32::from_rgb(232, 163, 61);
 pub const GOOD: Color32 = Color32::from_rgb(118, 196, 122);
 pub const BAD: Color32 = Color32::from_rgb(232, 100, 88);
 pub const BLUE: Color32 = Color32::from_rgb(92, 160, 224);
-/// For parts of a whole, in order.
+/// Colours of the parts of a stacked bar, in order.
 pub const PARTS: [Color32; 6] = [
     Color32::from_rgb(126, 104, 84),
     Color32::from_rgb(232, 163, 61),
@@ -34,7 +35,7 @@ pub const PARTS: [Color32; 6] = [
     Color32::from_rgb(224, 122, 140),
 ];
 
-/// Of materials that a terrain's colours do not reach: soil, sandstone, shale, gravel.
+/// Colours of further materials that the terrain does not define: soil, sandstone, shale, gravel.
 pub const MORE_MATERIALS: [Color32; 4] = [
     Color32::from_rgb(96, 70, 48),
     Color32::from_rgb(178, 134, 92),
@@ -52,7 +53,7 @@ pub fn card() -> Frame {
         .shadow(Shadow { offset: [0, 4], blur: 16, spread: 0, color: Color32::from_black_alpha(90) })
 }
 
-/// The style of everything in a column.
+/// The style of all widgets in a column.
 pub fn style() -> Arc<Style> {
     let mut style = Style::default();
     let font = |size| FontId::new(size, FontFamily::Proportional);

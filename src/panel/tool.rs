@@ -10,7 +10,8 @@ use crate::brush::{Brush, FULL_POWER, Roughness, Shape};
 use crate::ground::{GreyImage, MaterialId};
 use crate::plugin::TerrainHit;
 
-/// The current brush, in metres of world space. The panel changes it, and so may the game; the game turns it into brushes:
+/// The current brush, in metres of world space. The panel and the game may change it. The game turns it into
+/// brushes:
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -30,31 +31,32 @@ pub struct BrushTool {
     pub operation: ToolOperation,
     /// The shape.
     pub shape: ToolShape,
-    /// Radius of all shapes but boxes; of a torus, from its centre to the centre of its tube.
+    /// Radius of all shapes except boxes. For a torus, the distance from its centre to the centre of the tube.
     pub radius: f32,
-    /// Radius of a torus' tube, limited to `radius`.
+    /// Radius of a torus's tube, limited to `radius`.
     pub tube: f32,
-    /// Half sizes of a box.
+    /// Half extents of a box.
     pub half: Vec3,
-    /// Length of cylinders and cones; of capsules, the distance between the centres of their ends.
+    /// Length of cylinders and cones. For capsules, the distance between the centres of the two ends.
     pub length: f32,
     /// The direction of its axis.
     pub align: ToolAlign,
-    /// Rotation about its axis, in degrees; only boxes show it.
+    /// Rotation about its axis in degrees. Only affects boxes.
     pub turn: f32,
-    /// How deep it is placed: -1 on the ground, 0 half in it, 1 below the surface.
+    /// How deep it is placed: at -1 it rests on the ground, at 0 its centre is on the surface, at 1 it is just
+    /// below the surface.
     pub sink: f32,
-    /// The [`MaterialId`] that it adds or paints.
+    /// The [`MaterialId`] to add or paint.
     pub material: u8,
-    /// Whether sculpting makes new ground of that material too, instead of the one below.
+    /// Whether ground that sculpting adds also has that material, instead of the one below.
     pub is_of_material: bool,
-    /// Strength of one stroke, 0 to 1, for sculpting.
+    /// Sculpting only: strength of one stroke, 0 to 1.
     pub strength: f32,
-    /// Metres from its border inwards over which it fades in, for sculpting.
+    /// Sculpting only: width in metres over which the effect fades in, from the border inwards.
     pub falloff: f32,
-    /// Metres by which it raises or lowers, or the height of a stamp.
+    /// Metres to raise or lower, or the height of a stamp.
     pub amount: f32,
-    /// The height for levelling, in metres of world space.
+    /// Target height for levelling, in metres of world space.
     pub level: f32,
     /// Height of terraces, in metres.
     pub step: f32,
@@ -63,15 +65,15 @@ pub struct BrushTool {
     pub stamp: StampImage,
     /// Power against the hardness of materials, see [`Brush::power`]; 255 digs everything.
     pub power: u8,
-    /// Whether its surface has bumps.
+    /// Whether its surface is rough.
     pub is_rough: bool,
-    /// Height of the bumps.
+    /// Height of the bumps, in metres.
     pub bump: f32,
-    /// Width of the bumps.
+    /// Width of the bumps, in metres.
     pub bump_width: f32,
     /// Seed of the bumps.
     pub seed: u32,
-    /// Brushes per second while a button is held, for the game's timer.
+    /// Brushes per second while a button is held. The game's timer uses it.
     pub rate: f32,
 }
 
@@ -105,10 +107,10 @@ impl Default for BrushTool {
     }
 }
 
-/// The image of a [`BrushTool`]'s stamp, white is high. The default is a mountain with ridges.
+/// The image of a [`BrushTool`]'s stamp; white is high. The default is a mountain with ridges.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StampImage {
-    /// The heights, 2 to 256 samples a side; other images make brushes that are rejected.
+    /// Heights with 2 to 256 samples per side. Brushes with other images are rejected.
     pub image: Option<Arc<GreyImage>>,
     /// The name of the image in the panel.
     pub name: Option<Name>,
@@ -120,7 +122,7 @@ impl StampImage {
         Self { image: Some(image.into()), name: Some(name.into()) }
     }
 
-    /// The label in the panel: the image's name, or else its size.
+    /// The label in the panel: the image's name, or its size without one.
     pub(super) fn label(&self) -> String {
         match (&self.image, &self.name) {
             (None, _) => "Ridge".into(),
@@ -179,18 +181,18 @@ pub enum ToolAlign {
 }
 
 impl ToolShape {
-    /// All of them, in the panel's order.
+    /// All shapes, in the panel's order.
     pub const ALL: [Self; 6] =
         [Self::Sphere, Self::Box, Self::Cylinder, Self::Capsule, Self::Cone, Self::Torus];
 
-    /// Whether it has a length.
+    /// Whether `length` applies.
     pub fn is_long(self) -> bool {
         matches!(self, Self::Cylinder | Self::Capsule | Self::Cone)
     }
 }
 
 impl BrushTool {
-    /// The brush for a place on the ground, in world space.
+    /// The brush for a position on the ground, in world space.
     pub fn brush_at(&self, hit: &TerrainHit) -> Brush {
         let row = self.operation.row();
         let mut brush = Brush::dig(self.shape_at(hit));
@@ -204,13 +206,13 @@ impl BrushTool {
         if self.is_of_material { brush.with_material(self.material_id()) } else { brush }
     }
 
-    /// The shape of that brush, for a preview.
+    /// The shape of [`brush_at`](Self::brush_at), for a preview.
     pub fn shape_at(&self, hit: &TerrainHit) -> Shape {
         let axis = self.axis(hit);
         self.shape_around(hit.position - axis * self.sink * self.reach(), axis)
     }
 
-    /// The shape around its middle.
+    /// The shape around its centre.
     pub(super) fn shape_around(&self, middle: Vec3, axis: Vec3) -> Shape {
         let end = middle - axis * self.length / 2.0;
         match self.shape {
@@ -226,7 +228,7 @@ impl BrushTool {
         }
     }
 
-    /// The direction of its axis at a place.
+    /// The direction of its axis at this position.
     pub(super) fn axis(&self, hit: &TerrainHit) -> Vec3 {
         match self.align {
             ToolAlign::Upright => Vec3::Y,
@@ -234,22 +236,22 @@ impl BrushTool {
         }
     }
 
-    /// The distance from its centre to its side.
+    /// Half of its largest horizontal extent.
     pub(super) fn width(&self) -> f32 {
         if self.shape == ToolShape::Box { self.half.x.max(self.half.z) } else { self.radius }
     }
 
-    /// The material that it adds or paints.
+    /// The material to add or paint.
     pub fn material_id(&self) -> MaterialId {
         MaterialId(self.material)
     }
 
-    /// The bumps on its surface.
+    /// The roughness of its surface, if any.
     pub fn roughness(&self) -> Option<Roughness> {
         self.is_rough.then(|| Roughness::new(self.bump, self.bump_width, self.seed))
     }
 
-    /// The distance from its centre to its end along its axis.
+    /// Half extent along its axis.
     fn reach(&self) -> f32 {
         match self.shape {
             ToolShape::Sphere => self.radius,
@@ -260,8 +262,8 @@ impl BrushTool {
         }
     }
 
-    /// Scales its radius, or the size of a box, within the range of the panel's sliders on a terrain of this voxel size; for a
-    /// mouse wheel.
+    /// Scales its radius, or the size of a box, within the range of the panel's sliders for this voxel size. Useful
+    /// for a mouse wheel.
     pub fn grow(&mut self, factor: f32, voxel_size: f32) {
         let range = RADIUS.range(voxel_size);
         let grow = |size: f32| (size * factor).clamp(*range.start(), *range.end());
@@ -309,7 +311,7 @@ mod tests {
             ..BrushTool::default()
         };
         let brush = tool.brush_at(&hit());
-        // All of it in the ground: its far end lies where the ray met the surface.
+        // It is completely in the ground: its far end is where the ray hit the surface.
         let Shape::Cylinder(Cylinder { base, axis, radius }) = brush.shape else { panic!("a cylinder") };
         assert_eq!((base, axis, radius), (Vec3::new(4.0, 20.0, 30.0), Vec3::X * 6.0, 2.0));
         assert_eq!(brush.operation, Operation::Add { material: MaterialId(7) });

@@ -1,4 +1,4 @@
-//! The panel's own widgets: sections, tiles with icons, sliders with names, lines of figures.
+//! The panel's own widgets: collapsible sections, tiles with icons, labelled sliders, lines of text.
 
 use std::ops::RangeInclusive;
 
@@ -10,11 +10,11 @@ use bevy_egui::egui::{
 use super::PanelPlaces;
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
 
-/// Where widgets were drawn in this frame.
+/// Positions of the widgets drawn in this frame.
 #[derive(Clone, Default)]
 struct Drawn(PanelPlaces);
 
-/// Notes where a widget is, if it can be seen.
+/// Records the position of a widget if it is visible.
 pub fn note(ui: &Ui, name: &str, rect: Rect) {
     if !ui.is_rect_visible(rect) {
         return;
@@ -26,12 +26,12 @@ pub fn note(ui: &Ui, name: &str, rect: Rect) {
     });
 }
 
-/// Where this frame's widgets are.
+/// Takes the positions of this frame's widgets.
 pub fn places(context: &Context) -> PanelPlaces {
     context.data_mut(|data| std::mem::take(data.get_temp_mut_or_default::<Drawn>(Id::NULL))).0
 }
 
-/// A heading that opens and closes what follows.
+/// A section whose heading opens and closes it.
 pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl FnOnce(&mut Ui)) {
     let id = Id::new(("burrow section", name));
     let mut is_open = ui.data(|data| data.get_temp(id)).unwrap_or(is_open_at_first);
@@ -61,7 +61,7 @@ pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl Fn
     }
 }
 
-/// Tiles side by side, so many in a row; says which one was clicked.
+/// A grid of tiles with `columns` per row; returns which one was clicked.
 pub fn tiles(
     ui: &mut Ui,
     columns: usize,
@@ -96,7 +96,7 @@ pub fn tiles(
     clicked
 }
 
-/// The ground of a tile; returns the colour of what is on it.
+/// Draws the background of a tile; returns the colour for its content.
 fn frame_tile(ui: &Ui, rect: Rect, response: &Response, is_chosen: bool) -> Color32 {
     let (fill, edge, color) = match (is_chosen, response.hovered()) {
         (true, _) => (ACCENT.gamma_multiply(0.22), ACCENT, BRIGHT),
@@ -107,7 +107,7 @@ fn frame_tile(ui: &Ui, rect: Rect, response: &Response, is_chosen: bool) -> Colo
     color
 }
 
-/// Words side by side, of which one is chosen; says which one was clicked.
+/// A row of text options, one of them chosen; returns which one was clicked.
 pub fn choice(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
     let width = (ui.available_width() - 6.0 * (names.len().max(1) - 1) as f32) / names.len().max(1) as f32;
     let mut clicked = None;
@@ -125,8 +125,8 @@ pub fn choice(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
     clicked
 }
 
-/// Coloured squares, of which one is chosen; says which one was clicked. Names show when hovered; `prefix` goes before
-/// them where places are noted.
+/// A grid of coloured squares, one of them chosen; returns which one was clicked. Names are shown on hover.
+/// Positions are recorded as `prefix` and name.
 pub fn swatches(ui: &mut Ui, prefix: &str, colors: &[(Color32, &str)], chosen: usize) -> Option<usize> {
     const COLUMNS: usize = 8;
     let gap = 5.0;
@@ -154,7 +154,7 @@ pub fn swatches(ui: &mut Ui, prefix: &str, colors: &[(Color32, &str)], chosen: u
     clicked
 }
 
-/// A slider with its name before it.
+/// A labelled slider.
 pub fn slider<N: Numeric>(
     ui: &mut Ui,
     name: &str,
@@ -175,24 +175,24 @@ pub fn slider<N: Numeric>(
     .inner
 }
 
-/// The format of a slider in metres.
+/// Formats a slider in metres.
 pub fn metres(slider: Slider<'_>) -> Slider<'_> {
     slider.fixed_decimals(1).suffix(" m")
 }
 
-/// The format of a slider in hundredths.
+/// Formats a slider in percent.
 pub fn percent(slider: Slider<'_>) -> Slider<'_> {
     slider
         .custom_formatter(|value, _| format!("{:.0} %", value * 100.0))
         .custom_parser(|text| text.trim().trim_end_matches('%').trim().parse::<f64>().ok().map(|v| v / 100.0))
 }
 
-/// A name at the left and a figure at the right.
+/// A label at the left and a value at the right.
 pub fn figure(ui: &mut Ui, name: &str, value: impl Into<String>) {
     figure_in(ui, name, value, BRIGHT);
 }
 
-/// The same in a colour.
+/// The same in this colour.
 pub fn figure_in(ui: &mut Ui, name: &str, value: impl Into<String>, color: Color32) {
     let line = ui.horizontal(|ui| {
         ui.label(RichText::new(name).color(FAINT).size(12.0));
@@ -203,7 +203,7 @@ pub fn figure_in(ui: &mut Ui, name: &str, value: impl Into<String>, color: Color
     note(ui, name, line.response.rect);
 }
 
-/// A switch with its name.
+/// A labelled switch.
 pub fn switch(ui: &mut Ui, name: &str, is_on: &mut bool) -> Response {
     let (rect, mut response) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 20.0), Sense::click());
     if response.clicked() {
@@ -224,7 +224,7 @@ pub fn switch(ui: &mut Ui, name: &str, is_on: &mut bool) -> Response {
     response
 }
 
-/// A button as wide as its share of a row.
+/// A button of this width.
 pub fn button(ui: &mut Ui, text: &str, width: f32, is_enabled: bool) -> Response {
     let response = ui.add_enabled(is_enabled, Button::new(text).min_size(Vec2::new(width, 26.0)));
     note(ui, text, response.rect);
@@ -237,7 +237,7 @@ pub fn share(ui: &Ui, count: usize) -> f32 {
         / count.max(1) as f32
 }
 
-/// Bytes in words.
+/// Formats a size with its unit.
 pub fn bytes(count: usize) -> String {
     let count = count as f64;
     match count {
@@ -248,7 +248,7 @@ pub fn bytes(count: usize) -> String {
     }
 }
 
-/// A count with thin gaps between thousands.
+/// Formats a number with spaces between thousands.
 pub fn count(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
@@ -261,7 +261,7 @@ pub fn count(number: usize) -> String {
     text
 }
 
-/// A time in words.
+/// Formats a duration with its unit.
 pub fn time(time: Option<std::time::Duration>) -> String {
     match time.map(|time| time.as_secs_f64() * 1e3) {
         None => "-".into(),

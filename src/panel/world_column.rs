@@ -1,4 +1,4 @@
-//! The right column: buttons, terrain, figures, memory, engine, settings.
+//! The right column: buttons, terrain, statistics, memory, engine, settings.
 
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Color32, RichText, Ui, Vec2};
@@ -13,14 +13,14 @@ use crate::backend::{Choice, EngineState, Stage};
 use crate::plugin::{BurrowFigures, BurrowSettings, Times};
 use crate::terrain::{History, Terrain};
 
-/// A terrain on the list.
+/// A terrain in the list.
 pub struct TerrainLine<'a> {
     pub entity: Entity,
     pub name: String,
     pub terrain: &'a Terrain,
 }
 
-/// What the column is about.
+/// Data that the column shows and edits.
 pub struct Content<'a> {
     pub terrains: &'a [TerrainLine<'a>],
     pub chosen: Option<Entity>,
@@ -81,7 +81,7 @@ fn buttons(ui: &mut Ui, panel: &BurrowPanel, actions: &mut Vec<PanelAction>, cho
     });
 }
 
-/// What the panel has to say.
+/// Shows the current message.
 fn note(ui: &mut Ui, panel: &BurrowPanel, chosen: Option<&TerrainLine>) {
     let (color, text) = match &panel.note {
         None => return,
@@ -140,7 +140,7 @@ fn live(ui: &mut Ui, figures: &BurrowFigures, survey: &Survey) {
     );
 }
 
-/// The times that half of all, all but 5 % and all but 1 % do not exceed.
+/// The 50th, 95th and 99th percentile.
 fn percentiles(times: &Times) -> String {
     [50, 95, 99].map(|percent| time(times.percentile(percent))).join(", ")
 }
@@ -203,7 +203,7 @@ fn settings(ui: &mut Ui, undo_budget: Option<&mut usize>, settings: &mut BurrowS
     if let Some(bytes) = undo_budget {
         let mut mebibytes = *bytes >> 20;
         let history = slider(ui, "History", &mut mebibytes, 0..=1024, |slider| slider.suffix(" MiB"));
-        // Only then: not every budget is a whole number of them.
+        // Write only on change, as not every budget is a whole number of MiB.
         if history.on_hover_text("What undo may take of memory, on this terrain").changed() {
             *bytes = mebibytes << 20;
         }
