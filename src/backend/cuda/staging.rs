@@ -177,7 +177,7 @@ impl OutputList {
 
     /// Starts to read entries from another device address. They arrive with the next [`Device::wait`].
     pub fn read(&mut self, device: &mut dyn Device, from: u64, entries: usize) -> Result<(), Fault> {
-        // SAFETY: callers give a list of so many entries, and read it after a wait.
+        // SAFETY: callers pass the address of at least this many entries, and read them after a wait.
         unsafe { device.download(from, &mut *self.host, 0..entries * self.entry) }
     }
 

@@ -15,7 +15,7 @@ __device__ inline float quotient(float a, float number, float reciprocal) {
     return copysignf(result, a);
 }
 
-// Normalises a vector; a zero vector gives up. The order of the sum matters for the last bit.
+// Normalises a vector; a zero vector becomes (0, 1, 0). The order of the sum matters for the last bit.
 __device__ inline Vector unit(Vector v) {
     float length = sqrtf(v.x * v.x + v.y * v.y + v.z * v.z);
     if (!(length > 0.0f)) return {0.0f, 1.0f, 0.0f};
