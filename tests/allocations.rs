@@ -1,4 +1,4 @@
-//! How often an edit asks the system for memory: never while it meshes, and a known number of times in all.
+//! Heap allocations of an edit: none while meshing, and a bounded number per transaction.
 
 mod worlds;
 
@@ -10,14 +10,14 @@ use bevy_burrow::surface::block::{Block, Mesher, Parts};
 use bevy_burrow::terrain::World;
 use glam::{IVec3, Vec3};
 
-/// Runs `work`; how often did it ask for memory?
+/// Runs `work` and counts its heap allocations.
 fn count<T>(work: impl FnOnce() -> T) -> (Option<T>, u64) {
     let mut result = None;
     let allocations = measure(|| result = Some(work())).count_total;
     (result, allocations)
 }
 
-/// The blocks of all stored bricks and those around them.
+/// The blocks of all stored bricks and of their neighbours.
 fn blocks(world: &World) -> Vec<Block> {
     let mut bricks: Vec<BrickPos> = world.bricks().map(|(brick, _)| brick).collect();
     bricks.sort_unstable_by_key(|brick| (brick.0.x, brick.0.z, brick.0.y));
@@ -66,7 +66,7 @@ fn an_edit_takes_memory_for_what_it_leaves_behind() {
         Terrain::new(worlds::real_ground(), &TerrainSettings::default()).expect("valid settings");
     let mut most = [0; 2];
     for i in 0..60 {
-        // Six times the same ten holes, a little deeper each time: from the second on, bricks, mask and rings are there.
+        // The same ten holes six times, a little deeper each time: from the second time on, bricks, mask and rings exist.
         let (x, z) = (100 + i % 10 * 40, 200 + i % 10 * 3);
         let height = terrain.world().ground().height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
         let place = Vec3::new(x as f32, height - 0.3 * (i / 10) as f32, z as f32);
@@ -83,6 +83,6 @@ fn an_edit_takes_memory_for_what_it_leaves_behind() {
     println!(
         "the transaction of one radius-4 dig: at most {fresh} allocations on fresh ground, {dug} on dug ground"
     );
-    // A brick and its share of the receipt for each of some thirty bricks, two buffers for each chunk, a few lists.
+    // One brick and its part of the receipt for each of some thirty bricks, two buffers per chunk, and a few lists.
     assert!(fresh <= 175 && dug <= 175, "{fresh} and {dug} allocations");
 }

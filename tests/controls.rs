@@ -1,5 +1,5 @@
-//! Negative controls: each rule of the seam, broken on purpose, tears the surface open. And the oracle: the same rules
-//! written down plainly, cell by cell, draw exactly what the crate draws.
+//! Negative controls: breaking any one seam rule on purpose opens the surface. A reference implementation, which follows
+//! the rules cell by cell, draws exactly what the crate draws.
 
 mod worlds;
 
@@ -16,22 +16,22 @@ use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
-/// What is broken.
+/// The rule that is broken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
-    /// Nothing.
+    /// None.
     None,
     /// Rule 1: pristine samples are stored, clamped to two voxels.
     ClampedPristine,
     /// Rule 2: cells with only one or two edited columns are left out of the mask.
     ThinMask,
-    /// Rule 2: a column is judged at its own height, not in all cubes that a steep surface crosses beside it.
+    /// Rule 2: a column is judged at its own height, not in all cubes that a steep surface crosses next to it.
     OwnHeights,
     /// Rule 2: heightmap cells leave out the caves below and the rocks above them.
     HeightmapOnly,
     /// Rule 3: heightmap cells keep straight sides against volumetric ones.
     StraightRing,
-    /// Rule 4: the ring interpolates the heights itself and rounds in its own way.
+    /// Rule 4: the ring interpolates the heights itself and rounds differently.
     OwnRingVertices,
     /// Rule 5: the y-range of a footprint ignores its pristine border columns.
     ShortRange,
@@ -41,7 +41,7 @@ enum Fault {
     GradientNormals,
 }
 
-/// Samples as marching cubes sees them when rule 1 is broken.
+/// Samples as marching cubes reads them when rule 1 is broken.
 struct Clamped<'a>(WorldView<'a>);
 
 impl Lattice for Clamped<'_> {
@@ -62,7 +62,7 @@ impl Lattice for Clamped<'_> {
     }
 }
 
-/// A world whose mask has no border for marching cubes.
+/// A world whose mask has no border, as seen by marching cubes.
 struct Borderless<'a>(WorldView<'a>);
 
 impl Lattice for Borderless<'_> {
@@ -83,7 +83,7 @@ impl Lattice for Borderless<'_> {
     }
 }
 
-/// Draws a world cell by cell, as plainly as the rules are written.
+/// The reference implementation: draws a world cell by cell, as the rules are written.
 struct Plain<'a> {
     view: WorldView<'a>,
     fault: Fault,
@@ -302,7 +302,7 @@ fn a_complement_symmetric_case_table_leaves_holes() {
 fn with_gradients_at_the_masks_border_shading_jumps_there() {
     let terrain = control_world();
     let report = check(terrain.world(), &Plain::draw(terrain.world(), Fault::GradientNormals));
-    // Nothing but shading is wrong.
+    // Only the shading is wrong.
     assert!(report.is_closed() && report.first.is_empty(), "{report}");
     assert!(report.worst_normal_jump > 1.0, "gradients went unnoticed: {report}");
     let at = report.worst_normal_at.expect("a jump is somewhere");

@@ -1,4 +1,4 @@
-//! The same edits make the same world, bit for bit: however they are batched, threaded, cut into chunks or sent.
+//! The same edits give the same world, bit for bit, whatever the batching, threads, chunk size or serialisation.
 
 mod worlds;
 
@@ -17,10 +17,10 @@ use worlds::{
     steep_real_ground,
 };
 
-/// A vertex without floats, so that it can be compared bit for bit.
+/// A vertex as integers, for exact comparison.
 type Bits = ([i64; 3], [u32; 3], [[u8; 4]; 2]);
 
-/// A ground and edits of every kind, many of them on chunk faces of some chunk size.
+/// A ground and edits of every kind, many of them on chunk faces of one of the chunk sizes.
 fn random_script(seed: u64) -> (Ground, Vec<Brush>) {
     let mut rng = Rng::with_seed(seed);
     let (ground, _) = random_ground(&mut rng, seed);
@@ -42,7 +42,7 @@ fn terrain(ground: &Arc<Ground>, chunk_size: u32) -> Terrain {
     Terrain::new(Arc::clone(ground), &settings).expect("valid settings")
 }
 
-/// A script of which rules refuse a part, and whose end cuts something off.
+/// A script that is partly refused by digging rules, and whose last brush cuts a piece off.
 struct HardScript {
     ground: Arc<Ground>,
     brushes: Vec<Brush>,
@@ -54,7 +54,7 @@ impl HardScript {
         let mut rng = Rng::with_seed(seed);
         let (ground, mut brushes) = random_script(seed);
         brushes.iter_mut().for_each(|brush| brush.power = rng.u8(..) | rng.u8(..));
-        // A ball on the ground, and a cut through its foot.
+        // A ball on the ground, and a cut through its base.
         let column = Column::new(rng.i32(4..ground.width() - 4), rng.i32(4..ground.depth() - 4));
         let height = ground.height(column) as f32 / 256.0;
         let at = |up: f32| Vec3::new(column.x as f32, height + up, column.z as f32);
@@ -64,7 +64,7 @@ impl HardScript {
         Self { ground: ground.into(), brushes, rules }
     }
 
-    /// In one transaction.
+    /// Runs the whole script in one transaction.
     fn play(&self, chunk_size: u32) -> (Terrain, Vec<Receipt>) {
         let mut terrain = terrain(&self.ground, chunk_size);
         terrain.set_rules(self.rules.clone()).expect("valid rules");
@@ -74,14 +74,14 @@ impl HardScript {
     }
 }
 
-/// What brushes did, but for how that was cut into chunks.
+/// The outcomes of brushes without the parts that depend on the chunk size.
 fn without_chunks(receipts: &[Receipt]) -> Vec<Result<Applied, Rejection>> {
     let applied =
         |receipt: &Receipt| receipt.outcome.clone().map(|applied| Applied { chunks: Vec::new(), ..applied });
     receipts.iter().map(applied).collect()
 }
 
-/// How many of these receipts tell of something refused, and how many pieces came off.
+/// The number of receipts with refused voxels, and the number of pieces that came off.
 fn refused_and_loose(receipts: &[Receipt]) -> (usize, usize) {
     let applied = || receipts.iter().filter_map(|receipt| receipt.outcome.as_ref().ok());
     let refused = applied().filter(|applied| !applied.refused.is_empty());
@@ -107,12 +107,12 @@ fn bits(mesh: &SurfaceMesh, origin: glam::IVec3) -> Vec<Bits> {
     mesh.vertices.iter().map(vertex).collect()
 }
 
-/// Every mesh as it is drawn: which, vertices, indices.
+/// Every drawn mesh: its tile or chunk, vertices and indices.
 fn drawn(world: &World) -> Vec<(Drawn, Vec<Bits>, Indices)> {
     world.drawn().map(|(drawn, mesh)| (drawn, bits(&mesh, world.origin(drawn)), mesh.indices)).collect()
 }
 
-/// Every triangle in world places, in an order of its own: the same picture gives the same list.
+/// Every triangle in world coordinates in a canonical order: the same surface gives the same list.
 fn picture(world: &World) -> Vec<[Bits; 3]> {
     let mut triangles: Vec<[Bits; 3]> = Vec::new();
     for (drawn, mesh) in world.drawn() {
@@ -128,7 +128,7 @@ fn picture(world: &World) -> Vec<[Bits; 3]> {
     triangles
 }
 
-/// Where two worlds have other samples than each other: looks at every brick that either of them stores, and around it.
+/// The first sample that differs between two worlds; compares every brick stored in either of them and its neighbours.
 fn first_difference(a: &World, b: &World) -> Option<String> {
     let bricks: BTreeSet<[i32; 3]> = a.bricks().chain(b.bricks()).map(|(pos, _)| pos.0.to_array()).collect();
     let (left, right) = (a.samples(), b.samples());
@@ -155,8 +155,8 @@ fn two_runs_make_the_same_world_and_the_same_meshes() {
             (terrain.world().hash(), drawn(terrain.world()), receipts)
         };
         let (first, second) = (run(), run());
-        assert_eq!(first.0, second.0, "script {seed}: other hash");
-        assert!(first == second, "script {seed}: same hash, but other meshes or receipts");
+        assert_eq!(first.0, second.0, "script {seed}: the hash differs");
+        assert!(first == second, "script {seed}: same hash, but meshes or receipts differ");
     }
 }
 
@@ -234,7 +234,7 @@ fn one_transaction_or_many_make_the_same_world_and_the_same_meshes() {
         for (name, other) in [("one by one", &one_by_one), ("in batches", &batched)] {
             assert_eq!(first_difference(at_once.world(), other.world()), None, "script {seed} {name}");
             assert_eq!(other.world().hash(), at_once.world().hash(), "script {seed} {name}");
-            assert!(other.world().mask() == at_once.world().mask(), "script {seed} {name}: other mask");
+            assert!(other.world().mask() == at_once.world().mask(), "script {seed} {name}: the mask differs");
             assert!(
                 drawn(other.world()) == expected,
                 "script {seed} {name}: a mesh was not brought up to date"
@@ -265,7 +265,7 @@ fn the_meshes_of_commits_add_up_to_the_drawn_world() {
         let mut swapped: Vec<_> = shown.into_values().filter(|(_, mesh)| !mesh.is_empty()).collect();
         drawn.sort_by_key(|(drawn, _)| format!("{drawn:?}"));
         swapped.sort_by_key(|(drawn, _)| format!("{drawn:?}"));
-        assert!(drawn == swapped, "script {seed}: a renderer that follows the commits shows something else");
+        assert!(drawn == swapped, "script {seed}: a renderer that only applies the commits' meshes differs");
     }
 }
 
@@ -283,7 +283,7 @@ fn the_chunk_size_changes_neither_samples_nor_picture() {
             let what = format!("script {seed}, chunks of 8 and of {chunk_size}");
             assert_eq!(first_difference(first.world(), other.world()), None, "{what}");
             assert_eq!(first.world().hash(), other.world().hash(), "{what}");
-            assert!(first.world().mask() == other.world().mask(), "{what}: other mask");
+            assert!(first.world().mask() == other.world().mask(), "{what}: the mask differs");
             for (a, b) in receipts.iter().zip(&counts) {
                 let volumes = |receipt: &Receipt| {
                     let applied = receipt.outcome.as_ref().map_err(Clone::clone)?;
@@ -296,7 +296,7 @@ fn the_chunk_size_changes_neither_samples_nor_picture() {
                 };
                 assert_eq!(volumes(a), volumes(b), "{what}");
             }
-            assert!(picture(other.world()) == expected, "{what}: same samples, but other triangles");
+            assert!(picture(other.world()) == expected, "{what}: same samples, but triangles differ");
         }
     }
 }
@@ -313,8 +313,8 @@ fn the_chunk_size_does_not_show_in_what_is_refused_or_comes_off() {
             let what = format!("script {seed}, chunks of 8 and of {chunk_size}");
             assert_eq!(first_difference(first.world(), other.world()), None, "{what}");
             assert_eq!(first.world().hash(), other.world().hash(), "{what}");
-            assert!(without_chunks(&receipts) == without_chunks(&others), "{what}: other receipts");
-            assert!(picture(other.world()) == expected, "{what}: same samples, but other triangles");
+            assert!(without_chunks(&receipts) == without_chunks(&others), "{what}: receipts differ");
+            assert!(picture(other.world()) == expected, "{what}: same samples, but triangles differ");
         }
         let found = refused_and_loose(&receipts);
         (refused, loose) = (refused + found.0, loose + found.1);
@@ -340,10 +340,10 @@ fn edits_sent_as_json_make_the_same_world() {
         if let Some(transaction) = there.begin() {
             let answers = there.commit(transaction.run()).expect("nothing came in between");
             let valid = |receipt: &&Receipt| !matches!(receipt.outcome, Err(Rejection::Brush(_)));
-            assert!(answers.iter().eq(receipts.iter().filter(valid)), "script {seed}: other receipts");
+            assert!(answers.iter().eq(receipts.iter().filter(valid)), "script {seed}: receipts differ");
         }
         assert_eq!(here.world().hash(), there.world().hash(), "script {seed}");
-        assert!(drawn(here.world()) == drawn(there.world()), "script {seed}: other meshes");
+        assert!(drawn(here.world()) == drawn(there.world()), "script {seed}: meshes differ");
     }
 }
 
@@ -361,7 +361,7 @@ fn golden_script(ground: &Ground) -> Vec<Brush> {
     .enumerate()
     {
         let at = |k: usize| {
-            // The ground's own look is given back to what was painted.
+            // Painting with 0 restores the ground's own material.
             let (x, z) = (6.25 + 9.5 * k as f32, 8.0 + 11.125 * i.min(2) as f32 + (i / 3) as f32);
             let height = ground.height(Column::new(x as i32, z as i32));
             Vec3::new(x, (height / 64) as f32 / 4.0, z)
@@ -386,7 +386,7 @@ fn golden_script(ground: &Ground) -> Vec<Brush> {
     brushes
 }
 
-/// Steep ground that every machine makes alike.
+/// Steep ground that is the same on every machine.
 fn golden_ground() -> Ground {
     let height =
         |x: i32, z: i32| f64::from((x * x * 7 + z * z * 5 + x * z * 3) % 97) / 8.0 + f64::from(x) / 4.0;
@@ -402,23 +402,23 @@ fn the_hash_of_a_dug_world_is_the_same_on_every_machine() {
     for (receipts, brushes) in receipts.chunks(3).zip(script.chunks(3)) {
         let changes =
             |receipt: &Receipt| receipt.outcome.as_ref().is_ok_and(|applied| applied.bounds.is_some());
-        assert!(receipts.iter().any(changes), "brushes that change nothing prove nothing: {brushes:?}");
+        assert!(receipts.iter().any(changes), "none of these brushes changes anything: {brushes:?}");
     }
     assert_eq!(
         format!("{:#018x}", terrain.world().hash()),
         "0x2c65b13fc5ca894a",
-        "the same script made another world than before, or than on other machines. If edits are meant to come out \
-         differently from now on, put the new hash here, and say in the change log that saved journals give other \
-         worlds. If not, something in `ground`, `brush` or `volume` lost its written order of arithmetic"
+        "the script gives another hash than before, or than on other machines. If the change is intended, put the new \
+        hash here and say in the change log that saved journals give other worlds. If not, `ground`, `brush` or \
+        `volume` evaluates floating-point arithmetic in another order than written"
     );
 }
 
-/// A number that stands for some numbers in their order (FNV-1a, by words).
+/// The FNV-1a hash of a sequence of words.
 fn fold(words: impl IntoIterator<Item = u64>) -> u64 {
     words.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Every bit of a mesh whose positions count from `origin`, and its triangles.
+/// All bits of a mesh, its triangles included; positions are relative to `origin`.
 fn mesh_words(mesh: &SurfaceMesh, origin: glam::IVec3) -> impl Iterator<Item = u64> {
     let vertices = bits(mesh, origin).into_iter().flat_map(|(place, normal, materials)| {
         let place = place.map(|part| part as u64).into_iter();
@@ -428,13 +428,13 @@ fn mesh_words(mesh: &SurfaceMesh, origin: glam::IVec3) -> impl Iterator<Item = u
     vertices.chain([indices.len() as u64]).chain(indices)
 }
 
-/// Every mesh that a world draws.
+/// The hash of every mesh that a world draws.
 fn drawn_hash(world: &World) -> u64 {
     let meshes = world.drawn().map(|(drawn, mesh)| fold(mesh_words(&mesh, world.origin(drawn))));
     fold(meshes.collect::<Vec<_>>())
 }
 
-/// Every operation that sculpts, on shapes of every kind that are softer than they are deep or harder.
+/// Every sculpting operation, on shapes of every kind, with falloffs narrower and wider than the shapes are deep.
 fn sculpting_script(ground: &Ground) -> Vec<Brush> {
     let image = GreyImage::from_samples(4, 3, (0..12).map(|i| i * 5003).collect()).expect("twelve samples");
     let turn = Quat::from_xyzw(0.3, -0.1, 0.2, 0.9).normalize();
@@ -472,7 +472,7 @@ fn sculpting_script(ground: &Ground) -> Vec<Brush> {
 
 /// A table, a ball on a post and a stick, and a cut through all of them that leaves a crumb of the stick.
 fn falling_script() -> Vec<Brush> {
-    // From below the ground.
+    // The post and the stick begin below the ground.
     let post = |x: f32, z: f32, half: f32, top: f32, material| {
         let (middle, half) = (Vec3::new(x, top * 0.5 - 1.0, z), Vec3::new(half, top * 0.5 + 1.0, half));
         Brush::add(Shape::cuboid(middle, half), MaterialId(material))
@@ -503,7 +503,10 @@ fn worlds_meshes_and_loose_pieces_have_the_same_bits_on_every_machine() {
     let mut sculpted = terrain(&ground, 32);
     let receipts = sculpted.apply(sculpting_script(&ground));
     let changes = |receipt: &Receipt| receipt.outcome.as_ref().is_ok_and(|own| own.bounds.is_some());
-    assert!(receipts.iter().filter(|receipt| changes(receipt)).count() > 16, "few brushes change something");
+    assert!(
+        receipts.iter().filter(|receipt| changes(receipt)).count() > 16,
+        "too few brushes change something"
+    );
     found.push(("a sculpted world", sculpted.world().hash()));
     found.push(("its meshes", drawn_hash(sculpted.world())));
 
@@ -517,7 +520,7 @@ fn worlds_meshes_and_loose_pieces_have_the_same_bits_on_every_machine() {
     ruled.set_rules(rules).expect("valid rules");
     let script = golden_script(&ground).into_iter().chain(sculpting_script(&ground)).enumerate();
     let receipts = ruled.apply(script.map(|(i, brush)| brush.with_power([255, 180, 130, 60][i % 4])));
-    assert!(refused_and_loose(&receipts).0 > 5, "little is refused");
+    assert!(refused_and_loose(&receipts).0 > 5, "too little is refused");
     found.push(("a world under rules", ruled.world().hash()));
     found.push(("its meshes", drawn_hash(ruled.world())));
 
@@ -548,8 +551,8 @@ fn worlds_meshes_and_loose_pieces_have_the_same_bits_on_every_machine() {
     let hashes: Vec<u64> = found.iter().map(|(_, hash)| *hash).collect();
     assert!(
         hashes == expected,
-        "other bits than before, or than on other machines. If these scripts are meant to come out differently from now \
-         on, put what was found in place of the numbers here. Found:\n{}Expected:\n{}",
+        "hashes differ from the expected ones, or from those of other machines. If the change is intended, replace \
+        the expected hashes by those found. Found:\n{}Expected:\n{}",
         lines(&hashes),
         lines(&expected)
     );

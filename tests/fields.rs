@@ -1,8 +1,8 @@
-//! The paper's five scenarios at places worked out by hand, and the laws that fields keep whatever is dug.
+//! The paper's five scenarios on examples worked out by hand, and the invariants of fields under random edits.
 //!
-//! A dig of radius r at lattice height of level ground changes, per sample, what lies above both its old density and the
-//! negative distance to the ball, no farther than two voxels outside (rule 6). For r = 2 around (x, h, z) that reaches 3
-//! voxels sideways (two below the middle: 2.6 and 3.6 voxels off, still within 4), 4 voxels down, and up to h itself.
+//! A dig of radius r at lattice height on level ground raises each density to at least the negated distance to the ball,
+//! but only up to two voxels outside the ball (rule 6). For r = 2 around (x, h, z) it changes samples up to 3 voxels
+//! sideways (two below the centre: at distance 2.6 and 3.6, both within 4), down to 4 voxels below, and up to h itself.
 
 mod worlds;
 
@@ -16,7 +16,7 @@ use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use worlds::{random_brush, random_brush_at_a_face, random_ground};
 
-/// Level ground at `height`, as wide as `chunks` chunks.
+/// Level ground at `height`, `chunks` chunks wide and deep.
 fn level(chunk_size: u32, chunks: u32, height: i32) -> Terrain {
     let ground =
         Ground::flat(chunk_size * chunks, chunk_size * chunks, height.into()).expect("finite heights");
@@ -51,7 +51,7 @@ fn boxes(world: &World, chunk: [i32; 3]) -> Vec<LatticeBox> {
     world.fields_of(chunk).into_iter().flat_map(|fields| fields.iter().map(|field| field.bounds)).collect()
 }
 
-/// The laws of fields, of each against each.
+/// Checks the invariants of all fields, and of each pair of them.
 fn check_laws(world: &World, what: &str) {
     let grid = world.grid();
     let mut names = BTreeSet::<FieldId>::new();
@@ -99,7 +99,7 @@ fn first_scenario_a_field_is_created_to_fit() {
     assert_eq!(boxes(terrain.world(), [0, 0, 0]), [cuboid([13, 6, 13], [19, 10, 19])]);
     assert_eq!(applied.bounds, Some(cuboid([13, 6, 13], [19, 10, 19])));
 
-    // Two voxels of untouched samples between them are enough to be apart.
+    // Two unedited samples between the pits are enough to keep the fields apart.
     let applied = dig(&mut terrain, ball(24, 10, 16, 2.0));
     assert_eq!(only(&applied), Scenario::Created);
     assert_eq!(boxes(terrain.world(), [0, 0, 0]).len(), 2);
@@ -111,11 +111,11 @@ fn second_scenario_an_edit_inside_leaves_the_box() {
     let mut terrain = level(32, 2, 10);
     let created = dig(&mut terrain, ball(16, 10, 16, 4.0));
     let before = boxes(terrain.world(), [0, 0, 0]);
-    // The pit's floor is at y = 6; the ball of paint reaches from 4 to 6, and paint goes no farther than its shape.
+    // The pit's floor is at y = 6. The painted ball covers 4 to 6: paint does not reach beyond its shape.
     let applied = apply(&mut terrain, Brush::paint(ball(16, 5, 16, 1.0), MaterialId(3)));
     assert_eq!(only(&applied), Scenario::Changed);
     assert_eq!(applied.chunks[0].field, created.chunks[0].field);
-    // Of the seven lattice points of the ball one was dug: (16, 6, 16) is air.
+    // One of the ball's seven lattice points was dug before: (16, 6, 16) is air.
     assert_eq!(applied.painted.of(MaterialId(3)), 6);
     assert_eq!(boxes(terrain.world(), [0, 0, 0]), before);
     let field =
@@ -127,12 +127,12 @@ fn second_scenario_an_edit_inside_leaves_the_box() {
 fn third_scenario_an_edit_reaches_out_and_the_field_grows() {
     let mut terrain = level(32, 2, 10);
     let created = dig(&mut terrain, ball(16, 10, 16, 2.0));
-    // One sample farther along x: the boxes of 13..=19 and 14..=20 overlap.
+    // One sample farther along x: the boxes 13..=19 and 14..=20 overlap.
     let applied = dig(&mut terrain, ball(17, 10, 16, 2.0));
     assert_eq!(only(&applied), Scenario::Extended);
     assert_eq!(applied.chunks[0].field, created.chunks[0].field);
     assert_eq!(boxes(terrain.world(), [0, 0, 0]), [cuboid([13, 6, 13], [20, 10, 19])]);
-    // Boxes of 13..=20 and 21..=27 only lie side by side; a cell touches both, so they are one field.
+    // The boxes 13..=20 and 21..=27 only lie side by side, but a cell touches both, so they are one field.
     assert_eq!(only(&dig(&mut terrain, ball(24, 10, 16, 2.0))), Scenario::Extended);
     assert_eq!(boxes(terrain.world(), [0, 0, 0]), [cuboid([13, 6, 13], [27, 10, 19])]);
     check_laws(terrain.world(), "a row");
@@ -147,14 +147,14 @@ fn fourth_scenario_fields_that_an_edit_joins_merge() {
         assert_eq!(only(&applied), Scenario::Created);
         pits.push(applied.chunks[0].field);
     }
-    // A trench between the first two; the oldest field goes on.
+    // A trench joins the first two; the oldest field survives.
     let trench = Shape::capsule(Vec3::new(6.0, 10.0, 6.0), Vec3::new(26.0, 10.0, 6.0), 2.0);
     let applied = dig(&mut terrain, trench);
     assert_eq!(only(&applied), Scenario::Merged { fields: 2 });
     assert_eq!(applied.chunks[0].field, pits[0]);
     assert_eq!(boxes(terrain.world(), [0, 0, 0]).len(), 3);
     check_laws(terrain.world(), "a trench");
-    // A wide pit in the middle touches the trench and both other pits: 16 +- 9 voxels sideways.
+    // A wide pit in the middle meets the trench and both other pits: 16 +- 9 voxels sideways.
     let applied = dig(&mut terrain, ball(16, 10, 16, 8.0));
     assert_eq!(only(&applied), Scenario::Merged { fields: 3 });
     assert_eq!(applied.chunks[0].field, pits[0]);
@@ -177,8 +177,8 @@ fn fourth_scenario_counts_every_field_that_goes_in() {
 fn fifth_scenario_an_edit_on_a_face_an_edge_or_a_corner_is_split() {
     for chunk_size in [8, 25, 32, 50, 75, 100, 128] {
         let size = chunk_size as i32;
-        // The surface lies in the chunks' horizontal face, so a corner of eight chunks lies on it. Samples on a face
-        // belong to the chunk above, the next below it to the chunk below.
+        // The surface lies in the horizontal face between chunks, so a corner of eight chunks lies on it. Samples on a
+        // face belong to the chunk above it, those one below to the chunk below.
         for (at, chunks, name) in [
             ([size, size + 4, size / 2], 2, "face"),
             ([size, size + 4, size], 4, "edge"),
@@ -189,7 +189,7 @@ fn fifth_scenario_an_edit_on_a_face_an_edge_or_a_corner_is_split() {
             let height = at[1];
             let mut terrain = level(chunk_size, 2, height);
             let applied = dig(&mut terrain, ball(at[0], at[1], at[2], 2.0));
-            // A small chunk's neighbour on the other side is reached as well.
+            // A small chunk's neighbour on the far side is reached as well.
             let crowded = chunk_size == 8 && name != "corner";
             if !crowded {
                 assert_eq!(applied.chunks.len(), chunks, "{what}: {applied:?}");
@@ -205,7 +205,7 @@ fn fifth_scenario_an_edit_on_a_face_an_edge_or_a_corner_is_split() {
             );
             let ids: BTreeSet<FieldId> = applied.chunks.iter().map(|part| part.field).collect();
             assert_eq!(ids.len(), applied.chunks.len(), "{what}: each chunk has a field of its own");
-            // Together the parts are what an edit in the middle of a chunk would be.
+            // Together the parts are what one edit in the middle of a chunk would give.
             let bounds = cuboid([at[0] - 3, at[1] - 4, at[2] - 3], [at[0] + 3, at[1], at[2] + 3]);
             assert_eq!(applied.bounds, Some(bounds), "{what}");
             let parts: Vec<LatticeBox> = applied
@@ -234,18 +234,18 @@ fn fifth_scenario_each_chunk_has_a_scenario_of_its_own() {
     dig(&mut terrain, ball(24, 10, 16, 2.0));
     dig(&mut terrain, ball(40, 10, 12, 2.0));
     dig(&mut terrain, ball(40, 10, 20, 2.0));
-    // A trench across the face runs into all three; the second one stays inside of what is there.
+    // A trench across the face meets all three; it stays inside the box of the second one.
     let trench = Shape::capsule(Vec3::new(24.0, 10.0, 16.0), Vec3::new(40.0, 10.0, 16.0), 2.0);
     let applied = dig(&mut terrain, trench);
     let scenarios: Vec<_> = applied.chunks.iter().map(|part| (part.chunk.x, part.scenario)).collect();
     assert_eq!(scenarios, [(0, Scenario::Extended), (1, Scenario::Merged { fields: 2 })]);
-    // The trench's walls lie a little outside it, and inside the boxes.
+    // The trench's walls reach slightly beyond it, but stay inside the boxes.
     let walls = Shape::capsule(Vec3::new(24.0, 10.0, 16.0), Vec3::new(40.0, 10.0, 16.0), 2.75);
     let again = apply(&mut terrain, Brush::paint(walls, MaterialId(2)));
     let scenarios: Vec<_> = again.chunks.iter().map(|part| (part.chunk.x, part.scenario)).collect();
     assert_eq!(scenarios, [(0, Scenario::Changed), (1, Scenario::Changed)]);
 
-    // On new ground beyond, one chunk grows a field while the next gets its first.
+    // On untouched ground farther on, one chunk extends a field while the next creates its first.
     let applied =
         dig(&mut terrain, Shape::capsule(Vec3::new(24.0, 10.0, 16.0), Vec3::new(24.0, 10.0, 40.0), 2.0));
     let scenarios: Vec<_> = applied.chunks.iter().map(|part| (part.chunk.z, part.scenario)).collect();
@@ -297,7 +297,7 @@ fn fields_keep_their_laws_whatever_is_dug() {
                 for part in receipt.outcome.iter().flat_map(|applied| &applied.chunks) {
                     match part.scenario {
                         Scenario::Created => {
-                            assert!(known.insert(part.field), "seed {seed}: a name is used again")
+                            assert!(known.insert(part.field), "seed {seed}: a field id is used again")
                         }
                         Scenario::Merged { fields } => {
                             assert!(fields >= 2);
@@ -366,13 +366,15 @@ fn the_news_of_a_commit_are_the_difference_of_its_fields() {
                         );
                         assert!(
                             after.get(&into).is_some_and(|f| f.0 == chunk),
-                            "seed {seed}: merged into {into:?}, which is gone"
+                            "seed {seed}: merged into {into:?}, which no longer exists"
                         );
                         gone
                     }
-                    FieldNews::Removed(id) => panic!("seed {seed}: {id:?} is gone, but nothing was undone"),
+                    FieldNews::Removed(id) => {
+                        panic!("seed {seed}: {id:?} was removed, but nothing was undone")
+                    }
                 };
-                assert!(named.insert(id), "seed {seed}: {id:?} is in the news twice");
+                assert!(named.insert(id), "seed {seed}: {id:?} is reported twice");
             }
             let differs = |id: &&FieldId| before.get(id) != after.get(id);
             let expected: BTreeSet<FieldId> =
@@ -392,7 +394,7 @@ fn news_of_a_chain_of_merges_name_the_field_that_is_left() {
         Brush::dig(Shape::capsule(Vec3::new(from, 10.0, 30.0), Vec3::new(to, 10.0, 30.0), 2.0))
     };
     let [a, b, c] = [8, 28, 48].map(|x| dig(&mut terrain, pit(x)).chunks[0].field);
-    // In one transaction, b takes in c, then a takes in b.
+    // In one transaction, b absorbs c, then a absorbs b.
     terrain.submit(&trench(28.0, 48.0));
     terrain.submit(&trench(8.0, 28.0));
     let commit = terrain.begin().expect("edits wait").run();
@@ -405,6 +407,6 @@ fn news_of_a_chain_of_merges_name_the_field_that_is_left() {
     ];
     assert!(
         news.len() == 3 && expected.iter().all(|line| news.contains(line)),
-        "`into` holds the data of the field that is gone once this is committed: {news:?}"
+        "`into` names the field that holds the merged data after the commit: {news:?}"
     );
 }

@@ -1,11 +1,11 @@
-//! The README and the guide: every link leads somewhere, every page is in the summary, and every command names something
-//! that exists. Their programs are documentation tests of the crate.
+//! The README and the guide: links resolve, every page is in the summary, and commands name existing targets. Their
+//! programs are documentation tests of the crate.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The repository.
+/// The repository root.
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -14,7 +14,7 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Markdown files in a folder and those below it.
+/// Markdown files in a folder, recursively.
 fn pages_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     let mut pages = Vec::new();
@@ -33,14 +33,14 @@ fn guide() -> PathBuf {
     root().join("docs/guide/src")
 }
 
-/// All pages that users read.
+/// All pages for users.
 fn documents() -> Vec<PathBuf> {
     let mut pages = pages_in(&root().join("docs"));
     pages.extend(["README.md", "CHANGELOG.md", "assets/README.md"].map(|name| root().join(name)));
     pages
 }
 
-/// The lines outside code blocks, or those within.
+/// The lines inside or outside of code blocks.
 fn lines(text: &str, within_code: bool) -> impl Iterator<Item = &str> {
     let mut is_code = false;
     text.lines().filter(move |line| {
@@ -50,12 +50,12 @@ fn lines(text: &str, within_code: bool) -> impl Iterator<Item = &str> {
     })
 }
 
-/// A text without what stands between backticks.
+/// The text without its inline code.
 fn without_code(line: &str) -> String {
     line.split('`').step_by(2).collect()
 }
 
-/// The targets of all links and pictures: `[text](target)`.
+/// The targets of all links and images: `[text](target)`.
 fn links(text: &str) -> Vec<String> {
     let prose: Vec<String> = lines(text, false).map(without_code).collect();
     let prose = prose.join("\n");
@@ -63,7 +63,7 @@ fn links(text: &str) -> Vec<String> {
     targets.map(str::to_owned).collect()
 }
 
-/// The anchor of a heading, as GitHub and mdBook make it.
+/// The anchor of a heading, as GitHub and mdBook generate it.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim().to_lowercase();
     let kept = kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
@@ -76,7 +76,7 @@ fn anchors(text: &str) -> BTreeSet<String> {
     headings.map(anchor).collect()
 }
 
-/// What is wrong with the links of a page.
+/// The broken links of a page.
 fn broken_links(page: &Path, text: &str) -> Vec<String> {
     let folder = page.parent().expect("a file has a folder");
     let is_broken = |target: &String| {
@@ -96,7 +96,7 @@ fn broken_links(page: &Path, text: &str) -> Vec<String> {
     links(text).into_iter().filter(is_broken).collect()
 }
 
-/// The words after each `marker` in a text, up to the next character that no name has.
+/// The names after each `marker` in a text, up to the first character that no name contains.
 fn named<'a>(text: &'a str, marker: &'a str) -> impl Iterator<Item = &'a str> {
     let is_name = |c: char| c.is_alphanumeric() || "-_,".contains(c);
     let names =
@@ -104,7 +104,7 @@ fn named<'a>(text: &'a str, marker: &'a str) -> impl Iterator<Item = &'a str> {
     names.filter(|name| !name.is_empty())
 }
 
-/// The names that a Cargo manifest gives to features, and to targets of a kind such as `[[example]]`.
+/// The feature names in a Cargo manifest.
 fn features(manifest: &str) -> BTreeSet<&str> {
     let section = manifest.split("[features]").nth(1).and_then(|rest| rest.split("\n[").next());
     let keys =
@@ -112,13 +112,13 @@ fn features(manifest: &str) -> BTreeSet<&str> {
     keys.filter(|key| !key.contains(' ')).collect()
 }
 
-/// Whether there is an example, a test or a benchmark of this name.
+/// Whether an example, test or benchmark of this name exists.
 fn has_target(folder: &str, name: &str) -> bool {
     let folder = root().join(folder);
     folder.join(name).join("main.rs").exists() || folder.join(format!("{name}.rs")).exists()
 }
 
-/// Names of commands in a text that mean nothing: make targets, examples, tests, benchmarks and features.
+/// Unknown names in the commands of a text: make targets, examples, tests, benchmarks and features.
 fn unknown_names(text: &str, makefile: &str, manifest: &str) -> Vec<String> {
     let targets: BTreeSet<&str> =
         makefile.lines().filter_map(|line| line.split_once(':').map(|(target, _)| target)).collect();
@@ -129,7 +129,7 @@ fn unknown_names(text: &str, makefile: &str, manifest: &str) -> Vec<String> {
             unknown.push(format!("{what} {name}"));
         }
     };
-    // In prose `make` is a word, so only code counts.
+    // In prose, `make` is an ordinary word, so only code counts.
     let spans = lines(text, false).flat_map(|line| line.split('`').skip(1).step_by(2));
     let code: Vec<&str> = lines(text, true).chain(spans).collect();
     for line in code {
@@ -181,7 +181,10 @@ fn pages_with_programs_are_documentation_tests() {
         let text = read(&page);
         let name = page.strip_prefix(root()).expect("below it").to_string_lossy().into_owned();
         let is_tested = library.contains(&format!("\"{name}\""));
-        assert!(is_tested || !text.contains("```rust"), "{name} has programs that nothing compiles");
+        assert!(
+            is_tested || !text.contains("```rust"),
+            "{name} has programs that no documentation test compiles"
+        );
         assert!(!text.contains("rust,ignore"), "{name} has a program that is not compiled");
     }
 }

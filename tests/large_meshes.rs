@@ -1,4 +1,4 @@
-//! Meshes of more vertices than indices of 16 bits can tell apart.
+//! Meshes with more vertices than 16-bit indices can address.
 
 use bevy_burrow::ground::Ground;
 use bevy_burrow::lattice::ONE;
@@ -7,7 +7,7 @@ use bevy_burrow::surface::{Indices, SurfaceMesh};
 use bevy_burrow::terrain::Drawn;
 use glam::Vec3;
 
-/// Are there 16 bits an index where they are enough, and no index without vertex?
+/// Checks that indices have 16 bits where that is enough, and that each has a vertex; returns whether they have 32 bits.
 fn check(what: &str, mesh: &SurfaceMesh) -> bool {
     let is_long = matches!(mesh.indices, Indices::U32(_));
     assert_eq!(is_long, mesh.vertices.len() > Indices::MOST_SHORT, "{what}");
@@ -15,7 +15,7 @@ fn check(what: &str, mesh: &SurfaceMesh) -> bool {
     is_long
 }
 
-/// Holes in a grid below level ground, layer by layer from the top.
+/// A grid of holes below level ground, layer by layer from the top.
 fn holes(layers: std::ops::Range<i32>) -> Vec<Brush> {
     let place = |i: i32| 8.0 + 12.0 * i as f32;
     let hole = |x, y, z| Brush::dig(Shape::sphere(Vec3::new(place(x), place(9 - y), place(z)), 4.5));
@@ -34,12 +34,12 @@ fn a_chunk_grows_beyond_16_bits_and_shrinks_again() {
         long += drawn.iter().filter(|(at, mesh)| check(&format!("{at:?}, {layer} layers"), mesh)).count();
         states.push(drawn);
     }
-    assert!((1..8).contains(&long), "{long} long meshes");
+    assert!((1..8).contains(&long), "{long} meshes with 32-bit indices");
     let mut at_once = Terrain::new(ground(), &settings).expect("valid settings");
     at_once.apply(holes(0..8));
     assert!(
         at_once.world().drawn().collect::<Vec<_>>() == states[8],
-        "one after the other is not all at once"
+        "digging layer by layer differs from digging all at once"
     );
     let seams = terrain.world().check_seams();
     assert!(seams.is_flawless(), "{seams:?}");
@@ -58,7 +58,7 @@ fn a_ring_on_needles_makes_a_tile_grow_beyond_16_bits() {
     terrain.apply([Brush::dig(Shape::sphere(Vec3::new(16.0, 1500.0, 16.0), 3.0))]);
     let is_long =
         |(at, mesh): (Drawn, SurfaceMesh)| check(&format!("{at:?}"), &mesh) && matches!(at, Drawn::Tile(_));
-    assert!(terrain.world().drawn().any(is_long), "no tile of many vertices");
+    assert!(terrain.world().drawn().any(is_long), "no tile has more vertices than 16 bits can address");
     let seams = terrain.world().check_seams();
     assert!(seams.is_flawless(), "{seams:?}");
     terrain.undo();

@@ -1,4 +1,4 @@
-//! Loose pieces: what digging cuts off is found, all of it and nothing else, and taken out with the edit that did it.
+//! Loose pieces: exactly the pieces that a dig cuts off are found, and they are removed in the same edit.
 
 mod worlds;
 
@@ -20,11 +20,11 @@ const STEPS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3
 
 type Point = [i32; 3];
 
-/// Samples in order.
+/// The samples of a piece, sorted.
 type Piece = BTreeSet<Point>;
 
-/// All loose pieces of a world, by filling what is solid sample by sample: those that do not reach the bottom, which lies
-/// below all that was edited and all of the surface.
+/// All loose pieces of a world by a flood fill sample by sample: the components that do not reach the bottom, which lies
+/// below all edits and the whole surface.
 fn by_brute_force(world: &World) -> Vec<Piece> {
     let samples = world.samples();
     let (low, high) = world.ground().height_range();
@@ -41,7 +41,7 @@ fn by_brute_force(world: &World) -> Vec<Piece> {
     };
     let mut solid: Vec<bool> = all.points().map(|point| samples.is_solid(point)).collect();
     let mut pieces = Vec::new();
-    // From the bottom first; then from whatever is left.
+    // First the component connected to the bottom, then the others.
     for start in all.points() {
         if !solid[index(start)] {
             continue;
@@ -68,7 +68,7 @@ fn samples_of(piece: &LoosePiece) -> Piece {
     piece.runs.iter().flat_map(|run| (0..run.len).map(move |x| along(x, run.start))).collect()
 }
 
-/// Fails unless what a piece says of itself is so.
+/// Checks the figures that a piece reports about itself.
 fn check_piece(world: &World, piece: &LoosePiece, what: &str) {
     let samples = samples_of(piece);
     assert_eq!(piece.voxels, samples.len() as u64, "{what}");
@@ -81,12 +81,12 @@ fn check_piece(world: &World, piece: &LoosePiece, what: &str) {
     assert_eq!(piece.materials.iter().collect::<BTreeMap<_, _>>(), counts, "{what}");
 }
 
-/// Edits that leave much hanging: rough digs, thin walls, balls in the air that are cut through, and sculpting of all that.
+/// Edits that leave many loose pieces: rough digs, thin walls, cut balls in the air, and sculpting on top of these.
 fn crumbling_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
     let brush = match rng.u32(0..9) {
         0 => random_brush_at_a_face(rng, ground, chunk_size),
         1 => {
-            // A cut right through hills and what hangs over them.
+            // A horizontal cut through hills and everything above them.
             let (low, high) = ground.height_range();
             let y = (low as f32 + (high - low) as f32 * rng.f32()) / 256.0 + rng.f32() * 6.0;
             let middle = Vec3::new(ground.width() as f32, 2.0 * y, ground.depth() as f32) / 2.0;
@@ -168,9 +168,9 @@ fn pieces_are_those_of_brute_force() {
     assert!(found > 500 && bounded > 100, "{found} pieces, {bounded} bounded searches");
 }
 
-/// Every edge is walked both ways: the surface has no rim.
+/// Every edge is used equally often in both directions: the mesh is closed.
 fn assert_closed(piece: &LoosePiece, what: &str) {
-    let mesh = piece.mesh.as_ref().expect("what broke off has a mesh");
+    let mesh = piece.mesh.as_ref().expect("a piece that broke off has a mesh");
     let mut edges: HashMap<([i32; 3], [i32; 3]), i32> = HashMap::new();
     let mut volume = 0.0;
     for triangle in mesh.triangles() {
@@ -191,7 +191,7 @@ fn assert_closed(piece: &LoosePiece, what: &str) {
     }
 }
 
-/// The materials of what a world draws, by place in 1/4096 voxel.
+/// The materials of the drawn vertices, by position in 1/4096 voxel.
 fn drawn_materials(world: &World) -> HashMap<IVec3, MaterialMix> {
     let mut all = HashMap::new();
     for (drawn, mesh) in world.drawn() {
@@ -202,8 +202,8 @@ fn drawn_materials(world: &World) -> HashMap<IVec3, MaterialMix> {
     all
 }
 
-/// Of the vertices of pieces: how many the world had drawn, how many are of what somebody built or painted, how many lie in
-/// the sides of the world, and how many normals were compared.
+/// Counts of the pieces' vertices: those that the world had drawn, those of built or painted material, those at the rim of
+/// the world, and the normals compared.
 #[derive(Debug, Default)]
 struct Looks {
     drawn: usize,
@@ -213,7 +213,7 @@ struct Looks {
 }
 
 impl Looks {
-    /// Fails unless a piece looks as it did in the world that it came from, and as the ground beside it were not there.
+    /// Checks that a piece looks as it did in its world, as if the ground next to it were not there.
     fn check(&mut self, world: &World, drawn: &HashMap<IVec3, MaterialMix>, piece: &LoosePiece, what: &str) {
         let (own, samples, grid) = (samples_of(piece), world.samples(), world.grid());
         let is_own = |point: IVec3| own.contains(&point.to_array());
@@ -228,11 +228,11 @@ impl Looks {
             let along = |step: IVec3| density(point + step) - density(point - step);
             DVec3::new(along(IVec3::X), along(IVec3::Y), along(IVec3::Z))
         };
-        let mesh = piece.mesh.as_ref().expect("what broke off has a mesh");
+        let mesh = piece.mesh.as_ref().expect("a piece that broke off has a mesh");
         for vertex in &mesh.vertices {
             let place = vertex.position + piece.bounds.min * SNAP;
             let (cube, rest) = (place.div_euclid(IVec3::splat(SNAP)), place.rem_euclid(IVec3::splat(SNAP)));
-            // On a lattice point it is at the upper end of an edge of ground that nobody edited.
+            // A vertex on a lattice point lies at the upper end of an unedited edge.
             let axis = (0..3).find(|&axis| rest[axis] > 0).unwrap_or(1);
             let from = if rest == IVec3::ZERO { cube - IVec3::Y } else { cube };
             let way = [IVec3::X, IVec3::Y, IVec3::Z][axis];
@@ -249,14 +249,14 @@ impl Looks {
                 self.built += 1;
             }
             if !is_inside(solid + out) {
-                // The piece ends at its last sample.
+                // At the rim the piece ends at its last sample.
                 assert_eq!(place, solid * SNAP + out, "{what}: {place}");
                 assert!(vertex.normal.dot(out.as_vec3()) > 0.5, "{what}: {place}: {}", vertex.normal);
                 self.sides += 1;
             } else {
                 let step = crossing(&world.view(), from, axis);
                 assert_eq!(place, from * SNAP + way * step, "{what}: {place}");
-                // Where the heightmap is drawn, cubes have vertices that it has not.
+                // Where the heightmap is drawn, cubes have vertices that the heightmap does not have.
                 if let Some(materials) = drawn.get(&place) {
                     assert_eq!(vertex.materials, *materials, "{what}: {place}");
                     self.drawn += 1;
@@ -273,7 +273,7 @@ impl Looks {
     }
 }
 
-/// The pieces that an edit cut off: those with a sample beside one that turned to air.
+/// The pieces that an edit cut off: those with a sample next to one that turned to air.
 fn cut_off(before: &World, after: &World) -> Vec<Piece> {
     let turned = |point: IVec3| before.samples().is_solid(point) && !after.samples().is_solid(point);
     let is_inside = |p: &IVec3| {
@@ -334,7 +334,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
                     gone.append(&mut samples_of(piece));
                 }
             }
-            // What is solid, and of what; and where the surface lies.
+            // Which samples are solid, their materials, and the position of the surface.
             let (world, mut counts) = (terrain.world(), MaterialCounts::default());
             let columns = everything(world);
             let bricks = world.bricks().filter_map(|(pos, _)| pos.samples().intersection(columns));
@@ -377,7 +377,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
     }
     println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting; {looks:?}");
     assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
-    assert!(sculpted > 10, "{sculpted} were cut off by sculpting");
+    assert!(sculpted > 10, "{sculpted} pieces were cut off by sculpting");
     let Looks { drawn, built, sides, normals } = looks;
     assert!(drawn.min(normals) > 300 && built.min(sides) > 20, "{looks:?}");
 }
@@ -393,7 +393,7 @@ fn what_falls_does_not_depend_on_how_edits_are_batched() {
         let settings = LooseSettings { largest: 2000, crumbs: 10, debris: 300 };
         let (seed, mut results) = (rng.u64(..), Vec::new());
         for batch in [1, 3, 14] {
-            // The same world each time, in chunks of another size.
+            // The same world each time, with another chunk size.
             let mut rng = Rng::with_seed(seed);
             let (ground, _) = small_world(&mut rng, index);
             let brushes = brushes(&mut rng, &ground, 16);
@@ -423,7 +423,7 @@ fn adds_that_run_after_each_other_keep_what_was_dug_before_them() {
     let brushes = [
         Brush::dig(Shape::sphere(at(20.0, 10.0), 4.0)),
         Brush::add(Shape::sphere(at(44.0, 10.0), 3.0), MaterialId(1)),
-        // It reads what the one before may change, and lies in a brick that the dig changed.
+        // The add reads samples that the dig may change, and lies in a brick that the dig changed.
         Brush::add(Shape::capsule(at(24.0, 12.0), at(42.0, 12.0), 1.5), MaterialId(2)),
     ];
     let hash = |batch: usize| {
@@ -458,11 +458,14 @@ fn a_slab_falls_when_its_pillar_is_sawn_through() {
     terrain.set_loose(Some(settings));
     let half = Brush::dig(Shape::cuboid(Vec3::new(29.0, 14.0, 32.0), Vec3::new(2.2, 1.2, 4.0)));
     let receipt = terrain.apply([half]).remove(0).outcome.expect("it reaches the pillar");
-    assert!(receipt.removed.total() > 0 && receipt.loose.is_empty(), "half a pillar carries it");
+    assert!(
+        receipt.removed.total() > 0 && receipt.loose.is_empty(),
+        "half of the pillar still carries the slab"
+    );
     let receipt = terrain.apply([saw()]).remove(0).outcome.expect("it reaches the pillar");
     let [piece] = &receipt.loose[..] else { panic!("one piece: {:?}", receipt.loose) };
     assert_eq!(piece.fate, PieceFate::BrokeOff);
-    // 17 x 5 x 17 samples, into which the pillar reaches two deep.
+    // 17 x 5 x 17 samples, and two layers of the pillar inside them.
     assert_eq!(piece.materials.of(MaterialId(3)), 17 * 5 * 17 - 3 * 3 * 2);
     assert!(piece.materials.of(MaterialId(2)) > 3 * 3 * 2);
     assert_closed(piece, "slab");
@@ -483,7 +486,7 @@ fn paint_and_add_cut_nothing_off_and_what_is_large_is_tied() {
     let painted = terrain.apply([Brush::paint(Shape::sphere(slab, 3.0), MaterialId(7))]);
     assert!(painted[0].outcome.as_ref().is_ok_and(|applied| applied.loose.is_empty()));
     assert_ne!(hash(&terrain), before);
-    // The first dig at it finds that it hangs.
+    // The first dig at the slab finds that it is loose.
     let receipt = terrain.apply([Brush::dig(Shape::sphere(slab, 2.0))]).remove(0).outcome.expect("a hit");
     assert_eq!(receipt.loose.iter().map(|piece| piece.fate).collect::<Vec<_>>(), [PieceFate::Removed]);
     assert!(receipt.loose[0].materials.of(MaterialId(7)) > 0);
@@ -492,7 +495,7 @@ fn paint_and_add_cut_nothing_off_and_what_is_large_is_tied() {
 
 #[test]
 fn the_surface_connects_what_neighbours_do() {
-    // Whatever a triangle hangs on is one part of its cube, by steps along solid corners.
+    // All corners that a triangle touches are connected within its cube by steps along solid corners.
     for (case, drawn) in cases::table().iter().enumerate() {
         let part = |corner: usize| {
             let mut reached = 1 << corner;
@@ -512,14 +515,14 @@ fn the_surface_connects_what_neighbours_do() {
                 assert_ne!(ends[0], ends[1], "case {case}: a vertex between two solid corners");
                 part(if ends[0] { low } else { low | 1 << axis })
             });
-            assert!(parts[0] == parts[1] && parts[1] == parts[2], "case {case} joins two parts");
+            assert!(parts[0] == parts[1] && parts[1] == parts[2], "case {case} joins two components");
         }
     }
 }
 
 #[test]
 fn corners_and_edges_connect_nothing() {
-    // Two balls whose boxes meet at a corner only, above ground.
+    // Two balls above ground whose boxes meet only at a corner.
     let mut terrain = terrain(Ground::flat(64, 64, 8.0).expect("flat ground"), 32);
     let cube = |low: Vec3| Brush::add(Shape::cuboid(low + 1.5, Vec3::splat(1.6)), MaterialId(1));
     terrain.apply([cube(Vec3::new(20.0, 20.0, 20.0)), cube(Vec3::new(24.0, 24.0, 20.0))]);

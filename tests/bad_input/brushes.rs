@@ -1,4 +1,4 @@
-//! Brushes and settings of any numbers.
+//! Brushes and settings with arbitrary numbers.
 
 use std::cell::Cell;
 
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use crate::operations::sculpting;
 use crate::terrains::small_terrain;
 
-/// Any bits, special numbers, and numbers that make sense.
+/// Arbitrary bit patterns, special values, and plausible numbers.
 pub fn number() -> impl Strategy<Value = f32> {
     let limit = LIMIT as f32;
     let special = [
@@ -82,7 +82,7 @@ proptest! {
     #[test]
     fn any_brushes_get_receipts_and_leave_a_closed_surface(brushes in prop::collection::vec(prop_oneof![brush(), sculpting()], 1..6)) {
         let mut terrain = small_terrain();
-        // Brushes of the greatest size are valid; here they would only take long.
+        // Brushes of the largest size are valid, but too slow for this test.
         let affordable = |brush: &&Brush| {
             let Ok(edit) = Edit::quantize(brush) else { return true };
             let reach = edit.reach().intersection(terrain.world().grid().edit_bounds());
@@ -125,7 +125,7 @@ proptest! {
     }
 }
 
-/// Lengths and places in 1/256 voxel, and a seed, as they stand in JSON: any numbers, small ones, or such as make sense.
+/// Lengths and positions in 1/256 voxel, and a seed, as in JSON: arbitrary, small or plausible numbers.
 fn units() -> impl Strategy<Value = [i32; 8]> {
     let sensible = (prop::array::uniform3(-4000i32..4000), prop::array::uniform5(64i32..4000));
     prop_oneof![
@@ -165,7 +165,7 @@ fn any_json_is_an_edit_or_an_error() {
         prop_assert!(matches!(receipts, Some(Ok(ref receipts)) if receipts.len() == 1 && receipts[0].tag == 9));
         prop_assert!(terrain.world().check_seams().is_flawless(), "{}", json);
     });
-    // Of some eighty of each shape, half have numbers that make sense; of the boxes among them, half are not turned.
+    // About eighty of each shape are drawn. Half have plausible numbers; half of those boxes are not rotated.
     assert!(accepted.iter().all(|count| count.get() > 0), "{accepted:?}");
 }
 

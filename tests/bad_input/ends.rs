@@ -1,4 +1,4 @@
-//! Worlds and edits at the ends: of size, of the lattice, of height.
+//! Worlds and edits at the limits of size, lattice coordinates and height.
 
 use bevy_burrow::lattice::{Column, LIMIT};
 use bevy_burrow::prelude::*;
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::terrains::{assert_flawless, terrain};
 
-/// Digs, fills and paints at a few places of the surface and over rim and corners, and checks after each edit.
+/// Digs, fills and paints at several places on the surface, the rim and the corners, and checks the world after each edit.
 fn work_over(mut terrain: Terrain, rng: &mut Rng, what: &str) -> Terrain {
     let grid = terrain.world().grid();
     let (width, depth) = (grid.width(), grid.depth());
@@ -28,14 +28,14 @@ fn work_over(mut terrain: Terrain, rng: &mut Rng, what: &str) -> Terrain {
         let receipt = terrain.apply([&brush]).remove(0);
         assert!(receipt.outcome.is_ok(), "{what}: {brush:?}: {receipt:?}");
         assert_flawless(&terrain, format!("{what}, step {step}: {brush:?}"));
-        // Queries answer there, too.
+        // Queries work there too.
         let world = terrain.world();
         let spans = world.spans(x.into(), z.into());
         assert!(!spans.is_empty(), "{what}, step {step}: nothing at ({x}, {z})");
         let top = spans[spans.len() - 1].floor;
         let above = DVec3::new(x.into(), top + 10.0, z.into());
         let hit = world.raycast(above, DVec3::NEG_Y, 1e6);
-        // On a cliff's edge the ray may fall past it, or the column lie beside it.
+        // At the edge of a cliff, rounding may take the ray or the column past the ground.
         assert!(hit.is_some(), "{what}, step {step}: a ray from {above} down hits nothing");
     }
     terrain
@@ -78,7 +78,7 @@ fn worlds_at_the_ends_of_the_lattice_are_dug_without_a_hole() {
             let mut rng = Rng::with_seed(chunk_size.into());
             let ground = Ground::flat(12, 11, height).expect("heights within the limit");
             let mut terrain = work_over(terrain(ground, chunk_size), &mut rng, &format!("level at {height}"));
-            // From one end of the lattice to the next chunk, and as far out as a brush may be.
+            // From one end of the lattice to the next chunk, and as far out as a brush may lie.
             let end = Vec3::new(6.0, (limit * height.signum()) as f32, 6.0);
             terrain.apply([Brush::add(Shape::sphere(end, 3.0), MaterialId(2))]);
             assert_flawless(&terrain, format!("added at the end, level at {height}"));
@@ -107,7 +107,7 @@ fn edits_at_the_ends_of_the_lattice_far_from_the_ground_are_closed() {
         }
     }
     for y in [limit, -limit] {
-        // What is added at the very top is closed by the pristine air beyond, what is dug at the bottom by the rock.
+        // Ground added at the very top is closed by the pristine air above it, holes at the bottom by the rock below.
         terrain.apply([Brush::add(Shape::sphere(Vec3::new(6.0, y, 6.0), 3.0), MaterialId(1))]);
         assert_flawless(&terrain, "a ball at the end");
     }

@@ -1,4 +1,4 @@
-//! Points, boxes, columns, chunks and tiles of any integers: whoever asks about them gets an answer.
+//! Queries about points, boxes, columns, chunks and tiles with arbitrary integers always return an answer.
 
 use bevy_burrow::brush::Evaluator;
 use bevy_burrow::lattice::{BrickPos, ChunkPos, Column, LIMIT, LatticeBox, TilePos};

@@ -1,4 +1,4 @@
-//! Whatever comes in from outside: no panic, no lost edit, no broken surface.
+//! Untrusted input never causes a panic, a lost edit or a broken surface.
 
 mod brushes;
 mod ends;

@@ -1,4 +1,4 @@
-//! Operations that sculpt, of any numbers: from brushes, and from JSON.
+//! Sculpting operations with arbitrary numbers, from brushes and from JSON.
 
 use bevy_burrow::lattice::LIMIT;
 use bevy_burrow::prelude::*;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::brushes::number;
 use crate::terrains::small_terrain;
 
-/// A brush that sculpts with a shape that is fine, and numbers that may not be.
+/// A sculpting brush with a valid shape, and numbers that may be invalid.
 pub fn sculpting() -> impl Strategy<Value = Brush> {
     let place = prop::array::uniform3(-3.0f32..17.0);
     let numbers = prop::array::uniform10(number());
@@ -33,7 +33,7 @@ pub fn sculpting() -> impl Strategy<Value = Brush> {
                 _ => {
                     let stamp = Stamp::new(image(), a, Vec2::new(n[3], n[4]), n[5]);
                     let turned = Quat::from_xyzw(n[6], n[7], n[8], n[9]);
-                    // Few four numbers are a rotation.
+                    // Few random quadruples are a rotation.
                     let stamp = if n[6] > 0.0 { stamp.onto(b) } else { stamp.with_rotation(turned) };
                     Operation::Stamp { stamp }
                 }
@@ -47,7 +47,7 @@ pub fn sculpting() -> impl Strategy<Value = Brush> {
     )
 }
 
-/// Integers that make sense, those at the ends, and any.
+/// Plausible integers, extreme integers and arbitrary integers.
 fn integer() -> impl Strategy<Value = i32> {
     let (limit, most) = (LIMIT * 256, i32::from(i16::MAX));
     let special = [i32::MIN, i32::MAX, 0, 1, 64, 255, 256, 257, most, -most, limit, -limit, limit + 1, 1024];
@@ -90,7 +90,7 @@ proptest! {
         let Ok(edit) = serde_json::from_str::<Edit>(&json) else { return Ok(()) };
         prop_assert!(edit.check().is_ok());
         prop_assert_eq!(&serde_json::to_string(&edit).expect("edits are written"), &json);
-        // What was moved far is moved again.
+        // Ground that was moved far is moved again.
         let mut terrain = small_terrain();
         (0..3).for_each(|_| terrain.submit_edit(&edit));
         terrain.submit(&Brush::smooth(Shape::sphere(Vec3::new(7.0, 9.0, 6.0), 5.0), 1.0));

@@ -1,4 +1,4 @@
-//! Transactions that are given up, stale, overtaken or of another terrain.
+//! Transactions that are cancelled, stale, overtaken or committed to another terrain.
 
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
@@ -16,7 +16,7 @@ fn a_stale_commit_is_refused_and_loses_nothing() {
         terrain.world().hash()
     };
 
-    // Edits that are applied at once overtake a transaction under way, which is then done again with them.
+    // Edits that are applied at once overtake a running transaction. It is then run again together with them.
     let mut terrain = small_terrain();
     terrain.submit(&dig(3.0, 1));
     let stale = terrain.begin().expect("an edit waits").run();
@@ -37,12 +37,12 @@ fn a_transaction_that_was_given_up_is_not_committed_beside_its_successor() {
     let mut terrain = small_terrain();
     terrain.submit(&dig(3.0, 1));
     let first = terrain.begin().expect("an edit waits");
-    // Its task seems lost, so it is given up, and done again together with what came since.
+    // Its task seems lost, so it is cancelled and run again together with the edits sent since.
     terrain.abandon();
     terrain.submit(&dig(11.0, 2));
     let second = terrain.begin().expect("edits wait");
     assert_eq!(second.len(), 2);
-    // The lost one turns up after all.
+    // The lost transaction finishes after all.
     let late = terrain.commit(first.run()).map_or(0, |receipts| receipts.len());
     let receipts = terrain.commit(second.run()).map_or(0, |receipts| receipts.len());
     let rest = terrain
@@ -94,18 +94,18 @@ fn edits_that_were_given_up_are_queued_again_in_order() {
     }
     assert!(terrain.begin().is_none(), "one at a time");
     assert_eq!(terrain.queued(), 2);
-    // The task dies, and the transaction with it.
+    // The task is dropped together with its transaction.
     drop(lost);
-    assert!(terrain.is_busy(), "nobody told the terrain");
+    assert!(terrain.is_busy(), "the terrain was not told");
     terrain.abandon();
     assert!(!terrain.is_busy());
     assert_eq!(terrain.queued(), 5);
-    // Twice is not more.
+    // Cancelling twice has no further effect.
     terrain.abandon();
     assert_eq!(terrain.queued(), 5);
     assert_eq!(tags(&mut terrain), [0, 1, 2, 3, 4]);
 
-    // A commit that was computed and dropped is no different.
+    // Dropping a computed commit has the same effect.
     terrain.submit(&brush(7));
     drop(terrain.begin().expect("an edit waits").run());
     terrain.submit(&brush(8));
@@ -116,7 +116,7 @@ fn edits_that_were_given_up_are_queued_again_in_order() {
 
 #[test]
 fn edits_overtaken_by_apply_keep_their_order() {
-    // Add over dig and dig over add differ, so the hash tells the order.
+    // Dig after add and add after dig give different worlds, so the hash shows the order.
     let place = Shape::sphere(Vec3::new(7.0, 9.0, 6.0), 3.0);
     let nearby = Shape::sphere(Vec3::new(8.0, 9.0, 6.0), 3.0);
     let script = [

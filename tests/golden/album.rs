@@ -1,24 +1,24 @@
-//! Golden pictures and what is compared with them.
+//! Golden pictures and the comparison with them.
 
 use std::path::PathBuf;
 
 use bevy::math::UVec2;
 use image::RgbImage;
 
-/// Mean FLIP above which a picture counts as another one.
+/// Mean FLIP above which a picture counts as different.
 ///
-/// The same machine draws the same picture again (0). A spot of another material, 4 m wide in a picture of some 20 m, gives
-/// 0.018, and a camera that moves by a quarter of a pixel 0.022: `sameness.rs` measures both.
+/// The same machine draws an identical picture (0). A spot of another material, 4 m wide in a picture of about 20 m,
+/// gives 0.018; a camera that moves by a quarter of a pixel gives 0.022. `sameness.rs` measures both.
 pub const THRESHOLD: f32 = 0.01;
 
-/// Pictures compared so far.
+/// Compares pictures and collects the differences.
 #[derive(Default)]
 pub struct Album {
     faults: Vec<String>,
 }
 
 impl Album {
-    /// Compares a picture with the golden one of that name, or makes it the golden one when told to.
+    /// Compares a picture with the golden one of that name, or saves it as the golden one if `BURROW_GOLDEN=write` is set.
     pub fn compare(&mut self, name: &str, picture: &RgbImage) {
         if std::env::var("BURROW_GOLDEN").is_ok_and(|value| value == "write") {
             let path = place_of(name);
@@ -41,28 +41,28 @@ impl Album {
         }
     }
 
-    /// The golden picture of a name.
+    /// The golden picture of that name.
     pub fn golden(&self, name: &str) -> Option<RgbImage> {
         Some(image::open(place_of(name)).ok()?.into_rgb8())
     }
 
-    /// Notes something else that is wrong.
+    /// Records a fault with this message unless `is_right`.
     pub fn check(&mut self, is_right: bool, otherwise: impl FnOnce() -> String) {
         if !is_right {
             self.faults.push(otherwise());
         }
     }
 
-    /// All pictures have been compared.
+    /// Ends the comparison.
     ///
     /// # Panics
-    /// When one of them differs: all are told.
+    /// Panics if any picture differs; the message lists all faults.
     pub fn close(self) {
         assert!(self.faults.is_empty(), "pictures differ:\n{}", self.faults.join("\n"));
     }
 }
 
-/// How different two pictures look: mean FLIP, and a map of it. Pictures of different sizes have nothing in common.
+/// The difference of two pictures: mean FLIP, and a map of it. Pictures of different sizes count as entirely different.
 pub fn flip(a: &RgbImage, b: &RgbImage) -> (f32, RgbImage) {
     if a.dimensions() != b.dimensions() {
         return (1.0, b.clone());
@@ -74,19 +74,19 @@ pub fn flip(a: &RgbImage, b: &RgbImage) -> (f32, RgbImage) {
     (mean, seen)
 }
 
-/// The FLIP of each pixel of two pictures of one size.
+/// The FLIP of each pixel of two pictures of the same size.
 fn flip_map(a: &RgbImage, b: &RgbImage) -> nv_flip::FlipImageFloat {
     let of =
         |picture: &RgbImage| nv_flip::FlipImageRgb8::with_data(picture.width(), picture.height(), picture);
     nv_flip::flip(of(a), of(b), nv_flip::DEFAULT_PIXELS_PER_DEGREE)
 }
 
-/// The mean FLIP of some pixels of two pictures of one size.
+/// The mean FLIP over some pixels of two pictures of the same size.
 pub fn flip_at(a: &RgbImage, b: &RgbImage, pixels: &[UVec2]) -> f32 {
     flip_anywhere(a, b)(pixels)
 }
 
-/// The same for any pixels, once the pictures have been compared.
+/// Like [`flip_at`], for any number of pixel sets after one comparison.
 pub fn flip_anywhere(a: &RgbImage, b: &RgbImage) -> impl Fn(&[UVec2]) -> f32 + use<> {
     let (map, width) = (flip_map(a, b).to_vec(), a.width());
     move |pixels| {
@@ -95,9 +95,9 @@ pub fn flip_anywhere(a: &RgbImage, b: &RgbImage) -> impl Fn(&[UVec2]) -> f32 + u
     }
 }
 
-/// Leaves a picture where one can look at it.
+/// Saves a picture in the target folder for inspection.
 pub fn keep(name: &str, what: &str, picture: &RgbImage) -> PathBuf {
-    // The folder of Cargo's own temporary files lies in the target folder.
+    // Cargo's folder for temporary files lies in the target folder.
     let target = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("a target folder");
     let folder = target.join("proof").join("golden");
     std::fs::create_dir_all(&folder).expect("a folder for proof");

@@ -15,7 +15,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         .expect("valid ground");
     studio.terrain(ground, GroundLook::default());
     let middle = Vec3::new(64.0, studio.height(64.0, 64.0), 64.0);
-    // Without a fade: a picture is to be the same whenever it is taken.
+    // No fading, so that the picture does not depend on when it is taken.
     let mut debug = BurrowDebug { focus: Some(middle), radius: 60.0, near: 14.0, fade: 1e9, ..default() };
     debug.dirty = true;
     studio.app.world_mut().insert_resource(debug.clone());
@@ -30,7 +30,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         (0..3).for_each(|_| studio.app.update());
         studio.picture()
     };
-    // First, as they are forgotten when the view is off.
+    // This view comes first: dirty bricks are recorded only while it is on.
     let dirty = shot(&BurrowDebug { dirty: true, ..debug.clone() });
     album.compare("debug_dirty", &dirty);
     let without = shot(&debug);
@@ -42,8 +42,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         album.compare(&name, &picture);
         let (apart, _) = flip(&without, &picture);
         println!("{name}: FLIP {apart:.5} beside the ground without it");
-        album.check(apart > 0.003, || format!("{name} can hardly be seen: FLIP {apart:.5}"));
+        album.check(apart > 0.003, || format!("{name} is hardly visible: FLIP {apart:.5}"));
     }
     let (apart, _) = flip(&without, &dirty);
-    album.check(apart > 0.003, || format!("dirty bricks can hardly be seen: FLIP {apart:.5}"));
+    album.check(apart > 0.003, || format!("dirty bricks are hardly visible: FLIP {apart:.5}"));
 }

@@ -6,7 +6,7 @@ use bevy_burrow::prelude::*;
 use crate::album::Album;
 use crate::studio::Studio;
 
-/// Where the camera stands: x, metres above the ground, z; and what it looks at, from the pit.
+/// The camera's position, as x, metres above the ground and z, and its target relative to the pit.
 const EYE: Vec3 = Vec3::new(128.0, 22.0, 60.0);
 const AT: Vec3 = Vec3::new(-8.0, 2.0, 22.0);
 
@@ -46,7 +46,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let eye = place(studio, EYE.x, EYE.z, EYE.y);
     studio.look(eye, pit + AT);
     album.compare("landscape", &studio.picture());
-    // The same on a weak machine.
+    // The same with the low quality settings.
     studio.one::<GroundLook>().quality = GroundQuality::Low;
     album.compare("landscape_low", &studio.picture());
 }

@@ -1,18 +1,18 @@
-//! Golden pictures: what the ground looks like, compared with what it looked like when somebody last approved of it.
+//! Golden pictures: renders the ground and compares it with approved pictures.
 //!
 //! | | |
 //! | --- | --- |
 //! | run | `cargo test --release --features examples --test golden` |
 //! | approve of new looks | the same with `BURROW_GOLDEN=write`, then look at `tests/golden/pictures` and commit |
-//! | after a failure | `$CARGO_TARGET_DIR/proof/golden` has the picture, the golden one and where they differ |
+//! | after a failure | `$CARGO_TARGET_DIR/proof/golden` has the picture, the golden one and their difference |
 //!
-//! Pictures are compared by FLIP, which says how much of a difference an eye would see: 0 none, 1 all of it. Needs a
-//! Vulkan driver; lavapipe will do. Where there is none, the tests say so and pass; with `BURROW_REQUIRE=1` they fail.
+//! Pictures are compared by FLIP, an estimate of visible difference: 0 is none, 1 is the largest. The tests need a Vulkan
+//! driver; lavapipe is enough. Without one, the tests print a notice and pass; with `BURROW_REQUIRE=1` they fail.
 //!
 //! # A new scene
 //!
-//! A file with `pub fn shoot(studio: &mut Studio, album: &mut Album)`, and a line in the test below. What needs other
-//! plugins opens a [`Studio`](studio::Studio) of its own, in a test of its own.
+//! Add a file with `pub fn shoot(studio: &mut Studio, album: &mut Album)`, and a line to the test below. A scene that
+//! needs other plugins opens its own [`Studio`](studio::Studio) in a test of its own.
 #![cfg(feature = "examples")]
 
 mod album;

@@ -1,4 +1,4 @@
-//! A game's own textures are what the ground is drawn with, and the project's own come back.
+//! The ground is drawn with a game's own textures, and the crate's own ones can be restored.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
@@ -9,10 +9,10 @@ use crate::album::{Album, flip};
 use crate::landscape::hills;
 use crate::studio::Studio;
 
-/// Layers: as many as the default look names.
+/// The number of layers that the default look names.
 const LAYERS: usize = 14;
 
-/// Textures of one colour, with all mip levels.
+/// Textures of a single colour, with all mip levels.
 fn plain(studio: &mut Studio, texel: [u8; 4]) -> GroundTextures {
     let size = Extent3d { width: 16, height: 16, ..default() };
     let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
@@ -22,7 +22,7 @@ fn plain(studio: &mut Studio, texel: [u8; 4]) -> GroundTextures {
     arrays.add_to(&mut studio.app.world_mut().resource_mut::<Assets<Image>>())
 }
 
-/// From now on the ground is drawn with these.
+/// Draws the ground with these textures from now on.
 fn dress(studio: &mut Studio, textures: GroundTextures) {
     studio.app.world_mut().insert_resource(textures);
     studio.app.update();
@@ -50,5 +50,5 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     });
     dress(studio, own);
     let (apart, _) = flip(&before, &studio.picture());
-    album.check(apart < 1e-4, || format!("the project's own textures came back as others: FLIP {apart:.5}"));
+    album.check(apart < 1e-4, || format!("the crate's own textures were not restored: FLIP {apart:.5}"));
 }

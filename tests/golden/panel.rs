@@ -1,4 +1,4 @@
-//! The panel, with every section of figures and of settings; what differs from run to run, which is times, is covered.
+//! The panel with every section of figures and settings. Timings, which differ from run to run, are masked.
 
 use bevy::prelude::*;
 use bevy_burrow::panel::{BrushTool, PanelPlaces, ToolOperation, ToolShape};
@@ -22,7 +22,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     *world.resource_mut::<BrushTool>() =
         BrushTool { operation: ToolOperation::Raise, shape: ToolShape::Cylinder, ..default() };
     studio.resize((1280, 1040));
-    // Figures of terrain and engine are counted twice a second, of 16 ms a frame, in tasks.
+    // Terrain and engine figures are updated twice a second of app time (16 ms per frame), in tasks.
     let mut frames = 0;
     studio.until("figures", |_| {
         frames += 1;
@@ -43,12 +43,12 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     photograph(studio, album, "panel_settings", &SETTINGS);
 }
 
-/// Takes a picture; each widget of it has to look as it did, however small it is.
+/// Takes a picture and compares each widget on its own, so that small ones count as well.
 fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&str]) {
     let mut picture = studio.picture();
     let places = studio.app.world().resource::<PanelPlaces>().clone();
     for widget in widgets {
-        album.check(places.0.contains_key(*widget), || format!("{name}: {widget} is not seen"));
+        album.check(places.0.contains_key(*widget), || format!("{name}: {widget} is not visible"));
     }
     TIMES.iter().filter_map(|name| places.0.get(*name)).for_each(|place| cover(&mut picture, *place));
     album.compare(name, &picture);
@@ -60,7 +60,7 @@ fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&st
     }
 }
 
-/// Mean FLIP above which a widget counts as another one.
+/// Mean FLIP above which a widget counts as different.
 const WIDGET: f32 = 0.05;
 
 const SETTINGS: [&str; 6] = ["Of a material", "Bedrock", "Found after digs", "Variety", "Beds", "History"];
@@ -80,7 +80,7 @@ const FIGURES: [&str; 12] = [
     "Backend",
 ];
 
-/// What tells of times.
+/// Widgets that show timings.
 const TIMES: [&str; 6] = [
     "transaction",
     "p50, p95, p99",

@@ -1,4 +1,4 @@
-//! Ground that broke off looks as it did, and takes its look along.
+//! Loose pieces look as they did in the ground, and keep their look when they move.
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -8,10 +8,10 @@ use image::imageops::crop_imm;
 use crate::album::{Album, flip};
 use crate::studio::Studio;
 
-/// Mean FLIP between a block in the ground and the same one cut off, whose normals are those of its own samples: less than
-/// what a camera does that moves by a quarter of a pixel, and a quarter of what textures do that lie elsewhere.
+/// Mean FLIP between a block in the ground and the same block cut off, whose normals come from its own samples. It is less
+/// than when the camera moves by a quarter of a pixel, and a quarter of what shifted textures give.
 const CUT_OFF: f32 = 0.022;
-/// The same between a piece here and there, under the same light.
+/// Mean FLIP between a piece at its origin and a moved piece, under the same light.
 const MOVED: f32 = 0.004;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
@@ -24,7 +24,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let world = studio.app.world_mut();
     let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
     world.entity_mut(terrain).insert(LooseGround { debris: 100_000, largest: 100_000, ..default() });
-    // A trench all around, with a vein in its inner wall; and then from side to side below.
+    // A trench around the block, with a vein in its inner wall, and then a cut below it from side to side.
     let middle = Vec3::new(48.0, 20.0, 48.0);
     let trench = |aside: Vec3, half: Vec3| Brush::dig(Shape::cuboid(middle + aside, half));
     studio.apply([
@@ -50,7 +50,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let part = GroundPiece { terrain, origin: found.piece.bounds.min };
     let here = Transform::from_translation(found.origin());
     let piece = world.spawn((part, Mesh3d(mesh), here)).id();
-    studio.until("a piece that is dressed", |app| {
+    studio.until("the piece's material", |app| {
         app.world().entity(piece).contains::<MeshMaterial3d<GroundMaterial>>()
     });
     let material =
@@ -58,13 +58,13 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     album.check(material(piece) != material(terrain), || "a piece shares its terrain's material".into());
     let cut = studio.picture();
     album.compare("piece", &cut);
-    // At the bottom of the picture one sees the cut itself.
+    // The cut itself is visible at the bottom of the picture.
     let above = |picture: &RgbImage| crop_imm(picture, 0, 0, picture.width(), 190).to_image();
     let (apart, _) = flip(&above(&whole), &above(&cut));
     println!("a block cut off below: FLIP {apart:.5}");
     album.check(apart < CUT_OFF, || format!("a block looks different once it is cut off: FLIP {apart:.5}"));
 
-    // Alone; then far away and turned, with eyes and sun turned along.
+    // The piece alone, then far away and turned, with camera and sun turned along.
     let shared = studio.app.world().entity(terrain).get::<MeshMaterial3d<GroundMaterial>>().cloned();
     studio.close_terrain();
     let alone = studio.picture();
@@ -75,7 +75,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     world.entity_mut(studio.camera).insert(step * eye);
     studio.sun(step.rotation * sun);
     let (moved, _) = flip(&alone, &studio.picture());
-    studio.app.world_mut().entity_mut(piece).insert(shared.expect("a dressed terrain"));
+    studio.app.world_mut().entity_mut(piece).insert(shared.expect("a terrain with a material"));
     let (swims, _) = flip(&alone, &studio.picture());
     println!("a piece that moved: FLIP {moved:.5}; with textures that stay in the world: {swims:.5}");
     album.check(moved < MOVED, || format!("a piece looks different once it has moved: FLIP {moved:.5}"));

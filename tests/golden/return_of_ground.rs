@@ -1,4 +1,4 @@
-//! Chunks and tiles whose surface went and came back are drawn again.
+//! Chunks and tiles whose surface vanished and came back are drawn again.
 
 use std::time::Instant;
 
@@ -8,16 +8,16 @@ use bevy_burrow::prelude::*;
 use crate::album::{Album, flip};
 use crate::studio::{PATIENCE, Studio};
 
-/// Height of the level ground: the middle of a chunk, so that all of its surface is in one layer of chunks.
+/// Height of the level ground: the middle of a chunk, so that the whole surface is in one layer of chunks.
 const HEIGHT: f64 = 16.0;
 
 pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let level = || Ground::flat(96, 96, HEIGHT).expect("valid ground");
-    // In the middle of the tile and chunk at 32 to 64; the larger one takes all of that tile.
+    // In the middle of the tile and chunk at 32 to 64; the larger one removes the whole tile.
     let middle = Vec3::new(48.0, HEIGHT as f32, 48.0);
     let hole = || Brush::dig(Shape::sphere(middle, 6.0));
     let yard = || Brush::dig(Shape::cuboid(middle, Vec3::new(20.0, 3.0, 20.0)));
-    // A chunk with a field in it stays, whether there is a surface in it or not.
+    // A chunk that contains a field keeps its entity, even without a surface.
     let vein = || Brush::paint(Shape::sphere(middle - Vec3::Y * 11.0, 3.0), MaterialId(7));
     for (what, dig) in [("a hole", &hole as &dyn Fn() -> Brush), ("a yard", &yard)] {
         studio.terrain(level(), GroundLook::default());
@@ -39,8 +39,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     }
 }
 
-/// Sends a brush or a step, and waits for its commit. The camera runs all the while: what comes into view anew is drawn in
-/// any case.
+/// Sends a brush or a history step, and waits for its commit. The camera draws all the while, as anything that newly comes
+/// into view would be drawn anyway.
 fn while_looking(studio: &mut Studio, message: impl Message) {
     let commits = |studio: &Studio| studio.app.world().resource::<BurrowFigures>().commits;
     let (before, start) = (commits(studio), Instant::now());

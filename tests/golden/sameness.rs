@@ -1,4 +1,4 @@
-//! The seam from close by: ground that was handed to marching cubes looks as it did before, wherever the sun stands.
+//! The seam up close: cells that were handed to marching cubes look as before, under any sun direction.
 
 use std::collections::BTreeSet;
 
@@ -11,9 +11,9 @@ use crate::album::{Album, flip, flip_at, keep};
 use crate::landscape::hills;
 use crate::studio::Studio;
 
-/// Mean FLIP that counts as noise, in the whole picture and along the seam: a third of what it is when the camera moves by
-/// a quarter of a pixel (0.022), less than half of what a spot of another material gives (0.018), and a sixteenth of what a
-/// line along the seam gives there (0.12). The test prints and checks them all.
+/// Mean FLIP that counts as noise, in the whole picture and along the seam. It is a third of what a camera shift by a
+/// quarter of a pixel gives (0.022), less than half of what a spot of another material gives (0.018), and a sixteenth of
+/// what a line along the seam gives there (0.12). The test prints and checks all of these.
 const NOISE: f32 = 0.007;
 
 /// Sun directions all around, low, middle and high.
@@ -25,7 +25,7 @@ fn suns() -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// A picture under each sun.
+/// One picture for each sun direction.
 fn photograph(studio: &mut Studio, suns: impl Iterator<Item = Vec3>) -> Vec<RgbImage> {
     let under = |sun| {
         studio.sun(sun);
@@ -41,7 +41,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.look(middle + from, middle);
     let before = photograph(studio, suns());
     album.compare("seam", &before[1]);
-    // What a quarter of a pixel does; a pixel is 37 mm wide at this distance.
+    // The effect of a camera shift by a quarter of a pixel; a pixel is 37 mm wide at this distance.
     studio.sun(suns().nth(1).unwrap_or(Vec3::Y));
     let aside = Vec3::new(11.0, 0.0, -9.0).normalize() * 0.037 / 4.0;
     studio.look(middle + from + aside, middle + aside);
@@ -49,7 +49,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.look(middle + from, middle);
     println!("the camera moved by a quarter of a pixel: FLIP {moved:.5}");
     album.check(moved > 2.0 * NOISE, || format!("the measure is too coarse: FLIP {moved:.5}"));
-    // Painting with the ground's own material changes nothing, but hands the cells over to marching cubes.
+    // Painting with the ground's own material changes no sample, but hands the cells to marching cubes.
     studio.apply([Brush::paint(Shape::sphere(middle, 6.0), MaterialId::GROUND)]);
     let cells = studio.one::<Terrain>().world().mask().len();
     album.check(cells > 80, || format!("only {cells} cells were handed over"));
@@ -57,12 +57,12 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     album.compare("seam_field", &after[1]);
     let seam = seam(studio);
     let band = grown(&seam, 2);
-    album.check(seam.len() > 300, || format!("only {} pixels of the seam are seen", seam.len()));
-    // The measure along the seam sees a line that is a little darker, and lighter, than the ground.
+    album.check(seam.len() > 300, || format!("only {} pixels of the seam are visible", seam.len()));
+    // The measure along the seam detects a line slightly darker or lighter than the ground.
     for shade in [0.85, 1.15] {
         let drawn = flip_at(&after[1], &with_line(&after[1], &seam, shade), &band);
-        println!("a line along the seam, {shade} as light: FLIP {drawn:.5} there");
-        album.check(drawn > 10.0 * NOISE, || format!("a line went unnoticed: FLIP {drawn:.5}"));
+        println!("a line along the seam, brightness {shade}: FLIP {drawn:.5} there");
+        album.check(drawn > 10.0 * NOISE, || format!("a line was not detected: FLIP {drawn:.5}"));
     }
     for (hour, (before, after)) in before.iter().zip(&after).enumerate() {
         let (mean, map) = flip(before, after);
@@ -80,23 +80,23 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         album.check(mean <= NOISE, || format!("sun {hour}: FLIP {mean:.5} with and without the field"));
         album.check(along <= NOISE, || format!("sun {hour}: FLIP {along:.5} along the seam"));
     }
-    // The same measure sees faults.
+    // The measure detects real faults.
     studio.sun(suns().nth(1).unwrap_or(Vec3::Y));
     studio.apply([Brush::paint(Shape::sphere(middle, 2.0), MaterialId(5))]);
     let (painted, _) = flip(&before[1], &studio.picture());
     studio.apply([Brush::dig(Shape::sphere(middle, 1.0))]);
     let (dug, _) = flip(&before[1], &studio.picture());
     println!("a spot of another material: FLIP {painted:.5}; a small hole in it: {dug:.5}");
-    album.check(painted > 2.0 * NOISE, || format!("a painted spot went unnoticed: FLIP {painted:.5}"));
+    album.check(painted > 2.0 * NOISE, || format!("a painted spot was not detected: FLIP {painted:.5}"));
     elsewhere(studio, album);
     studio.sun(Vec3::new(1.0, 0.9, 0.4));
 }
 
-/// Where ground rises twice as fast as it goes on, the two surfaces divide its cells otherwise, and what is seen of that is as
-/// much as when the camera moves by a quarter of a pixel.
+/// The same limit for slopes steeper than 2:1. There the two surfaces split cells differently, and the visible difference
+/// is about that of a camera shift by a quarter of a pixel.
 const NOISE_ON_CLIFFS: f32 = 0.03;
 
-/// The seam around a corner of four chunks, and around the steepest place.
+/// The seam around a corner of four chunks, and at the steepest place.
 fn elsewhere(studio: &mut Studio, album: &mut Album) {
     let world = studio.one::<Terrain>().snapshot();
     let rise = |(x, z): (i32, i32)| {
@@ -108,7 +108,7 @@ fn elsewhere(studio: &mut Studio, album: &mut Album) {
     let steepest = places().filter(is_far).max_by(|a, b| rise(*a).total_cmp(&rise(*b))).unwrap_or((40, 40));
     for (name, (x, z), noise) in [("corner", (64, 64), NOISE), ("steep", steepest, NOISE_ON_CLIFFS)] {
         let middle = Vec3::new(x as f32, studio.height(x as f32, z as f32), z as f32);
-        // From the lower side, so that all of it is seen.
+        // Seen from the downhill side, so that the whole seam is visible.
         let down = Vec3::new(
             studio.height(x as f32 - 1.0, z as f32) - studio.height(x as f32 + 1.0, z as f32),
             0.0,
@@ -133,7 +133,7 @@ fn elsewhere(studio: &mut Studio, album: &mut Album) {
     }
 }
 
-/// The pixels that the seam crosses: where a cell that marching cubes draws borders on one of the heightmap's.
+/// The pixels on the seam: where cells drawn by marching cubes border on heightmap cells.
 fn seam(studio: &mut Studio) -> BTreeSet<(u32, u32)> {
     let world = studio.one::<Terrain>().snapshot();
     let eye = studio.app.world().entity(studio.camera);
@@ -167,7 +167,7 @@ fn seam(studio: &mut Studio) -> BTreeSet<(u32, u32)> {
     pixels
 }
 
-/// These pixels, and those so near.
+/// These pixels and all within `by` pixels of them.
 fn grown(pixels: &BTreeSet<(u32, u32)>, by: u32) -> Vec<UVec2> {
     let (width, height) = crate::studio::SIZE;
     let near = |at: u32, end: u32| at.saturating_sub(by)..=(at + by).min(end - 1);
@@ -178,7 +178,7 @@ fn grown(pixels: &BTreeSet<(u32, u32)>, by: u32) -> Vec<UVec2> {
     all.into_iter().map(UVec2::from).collect()
 }
 
-/// A picture whose pixels along the seam are darker or lighter.
+/// A picture whose pixels along the seam are darkened or lightened.
 fn with_line(picture: &RgbImage, seam: &BTreeSet<(u32, u32)>, shade: f32) -> RgbImage {
     let mut drawn = picture.clone();
     for &(x, y) in seam {

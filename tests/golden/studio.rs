@@ -1,4 +1,4 @@
-//! An app without a window that takes pictures of terrains.
+//! A windowless app that takes pictures of terrains.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -18,13 +18,13 @@ use crate::{offscreen, shaders};
 /// Width and height of pictures.
 pub const SIZE: (u32, u32) = (480, 270);
 
-/// Longest wait for anything.
+/// The longest wait for any event.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// One studio at a time: a software renderer takes all cores.
+/// Only one studio runs at a time: a software renderer uses all cores.
 static OPEN: Mutex<()> = Mutex::new(());
 
-/// An app without a window: a camera, a sun, some haze, and terrains as scenes want them.
+/// A windowless app with a camera, a sun, some haze, and the terrains of the scenes.
 pub struct Studio {
     pub app: App,
     pub camera: Entity,
@@ -35,8 +35,8 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// Opens a studio with `BurrowPlugins` and whatever else is added. `None`, and a line that says so, where nothing
-    /// can draw; a failure if `BURROW_REQUIRE` is set.
+    /// Opens a studio with `BurrowPlugins` and whatever `add` adds. Without a Vulkan device it prints a notice and returns
+    /// `None`, or panics if `BURROW_REQUIRE` is set.
     pub fn open(add: impl FnOnce(&mut App)) -> Option<Self> {
         let only = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(renderer) = offscreen::find_renderer() else {
@@ -49,7 +49,7 @@ impl Studio {
         };
         let mut app = offscreen::build(Some(renderer), |app| {
             app.add_plugins(BurrowPlugins)
-                // Small textures are painted fast; all machines filter them alike without anisotropy.
+                // Small textures are generated quickly; without anisotropy, all machines filter them alike.
                 .insert_resource(GroundTextures::Baked { side: 256, anisotropy: 1 })
                 .insert_resource(ClearColor(Color::linear_rgb(0.50, 0.66, 0.86)))
                 .insert_resource(GlobalAmbientLight {
@@ -89,12 +89,12 @@ impl Studio {
         Some(studio)
     }
 
-    /// Puts a terrain with a look into the world, in place of the one before, and waits until it is shown.
+    /// Replaces the terrain by a new one with this look, and waits until it is shown.
     pub fn terrain(&mut self, ground: Ground, look: GroundLook) {
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         self.close_terrain();
         let entity = self.app.world_mut().spawn((terrain, look)).id();
-        self.until("a terrain that is dressed", |app| {
+        self.until("the terrain's material", |app| {
             let mut tiles = app
                 .world_mut()
                 .query_filtered::<&ChildOf, (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>();
@@ -102,7 +102,7 @@ impl Studio {
         });
     }
 
-    /// From now on pictures have another size.
+    /// Changes the size of the pictures.
     pub fn resize(&mut self, size: (u32, u32)) {
         let image = Image::new_target_texture(size.0, size.1, TextureFormat::Rgba8UnormSrgb, None);
         self.film = self.app.world_mut().resource_mut::<Assets<Image>>().add(image);
@@ -110,42 +110,42 @@ impl Studio {
         self.app.world_mut().entity_mut(self.camera).insert(RenderTarget::from(self.film.clone()));
     }
 
-    /// Takes the terrain away.
+    /// Despawns the terrain.
     pub fn close_terrain(&mut self) {
         let world = self.app.world_mut();
         let old: Vec<Entity> = world.query_filtered::<Entity, With<Terrain>>().iter(world).collect();
         old.into_iter().for_each(|old| assert!(world.despawn(old)));
     }
 
-    /// Where the camera is, and what it looks at.
+    /// Sets the camera's position and target.
     pub fn look(&mut self, from: Vec3, at: Vec3) {
         let place = Transform::from_translation(from).looking_at(at, Vec3::Y);
         self.app.world_mut().entity_mut(self.camera).insert(place);
     }
 
-    /// Where the sun is.
+    /// Sets the sun's direction.
     pub fn sun(&mut self, from: Vec3) {
         let place = Transform::from_translation(from).looking_at(Vec3::ZERO, Vec3::Y);
         self.app.world_mut().entity_mut(self.sun).insert(place);
     }
 
-    /// The light of the sky, in cd/m2.
+    /// Sets the brightness of the sky, in cd/m2.
     pub fn sky(&mut self, brightness: f32) {
         self.app.world_mut().resource_mut::<GlobalAmbientLight>().brightness = brightness;
     }
 
-    /// The component of a type that is there once.
+    /// The only component of this type.
     pub fn one<C: Component<Mutability = Mutable>>(&mut self) -> Mut<'_, C> {
         let world = self.app.world_mut();
         world.query::<&mut C>().single_mut(world).expect("one of its kind")
     }
 
-    /// The ground's height over a place, in metres.
+    /// The ground's height at (x, z), in metres.
     pub fn height(&mut self, x: f32, z: f32) -> f32 {
         self.one::<Terrain>().world().height(f64::from(x), f64::from(z)).expect("within the world") as f32
     }
 
-    /// Sends brushes and waits until all are shown.
+    /// Sends brushes and waits until all of them are shown.
     pub fn apply(&mut self, brushes: impl IntoIterator<Item = Brush>) {
         let brushes: Vec<Brush> = brushes.into_iter().collect();
         let answered = self.app.world().resource::<BurrowFigures>().brushes + brushes.len() as u64;
@@ -153,28 +153,28 @@ impl Studio {
         self.until("receipts", |app| app.world().resource::<BurrowFigures>().brushes >= answered);
     }
 
-    /// Frames go by until something has happened.
+    /// Updates the app until `done` returns true.
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut App) -> bool) {
-        // Nobody looks meanwhile.
+        // The camera is off meanwhile, to save time.
         self.film_runs(false);
         let start = Instant::now();
         while !done(&mut self.app) {
-            assert!(start.elapsed() < PATIENCE, "waited in vain for {what}");
+            assert!(start.elapsed() < PATIENCE, "timed out waiting for {what}");
             self.app.update();
             std::thread::sleep(Duration::from_millis(1));
         }
         self.film_runs(true);
     }
 
-    /// A picture, once lights have found what they shine on.
+    /// Takes a picture, after a few frames in which lights and shadows settle.
     pub fn picture(&mut self) -> RgbImage {
         for _ in 0..2 {
             self.app.update();
         }
-        // What waits for its shader is not drawn.
+        // Meshes are not drawn before their shaders are compiled.
         let waiting = Instant::now();
         while shaders::are_missing(&self.app) {
-            assert!(waiting.elapsed() < PATIENCE, "a shader never came");
+            assert!(waiting.elapsed() < PATIENCE, "a shader was not compiled in time");
             self.app.update();
         }
         let taken = Arc::new(Mutex::new(None));

@@ -1,4 +1,4 @@
-//! Inside a tunnel: strata on its walls tell how deep it is.
+//! Inside a tunnel: strata on the walls show the depth.
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -6,7 +6,7 @@ use bevy_burrow::prelude::*;
 use crate::album::Album;
 use crate::studio::Studio;
 
-/// Digs a cutting, and a gallery on into the ground: mouth, bend and end.
+/// Digs a cutting, and from it a gallery into the ground; returns its mouth, bend and end.
 pub fn dig(studio: &mut Studio) -> [Vec3; 3] {
     let noise = NoiseHeights { seed: 3, scale: 90.0, amplitude: 10.0, octaves: 4, ..default() };
     let skin = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };

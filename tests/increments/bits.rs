@@ -1,10 +1,10 @@
-//! Vertices and meshes as bits, and the mixing that hashes are made of.
+//! Vertices and meshes as integers for exact comparison, and the mixing function of hashes.
 
 use bevy_burrow::surface::{Indices, SurfaceMesh, Vertex};
 
-/// A vertex as bits: 0.0 is not -0.0.
+/// A vertex as bit patterns: 0.0 and -0.0 differ.
 type Bits = ([i32; 3], [u32; 3], [u8; 4], [u8; 4]);
-/// A mesh as bits.
+/// A mesh as bit patterns.
 pub type MeshBits = (Vec<Bits>, Indices);
 
 pub fn bits(vertex: &Vertex) -> Bits {
@@ -23,7 +23,7 @@ pub fn sorted(vertices: &[Vertex], indices: impl Iterator<Item = usize>) -> Vec<
     triangles
 }
 
-/// SplitMix64, as the hash of samples is documented to be made of.
+/// SplitMix64, of which the documented hash of samples consists.
 pub fn mix(value: u64) -> u64 {
     let z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

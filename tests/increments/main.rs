@@ -1,5 +1,5 @@
-//! After every commit, what was kept up to date is what would be made from scratch: samples, bits, hash, receipts, mask,
-//! meshes, shared bricks. Everything here is counted again, one sample and one cell at a time.
+//! After every commit, incrementally updated data equals the same data computed from scratch: samples, bits, hash,
+//! receipts, mask, meshes and shared bricks. The references here go sample by sample and cell by cell.
 
 mod bits;
 mod meshes;

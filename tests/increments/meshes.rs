@@ -1,4 +1,4 @@
-//! Meshes, made again.
+//! Compares incrementally updated meshes with meshes made from scratch.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +13,7 @@ use crate::bits::{mesh_bits, sorted};
 use crate::witness::Witness;
 
 impl Witness {
-    /// Whoever only follows updates draws what the world draws.
+    /// Meshes that are only ever updated by commits equal those of the world.
     pub fn check_updates(&mut self, meshes: &MeshUpdates, what: &str) {
         let world = self.terrain.world();
         for (tile, update) in &meshes.tiles {
@@ -26,7 +26,7 @@ impl Witness {
             } else {
                 self.chunks.insert(*chunk, new.clone())
             };
-            assert!(old.is_none_or(|old| old != new), "{what}: {chunk:?} is sent without need");
+            assert!(old.is_none_or(|old| old != new), "{what}: {chunk:?} is sent without a change");
         }
         assert_eq!(self.tiles.len(), world.grid().tiles().count(), "{what}");
         for (&tile, mesh) in &self.tiles {
@@ -39,7 +39,7 @@ impl Witness {
         }
     }
 
-    /// Chunks hold what meshing all blocks now gives, and that is as by the book.
+    /// Chunks equal all of their blocks meshed now, and blocks equal the reference mesher's.
     pub fn check_meshes(&mut self, what: &str) {
         let world = self.terrain.world();
         let (view, grid) = (world.view(), world.grid());
@@ -52,7 +52,7 @@ impl Witness {
             let book = plain::mesh(&view, block.brick, cells, grid.origin(block.chunk));
             let ours = sorted(vertices, indices.iter().map(|&index| usize::from(index)));
             let theirs = sorted(&book.vertices, book.indices.iter().map(|index| index as usize));
-            assert!(ours == theirs, "{what}: {block:?} is not as by the book");
+            assert!(ours == theirs, "{what}: {block:?} differs from the reference mesher");
             assert_eq!(vertices.len(), book.vertices.len(), "{what}: {block:?}");
             if !indices.is_empty() {
                 let key = [block.brick.0.y, block.brick.0.z, block.brick.0.x];
@@ -79,8 +79,7 @@ impl Witness {
     }
 }
 
-/// Every block that could draw something: one brick further on all sides than any that is stored, and all sheets of the
-/// mask.
+/// Every block that could draw something: all stored bricks and their neighbours, and all sheets of the mask.
 fn blocks(world: &World) -> Vec<Block> {
     let (grid, mut bricks) = (world.grid(), BTreeSet::new());
     let end = IVec3::new(grid.width() - 1, i32::MAX, grid.depth() - 1);

@@ -1,4 +1,4 @@
-//! Edits, sample by sample, straight from what the documentation says.
+//! A reference implementation of edits, sample by sample, written from the documentation.
 
 use bevy_burrow::brush::shapes::{Capsule, Cone, Cuboid, Cylinder, Sphere};
 use bevy_burrow::brush::{BAND, Evaluator};
@@ -9,7 +9,7 @@ use glam::{IVec2, IVec3, Quat, Vec3};
 use crate::witness::{Effect, Witness};
 use crate::worlds::plainly_applied;
 
-/// Where stored densities end.
+/// The largest stored density.
 const FARTHEST: i32 = 32_767;
 
 /// A length in 1/256 voxel.
@@ -17,7 +17,7 @@ fn units(voxels: f32) -> i32 {
     (voxels * 256.0).round_ties_even() as i32
 }
 
-/// How deep the middle of a shape lies inside it, rounded down.
+/// The largest depth inside a shape, rounded down.
 fn deepest(shape: &Shape) -> i32 {
     let length =
         |axis: Vec3| axis.to_array().map(|part| f64::from(units(part)).powi(2)).iter().sum::<f64>().sqrt();
@@ -25,7 +25,7 @@ fn deepest(shape: &Shape) -> i32 {
         Shape::Sphere(Sphere { radius, .. }) | Shape::Capsule(Capsule { radius, .. }) => units(radius),
         Shape::Cuboid(Cuboid { half, .. }) => units(half.min_element()),
         Shape::Cylinder(Cylinder { axis, radius, .. }) => units(radius).min((length(axis) / 2.0) as i32),
-        // The radius of the ball that touches base and side: the area of a section by half its outline.
+        // The radius of the ball that touches base and side: the area of a cross-section divided by half its perimeter.
         Shape::Cone(Cone { axis, radius, .. }) => {
             let (height, radius) = (length(axis), f64::from(units(radius)));
             let slant = (height * height + radius * radius).sqrt();
@@ -36,24 +36,24 @@ fn deepest(shape: &Shape) -> i32 {
     }
 }
 
-/// How far a point lies above a plane that lies along two axes.
+/// The height of a point above a plane that is parallel to two axes.
 fn above_plane(point: IVec3, on: Vec3, normal: Vec3) -> i32 {
     let from = point * 256 - IVec3::from_array(on.to_array().map(units));
-    assert_eq!(normal.as_ivec3().as_vec3().abs(), normal.abs(), "planes along axes only");
+    assert_eq!(normal.as_ivec3().as_vec3().abs(), normal.abs(), "only axis-aligned planes");
     (from * normal.as_ivec3()).element_sum()
 }
 
-/// Half the sides of a stamp.
+/// The half extents of a stamp.
 fn half(stamp: &Stamp) -> IVec2 {
     IVec2::new(units(stamp.size.x / 2.0), units(stamp.size.y / 2.0))
 }
 
-/// How far a point lies beside the image of a stamp that is not turned, and above its relief.
+/// A point's distance outside the image of an unrotated stamp, and its height above the relief.
 fn from_relief(point: IVec3, stamp: &Stamp) -> (i32, i32) {
-    assert_eq!(stamp.rotation, Quat::IDENTITY, "stamps that are not turned only");
+    assert_eq!(stamp.rotation, Quat::IDENTITY, "only unrotated stamps");
     let (from, half) = (point * 256 - IVec3::from_array(stamp.center.to_array().map(units)), half(stamp));
     let beside = (from.x.abs() - half.x).max(from.z.abs() - half.y);
-    // Where on the image, in 1/256 of a step between samples; beside it, its rim goes on.
+    // The position on the image, in 1/256 of a step between samples; outside the image, its border continues.
     let place = |from: i32, half: i32, side: u32| {
         let last = (i64::from(side) - 1) * 256;
         (i64::from(from + half) * last / i64::from(2 * half)).clamp(0, last)
@@ -71,7 +71,7 @@ fn from_relief(point: IVec3, stamp: &Stamp) -> (i32, i32) {
 }
 
 impl Witness {
-    /// What an operation that sculpts makes of a sample, straight from what the crate's documentation says.
+    /// The new density of a sample under a sculpting operation, as the crate's documentation defines it.
     fn sculpted(&self, brush: &Brush, point: IVec3, outside: i32) -> Option<i32> {
         let (mut deepest, mut outside) = (deepest(&brush.shape), outside);
         let target = match &brush.operation {
@@ -79,7 +79,7 @@ impl Witness {
             Operation::Flatten { point: on, normal } => Some(above_plane(point, *on, *normal)),
             Operation::Stamp { stamp } => {
                 let (beside, above) = from_relief(point, stamp);
-                // Nothing changes outside of the shape, nor of the image.
+                // Nothing changes outside the shape or outside the stamp's image.
                 (outside, deepest) = (outside.max(beside), deepest.min(half(stamp).min_element()));
                 Some(above)
             }
@@ -113,7 +113,7 @@ impl Witness {
             let by = (units(amount) * weight + 128) / 256;
             let by = if matches!(brush.operation, Operation::Raise { .. }) { -by } else { by };
             let ground = self.terrain.world().ground();
-            // Known, and by a voxel or more farther from the surface than nature made it.
+            // The density is exact, and at least a voxel farther from the surface than the pristine one.
             let is_moved = |at: &&IVec3| {
                 let (now, nature) = (distance(**at), ground.distance(self.at_rim(**at)));
                 !is_cut(**at)
@@ -121,7 +121,8 @@ impl Witness {
                     && (now - nature) * (if now < 0 { -1 } else { 1 }) >= 256
             };
             let middle = if own.abs() >= FARTHEST {
-                // Where densities end, nothing moves but towards a surface that was moved beyond nature's.
+                // At the largest stored density, samples change only towards a surface that was moved beyond
+                // the pristine one.
                 if (by < 0) == (own < 0) || !faces.iter().filter(is_other).any(|at| is_moved(&at)) {
                     return None;
                 }
@@ -137,10 +138,10 @@ impl Witness {
                 own
             };
             let after = middle + by;
-            // Only digs and adds leave a sample that says it is cut off.
+            // Only dig and add leave clamped samples.
             return (by != 0).then_some(if after.abs() == depth { after + by.signum() } else { after });
         }
-        // Of what was cut off, no more is known than that it is a voxel farther than what is not.
+        // Of a clamped sample, only a lower bound is known: a voxel farther than its neighbours that are exact.
         let mut middle = own;
         if is_cut(point) && own.abs() == FARTHEST {
             faces.iter().find(is_other)?;
@@ -152,7 +153,7 @@ impl Witness {
             let others = faces.iter().filter(|&&face| is_cut(face)).map(|_| depth).min();
             middle = sign * (nearest.min(others.unwrap_or(i32::MAX)).max(0) + 256);
         }
-        // 64 times the change that the average of 27 samples would be.
+        // 64 times the change towards the average of the 27 samples.
         let average = || {
             let mut sum = 0;
             let steps = (0..27).map(|i| IVec3::new(i % 3, i / 3 % 3, i / 9) - 1);
@@ -196,13 +197,13 @@ impl Witness {
         }
     }
 
-    /// Beyond the world's rim all goes on as it is at the rim.
+    /// Beyond the world's rim, samples repeat those at the rim.
     fn at_rim(&self, at: IVec3) -> IVec3 {
         let ground = self.terrain.world().ground();
         IVec3::new(at.x.clamp(0, ground.width()), at.y, at.z.clamp(0, ground.depth()))
     }
 
-    /// What a sample is made of that becomes solid.
+    /// The material of a sample that becomes solid.
     fn new_material(&self, brush: &Brush, point: IVec3) -> MaterialId {
         if let Some(material) = brush.blend.material {
             return material;
@@ -214,7 +215,7 @@ impl Witness {
         stored.map_or(MaterialId::GROUND, |&(_, material)| material)
     }
 
-    /// Applies a brush to the naive samples.
+    /// Applies a brush to the reference samples.
     pub fn naive(&mut self, brush: &Brush, edit: &Edit) -> Effect {
         let (grid, ground) = (self.terrain.world().grid(), self.terrain.world().ground());
         let mut effect = Effect::default();

@@ -1,4 +1,4 @@
-//! Random grounds, and games played on them.
+//! Random grounds, and random edits played on them.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use glam::{Quat, Vec2, Vec3};
 
 use crate::witness::Witness;
 
-/// Any shape, any operation, rough or smooth, of about this radius, at about this place.
+/// A brush of any shape and operation, rough or smooth, with about this radius and position.
 pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
     let mut vector = |scale: f32| Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5) * 2.0 * scale;
     let (axis, jitter, turn) = (vector(2.0 * radius), vector(2.0), vector(3.0));
@@ -58,7 +58,7 @@ pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
     }
 }
 
-/// A stamp about as large as that; not turned.
+/// An unrotated stamp of about this radius.
 fn any_stamp(rng: &mut Rng, center: Vec3, radius: f32) -> Stamp {
     let (width, height) = (rng.u32(2..6), rng.u32(2..6));
     let samples = (0..width * height).map(|_| rng.u16(..)).collect();
@@ -67,7 +67,7 @@ fn any_stamp(rng: &mut Rng, center: Vec3, radius: f32) -> Stamp {
     Stamp::new(image, center, Vec2::new(side(), side()), 8.0 * (rng.f32() - 0.5))
 }
 
-/// A place in or near the world, its rims and corners often; mostly near the surface.
+/// A position in or near the world: often at rims and corners, mostly near the surface.
 pub fn any_place(rng: &mut Rng, ground: &Ground) -> Vec3 {
     let along = |rng: &mut Rng, end: i32| match rng.u32(0..6) {
         0 => 0.0,
@@ -119,7 +119,7 @@ fn fingerprint(world: &World) -> (u64, usize) {
     (world.hash() ^ world.mask().len() as u64, drawn)
 }
 
-/// Grounds of every kind, small enough to be looked at whole.
+/// Grounds of every kind, small enough to compare every sample.
 pub fn any_ground(rng: &mut Rng, seed: u64) -> (Ground, u32) {
     let chunk_size = [8, 9, 13, 16, 27, 100, 128][rng.usize(0..7)];
     let side = |rng: &mut Rng| match rng.u32(0..6) {

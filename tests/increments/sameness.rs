@@ -1,4 +1,4 @@
-//! How a world came to be does not show.
+//! The result does not depend on batching or threads, and the reported memory is what is actually freed.
 
 use bevy_burrow::lattice::{ChunkPos, TilePos};
 use bevy_burrow::prelude::*;
@@ -48,13 +48,13 @@ fn memory_is_what_the_world_gives_back() {
         let settings = TerrainSettings { chunk_size, ..Default::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
         brushes.iter().for_each(|brush| drop(terrain.apply([brush])));
-        // What was there before leaves no room behind that is not told.
+        // Undo and redo may leave spare capacity in lists, which has to be reported as well.
         (0..seed % 4 * 3).for_each(|_| drop(terrain.undo()));
         (0..seed % 3).for_each(|_| drop(terrain.redo()));
         let told = terrain.memory();
         let blocks = told.samples / Brick::BYTES + terrain.world().drawn().count() + 2;
         let given_back = allocation_counter::measure(|| drop(terrain)).bytes_current.unsigned_abs() as usize;
-        // Two counts of references stand before whatever is shared; the rest is the terrain's own lists.
+        // Two reference counts precede each shared allocation; the rest are the terrain's own lists.
         let least = told.total();
         assert!((least..=least + blocks * 16 + 2048).contains(&given_back), "{given_back}, not {told:?}");
     }

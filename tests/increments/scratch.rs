@@ -1,4 +1,4 @@
-//! All is as if made from scratch.
+//! Incremental updates equal a computation from scratch.
 
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
@@ -22,19 +22,19 @@ fn after_every_commit_all_is_as_if_made_from_scratch() {
 
 #[test]
 fn a_normal_that_only_changes_the_sign_of_its_zeros_is_redrawn() {
-    // The tile's normal of flat ground and the gradient of its samples are both straight up, by other bits once.
+    // The tile's normal of flat ground and the gradient of its samples both point straight up, but differ in a zero's sign.
     let ground = || Ground::flat(32, 32, 10.5).expect("valid ground");
     let paint = |from: f32, to: f32| {
         let (middle, half) = (Vec3::new((from + to) * 0.5, 9.0, 4.0), Vec3::new((to - from) * 0.5, 2.0, 2.0));
         Brush::paint(Shape::cuboid(middle, half), MaterialId::GROUND)
     };
-    // Column 8, on the face of two bricks, is on the mask's border only until the second brush.
+    // Column 8, on the face of two bricks, lies on the mask's border only until the second brush.
     let (first, second) = (paint(2.0, 7.0), paint(9.0, 14.0));
     let (mut once, mut twice) = (Witness::new(ground(), 32), Witness::new(ground(), 32));
     once.apply(&[first.clone(), second.clone()], "at once");
     twice.apply(&[first], "first");
     twice.apply(&[second], "second");
-    assert!(once.chunks == twice.chunks, "batching shows");
+    assert!(once.chunks == twice.chunks, "the result depends on batching");
 }
 
 #[test]
@@ -89,6 +89,6 @@ fn large_brushes_over_small_ones_are_as_if_made_from_scratch() {
     {
         witness.apply(&[brush], &format!("large brush {i}"));
     }
-    assert!(witness.kinds.len() > 1, "bricks that are all alike: {:?}", witness.kinds);
+    assert!(witness.kinds.len() > 1, "kinds of uniform bricks: {:?}", witness.kinds);
     play(&mut witness, &mut rng, 4, 6.0, "small again");
 }

@@ -1,5 +1,5 @@
-//! Transactions so large that threads share what is cheap for each brick: slabs of bricks along x, batches of edits. They
-//! make what small ones make, which share nothing.
+//! Transactions large enough for threads to share the cheap work per brick (slabs of bricks along x, batches of edits)
+//! give the same result as small ones, which share nothing.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::bits::mesh_bits;
 
-/// A ground, and what is done to it, transaction by transaction.
+/// A ground, and the brushes of each transaction.
 struct Script {
     ground: Arc<Ground>,
     chunk_size: u32,
@@ -23,8 +23,8 @@ impl Script {
         Terrain::new(Arc::clone(&self.ground), &settings).expect("valid settings")
     }
 
-    /// Plays it several times: in parts of so many brushes, and each transaction at once with as many threads as there are,
-    /// with 1, 2 and 5. At least so many bricks are edited by the first one.
+    /// Plays the script several times: in parts of `part` brushes, and with each transaction at once on all, 1, 2 and 5
+    /// threads. The first transaction has to edit at least `bricks` bricks.
     fn check(&self, part: usize, bricks: usize, what: &str) {
         let pool = |count| rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("threads");
         let mut pooled = [1, 2, 5].map(|count| (pool(count), self.terrain()));
@@ -35,7 +35,7 @@ impl Script {
             let parts = brushes.chunks(part).flat_map(|brushes| parted.apply(brushes));
             assert_eq!(counted(&receipts), counted(&parts.collect::<Vec<_>>()), "{what}");
             let edited = once.world().bricks().count();
-            assert!(edited >= bricks, "{what}: {edited} bricks are few");
+            assert!(edited >= bricks, "{what}: only {edited} bricks were edited");
             assert_same(once.world(), parted.world(), &what);
             let report = once.world().check_seams();
             assert!(report.is_flawless(), "{what}: {report}");
@@ -48,11 +48,11 @@ impl Script {
     }
 }
 
-/// What each brush changed, by its own count.
+/// What each brush changed, without the scenarios.
 fn counted(receipts: &[Receipt]) -> Vec<Applied> {
     let counts = |receipt: &Receipt| {
         let applied = receipt.outcome.clone().expect("every brush reaches the world");
-        // Of scenarios, part by part, fields know more.
+        // Scenarios depend on how the brushes are split into transactions.
         Applied { chunks: Vec::new(), ..applied }
     };
     receipts.iter().map(counts).collect()
@@ -76,7 +76,7 @@ fn at(x: i32, y: f32, z: i32) -> Vec3 {
 
 #[test]
 fn more_bricks_than_one_thread_looks_at_are_drawn_as_few_are() {
-    // Balls one beside the other, from the first slab of bricks to the last; their ends lie everywhere in a brick.
+    // A row of balls from the first slab of bricks to the last; their ends lie at all offsets within a brick.
     for (shift, chunk_size) in [(0, 32), (3, 25)] {
         let height = |x: i32, z: i32| 20.0 + f64::from(x * 7 % 11 + z * 5 % 13) * 0.4;
         let ground = Ground::from_fn(226, 190, height).expect("finite heights");
@@ -106,7 +106,7 @@ fn more_bricks_than_one_thread_looks_at_are_drawn_as_few_are() {
 
 #[test]
 fn more_bricks_than_one_batch_holds_are_what_few_are() {
-    // Pillars of air that together are one hall of ten thousand bricks; some come out at the surface.
+    // Columns of air that together form one hall of ten thousand bricks; some of them break through the surface.
     let height = |x: i32, z: i32| 39.0 + f64::from(x * z % 5) * 0.3;
     let ground = Ground::from_fn(268, 268, height).expect("finite heights");
     let half = Vec3::new(18.0, 36.0, 18.0);
@@ -123,7 +123,7 @@ fn more_bricks_than_one_batch_holds_are_what_few_are() {
 
 #[test]
 fn edits_with_too_many_bricks_around_them_for_one_list_are_what_single_ones_are() {
-    // Shafts from corner to corner of boxes of some 300,000 bricks, all through one place in the middle.
+    // Diagonal shafts in boxes of some 300,000 bricks, all through one place in the middle.
     let ground = Ground::flat(400, 400, 0.0).expect("valid");
     let shaft = |i: i32| {
         let (from, to) = (at(0, -990.0, 10 * i), at(400, 10.0, 400 - 10 * i));
@@ -135,7 +135,7 @@ fn edits_with_too_many_bricks_around_them_for_one_list_are_what_single_ones_are(
         let reach = Edit::quantize(brush).expect("valid").reach();
         LatticeBox { min: reach.min >> 3, max: reach.max >> 3 }.volume()
     };
-    assert!(shafts.iter().map(around).sum::<u64>() > 2 << 20, "they are less than two lists");
+    assert!(shafts.iter().map(around).sum::<u64>() > 2 << 20, "too few bricks for two lists");
     let script = Script { ground: ground.into(), chunk_size: 32, transactions: vec![] };
     let [mut once, mut single] = [0, 1].map(|_| script.terrain());
     let pristine = once.world().hash();

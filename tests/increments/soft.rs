@@ -1,11 +1,11 @@
-//! Brushes that are softer than their shape is deep: all of the change is made in the middle, and less around it.
+//! Brushes whose falloff is wider than their shape is deep: the full change in the middle, and less around it.
 
 use bevy_burrow::prelude::*;
 use glam::{IVec3, Vec2, Vec3};
 
 use crate::witness::Witness;
 
-/// Every shape, with one that is deepest along its axis and one that is deepest across it.
+/// Every shape, including one that is deepest along its axis and one that is deepest across it.
 fn shapes(at: Vec3) -> [Shape; 8] {
     [
         Shape::sphere(at, 5.0),
@@ -43,7 +43,7 @@ fn a_falloff_wider_than_the_shape_is_deep_ends_in_its_middle() {
         let mut witness = Witness::new(ground(), 16);
         for brush in operations(shape, at) {
             let what = format!("shape {number}, {:?}", brush.operation);
-            // As deep, about; and much wider, which makes no difference.
+            // A falloff about as wide as the depth; a much wider one gives the same result.
             for falloff in [3.0, 64.0] {
                 witness.apply(&[brush.clone().with_falloff(falloff)], &what);
             }
@@ -56,7 +56,7 @@ fn in_the_middle_of_a_soft_brush_all_of_the_change_is_made() {
     let at = |y: f32| Vec3::new(16.0, y, 16.0);
     let middle = IVec3::new(16, 10, 16);
     for (shape, outwards) in [
-        // As deep as their radius, and as half their height.
+        // A falloff as wide as the radius, and as wide as half the height.
         (Shape::cylinder(at(4.0), Vec3::Y * 12.0, 5.0), IVec3::X),
         (Shape::cylinder(at(7.0), Vec3::Y * 6.0, 9.0), IVec3::Y),
         // A ball of radius 3 touches the base and the side of a cone whose section has sides of 6, 8 and 10.

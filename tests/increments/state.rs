@@ -1,4 +1,4 @@
-//! Receipts, samples, bricks, fields and mask, counted again.
+//! Compares receipts, samples, bricks, fields and mask with the reference.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -35,7 +35,7 @@ impl Witness {
         assert!(told == expected, "{what}: {brush:?}\ntold {told:?}\nexpected {expected:?}");
     }
 
-    /// Samples, solid and edited bits, hash.
+    /// Samples, solid bits, edited bits and hash.
     pub fn check_samples(&self, what: &str) {
         let world = self.terrain.world();
         let mut found = 0;
@@ -60,13 +60,13 @@ impl Witness {
                     hash = hash.wrapping_add(mix(place ^ u64::from(point.y as u32) << 32 ^ sample));
                 }
             }
-            assert!(is_any, "{what}: {pos:?} is stored without need");
+            assert!(is_any, "{what}: {pos:?} is stored without edited samples");
         }
         assert_eq!(found, self.samples.len(), "{what}: edited samples");
         assert_eq!(world.hash(), mix(world.ground().hash() ^ mix(hash)), "{what}: hash");
     }
 
-    /// Bricks all of whose samples are alike are one brick, and memory counts each once.
+    /// Uniform bricks are shared, and memory counts each kind once.
     pub fn check_bricks(&mut self, what: &str) {
         let world = self.terrain.world();
         let mut shared: HashMap<(i32, MaterialId), *const Brick> = HashMap::new();
@@ -87,14 +87,14 @@ impl Witness {
             }
         }
         let memory = world.memory();
-        // From 64 kinds on a world may let go of those that are gone.
-        assert!(self.kinds.len() < 64, "{what}: more kinds than can be counted from here");
+        // From 64 kinds on, a world may drop those that are no longer used.
+        assert!(self.kinds.len() < 64, "{what}: too many kinds of uniform bricks for this check");
         assert_eq!(memory.samples, Brick::BYTES * (single + self.kinds.len()), "{what}: memory of samples");
         materials += self.kinds.values().sum::<usize>();
         assert_eq!(memory.materials, materials, "{what}: memory of materials");
     }
 
-    /// Each edited sample lies in one field of its chunk, fields keep apart, and news tell how they came.
+    /// Each edited sample lies in one field of its chunk, fields do not touch, and events report every change of them.
     pub fn check_fields(&mut self, news: &[(ChunkPos, FieldNews)], what: &str) {
         let world = self.terrain.world();
         for &(chunk, news) in news {
@@ -102,10 +102,10 @@ impl Witness {
                 FieldNews::Created(id) => assert!(self.fields.insert((chunk, id)), "{what}: created twice"),
                 FieldNews::Changed(id) => assert!(self.fields.contains(&(chunk, id)), "{what}: unknown"),
                 FieldNews::Merged { gone, into } => {
-                    assert!(self.fields.remove(&(chunk, gone)), "{what}: gone twice");
+                    assert!(self.fields.remove(&(chunk, gone)), "{what}: removed twice");
                     assert!(world.fields_of(chunk).is_some_and(|f| f.get(into).is_some()), "{what}: into");
                 }
-                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: gone twice"),
+                FieldNews::Removed(id) => assert!(self.fields.remove(&(chunk, id)), "{what}: removed twice"),
             }
         }
         let all = world.fields().flat_map(|(chunk, fields)| fields.iter().map(move |f| (chunk, f.id)));

@@ -1,4 +1,4 @@
-//! What a world under test is compared with.
+//! The reference that a terrain under test is compared with.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -13,7 +13,7 @@ use crate::bits::{MeshBits, mesh_bits};
 /// Every edited sample: density and stored material.
 pub type Samples = HashMap<IVec3, (i32, MaterialId)>;
 
-/// What an edit did, by the naive count.
+/// What an edit changed, according to the reference.
 #[derive(Debug, Default, PartialEq)]
 pub struct Effect {
     pub chunks: BTreeSet<ChunkPos>,
@@ -23,18 +23,18 @@ pub struct Effect {
     pub painted: BTreeMap<MaterialId, u64>,
 }
 
-/// A world that is edited sample by sample, and whatever else has to be true of the one under test.
+/// A terrain under test and a reference world that is edited sample by sample.
 pub struct Witness {
     pub terrain: Terrain,
     pub samples: Samples,
-    /// Meshes as a game has them that only ever hears of updates.
+    /// Meshes that are only ever updated by commits.
     pub tiles: HashMap<TilePos, MeshBits>,
     pub chunks: HashMap<ChunkPos, MeshBits>,
-    /// Kinds of bricks that were all alike at some commit, with the bytes of their materials.
+    /// Kinds of uniform bricks at some commit, with the bytes of their materials.
     pub kinds: HashMap<(i32, MaterialId), usize>,
     pub fields: BTreeSet<(ChunkPos, FieldId)>,
     pub mesher: Mesher,
-    /// A tall cliff's sheets have too many blocks to be meshed twice each time.
+    /// Whether to mesh everything again after each commit: too slow for tall cliffs, whose sheets have many blocks.
     pub is_meshed_again: bool,
 }
 
@@ -56,13 +56,13 @@ impl Witness {
         }
     }
 
-    /// One transaction of these brushes, and every check there is.
+    /// Applies brushes in one transaction and runs every check.
     pub fn apply(&mut self, brushes: &[Brush], what: &str) {
         self.terrain.submit_all(brushes);
         let transaction = self.terrain.begin().expect("brushes wait");
         let mut commit = transaction.run();
         let news = commit.field_news().to_vec();
-        // Whoever swaps meshes may take them away; the world keeps its own.
+        // Taking the meshes out of the commit must not affect the world, which keeps its own.
         let meshes = std::mem::take(&mut commit.meshes);
         let receipts = self.terrain.commit(commit).expect("nothing else commits");
         assert_eq!(receipts.len(), brushes.len(), "{what}");

@@ -1,4 +1,4 @@
-//! Bumps: what a rolling ball and a walking capsule feel of seams and of chunk borders, beside flat ground of one piece.
+//! Bumps at seams and chunk borders, as felt by a rolling ball and a walking capsule, compared with a single flat box.
 
 use avian3d::parry::shape::{SharedShape, TypedShape};
 use avian3d::prelude::*;
@@ -8,38 +8,38 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level, pit};
 
-/// How rough a way was, in voxels: of one voxel to the metre.
+/// How rough a ride was, in voxels of one metre.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ride {
-    /// The largest step from one frame to the next, up or down, beyond what the step before it led to.
+    /// The largest change of the vertical step from one frame to the next.
     jump: f32,
-    /// The farthest from the height that the ground has.
+    /// The largest distance from the ground's height.
     off: f32,
-    /// How far it went, along x.
+    /// The distance covered along x.
     went: f32,
 }
 
-/// Rides along heights, one for each frame.
+/// The ride given by the heights of all frames.
 fn ride(heights: &[f32], ground: f32) -> Ride {
     let jump = heights.windows(3).map(|y| (y[2] - 2.0 * y[1] + y[0]).abs()).fold(0.0, f32::max);
     let off = heights.iter().map(|y| (y - ground).abs()).fold(0.0, f32::max);
     Ride { jump, off, went: 0.0 }
 }
 
-/// Ground whose surface is level at height 8, cut in many ways, from x = 0 to 96.
+/// Level ground at height 8 from x = 0 to 96, divided in different ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Ground8 {
-    /// One box: no terrain at all.
+    /// One box without any terrain.
     OnePiece,
-    /// Tiles only: borders every 16 m.
+    /// Only tiles: borders every 16 m.
     Tiles,
-    /// Tiles, and patches that marching cubes draws: seams every few metres.
+    /// Tiles with patches drawn by marching cubes: seams every few metres.
     Seams,
-    /// All of it drawn by marching cubes: borders of chunks and of their inner blocks.
+    /// All of it drawn by marching cubes: borders of chunks and of the blocks inside them.
     Chunks,
 }
 
-/// Gives all ground the collider that its triangles would have on their own, without knowing their neighbours.
+/// Replaces all ground colliders by plain triangle meshes that know nothing of neighbouring triangles.
 fn forget_neighbours(stage: &mut Stage) {
     for body in stage.ground() {
         let mut body = stage.app.world_mut().entity_mut(body);
@@ -83,12 +83,12 @@ fn lay(ground: Ground8, voxel_size: f32) -> Stage {
     stage
 }
 
-/// The lanes that bodies take, off the borders along x and right on one.
+/// The z of the two lanes: one between the borders along x, one right on such a border.
 const LANES: [f32; 2] = [30.3, 32.0];
 
-/// Bodies move along x until one of them is across; how rough their ways were.
+/// Lets two bodies move along x until one of them is across, and returns their rides.
 fn travel(stage: &mut Stage, bodies: [Entity; 2], level: f32, voxel_size: f32) -> [Ride; 2] {
-    // At first they settle on the ground.
+    // At first the bodies settle on the ground.
     stage.frames(20);
     let mut heights = bodies.map(|_| Vec::new());
     while bodies.iter().all(|&body| stage.place(body).x < 92.0) && heights[0].len() < 2000 {
@@ -101,7 +101,7 @@ fn travel(stage: &mut Stage, bodies: [Entity; 2], level: f32, voxel_size: f32) -
     [0, 1].map(|lane| Ride { went: went[lane], ..ride(&heights[lane], level / voxel_size) })
 }
 
-/// Balls roll along x.
+/// Two balls roll along x.
 fn roll(ground: Ground8, voxel_size: f32, speed: f32) -> [Ride; 2] {
     let mut stage = lay(ground, voxel_size);
     let level = 8.0 * voxel_size + 0.5;
@@ -109,7 +109,7 @@ fn roll(ground: Ground8, voxel_size: f32, speed: f32) -> [Ride; 2] {
     travel(&mut stage, balls, level, voxel_size)
 }
 
-/// Characters walk along x.
+/// Two characters walk along x.
 fn walk(ground: Ground8, voxel_size: f32) -> [Ride; 2] {
     let mut stage = lay(ground, voxel_size);
     let top = 8.0 * voxel_size;
@@ -117,7 +117,7 @@ fn walk(ground: Ground8, voxel_size: f32) -> [Ride; 2] {
     travel(&mut stage, people, top + Character::default().height / 2.0, voxel_size)
 }
 
-/// On cut ground a way is as smooth as on one piece.
+/// Checks that rides on divided ground are as smooth as on a single box.
 fn compare(what: &str, ways: impl Fn(Ground8) -> [Ride; 2]) {
     let [plain, _] = ways(Ground8::OnePiece);
     println!("{what}, one piece: {plain:?}");
@@ -145,7 +145,7 @@ fn a_walker_feels_neither_seams_nor_borders() {
     }
 }
 
-/// The other tests can fail: triangles on their own do bump, by more than those allow.
+/// Checks that the other tests can fail: plain triangle meshes do cause bumps larger than those tests allow.
 #[test]
 fn a_ball_feels_the_triangles_of_a_plain_mesh() {
     let mut worst = 0.0f32;

@@ -1,4 +1,4 @@
-//! What changing ground does to bodies that rest on it, hang on it, or stand where it comes.
+//! What a change of the ground does to bodies that rest on it, hang on it, or are in its way.
 
 use std::f32::consts::TAU;
 
@@ -89,7 +89,7 @@ fn who_is_built_over_in_part_is_not_squeezed_into_the_ground() {
     let balls: Vec<Entity> = places.map(|place| stage.ball(place, 0.5, Vec3::ZERO)).collect();
     stage.frames(seconds(0.5));
     for round in 0..8 {
-        // From all sides, more or less from above: not as far as the middle, or just beyond.
+        // Overlapping from all sides, mostly from above: the new ground just reaches the ball's centre, or not quite.
         let brush = |&ball: &Entity| {
             let (turn, tilt, radius) = (rng.f32() * TAU, rng.f32() * 1.2 - 0.3, 1.5 + 2.5 * rng.f32());
             let way = Vec3::new(turn.cos() * tilt.cos(), tilt.sin(), turn.sin() * tilt.cos());
@@ -98,7 +98,7 @@ fn who_is_built_over_in_part_is_not_squeezed_into_the_ground() {
         };
         let brushes: Vec<Brush> = balls.iter().map(brush).collect();
         stage.dig(brushes);
-        // However long the game stands still in between.
+        // The result does not depend on how long the game was paused in between.
         stage.app.world_mut().resource_mut::<Time<Physics>>().pause();
         stage.frames(seconds(3.0));
         stage.app.world_mut().resource_mut::<Time<Physics>>().unpause();
@@ -162,7 +162,7 @@ fn hidden_triangles_are_no_colliders() {
     let world = stage.app.world_mut();
     let mut bodies = world.query_filtered::<&Collider, With<GroundBody>>();
     let shapes = bodies.iter(world).map(|body| body.shape().as_shape::<GroundShape>().expect("ground"));
-    // Only triangles without any area are left out.
+    // Only triangles without area are left out.
     let colliding: usize = shapes.map(GroundShape::triangles).sum();
     assert!(colliding <= drawn && colliding > drawn * 99 / 100, "{colliding} of {drawn}");
 }
@@ -226,7 +226,7 @@ fn a_walker_jumps_as_high_as_it_should_and_stands_still_when_told_nothing() {
 #[test]
 fn a_loose_piece_becomes_a_body_with_its_volume() {
     let mut terrain = level(64, 1.0);
-    // A ball in the air: its surface is a closed mesh.
+    // A ball in the air, whose surface is a closed mesh.
     terrain.apply([Brush::add(Shape::sphere(Vec3::new(24.0, 24.0, 24.0), 4.0), MaterialId(2))]);
     let chunk = terrain.world().grid().chunk_of(IVec3::new(24, 24, 24));
     let piece = terrain.world().chunk_mesh(chunk);
@@ -263,9 +263,9 @@ fn nobody_is_lifted_onto_ground_that_is_not_shown_yet() {
     let (mut stage, entity) = Stage::with_ground(level(64, 1.0));
     let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     stage.frames(4);
-    // For a while after a change near it a body is watched.
+    // A body near a change is watched for a while.
     stage.dig([pit(22.0, 8.0, 20.0, 1.5)]);
-    // A change by the game itself is shown when it has loaded.
+    // A change made by the game itself is shown only once it has loaded.
     let mut terrain = stage.app.world_mut().get_mut::<Terrain>(entity).expect("it stays");
     terrain.apply([Brush::add(Shape::sphere(Vec3::new(20.0, 8.0, 20.0), 4.0), MaterialId(2))]);
     stage.frame();
@@ -279,7 +279,7 @@ fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let rock = Shape::cuboid(Vec3::new(30.0, 9.5, 20.0), Vec3::splat(2.0));
     stage.dig([Brush::add(rock, MaterialId(2))]);
-    // Below the ball, as if it were heavy there, and in the rock that the arch stands astride.
+    // A ball whose centre of mass lies below it in the ground, and an arch whose transform lies in the rock between its legs.
     let ball = stage.ball(Vec3::new(10.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     stage.app.world_mut().entity_mut(ball).insert((CenterOfMass(Vec3::NEG_Y * 2.0), NoAutoCenterOfMass));
     let leg = |x: f32| (Vec3::new(x, 2.0, 0.0), Quat::IDENTITY, Collider::cuboid(2.0, 4.0, 2.0));
@@ -292,7 +292,7 @@ fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
     for (body, height) in [(ball, 8.5), (arch, 8.0)] {
         assert!((stage.place(body).y - height).abs() < 0.1, "{} for {height}", stage.place(body));
     }
-    // In the ground itself it is lifted all the same.
+    // A body that is itself in the ground is lifted.
     stage.app.world_mut().get_mut::<Transform>(ball).expect("a body").translation.y = -30.0;
     stage.frames(seconds(1.0));
     assert!(stage.figures().lifted > 0 && stage.place(ball).y > 8.0, "{}", stage.place(ball));
@@ -301,7 +301,7 @@ fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
 #[test]
 fn who_is_put_into_the_ground_is_lifted_and_what_is_buried_on_purpose_stays() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
-    // In ground where nothing ever changed.
+    // In ground that never changed.
     let deep = |x: f32| Vec3::new(x, -30.0, 20.0);
     let [lost, kept, off] = [10.0, 20.0, 30.0].map(|x| stage.ball(deep(x), 0.5, Vec3::ZERO));
     stage.app.world_mut().entity_mut(kept).insert(LockedAxes::ALL_LOCKED);
@@ -341,7 +341,7 @@ fn ground_that_changes_is_to_bodies_what_the_game_says_by_then() {
     stage.dig([pit(24.0, 8.0, 24.0, 4.0)]);
     assert_eq!(like(&mut stage, &plain).len(), before.len() + 1);
 
-    // What a game puts on one of them itself is not touched by a dig.
+    // Components that the game adds to one of the bodies survive a dig.
     for &body in &changed {
         stage.app.world_mut().entity_mut(body).insert(Friction::new(0.5));
     }

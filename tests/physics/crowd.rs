@@ -1,7 +1,7 @@
 //! Many bodies on ground that is dug and built under their feet.
 //!
-//! `BURROW_CROWD=1000` has so many balls, a tenth as many walkers, and goes on for a minute; else it is a tenth of that,
-//! for a few seconds. `BURROW_SEED` is another landscape with other bodies and edits for each number.
+//! `BURROW_CROWD=1000` sets the number of balls; there are a tenth as many walkers, and the test lasts a minute. The
+//! default is a tenth of that, for a few seconds. `BURROW_SEED` selects another landscape, bodies and edits.
 
 use std::collections::HashMap;
 
@@ -15,15 +15,15 @@ use fastrand::Rng;
 
 use crate::stage::{STEP, Stage};
 
-/// Cells along a side of the landscape.
+/// Cells along each side of the landscape.
 const SIDE: u32 = 128;
 
-/// How large the crowd is.
+/// The number of balls.
 fn crowd() -> usize {
     std::env::var("BURROW_CROWD").ok().and_then(|count| count.parse().ok()).unwrap_or(100)
 }
 
-/// Which landscape, bodies and edits.
+/// The seed of landscape, bodies and edits.
 fn seed() -> u32 {
     std::env::var("BURROW_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(0)
 }
@@ -35,7 +35,7 @@ fn landscape(amplitude: f64, scale: f64) -> Terrain {
     Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size: 1.0 }).expect("valid settings")
 }
 
-/// Walls around the world, for bodies to stay in it.
+/// Walls around the world that keep bodies in it.
 fn fence(stage: &mut Stage) {
     let side = SIDE as f32;
     for (x, z, width, depth) in [
@@ -49,7 +49,7 @@ fn fence(stage: &mut Stage) {
     }
 }
 
-/// A place over the world, off its walls.
+/// A position over the world, away from its walls.
 fn somewhere(rng: &mut Rng) -> Vec2 {
     let mut along = || 3.0 + rng.f32() * (SIDE as f32 - 6.0);
     Vec2::new(along(), along())
@@ -59,7 +59,7 @@ fn height(model: &Model, place: Vec2) -> f32 {
     model.height(place.x.into(), place.y.into()).expect("in the world") as f32
 }
 
-/// Tunnels through the hills, along all chunks.
+/// Tunnels through the hills, crossing all chunks.
 fn tunnels() -> impl Iterator<Item = Brush> {
     let side = SIDE as f32;
     (0..4).flat_map(move |number| {
@@ -71,7 +71,7 @@ fn tunnels() -> impl Iterator<Item = Brush> {
     })
 }
 
-/// A brush near the ground, as players send them; those who only dig never put ground where somebody is.
+/// A brush near the ground, as players send them. With `builds` unset it never adds ground.
 fn edit(rng: &mut Rng, model: &Model, builds: bool) -> Brush {
     let place = somewhere(rng);
     let center = Vec3::new(place.x, height(model, place) + rng.f32() * 4.0 - 3.0, place.y);
@@ -83,12 +83,12 @@ fn edit(rng: &mut Rng, model: &Model, builds: bool) -> Brush {
     }
 }
 
-/// Is an edit to be sent in this frame? Ten are in a second.
+/// Whether an edit is sent in this frame: ten a second.
 fn is_due(frame: u32) -> bool {
     frame * 10 / 64 != (frame + 1) * 10 / 64
 }
 
-/// How many edits changed the ground before, and when that was in the time of bodies.
+/// How many edits changed the ground before, and the physics time at the start.
 struct Edits {
     changed: usize,
     seconds: f32,
@@ -99,7 +99,7 @@ impl Edits {
         Self { changed: stage.changed(), seconds: stage.seconds() }
     }
 
-    /// Fails unless edits changed the ground ten times a second since; a tenth of them may have found nothing to change.
+    /// Checks that edits changed the ground ten times a second since; a tenth of them may have found nothing to change.
     fn check(&self, stage: &mut Stage, sent: usize) {
         let seconds = stage.seconds() - self.seconds;
         stage.catch_up();
@@ -110,14 +110,14 @@ impl Edits {
     }
 }
 
-/// Who is inside the ground, and for how many frames in a row.
+/// Bodies inside the ground, and for how many frames in a row.
 #[derive(Default)]
 struct Buried {
     frames: HashMap<Entity, u32>,
     longest: u32,
     /// Bodies that were in the ground for three frames.
     through: usize,
-    /// Bodies that got into the ground in a frame that did not change it.
+    /// Bodies that entered the ground in a frame that did not change it.
     sank: usize,
     worst: f64,
     revision: u64,
@@ -125,13 +125,13 @@ struct Buried {
 }
 
 impl Buried {
-    /// Begins a frame.
+    /// Starts a frame.
     fn begin(&mut self, model: &Model) {
         self.is_same = model.revision() == self.revision;
         self.revision = model.revision();
     }
 
-    /// Looks at a body. Built over, it may be in the ground for the frame of the commit and no longer.
+    /// Checks a body. One that was built over may be in the ground in the frame of the commit, but no longer.
     fn look(&mut self, model: &Model, body: Entity, place: Vec3) {
         let is_under = !place.is_finite() || model.is_solid(place.as_dvec3());
         if !is_under {
@@ -163,7 +163,7 @@ fn hardly_anybody_is_lifted_where_a_crowd_only_digs() {
     assert!(figures.lifted <= crowd() as u64 / 20, "{} of {} were lifted", figures.lifted, crowd());
 }
 
-/// Plays a crowd on ground that is dug, and built too if somebody builds; nobody may fall through.
+/// Plays a crowd on ground that is dug, and also built if `builds` is set. No body may fall through.
 fn play(builds: bool) -> PhysicsFigures {
     let (balls, walkers) = (crowd(), crowd() / 10);
     let seconds = if balls >= 1000 { 60.0 } else { 8.0 };
@@ -175,7 +175,7 @@ fn play(builds: bool) -> PhysicsFigures {
     let mut bodies = Vec::new();
     for _ in 0..balls {
         let place = somewhere(&mut rng);
-        // Half of them start below the open sky, the others wherever there is air: in tunnels too.
+        // Half of them start below the open sky, the others wherever there is air, tunnels included.
         let spans = stage.terrain(terrain).world().spans(place.x.into(), place.y.into());
         let span = if rng.bool() { spans.last() } else { rng.choice(spans.iter()) };
         let Some(span) = span else { continue };
@@ -243,7 +243,7 @@ fn play(builds: bool) -> PhysicsFigures {
     stage.figures().clone()
 }
 
-/// A tunnel with a level floor, deep below all hills, from one side of the world to the other.
+/// A tunnel with a level floor deep below all hills, from one side of the world to the other.
 struct Tunnel {
     floor: f32,
     ceiling: f32,
@@ -261,36 +261,36 @@ impl Tunnel {
         Brush::dig(Shape::cuboid(Vec3::new(middle, self.floor + tall / 2.0, middle), half))
     }
 
-    /// The place on its floor that lies below another one, off its walls.
+    /// The position on its floor below the given one, away from its walls.
     fn at(&self, place: Vec2) -> Vec3 {
         Vec3::new(place.x, self.floor, SIDE as f32 / 2.0 + 6.0 * (place.y / SIDE as f32 - 0.5))
     }
 
-    /// A hole near a body where nobody is: below the surface of the hills, or in the tunnel's ceiling. The ground that
-    /// bodies move on keeps its shape, but what draws it is made anew.
+    /// A hole near a body, but out of its way: below the surface of the hills, or in the tunnel's ceiling. The surface
+    /// under the bodies keeps its shape, but its mesh and collider are rebuilt.
     fn hole(&self, rng: &mut Rng, model: &Model, body: Vec3) -> Brush {
         let radius = 1.5 + rng.f32();
         let aside = 4.0 * Vec2::new(rng.f32() - 0.5, rng.f32() - 0.5);
         let place = (body.xz() + aside).clamp(Vec2::splat(4.0), Vec2::splat(SIDE as f32 - 4.0));
         let is_inside = body.y < self.ceiling;
-        // Off the surface by more than the two voxels around a brush where samples change.
+        // Away from the surface by more than the two voxels around a brush in which samples change.
         let y = if is_inside { self.ceiling } else { height(model, place) - 4.0 - radius };
         Brush::dig(Shape::sphere(Vec3::new(place.x, y, place.y), radius))
     }
 }
 
-/// The tile or chunk that draws the ground under a place.
+/// The tile or chunk that draws the ground below a position.
 fn drawn_below(model: &Model, place: Vec3) -> (bool, IVec3) {
     let cell = place.floor().as_ivec3();
     let column = Column::new(cell.x, cell.z);
-    // So far below the pristine surface no tile draws anything.
+    // That far below the pristine surface, tiles draw nothing.
     let is_deep = 256 * (cell.y + 8) < model.ground().height(column);
     let is_dug = is_deep || model.mask().contains(column);
     let chunk = cell.div_euclid(IVec3::splat(16));
     (is_dug, if is_dug { chunk } else { chunk.with_y(0) })
 }
 
-/// Jumps: how far each step up or down differs from the one before, in voxels.
+/// Jumps: how much each vertical step differs from the one before, in voxels.
 #[derive(Default)]
 struct Jumps {
     all: Vec<f32>,
@@ -306,9 +306,9 @@ impl Jumps {
     }
 }
 
-/// On gentle hills nothing but a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere. A fifth
-/// of the bodies are on the level floor of a tunnel below the hills. Ten times a second the ground below somebody is
-/// painted, or a hole is dug near it, out of its way: new seams, new meshes and colliders, and the same surface.
+/// On gentle hills only a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere. A fifth of the
+/// bodies are on the level floor of a tunnel below the hills. Ten times a second the ground below a body is painted, or a
+/// hole is dug nearby, out of its way. That gives new seams, meshes and colliders for the same surface.
 #[test]
 fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     let (balls, walkers) = (crowd(), crowd() / 10);
@@ -317,7 +317,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     fence(&mut stage);
     let mut rng = Rng::with_seed(4 + 64 * u64::from(seed()));
     let model = stage.terrain(terrain).world();
-    // Patches that marching cubes draws and that look as before, on chunk borders and off them.
+    // Patches drawn by marching cubes that look as before, on chunk borders and away from them.
     let patches: Vec<Brush> = (0..120)
         .map(|number| {
             let mut place = somewhere(&mut rng);
@@ -330,7 +330,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
         .collect();
     let tunnel = Tunnel::below(model);
     stage.dig(patches.into_iter().chain([tunnel.brush()]));
-    // Where a body starts, and which way it goes.
+    // The start and the direction of each body.
     let start = |stage: &Stage, rng: &mut Rng, number: usize| {
         let (place, way) = (somewhere(rng), Vec2::from_angle(rng.f32() * 6.3));
         if number.is_multiple_of(5) {
@@ -340,7 +340,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
             (Vec3::new(place.x, y, place.y), way)
         }
     };
-    // Bodies do not meet each other here: only ground counts.
+    // Bodies do not collide with each other here: only the ground matters.
     let layers = CollisionLayers::new(LayerMask(2), LayerMask(1));
     let mut bodies = Vec::new();
     for number in 0..balls {
@@ -364,7 +364,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
         ([Jumps::default(), Jumps::default()], [Jumps::default(), Jumps::default()]);
     for frame in 0..(seconds / STEP) as u32 {
         if is_due(frame) {
-            // Each edit by itself: on a machine that does not keep up with them, bodies wait.
+            // Each edit is a transaction of its own. On a slow machine, the bodies wait for it.
             if !stage.is_idle() {
                 stage.catch_up();
                 waits += 1;
@@ -394,7 +394,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
             }
             in_tunnel += usize::from(c.y < tunnel.ceiling);
             let jump = (c.y - 2.0 * b.y + a.y).abs();
-            // The body touches the border with all of its width.
+            // The body's whole width counts as touching the border.
             let around = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::NEG_X, Vec2::NEG_Y];
             let mut drawn = around.map(|side| {
                 let side = c + Vec3::new(side.x, 0.0, side.y) * 0.3 - Vec3::Y * reach;
@@ -411,10 +411,10 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     let swapped = stage.figures().swaps - swaps;
     println!(
         "{holes} of them were holes; {swapped} colliders were swapped, bodies waited {waits} times; \
-         {in_tunnel} samples are of the tunnel"
+         {in_tunnel} samples are from the tunnel"
     );
     assert!(swapped > sent as u64, "{swapped} colliders were swapped by {sent} edits");
-    assert!(in_tunnel > 1000, "{in_tunnel} samples of the tunnel");
+    assert!(in_tunnel > 1000, "{in_tunnel} samples from the tunnel");
     for (kind, name) in ["balls", "walkers"].iter().enumerate() {
         let (seams, plain) = (at_seams[kind].figures(), elsewhere[kind].figures());
         println!("{name}: (samples, p99, highest) at seams and borders {seams:?}, elsewhere {plain:?}");

@@ -1,4 +1,4 @@
-//! Ground that breaks off falls, and makes room for ground that comes back.
+//! Debris: ground that breaks off falls, and disappears when an undo restores that ground.
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
@@ -7,22 +7,22 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level};
 
-/// A slab on a pillar, on level ground at 8 voxels; what cuts it off takes the pillar away.
+/// A slab on a pillar, on level ground at 8 voxels. Digging the pillar away cuts the slab off.
 const PILLAR: Vec3 = Vec3::new(32.0, 14.0, 32.0);
 const SLAB: Vec3 = Vec3::new(32.0, 22.0, 32.0);
 
-/// How often debris has crumbled.
+/// How many pieces of debris have crumbled.
 #[derive(Resource, Default)]
 struct Crumbled(usize);
 
-/// A stage with such a table on a terrain that stands somewhere, and its entity. Pieces stay for so many seconds.
+/// A stage with such a table on a terrain at `place`, and its entity. Pieces stay for `stay` seconds.
 fn stage(voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
     furnish(Stage::new(), voxel_size, place, stay)
 }
 
 fn furnish(stage: Stage, voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
     let mut terrain = level(64, voxel_size);
-    // The model counts in voxels.
+    // The terrain's own coordinates are in voxels.
     terrain.apply([
         Brush::add(Shape::cuboid(PILLAR, Vec3::new(1.2, 8.0, 1.2)), MaterialId(2)),
         Brush::add(Shape::cuboid(SLAB, Vec3::new(6.2, 2.2, 6.2)), MaterialId(3)),
@@ -42,7 +42,7 @@ fn furnish(stage: Stage, voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Ent
     (stage, entity)
 }
 
-/// Cuts the table's slab off, on a terrain that stands somewhere.
+/// Cuts the table's slab off, on a terrain at `place`.
 fn saw(voxel_size: f32, place: Vec3) -> Brush {
     let half = Vec3::new(4.0, 1.2, 4.0) * voxel_size;
     Brush::dig(Shape::cuboid(place + PILLAR * voxel_size, half)).with_tag(9)
@@ -69,14 +69,14 @@ fn a_slab_that_is_sawn_off_falls_and_lies_on_the_ground() {
         assert!(middle.distance(home) < 3.0 * voxel_size, "{middle} is not {home}");
         stage.frames((4.0 / STEP) as usize);
         let [(_, at)] = &pieces(&mut stage)[..] else { panic!("it stays") };
-        // It may lie on what is left of the pillar, but not in the ground, and not up where it was.
+        // It may lie on the rest of the pillar, but neither in the ground nor up where it was.
         let height = (at.translation.y - place.y) / voxel_size;
         assert!((9.5..19.0).contains(&height), "{height}");
         assert_eq!(stage.figures().lifted, 0);
     }
 }
 
-/// Where the meshes of pieces are in the world, and the bodies that they are children of.
+/// World positions of the pieces' meshes, and the bodies whose children they are.
 fn drawn(stage: &mut Stage) -> Vec<(Vec3, Entity)> {
     let world = stage.app.world_mut();
     let mut drawn = world.query_filtered::<(&Transform, &ChildOf), (With<GroundPiece>, With<Mesh3d>)>();
@@ -97,7 +97,7 @@ fn a_piece_of_a_terrain_without_colours_is_drawn_all_the_same() {
     assert_eq!(drawn(&mut stage).len(), 1);
 }
 
-/// How often a piece was found, and was drawn in the very same frame, where it was in the ground.
+/// For each piece found: whether it was drawn in the same frame where it was in the ground.
 #[derive(Resource, Default)]
 struct Seen(Vec<bool>);
 
@@ -125,7 +125,7 @@ fn a_piece_is_drawn_in_the_frame_in_which_the_ground_loses_it() {
             assert_eq!(drawn.len(), seen.len(), "as many are drawn as were found");
             let is_body = !pieces(stage).is_empty();
             for (home, body) in drawn {
-                // It neither falls nor is in the way before its collider is done.
+                // Before its collider is ready, it neither falls nor is in the way.
                 let body = stage.app.world().entity(body);
                 assert_eq!(body.contains::<RigidBody>(), is_body);
                 assert_eq!(body.contains::<Collider>(), is_body);
@@ -150,7 +150,7 @@ fn a_piece_is_drawn_in_the_frame_in_which_the_ground_loses_it() {
 #[test]
 fn a_boulder_that_rolls_is_never_taken_for_one_in_the_ground() {
     let (mut stage, _) = stage(1.0, Vec3::ZERO, 1e9);
-    // Rounder than the box around it, whose corners turn through the ground.
+    // A boulder rounder than its bounding box, whose corners turn through the ground.
     stage.dig([Brush::add(Shape::sphere(SLAB + Vec3::new(0.0, 6.0, 0.0), 7.0), MaterialId(2))]);
     stage.dig([saw(1.0, Vec3::ZERO), Brush::dig(Shape::cuboid(SLAB, Vec3::new(9.0, 2.5, 9.0)))]);
     stage.frames_until("pieces take shape", |stage| !pieces(stage).is_empty());
@@ -172,7 +172,7 @@ fn what_fell_makes_room_for_ground_that_comes_back() {
     stage.frames_until("it goes", |stage| pieces(stage).is_empty());
     let world = stage.app.world_mut();
     assert_eq!(world.query::<&Terrain>().single(world).expect("one terrain").world().hash(), hash);
-    assert_eq!(world.resource::<Crumbled>().0, 0, "it did not crumble, it went back");
+    assert_eq!(world.resource::<Crumbled>().0, 0, "an undo counted as crumbling");
 }
 
 #[test]
@@ -182,7 +182,7 @@ fn debris_crumbles_in_its_time_and_goes_with_its_terrain() {
     stage.frames_until("it crumbles", |stage| stage.app.world().resource::<Crumbled>().0 == 1);
     stage.frame();
     assert!(pieces(&mut stage).is_empty());
-    // Another piece, of a terrain that makes way for the next one.
+    // Another piece, of a terrain that is replaced by the next one.
     stage.app.world_mut().resource_mut::<DebrisSettings>().stay = 1e9;
     let again = Brush::add(Shape::cuboid(SLAB, Vec3::new(3.2, 2.2, 3.2)), MaterialId(3));
     let corner = Brush::dig(Shape::cuboid(SLAB - Vec3::Y * 2.0, Vec3::new(6.0, 1.0, 6.0)));

@@ -1,4 +1,4 @@
-//! Walls around a terrain, as bodies feel them.
+//! Walls around a terrain, and how bodies collide with them.
 
 use bevy::prelude::*;
 use bevy_burrow::physics::{CharacterSteering, EdgeWalls};
@@ -33,7 +33,7 @@ fn nobody_walks_or_jumps_off_a_terrain_with_walls() {
     }
 }
 
-/// How many walls there are, and the farthest one's x.
+/// The number of walls, and the largest x among them.
 fn walls_of(stage: &mut Stage) -> (usize, f32) {
     let mut names = stage.app.world_mut().query::<(&Name, &Transform)>();
     let walls = names.iter(stage.app.world()).filter(|(name, _)| name.as_str() == "edge wall");

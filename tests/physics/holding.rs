@@ -1,4 +1,4 @@
-//! Bodies that are held over ground without colliders, while the game goes on changing them.
+//! Bodies that are held above ground without colliders, while the game keeps changing them.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{STEP, Stage, level};
 
-/// Places that bodies are to be put at, in the next `Update`.
+/// Positions to which bodies are moved in the next `Update`.
 #[derive(Resource, Default)]
 struct Teleports(Vec<(Entity, Vec3)>);
 
@@ -57,7 +57,7 @@ fn who_is_teleported_over_ground_without_colliders_is_held_before_the_next_step(
     stage.app.world_mut().get_mut::<LinearVelocity>(ball).expect("a body").y = -20.0;
     stage.app.world_mut().resource_mut::<Teleports>().0.extend(places);
     stage.frame();
-    // A hitch of the machine: many steps in a frame.
+    // A hitch of the machine: many steps in one frame.
     let hitch = TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(12.0 * STEP));
     stage.app.insert_resource(hitch);
     stage.frames(2);
@@ -98,7 +98,7 @@ fn a_game_that_lets_go_of_a_held_body_leaves_no_axis_locked() {
     let (mut stage, ball) = held_ball();
     stage.app.world_mut().entity_mut(ball).remove::<HeldByGround>();
     assert!(get::<LockedAxes>(&stage, ball).is_none());
-    // There still is no ground.
+    // There is still no ground.
     stage.frames(4);
     assert!(stage.is_held(ball));
     source(&mut stage, 120.0, 120.0);
@@ -118,7 +118,7 @@ fn a_held_body_goes_on_with_the_velocity_that_the_game_gave_it() {
     assert!(!stage.is_held(ball) && stage.place(ball).x > place.x + 1.0, "{}", stage.place(ball));
 }
 
-/// A fast ball that is held over ground with colliders, for want of some where it was going, and has fallen asleep.
+/// A fast ball that is held above ground with colliders, as there are none where it was going, and has fallen asleep.
 fn asleep_on_the_way() -> (Stage, Entity) {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(256, 1.0));
@@ -163,7 +163,7 @@ fn what_ground_lets_through_is_not_held() {
     for (ghost, start) in ghosts.into_iter().zip(starts) {
         assert!(stage.place(ghost).x > start.x + 1.0, "{} from {start}", stage.place(ghost));
     }
-    // One that ground lets through from now on is let go.
+    // A body that the ground no longer collides with is let go.
     stage.app.world_mut().entity_mut(solid).insert(CollisionLayers::NONE);
     stage.frames(2);
     assert!(!stage.is_held(solid) && get::<LockedAxes>(&stage, solid).is_none());
@@ -200,7 +200,7 @@ fn a_held_source_gets_ground_below_all_of_its_colliders() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(256, 1.0));
     source(&mut stage, 200.0, 200.0);
-    // Off its radius, in the next column of chunks.
+    // Outside its radius, in the next column of chunks.
     let body = on_an_arm(&mut stage, 75.0, 7.0);
     stage.app.world_mut().entity_mut(body).insert(ColliderSource { radius: 1.0 });
     stage.frame();
@@ -231,7 +231,7 @@ fn a_held_body_that_moves_no_longer_by_itself_is_let_go() {
 fn who_flies_into_a_hill_without_colliders_is_held_before_it() {
     let mut stage = Stage::new();
     let mut terrain = level(256, 1.0);
-    // From x = 150 on, and higher than the flight.
+    // The hill begins at x = 150, and is higher than the flight.
     let hill = Shape::cuboid(Vec3::new(170.0, 24.0, 120.0), Vec3::new(20.0, 17.0, 20.0));
     terrain.apply([Brush::add(hill, MaterialId(2))]);
     stage.app.world_mut().spawn(terrain);
@@ -252,7 +252,7 @@ fn nobody_waits_for_ground_where_the_game_took_the_tile_away() {
     stage.frames_until("the ground is shown", |stage| tile(stage).is_some());
     stage.frames(120);
     assert!(stage.is_held(ball) && get::<Sleeping>(&stage, ball).is_some());
-    // For ground of its own.
+    // It is held for the ground below it.
     let floor = (Collider::cuboid(16.0, 1.0, 16.0), Transform::from_xyz(120.0, 7.5, 120.0));
     stage.app.world_mut().spawn((RigidBody::Static, floor));
     let tile = tile(&mut stage).expect("it is shown");

@@ -1,4 +1,4 @@
-//! Bodies on ground that is dug and built: in an app with avian, frame by frame, at a fixed time step.
+//! Bodies on ground that is dug and built: an app with avian, frame by frame, at a fixed time step.
 #![cfg(feature = "avian")]
 
 mod bumps;

@@ -1,4 +1,4 @@
-//! Terrains that are moved, turned, or scaled by a parent.
+//! Terrains that are moved, rotated, or scaled by a parent.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -70,7 +70,7 @@ fn below_a_scaled_parent_sources_reach_as_far_and_bodies_are_held_as_high_up() {
     assert!(stage.is_held(ball) && stage.place(ball).y > 2.5, "{}", stage.place(ball));
 }
 
-/// Where a triangle lets a normal point to that leans.
+/// The normal that a triangle's shape makes of a tilted contact normal.
 fn pushed(shape: &GroundShape, triangle: u32, normal: Vec3) -> Option<Vec3> {
     let mut pushed = None;
     shape.map_part_at(triangle, &mut |_, _, cone| {

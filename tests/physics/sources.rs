@@ -1,4 +1,4 @@
-//! Colliders come with sources and go with them, and nothing falls where they are missing.
+//! Colliders are created near sources and removed with them, and nothing falls where they are missing.
 
 use std::time::Duration;
 
@@ -83,7 +83,7 @@ fn a_source_that_races_along_never_leaves_its_body_without_ground() {
 
 #[test]
 fn a_source_that_is_held_has_ground_made_where_it_was_going() {
-    // The ground that each needs before it goes on is farther off than its radius: ahead, to both sides, or below its rim.
+    // The ground that each needs next lies outside its radius: ahead, to both sides, or below its rim.
     let cases = [
         (Vec3::X * 60.0, 0.5, 1.0),
         (Vec3::new(300.0, 0.0, 300.0), 0.5, 1.0),
@@ -93,7 +93,7 @@ fn a_source_that_is_held_has_ground_made_where_it_was_going() {
     for (velocity, ball_radius, radius) in cases {
         let mut stage = Stage::new();
         stage.app.world_mut().spawn(level(512, 1.0));
-        // Without a source, ground is shown and has no colliders.
+        // Without a source, ground is shown but has no colliders.
         stage.frames_until("the ground is shown", |stage| {
             let world = stage.app.world_mut();
             world.query::<&Tile>().iter(world).next().is_some()
@@ -143,7 +143,7 @@ fn what_is_dug_just_beyond_a_source_is_ground_for_those_who_are_there() {
     let place = Transform::from_xyz(56.0, 8.0, 40.0);
     let source = stage.app.world_mut().spawn((place, ColliderSource { radius: 20.0 })).id();
     stage.settle();
-    // The tile from x = 64 on keeps its collider, though it is farther off than the radius now.
+    // The tile from x = 64 on keeps its collider, though it is now outside the radius.
     stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x = 40.0;
     stage.frame();
     stage.settle();
@@ -171,7 +171,8 @@ fn colliders_go_with_their_terrain() {
 fn no_collider_is_of_ground_that_is_not_shown_yet() {
     let (mut stage, entity) = Stage::with_ground(level(192, 1.0));
     for number in 0..6 {
-        // A change by the game itself is loaded, and shown when all of it is there; meanwhile a part loses its collider.
+        // A change made by the game is loaded in the background and shown once complete. Meanwhile a part loses its
+        // collider.
         let world = stage.app.world_mut();
         let part =
             world.query_filtered::<Entity, With<GroundCollider>>().iter(world).next().expect("one is there");
@@ -184,7 +185,7 @@ fn no_collider_is_of_ground_that_is_not_shown_yet() {
             let world = stage.app.world_mut();
             let shown = world.query::<&ShownSurface>().iter(world).map(|shown| shown.revision).max();
             let made = world.query::<&GroundCollider>().iter(world).map(|ground| ground.revision).max();
-            assert!(made <= shown, "a collider of revision {made:?}, but {shown:?} is what is shown");
+            assert!(made <= shown, "a collider of revision {made:?}, but {shown:?} is shown");
             shown > Some(revision)
         });
         stage.settle();
@@ -217,7 +218,7 @@ fn colliders_on_their_way_do_not_keep_the_world_from_being_edited_in_place() {
             world.entity_mut(part).remove::<GroundCollider>();
             world.despawn(body);
         }
-        // Who else holds the world: its terrain, and this test.
+        // The world is also referenced by its terrain and by this test.
         let mut frames = 0;
         stage.frames_until("the colliders are there", |stage| {
             let world = stage.terrain(entity).snapshot();

@@ -1,4 +1,4 @@
-//! The app that the tests play on: a terrain, bodies, and one step of physics per frame.
+//! The test app: a terrain, bodies, and one physics step per frame.
 
 use std::time::{Duration, Instant};
 
@@ -11,24 +11,24 @@ use bevy_burrow::physics::{
 };
 use bevy_burrow::prelude::*;
 
-/// Seconds of a step.
+/// Seconds per step.
 pub const STEP: f32 = 1.0 / 64.0;
 
-/// How long a stage waits for something before it gives up: machines may have much else to do.
+/// How long a stage waits before it gives up: the machine may be busy.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// How long a stage sleeps between two frames, so that tasks get on.
+/// Sleep between two frames, so that tasks can proceed.
 const NAP: Duration = Duration::from_micros(500);
 
 /// The receipts so far.
 #[derive(Resource, Default)]
 struct Receipts {
     all: usize,
-    /// Those of edits that changed some sample.
+    /// Receipts of edits that changed a sample.
     changed: usize,
 }
 
-/// An app with the plugin, as a dedicated server has it: no meshes, no assets.
+/// An app with the plugin, as on a dedicated server: no meshes, no assets.
 pub struct Stage {
     /// The app itself.
     pub app: App,
@@ -39,7 +39,7 @@ impl Stage {
         Self::within(App::new())
     }
 
-    /// In an app that has settings for plugins already.
+    /// Like [`Self::new`], in an app that already has settings for plugins.
     pub fn within(mut app: App) -> Self {
         app.add_plugins((
             MinimalPlugins,
@@ -63,7 +63,7 @@ impl Stage {
         Self { app }
     }
 
-    /// With meshes, which nobody draws.
+    /// With meshes, but no renderer.
     pub fn with_meshes() -> Self {
         let mut stage = Self::new();
         stage.app.init_resource::<Assets<Mesh>>();
@@ -75,7 +75,7 @@ impl Stage {
         Self::new().on(terrain)
     }
 
-    /// The same in an app that is there already.
+    /// Spawns a terrain and its source in this stage.
     pub fn on(mut self, terrain: Terrain) -> (Self, Entity) {
         let entity = self.app.world_mut().spawn(terrain).id();
         self.app.world_mut().spawn((Transform::default(), ColliderSource { radius: 1e4 }));
@@ -91,7 +91,7 @@ impl Stage {
         (0..count).for_each(|_| self.frame());
     }
 
-    /// Frames until something is so. Panics when it never comes.
+    /// Updates frames until a condition holds. Panics if it never does.
     pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
@@ -101,10 +101,10 @@ impl Stage {
             }
             std::thread::sleep(NAP);
         }
-        panic!("waited in vain: {what}");
+        panic!("timed out waiting until {what}");
     }
 
-    /// Frames until no edit is on its way and no collider is missing. Time stands still meanwhile.
+    /// Updates frames until no edit is pending and no collider is missing. Time is paused meanwhile.
     pub fn settle(&mut self) {
         self.app.world_mut().resource_mut::<Time<Physics>>().pause();
         self.frames_until("the ground settles", |stage| {
@@ -114,14 +114,14 @@ impl Stage {
         self.app.world_mut().resource_mut::<Time<Physics>>().unpause();
     }
 
-    /// Is no edit on its way?
+    /// Whether no edit is pending.
     pub fn is_idle(&mut self) -> bool {
         let world = self.app.world_mut();
         let mut terrains = world.query::<&Terrain>();
         terrains.iter(world).all(|terrain| terrain.queued() == 0 && !terrain.is_busy())
     }
 
-    /// Frames until no edit is on its way. All time stands still meanwhile: physics takes no step, not even the last one
+    /// Updates frames until no edit is pending. All time is paused meanwhile: physics takes no step, not even the last one
     /// that it takes after it was paused itself.
     pub fn catch_up(&mut self) {
         self.app.world_mut().resource_mut::<Time<Virtual>>().pause();
@@ -142,7 +142,7 @@ impl Stage {
         self.app.world().resource::<Receipts>().all
     }
 
-    /// Edits so far that changed some sample.
+    /// The number of edits so far that changed a sample.
     pub fn changed(&self) -> usize {
         self.app.world().resource::<Receipts>().changed
     }
@@ -151,21 +151,21 @@ impl Stage {
         self.app.world_mut().write_message(brush).expect("the plugin added the message");
     }
 
-    /// Sends brushes and waits until they are dug, with time standing still.
+    /// Sends brushes and waits until they are applied, with time paused.
     pub fn dig(&mut self, brushes: impl IntoIterator<Item = Brush>) {
         brushes.into_iter().for_each(|brush| self.send(brush));
         self.frame();
         self.settle();
     }
 
-    /// A ball that moves.
+    /// Spawns a ball with a velocity.
     pub fn ball(&mut self, place: Vec3, radius: f32, velocity: Vec3) -> Entity {
         let body = (RigidBody::Dynamic, Collider::sphere(radius), Transform::from_translation(place));
         let turn = Vec3::new(velocity.z, 0.0, -velocity.x) / radius;
         self.app.world_mut().spawn((body, LinearVelocity(velocity), AngularVelocity(turn))).id()
     }
 
-    /// A character that stands.
+    /// Spawns a standing character.
     pub fn character(&mut self, feet: Vec3, direction: Vec2) -> Entity {
         let character = Character::default();
         let place = character.standing_at(feet);
@@ -205,7 +205,7 @@ pub fn level(cells: u32, voxel_size: f32) -> Terrain {
     Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size }).expect("valid settings")
 }
 
-/// A ball that is dug out.
+/// A brush that digs a ball.
 pub fn pit(x: f32, y: f32, z: f32, radius: f32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius))
 }

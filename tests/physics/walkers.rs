@@ -1,4 +1,4 @@
-//! Walking bodies as games build them: with a shield, in a trigger, on a vehicle, crouching.
+//! Walkers as games build them: with a shield, in a trigger, on a vehicle, crouching.
 
 use avian3d::prelude::*;
 use bevy::prelude::*;
@@ -33,7 +33,7 @@ fn a_trigger_over_a_step_is_nothing_to_stumble_on() {
     }
     let trigger = (Collider::cuboid(8.0, 6.0, 8.0), Transform::from_xyz(20.0, 9.0, 40.0));
     stage.app.world_mut().spawn((RigidBody::Static, Sensor, trigger));
-    // So careful that the step's edge is too steep: only a look ahead finds its top.
+    // The walker accepts only gentle slopes, so the step's edge counts as too steep: only a look ahead finds its top.
     let walkers = [20.0, 40.0].map(|z| {
         let walker = stage.character(Vec3::new(18.5, 8.0, z), Vec2::X);
         stage.app.world_mut().get_mut::<Character>(walker).expect("a walker").steepest = 0.6;
@@ -62,7 +62,7 @@ fn a_walker_takes_a_step_however_slow_it_is_and_comes_down_again() {
         stage.frame();
         for &(walker, top, speed) in &walkers {
             let feet = stage.feet(walker);
-            // The soles keep a skin's width from what they stand on.
+            // The soles stay a skin's width above the ground.
             let expected = match feet.x {
                 24.1..25.9 => 8.0 + top,
                 26.5..30.0 => 8.0,
@@ -73,7 +73,7 @@ fn a_walker_takes_a_step_however_slow_it_is_and_comes_down_again() {
         walkers.retain(|&(walker, ..)| stage.feet(walker).x < 30.0);
     }
     let late = walkers.iter().find(|&&(walker, ..)| stage.feet(walker).x < 26.5);
-    assert_eq!(late.map(|(_, top, speed)| (top, speed)), None, "still before the step");
+    assert_eq!(late.map(|(_, top, speed)| (top, speed)), None, "a walker did not get over the step");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
     let mut lowest = f32::INFINITY;
     for frame in 0..seconds(14.0) {
         if frame % 2 == 0 {
-            // The same surface, but another's to draw: the tile loses it, and a chunk gets it.
+            // The same surface, but drawn by another part: the tile loses it, and a chunk gets it.
             let ahead = 1.5 + (frame % 13) as f32 * 0.3;
             let place = stage.feet(walkers[frame * 7 % walkers.len()]) + Vec3::X * ahead;
             stage.send(Brush::paint(Shape::sphere(place, 1.5), MaterialId(2)));
@@ -109,7 +109,7 @@ fn a_walker_below_a_parent_walks_in_the_world() {
     let character = Character::default();
     let place = character.standing_at(Vec3::new(20.0, 8.1, 30.0));
     let local = GlobalTransform::from(place).reparented_to(&GlobalTransform::from(vehicle));
-    // Children are as large as their parents, and so are their colliders.
+    // Children have their parents' scale, and so do their colliders.
     let local = local.with_rotation(turned.inverse()).with_scale(Vec3::splat(0.5));
     let steering = CharacterSteering { direction: Vec2::X, ..default() };
     let walker = stage.app.world_mut().spawn((character.clone(), steering, local, ChildOf(parent))).id();
@@ -118,7 +118,7 @@ fn a_walker_below_a_parent_walks_in_the_world() {
     let feet = character.feet(place(&stage));
     assert!((28.0..31.0).contains(&feet.x) && (feet.z - 30.0).abs() < 0.05, "{feet}");
     assert!((feet.y - 8.0).abs() < 0.05 && stage.motion(walker).grounded, "{feet}");
-    // Who stands is carried along.
+    // A standing walker is carried along.
     stage.app.world_mut().get_mut::<CharacterSteering>(walker).expect("a walker").direction = Vec2::ZERO;
     stage.frames(seconds(1.0));
     let before = place(&stage);
@@ -134,7 +134,7 @@ fn tall(stage: &Stage, walker: Entity) -> f32 {
     aabb.max.y - aabb.min.y
 }
 
-/// For half a second, a walker of that character stands at height 8.
+/// Checks that a walker with this character stands at height 8 for half a second.
 fn stands(stage: &mut Stage, walker: Entity, character: &Character) {
     let height = character.height;
     for _ in 0..seconds(0.5) {
