@@ -1,5 +1,5 @@
-//! Negative controls: breaking any one seam rule on purpose opens the surface. A reference implementation, which follows
-//! the rules cell by cell, draws exactly what the crate draws.
+//! Negative controls: breaking any one seam rule on purpose opens the surface. A reference implementation, which
+//! follows the rules cell by cell, draws exactly what the crate draws.
 
 mod worlds;
 

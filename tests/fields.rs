@@ -1,8 +1,9 @@
 //! The paper's five scenarios on examples worked out by hand, and the invariants of fields under random edits.
 //!
-//! A dig of radius r at lattice height on level ground raises each density to at least the negated distance to the ball,
-//! but only up to two voxels outside the ball (rule 6). For r = 2 around (x, h, z) it changes samples up to 3 voxels
-//! sideways (two below the centre: at distance 2.6 and 3.6, both within 4), down to 4 voxels below, and up to h itself.
+//! A dig of radius r at lattice height on level ground raises each density to at least the negated distance to the
+//! ball, but only up to two voxels outside the ball (rule 6). For r = 2 around (x, h, z) it changes samples up to 3
+//! voxels sideways (two below the centre: at distance 2.6 and 3.6, both within 4), down to 4 voxels below, and up to
+//! h itself.
 
 mod worlds;
 

@@ -7,7 +7,8 @@ use bevy_burrow::surface::{Indices, SurfaceMesh};
 use bevy_burrow::terrain::Drawn;
 use glam::Vec3;
 
-/// Checks that indices have 16 bits where that is enough, and that each has a vertex; returns whether they have 32 bits.
+/// Checks that indices have 16 bits where that is enough, and that each has a vertex; returns whether they have 32
+/// bits.
 fn check(what: &str, mesh: &SurfaceMesh) -> bool {
     let is_long = matches!(mesh.indices, Indices::U32(_));
     assert_eq!(is_long, mesh.vertices.len() > Indices::MOST_SHORT, "{what}");

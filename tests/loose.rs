@@ -23,8 +23,8 @@ type Point = [i32; 3];
 /// The samples of a piece, sorted.
 type Piece = BTreeSet<Point>;
 
-/// All loose pieces of a world by a flood fill sample by sample: the components that do not reach the bottom, which lies
-/// below all edits and the whole surface.
+/// All loose pieces of a world by a flood fill sample by sample: the components that do not reach the bottom, which
+/// lies below all edits and the whole surface.
 fn by_brute_force(world: &World) -> Vec<Piece> {
     let samples = world.samples();
     let (low, high) = world.ground().height_range();
@@ -202,8 +202,8 @@ fn drawn_materials(world: &World) -> HashMap<IVec3, MaterialMix> {
     all
 }
 
-/// Counts of the pieces' vertices: those that the world had drawn, those of built or painted material, those at the rim of
-/// the world, and the normals compared.
+/// Counts of the pieces' vertices: those that the world had drawn, those of built or painted material, those at the
+/// rim of the world, and the normals compared.
 #[derive(Debug, Default)]
 struct Looks {
     drawn: usize,

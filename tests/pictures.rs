@@ -1,7 +1,7 @@
-//! The examples that make pictures, each started as a user without a display starts it: pictures come in time, and show
-//! ground.
+//! Runs each example that makes pictures, as a user without a display would, and checks that the pictures come in
+//! time and show ground.
 //!
-//! `make test-examples` builds the examples, and runs this.
+//! `make test-examples` builds the examples and runs this test.
 #![cfg(feature = "examples")]
 
 #[path = "../examples/shared/pixels.rs"]
@@ -14,16 +14,16 @@ use std::time::{Duration, Instant};
 
 use pixels::Shares;
 
-/// An example, and what is to be seen in each of its pictures.
+/// An example, and what each of its pictures has to show.
 struct Example {
     name: &'static str,
-    /// Besides `--headless` and `--out`.
+    /// Arguments besides `--headless` and `--out`.
     arguments: &'static str,
-    /// How many pictures there are at least.
+    /// Least number of pictures.
     pictures: usize,
-    /// How much of each is ground at least.
+    /// Least share of ground in each picture.
     ground: f32,
-    /// How much of each is black at most.
+    /// Largest share of black in each picture.
     black: f32,
 }
 
@@ -60,27 +60,27 @@ const EXAMPLES: [Example; 5] = [
     Example { name: "custom_material", arguments: "--headless", pictures: 2, ground: 0.6, black: 0.05 },
 ];
 
-/// Longest time for all pictures of an example. Two busy cores without a graphics card take half of it.
+/// Longest time for all pictures of an example; about twice what two busy cores without a graphics card need.
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[test]
 #[ignore = "the examples must be built before: make test-examples"]
 fn examples_show_ground() {
-    // The folder of Cargo's own temporary files lies in the target folder.
+    // Cargo's folder for temporary files lies in the target folder.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("a target folder");
-    // And the tests of a profile beside its examples.
+    // The tests of a profile lie beside its examples.
     let program = std::env::current_exe().expect("the test knows its own path");
     let examples = program.ancestors().nth(2).expect("the folder of a profile").join("examples");
     let faults: Vec<String> = EXAMPLES.iter().flat_map(|example| play(example, target, &examples)).collect();
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
 
-/// Plays an example, and tells what is wrong with its pictures.
+/// Runs an example and returns the faults of its pictures.
 fn play(example: &Example, target: &Path, examples: &Path) -> Vec<String> {
     let Example { name, arguments, .. } = *example;
     let is_tour = arguments.contains("--tour");
     let folder = target.join("proof").join(if is_tour { "tour" } else { name });
-    // Whatever an earlier run left is not taken for what this one makes.
+    // Pictures of an earlier run must not count.
     let _ = std::fs::remove_dir_all(&folder);
     let start = Instant::now();
     let mut command = Command::new(examples.join(format!("{name}{EXE_SUFFIX}")));

@@ -1,4 +1,4 @@
-//! The fast mesher against the one by the book: the same vertices and triangles in every block, bit by bit.
+//! The fast mesher against the reference mesher: the same vertices and triangles in every block, bit for bit.
 
 mod worlds;
 
@@ -8,7 +8,7 @@ use bevy_burrow::surface::{Vertex, plain};
 use bevy_burrow::terrain::World;
 use glam::IVec3;
 
-/// A vertex as bits: 0.0 is not -0.0.
+/// A vertex as bit patterns: 0.0 and -0.0 differ.
 type Bits = ([i32; 3], [u32; 3], [u8; 4], [u8; 4]);
 
 fn bits(vertex: &Vertex) -> Bits {
@@ -16,7 +16,7 @@ fn bits(vertex: &Vertex) -> Bits {
     (vertex.position.to_array(), normal, vertex.materials.ids, vertex.materials.weights)
 }
 
-/// Triangles in an order of their own.
+/// Triangles in a canonical order.
 fn sorted(vertices: &[Vertex], indices: impl Iterator<Item = usize>) -> Vec<[Bits; 3]> {
     let corners: Vec<Bits> = indices.map(|index| bits(&vertices[index])).collect();
     let mut triangles: Vec<[Bits; 3]> = corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
@@ -24,7 +24,7 @@ fn sorted(vertices: &[Vertex], indices: impl Iterator<Item = usize>) -> Vec<[Bit
     triangles
 }
 
-/// Every block that could draw something, and those around: one brick further on all sides than any that is stored.
+/// Every block that could draw something: all stored bricks and their neighbours.
 fn blocks(world: &World) -> Vec<Block> {
     let grid = world.grid();
     let inside = LatticeBox {
@@ -71,7 +71,7 @@ fn every_block_has_the_bits_of_the_mesher_by_the_book() {
                 let missing: Vec<_> = theirs.iter().filter(|t| !ours.contains(t)).take(2).collect();
                 println!("{} {}: extra {extra:?}\nmissing {missing:?}", ours.len(), theirs.len());
             }
-            assert!(ours == theirs, "world {seed}, {block:?}: other triangles than by the book");
+            assert!(ours == theirs, "world {seed}, {block:?}: triangles differ from the reference mesher's");
             assert_eq!(
                 vertices.len(),
                 expected.vertices.len(),
@@ -83,6 +83,6 @@ fn every_block_has_the_bits_of_the_mesher_by_the_book() {
         assert_eq!(drawn, kept, "world {seed}: the world keeps the triangles of all its blocks");
         triangles += drawn;
     }
-    assert!(triangles > 500 * count as usize, "hardly anything was drawn: {triangles} triangles");
+    assert!(triangles > 500 * count as usize, "too little was drawn: {triangles} triangles");
     println!("{count} worlds, {triangles} triangles");
 }

@@ -1,4 +1,4 @@
-//! Receipts tell what happened: volumes balance, bounds are tight, nothing changes out of reach.
+//! Receipts are correct: volumes balance, bounds are tight, and nothing changes out of reach.
 
 mod worlds;
 
@@ -14,7 +14,7 @@ use fastrand::Rng;
 use glam::{IVec3, Vec3};
 use worlds::{plainly_applied, random_brush, random_brush_at_a_face, random_ground};
 
-/// What a comparison of two worlds, sample by sample, finds in a box.
+/// The difference of two worlds within a box, sample by sample.
 #[derive(Default, Debug)]
 struct Difference {
     bounds: Option<LatticeBox>,
@@ -66,7 +66,7 @@ fn edited_samples(world: &World) -> u64 {
         .sum()
 }
 
-/// A ground with several materials: rock with patches of grass and sand as its skin.
+/// Adds materials to a ground: rock with patches of grass and sand on top.
 fn with_materials(ground: Ground) -> Ground {
     let rules = vec![
         MaterialRule { overlay: MaterialId(11), slope: (0.8, f64::INFINITY), ..Default::default() },
@@ -88,7 +88,7 @@ fn a_thousand_receipts_balance_with_the_world() {
             break;
         }
         let mut rng = Rng::with_seed(seed);
-        // Worlds of small and middle-sized chunks; the count takes a while in larger ones.
+        // Chunks of small and medium size; counting large ones takes too long.
         let (ground, chunk_size) = random_ground(&mut rng, [0, 0, 1, 2][seed as usize % 4]);
         let ground = with_materials(ground);
         let settings = TerrainSettings { chunk_size, ..Default::default() };
@@ -111,7 +111,7 @@ fn a_thousand_receipts_balance_with_the_world() {
             let receipts = terrain.apply([&brush]);
             let after = terrain.world();
             let [Receipt { tag: 0, outcome: Ok(applied) }] = receipts.as_slice() else {
-                // The reach may end short of the world where the box around it, grown, did not.
+                // The edit's reach may end outside the world, although its enlarged box meets it.
                 assert_eq!(receipts[0].outcome, Err(Rejection::OutsideWorld), "{what}");
                 assert_eq!(after.hash(), before.hash(), "{what}");
                 continue;
@@ -127,7 +127,7 @@ fn a_thousand_receipts_balance_with_the_world() {
             assert_eq!(edited_samples(after) - edited_samples(&before), found.newly_edited, "{what}");
             assert_eq!(applied.bounds.is_none(), after.hash() == before.hash(), "{what}");
 
-            // Each chunk is named once, and holds some of the change.
+            // Each chunk is named once, and contains some of the change.
             let mut chunks: Vec<_> = applied.chunks.iter().map(|part| part.chunk).collect();
             chunks.dedup();
             assert_eq!(chunks.len(), applied.chunks.len(), "{what}");
@@ -168,7 +168,7 @@ fn the_sum_of_receipts_is_the_change_of_the_whole_world() {
         let whole = LatticeBox::new(low, high).expect("a world is not empty");
         let before = terrain.world().samples().solid_count(whole);
         let (mut removed, mut added) = (MaterialCounts::default(), MaterialCounts::default());
-        // All in one transaction: each receipt counts from what the edits before it left.
+        // All in one transaction: each receipt is relative to the edits before it.
         for receipt in terrain.apply(&brushes) {
             if let Ok(applied) = receipt.outcome {
                 removed.add(&applied.removed);
@@ -215,7 +215,7 @@ fn samples_farther_than_two_voxels_outside_a_shape_stay_as_they_are() {
                     && old.stored_material(point) == new.stored_material(point);
                 assert!(
                     edit.reach().contains(point) || outside > BAND,
-                    "the reach leaves out {point} of {brush:?}"
+                    "the reach does not contain {point} of {brush:?}"
                 );
                 if outside > BAND {
                     assert!(
@@ -227,7 +227,7 @@ fn samples_farther_than_two_voxels_outside_a_shape_stay_as_they_are() {
                 }
                 near += 1;
                 untouched += usize::from(same);
-                // And what is near is exactly what the operation says.
+                // Near the shape, samples are exactly what the operation gives.
                 let expected = plainly_applied(&brush.operation, old.distance(point), outside);
                 let stored = expected.clamp(-32_767, 32_767);
                 let unedited = !new.is_edited(point) && new.distance(point) == expected;
@@ -349,10 +349,10 @@ fn a_brush_that_finds_nothing_to_change_has_an_empty_receipt() {
         assert_eq!(receipts[0].outcome, Ok(Applied::default()), "{brush:?}");
         assert_eq!(terrain.world().hash(), untouched, "{brush:?}");
     }
-    assert_eq!(terrain.world().bricks().count(), 0, "nothing is stored for edits that change nothing");
+    assert_eq!(terrain.world().bricks().count(), 0, "edits that change nothing store nothing");
     assert_eq!(terrain.world().fields().filter(|(_, fields)| !fields.is_empty()).count(), 0);
 
-    // The same edit again finds its work done.
+    // The same edit again changes nothing.
     let dig = Brush::dig(Shape::sphere(Vec3::new(20.0, 10.0, 20.0), 4.0));
     let first = terrain.apply([&dig]).remove(0).outcome.expect("a valid brush");
     assert!(first.removed.total() > 100 && first.added.total() == 0);

@@ -1,4 +1,4 @@
-//! Digging rules: what they protect stays, what they allow happens, and nobody can tell how it was computed.
+//! Digging rules: protected ground stays, allowed edits happen, and the result does not depend on batching or threads.
 
 mod worlds;
 
@@ -78,7 +78,7 @@ fn what_is_protected_or_unbreakable_stays() {
                 let is_bedrock = rules.bedrock.is_some_and(|bedrock| point.y < bedrock);
                 let is_hard = rules.unbreakable.contains(&old.material(point));
                 if old.is_solid(point) && (is_bedrock || is_hard) {
-                    // What is stored ends at 128 voxels, whatever there was.
+                    // Stored densities end at 128 voxels.
                     let is_kept = new.distance(point) <= old.distance(point).max(-32_767);
                     assert!(is_kept, "world {seed} at {point}: {brush:?}");
                     assert!(is_bedrock || new.material(point) == old.material(point), "{seed} at {point}");
@@ -95,7 +95,7 @@ fn what_is_protected_or_unbreakable_stays() {
 fn rules_that_are_against_nothing_change_nothing() {
     let (none, nowhere) = (DiggingRules::default, MaterialId(200));
     let far = LatticeBox::point(IVec3::new(3, 32_000, 3));
-    // The first bears on every edit, the second on those of less than full power, the last on next to none.
+    // The first applies to every edit, the second to those of less than full power, the last to almost none.
     let rules = [
         none().with_unbreakable(nowhere),
         none().with_hardness(nowhere, 255),
@@ -119,7 +119,7 @@ fn rules_that_are_against_nothing_change_nothing() {
     }
 }
 
-/// Boxes that protect nothing that is there: far off, beyond the world, turned inside out, at the ends of the numbers.
+/// Boxes that protect no existing ground: far away, outside the world, inverted, and at the limits of the integers.
 fn boxes_of_no_account() -> Vec<LatticeBox> {
     let far = |i: i32| LatticeBox::point(IVec3::new(i % 100 - 50, 20_000 + i, i / 10 - 50)).grown(i % 7);
     let (low, high) = (IVec3::MIN, IVec3::MAX);
@@ -140,12 +140,12 @@ fn any_number_of_boxes_elsewhere_changes_nothing() {
     let protected = boxes_of_no_account();
     for seed in 300..300 + worlds::world_count(30) {
         let (ground, chunk_size, own, brushes) = script(seed);
-        // Alone, and beside rules that matter.
+        // Without other rules, and in addition to rules that matter.
         for rules in [DiggingRules::default(), own] {
             let more = DiggingRules { protected: [&*protected, &*rules.protected].concat(), ..rules.clone() };
             let [mut with, mut without] = [more, rules].map(|rules| {
                 let mut terrain = terrain(&ground, chunk_size, &rules);
-                // What falls is kept from it by protected boxes too.
+                // Protected boxes also restrict the removal of loose pieces.
                 terrain
                     .set_loose((seed % 2 == 0).then(|| LooseSettings { debris: 400, ..Default::default() }));
                 terrain
@@ -197,7 +197,7 @@ fn what_falls_takes_nothing_along_that_is_protected() {
     let cuboid = |center: Vec3, half: Vec3| Brush::add(Shape::cuboid(center, half), MaterialId(2));
     let pillar = cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(1.2, 8.0, 1.2));
     let slab = cuboid(Vec3::new(32.0, 22.0, 32.0), Vec3::new(6.2, 2.2, 6.2));
-    // What changes in a box when the pillar is dug away, and what becomes of the slab.
+    // What changes in a box when the pillar is dug away, and the fate of the slab.
     let fall = |rules: DiggingRules, own: LatticeBox| {
         let mut terrain = terrain(&ground, 16, &DiggingRules::default());
         terrain.apply([&pillar, &slab]);
@@ -211,13 +211,13 @@ fn what_falls_takes_nothing_along_that_is_protected() {
         assert!(terrain.world().check_seams().is_flawless());
         (changed, applied.loose.iter().map(|piece| piece.fate).collect::<Vec<_>>())
     };
-    // Air that the slab touches, among a thousand boxes far off.
+    // Air next to the slab, among a thousand boxes far away.
     let beside = LatticeBox::new(IVec3::new(39, 18, 20), IVec3::new(42, 26, 44)).expect("not empty");
     let rules = DiggingRules { protected: boxes_of_no_account(), ..Default::default() };
     let (changed, fates) = fall(rules.clone(), beside);
     assert!(changed > 50 && fates == [PieceFate::Removed]);
     assert_eq!(fall(rules.clone().with_protected(beside), beside), (0, vec![PieceFate::Removed]));
-    // A voxel of the slab itself.
+    // One voxel of the slab itself.
     let corner = LatticeBox::point(IVec3::new(38, 22, 32));
     assert_eq!(fall(rules.with_protected(corner), beside), (0, vec![PieceFate::Left]));
 }
@@ -233,7 +233,7 @@ fn hardness_has_two_ends() {
         (applied.removed.total(), applied.refused.total())
     };
     let (all, none) = removed(0, 0);
-    assert!(all > 100 && none == 0, "what is not hard needs no power");
+    assert!(all > 100 && none == 0, "material without hardness needs no power");
     assert_eq!(removed(255, 255), (all, 0));
     let (nearly, slowed) = removed(255, 254);
     assert!(nearly + slowed == all && slowed > 0 && slowed < all / 4, "{nearly} and {slowed} of {all}");
@@ -279,20 +279,24 @@ fn a_weak_tool_takes_its_time_and_gets_there() {
         while air(&slow) < air(&full) {
             let receipts = slow.apply([Brush::dig(shape).with_power(power)]);
             let applied = receipts[0].outcome.as_ref().expect("a valid brush");
-            assert!(applied.bounds.is_some(), "it goes on while anything is left");
+            assert!(applied.bounds.is_some(), "each dig changes something until nothing is left");
             assert!(count > 0 || power > 100 || applied.refused.slowed.total() > 50);
             sum += applied.removed.total();
             count += 1;
             assert!(count < 200 && air(&slow) <= air(&full));
         }
-        assert_eq!(sum, all, "in the end, as much as at once");
+        assert_eq!(sum, all, "all digs together remove as much as one strong dig");
         steps.push(count);
     }
     assert!(steps[0] > steps[1] && steps[1] > steps[2] && steps[2] > 1, "{steps:?}");
     let mut weak = terrain(&ground, 32, &rules);
     let receipts = weak.apply([Brush::dig(shape).with_power(60)]);
     let applied = receipts[0].outcome.as_ref().expect("a valid brush");
-    assert_eq!((applied.bounds, applied.removed.total()), (None, 0), "half the hardness is too little");
+    assert_eq!(
+        (applied.bounds, applied.removed.total()),
+        (None, 0),
+        "half of the needed power is too little"
+    );
     assert_eq!(applied.refused.too_hard.iter().collect::<Vec<_>>(), [(MaterialId(0), all)]);
 }
 
@@ -313,7 +317,7 @@ fn receipts_tell_what_was_refused_and_why() {
     let applied: Vec<&Applied> =
         receipts.iter().map(|receipt| receipt.outcome.as_ref().expect("valid brushes")).collect();
     let list = |counts: &MaterialCounts| counts.iter().collect::<Vec<_>>();
-    // Of the ball below the surface, what is not taken away is refused.
+    // The part of the ball below the surface is either dug or refused.
     let solid = |points: &mut dyn Iterator<Item = IVec3>| points.count() as u64;
     let inside = |at: IVec3| at.y <= 20 && (at - IVec3::new(32, 20, 32)).length_squared() <= 36;
     let all = LatticeBox::point(IVec3::new(32, 20, 32)).grown(6);
@@ -323,7 +327,7 @@ fn receipts_tell_what_was_refused_and_why() {
     assert_eq!(list(&applied[0].refused.unbreakable), [(MaterialId(0), rock)]);
     let every = solid(&mut all.points().filter(|&at| inside(at)));
     assert_eq!(applied[0].removed.total() + boxed + rock, every);
-    // New ground in the box would have been of material 7, and is unbreakable beside it.
+    // New ground in the box would have been of material 7, which is unbreakable in general.
     assert!(applied[1].refused.protected.of(MaterialId(7)) > 100 && applied[1].added.total() > 100);
     assert_eq!(list(&applied[2].refused.protected), [(MaterialId(0), boxed)]);
     assert!(applied[2].painted.of(MaterialId(3)) > 50);
@@ -341,7 +345,7 @@ fn rules_can_be_taken_back() {
     terrain.apply([&dig]);
     let held = terrain.snapshot();
     terrain.set_rules(DiggingRules::default()).expect("valid rules");
-    // Whoever reads the world meanwhile makes nobody copy it.
+    // Reading the world must not cause a copy of it.
     assert!(terrain.rules().is_none() && std::ptr::eq(terrain.world(), &*held));
     terrain.apply([&dig]);
     let mut free = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
@@ -373,7 +377,7 @@ fn what_is_built_on_ground_that_stays_is_dug_off_without_a_scar() {
         assert!(height(&terrain) > before + 0.1);
         let receipts = terrain.apply([&dig]);
         let applied = receipts[0].outcome.as_ref().expect("applied");
-        assert_eq!(applied.removed.total(), 25, "the bumps");
+        assert_eq!(applied.removed.total(), 25, "only the bumps are dug");
         assert!((height(&terrain) - before).abs() < 0.01, "{before} became {}", height(&terrain));
     }
 }

@@ -1,4 +1,4 @@
-//! Everything drawn is one closed surface, whatever was dug.
+//! The drawn surface is closed, whatever was dug.
 //!
 //! `BURROW_WORLDS=10000 cargo test --release --no-default-features --test seams` runs more random worlds.
 
@@ -16,8 +16,8 @@ use glam::{IVec3, Vec3};
 use rustc_hash::FxHashMap;
 use worlds::{random_world, real_ground, world_count};
 
-/// How many vertices that meet at one place were compared, and how many of them have more than one material: by what meets
-/// there.
+/// Vertices at the same position that were compared, and how many of them have several materials, by the parts that
+/// meet there.
 #[derive(Debug, Default)]
 struct Met(BTreeMap<&'static str, [usize; 2]>);
 
@@ -39,11 +39,11 @@ impl Met {
         }
     }
 
-    /// Fails unless all drawn vertices of a place have the same materials, by the same weights.
+    /// Checks that all drawn vertices at the same position have the same materials and weights.
     fn check_materials(&mut self, world: &World, what: &str) {
         let mut first: FxHashMap<IVec3, (Drawn, MaterialMix)> = FxHashMap::default();
         for (drawn, mesh) in world.drawn() {
-            // Tiles keep vertices that no triangle has.
+            // Tiles also contain vertices that no triangle uses.
             let mut is_drawn = vec![false; mesh.vertices.len()];
             mesh.indices.iter().for_each(|index| is_drawn[index as usize] = true);
             let origin = world.origin(drawn) * SNAP;
@@ -142,7 +142,7 @@ fn ground_dug_through_the_rim_is_shaded_there_as_it_is_inside() {
             Brush::add(rod(11.0, 34.0), MaterialId(2)),
         ]);
 
-        // Everything goes straight through the world, so a vertex is shaded like the one beside it, all along.
+        // The cut is the same along the whole world, so neighbouring vertices have the same normal.
         let mut normals: BTreeMap<[i32; 2], Vec3> = BTreeMap::new();
         let (mut vertices, mut at_rim) = (0, 0);
         let world = terrain.world();

@@ -7,7 +7,8 @@ use glam::{DVec3, Vec3};
 
 use crate::terrains::{assert_flawless, terrain};
 
-/// Digs, fills and paints at several places on the surface, the rim and the corners, and checks the world after each edit.
+/// Digs, fills and paints at several places on the surface, the rim and the corners, and checks the world after each
+/// edit.
 fn work_over(mut terrain: Terrain, rng: &mut Rng, what: &str) -> Terrain {
     let grid = terrain.world().grid();
     let (width, depth) = (grid.width(), grid.depth());

@@ -18,7 +18,8 @@ pub struct Album {
 }
 
 impl Album {
-    /// Compares a picture with the golden one of that name, or saves it as the golden one if `BURROW_GOLDEN=write` is set.
+    /// Compares a picture with the golden one of that name, or saves it as the golden one if `BURROW_GOLDEN=write` is
+    /// set.
     pub fn compare(&mut self, name: &str, picture: &RgbImage) {
         if std::env::var("BURROW_GOLDEN").is_ok_and(|value| value == "write") {
             let path = place_of(name);

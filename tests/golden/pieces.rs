@@ -8,8 +8,8 @@ use image::imageops::crop_imm;
 use crate::album::{Album, flip};
 use crate::studio::Studio;
 
-/// Mean FLIP between a block in the ground and the same block cut off, whose normals come from its own samples. It is less
-/// than when the camera moves by a quarter of a pixel, and a quarter of what shifted textures give.
+/// Mean FLIP between a block in the ground and the same block cut off, whose normals come from its own samples. It is
+/// less than when the camera moves by a quarter of a pixel, and a quarter of what shifted textures give.
 const CUT_OFF: f32 = 0.022;
 /// Mean FLIP between a piece at its origin and a moved piece, under the same light.
 const MOVED: f32 = 0.004;

@@ -39,8 +39,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     }
 }
 
-/// Sends a brush or a history step, and waits for its commit. The camera draws all the while, as anything that newly comes
-/// into view would be drawn anyway.
+/// Sends a brush or a history step, and waits for its commit. The camera draws all the while, as anything that newly
+/// comes into view would be drawn anyway.
 fn while_looking(studio: &mut Studio, message: impl Message) {
     let commits = |studio: &Studio| studio.app.world().resource::<BurrowFigures>().commits;
     let (before, start) = (commits(studio), Instant::now());

@@ -12,8 +12,8 @@ use crate::landscape::hills;
 use crate::studio::Studio;
 
 /// Mean FLIP that counts as noise, in the whole picture and along the seam. It is a third of what a camera shift by a
-/// quarter of a pixel gives (0.022), less than half of what a spot of another material gives (0.018), and a sixteenth of
-/// what a line along the seam gives there (0.12). The test prints and checks all of these.
+/// quarter of a pixel gives (0.022), less than half of what a spot of another material gives (0.018), and a sixteenth
+/// of what a line along the seam gives there (0.12). The test prints and checks all of these.
 const NOISE: f32 = 0.007;
 
 /// Sun directions all around, low, middle and high.
@@ -92,8 +92,8 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.sun(Vec3::new(1.0, 0.9, 0.4));
 }
 
-/// The same limit for slopes steeper than 2:1. There the two surfaces split cells differently, and the visible difference
-/// is about that of a camera shift by a quarter of a pixel.
+/// The same limit for slopes steeper than 2:1. There the two surfaces split cells differently, and the visible
+/// difference is about that of a camera shift by a quarter of a pixel.
 const NOISE_ON_CLIFFS: f32 = 0.03;
 
 /// The seam around a corner of four chunks, and at the steepest place.

@@ -35,7 +35,8 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// Opens a studio with `BurrowPlugins` and whatever `add` adds. Without a Vulkan device it prints a notice and returns
+    /// Opens a studio with `BurrowPlugins` and whatever `add` adds. Without a Vulkan device it prints a notice and
+    /// returns
     /// `None`, or panics if `BURROW_REQUIRE` is set.
     pub fn open(add: impl FnOnce(&mut App)) -> Option<Self> {
         let only = OPEN.lock().unwrap_or_else(PoisonError::into_inner);

@@ -22,7 +22,8 @@ fn after_every_commit_all_is_as_if_made_from_scratch() {
 
 #[test]
 fn a_normal_that_only_changes_the_sign_of_its_zeros_is_redrawn() {
-    // The tile's normal of flat ground and the gradient of its samples both point straight up, but differ in a zero's sign.
+    // The tile's normal of flat ground and the gradient of its samples both point straight up, but differ in a zero's
+    // sign.
     let ground = || Ground::flat(32, 32, 10.5).expect("valid ground");
     let paint = |from: f32, to: f32| {
         let (middle, half) = (Vec3::new((from + to) * 0.5, 9.0, 4.0), Vec3::new((to - from) * 0.5, 2.0, 2.0));

@@ -279,7 +279,8 @@ fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let rock = Shape::cuboid(Vec3::new(30.0, 9.5, 20.0), Vec3::splat(2.0));
     stage.dig([Brush::add(rock, MaterialId(2))]);
-    // A ball whose centre of mass lies below it in the ground, and an arch whose transform lies in the rock between its legs.
+    // A ball whose centre of mass lies below it in the ground, and an arch whose transform lies in the rock between
+    // its legs.
     let ball = stage.ball(Vec3::new(10.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     stage.app.world_mut().entity_mut(ball).insert((CenterOfMass(Vec3::NEG_Y * 2.0), NoAutoCenterOfMass));
     let leg = |x: f32| (Vec3::new(x, 2.0, 0.0), Quat::IDENTITY, Collider::cuboid(2.0, 4.0, 2.0));

@@ -306,9 +306,9 @@ impl Jumps {
     }
 }
 
-/// On gentle hills only a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere. A fifth of the
-/// bodies are on the level floor of a tunnel below the hills. Ten times a second the ground below a body is painted, or a
-/// hole is dug nearby, out of its way. That gives new seams, meshes and colliders for the same surface.
+/// On gentle hills only a bump makes a body on the ground jump, so all jumps count, at seams and elsewhere. A fifth
+/// of the bodies are on the level floor of a tunnel below the hills. Ten times a second the ground below a body is
+/// painted, or a hole is dug nearby, out of its way. That gives new seams, meshes and colliders for the same surface.
 #[test]
 fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     let (balls, walkers) = (crowd(), crowd() / 10);

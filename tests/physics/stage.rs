@@ -121,8 +121,8 @@ impl Stage {
         terrains.iter(world).all(|terrain| terrain.queued() == 0 && !terrain.is_busy())
     }
 
-    /// Updates frames until no edit is pending. All time is paused meanwhile: physics takes no step, not even the last one
-    /// that it takes after it was paused itself.
+    /// Updates frames until no edit is pending. All time is paused meanwhile: physics takes no step, not even the
+    /// last one that it takes after it was paused itself.
     pub fn catch_up(&mut self) {
         self.app.world_mut().resource_mut::<Time<Virtual>>().pause();
         self.frames_until("edits are applied", Self::is_idle);

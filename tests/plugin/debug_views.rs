@@ -1,4 +1,4 @@
-//! Debug views: drawn below their terrains while they are on, and gone when they are off.
+//! Debug views: drawn as children of their terrains while they are on, and removed when they are off.
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::mesh::MeshPlugin;
@@ -8,12 +8,12 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level};
 
-/// A stage with meshes and something more.
+/// A stage with meshes, and whatever `more` adds.
 fn stage(more: impl Fn(&mut App) + Send + Sync + 'static) -> Stage {
     Stage::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, more))
 }
 
-/// A stage with the debug views, around a place that was dug.
+/// A stage with the debug views, around a dug pit.
 fn dug_stage() -> (Stage, Entity) {
     let views = |app: &mut App| {
         app.init_asset::<GizmoAsset>().add_plugins(BurrowDebugPlugin);
@@ -22,9 +22,9 @@ fn dug_stage() -> (Stage, Entity) {
     let focus = Some(Vec3::new(32.0, 8.0, 32.0));
     stage.app.insert_resource(BurrowDebug { focus, fade: 1e6, ..default() });
     let terrain = stage.show(level(1.0));
-    // Nobody here works out who is seen.
+    // No system computes visibility here.
     stage.app.world_mut().entity_mut(terrain).insert(InheritedVisibility::VISIBLE);
-    // Seen by the views of dirty bricks, which have to be on by then.
+    // Dirty bricks are recorded only while their view is on.
     stage.app.world_mut().resource_mut::<BurrowDebug>().dirty = true;
     stage.send(dig(32.0, 8.0, 32.0, 5.0));
     stage.settle();
@@ -32,7 +32,7 @@ fn dug_stage() -> (Stage, Entity) {
     (stage, terrain)
 }
 
-/// Ends of lines that a view draws.
+/// The number of line vertices that a view draws.
 fn vertices(stage: &mut Stage, view: DebugView) -> usize {
     let world = stage.app.world_mut();
     let mut lines = world.query::<(&DebugLines, &Gizmo)>();
@@ -63,7 +63,7 @@ fn each_view_draws_while_it_is_on_and_nothing_when_it_is_off() {
         assert_eq!(vertices(&mut stage, view), 0, "{view:?}");
     }
     assert_eq!(stage.count::<DebugLines>(), 0);
-    // Gizmos are freed with whoever showed them.
+    // Gizmo assets are freed together with the entities that show them.
     stage.frames(2);
     assert_eq!(stage.app.world().resource::<Assets<GizmoAsset>>().len(), 0);
 }

@@ -1,4 +1,4 @@
-//! Terrains that go while they load or are dug.
+//! Terrains that are despawned while they load or are dug.
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
@@ -7,7 +7,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
 
-/// Fails when something of a terrain is left.
+/// Checks that nothing of a terrain is left.
 fn assert_clean(stage: &mut Stage, when: &str) {
     stage.frames(4);
     let left =
@@ -16,7 +16,7 @@ fn assert_clean(stage: &mut Stage, when: &str) {
     assert_eq!((stage.count::<Mesh3d>(), stage.meshes()), (0, 0), "{when}: entities with meshes, meshes");
 }
 
-/// Fails unless a new terrain works as if nothing had been.
+/// Checks that a new terrain works normally afterwards.
 fn assert_works(stage: &mut Stage) {
     let terrain = stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
@@ -56,11 +56,11 @@ fn nothing_is_left_of_a_terrain_that_goes_while_it_loads() {
     assert_works(&mut stage);
 }
 
-/// Says to [`leave`] that it is time.
+/// Tells [`leave`] to despawn the terrains.
 #[derive(Resource, Default)]
 struct Leaving(bool);
 
-/// A game's own system, which lets go of all terrains.
+/// A game's own system that despawns all terrains.
 fn leave(mut commands: Commands, mut leaving: ResMut<Leaving>, terrains: Query<Entity, With<Terrain>>) {
     if std::mem::take(&mut leaving.0) {
         for terrain in &terrains {
@@ -69,8 +69,8 @@ fn leave(mut commands: Commands, mut leaving: ResMut<Leaving>, terrains: Query<E
     }
 }
 
-/// A stage whose game lets go of terrains in the same stretch of the schedule as the plugin works on them: its command
-/// is applied just before the plugin's own. Systems without an order may fall like that.
+/// A stage whose game despawns terrains during the plugin's own systems: its command is applied just before the
+/// plugin's commands. Systems without an explicit order may be scheduled like that.
 fn stage_that_leaves<M>(leave: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>) -> Stage {
     let mut stage = Stage::drawing();
     stage.app.init_resource::<Leaving>().add_systems(Update, leave);
@@ -90,7 +90,7 @@ fn a_terrain_may_go_in_the_frame_of_its_commit() {
             stage.send(brush);
         }
         stage.frame();
-        // Longer and longer, for machines that have much else to do.
+        // Longer and longer waits, for slow machines.
         (0..1 << (round / 2).min(6)).for_each(|_| stage.rest());
         stage.app.world_mut().resource_mut::<Leaving>().0 = true;
         stage.frame();
@@ -100,7 +100,7 @@ fn a_terrain_may_go_in_the_frame_of_its_commit() {
             break;
         }
     }
-    assert!(met > 0, "no terrain went in the frame of its commit");
+    assert!(met > 0, "no terrain was despawned in the frame of its commit");
     assert_works(&mut stage);
 }
 
@@ -126,7 +126,7 @@ fn no_news_is_told_of_what_went_with_its_terrain() {
     });
     for round in 0..6 {
         stage.show(steep());
-        // In some rounds there are chunks and fields that change, in others all are new.
+        // In some rounds existing chunks and fields change, in others all are new.
         for brush in random_brushes(13, 40).into_iter().take(10 * round) {
             stage.send(brush);
         }
@@ -171,7 +171,7 @@ fn a_terrain_may_go_in_the_frame_that_spawned_it() {
 
 #[test]
 fn a_terrain_may_go_in_the_frame_of_a_brush() {
-    // The first of the two comes after all commands of the commit, and has none itself.
+    // The empty system makes Bevy apply the commit's commands before `leave`, and adds none itself.
     let leave =
         (|| (), leave).chain().after(BurrowSystems::Commit).before_ignore_deferred(BurrowSystems::Begin);
     let mut stage = stage_that_leaves(leave);
@@ -208,7 +208,7 @@ fn a_tile_or_chunk_that_a_game_despawns_is_not_missed() {
         stage.send(brush);
     }
     stage.settle();
-    assert_eq!(stage.receipts().len(), 41, "no brush is lost over it");
+    assert_eq!(stage.receipts().len(), 41, "no brush is lost because of it");
 }
 
 #[test]
@@ -223,7 +223,7 @@ fn a_terrain_goes_with_all_its_children_when_a_system_despawns_it() {
     assert_clean(&mut stage, "after a command");
 }
 
-/// For each tile that went, how many children its terrain had behind it.
+/// For each despawned tile, the number of its terrain's children after it.
 #[derive(Resource, Default)]
 struct Behind(Vec<usize>);
 
@@ -240,7 +240,7 @@ fn look_behind(
 
 #[test]
 fn tiles_go_from_the_end_of_their_terrains_children() {
-    // Bevy looks for each from there: any other way is slow where there are thousands.
+    // Bevy searches the children from the end, so any other order is slow with thousands of them.
     let mut stage = Stage::drawing();
     stage.app.init_resource::<Behind>().add_observer(look_behind);
     let behind = |stage: &mut Stage| std::mem::take(&mut stage.app.world_mut().resource_mut::<Behind>().0);

@@ -1,4 +1,4 @@
-//! Entities below a terrain, and the events that tell of them.
+//! The entities below a terrain, and the events about them.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -8,7 +8,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
 
-/// Something that was told, with what the entity was at that moment.
+/// An event, with the entity's component at that moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum News {
     ChunkCreated(Entity, Chunk),
@@ -22,7 +22,7 @@ enum News {
 #[derive(Resource, Default)]
 struct Told(Vec<News>);
 
-/// A stage that writes down all news. Each must tell of an entity that is there, with its component.
+/// A stage that records all events. Each must name an existing entity with its component.
 fn listening(mut stage: Stage) -> Stage {
     stage
         .app
@@ -42,7 +42,7 @@ fn listening(mut stage: Stage) -> Stage {
         .add_observer(|on: On<FieldMerged>, fields: Query<&Field>, mut told: ResMut<Told>| {
             assert!(
                 fields.contains(on.entity) && fields.contains(on.into),
-                "both fields are there when it is told"
+                "both fields exist when the merge is reported"
             );
             told.0.push(News::FieldMerged { gone: on.entity, into: on.into });
         })
@@ -56,7 +56,7 @@ fn told(stage: &mut Stage) -> Vec<News> {
     std::mem::take(&mut stage.app.world_mut().resource_mut::<Told>().0)
 }
 
-/// Fields by their names, with their entities and the chunks above them.
+/// Fields by id, with their entities and the chunks above them.
 fn fields(stage: &mut Stage) -> BTreeMap<u64, (Entity, Field, Chunk)> {
     let world = stage.app.world_mut();
     let mut fields = world.query::<(Entity, &Field, &ChildOf)>();
@@ -69,7 +69,7 @@ fn fields(stage: &mut Stage) -> BTreeMap<u64, (Entity, Field, Chunk)> {
     fields.iter(world).map(below).collect()
 }
 
-/// Fails unless entities are what the model has: tiles, chunks and fields, in their hierarchy and places.
+/// Checks that entities match the model: tiles, chunks and fields, with their hierarchy and positions.
 pub fn assert_entities(stage: &mut Stage, terrain: Entity) {
     let shown = fields(stage);
     let world = stage.terrain(terrain).world();
@@ -166,7 +166,7 @@ fn news_tell_what_happened_to_every_chunk_and_field() {
                         .expect("it goes into a field that is there");
                     assert_eq!(survivor.2, *chunk, "a field never leaves its chunk");
                     rest.remove(&old.id);
-                    assert!(stage.app.world().get_entity(gone).is_err(), "its entity is gone");
+                    assert!(stage.app.world().get_entity(gone).is_err(), "its entity is despawned");
                 }
                 News::FieldRemoved(entity) => {
                     kinds[5] += 1;
@@ -174,11 +174,11 @@ fn news_tell_what_happened_to_every_chunk_and_field() {
                 }
             }
         }
-        assert_eq!(rest, after, "whatever differs was told");
+        assert_eq!(rest, after, "every difference was reported");
         before = after;
     }
     assert!(kinds.iter().all(|&count| count > 5), "every kind of news came: {kinds:?}");
-    assert_eq!(kinds[4], kinds[5], "fields go by merging alone");
+    assert_eq!(kinds[4], kinds[5], "fields are only removed by merging");
     assert_eq!(chunks.len(), stage.count::<Chunk>());
     assert_entities(&mut stage, terrain);
 }
@@ -235,7 +235,7 @@ fn a_terrain_that_was_dug_before_tells_its_chunks_and_fields_as_it_appears() {
     assert_entities(&mut stage, terrain);
 }
 
-/// What an observer of a chunk sees.
+/// How many events an observer saw.
 #[derive(Resource, Default)]
 struct Seen(usize);
 
@@ -276,7 +276,7 @@ fn a_chunk_has_its_new_mesh_when_its_news_is_told() {
 fn a_chunk_that_draws_nothing_any_more_keeps_its_entity_without_a_mesh() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(level(1.0));
-    // A rock in the air is all that this chunk has.
+    // This chunk contains only a rock in the air.
     stage.send(Brush::add(Shape::sphere(Vec3::new(24.0, 40.0, 24.0), 3.0), MaterialId(5)));
     stage.settle();
     let rock = stage.with_component::<Chunk>();

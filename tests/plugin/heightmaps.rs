@@ -27,7 +27,7 @@ fn stage_in(folder: &Path) -> Stage {
     stage
 }
 
-/// A folder that goes when the test ends.
+/// A temporary folder that is removed when dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -155,7 +155,7 @@ fn a_raw_file_loads_with_the_settings_of_its_meta_file() {
     assert_eq!((image.width(), image.height(), image.samples()), (4, 3, &samples[..]));
 }
 
-/// Stands for Bevy's own loader of pictures.
+/// A stand-in for Bevy's own image loader.
 #[derive(Default, TypePath)]
 struct Pictures;
 
@@ -197,7 +197,7 @@ fn pictures_of_a_game_stay_pictures() {
     assert_eq!(pictures.iter().count(), 1, "no other loader took it");
 }
 
-/// A game's own resource, which wants a heightmap at once.
+/// A game's own resource that loads a heightmap when it is created.
 #[derive(Resource)]
 struct Map(Handle<HeightmapImage>);
 

@@ -1,4 +1,4 @@
-//! Undo and redo as messages: in order with brushes, shown in one frame, and never without an answer.
+//! Undo and redo as messages: in order with brushes, shown in one frame, and always answered.
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -30,7 +30,7 @@ fn frames_show_what_was_undone_and_redone() {
         stage.frames_until("the step is told", |stage| {
             let is_whole = stage.is_settled();
             let heard = stage.heard::<HistoryMoved>();
-            assert_eq!(heard.is_empty(), !is_whole, "it is told in the frame of its commit");
+            assert_eq!(heard.is_empty(), !is_whole, "it is reported in the frame of its commit");
             assert!(heard.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.step == step));
             is_whole
         });
@@ -53,7 +53,7 @@ fn steps_come_after_the_brushes_of_their_frame() {
         stage.send(dig(20.0, 8.0, 20.0, 4.0));
         stage.send_to(terrain, dig(40.0, 8.0, 20.0, 4.0));
         stage.settle();
-        assert_eq!(stage.hash(terrain), pristine, "both were one step");
+        assert_eq!(stage.hash(terrain), pristine, "both brushes are one step");
         assert_eq!(stage.receipts().len(), 2);
         stage.tell(Redo::default());
         stage.tell(ALL);
@@ -97,7 +97,7 @@ fn every_step_is_answered_by_every_terrain_that_it_is_for() {
     assert!(of(a).is_some_and(|outcome| outcome.is_ok()));
     assert_eq!(of(b), Some(&Err(HistoryRejection::NothingToUndo)));
 
-    // One that goes while a step waits, and one that is gone already.
+    // One terrain that is despawned while a step waits, and one that is despawned already.
     stage.send(dig(20.0, 8.0, 20.0, 4.0));
     stage.tell(Undo { terrain: Some(a) });
     stage.frame();

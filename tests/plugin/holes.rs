@@ -15,7 +15,7 @@ fn no_frame_of_500_brushes_shows_a_hole_and_each_brush_has_one_receipt_in_order(
     let mut brushes = random_brushes(2, COUNT).into_iter();
     let (mut frames, mut changes, mut last) = (0, 0, stage.hash(terrain));
     while stage.receipts().len() < COUNT as usize {
-        // A machine that is busy otherwise gets time, or all brushes would come in a few commits.
+        // A busy machine gets extra time, or all brushes would end up in a few commits.
         let waits = stage.terrain(terrain).queued() > 12;
         let burst = match rng.u32(0..8) {
             _ if waits => 0,
@@ -84,7 +84,7 @@ fn a_single_swap_withheld_is_a_hole() {
 
 #[test]
 fn moved_and_scaled_terrains_are_closed_too() {
-    // By whole voxels; by other parts than powers of two hairline cracks may show, and the plugin warns.
+    // Moved by whole voxels. With scales that are no powers of two hairline cracks may show, and the plugin warns.
     for (place, voxel_size) in [(Vec3::new(-1000.0, 40.0, 3.5), 0.125), (Vec3::new(4096.0, -8.0, 104.0), 8.0)]
     {
         let mut stage = Stage::drawing();

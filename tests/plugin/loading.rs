@@ -5,7 +5,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
 
-/// Loads a terrain and looks at every frame; returns in how many of them nothing was shown yet.
+/// Loads a terrain and checks every frame; returns how many frames showed nothing yet.
 fn load(stage: &mut Stage, terrain: Entity) -> usize {
     let mut empty = 0;
     stage.frames_until("the terrain is shown", |stage| {
@@ -39,7 +39,7 @@ fn a_terrain_that_was_dug_before_shows_tiles_and_chunks_in_the_same_frame() {
         assert!(loads_per_frame > 1 || empty >= 16 + drawn - 1, "one mesh a frame took {empty} frames");
         assert_eq!(stage.count::<Tile>(), 16);
         assert!(stage.count::<Chunk>() >= drawn);
-        // And it goes on like any other terrain.
+        // Afterwards it behaves like any other terrain.
         for brush in random_brushes(5, 20) {
             stage.send(brush);
         }
@@ -54,7 +54,7 @@ fn brushes_that_come_while_a_terrain_loads_wait_and_then_apply() {
     let mut model = steep();
     model.apply(&brushes);
 
-    // One mesh a frame: it loads for at least sixteen frames.
+    // One mesh per frame: it loads for at least sixteen frames.
     let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 1, ..default() });
     let terrain = stage.spawn(steep());
     let pristine = stage.hash(terrain);
@@ -62,7 +62,7 @@ fn brushes_that_come_while_a_terrain_loads_wait_and_then_apply() {
         pair.iter().for_each(|brush| stage.send(brush.clone()));
         stage.frame();
         assert_eq!(stage.count::<Tile>(), 0, "the terrain still loads");
-        assert_eq!(stage.hash(terrain), pristine, "no brush goes ahead");
+        assert_eq!(stage.hash(terrain), pristine, "no brush is applied early");
     }
     assert_eq!(stage.terrain(terrain).queued(), brushes.len());
     assert!(stage.receipts().is_empty());
@@ -70,13 +70,13 @@ fn brushes_that_come_while_a_terrain_loads_wait_and_then_apply() {
     stage.settle();
     assert_eq!(stage.tags(), (0..24).collect::<Vec<_>>());
     assert_eq!(stage.hash(terrain), model.world().hash());
-    assert_eq!(stage.figures().commits, 1, "what waited together goes in together");
+    assert_eq!(stage.figures().commits, 1, "brushes that waited together are one commit");
     stage.assert_whole(terrain, "after loading");
 }
 
 #[test]
 fn a_brush_in_the_first_frame_of_a_moved_and_scaled_terrain_goes_where_it_was_sent() {
-    // The frame that spawns a terrain may also dig it, in the very first frame of the app and later.
+    // A terrain may be dug in the frame that spawns it, in the very first frame of the app and later.
     for earlier in [0, 3] {
         let place = Vec3::new(100.0, 20.0, -40.0);
         let mut model = level(0.5);
@@ -106,7 +106,7 @@ fn a_terrain_without_colours_loads_and_is_dug() {
     assert!(meshes.iter().all(|(_, mesh)| mesh.attribute(Mesh::ATTRIBUTE_COLOR).is_none()));
 }
 
-/// How high terrains were found to be.
+/// The heights that a query found.
 #[derive(Resource, Default)]
 struct Floors(Vec<Option<f32>>);
 

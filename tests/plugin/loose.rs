@@ -1,4 +1,4 @@
-//! Loose ground: a component turns it on, and messages tell what broke off.
+//! Loose ground: a component enables it, and messages report the pieces that broke off.
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -41,14 +41,14 @@ fn what_breaks_off_is_told_with_its_mesh() {
         if is_drawing {
             stage.assert_whole(terrain, "without the slab");
         }
-        // It comes back with what cut it off.
+        // An undo restores it together with the ground of the cut.
         stage.tell(Undo { terrain: None });
         stage.settle();
         assert_eq!(stage.hash(terrain), table().world().hash());
         stage.app.world_mut().entity_mut(terrain).remove::<LooseGround>();
         stage.send(saw());
         stage.settle();
-        assert!(stage.heard::<LoosePieceFound>().is_empty(), "nobody looks any more");
+        assert!(stage.heard::<LoosePieceFound>().is_empty(), "the search is off");
         assert_ne!(stage.hash(terrain), model.world().hash());
     }
 }

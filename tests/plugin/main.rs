@@ -1,4 +1,4 @@
-//! The Bevy plugin from outside: brushes go in as messages, and what is shown, told and kept is looked at frame by frame.
+//! The Bevy plugin from outside: brushes go in as messages; frames, messages and entities are checked frame by frame.
 #![cfg(feature = "plugin")]
 
 #[cfg(feature = "debug")]

@@ -1,4 +1,4 @@
-//! Any material on a terrain's entity is handed on to its tiles and chunks.
+//! Any material on a terrain's entity is propagated to its tiles and chunks.
 
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
@@ -21,7 +21,7 @@ fn stage() -> Stage {
     stage
 }
 
-/// Do all tiles and chunks of a terrain have this material, and no other one?
+/// Whether all tiles and chunks of a terrain have this material and no other.
 fn wears<M: Material>(stage: &mut Stage, terrain: Entity, material: &Handle<M>) -> bool {
     let world = stage.app.world_mut();
     let mut drawn =
@@ -40,7 +40,7 @@ fn add<M: Material>(stage: &mut Stage, material: M) -> Handle<M> {
     stage.app.world_mut().resource_mut::<Assets<M>>().add(material)
 }
 
-/// What holds for every type of material.
+/// Checks that hold for every type of material.
 fn is_propagated<M: Material + Default>(mut stage: Stage) {
     let (first, second) = (add(&mut stage, M::default()), add(&mut stage, M::default()));
     let mut model = steep();
@@ -94,20 +94,20 @@ fn a_material_that_is_taken_off_a_terrain_is_taken_off_its_tiles() {
     stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(standard.clone()));
     stage.frame();
     assert!(wears(&mut stage, terrain, &standard));
-    // Both at once would be drawn both.
+    // With both materials, tiles would be drawn twice.
     exchange(&mut stage, terrain, &glow);
     assert!(wears(&mut stage, terrain, &glow));
-    assert!(is_bare::<StandardMaterial>(&mut stage), "tiles wear both materials");
+    assert!(is_bare::<StandardMaterial>(&mut stage), "tiles still have the standard material");
 }
 
-/// Takes the standard material off a terrain, and puts the game's own on.
+/// Replaces a terrain's standard material by the game's own.
 fn exchange(stage: &mut Stage, terrain: Entity, glow: &Handle<Glow>) {
     let mut terrain = stage.app.world_mut().entity_mut(terrain);
     terrain.remove::<MeshMaterial3d<StandardMaterial>>().insert(MeshMaterial3d(glow.clone()));
     stage.frame();
 }
 
-/// What a piece wears: the standard material, and that of the game's own.
+/// The materials of a piece: the standard material, and the game's own.
 fn worn(stage: &Stage, piece: Entity) -> (Option<Handle<StandardMaterial>>, Option<Handle<Glow>>) {
     let piece = stage.app.world().entity(piece);
     let standard = piece.get::<MeshMaterial3d<StandardMaterial>>();

@@ -1,4 +1,5 @@
-//! What does not depend on frames: steps of undo, rules, answers to too much at once; and what a game changes by itself.
+//! What must not depend on frame timing: undo steps, rules and overload; and changes that a game makes to the model
+//! itself.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +24,7 @@ fn a_stroke_over_many_frames_is_one_step_whenever_its_transactions_are() {
         let pristine = stage.hash(terrain);
         for (number, brush) in random_brushes(41, 24).into_iter().enumerate() {
             stage.send(brush.with_stroke(number as u64 / 8));
-            // Some frames have a brush each, some transactions have many.
+            // Some frames have one brush each, some transactions have many.
             (0..pause).for_each(|_| stage.rest());
             stage.frame();
             if pause == 5 {
@@ -54,7 +55,7 @@ fn brushes_of_one_frame_are_one_step_and_those_of_another_are_not() {
     for x in [12.0, 24.0, 36.0] {
         stage.send(dig(x, 8.0, 20.0, 3.0));
         stage.send_to(terrain, dig(x, 8.0, 44.0, 3.0));
-        // The next ones come while these are under way.
+        // These come while the first ones are being applied.
         stage.frame();
     }
     stage.settle();
@@ -68,7 +69,7 @@ fn rules_bind_brushes_that_are_sent_after_them_and_no_others() {
     let rock = DiggingRules::default().with_bedrock(i32::MAX);
     stage.send(dig(12.0, 8.0, 20.0, 3.0));
     stage.frame();
-    // Sent and queued before the rules, whenever it begins.
+    // Sent and queued before the rules, so they do not apply, whenever the transaction begins.
     stage.send(dig(24.0, 8.0, 20.0, 3.0));
     stage.frame();
     model(&mut stage, terrain).set_rules(rock).expect("valid rules");
@@ -98,7 +99,7 @@ fn too_much_at_once_is_answered_in_its_frame_and_a_player_is_heard_soon() {
     let refused = stage.receipts().iter().filter(is_refused).count();
     assert!(refused > 1000, "{refused}");
     assert!(stage.terrain(terrain).waiting_work() <= limits.waiting);
-    // A player who digs all the while: no more waits before each dig than the limit.
+    // A player digs all the while: before each dig, no more work may wait than the limit.
     let mut sent = Vec::new();
     for tag in 10_000..10_040 {
         stage.send(dig(30.0, 8.0, 30.0, 2.0).with_tag(tag));
@@ -118,13 +119,13 @@ fn too_much_at_once_is_answered_in_its_frame_and_a_player_is_heard_soon() {
     assert!(sent.iter().filter(|tag| is_done(tag)).count() > 30, "a small dig finds room");
 }
 
-/// Is all ground shown as it is?
+/// Whether the shown ground is up to date.
 fn shows_all(stage: &mut Stage) -> bool {
     let ask = |terrains: Terrains| terrains.is_ready(Vec3::NEG_INFINITY, Vec3::INFINITY);
     stage.app.world_mut().run_system_cached(ask).expect("it can be asked")
 }
 
-/// What each tile and chunk shows: its entity, and of which revision.
+/// What each tile and chunk entity shows, by revision.
 fn shown(stage: &mut Stage) -> BTreeMap<Entity, u64> {
     let world = stage.app.world_mut();
     let mut query = world.query_filtered::<(Entity, &ShownSurface), Or<(With<Tile>, With<Chunk>)>>();
@@ -138,7 +139,7 @@ fn of_what_a_game_changes_by_itself_only_that_is_meshed_anew() {
     stage.send(dig(50.0, 8.0, 50.0, 4.0));
     stage.settle();
     let mut before = shown(&mut stage);
-    // A dig, a step back, a commit without its meshes, and a burst with a step in it.
+    // A dig, an undo, a commit without its meshes, and several edits with an undo among them.
     for turn in 0..4 {
         let swaps = stage.figures().swaps;
         let mut own = model(&mut stage, terrain);
@@ -148,7 +149,7 @@ fn of_what_a_game_changes_by_itself_only_that_is_meshed_anew() {
             2 => {
                 own.submit(&dig(20.0, 8.0, 8.0, 3.0));
                 let mut commit = own.begin().expect("a brush waits").run();
-                // The game wants the meshes for itself.
+                // The game takes the meshes for itself.
                 drop(std::mem::take(&mut commit.meshes));
                 own.commit(commit).expect("nothing else commits");
             }
@@ -170,7 +171,7 @@ fn of_what_a_game_changes_by_itself_only_that_is_meshed_anew() {
         assert!((1..12).contains(&(stage.figures().swaps - swaps)), "turn {turn}");
         before = after;
     }
-    // Brushes go on where it ended.
+    // The plugin's brushes work on afterwards.
     stage.send(dig(12.0, 8.0, 12.0, 3.0));
     stage.settle();
     stage.assert_whole(terrain, "a brush after it");
@@ -180,7 +181,7 @@ struct Faulty;
 
 impl SurfaceProcessor for Faulty {
     fn build(&self, part: &Part, _: &SurfaceMesh) -> Option<CommitAction> {
-        assert!(part.revision == 0, "as it was told");
+        assert!(part.revision == 0, "the processor fails, as intended");
         None
     }
 }

@@ -7,7 +7,7 @@ use bevy_burrow::terrain::Drawn;
 
 use crate::stage::{Stage, random_brushes, steep};
 
-/// How many triangles a tile or chunk has.
+/// The number of triangles of a tile or chunk.
 #[derive(Component)]
 struct Triangles(usize, Drawn);
 
@@ -22,13 +22,13 @@ impl SurfaceProcessor for Counter {
     }
 }
 
-/// Fails unless every part has what belongs to the world that is committed.
+/// Checks that every part has the data for the committed world.
 fn assert_counted(stage: &mut Stage, terrain: Entity) {
     let world = stage.app.world_mut();
     let counted: Vec<(usize, Drawn)> = world.query::<&Triangles>().iter(world).map(|t| (t.0, t.1)).collect();
     let model = stage.terrain(terrain).world();
     for (drawn, mesh) in model.drawn() {
-        assert!(counted.contains(&(mesh.indices.len() / 3, drawn)), "{drawn:?} has not what belongs to it");
+        assert!(counted.contains(&(mesh.indices.len() / 3, drawn)), "{drawn:?} has stale data");
     }
     let all: usize = counted.iter().map(|(count, _)| count).sum();
     assert_eq!(all, model.drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum::<usize>());
@@ -46,7 +46,7 @@ fn processors_come_with_every_commit() {
             stage.send(brush);
             stage.frames_until("a brush is answered", |stage| {
                 let now = stage.terrain(terrain).world().revision();
-                // In whatever frame the commit comes, all of it is there.
+                // Whenever the commit arrives, all of its data arrives in that frame.
                 if now != revision {
                     assert_counted(stage, terrain);
                 }

@@ -1,4 +1,4 @@
-//! Layers and shadows of a terrain are those of all that is drawn below it.
+//! Render layers and shadow settings of a terrain are propagated to everything below it.
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::prelude::*;
@@ -6,7 +6,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, level, random_brushes, steep};
 
-/// Have all tiles, chunks and pieces this layer alone, or no layers?
+/// Whether all tiles, chunks and pieces have exactly this layer, or none.
 fn all_have(stage: &mut Stage, layer: Option<usize>) -> bool {
     let expected = layer.map(RenderLayers::layer);
     let world = stage.app.world_mut();

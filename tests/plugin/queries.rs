@@ -1,4 +1,4 @@
-//! The `Terrains` parameter: questions in world space.
+//! The `Terrains` system parameter: queries in world space.
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
@@ -47,7 +47,7 @@ fn rays_in_world_space_meet_what_the_model_says() {
         let place = |rng: &mut Rng| {
             Vec3::new(rng.f32() * 68.0 - 2.0, rng.f32() * 70.0 - 30.0, rng.f32() * 68.0 - 2.0)
         };
-        // Coordinates that a float holds exactly, in either space.
+        // Coordinates that are exact in `f32` in both spaces.
         let (from, to) = ((place(&mut rng) * 8.0).round() / 8.0, (place(&mut rng) * 8.0).round() / 8.0);
         let direction = (to - from).normalize_or(Vec3::NEG_Y);
         let reach = [1000.0, 20.0][index % 2];
@@ -141,7 +141,7 @@ fn of_two_terrains_a_ray_meets_the_nearer_one() {
     assert_eq!(ask(&mut stage, move |terrains| terrains.raycast(down(90.0), 1000.0)), None);
 }
 
-/// A terrain that is moved, rotated and scaled, with a spot of another material; its place, and its model.
+/// A terrain that is moved, rotated and scaled, with a spot of another material; its transform, and its model.
 fn turned() -> (Stage, Transform, Terrain) {
     let settings = TerrainSettings { chunk_size: 16, voxel_size: VOXEL };
     let fresh = || {
@@ -179,7 +179,7 @@ fn rays_meet_a_turned_terrain_where_it_is() {
         assert!(found.normal.is_normalized());
         alike += usize::from(found.normal.abs_diff_eq(place.rotation * expected.normal, 1e-3));
     }
-    // Rounding may take a ray to the other side of an edge.
+    // Rounding may move a ray across an edge.
     assert!(hits > 50 && alike + 2 >= hits, "{alike} normals of {hits} are alike");
 }
 
@@ -188,7 +188,7 @@ fn normals_and_materials_of_a_turned_terrain_are_those_of_the_model() {
     let (mut stage, place, model) = turned();
     let (mut all, mut painted) = (0, 0);
     for (x, z) in (1..63).step_by(3).flat_map(|x| (1..63).step_by(3).map(move |z| (x, z))) {
-        // Off the edges of triangles, and nearer to one lattice point than to others.
+        // Away from the edges of triangles, and clearly nearest to one lattice point.
         let (x, z) = (x as f32 + 0.3, z as f32 + 0.2);
         let y = model.world().height(f64::from(x), f64::from(z)).expect("ground") as f32;
         let local = Vec3::new(x, y - 0.1, z);

@@ -25,8 +25,8 @@ fn brushes_that_come_while_a_transaction_runs_make_the_next_one() {
     let terrain = stage.show(steep());
     stage.send(dig(20.0, 4.0, 20.0, 4.0).with_tag(0));
     stage.frame();
-    assert!(stage.terrain(terrain).is_busy(), "it began in the frame that it came");
-    // One frame collects these; the first transaction may or may not be done by then.
+    assert!(stage.terrain(terrain).is_busy(), "it began in the frame in which the brush was sent");
+    // One frame collects these. The first transaction may or may not be finished by then.
     for tag in 1..20 {
         stage.send(dig(20.0 + tag as f32, 4.0, 20.0, 4.0).with_tag(tag));
     }
@@ -65,7 +65,7 @@ fn the_world_is_the_same_however_brushes_are_batched() {
     }
 }
 
-/// Brushes that no terrain can take, and a brush that is fine but lies elsewhere.
+/// Brushes that every terrain refuses, and a valid brush that lies elsewhere.
 fn refused() -> Vec<Brush> {
     let (at, nan) = (Vec3::new(30.0, 8.0, 30.0), f32::NAN);
     let shapes = [
@@ -115,7 +115,7 @@ fn refused_brushes_say_why_and_change_nothing() {
         assert_eq!(receipts.len(), count);
         for (tag, applied) in receipts.iter().enumerate() {
             assert_eq!(applied.receipt.tag, tag as u64);
-            // What reaches the terrain, in spite of all, is refused by it.
+            // Brushes that reach the terrain are refused by it.
             let (is_nowhere, is_far) = (tag == 1 || tag == 12, tag == 8 || tag == 9 || tag == 13);
             let is_refused_here = targeted || !(is_nowhere || is_far);
             assert_eq!(applied.terrain, is_refused_here.then_some(terrain), "brush {tag}");

@@ -1,4 +1,4 @@
-//! A game that changes the model itself, or puts another one in its place.
+//! Games that edit the model themselves, or replace it.
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
@@ -6,7 +6,7 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
 
-/// Is a terrain at the origin shown as it is?
+/// Whether the shown ground at the origin is up to date.
 fn is_ready(stage: &mut Stage) -> bool {
     let is_ready = |terrains: Terrains| terrains.is_ready(Vec3::ZERO, Vec3::splat(64.0));
     stage.app.world_mut().run_system_once(is_ready).expect("it runs")
@@ -148,7 +148,7 @@ fn a_terrain_that_is_taken_off_in_the_middle_of_a_transaction_works_elsewhere() 
     assert_eq!(outcomes, [(1, false), (2, false), (3, true)]);
     let mut model = steep();
     model.apply([dig(40.0, 4.0, 40.0, 5.0)]);
-    assert_eq!(stage.hash(second), model.world().hash(), "what was answered is not done");
+    assert_eq!(stage.hash(second), model.world().hash(), "a brush with a receipt was not applied");
     stage.assert_whole(second, "parked");
 }
 
@@ -189,7 +189,7 @@ fn a_terrain_that_is_put_elsewhere_keeps_the_size_of_its_voxels() {
     assert_eq!(stage.hash(terrain), model.world().hash());
 }
 
-/// The ways to put a terrain in place of another one.
+/// The ways to replace a terrain.
 const WAYS: [fn(&mut Stage, Entity, Terrain); 2] = [insert, assign];
 
 fn insert(stage: &mut Stage, entity: Entity, other: Terrain) {

@@ -8,8 +8,8 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level};
 
-/// One terrain of 64 x 64 metres, and beside it, four metres away and two metres lower, one of 32 x 32 metres in half
-/// voxels. Both have their ground at height 8 (voxels), at 8 and 2 metres.
+/// A terrain of 64 x 64 metres; and one of 32 x 32 metres with voxels of half a metre, four metres beside it and two
+/// metres lower. Both have their ground at height 8 in voxels, that is at 8 and 4 - 2 = 2 metres.
 fn pair() -> (Stage, Entity, Entity) {
     let mut stage = Stage::drawing();
     let first = stage.spawn(level(1.0));
@@ -20,7 +20,7 @@ fn pair() -> (Stage, Entity, Entity) {
 
 const SECOND: Vec3 = Vec3::new(68.0, -2.0, 10.0);
 
-/// What a world-space brush makes of a fresh second terrain.
+/// The hash of a fresh second terrain after world-space brushes.
 fn second_after(brushes: &[Brush]) -> u64 {
     let mut model = level(0.5);
     model.apply(brushes.iter().map(|brush| brush.transformed(Quat::IDENTITY, SECOND * -2.0, 2.0)));
@@ -86,7 +86,7 @@ fn a_targeted_brush_changes_its_target_alone() {
     stage.send_to(second, tunnel.clone());
     stage.settle();
     assert_eq!((stage.hash(first), stage.hash(second)), (first_after(&[]), second_after(&[tunnel])));
-    // One that lies beside its target is refused, though another terrain is there.
+    // A brush outside its target is refused, even if another terrain is there.
     stage.send_to(second, dig(20.0, 8.0, 20.0, 4.0));
     stage.settle();
     assert_eq!(stage.hash(first), first_after(&[]));
@@ -133,7 +133,7 @@ fn a_terrain_below_another_entity_is_dug_where_that_one_puts_it() {
     stage.assert_whole(terrain, "below another entity");
 }
 
-/// Brushes for level ground in the space that `place` takes voxels to, with a voxel as large as `size`.
+/// Brushes for level ground in the space to which `place` maps voxels of size `size`.
 fn tools(place: Affine3A, size: f32) -> [Brush; 6] {
     let at = |x, y, z| place.transform_point3(Vec3::new(x, y, z));
     let up = |length: f32| place.transform_vector3(Vec3::Y * length);
@@ -188,7 +188,7 @@ fn a_brush_that_reaches_no_terrain_lies_outside_whatever_they_think_of_it() {
     assert_eq!((applied.terrain, &applied.receipt.outcome), (None, &Err(Rejection::OutsideWorld)));
 }
 
-/// The terrains that were changed.
+/// The terrains that change detection reports.
 #[derive(Resource, Default)]
 struct Changes(Vec<Entity>);
 
@@ -201,7 +201,7 @@ fn a_brush_does_not_count_as_a_change_of_terrains_that_it_does_not_reach() {
             changes.0.extend(changed.iter());
         },
     );
-    // To the new system, all are changed at first.
+    // A new system sees everything as changed at first.
     stage.frame();
     stage.app.world_mut().resource_mut::<Changes>().0.clear();
     stage.send(dig(30.0, 8.0, 30.0, 4.0));

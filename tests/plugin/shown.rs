@@ -1,4 +1,4 @@
-//! What a frame shows: the meshes of tiles and chunks as a GPU places them, welded where all bits agree.
+//! What a frame shows: the meshes of tiles and chunks in GPU precision, welded where all bits are equal.
 
 use std::collections::HashMap;
 
@@ -8,21 +8,21 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::Stage;
 
-/// How well the triangles of one terrain close.
+/// How well the triangles of a terrain close.
 #[derive(Debug, Default)]
 pub struct Shown {
-    /// Triangles, those that floats make flat included.
+    /// Triangles, including those that rounding makes degenerate.
     pub triangles: usize,
-    /// Edges with one triangle only, off the rim.
+    /// Edges with one triangle only, except at the rim.
     pub open: usize,
-    /// Edges run through more often one way than the other, off the rim.
+    /// Edges used more often in one direction than in the other, except at the rim.
     pub unbalanced: usize,
-    /// The first of these.
+    /// The first of these edges.
     pub first: Option<(Vec3, Vec3)>,
 }
 
 impl Shown {
-    /// Is something shown, and all of it closed?
+    /// Whether something is shown and all of it is closed.
     pub fn is_closed(&self) -> bool {
         self.triangles > 0 && self.open == 0 && self.unbalanced == 0
     }
@@ -50,7 +50,7 @@ impl TriangleSoup {
     }
 
     fn weld(&mut self, place: Vec3) -> u32 {
-        // Adding zero makes one of the two zeros.
+        // Adding zero turns -0.0 into 0.0.
         let bits = (place + Vec3::ZERO).to_array().map(f32::to_bits);
         *self.numbers.entry(bits).or_insert_with(|| {
             self.places.push(place);
@@ -87,7 +87,7 @@ impl TriangleSoup {
 }
 
 impl Stage {
-    /// What this frame shows of a terrain.
+    /// Checks what this frame shows of a terrain.
     pub fn shown(&mut self, terrain: Entity) -> Shown {
         let world = self.app.world_mut();
         let mut drawn = world.query_filtered::<(&Mesh3d, &GlobalTransform, &Visibility, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
@@ -104,15 +104,12 @@ impl Stage {
         soup.check(place.transform_point(Vec3::ZERO), place.transform_point(Vec3::new(width, 0.0, depth)))
     }
 
-    /// Fails unless this frame shows all of a terrain's world, and no hole.
+    /// Checks that this frame shows all of a terrain's world, without a hole.
     pub fn assert_whole(&mut self, terrain: Entity, when: &str) {
         let shown = self.shown(terrain);
         assert!(shown.is_closed(), "{when}: {shown:?}");
         let world = self.terrain(terrain).world();
         let triangles: usize = world.drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
-        assert_eq!(
-            shown.triangles, triangles,
-            "{when}: the frame shows another world than the committed one"
-        );
+        assert_eq!(shown.triangles, triangles, "{when}: the frame does not show the committed world");
     }
 }

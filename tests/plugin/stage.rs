@@ -1,4 +1,4 @@
-//! The app that the tests play on: terrains go in, brushes too, and receipts are kept.
+//! The test app: spawns terrains, sends brushes and collects receipts.
 
 use std::time::{Duration, Instant};
 
@@ -9,10 +9,10 @@ use fastrand::Rng;
 
 use crate::worlds;
 
-/// How long a stage waits for something before it gives up: machines may have much else to do.
+/// How long a stage waits before it gives up: the machine may be busy.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// How long a stage sleeps between two frames, so that tasks get on.
+/// Sleep between two frames, so that tasks can proceed.
 const NAP: Duration = Duration::from_micros(500);
 
 /// Longer than small transactions take.
@@ -26,7 +26,7 @@ struct Receipts(Vec<BrushApplied>);
 #[derive(Resource)]
 struct Heard<M: Message>(Vec<M>);
 
-/// The terrains that said they are ready.
+/// The terrains that reported that they are ready.
 #[derive(Resource, Default)]
 struct ReadyTerrains(Vec<Entity>);
 
@@ -37,7 +37,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// An app that has meshes and transforms, but no renderer that would take the meshes away.
+    /// An app with meshes and transforms, but without a renderer that would extract the meshes.
     pub fn drawing() -> Self {
         Self::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
     }
@@ -47,7 +47,7 @@ impl Stage {
         Self::with(MinimalPlugins)
     }
 
-    /// An app with these plugins under those of the crate.
+    /// An app with these plugins besides those of the crate.
     pub fn with<M>(plugins: impl bevy::app::Plugins<M>) -> Self {
         let mut app = App::new();
         app.add_plugins(plugins)
@@ -65,7 +65,7 @@ impl Stage {
         Self { app }
     }
 
-    /// The same app, which writes down messages of one more kind.
+    /// Makes the app record messages of one more kind.
     pub fn hearing<M: Message + Clone>(mut self) -> Self {
         self.app
             .insert_resource(Heard::<M>(Vec::new()))
@@ -75,7 +75,7 @@ impl Stage {
         self
     }
 
-    /// What it heard since it was asked last.
+    /// The messages recorded since the last call.
     pub fn heard<M: Message>(&mut self) -> Vec<M> {
         std::mem::take(&mut self.app.world_mut().resource_mut::<Heard<M>>().0)
     }
@@ -85,18 +85,18 @@ impl Stage {
         self.app.world_mut().write_message(message).expect("the plugin added the message");
     }
 
-    /// The same app with other settings.
+    /// Replaces the settings.
     pub fn with_settings(mut self, settings: BurrowSettings) -> Self {
         self.app.insert_resource(settings);
         self
     }
 
-    /// Spawns a terrain where it counts from the world's origin.
+    /// Spawns a terrain at the world's origin.
     pub fn spawn(&mut self, terrain: Terrain) -> Entity {
         self.spawn_at(terrain, Vec3::ZERO)
     }
 
-    /// Spawns a terrain elsewhere.
+    /// Spawns a terrain at another place.
     pub fn spawn_at(&mut self, terrain: Terrain, place: Vec3) -> Entity {
         self.app.world_mut().spawn((terrain, Transform::from_translation(place))).id()
     }
@@ -126,7 +126,7 @@ impl Stage {
         self.app.update();
     }
 
-    /// Some frames more, with time for tasks.
+    /// Several frames, with time for tasks.
     pub fn frames(&mut self, count: usize) {
         for _ in 0..count {
             self.frame();
@@ -134,12 +134,12 @@ impl Stage {
         }
     }
 
-    /// Sleeps, so that small transactions under way are done before the next frame.
+    /// Sleeps, so that small running transactions finish before the next frame.
     pub fn rest(&self) {
         std::thread::sleep(REST);
     }
 
-    /// Frames until something is so; at least one. Panics when it never comes.
+    /// Updates frames, at least one, until a condition holds. Panics if it never does.
     pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
@@ -149,15 +149,15 @@ impl Stage {
             }
             std::thread::sleep(NAP);
         }
-        panic!("waited in vain: {what}");
+        panic!("timed out waiting until {what}");
     }
 
-    /// Frames until every terrain is shown and no brush is on its way.
+    /// Updates frames until every terrain is shown and no brush is pending.
     pub fn settle(&mut self) {
         self.frames_until("all terrains settle", |stage| stage.is_settled());
     }
 
-    /// Is every terrain shown, and no brush on its way?
+    /// Whether every terrain is shown and no brush is pending.
     pub fn is_settled(&mut self) -> bool {
         let terrains: Vec<Entity> = self.with_component::<Terrain>();
         let ready = &self.app.world().resource::<ReadyTerrains>().0;
@@ -172,7 +172,7 @@ impl Stage {
         self.app.world().get(entity).expect("the terrain is there")
     }
 
-    /// Hash of a terrain's world.
+    /// The hash of a terrain's world.
     pub fn hash(&self, entity: Entity) -> u64 {
         self.terrain(entity).world().hash()
     }
@@ -187,7 +187,7 @@ impl Stage {
         self.receipts().iter().map(|applied| applied.receipt.tag).collect()
     }
 
-    /// What the plugin did so far.
+    /// The plugin's figures.
     pub fn figures(&self) -> &BurrowFigures {
         self.app.world().resource()
     }
@@ -203,7 +203,7 @@ impl Stage {
         self.with_component::<C>().len()
     }
 
-    /// How many meshes are kept as assets.
+    /// The number of mesh assets.
     pub fn meshes(&self) -> usize {
         self.app.world().resource::<Assets<Mesh>>().len()
     }
@@ -222,7 +222,7 @@ pub fn hills() -> Ground {
     Ground::from_noise(64, 64, &noise).expect("valid hills")
 }
 
-/// Steep hills that nobody dug yet, in 4 x 4 tiles.
+/// Steep hills without edits, in 4 x 4 tiles.
 pub fn steep() -> Terrain {
     terrain(hills(), 1.0)
 }
@@ -236,12 +236,12 @@ fn terrain(ground: Ground, voxel_size: f32) -> Terrain {
     Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size }).expect("valid settings")
 }
 
-/// A ball that is dug out.
+/// A brush that digs a ball.
 pub fn dig(x: f32, y: f32, z: f32, radius: f32) -> Brush {
     Brush::dig(Shape::sphere(Vec3::new(x, y, z), radius))
 }
 
-/// Brushes of all kinds for the [`hills`], every other one on chunk faces or at the rim. Tags count from 0.
+/// Brushes of all kinds for the [`hills`]; every other one lies on chunk faces or at the rim. Tags count from 0.
 pub fn random_brushes(seed: u64, count: u64) -> Vec<Brush> {
     let (mut rng, ground) = (Rng::with_seed(seed), hills());
     let brush = |tag: u64| {

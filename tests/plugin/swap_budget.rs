@@ -1,4 +1,4 @@
-//! The budget of mesh swaps per frame: commits wait for each other, and none is cut.
+//! The budget of mesh swaps per frame: commits wait for each other, and none is split.
 
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -14,8 +14,8 @@ fn pair(swaps_per_frame: usize) -> (Stage, [Entity; 2]) {
     (stage, terrains)
 }
 
-/// Digs both terrains over a corner of four chunks, so that each commit has several swaps, and looks at every frame;
-/// returns the most commits that a frame had.
+/// Digs both terrains over a corner of four chunks, so that each commit has several swaps, and checks every frame.
+/// Returns the largest number of commits in one frame.
 fn dig_both(stage: &mut Stage, terrains: [Entity; 2], x: f32) -> u64 {
     for offset in [Vec3::ZERO, SECOND] {
         stage.send(dig(x + offset.x, 8.0, 16.0, 4.0));
@@ -49,7 +49,7 @@ fn commits_over_the_budget_land_in_different_frames_each_whole() {
 #[test]
 fn commits_within_the_budget_land_in_one_frame() {
     let (mut stage, terrains) = pair(256);
-    // Both are done in time in most rounds.
+    // In most rounds both transactions finish in time.
     assert!((0..5).any(|round| dig_both(&mut stage, terrains, 8.0 + 8.0 * round as f32) == 2));
 }
 
@@ -74,7 +74,7 @@ fn terrains_that_are_dug_all_the_time_do_not_keep_another_one_waiting() {
             stage.rest();
             frames += 1;
             let others = stage.figures().commits - commits;
-            assert!(others < 20, "terrain {waiting} waits for ever while the others are dug");
+            assert!(others < 20, "terrain {waiting} starves while the others are dug");
             assert!(frames < 2000, "nothing is committed");
         }
     }

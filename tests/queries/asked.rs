@@ -1,4 +1,4 @@
-//! The worlds that are asked, and where.
+//! The worlds and places that are queried.
 
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
@@ -9,7 +9,7 @@ use glam::{DVec3, IVec3, Vec3};
 use crate::triangles::Triangles;
 use crate::worlds::{random_brush, random_world, real_ground, world_count};
 
-/// The worlds that are asked.
+/// The worlds that are queried.
 pub fn dug_worlds() -> impl Iterator<Item = (String, Terrain)> {
     (0..world_count(24)).map(|index| {
         let mut rng = Rng::with_seed(31_000 + index);
@@ -17,7 +17,7 @@ pub fn dug_worlds() -> impl Iterator<Item = (String, Terrain)> {
     })
 }
 
-/// A corner of the real landscape with a hillside of tunnels, its materials by height and slope.
+/// A corner of the real landscape with a hillside full of tunnels; materials depend on height and slope.
 pub fn dug_landscape() -> Terrain {
     let whole = real_ground();
     let height = |x: i32, z: i32| f64::from(whole.height(Column::new(400 + x, 300 + z))) / 256.0;
@@ -64,7 +64,7 @@ pub fn small_terrain() -> Terrain {
     terrain
 }
 
-/// A direction of any kind, unit or not.
+/// A random direction, normalised or not.
 pub fn random_direction(rng: &mut Rng) -> DVec3 {
     let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
     let component = |rng: &mut Rng| rng.f64() * 2.0 - 1.0;
@@ -86,7 +86,7 @@ pub fn point_near_surface(rng: &mut Rng, world: &World) -> IVec3 {
     column.at(world.ground().height(column) / 256 + rng.i32(-8..=6))
 }
 
-/// A vertical line anywhere: free, on lattice lines and points, on the rim, through vertices and edges.
+/// A random vertical line: anywhere, on lattice lines and points, on the rim, through vertices and edges.
 pub fn random_column(rng: &mut Rng, world: &World, triangles: &Triangles) -> (f64, f64) {
     let (width, depth) = (world.grid().width(), world.grid().depth());
     let free = (rng.f64() * f64::from(width), rng.f64() * f64::from(depth));
@@ -98,7 +98,7 @@ pub fn random_column(rng: &mut Rng, world: &World, triangles: &Triangles) -> (f6
         4 => ([0.0, f64::from(width)][rng.usize(0..2)], [free.1, lattice.1][rng.usize(0..2)]),
         5 => ([free.0, lattice.0, 0.0][rng.usize(0..3)], [0.0, f64::from(depth)][rng.usize(0..2)]),
         _ => {
-            // Through what was dug; tiles come first in the triangles.
+            // Through dug ground: triangles of tiles come first in the list.
             let count = triangles.triangles.len();
             let [a, b, c] = triangles.triangles[rng.usize(triangles.tiles.min(count - 1)..count)];
             let place = [a, (a + b) / 2.0, a.lerp(b, rng.f64()), (a + b + c) / 3.0][rng.usize(0..4)];

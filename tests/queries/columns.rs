@@ -1,4 +1,4 @@
-//! Columns and places against brute force.
+//! Queries of columns and points against brute force.
 
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::asked::{dug_landscape, dug_worlds, point_near_surface, random_column};
 use crate::triangles::{NUDGE, TOLERANCE, Triangles};
 
-/// The crossings that spans stand for, lowest first: height and whether it is a floor.
+/// The crossings that spans consist of, lowest first: height, and whether it is a floor.
 fn as_crossings(spans: &[Span]) -> Vec<(f64, bool)> {
     spans
         .iter()
@@ -16,8 +16,8 @@ fn as_crossings(spans: &[Span]) -> Vec<(f64, bool)> {
         .collect()
 }
 
-/// Small steps off a vertical line, none of them along a lattice line: far from all and close to each, and all that
-/// again much smaller.
+/// Small offsets from a vertical line, in directions close to lattice lines and away from them, and the same at a
+/// thousandth of the size.
 fn steps() -> impl Iterator<Item = (f64, f64)> {
     let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
     let shapes = [(1.0, 0.99999), (0.99999, 1.0), (1.0, 0.3), (0.3, 1.0), (1.0, 1e-5), (1e-5, 1.0)];
@@ -27,7 +27,7 @@ fn steps() -> impl Iterator<Item = (f64, f64)> {
     around(NUDGE).chain(around(NUDGE * 1e-3))
 }
 
-/// A coordinate a little inside the world.
+/// A coordinate clamped slightly inside the world.
 fn inside(at: f64, end: f64) -> f64 {
     at.clamp(NUDGE * 1e-6, end - NUDGE / 10.0)
 }
@@ -47,9 +47,9 @@ fn columns_cross_what_is_drawn() {
             columns += 1;
             caves += usize::from(spans.len() > 1);
 
-            // Air and ground take turns, and the sky is open.
+            // Air and ground alternate, and the top span is open.
             for (i, span) in spans.iter().enumerate() {
-                // Along an edge a span may be a gap of no height, up to rounding.
+                // At an edge a span may have no height, up to rounding.
                 assert!(span.ceiling.is_none_or(|top| top >= span.floor - 1e-9), "{what}: {spans:?}");
                 assert_eq!(span.ceiling.is_none(), i + 1 == spans.len(), "{what}: {spans:?}");
                 assert!(
@@ -94,7 +94,7 @@ fn what_is_solid_is_what_the_samples_say() {
         let samples = world.samples();
         for _ in 0..1500 {
             let point = point_near_surface(&mut rng, world);
-            // On the far rim, answers are those of 2^-20 voxel inside, which may be higher or lower.
+            // On the far rim, the query answers for a point 2^-20 voxel inside, which may be higher or lower.
             let on_rim = point.x == world.grid().width() || point.z == world.grid().depth();
             if on_rim && samples.distance(point).abs() < 16 {
                 continue;
@@ -132,7 +132,7 @@ fn places_between_the_samples_are_solid_below_the_surface() {
             let above = crossings.iter().filter(|crossing| crossing.0 > place.y).count();
             let is_solid = world.is_solid(place);
             assert_eq!(is_solid, above % 2 == 1, "{name}: {place:?} between {crossings:?}");
-            // Where all corners around it are.
+            // A place is buried only if all corners around it are solid.
             assert!(is_solid || !world.is_buried(place), "{name}: {place:?} is buried in air");
             solid += usize::from(is_solid);
             buried += usize::from(world.is_buried(place));
@@ -156,7 +156,7 @@ fn the_normal_of_a_place_is_that_of_the_triangle_over_or_below_it() {
             let place = DVec3::new(x, y + (rng.f64() - 0.5) * 0.01, z);
             let mut candidates = Vec::new();
             for (dx, dz) in steps() {
-                // Small steps around the place that the query takes the nearest 2^-20 voxel to be.
+                // Small offsets around the point, which the query rounds to 2^-20 voxel.
                 let fine =
                     |at: f64, step: f64| (at * f64::from(1 << 20)).round() / f64::from(1 << 20) + step / 1e4;
                 for (x, z) in [(x + dx, z + dz), (fine(x, dx), fine(z, dz))] {

@@ -1,8 +1,8 @@
-//! Rays and columns answer what is drawn: checked against every drawn triangle, one by one.
+//! Ray and column queries against brute force over every drawn triangle.
 //!
-//! Brute force knows nothing of cells, cubes or masks. It takes the triangles as a renderer gets them and tests all that
-//! lie anywhere near the ray. Where a ray runs exactly through an edge or a vertex, arithmetic decides which of the
-//! triangles around it is hit, so there any answer counts that the ray, moved by a millionth of a voxel, could give.
+//! Brute force does not use cells, cubes or masks: it tests the drawn triangles near the ray. If a ray runs exactly
+//! through an edge or a vertex, rounding decides which triangle is hit. Any answer is accepted then that a ray moved
+//! by a millionth of a voxel could give.
 
 mod asked;
 mod columns;

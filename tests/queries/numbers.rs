@@ -1,4 +1,4 @@
-//! Numbers that mean nothing, that lie outside the world, or that are of any size.
+//! Non-finite numbers, numbers outside the world, and numbers of any magnitude.
 
 use fastrand::Rng;
 use glam::DVec3;
@@ -20,12 +20,12 @@ fn numbers_that_mean_nothing_have_no_answer() {
         ] {
             assert_eq!(world.raycast(broken, down, 100.0), None, "{broken}");
             assert_eq!(world.raycast(place, broken, 100.0), None, "{broken}");
-            // Only x and z matter to columns.
+            // Columns depend on x and z only.
             if !broken.x.is_finite() || !broken.z.is_finite() {
                 assert_eq!(world.normal(broken), None, "{broken}");
                 assert!(!world.is_solid(broken), "{broken}");
             } else {
-                // Below the world all is ground.
+                // Below the world, everything is ground.
                 assert_eq!(world.is_solid(broken), bad == f64::NEG_INFINITY, "{broken}");
                 let _ = world.normal(broken);
             }

@@ -1,4 +1,4 @@
-//! Rays against brute force.
+//! Ray queries against brute force.
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
@@ -9,13 +9,13 @@ use glam::{DVec3, IVec3, Vec3};
 use crate::asked::{dug_landscape, dug_worlds, point_near_surface, random_direction, small_terrain};
 use crate::triangles::{NUDGE, TOLERANCE, Triangles, distance_to, meet};
 
-/// Two directions across a ray.
+/// Two directions perpendicular to a ray.
 fn across(direction: DVec3) -> [DVec3; 2] {
     let (a, b) = direction.any_orthonormal_pair();
     [a, b]
 }
 
-/// What the checks of many rays found.
+/// Counts of the checks of many rays.
 #[derive(Default, Debug)]
 struct Figures {
     rays: usize,
@@ -46,7 +46,7 @@ fn check_ray(
         _ => false,
     };
     if !agree(expected.map(|hit| hit.0)) {
-        // Perhaps the ray brushes an edge: then rays beside it disagree with each other, too.
+        // The ray may touch an edge: then rays next to it disagree with each other, too.
         figures.close_calls += 1;
         let [a, b] = across(unit);
         let beside = [a, -a, b, -b, a + b, a - b, b - a, -a - b];
@@ -54,18 +54,18 @@ fn check_ray(
             .iter()
             .map(|&d| triangles.raycast(origin + d * NUDGE, unit, max).map(|hit| hit.0))
             .collect();
-        // Or it starts or ends on the surface.
+        // It may start or end on the surface.
         for reach in [-NUDGE, NUDGE] {
             answers.push(triangles.raycast(origin + unit * reach, unit, max).map(|hit| hit.0 + reach));
             answers.push(triangles.raycast(origin, unit, max + reach).map(|hit| hit.0));
         }
-        // Or it runs along a triangle, and may count as hitting it anywhere.
+        // It may run along a triangle, and may count as hitting it anywhere.
         let range =
             answers.iter().flatten().fold((f64::MAX, f64::MIN), |(low, high), &t| (low.min(t), high.max(t)));
         let between =
             answer.is_some_and(|hit| (range.0 - TOLERANCE..=range.1 + TOLERANCE).contains(&hit.distance));
-        // Or it grazes edges, of which some count and some don't: before it meets anything for certain, or where rays
-        // beside it disagree whether there is anything at all.
+        // It may graze edges, only some of which count as hits: before its first certain hit, or where rays next to
+        // it disagree whether they hit anything.
         let is_early = |hit: RayHit| expected.is_none_or(|(t, _)| hit.distance < t);
         let is_unsure = answers.iter().any(Option::is_none) && answers.iter().any(Option::is_some);
         let touches = |hit: RayHit| {
@@ -105,7 +105,7 @@ fn check_ray(
     assert!((hit.normal.length() - 1.0).abs() < 1e-5, "{}: {hit:?}", what());
     assert_eq!(hit.from_inside, hit.normal.as_dvec3().dot(unit) > 0.0, "{}: {hit:?}", what());
 
-    // The normal is that of a triangle there; more than one is there only on edges.
+    // The normal is that of a triangle at the hit; only on edges there are several.
     let near = triangles.near(origin, unit).into_iter();
     let same_place = near.filter(|&other| {
         meet(origin, unit, &triangles.triangles[other as usize], 1e-6)
@@ -117,10 +117,10 @@ fn check_ray(
     check_material(world, &hit, &what());
 }
 
-/// The material of a hit is that of the solid sample nearest to it, or nearest among the corners of its cube.
+/// The material of a hit is that of the nearest solid sample, or of the nearest one among the corners of its cube.
 fn check_material(world: &World, hit: &RayHit, what: &str) {
     let samples = world.samples();
-    // On a lattice plane, rounding decides on which side of it the place is.
+    // On a lattice plane, rounding decides on which side the hit lies.
     let (low, high) =
         ((hit.position - 1e-6).floor().as_ivec3(), (hit.position + 1e-6).floor().as_ivec3() + 1);
     let cube = LatticeBox::new(low, high).expect("low is below high");
@@ -135,7 +135,7 @@ fn check_material(world: &World, hit: &RayHit, what: &str) {
     assert!(candidates.contains(&hit.material), "{what}: {hit:?}, but the samples there are {candidates:?}");
 }
 
-/// A ray from anywhere: sky, side, inside the ground, caves; free or exactly on lattice lines, edges and vertices.
+/// A random ray: from the sky, the side, the ground or caves; anywhere or exactly on lattice lines, edges and vertices.
 fn random_ray(rng: &mut Rng, world: &World, triangles: &Triangles) -> (DVec3, DVec3) {
     let (width, depth) = (f64::from(world.grid().width()), f64::from(world.grid().depth()));
     let free = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64() - 0.5);
@@ -153,12 +153,12 @@ fn random_ray(rng: &mut Rng, world: &World, triangles: &Triangles) -> (DVec3, DV
             let from = DVec3::new(width / 2.0, target.y, depth / 2.0) + away;
             (from, target + free - from)
         }
-        // Very far away.
+        // From very far away.
         2 => {
             let from = target + random_direction(rng) * [1e3, 1e4, 1e5][rng.usize(0..3)];
             (from, target + free - from)
         }
-        // Around the surface: inside the ground, in caves, just above.
+        // Near the surface: in the ground, in caves, just above the ground.
         3 => (target + free * 4.0, random_direction(rng)),
         // From lattice points, along lattice lines.
         4 => (target, random_direction(rng)),
@@ -175,14 +175,14 @@ fn random_ray(rng: &mut Rng, world: &World, triangles: &Triangles) -> (DVec3, DV
             let at = bounds.min.as_dvec3() + (bounds.size().as_dvec3()) * (free + 0.5);
             (if rng.bool() { at } else { at.round() }, random_direction(rng))
         }
-        // Exactly at a vertex, the middle of an edge or a place on an edge of what is drawn.
+        // Exactly at a vertex, the middle of an edge, or a point on an edge of the surface.
         7 => {
             let [a, b, _] = triangles.triangles[rng.usize(0..triangles.triangles.len())];
             let place = [a, (a + b) / 2.0, a.lerp(b, rng.f64())][rng.usize(0..3)];
             let direction = random_direction(rng);
             (place - direction * f64::from(rng.u32(1..40)), direction)
         }
-        // At small triangles, and at large ones close to their edge.
+        // At small triangles, and at large ones close to an edge.
         _ => {
             let [a, b, c] = triangles.triangles[rng.usize(0..triangles.triangles.len())];
             let (u, v) = (rng.f64() * 0.5, rng.f64() * [1e-9, 1e-3, 0.5][rng.usize(0..3)]);
@@ -258,8 +258,8 @@ fn rays_slip_through_no_edge() {
                     DVec3::new(f64::from(rng.i32(-2..=2)) * slant, -1.0, f64::from(rng.i32(-2..=2)) * slant)
                 }
             };
-            // All is ground below `low`: a ray that comes down from the sky to there, over the world all the way from
-            // the highest ground on, has met some.
+            // Everything below `low` is ground, so a ray that comes down from the sky to there must hit something if
+            // it stays over the world from the highest ground on.
             let at = |y: f64| target + direction * (target.y - y);
             let is_over =
                 |p: DVec3| (0.01..width - 0.01).contains(&p.x) && (0.01..depth - 0.01).contains(&p.z);
@@ -280,7 +280,7 @@ fn rays_slip_through_no_edge() {
 
 #[test]
 fn rays_in_the_plane_of_a_triangle_end_on_the_surface() {
-    // Stairs of level and slanting ground: rays in the plane of one triangle run on over others.
+    // Steps of level and sloping ground: rays in the plane of one triangle continue over others.
     let height = |x: i32, z: i32| if (x / 3 + z / 3) % 2 == 0 { 0.0 } else { f64::from((x * 7 + z * 5) % 4) };
     let ground = Ground::from_fn(40, 40, height).expect("finite heights");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
@@ -304,6 +304,6 @@ fn rays_in_the_plane_of_a_triangle_end_on_the_surface() {
         let apart = apart.fold(f64::INFINITY, f64::min);
         assert!(apart <= TOLERANCE, "ray from {origin:?} along {direction:?}: {hit:?} is {apart} voxels off");
     }
-    // Stairs are never far: nine in ten such rays meet the ground beside their triangle.
+    // The steps are close together: nine in ten such rays hit the ground next to their triangle.
     assert!(hits > 10_000, "{hits}");
 }

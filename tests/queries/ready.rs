@@ -1,4 +1,4 @@
-//! Places that an edit is on its way to.
+//! `is_ready` is false where an edit is pending.
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
@@ -17,11 +17,11 @@ fn a_place_is_ready_unless_an_edit_is_on_its_way_to_it() {
     // Queued.
     terrain.submit(&dig);
     assert!(!terrain.is_ready(here) && terrain.is_ready(there));
-    // The reach is 4 voxels: the radius and two more.
+    // The edit reaches 4 voxels: its radius and two more.
     assert!(!terrain.is_ready(around(14, 10, 10, 0)) && terrain.is_ready(around(15, 10, 10, 0)));
     assert!(!terrain.is_ready(around(15, 10, 10, 1)));
 
-    // Under way, with another one queued elsewhere.
+    // It runs, with another one queued elsewhere.
     let transaction = terrain.begin().expect("an edit waits");
     assert!(!terrain.is_ready(here) && terrain.is_ready(there));
     terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(35.0, 10.0, 25.0), 2.0)));
@@ -31,7 +31,7 @@ fn a_place_is_ready_unless_an_edit_is_on_its_way_to_it() {
     terrain.commit(commit).expect("nothing came in between");
     assert!(terrain.is_ready(here) && !terrain.is_ready(there));
 
-    // Given up, and so queued again.
+    // It is cancelled, and so queued again.
     let lost = terrain.begin().expect("an edit waits");
     drop(lost);
     terrain.abandon();
@@ -39,7 +39,7 @@ fn a_place_is_ready_unless_an_edit_is_on_its_way_to_it() {
     terrain.apply(std::iter::empty::<Brush>());
     assert!(terrain.is_ready(here) && terrain.is_ready(there));
 
-    // A brush that will be rejected is no edit.
+    // A brush that will be rejected does not count as an edit.
     terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(10.0, f32::NAN, 10.0), 2.0)));
     assert!(terrain.is_ready(here));
 }

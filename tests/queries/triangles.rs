@@ -1,19 +1,19 @@
-//! Brute force: everything drawn, triangle by triangle.
+//! Brute force over all drawn triangles.
 
 use bevy_burrow::lattice::SNAP;
 use bevy_burrow::terrain::{Drawn, World};
 use glam::DVec3;
 
-/// How far answers may be from the drawn triangles, in voxels.
+/// Tolerance between answers and drawn triangles, in voxels.
 pub const TOLERANCE: f64 = 1.0 / 256.0;
 
-/// How far a ray is moved to ask whether it runs close by an edge, in voxels.
+/// How far a ray is moved to test whether it runs close to an edge, in voxels.
 pub const NUDGE: f64 = 1e-6;
 
-/// Everything drawn, sorted into squares of `SIDE` x `SIDE` voxels by the triangles' own bounds.
+/// All drawn triangles, sorted into squares of `SIDE` x `SIDE` voxels by their bounds.
 pub struct Triangles {
     pub triangles: Vec<[DVec3; 3]>,
-    /// How many triangles belong to tiles; they come first.
+    /// The number of triangles of tiles; they come first.
     pub tiles: usize,
     squares: Vec<Vec<u32>>,
     width: i32,
@@ -56,12 +56,12 @@ impl Triangles {
         ((at / f64::from(SIDE)).floor() as i32).clamp(0, end - 1)
     }
 
-    /// The triangles of all squares that the ray runs over, with half a voxel to spare on all sides; some twice.
+    /// The triangles of all squares below the ray, with a margin of half a voxel; some occur twice.
     pub fn near(&self, origin: DVec3, direction: DVec3) -> Vec<u32> {
         let mut found = Vec::new();
         for z in 0..self.depth {
             let (low, high) = (f64::from(z * SIDE) - 0.5, f64::from((z + 1) * SIDE) + 0.5);
-            // Where along the ray it is over this row of squares.
+            // The part of the ray that is over this row of squares.
             let (from, to) = match direction.z {
                 dz if dz.abs() < 1e-9 => match (low - 0.5..=high + 0.5).contains(&origin.z) {
                     true => (0.0, 1e7),
@@ -84,7 +84,7 @@ impl Triangles {
         found
     }
 
-    /// The nearest triangle that a ray meets, and the distance to it.
+    /// The nearest triangle that a ray hits, and the distance to it.
     pub fn raycast(&self, origin: DVec3, direction: DVec3, max_distance: f64) -> Option<(f64, u32)> {
         let near = self.near(origin, direction).into_iter();
         let hits = near.filter_map(|number| {
@@ -93,8 +93,8 @@ impl Triangles {
         hits.filter(|(t, _)| (0.0..=max_distance).contains(t)).min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Heights at which the vertical through (x, z) crosses triangles, whether they face up, and which they are; lowest
-    /// first.
+    /// The crossings of the vertical line through (x, z), lowest first: height, whether the triangle faces up, and
+    /// its index.
     pub fn crossings(&self, x: f64, z: f64) -> Vec<(f64, bool, u32)> {
         let square = self.square(z, self.depth) * self.width + self.square(x, self.width);
         let mut found = Vec::new();
@@ -121,8 +121,8 @@ impl Triangles {
     }
 }
 
-/// Distance along a ray to a triangle (Moeller and Trumbore), measured from the ray's nearest point to the triangle so
-/// that far origins lose no digits. The triangle is taken larger by the share `hair` of itself.
+/// The distance along a ray to a triangle (Moeller and Trumbore), measured from the ray's closest point so that distant
+/// origins keep their precision. The triangle is enlarged by the fraction `hair` of itself.
 pub fn meet(origin: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3], hair: f64) -> Option<f64> {
     let shift = (*a - origin).dot(direction);
     let origin = origin + direction * shift;
@@ -139,7 +139,7 @@ pub fn meet(origin: DVec3, direction: DVec3, [a, b, c]: &[DVec3; 3], hair: f64) 
     (u >= -hair && v >= -hair && u + v <= 1.0 + hair).then(|| ac.dot(q) / determinant + shift)
 }
 
-/// How far a place is from a triangle.
+/// The distance of a point from a triangle.
 pub fn distance_to(place: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let normal = (b - a).cross(c - a).normalize();
     let sides = [(a, b), (b, c), (c, a)];

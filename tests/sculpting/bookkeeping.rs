@@ -1,4 +1,4 @@
-//! What holds for all that sculpt: their bounds, materials, receipts and hash.
+//! What holds for all sculpting operations: bounds, materials, receipts and hash.
 
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
@@ -52,13 +52,13 @@ fn new_ground_is_what_lies_below_or_beside_it_or_what_it_is_told() {
     assert_eq!((added[1].len(), added[1][0].0), (1, MaterialId(7)));
     assert_eq!(terrain.world().samples().material(IVec3::new(20, 22, 32)), MaterialId(5));
     assert_eq!(terrain.world().samples().material(IVec3::new(52, 22, 32)), MaterialId(7));
-    // In the air, over nothing: the nearest neighbour's, here the ceiling's.
+    // In the air above nothing, it takes the nearest neighbour's material, here the ceiling's.
     let ceiling = Shape::cuboid(Vec3::new(32.0, 150.5, 32.0), Vec3::splat(6.0));
     terrain.apply([Brush::add(ceiling, MaterialId(2))]);
     let below = Vec3::new(32.0, 144.0, 32.0);
     terrain.apply([Brush::raise(Shape::sphere(below, 5.0), 2.0)]);
     assert_eq!(terrain.world().samples().material(IVec3::new(32, 143, 32)), MaterialId(2));
-    // What is lowered and raised again has forgotten what it was.
+    // Ground that was lowered and raised again does not keep its former material.
     assert_closed(&terrain);
 }
 
@@ -130,6 +130,6 @@ fn the_hash_of_a_sculpted_world_is_the_same_on_every_machine() {
     assert_eq!(
         format!("{:#018x}", terrain.world().hash()),
         "0x210d2d631d1eb3de",
-        "sculpting gives other worlds than before, or than on other machines: saved journals would too"
+        "sculpting gives another hash than before, or than on other machines; saved journals would change too"
     );
 }

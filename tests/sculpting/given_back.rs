@@ -1,4 +1,4 @@
-//! Lower and raise undo each other: what one took, the other gives back.
+//! Lower and raise are inverse: each restores what the other changed.
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
@@ -9,10 +9,10 @@ use glam::Vec3;
 use crate::measured::{assert_closed, bumpy, dug, heights, solid, terrain};
 use crate::worlds::{random_brush, random_ground, random_lower_and_raise, world_count};
 
-/// Where stored densities end, in 1/256 voxel: that number says "at least as far".
+/// The largest stored density, in 1/256 voxel: it means "at least this far".
 const FARTHEST: i32 = 32_767;
 
-/// What is left of a dig or an add far from the surface says the same.
+/// The density to which dig and add clamp, with the same meaning.
 const DEPTH: i32 = 4 * 256;
 
 #[test]
@@ -55,7 +55,11 @@ fn a_pit_whose_ground_is_forgotten_is_filled_again_by_raising_on() {
     terrain.apply([&raise; 5]);
     let volume = solid(terrain.world());
     let floor = |terrain: &Terrain| terrain.world().height(32.0, 32.0).expect("inside");
-    assert!(floor(&terrain) < 16.0, "nothing was forgotten at {}", floor(&terrain));
+    assert!(
+        floor(&terrain) < 16.0,
+        "the ground was not lowered beyond the stored range, at {}",
+        floor(&terrain)
+    );
     let mut last = volume;
     for _ in 0..24 {
         terrain.apply([Brush::raise(shape, 2.0)]);
@@ -63,22 +67,22 @@ fn a_pit_whose_ground_is_forgotten_is_filled_again_by_raising_on() {
         assert!(now >= last, "{now} after {last}");
         last = now;
     }
-    assert!(floor(&terrain) > 20.0, "a pit is left down to {}", floor(&terrain));
+    assert!(floor(&terrain) > 20.0, "a pit is left, down to {}", floor(&terrain));
     assert_closed(&terrain);
 }
 
-/// What was found of samples that were lowered and raised; differences are in 1/256 voxel.
+/// Differences after a lower and a raise, in 1/256 voxel.
 #[derive(Debug, Default)]
 struct Found {
-    /// Samples that were never cut off, how many of them came back to the bit, and the most that any differs.
+    /// Samples that were never clamped: their number, how many were restored exactly, and the largest difference.
     known: u64,
     exact: u64,
     worst: i32,
-    /// Those that a dig or an add had cut off, and the most that any differs.
+    /// Samples that a dig or an add had clamped, and the largest difference.
     dug: u64,
     worst_dug: i32,
-    /// Those that lay where stored densities end, or beyond, and how many of them changed sides: as is to be expected, or
-    /// where ground had been dug or built, the other way.
+    /// Samples at the largest stored density or beyond, and how many of them changed sides: as expected, or, where
+    /// ground had been dug or built, the other way.
     clamped: u64,
     lost: u64,
     grown: u64,
@@ -88,7 +92,7 @@ fn densities(world: &World, within: LatticeBox) -> Vec<i32> {
     within.points().map(|at| world.samples().distance(at)).collect()
 }
 
-/// Lowers and raises again, or the other way round, and compares with what was before.
+/// Lowers and raises again, or the other way round, and compares with the state before.
 fn check_strokes(rng: &mut Rng, terrain: &mut Terrain, is_natural: bool, found: &mut Found, name: &str) {
     let (lower, raise) = random_lower_and_raise(rng, terrain.world().ground());
     let is_lowered = rng.bool();
@@ -113,7 +117,7 @@ fn check_strokes(rng: &mut Rng, terrain: &mut Terrain, is_natural: bool, found: 
         let what = || format!("{name} at {point}: {old} {new} {again}, {count} of {first:?}");
         if is_clamped[i] {
             found.clamped += 1;
-            // What was air before it was lowered is air again, what was solid before it was raised is solid again.
+            // A sample that was air before lowering is air again; one that was solid before raising is solid again.
             let is_lost = !is_same && (old < 0) == is_lowered;
             assert!(is_same || is_lost || !is_natural, "{}", what());
             found.lost += u64::from(is_lost);
@@ -128,7 +132,7 @@ fn check_strokes(rng: &mut Rng, terrain: &mut Terrain, is_natural: bool, found: 
             found.worst = found.worst.max(by);
             assert!(by <= 2 && (is_same || by == 1), "{}", what());
         }
-        // No drift: twice is as once.
+        // No drift: repeating it changes nothing more.
         assert!((again < 0) == (new < 0) || !is_natural, "{}", what());
     }
 }

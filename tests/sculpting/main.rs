@@ -1,4 +1,4 @@
-//! What sculpting does to ground: what each operation promises, measured on the surface itself.
+//! What each sculpting operation promises, measured on the surface.
 
 mod bookkeeping;
 mod given_back;

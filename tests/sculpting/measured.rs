@@ -1,4 +1,4 @@
-//! Ground to sculpt, and what is measured on it.
+//! Test grounds for sculpting, and measurements of their surface.
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
@@ -6,21 +6,21 @@ use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
-/// A voxel's fraction that counts as on the spot.
+/// Tolerance for positions of the surface, in voxels.
 pub const CLOSE: f64 = 1.0 / 16.0;
 
 pub fn terrain(ground: Ground) -> Terrain {
     Terrain::new(ground, &TerrainSettings::default()).expect("valid settings")
 }
 
-/// Bumps a few voxels high, the same each time.
+/// Fixed bumps, a few voxels high.
 pub fn bumpy(high: f64) -> Ground {
     let mut rng = Rng::with_seed(4);
     let bumps: Vec<f64> = (0..65 * 65).map(|_| rng.f64() * high).collect();
     Ground::from_fn(64, 64, |x, z| 20.0 + bumps[(z * 65 + x) as usize]).expect("finite heights")
 }
 
-/// Ground with a cave, a shaft, a heap and a tower in it.
+/// Ground with a cave, a shaft, a heap and a tower.
 pub fn dug(ground: Ground) -> Terrain {
     let mut terrain = terrain(ground);
     let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
@@ -33,7 +33,7 @@ pub fn dug(ground: Ground) -> Terrain {
     terrain
 }
 
-/// Where along a line of samples the surface lies: each change of sides, by the densities beside it.
+/// Positions of the surface along a line of samples: each sign change, interpolated between its densities.
 pub fn crossings(world: &World, from: IVec3, step: IVec3, count: i32) -> Vec<f64> {
     let samples = world.samples();
     let density = |i: i32| f64::from(samples.distance(from + step * i));
@@ -55,7 +55,7 @@ pub fn solid(world: &World) -> u64 {
     world.samples().solid_count(all)
 }
 
-/// Parts of the solid in a box that touch neither its rim nor each other.
+/// The number of solid components in a box that do not touch its rim.
 pub fn crumbs(world: &World, within: LatticeBox) -> usize {
     let samples = world.samples();
     let mut seen = std::collections::HashSet::new();
@@ -79,7 +79,7 @@ pub fn crumbs(world: &World, within: LatticeBox) -> usize {
     found
 }
 
-/// Mean square of second differences of height: what a smooth takes away.
+/// The mean square of second differences of height, which smoothing reduces.
 pub fn roughness(world: &World, from: i32, to: i32) -> f64 {
     let height = |x: i32, z: i32| heights(world, x, z, 0, 60).last().copied().expect("ground everywhere");
     let mut sum = 0.0;

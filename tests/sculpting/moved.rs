@@ -42,7 +42,7 @@ fn raised_ground_is_higher_by_the_amount() {
         let expected = f64::from(ground.height(Column::new(x, z))) / 256.0 + 3.25;
         assert!(found.len() == 1 && (found[0] - expected).abs() < CLOSE, "{found:?} not {expected}");
     }
-    // Beside the shape nothing has moved.
+    // Outside the shape nothing has moved.
     for (x, z) in [(20, 32), (43, 32), (32, 21), (40, 40)] {
         let found = heights(terrain.world(), x, z, 0, 55);
         assert!((found[0] - f64::from(ground.height(Column::new(x, z))) / 256.0).abs() < CLOSE);
@@ -52,7 +52,7 @@ fn raised_ground_is_higher_by_the_amount() {
 
 #[test]
 fn a_cave_that_is_raised_again_and_again_closes_from_its_walls() {
-    // Its middle was cut off at four voxels and would turn solid at once.
+    // The middle of the cave was clamped at four voxels, and must not turn solid at once.
     let mut terrain = terrain(Ground::flat(64, 64, 40.0).expect("valid"));
     let middle = Vec3::new(32.0, 16.0, 32.0);
     terrain.apply([Brush::dig(Shape::sphere(middle, 10.0))]);

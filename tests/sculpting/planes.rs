@@ -1,4 +1,4 @@
-//! Flatten, level, stamp and terrace: surfaces that are told where to be.
+//! Flatten, level, stamp and terrace: operations with a given target surface.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ fn flattened_ground_is_a_plane() {
                 let from = point - Vec3::new(x as f32, 0.0, z as f32);
                 let y = point.y + (normal.x * from.x + normal.z * from.z) / normal.y;
                 let place = Vec3::new(x as f32, y, z as f32);
-                // Half a voxel inside, so that both ends of each edge are.
+                // Half a voxel inside the shape, so that both ends of each edge are inside.
                 if place.distance(point) > 7.5 {
                     continue;
                 }
@@ -45,7 +45,7 @@ fn walls_and_ceilings_are_flattened_by_their_normals() {
     for _ in 0..40 {
         terrain.apply([Brush::flatten(Shape::sphere(wall, 5.0), wall, Vec3::NEG_X)]);
     }
-    // The cave lies on this side of the wall, ground on the other.
+    // The cave is on this side of the wall, the ground on the other.
     for (y, z) in (9..=15).flat_map(|y| (27..=33).map(move |z| (y, z))) {
         let found = crossings(terrain.world(), IVec3::new(34, y, z), IVec3::X, 4);
         assert_eq!(found.len(), 1);

@@ -1,4 +1,4 @@
-//! At the world's rim everything is as it is inland: beyond it is nobody's ground.
+//! At the world's rim everything behaves as it does inland.
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
@@ -8,7 +8,7 @@ use crate::measured::assert_closed;
 
 const SIDE: f32 = 64.0;
 
-/// Level ground of 64 x 64 cells, after some brushes around a place at x on the surface of z = 32.
+/// Level ground of 64 x 64 cells, after brushes around a place at x on the surface of z = 32.
 fn world(x: f32, brushes: impl Fn(f32) -> Vec<Brush>) -> Terrain {
     let ground = Ground::flat(SIDE as u32, SIDE as u32, 20.0).expect("valid");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
@@ -20,7 +20,7 @@ fn world(x: f32, brushes: impl Fn(f32) -> Vec<Brush>) -> Terrain {
     terrain
 }
 
-/// Places on the rim and inland; of the middle of a brush there.
+/// The x of brushes: at both rims and inland.
 const PLACES: [f32; 3] = [0.0, SIDE, 32.0];
 
 #[test]
@@ -45,7 +45,7 @@ fn level_ground_is_smooth_at_the_rim_too() {
 
 #[test]
 fn rules_hold_nothing_beyond_the_rim() {
-    // Hard ground under a soft heap; and a box that protects what nobody can edit.
+    // Hard ground under a soft heap, and a protected box outside the world.
     let beyond = LatticeBox { min: IVec3::new(65, 0, 0), max: IVec3::new(90, 60, 64) };
     let rules = DiggingRules::default().with_hardness(MaterialId(0), 200).with_protected(beyond);
     let spans = |x: f32| {

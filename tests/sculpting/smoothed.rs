@@ -36,7 +36,7 @@ fn slopes_and_flat_ground_are_smooth_already() {
             ]);
             assert!(receipts.iter().all(|receipt| receipt.outcome == Ok(Applied::default())), "{slope}");
         }
-        assert_eq!(terrain.world().bricks().count(), 0, "nothing is edited where nothing changes");
+        assert_eq!(terrain.world().bricks().count(), 0, "unchanged samples are not stored");
     }
 }
 
@@ -45,19 +45,19 @@ fn a_hundred_smooths_neither_hollow_out_nor_inflate() {
     let cliff = |x: i32, _| if x < 32 { 12.0 } else { 40.0 };
     for (name, mut terrain, most) in [
         ("bumps", terrain(bumpy(9.0)), 300),
-        // Cave and shaft hold 3,400 voxels, and close.
+        // Cave and shaft have 3,400 voxels, and smoothing fills them.
         ("dug", dug(bumpy(2.0)), 3400),
         ("cliff", terrain(Ground::from_fn(64, 64, cliff).expect("valid")), 300),
     ] {
         let within = LatticeBox::new(IVec3::new(14, 0, 14), IVec3::new(50, 55, 50)).expect("not empty");
         let (volume, loose) = (solid(terrain.world()), crumbs(terrain.world(), within));
-        // Tall enough to undercut nothing that it does not reach.
+        // The cylinder is tall enough not to undercut ground above it.
         let shape = Shape::cylinder(Vec3::new(32.0, 2.0, 32.0), Vec3::Y * 46.0, 12.0);
         for _ in 0..100 {
             terrain.apply([Brush::smooth(shape, 1.0)]);
         }
         let now = solid(terrain.world());
-        // The cylinder holds some 20,000 voxels.
+        // The cylinder has some 20,000 voxels.
         assert!(now.abs_diff(volume) < most, "{name}: {volume} to {now}");
         assert!(crumbs(terrain.world(), within) <= loose, "{name}: crumbs");
         assert_closed(&terrain);

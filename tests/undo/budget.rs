@@ -1,4 +1,4 @@
-//! What history takes: no more than its budget, and as many bytes as it says.
+//! History memory: within its budget, and as many bytes as reported.
 
 use allocation_counter::measure;
 use bevy_burrow::lattice::BrickPos;
@@ -41,17 +41,17 @@ fn history_takes_the_bytes_it_says_and_stays_within_its_budget() {
         full += u64::from(budget > 0 && terrain.history().undos < most);
         let history = terrain.history();
         assert_eq!(terrain.memory().undo, history.bytes);
-        // The world is let go of by whoever looked at it, so what history frees nobody else holds.
+        // No other reference to the world remains, so everything that history frees is really freed.
         drop(ground);
         let freed = measure(|| terrain.set_undo_budget(0));
         assert_eq!(-freed.bytes_current, history.bytes as i64, "world {index}: {history:?}");
         assert_eq!(terrain.history(), Default::default());
         assert!(terrain.undo().outcome == Err(HistoryRejection::NothingToUndo));
     }
-    assert!(full > 3, "old steps fell off in {full} worlds only");
+    assert!(full > 3, "old steps were dropped in {full} worlds only");
 }
 
-/// Bricks all of whose samples were edited to the same.
+/// The number of edited bricks with uniform samples.
 fn uniform_bricks(world: &World) -> usize {
     let is_uniform = |brick: &Brick, pos: BrickPos| {
         let of = |point| (brick.sample(point), brick.material(point));
@@ -72,7 +72,7 @@ fn a_large_hole_and_its_filling_are_undone_and_cost_what_they_say() {
         terrain.apply([brush]);
         states.push(State::of(terrain.world()));
         let alike = uniform_bricks(terrain.world());
-        assert!(alike > 20, "{alike} bricks are all alike");
+        assert!(alike > 20, "{alike} bricks are uniform");
     }
     let check = |terrain: &Terrain, state: usize, what: &str| {
         states[state].check(terrain.world(), what);

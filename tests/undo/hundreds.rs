@@ -1,4 +1,4 @@
-//! Five hundred edits of every kind, undone and done again one by one: all of them, or as many as a budget has room for.
+//! Five hundred edits of every kind, undone and redone one by one: all of them, or as many as the budget allows.
 
 use allocation_counter::measure;
 use bevy_burrow::prelude::*;
@@ -10,17 +10,17 @@ use crate::worlds::random_ground;
 
 const EDITS: usize = 500;
 
-/// A ground, the chunk size it gets, whether there are rules and loose pieces (see [`terrain`]), and a seed; all of them
-/// small, so that hundreds of states are soon compared.
+/// A ground, its chunk size, an index that selects rules and loose pieces (see [`terrain`]), and a seed. All grounds
+/// are small, so that hundreds of states are compared quickly.
 type Start = (u64, u32, u64, u64);
 
-/// A terrain, what it looks like, and all that it was and will be.
+/// A terrain with its displayed meshes, and its past and future states.
 struct Walker {
     name: String,
     terrain: Terrain,
     screen: Screen,
     budget: usize,
-    /// The states that steps back lead to, and those that steps forth lead to, next ones last.
+    /// The states to which undo and redo lead, next ones last.
     past: Vec<State>,
     future: Vec<State>,
     now: State,
@@ -44,7 +44,7 @@ impl Walker {
         (new, rng)
     }
 
-    /// Runs the one thing that waits. History is within its budget before and after.
+    /// Runs the pending work. History is within its budget before and after.
     fn play(&mut self) -> Vec<Receipt> {
         let receipts = self.screen.play(&mut self.terrain);
         let history = self.terrain.history();
@@ -80,7 +80,7 @@ impl Walker {
         }
     }
 
-    /// One step; was there one?
+    /// Takes one history step; returns whether there was one.
     fn step(&mut self, step: HistoryStep) -> bool {
         match step {
             HistoryStep::Undo => self.terrain.submit_undo(),
@@ -112,7 +112,7 @@ impl Walker {
         outcome.is_ok()
     }
 
-    /// As many steps as there are.
+    /// Takes as many steps as there are.
     fn walk(&mut self, step: HistoryStep) -> usize {
         let count = (0..).take_while(|_| self.step(step)).count();
         self.screen.check(self.terrain.world(), &self.name);
@@ -130,9 +130,9 @@ fn five_hundred_edits_of_every_kind_are_undone_and_redone_to_the_bit() {
         let (mut walker, mut rng) = Walker::new(start, 64 << 20);
         (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut account));
         let steps = walker.past.len();
-        assert!(steps > 400, "{steps} are not many");
+        assert!(steps > 400, "only {steps} steps");
         assert_eq!(walker.terrain.history().undos, steps, "the budget holds all of {steps}");
-        // Whatever edits may do from now on, steps do.
+        // Rules apply to edits, but not to history steps.
         walker.terrain.set_rules(DiggingRules::default().with_bedrock(i32::MAX)).expect("valid rules");
         assert_eq!(walker.walk(HistoryStep::Undo), steps);
         assert!(walker.now.is_pristine());
@@ -150,7 +150,7 @@ fn of_five_hundred_edits_a_tight_budget_keeps_the_last() {
         (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut account));
         let (steps, kept) = (walker.past.len(), walker.terrain.history().undos);
         assert!(0 < kept && kept < steps / 2, "{}: {kept} of {steps} steps are kept", walker.name);
-        // A step forth may take more bytes than the one back, for which the oldest ones go.
+        // A redo may take more bytes than the undo, so the oldest steps are dropped for it.
         let back = walker.walk(HistoryStep::Undo);
         let forth = walker.walk(HistoryStep::Redo);
         assert!(0 < back && back <= kept && forth <= back, "{}: {kept}, {back}, {forth}", walker.name);

@@ -1,4 +1,4 @@
-//! Undo and redo: back and forth by whole steps, exact to the bit, within a budget of bytes.
+//! Undo and redo: whole steps in both directions, exact to the bit, within a budget of bytes.
 
 mod budget;
 mod hundreds;

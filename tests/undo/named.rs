@@ -1,4 +1,4 @@
-//! Single cases: steps among brushes, steps without effect, steps given up, names of fields.
+//! Single cases: steps between brushes, steps without effect, cancelled steps, field ids.
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
@@ -34,7 +34,7 @@ fn steps_keep_their_place_among_brushes() {
     assert_eq!(terrain.take_answered().iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [1, 2, 3]);
     let moves = terrain.take_history_receipts();
     let is_done: Vec<bool> = moves.iter().map(|receipt| receipt.outcome.is_ok()).collect();
-    // Nothing yet; both balls; not after the third; the third; nothing; the third again.
+    // Nothing to undo yet; undo both balls; no redo after the third; undo the third; nothing to undo; redo the third.
     assert_eq!(is_done, [false, true, false, true, false, true]);
     assert_eq!(moves.iter().map(|receipt| receipt.step).take(5).collect::<Vec<_>>(), sent);
     assert_eq!(terrain.history().undos, 2);
@@ -69,9 +69,9 @@ fn a_step_that_is_given_up_is_not_lost() {
     assert!(terrain.commit(lost).is_err());
     assert!(!terrain.is_ready(LatticeBox::point(IVec3::new(10, 10, 10))));
     let again = terrain.begin().expect("it waits again").run();
-    // Meanwhile its budget goes; the step is done all the same.
+    // The budget is removed meanwhile; the step is taken all the same.
     terrain.set_undo_budget(0);
-    terrain.commit(again).expect("it is waited for");
+    terrain.commit(again).expect("the step is still pending");
     assert_eq!(terrain.world().hash(), pristine);
     assert!(terrain.take_history_receipts().iter().all(|receipt| receipt.outcome.is_ok()));
     assert_eq!(terrain.history(), Default::default());
@@ -102,7 +102,7 @@ fn fields_come_back_under_their_names_and_new_ones_get_new_names() {
     terrain.commit(commit).expect("nobody else commits");
     (0..3).for_each(|_| assert!(terrain.undo().outcome.is_ok()));
     let c = field(&mut terrain, ball(8.0, 10.0, 8.0, 2.0));
-    assert!(c > b, "{c:?} was the name of another field");
+    assert!(c > b, "{c:?} was the id of another field");
 }
 
 #[test]

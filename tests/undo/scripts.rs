@@ -1,4 +1,4 @@
-//! Random terrains to edit, brushes for them, and an account of what these did.
+//! Random terrains and brushes, and statistics of what the brushes did.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ pub fn any_brush(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
     brush.with_power(rng.u8(..) | rng.u8(..))
 }
 
-/// A terrain that nobody has edited. Of every four indices, two have digging rules and two look for loose pieces; one has
+/// A terrain without edits. Of every four indices, two have digging rules and two search for loose pieces; one has
 /// both.
 pub fn terrain(rng: &mut Rng, ground: Ground, chunk_size: u32, index: u64) -> Terrain {
     let rules = random_rules(rng, &ground);
@@ -40,7 +40,7 @@ pub fn terrain(rng: &mut Rng, ground: Ground, chunk_size: u32, index: u64) -> Te
     terrain
 }
 
-/// How often each kind of brush came, and how often it changed something; and what rules and loose pieces did to them.
+/// How often each kind of brush was used and changed something, and the effects of rules and loose pieces.
 #[derive(Debug, Default)]
 pub struct Account {
     kinds: BTreeMap<&'static str, (usize, usize)>,
@@ -68,8 +68,8 @@ impl Account {
         }
     }
 
-    /// Fails unless each operation and each shape changed something so many times, and each reason to refuse and each fate
-    /// of a loose piece came about.
+    /// Checks that each operation and each shape changed something at least `least` times, and that each kind of
+    /// refusal and each fate of loose pieces occurred.
     pub fn check(&self, least: usize) {
         println!("{self:?}");
         for kind in OPERATIONS.iter().chain(&SHAPES) {

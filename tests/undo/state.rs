@@ -1,4 +1,4 @@
-//! What a world is, and what somebody sees of it.
+//! The full state of a world, and what a renderer shows of it.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{Hash, Hasher};
@@ -11,8 +11,8 @@ use bevy_burrow::volume::Field;
 use glam::IVec3;
 use rustc_hash::FxHasher;
 
-/// Everything that a world is, but for what counts its commits. Of samples and meshes it keeps hashes, so that hundreds of
-/// states can be kept.
+/// The full state of a world except its commit counters. Samples and meshes are kept as hashes, so that hundreds of
+/// states fit into memory.
 #[derive(Debug)]
 pub struct State {
     hash: u64,
@@ -22,7 +22,7 @@ pub struct State {
     mask: Vec<Column>,
     /// Every bit of every mesh.
     meshes: Vec<(Drawn, u64)>,
-    /// Bytes of what meshes and rings were assembled from.
+    /// Bytes of the parts of which meshes and rings are assembled.
     parts: usize,
 }
 
@@ -47,13 +47,13 @@ impl State {
         }
     }
 
-    /// Has nobody edited anything?
+    /// Whether there are no edits.
     pub fn is_pristine(&self) -> bool {
         self.bricks.is_empty() && self.fields.is_empty() && self.mask.is_empty()
     }
 
-    /// Fails unless the world is in this state; says where it differs. Seams are a matter of meshes alone: where these are
-    /// the same, seams are.
+    /// Checks that the world is in this state; the message says where it differs. Seams need no check: they depend on
+    /// meshes only.
     pub fn check(&self, world: &World, what: &str) {
         check_index(world, what);
         let now = Self::of(world);
@@ -69,7 +69,7 @@ impl State {
     }
 }
 
-/// Fails unless the world finds by place what it holds: bricks above and below each other stand in lists of their own.
+/// Checks that the index by position finds exactly the stored bricks, including those above and below each other.
 fn check_index(world: &World, what: &str) {
     let all = LatticeBox { min: IVec3::splat(-LIMIT), max: IVec3::splat(LIMIT) };
     let listed: BTreeSet<[i32; 3]> = world.bricks_near(all).map(|pos| pos.0.to_array()).collect();
@@ -87,7 +87,7 @@ fn hash_of(write: impl FnOnce(&mut FxHasher)) -> u64 {
     hasher.finish()
 }
 
-/// Of positions, normals, materials and weights, bit by bit, and of the triangles between them.
+/// The hash of positions, normals, materials and weights, bit by bit, and of the triangles.
 fn mesh_hash(mesh: &SurfaceMesh) -> u64 {
     hash_of(|hasher| {
         for vertex in &mesh.vertices {
@@ -98,7 +98,7 @@ fn mesh_hash(mesh: &SurfaceMesh) -> u64 {
     })
 }
 
-/// What somebody sees who swaps only the meshes that commits name.
+/// The meshes that a renderer shows if it only applies the meshes in commits.
 pub struct Screen(HashMap<Drawn, SurfaceMesh>);
 
 impl Screen {
@@ -106,7 +106,7 @@ impl Screen {
         Self(world.drawn().collect())
     }
 
-    /// Runs and commits everything that waits; gives the receipts of its brushes.
+    /// Runs and commits all pending work; returns the receipts of its brushes.
     pub fn play(&mut self, terrain: &mut Terrain) -> Vec<Receipt> {
         let mut receipts = Vec::new();
         while let Some(transaction) = terrain.begin() {
@@ -125,14 +125,14 @@ impl Screen {
     pub fn check(&self, world: &World, what: &str) {
         let drawn: HashMap<Drawn, SurfaceMesh> = world.drawn().collect();
         for (drawn, mesh) in self.0.iter().filter(|(_, mesh)| !mesh.is_empty()) {
-            assert!(world.drawn_mesh_is(*drawn, mesh), "{what}: {drawn:?} shows something else");
+            assert!(world.drawn_mesh_is(*drawn, mesh), "{what}: {drawn:?} shows a stale mesh");
         }
         let shown = |(drawn, mesh): &(&Drawn, &SurfaceMesh)| mesh.is_empty() || self.0.contains_key(drawn);
         assert!(drawn.iter().all(|pair| shown(&pair)), "{what}: something is not shown");
     }
 }
 
-/// The mesh of what is drawn, and is it this one?
+/// Comparison of a drawn mesh with another one.
 trait MeshOf {
     fn drawn_mesh_is(&self, drawn: Drawn, mesh: &SurfaceMesh) -> bool;
 }

@@ -18,7 +18,7 @@ fn walks_through_history_meet_the_states_that_were() {
         let chunk_size = if index % 2 == 0 { usual } else { rng.u32(8..=128) };
         let mut terrain = terrain(&mut rng, ground, chunk_size, index / 4);
         let mut screen = Screen::of(terrain.world());
-        // What was before each transaction, and what was undone.
+        // The states before each transaction, and the states that were undone.
         let (mut past, mut future): (Vec<State>, Vec<State>) = Default::default();
         for turn in 0..rng.usize(6..24) {
             let what = format!("world {index}, chunks of {chunk_size}, turn {turn}");
@@ -60,7 +60,7 @@ fn walks_through_history_meet_the_states_that_were() {
         }
         assert!(terrain.world().check_seams().is_flawless(), "world {index}");
     }
-    assert!(moved > 100, "{moved} steps are not many");
+    assert!(moved > 100, "only {moved} steps");
     account.check(1);
 }
 

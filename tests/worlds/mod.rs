@@ -7,10 +7,10 @@ use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::{Quat, Vec3};
 
-/// Chunk sizes that the tests take turns with.
+/// The chunk sizes among which tests alternate.
 pub const CHUNK_SIZES: [u32; 4] = [8, 25, 32, 100];
 
-/// How many random worlds to test: `BURROW_WORLDS`, or the given number.
+/// The number of random worlds to test: `BURROW_WORLDS`, or the default.
 pub fn world_count(default: u64) -> u64 {
     std::env::var("BURROW_WORLDS").ok().and_then(|count| count.parse().ok()).unwrap_or(default)
 }
@@ -22,13 +22,13 @@ pub fn real_image() -> GreyImage {
     GreyImage::decode_png(&bytes, &ImageLimits::default()).expect("the shipped elevation model is a grey PNG")
 }
 
-/// The real landscape as the digger has it, at least 1024 x 1024 voxels.
+/// The real landscape as in the digger example, at least 1024 x 1024 voxels.
 pub fn real_ground() -> Ground {
     let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
     Ground::from_image(&real_image(), &scale).expect("the real landscape is valid")
 }
 
-/// One voxel a sample, much steeper than nature, cut out at (x, z).
+/// A cutout at (x, z), one voxel per sample, much steeper than in reality.
 pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) -> Ground {
     let image = real_image();
     let grey = |i: i32, k: i32| {
@@ -38,8 +38,7 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
     Ground::from_fn(width, depth, |i, k| grey(x + i, z + k) * relief).expect("finite heights")
 }
 
-/// A random ground, from flat to steep, and the chunk size of its world. Every third one has materials that change from
-/// column to column.
+/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let (ground, chunk_size) = random_heights(rng, index);
     if !index.is_multiple_of(3) {
@@ -60,7 +59,7 @@ pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
 
 fn random_heights(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let chunk_size = CHUNK_SIZES[(index % 4) as usize];
-    // Not only whole chunks: the last ones are cut at the rim.
+    // Sizes that are no multiples of the chunk size: the last chunks are cut at the rim.
     let side = |rng: &mut Rng| match chunk_size {
         8 => rng.u32(12..=26),
         25 | 32 => rng.u32(chunk_size..=chunk_size + 36),
@@ -85,7 +84,7 @@ fn random_heights(rng: &mut Rng, index: u64) -> (Ground, u32) {
     (Ground::from_fn(width, depth, height).expect("finite heights"), chunk_size)
 }
 
-/// A place under the ground (dig) or over it (add): a brush there cuts into the surface, or leaves a gap to it.
+/// The centre of a brush below the ground (dig) or above it (add), which cuts into the surface or leaves a gap to it.
 fn random_center(rng: &mut Rng, ground: &Ground, dig: bool, radius: f32) -> Vec3 {
     let x = rng.f32() * (ground.width() + 4) as f32 - 2.0;
     let z = rng.f32() * (ground.depth() + 4) as f32 - 2.0;
@@ -98,9 +97,9 @@ fn random_center(rng: &mut Rng, ground: &Ground, dig: bool, radius: f32) -> Vec3
     if rng.bool() { place.round() } else { place }
 }
 
-/// What a dig or an add makes of a sample, by the book; other operations leave densities alone or look at more than this.
+/// The result of a dig or an add on a sample by definition. Other operations keep densities or depend on more samples.
 pub fn plainly_applied(operation: &Operation, before: i32, outside: i32) -> i32 {
-    // A shape counts as four voxels deep at most.
+    // A shape counts as at most four voxels deep.
     let outside = outside.max(-1024);
     match operation {
         Operation::Dig => before.max(-outside),
@@ -109,7 +108,7 @@ pub fn plainly_applied(operation: &Operation, before: i32, outside: i32) -> i32 
     }
 }
 
-/// A random brush of any shape and operation, at lattice points as often as between.
+/// A random brush of any shape and operation, at lattice points or between them.
 pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let radius = [2.0, 3.0, 3.7, 5.0][rng.usize(0..4)];
     let dig = rng.bool();
@@ -142,7 +141,7 @@ pub fn random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     }
 }
 
-/// A random brush that sculpts, mostly where the surface is.
+/// A random sculpting brush, mostly near the surface.
 pub fn random_sculpting_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let like = random_brush(rng, ground);
     let (x, z) = (rng.i32(-1..=ground.width() + 1), rng.i32(-1..=ground.depth() + 1));
@@ -159,7 +158,7 @@ pub fn random_sculpting_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     sculpting_brush(rng, shape, place)
 }
 
-/// A random brush that sculpts, around a place.
+/// A random sculpting brush around a place.
 pub fn sculpting_brush(rng: &mut Rng, shape: Shape, place: Vec3) -> Brush {
     let by = [0.25, 1.0, 2.5, 9.0][rng.usize(0..4)];
     let up = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.2, rng.f32() - 0.5);
@@ -192,7 +191,7 @@ pub fn sculpting_brush(rng: &mut Rng, shape: Shape, place: Vec3) -> Brush {
     }
 }
 
-/// A lower and a raise by the same amount, by a brush of any shape near the surface.
+/// A lower and a raise by the same amount, with a brush of any shape near the surface.
 pub fn random_lower_and_raise(rng: &mut Rng, ground: &Ground) -> (Brush, Brush) {
     let (x, z) = (rng.i32(0..=ground.width()), rng.i32(0..=ground.depth()));
     let height = ground.height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
@@ -206,7 +205,7 @@ pub fn random_lower_and_raise(rng: &mut Rng, ground: &Ground) -> (Brush, Brush) 
         3 => Shape::capsule(at, at + Vec3::new(2.0, -5.0, 3.0), r.min(5.0)),
         _ => Shape::sphere(at, r),
     };
-    // Whole amounts on level ground are what games ask for.
+    // Games mostly use whole amounts on level ground.
     let amount = match rng.u32(0..4) {
         0 => 64.0,
         1 => rng.u32(1..=64) as f32,
@@ -235,7 +234,7 @@ pub fn any_random_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     Brush { shape: Shape::torus(center, axis, radius, radius * (0.2 + 0.8 * rng.f32())), ..brush }
 }
 
-/// Rules of every kind, some of which will matter.
+/// Rules of every kind, some of which affect the edits.
 pub fn random_rules(rng: &mut Rng, ground: &Ground) -> DiggingRules {
     let (low, high) = ground.height_range();
     let mut rules = DiggingRules::default();
@@ -269,7 +268,7 @@ fn random_rotation(rng: &mut Rng) -> Quat {
     }
 }
 
-/// A brush that lies on chunk faces, edges or corners, or on the world's rim.
+/// A brush that lies on chunk faces, edges or corners, or at the world's rim.
 pub fn random_brush_at_a_face(rng: &mut Rng, ground: &Ground, chunk_size: u32) -> Brush {
     let size = chunk_size as i32;
     let on = |rng: &mut Rng, end: i32| match rng.u32(0..3) {
@@ -284,13 +283,13 @@ pub fn random_brush_at_a_face(rng: &mut Rng, ground: &Ground, chunk_size: u32) -
     if rng.bool() { Brush::dig(shape) } else { Brush::add(shape, MaterialId(5)) }
 }
 
-/// A random, edited world; every fourth one with rules.
+/// A random, edited world; every fourth one has rules.
 pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
     let (ground, chunk_size) = random_ground(rng, index);
     let mut brushes = Vec::new();
     for _ in 0..rng.u32(2..8) {
         if rng.u32(0..4) == 0 {
-            // A run of balls: a tunnel, a dam.
+            // A row of balls: a tunnel or a dam.
             let first = any_random_brush(rng, &ground);
             let (from, to) = (random_center(rng, &ground, true, 3.0), random_center(rng, &ground, true, 3.0));
             for step in 0..12 {
@@ -310,7 +309,7 @@ pub fn random_world(rng: &mut Rng, index: u64) -> Terrain {
         terrain.set_rules(rules).expect("valid rules");
         brushes.iter_mut().for_each(|brush| brush.power = rng.u8(..) | rng.u8(..));
     }
-    // Some at once, some in transactions of their own.
+    // Some in one transaction, some in transactions of their own.
     let cut = rng.usize(0..=brushes.len());
     terrain.apply(&brushes[..cut]);
     for brush in &brushes[cut..] {
