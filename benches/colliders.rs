@@ -1,9 +1,8 @@
-//! What a collider costs in the task, and which kind: `cargo bench --features avian --bench colliders`. What colliders cost
-//! the main thread.
+//! The cost of colliders in tasks, by kind, and on the main thread: `cargo bench --features avian --bench colliders`.
 //!
-//! For tiles and chunks of hills with tunnels: the crate's own shape, a triangle mesh of parry's that mends its inner
-//! edges, one that does not, and, for tiles that nobody dug, a height field. Then the systems that look where colliders
-//! are wanted, on 4096 tiles; and commits, while somebody holds a snapshot of the world and while nobody does.
+//! For tiles and chunks of hills with tunnels, it compares the crate's own shape, a parry triangle mesh with fixed
+//! internal edges, one without, and, for unedited tiles, a height field. Then it measures the systems that update
+//! colliders on 4096 tiles, and commits with and without a snapshot of the world held.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -20,7 +19,7 @@ use bevy_burrow::physics::{
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 
-/// Rounds of which the fastest counts.
+/// Rounds, of which the fastest counts.
 const ROUNDS: u32 = 20;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -61,10 +60,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 #[derive(Resource, Default)]
 struct Clock(Option<Instant>, Vec<Duration>);
 
-/// Frames that are measured.
+/// Number of measured frames.
 const FRAMES: usize = 256;
 
-/// The systems in `Update` that see to colliders, and those of the plugin between them.
+/// The systems in `Update` that maintain colliders, and the plugin's systems between them.
 fn upkeep() -> Result<(), Box<dyn std::error::Error>> {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, PhysicsPlugins::default(), BurrowPlugins, TerrainPhysicsPlugin))
@@ -141,7 +140,7 @@ fn micros(sorted: &[Duration], share: f64) -> f64 {
     sorted.get(at).map_or(0.0, |duration| duration.as_secs_f64() * 1e6)
 }
 
-/// What a snapshot that somebody holds makes of a commit.
+/// The effect of a held snapshot on a commit.
 fn commits() -> Result<(), Box<dyn std::error::Error>> {
     println!("| bricks | a snapshot is held | commit, median µs | p99 µs |\n| --- | --- | --- | --- |");
     for side in [40.0, 200.0] {

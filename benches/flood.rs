@@ -1,4 +1,4 @@
-//! Ten thousand large brushes in one frame, and a player who goes on digging: what is answered when.
+//! Latency under overload: ten thousand large brushes in one frame, and a player who goes on digging.
 //!
 //! ```text
 //! cargo bench --features examples --bench flood
@@ -10,15 +10,15 @@ use std::time::{Duration, Instant};
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
-/// Brushes of the flood, and their radius.
+/// Number and radius of the brushes sent at once.
 const FLOOD: u64 = 10_000;
 const RADIUS: f32 = 60.0;
-/// How long the player digs, and how often.
+/// How many digs the player makes, and the pause between them.
 const DIGS: u64 = 80;
 const PAUSE: Duration = Duration::from_millis(100);
 const FRAME: Duration = Duration::from_micros(16_667);
 
-/// When brushes were sent, by tag, and what became of them.
+/// When brushes were sent, by tag, and their outcomes.
 #[derive(Resource, Default)]
 struct Heard {
     sent: HashMap<u64, Instant>,
@@ -37,7 +37,7 @@ fn hear(mut receipts: MessageReader<BrushApplied>, mut heard: ResMut<Heard>) {
     }
 }
 
-/// Bytes that the process holds, where the system tells.
+/// Resident memory of the process in MiB, where the system reports it.
 fn resident() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap_or_default();

@@ -1,10 +1,11 @@
-//! What digging costs a frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`.
+//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`.
 //!
-//! A walk over the real landscape in textures, shadows and fog, drawn without a window, at most 60 frames a second. On each
-//! backend it is walked digging, 20 brushes of radius 3 a second by the clock, and then again over the dug ground with
-//! nothing to do. Colliders are made near a body that walks along, and balls lie about there. A frame is timed from its
-//! start until the graphics card has drawn it, so one frame overlaps no other, as it would in a game. What the plugin takes
-//! on the main thread is what it says of itself. Last come frames of which a part is left out, to see where their time goes.
+//! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
+//! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
+//! dug ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is
+//! timed from its start until the graphics card has drawn it, so unlike in a game, frames never overlap. The plugin's
+//! time on the main thread is the one that it reports. Finally, parts of the frame are left out to show where the
+//! time goes.
 
 #[path = "../examples/shared/offscreen.rs"]
 mod offscreen;
@@ -23,24 +24,24 @@ use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::{ColliderSource, PhysicsFigures, TerrainPhysicsPlugin};
 use bevy_burrow::prelude::*;
 
-/// Time from frame to frame.
+/// Time between frames.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 60);
 
-/// Time from brush to brush.
+/// Time between brushes.
 const BRUSH: Duration = Duration::from_millis(50);
 
-/// Frames from ball to ball, and how many lie about.
+/// Frames between balls, and the largest number of balls.
 const BALL_EVERY: usize = 20;
 const BALLS: usize = 100;
 
-/// Frames of which a part is left out.
+/// Number of frames with a part left out.
 const PARTIAL: usize = 240;
 
-/// Frames before anything is timed.
+/// Frames before timing begins.
 const WARM_UP: usize = 120;
 
 fn main() {
-    // Cargo itself passes `--bench`.
+    // Cargo passes `--bench`.
     let given: Vec<u32> = std::env::args().skip(1).filter_map(|arg| arg.parse().ok()).collect();
     let [seconds, width, height] = [(0, 10), (1, 1280), (2, 720)]
         .map(|(at, default)| given.get(at).copied().unwrap_or(default).clamp(1, 8192));
@@ -88,7 +89,7 @@ fn main() {
     }
 }
 
-/// Prints and gives median and 99th percentile.
+/// Prints median and 99th percentile, and returns them.
 fn report(what: &str, mut times: Vec<Duration>) -> [f64; 2] {
     times.sort_unstable();
     let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e6;
@@ -135,7 +136,7 @@ impl Walk {
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         world.spawn((terrain, GroundLook::default()));
         let mut walk = Self { app, camera, path, balls: Vec::new(), next_brush: Instant::now() };
-        // The ground is there when its textures are painted and its tiles are shown.
+        // The ground is ready when its textures are generated and its tiles are shown.
         let start = Instant::now();
         while !walk.is_shown() {
             assert!(start.elapsed() < Duration::from_secs(300), "the ground never appeared");
@@ -151,7 +152,7 @@ impl Walk {
         is_painted && tiles.iter(world).count() > 0
     }
 
-    /// Frames without one thing more.
+    /// Times frames with one more part left out.
     fn leave_out(&mut self, what: &str, change: fn(&mut Self)) {
         change(self);
         let took = (0..PARTIAL).map(|number| self.frame(number, false));
@@ -174,7 +175,7 @@ impl Walk {
         self.app.world().resource::<BurrowFigures>().clone()
     }
 
-    /// One frame, and how long it took.
+    /// Draws one frame and returns its time.
     fn frame(&mut self, number: usize, is_digging: bool) -> Duration {
         let start = Instant::now();
         let at = self.path[number % self.path.len()];
@@ -212,7 +213,7 @@ fn ground() -> Ground {
     Ground::from_image(&image, &scale).expect("valid ground")
 }
 
-/// Where the walk is in each frame: a wide loop, 9 m/s, on the ground.
+/// The position of the walk in each frame: a wide loop at 9 m/s on the ground.
 fn path(ground: &Ground) -> Vec<Vec3> {
     let (center, radius, frames) = (Vec2::new(560.0, 500.0), 280.0, 12_000);
     let place = |frame: i32| {

@@ -1,9 +1,9 @@
-//! Fixed work whose instructions are counted: `tools/instructions.sh` runs every workload under callgrind, which counts
-//! what happens inside [`counted_workload`] and nothing else, and compares with `benches/instructions.txt`.
+//! Fixed workloads whose instructions are counted: `tools/instructions.sh` runs each of them under callgrind, which
+//! counts only what happens inside [`counted_workload`], and compares the counts with `benches/instructions.txt`.
 //!
-//! Unlike times, counts are the same on a busy machine, so a small loss shows. One thread, fixed inputs, no clocks.
+//! Unlike times, counts do not depend on other load, so small regressions show. One thread, fixed inputs, no clocks.
 //!
-//! `cargo bench --no-default-features --bench instructions -- NAME` does one workload; without a name it lists them.
+//! `cargo bench --no-default-features --bench instructions -- NAME` runs one workload; without a name it lists them.
 
 use std::hint::black_box;
 use std::process::ExitCode;
@@ -14,14 +14,14 @@ use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
 use glam::Vec3;
 
-// The fields of the bench `meshers`, of which this one takes but a few.
+// The fields of the benchmark `meshers`, of which only a few are used here.
 #[allow(dead_code)]
 #[path = "meshers/fields.rs"]
 mod fields;
 
 use fields::{Border, Field};
 
-/// What is counted. Callgrind knows it by this name, so it must stay a function of its own.
+/// The counted part. Callgrind finds it by this name, so it must not be inlined.
 #[inline(never)]
 fn counted_workload(work: &mut dyn FnMut()) {
     work();
@@ -45,10 +45,10 @@ const WORKLOADS: [Workload; 10] = [
 ];
 
 fn main() -> ExitCode {
-    // Everything on this thread: work that is handed to another would not be counted, and order would not be fixed.
+    // Everything runs on this thread: work on other threads would not be counted, and its order would vary.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
     pool.expect("no pool was made before");
-    // Cargo adds --bench.
+    // Cargo passes `--bench`.
     let Some(name) = std::env::args().skip(1).find(|word| word != "--bench") else {
         for (name, _) in WORKLOADS {
             println!("{name}");
@@ -63,7 +63,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// One grid of 64^3 floats, with normals. Tables and buffers are there before the count begins.
+/// One grid of 64^3 floats, with normals. Tables and buffers are created before counting begins.
 fn dense(field: Field) {
     let grid = field.grid(64, Border::Cut);
     mesh_counted(|| DenseGrid::new(&grid.samples, grid.sides()).expect("a cube of samples"));
@@ -89,14 +89,14 @@ fn terrain() -> Terrain {
     Terrain::new(ground, &TerrainSettings::default()).expect("valid settings")
 }
 
-/// The ground's surface over a place number; places lie all over the hills, apart from each other.
+/// The surface above place `number`; places lie all over the hills, apart from each other.
 fn place(terrain: &Terrain, number: i32) -> Vec3 {
     let (x, z) = (24 + number * 89 % 208, 24 + number * 55 % 208);
     let height = terrain.world().ground().height(Column::new(x, z)) as f32 / 256.0;
     Vec3::new(x as f32, height, z as f32)
 }
 
-/// One transaction per brush, as a player digs.
+/// One transaction per brush, as when a player digs.
 fn one_by_one(terrain: &mut Terrain, brushes: &[Brush]) {
     for brush in brushes {
         terrain.submit(brush);
@@ -111,17 +111,17 @@ fn spheres(terrain: &Terrain, radius: f32, offset: f32, count: i32) -> Vec<Brush
     (0..count).map(sphere).collect()
 }
 
-/// What lies where the spheres of radius 4 dig.
+/// The state of the ground where the spheres of radius 4 dig.
 enum Digging {
     /// Untouched ground.
     Fresh,
-    /// Half a radius beside earlier spheres.
+    /// Next to earlier spheres, half a radius away.
     Dug,
 }
 
 fn dig(ground: Digging) {
     let mut terrain = terrain();
-    // The first edit of all makes tables.
+    // The first edit of all initialises tables.
     let warm_up = Brush::dig(Shape::sphere(Vec3::new(8.0, 0.0, 8.0), 4.0));
     terrain.apply([warm_up]);
     let (first, second) = (spheres(&terrain, 4.0, 0.0, 24), spheres(&terrain, 4.0, 3.0, 24));
@@ -134,14 +134,14 @@ fn dig(ground: Digging) {
     }
 }
 
-/// Spheres that reach several chunks.
+/// Spheres that reach into several chunks.
 fn dig_wide() {
     let mut terrain = terrain();
     let wide = spheres(&terrain, 16.0, 0.0, 4);
     counted_workload(&mut || one_by_one(&mut terrain, &wide));
 }
 
-/// Paint over what is dug and over what is not.
+/// Paint over dug and untouched ground.
 fn paint() {
     let mut terrain = terrain();
     let dug = spheres(&terrain, 4.0, 0.0, 12);

@@ -1,7 +1,7 @@
-//! What digging costs the main thread: `cargo bench --features examples --bench main_thread`.
+//! The cost of digging on the main thread: `cargo bench --features examples --bench main_thread`.
 //!
-//! The real landscape in an app without a renderer; one radius-4 sphere at a time. Frames without work beside it; and what
-//! the task takes until Bevy's meshes are there, by chunk size.
+//! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames; and
+//! the task's time until Bevy's meshes are ready, by chunk size.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -27,7 +27,7 @@ struct Times {
     transactions: Vec<Duration>,
 }
 
-/// An app whose terrain is there.
+/// An app whose terrain is loaded.
 fn app(ground: &Arc<Ground>, chunk_size: u32) -> App {
     let settings = TerrainSettings { chunk_size, ..default() };
     let mut app = App::new();
@@ -43,7 +43,7 @@ fn app(ground: &Arc<Ground>, chunk_size: u32) -> App {
 }
 
 impl Times {
-    /// Digs once, and does nothing for some frames before.
+    /// Runs some idle frames, then digs once.
     fn dig(&mut self, app: &mut App, at: Vec3) {
         let frame = |app: &mut App| {
             let start = Instant::now();
@@ -75,7 +75,7 @@ fn main() {
     for (turn, i) in (0..500).enumerate() {
         let (x, z) = (40 + i * 389 % 1100, 40 + i * 211 % 940);
         let at = Vec3::new(x as f32, ground.height(Column::new(x, z)) as f32 / 256.0, z as f32);
-        // In turns, each time another one first.
+        // In turns, beginning with another app each time.
         for number in 0..apps.len() {
             let number = (number + turn) % apps.len();
             let (_, app, times) = &mut apps[number];

@@ -1,4 +1,4 @@
-//! Ground with many fields, and with one large one.
+//! Ground with many fields, and with one large field.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ impl Level {
         Terrain::new(Arc::clone(&self.ground), &TerrainSettings::default()).expect("valid settings")
     }
 
-    /// A brush for each chunk, which changes samples in nearly all of its bricks: a crater, rough or smooth.
+    /// One brush per chunk, a rough or smooth crater, that changes samples in nearly all of the chunk's bricks.
     pub fn brushes(&self, pass: usize, is_rough: bool) -> impl Iterator<Item = Brush> {
         (0..512u32).map(move |i| {
             let (x, z) = ((i % 16) as f32 * 32.0 + 16.0, (i / 16) as f32 * 32.0 + 16.0);
@@ -38,7 +38,7 @@ impl Level {
     }
 }
 
-/// A terrain of one chunk of so many cells, and a brush waiting that makes all of it a field with caves.
+/// A terrain of one chunk of `size` cells, and a queued brush that turns all of it into a field with caves.
 pub fn one_field(size: u32, round: u32) -> Terrain {
     let ground = Ground::flat(size, size, f64::from(size) * 0.5).expect("finite heights");
     let settings = TerrainSettings { chunk_size: size, ..Default::default() };

@@ -1,7 +1,7 @@
-//! The processor beside a CUDA card: `cargo bench --no-default-features --features cuda --bench backends [-- SECTION...]`.
+//! CPU against CUDA: `cargo bench --no-default-features --features cuda --bench backends [-- SECTION...]`.
 //!
-//! Transactions on the landscape that ships with the crate, the same ones on each backend in turns. The processor has all
-//! of its threads unless said otherwise. Times run from the edits to the commit, with vertices in the host's memory.
+//! The same transactions on the shipped landscape, on each backend in turn. The CPU uses all of its threads unless
+//! stated otherwise. Times run from the edits to the commit, with vertices in host memory.
 
 #[path = "../edits/landscape.rs"]
 #[allow(dead_code)]
@@ -34,7 +34,7 @@ const SECTIONS: [(&str, fn(&Engines)); 8] = [
     ("stroke-sweep", |engines| sweep(engines, smooth)),
 ];
 
-/// A round brush that smooths.
+/// A spherical brush that smooths.
 fn smooth(center: Vec3, radius: f32) -> Brush {
     Brush::smooth(Shape::sphere(center, radius), 1.0)
 }
@@ -46,7 +46,7 @@ struct Engines {
     auto: Engine,
 }
 
-/// Which of them.
+/// Which engine.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Who {
     Cpu,
@@ -63,26 +63,23 @@ impl Who {
 }
 
 impl Engines {
-    /// One transaction on an engine.
+    /// Runs one transaction on an engine.
     ///
     /// # Panics
-    /// Where the card left any of it to the processor, whose time would be taken for the card's.
+    /// Panics if the card left any stage to the CPU, whose time would then count as the card's.
     fn run(&self, transaction: Transaction, who: Who, times: &mut Times) -> Commit {
         let engine = [&self.cpu, &self.cuda, &self.auto][who as usize];
         let commit = transaction.run_on(engine);
         let choices = engine.figures().choices;
         assert!(who == Who::Cpu || matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
         let is_there = |choice: &Choice| choice.is_cuda || choice.amount == 0;
-        assert!(
-            who != Who::Cuda || choices.iter().all(is_there),
-            "the processor did the card's work: {choices:?}"
-        );
+        assert!(who != Who::Cuda || choices.iter().all(is_there), "the CPU did the card's work: {choices:?}");
         times.push(&commit.stages, &choices);
         commit
     }
 
-    /// Plays brushes in one transaction on a terrain that only this engine edits, so that a card has what it made; returns how
-    /// many seconds they took.
+    /// Plays brushes in one transaction on a terrain that only this engine edits, so that a card keeps its copy up to
+    /// date; returns the time in seconds.
     fn play(
         &self,
         terrain: &mut Terrain,
@@ -104,7 +101,7 @@ fn assert_same(terrains: &[Terrain; 3]) {
 }
 
 fn main() {
-    // Cargo itself passes `--bench`.
+    // Cargo passes `--bench`.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect();
     if let Some(unknown) = wanted.iter().find(|name| !SECTIONS.iter().any(|(known, _)| known == name)) {
         eprintln!("no section {unknown}; there are {:?}", SECTIONS.map(|(name, _)| name));
@@ -141,9 +138,9 @@ struct Times {
     meshing: Sample,
     assembly: Sample,
     ring: Sample,
-    /// The part of edits and of meshing that a backend does.
+    /// The parts of edits and of meshing that a backend does.
     backend: [Sample; 2],
-    /// On the card alone: edits, meshing; and their kernels.
+    /// On the card only: edits and meshing, and their kernels.
     device: [Sample; 2],
     kernel: [Sample; 2],
 }
@@ -188,23 +185,23 @@ impl Times {
     }
 }
 
-/// Heads the lines of [`Times::print`].
+/// Prints the header for the lines of [`Times::print`].
 fn header(what: &str) {
-    // What a backend does of edit and meshing comes before them. Surfaces that come while chunks are assembled count for
-    // that, and for the backend too as long as they are waited for.
+    // The parts of edit and meshing that a backend does come first. Surfaces that arrive while chunks are assembled
+    // count as assembly, and as backend time too while they are waited for.
     let names = ["whole", "p99", "edits", "blocks", "edit", "meshing", "assembly", "ring"];
     let names = names.map(|name| format!("{name:>9}")).concat();
     println!("  {what:<28}{names}   edits and blocks on the card (kernels); us, medians but for p99");
 }
 
-/// Who goes first, second and third in a round: whoever comes later finds caches warm, and all the warmer the more the one
-/// before did the same. So in six rounds, everybody follows everybody else equally often.
+/// The order of the engines in a round. Later engines find warmer caches, depending on the engine before. In six
+/// rounds, each engine follows each other engine equally often.
 fn turns(round: usize) -> [usize; 3] {
     let [a, b, c] = [0, 1, 2].map(|turn| (turn + round) % 3);
     if (round / 3).is_multiple_of(2) { [a, b, c] } else { [c, b, a] }
 }
 
-/// 512 fields of 32x32x32, all of them dirty: made, and then dug all over again.
+/// 512 fields of 32x32x32, all of them dirty: created, and then dug all over again.
 fn bulk(engines: &Engines, are_rough: bool) {
     let level = Level::new();
     let [mut cpu, mut cuda] = [(); 2].map(|()| [Times::default(), Times::default()]);
@@ -245,7 +242,7 @@ fn bulk(engines: &Engines, are_rough: bool) {
     println!("  {vertices} vertices");
 }
 
-/// Large transactions on a new engine: the first one opens the card, and the next ones find out what is faster.
+/// Large transactions on a new engine: the first one opens the card, the next ones measure which backend is faster.
 fn moving() {
     let start = std::time::Instant::now();
     let engine = Engine::new(Backend::Auto);
@@ -274,7 +271,7 @@ fn moving() {
     }
 }
 
-/// One field meshed whole.
+/// One field meshed as a whole.
 fn one_field(engines: &Engines) {
     header("one field");
     for size in [64, 100] {
@@ -320,7 +317,7 @@ fn brush(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     }
 }
 
-/// Transactions of one block to thousands, on each backend and as `Auto` has it.
+/// Transactions of one block to thousands of blocks, on each backend and with `Auto`.
 fn sweep(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     println!(
         "  {:<28}{:>9}{:>9}{:>9}   us, medians; Auto over the better one",

@@ -1,5 +1,5 @@
-//! One brush beside one chunk of a peer: what it takes to edit and mesh here, and what `fast-surface-nets` needs to mesh
-//! one chunk of 32x32x32 cells of the same ground, in turns.
+//! One brush (edit and meshing) against `fast-surface-nets` meshing one chunk of 32x32x32 cells of the same ground, in
+//! turns.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use glam::{IVec3, Vec3};
 use crate::landscape::{Places, dig, landscape, one_thread};
 use crate::statistics::Sample;
 
-/// The chunk with one sample more on each side, as that crate wants it.
+/// The chunk with one more sample on each side, as that crate requires.
 type Chunk = ConstShape3u32<34, 34, 34>;
 
 pub fn section() {

@@ -1,4 +1,4 @@
-//! The landscape that is dug, and where.
+//! The landscape that is dug, and the places on it.
 
 use std::sync::Arc;
 use std::sync::OnceLock;
@@ -8,7 +8,7 @@ use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
 use glam::Vec3;
 
-/// The shipped elevation model as the digger has it.
+/// The shipped elevation model as in the digger example.
 pub fn ground() -> Arc<Ground> {
     static GROUND: OnceLock<Arc<Ground>> = OnceLock::new();
     Arc::clone(GROUND.get_or_init(|| {
@@ -25,12 +25,12 @@ pub fn landscape(chunk_size: u32) -> Terrain {
     Terrain::new(ground(), &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings")
 }
 
-/// A hole in the ground.
+/// A brush that digs a ball.
 pub fn dig(center: Vec3, radius: f32) -> Brush {
     Brush::dig(Shape::sphere(center, radius))
 }
 
-/// Places on the surface, all over the landscape, in no order that a cache would like.
+/// Places on the surface, spread over the landscape in a cache-unfriendly order.
 pub struct Places {
     count: usize,
     first: usize,
@@ -41,7 +41,7 @@ impl Places {
         Self { count, first: 0 }
     }
 
-    /// Other places.
+    /// The same number of other places.
     pub fn offset(self, round: usize) -> Self {
         Self { first: round * 1009, ..self }
     }

@@ -1,13 +1,13 @@
-//! What it costs to look for loose pieces, and to undo: digs of some 100 voxels, a transaction each.
+//! The cost of searching for loose pieces, and of undo: digs of some 100 voxels, one transaction each.
 //!
-//! The same digs are done with every look in turns, each undone before the next, so that all of them find the world as it
-//! was built. What a look adds is the time of a dig less that of the same dig without a search, pair by pair.
+//! The same digs are done with every setting in turns, each undone before the next, so that all find the same world.
+//! The cost of a search is the time of a dig minus that of the same dig without a search, pair by pair.
 //!
-//! A search ends at [`LooseSettings::largest`] voxels. A body just below that is searched whole, found and described; one
-//! just above it costs all that a search may take, and larger ones of its make cost no more. The make counts, for a search
-//! goes from brick to brick: of all bodies of so many voxels a ball has the fewest bricks, a sheet one voxel thick has more
-//! than four times as many, and a tangle of threads would have more still. The bound is one for each piece: a dig that cuts
-//! several necks at once pays for each.
+//! A search ends at [`LooseSettings::largest`] voxels. A body just below that bound is searched completely, found and
+//! described. One just above costs as much as any search can, and larger bodies of the same shape cost no more. The
+//! shape matters because a search goes from brick to brick: for a given volume, a ball has the fewest bricks, a sheet
+//! one voxel thick has more than four times as many, and a tangle of threads would have more still. The bound applies
+//! to each piece: a dig that cuts several necks at once pays for each.
 
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
@@ -24,13 +24,13 @@ const RADIUS: f32 = 2.88;
 const NECK: f32 = 2.6;
 const CUT: f32 = 3.0;
 
-/// How high bodies hang above the ground under their necks.
+/// The height of bodies above the ground under their necks.
 const LIFT: f32 = 26.0;
 
-/// Which of the [`looks`] reports pieces, and leaves them where they are.
+/// The index in [`looks`] of the setting that reports pieces, and leaves them where they are.
 const REPORTED: usize = 1;
 
-/// What is looked for, from nothing on.
+/// The search settings that are compared, from no search on.
 fn looks() -> [(&'static str, Option<LooseSettings>); 3] {
     [
         ("nobody looks", None),
@@ -39,14 +39,14 @@ fn looks() -> [(&'static str, Option<LooseSettings>); 3] {
     ]
 }
 
-/// Digs of some 100 voxels, and what stands where they are done.
+/// Digs of some 100 voxels, and what is built where they are done.
 struct Scene {
     name: &'static str,
     build: fn(Vec3) -> Vec<Brush>,
     dig: fn(Vec3) -> Brush,
 }
 
-/// A pillar with a ball on it, over a place: 2 voxels thick, and 100 voxels large.
+/// A pillar, 2 voxels thick, with a ball of 100 voxels on it.
 fn mushroom(at: Vec3) -> Vec<Brush> {
     let (foot, head) = (at - Vec3::Y * 3.0, at + Vec3::Y * 9.0);
     let pillar = Shape::capsule(foot, head, 1.2);
@@ -57,7 +57,7 @@ fn hall(at: Vec3) -> Vec<Brush> {
     vec![Brush::dig(Shape::cuboid(at - Vec3::Y * 24.0, Vec3::new(15.0, 4.5, 15.0)))]
 }
 
-/// A body over a place that nothing but its neck ties to the ground.
+/// A body that only its neck connects to the ground.
 fn on_a_neck(at: Vec3, body: Shape) -> Vec<Brush> {
     let neck = Shape::capsule(at - Vec3::Y * 3.0, at + Vec3::Y * (LIFT + 4.0), NECK);
     vec![Brush::add(neck, MaterialId(1)), Brush::add(body, MaterialId(2))]
@@ -73,7 +73,7 @@ fn sheet(at: Vec3, half_width: f32) -> Vec<Brush> {
     on_a_neck(at, Shape::cuboid(at + Vec3::Y * (LIFT + half.y), half))
 }
 
-/// How far the ground around a place rises above it, within so many columns to each side.
+/// How far the ground rises above a place, within `reach` columns to each side.
 fn rise(at: Vec3, reach: i32) -> f32 {
     let (ground, x, z) = (ground(), at.x as i32, at.z as i32);
     let columns = (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dz| Column::new(x + dx, z + dz)));
@@ -90,7 +90,7 @@ fn open_places(count: usize) -> Vec<Vec3> {
             open.push(at);
         }
     }
-    assert_eq!(open.len(), count, "there are too few open places");
+    assert_eq!(open.len(), count, "too few open places");
     open
 }
 
@@ -98,7 +98,7 @@ fn voxels(pieces: &[LoosePiece]) -> f64 {
     pieces.iter().map(|piece| piece.voxels).sum::<u64>() as f64
 }
 
-/// Voxels of what digs cut off, and of what was reported of it.
+/// Voxels that digs cut off, and those that were reported.
 struct Loose {
     cut_off: Sample,
     found: Sample,
@@ -107,15 +107,15 @@ struct Loose {
 /// Undoes a dig.
 fn bring_back(terrain: &mut Terrain, hash: u64) {
     assert!(terrain.undo().outcome.is_ok(), "a dig can be undone");
-    assert_eq!(terrain.world().hash(), hash, "undone, a dig leaves nothing");
+    assert_eq!(terrain.world().hash(), hash, "an undone dig leaves no trace");
 }
 
-/// Does the same digs with every look, in turns, and prints what each takes and what it adds.
+/// Does the same digs with every setting in turns, and prints the time of each and the cost of the search.
 fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
     let (looks, before) = (looks(), terrain.world().hash());
     let mut played = looks.map(|_| Played::default());
     let (mut dug, mut found) = (Sample::default(), Sample::default());
-    // Each look is at other places in a turn: none digs where another one has just warmed the caches.
+    // Each setting digs at other places within a turn, so that none profits from caches that another has just warmed.
     let first = |look: usize| look * digs.len() / looks.len();
     for turn in 0..digs.len() {
         for (look, (_, settings)) in looks.iter().enumerate() {
@@ -128,7 +128,7 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
             bring_back(terrain, before);
         }
     }
-    // What is loose whatever its size, untimed.
+    // All loose voxels of any size, untimed.
     terrain.set_loose(None);
     let everything = LooseSettings { largest: u32::MAX, ..Default::default() };
     let mut cut_off = Sample::default();
@@ -141,7 +141,7 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
     for ((look, _), played) in looks.iter().zip(&played) {
         stages::row(&format!("{name}: {look}"), played);
     }
-    // In order of the digs.
+    // In the order of the digs.
     let times = |look: usize| {
         let mut times: Vec<f64> =
             played[look].stages.iter().map(|stages| stages.whole.as_secs_f64()).collect();
@@ -172,8 +172,8 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
     Loose { cut_off, found }
 }
 
-/// Digs into ground, under what then falls, and into the roof of a hall; and through the necks of bodies about as large as
-/// is looked for.
+/// Digs into ground, under things that then fall, into the roof of a hall, and through the necks of bodies with about
+/// as many voxels as the bound.
 pub fn section() {
     let scenes = [
         Scene { name: "into the ground", build: |_| Vec::new(), dig: |at| dig(at, RADIUS) },

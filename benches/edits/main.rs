@@ -1,8 +1,7 @@
-//! What edits cost: `cargo bench --no-default-features --bench edits [-- SECTION...]`.
+//! The cost of edits: `cargo bench --no-default-features --bench edits [-- SECTION...]`.
 //!
-//! Everything on the landscape that ships with the crate, a transaction at a time, on one thread unless said otherwise.
-//! Each section prints medians and 99th percentiles; what is compared runs in turns, and its ratio is the median of
-//! pairs.
+//! Everything runs on the shipped landscape, one transaction at a time, on one thread unless stated otherwise. Each
+//! section prints medians and 99th percentiles. Compared cases run in turns, and their ratio is the median of pairs.
 
 mod beside_peer;
 mod landscape;
@@ -30,15 +29,16 @@ const SECTIONS: [(&str, fn()); 7] = [
     ("loose", loose::section),
 ];
 
-/// Gives a large block of memory back, as programs do that have loaded a picture. From then on glibc keeps what a transaction
-/// frees; before, it returns that to the system at times, and the next transaction has to ask for it again.
+/// Frees a large block of memory, like programs that have loaded an image. From then on glibc keeps what a
+/// transaction frees; before, it sometimes returns that memory to the system, and the next transaction has to request
+/// it again.
 fn warm_allocator() {
     drop(std::hint::black_box(vec![0_u8; 24 << 20]));
 }
 
 fn main() {
     warm_allocator();
-    // Cargo itself passes `--bench`.
+    // Cargo passes `--bench`.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect();
     if let Some(unknown) = wanted.iter().find(|name| !SECTIONS.iter().any(|(known, _)| known == name)) {
         eprintln!("no section {unknown}; there are {:?}", SECTIONS.map(|(name, _)| name));
@@ -52,7 +52,7 @@ fn main() {
     }
 }
 
-/// One brush a transaction, by its radius, on untouched ground and on dug ground.
+/// One brush per transaction, by its radius, on fresh ground and on dug ground.
 fn by_radius() {
     stages::header("brush");
     one_thread(|| {
@@ -77,7 +77,7 @@ fn by_chunk_size() {
     });
 }
 
-/// Digs at each place in all terrains, one after the other, and each time another one first.
+/// Digs at each place in all terrains in turns, beginning with another terrain each time.
 fn in_turns<T: Copy>(
     terrains: &mut [(T, Terrain)],
     places: Places,
@@ -95,7 +95,7 @@ fn in_turns<T: Copy>(
     played
 }
 
-/// Many brushes in one transaction: all over the landscape, and all in one place.
+/// Many brushes in one transaction: spread over the landscape, and all in one place.
 fn by_batch() {
     header("radius 4, by brushes in a transaction", "an edit");
     let kinds = [("all over", true), ("in one place", false)];
@@ -111,7 +111,7 @@ fn by_batch() {
                     submit(&mut terrain, *count, round, *is_spread);
                     run(&mut terrain)
                 });
-                // The first one warms caches, which another case has used.
+                // The first run warms the caches, which another case has used.
                 each.push(twice[1] / *count as f64);
             }
         }
@@ -121,7 +121,7 @@ fn by_batch() {
     }
 }
 
-/// Hiding the heightmap: the list of indices of a tile, by its size.
+/// Rebuilding the index list of a tile that hides the dug cells, by tile size.
 fn index_lists() {
     header("a tile's index list", "a list");
     for chunk_size in [25, 32, 50, 75, 100, 128] {

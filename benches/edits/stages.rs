@@ -32,7 +32,7 @@ impl Played {
     }
 }
 
-/// How many seconds a transaction takes.
+/// Runs a transaction and returns its time in seconds.
 pub fn run(terrain: &mut Terrain) -> f64 {
     let transaction = terrain.begin().expect("brushes wait");
     let start = Instant::now();

@@ -9,7 +9,7 @@ impl Sample {
         self.0.push(value);
     }
 
-    /// The value below which this share of all lies.
+    /// The value below which this share of all values lies.
     pub fn percentile(&self, share: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -35,12 +35,12 @@ impl FromIterator<f64> for Sample {
     }
 }
 
-/// Heads the lines that [`row`] prints.
+/// Prints the header for the lines of [`row`].
 pub fn header(what: &str, each: &str) {
     println!("  {what:<44} {:>10} {:>10} {:>10}   us {each}", "median", "p99", "runs");
 }
 
-/// One line: microseconds.
+/// Prints one line in microseconds.
 pub fn row(what: &str, sample: &Sample) {
     let [median, high] = [0.5, 0.99].map(|share| sample.percentile(share) * 1e6);
     println!("  {what:<44} {median:>10.2} {high:>10.2} {:>10}", sample.len());

@@ -1,5 +1,6 @@
-//! Transactions on one, two and all threads, in turns: one of 64 dirty chunks, and batches of small digs. Beside them, what
-//! the machine itself gives: as many transactions at once, each on a thread and a terrain of its own.
+//! Transactions on one, two and all threads, in turns: one of 64 dirty chunks, and batches of small digs. For
+//! comparison, the machine's own scaling: independent transactions at the same time, each on a thread and a terrain
+//! of its own.
 
 use std::sync::Barrier;
 
@@ -25,7 +26,7 @@ pub fn section() {
     batches(&pools);
 }
 
-/// The order of a round: each takes one turn, and every round begins with another one.
+/// The order of a round: each case takes one turn, and every round begins with another one.
 fn turns(round: usize, count: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |at| (at + round) % count)
 }
@@ -61,7 +62,7 @@ fn many_chunks(pools: &[(usize, ThreadPool)]) {
     }
 }
 
-/// How many times as many transactions are done in a time, if several threads work for themselves: medians of pairs of
+/// How many times more transactions per second several independent threads do than one: medians of pairs of
 /// transactions that begin at the same moment.
 fn at_once(count: usize) -> f64 {
     let pools: Vec<_> = (0..count).map(|_| threads(1)).collect();
@@ -88,7 +89,7 @@ fn at_once(count: usize) -> f64 {
     (0..40).map(ratio).collect::<Sample>().median()
 }
 
-/// Small digs all over the landscape, by how many there are in a transaction.
+/// Small digs all over the landscape, by their number in a transaction.
 fn batches(pools: &[(usize, ThreadPool)]) {
     header("radius 4 all over, by brushes in a transaction", "an edit");
     for count in [10, 100, 1000] {
@@ -109,7 +110,7 @@ fn batches(pools: &[(usize, ThreadPool)]) {
     }
 }
 
-/// Digs in each of 8x8 chunks.
+/// A terrain with queued digs in each of 8x8 chunks.
 fn ready(round: usize) -> Terrain {
     let (mut terrain, round) = (landscape(32), round as i32);
     terrain.submit_all((0..64).map(|i| {

@@ -1,5 +1,5 @@
-//! The block mesher of bevy_burrow, which a terrain's edits run: the same samples in bricks, with their signs kept as bits.
-//! It makes more than the others do: positions on the lattice of 1/4096 voxel, and a mix of materials for each vertex.
+//! The block mesher of bevy_burrow, which terrain edits use: the same samples in bricks, with their signs as bits. It
+//! produces more than the others do: positions on a lattice of 1/4096 voxel, and a mix of materials for each vertex.
 
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ pub struct Bricked {
 impl Default for Bricked {
     fn default() -> Self {
         let cells = CHUNK_CELLS as u32;
-        // Deep below: no sample of the chunk is pristine.
+        // Far below: no sample of the chunk is pristine.
         let ground = || Ground::flat(cells, cells, -1000.0).expect("a small world");
         let settings = TerrainSettings { chunk_size: cells, ..Default::default() };
         let grid = Terrain::new(ground(), &settings).expect("a chunk size").world().grid();
@@ -60,7 +60,7 @@ impl Contender for Bricked {
         Class { shading: Shading::Unit, sharing: Sharing::Partly, dual: false }
     }
 
-    /// Bricks from one before the chunk to one after it; samples beyond the apron are air.
+    /// Copies bricks from one before the chunk to one after it; samples beyond the apron are air.
     fn load(&mut self, grid: &Grid) {
         let sides = grid.sides().map(|side| side as i32);
         let last = CHUNK_CELLS as i32 + 1;

@@ -1,8 +1,8 @@
-//! What has to hold before anything is timed: all meshes are closed, and are the same surface where algorithms have to agree.
+//! Checks before timing: all meshes are closed, and are the same surface where the algorithms have to agree.
 //!
-//! Where two solid samples of a cube's face lie across from each other, programs may join them or cut them off, and each
-//! choice is right. Balls have no such faces and hills hardly any; caves are full of them, so pieces and handles may
-//! differ there and are only reported. A dual mesh has one vertex for all sheets in a cell, so it may pinch.
+//! Where two solid corners of a cube's face lie diagonally, meshers may join or separate them; both are correct.
+//! Balls have no such faces and hills hardly any. Caves have many, so components and handles may differ there and are
+//! only reported. A dual mesh has a single vertex for all sheets in a cell, so it may be non-manifold.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use crate::fields::{Border, Field, Grid};
 use crate::timing::CHUNK_CELLS;
 use crate::topology::{Topology, open_inside};
 
-/// What one contender made of a closed grid.
+/// The result of one contender on a closed grid.
 #[derive(Debug, Serialize)]
 pub struct Finding {
     /// The field.
@@ -22,15 +22,15 @@ pub struct Finding {
     pub size: usize,
     /// The contender.
     pub name: &'static str,
-    /// What its mesh is, if it is one at all.
+    /// The topology of its mesh, if it could be computed.
     pub topology: Option<Topology>,
-    /// What is wrong with it, or different from the first contender.
+    /// Faults, and differences from the first contender.
     pub remarks: Vec<String>,
-    /// Does that stop the benchmark?
+    /// Whether this stops the benchmark.
     pub fatal: bool,
 }
 
-/// Meshes a closed grid with everything.
+/// Meshes a closed grid with every contender.
 pub fn closed_grid(contenders: &mut [Box<dyn Contender>], field: Field, size: usize) -> Vec<Finding> {
     let grid = field.grid(size, Border::Closed);
     let mut findings: Vec<Finding> = Vec::new();
@@ -78,7 +78,7 @@ pub fn closed_grid(contenders: &mut [Box<dyn Contender>], field: Field, size: us
                     topology.components, topology.euler, first.components, first.euler
                 ));
             }
-            // A peer that is broken proves nothing.
+            // Nothing follows from a broken peer.
             fatal |= !same && !broken && !class.dual && field != Field::Caves;
             fatal |= is_ours && topology.triangles != first.triangles;
         }
@@ -87,8 +87,8 @@ pub fn closed_grid(contenders: &mut [Box<dyn Contender>], field: Field, size: us
     findings
 }
 
-/// Meshes a chunk of a stream; says what is wrong. Ours must have the same triangles, whatever they read, and marching cubes
-/// no open edge but on the chunk's faces.
+/// Meshes a chunk of a stream and returns the faults. Our meshers must give the same triangles for all sample
+/// formats, and marching cubes may have open edges only on the chunk's faces.
 pub fn chunk(contenders: &mut [Box<dyn Contender>], chunk: &Grid) -> Vec<String> {
     let (mut remarks, mut expected) = (Vec::new(), None);
     for contender in contenders {
@@ -122,7 +122,7 @@ fn is_unit([x, y, z]: [f32; 3]) -> bool {
     (length - 1.0).abs() < 1e-3
 }
 
-/// The findings of one grid: what the first contender made, how many agree, and a line for each that does not.
+/// Formats the findings on one grid: the first contender's mesh, how many agree, and a line for each that does not.
 pub fn describe(findings: &[Finding]) -> String {
     let Some(first) = findings.first() else { return String::new() };
     let shape = first.topology.map_or_else(

@@ -1,4 +1,4 @@
-//! What is compared: anything that meshes a grid, and the class that says what its meshes hold.
+//! The interface of the compared meshers, and the class that describes their meshes.
 
 use serde::Serialize;
 
@@ -16,59 +16,59 @@ pub enum Shading {
     None,
 }
 
-/// Do triangles share vertices?
+/// Whether triangles share vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sharing {
     /// One vertex per place.
     Shared,
-    /// Some places have several.
+    /// Some places have several vertices.
     Partly,
     /// Three vertices per triangle.
     TriangleSoup,
 }
 
-/// What a contender's meshes hold. Only what holds the same is compared.
+/// The contents of a contender's meshes. Only contenders of the same class are compared.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Class {
     /// Its normals.
     pub shading: Shading,
     /// Its vertices.
     pub sharing: Sharing,
-    /// One vertex per cell, and quads between them, instead of one per crossed edge.
+    /// One vertex per cell and quads between them (dual), instead of one vertex per crossed edge.
     pub dual: bool,
 }
 
-/// A mesh in the form that the checks read, in lattice coordinates, counter-clockwise seen from the air.
+/// A mesh in lattice coordinates, for the checks; triangles are counter-clockwise seen from the air.
 pub struct Mesh {
     /// A position per vertex.
     pub positions: Vec<[f32; 3]>,
-    /// A normal per vertex, or nothing.
+    /// A normal per vertex, or empty.
     pub normals: Vec<[f32; 3]>,
-    /// Three per triangle.
+    /// Three indices per triangle.
     pub indices: Vec<u32>,
 }
 
-/// Part of a grid that is meshed.
+/// The part of a grid that is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Every cell.
     Whole,
-    /// The cells of a chunk: the outermost samples are there for gradients alone.
+    /// The cells of a chunk: the outermost samples are only used for gradients.
     WithinApron,
 }
 
-/// A mesher with its buffers, which it uses again and again.
+/// A mesher with its reusable buffers.
 pub trait Contender {
     /// Name and version.
     fn name(&self) -> &'static str;
     /// What its meshes hold.
     fn class(&self) -> Class;
-    /// Takes a copy of the grid, where it works on nothing else. Not timed.
+    /// Copies the grid if the mesher needs its own copy. Not timed.
     fn load(&mut self, _grid: &Grid) {}
     /// Meshes a grid; this is timed.
     fn mesh(&mut self, grid: &Grid, part: Part);
-    /// Triangles of the last mesh.
+    /// The number of triangles of the last mesh.
     fn triangles(&self) -> usize;
     /// The last mesh.
     fn result(&self) -> Mesh;

@@ -1,4 +1,4 @@
-//! The grids as files, so that programs in other languages mesh the very same samples.
+//! Writes the grids to files, so that programs in other languages can mesh the same samples.
 
 use std::fs;
 use std::io;
@@ -14,12 +14,12 @@ struct Entry {
     field: Field,
     /// Samples along a side.
     size: usize,
-    /// Is its border two samples of air?
+    /// Whether the border is two samples of air.
     closed: bool,
     file: String,
 }
 
-/// What lies beside the samples.
+/// The index file.
 #[derive(Serialize)]
 struct Index {
     format: &'static str,

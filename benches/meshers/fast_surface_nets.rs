@@ -1,4 +1,4 @@
-//! fast-surface-nets: dual, one shared vertex per cell, and always the gradient there as a normal that is not of unit length.
+//! fast-surface-nets: dual, with one shared vertex per cell, whose normal is always the unnormalised gradient there.
 
 use fast_surface_nets::ndshape::{ConstShape3u32, RuntimeShape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
@@ -16,7 +16,7 @@ pub struct FastSurfaceNets {
 }
 
 impl FastSurfaceNets {
-    /// With strides that the compiler knows, which is what the crate's examples and benchmarks do and is faster.
+    /// Uses compile-time strides, as the crate's examples and benchmarks do, which is faster.
     fn run<const N: u32>(&mut self, samples: &[f32], max: [u32; 3]) {
         surface_nets(samples, &ConstShape3u32::<N, N, N> {}, [0; 3], max, &mut self.buffer);
     }
@@ -33,7 +33,7 @@ impl Contender for FastSurfaceNets {
 
     fn mesh(&mut self, grid: &Grid, part: Part) {
         let side = grid.size as u32;
-        // A chunk of n cells takes n + 2 samples here, so that quads meet those of the next chunk; the apron has n + 3.
+        // A chunk of n cells has n + 2 samples here, so that quads meet those of the next chunk; the apron has n + 3.
         let last = match part {
             Part::Whole => side - 1,
             Part::WithinApron => side - 2,

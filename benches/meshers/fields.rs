@@ -1,29 +1,30 @@
-//! The density fields that are meshed, and the grids they are sampled on. Negative is solid; x runs fastest, then y, then z.
+//! The density fields that are meshed, and the grids of their samples. Negative is solid; x varies fastest, then y,
+//! then z.
 
 use clap::ValueEnum;
 use noise::{Fbm, MultiFractal, NoiseFn, Perlin};
 use serde::Serialize;
 
-/// What lies in a grid.
+/// The density function of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Field {
-    /// A ball whose centre is no lattice point.
+    /// A ball whose centre is not on a lattice point.
     Sphere,
     /// Hills: five octaves of noise, y upwards.
     Terrain,
     /// Three octaves of noise in space: a surface in most bricks.
     Caves,
-    /// Air alone, as in most chunks of a world.
+    /// Only air, as in most chunks of a world.
     Empty,
 }
 
-/// What a grid's border looks like.
+/// The border of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Border {
-    /// The field goes on beyond the grid: what is timed.
+    /// The field continues beyond the grid: used for timing.
     Cut,
-    /// Two samples of air all round, so that the surface is closed: what is checked.
+    /// Two samples of air all round, so that the surface is closed: used for checks.
     Closed,
 }
 
@@ -33,19 +34,19 @@ pub struct Grid {
     pub size: usize,
     /// Densities in voxels.
     pub samples: Vec<f32>,
-    /// The same in 256ths of a voxel.
+    /// The same densities in 1/256 voxel.
     pub fixed: Vec<i16>,
 }
 
-/// No density is nearer to zero than this, so that all programs agree on what is solid whether they ask for `< 0` or
-/// `<= 0`, in floats as in 256ths, and no two vertices fall on one lattice point.
+/// The smallest absolute density. All programs then agree on what is solid, whether they test `< 0` or `<= 0`, in
+/// floats or in 1/256 voxel, and no two vertices fall on the same lattice point.
 const LEAST: f64 = 1.0 / 256.0;
 
 impl Field {
     /// Every field, in the order of the tables.
     pub const ALL: [Self; 4] = [Self::Sphere, Self::Terrain, Self::Caves, Self::Empty];
 
-    /// Its name in tables and files.
+    /// The name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sphere => "sphere",
@@ -77,7 +78,7 @@ impl Field {
         })
     }
 
-    /// Chunk number `number` of a stream of chunks that all differ; `size` counts the apron's samples too.
+    /// Chunk `number` of a stream of chunks that all differ; `size` includes the apron's samples.
     pub fn chunk(self, number: usize, size: usize) -> Grid {
         let mut random = fastrand::Rng::with_seed(number as u64);
         let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
@@ -104,7 +105,7 @@ fn ball(center: [f64; 3], radius: f64) -> Box<Density> {
     })
 }
 
-/// Hills around the height `shift[1]`, from another place of the noise.
+/// Hills around the height `shift[1]`, at another place of the noise.
 fn hills(shift: [f64; 3]) -> Box<Density> {
     let noise = Fbm::<Perlin>::new(1).set_octaves(5);
     Box::new(move |[x, y, z]| {
@@ -121,7 +122,7 @@ fn caves(shift: [f64; 3]) -> Box<Density> {
     })
 }
 
-/// Air, the higher the farther from the ground.
+/// Air whose density grows with the distance from the ground.
 fn sky() -> Box<Density> {
     Box::new(|[x, y, z]| 9.0 + y + (0.11 * x).sin() + (0.07 * z).cos())
 }
@@ -138,7 +139,7 @@ impl Grid {
                 }
             }
         }
-        // Rounds to the nearest; what is out of range stays at the ends of i16.
+        // Rounds to nearest and saturates at the limits of i16.
         let fixed = samples.iter().map(|sample| (sample * 256.0).round() as i16).collect();
         Self { size, samples, fixed }
     }

@@ -1,6 +1,6 @@
 //! isosurface: marching cubes without normals; most vertices are shared.
 //!
-//! It has normals too, but only those that the caller's source gives at any point of space, and samples alone give none.
+//! It supports normals only if the caller's source computes them at arbitrary points, which samples alone cannot.
 
 use isosurface::marching_cubes::MarchingCubes as Peer;
 use isosurface::source::Source;
@@ -17,7 +17,7 @@ pub struct MarchingCubes {
     size: usize,
 }
 
-/// Samples as a function of space: it asks for lattice points alone, but in units of the whole grid.
+/// Samples as a function of space: the crate queries lattice points only, but in units of the whole grid.
 struct Samples<'a> {
     samples: &'a [f32],
     side: usize,
@@ -26,7 +26,7 @@ struct Samples<'a> {
 
 impl Source for Samples<'_> {
     fn sample(&self, x: f32, y: f32, z: f32) -> f32 {
-        // It asks for one layer too many at the end of z.
+        // The crate queries one layer too many at the end of z.
         let [x, y, z] = [x, y, z].map(|at| ((at * self.cells + 0.5) as usize).min(self.side - 1));
         self.samples[(z * self.side + y) * self.side + x]
     }
@@ -49,7 +49,7 @@ impl Contender for MarchingCubes {
     }
 
     fn mesh(&mut self, grid: &Grid, part: Part) {
-        assert_eq!(part, Part::Whole, "takes no part in streams");
+        assert_eq!(part, Part::Whole, "does not support streams");
         self.vertices.clear();
         self.indices.clear();
         let source = Samples { samples: &grid.samples, side: grid.size, cells: (grid.size - 1) as f32 };
@@ -65,7 +65,7 @@ impl Contender for MarchingCubes {
     fn result(&self) -> Mesh {
         let cells = (self.size - 1) as f32;
         let positions = self.vertices.chunks_exact(3).map(|v| [v[0] * cells, v[1] * cells, v[2] * cells]);
-        // Its triangles are clockwise.
+        // The crate's triangles are clockwise.
         let indices = self.indices.chunks_exact(3).flat_map(|t| [t[0], t[2], t[1]]);
         Mesh { positions: positions.collect(), normals: Vec::new(), indices: indices.collect() }
     }

@@ -1,18 +1,18 @@
-//! Dense meshing beside public crates: `cargo bench --no-default-features --bench meshers`.
+//! Dense meshing compared with public crates: `cargo bench --no-default-features --bench meshers`.
 //!
-//! The same grids, in one process, on one thread, in turns: see [`timing`]. Before any mesher is timed, the same fields are
-//! meshed as closed grids and as the first chunks of the streams, and the meshes are checked: see [`check`]. Then single grids
-//! are meshed again and again, which flatters every cache, and after them streams of chunks that all differ, as in a game.
-//! Ratios are paired: round by round, or chunk by chunk.
+//! The same grids in one process, on one thread, in turns: see [`timing`]. Before timing, the meshes of closed grids
+//! and of the first chunks of the streams are checked: see [`check`]. Then single grids are meshed repeatedly, which
+//! keeps caches warm, and after that streams of different chunks, as in a game. Ratios are paired, round by round or
+//! chunk by chunk.
 //!
 //! | module | subject |
 //! | --- | --- |
 //! | [`fields`] | what is meshed |
-//! | [`contender`] | what a contender is, and what its meshes hold |
+//! | [`contender`] | the interface of a contender, and the contents of its meshes |
 //! | [`ours`], [`fast_surface_nets`], [`transvoxel`], [`mcubes`], [`isosurface`] | the contenders |
 //! | [`registry`] | their lists |
-//! | [`topology`], [`check`] | are the meshes right, and the same? |
-//! | [`timing`], [`table`], [`targets`] | how long they take |
+//! | [`topology`], [`check`] | checks of the meshes |
+//! | [`timing`], [`table`], [`targets`] | timings |
 //! | [`export`], [`serve`] | the same for programs in other languages |
 
 mod bricks;
@@ -72,7 +72,7 @@ struct Args {
     /// Only answer requests on standard input; see serve.rs
     #[arg(long)]
     serve: bool,
-    /// What cargo adds
+    /// Passed by cargo
     #[arg(long, hide = true)]
     bench: bool,
 }
@@ -141,7 +141,7 @@ fn check_all(args: &Args) -> Vec<Finding> {
     all
 }
 
-/// Chunks of each stream that are checked.
+/// Number of chunks of each stream that are checked.
 const CHECKED: usize = 20;
 
 fn check_streams(args: &Args) -> bool {

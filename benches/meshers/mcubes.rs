@@ -1,7 +1,7 @@
-//! mcubes: marching cubes with unit normals, three new vertices per triangle, in new vectors each time.
+//! mcubes: marching cubes with unit normals and three new vertices per triangle, in newly allocated vectors.
 //!
-//! It walks z innermost over samples whose x runs fastest; both are fixed by the crate. What it calls the inside of a
-//! mesh is the side that is counter-clockwise seen from the air.
+//! The crate walks z innermost over samples whose x varies fastest. Triangles of what it calls the inside of a mesh are
+//! counter-clockwise seen from the air.
 
 use mcubes::{MarchingCubes as Peer, Mesh as PeerMesh, MeshSide};
 
@@ -25,7 +25,7 @@ impl Contender for MarchingCubes {
     }
 
     fn load(&mut self, grid: &Grid) {
-        // Its normals point from large values to small ones, so what is solid has to be large.
+        // The crate's normals point from large values to small ones, so solid samples have to be large.
         let samples = grid.samples.iter().map(|sample| -sample).collect();
         let side = grid.size as f32;
         let peer = Peer::new(
@@ -40,7 +40,7 @@ impl Contender for MarchingCubes {
     }
 
     fn mesh(&mut self, _grid: &Grid, part: Part) {
-        assert_eq!(part, Part::Whole, "takes no part in streams");
+        assert_eq!(part, Part::Whole, "does not support streams");
         self.mesh = self.loaded.as_ref().map(|peer| peer.generate(MeshSide::InsideOnly));
     }
 

@@ -5,7 +5,7 @@ use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
 use crate::contender::{Class, Contender, Mesh, Part, Shading, Sharing};
 use crate::fields::Grid;
 
-/// Name of the contender that all others are compared to.
+/// The contender with which all others are compared.
 pub const REFERENCE: &str = "burrow dense f32";
 /// The same without normals.
 pub const REFERENCE_BARE: &str = "burrow dense f32, bare";
@@ -26,7 +26,7 @@ pub fn without_normals() -> Vec<Box<dyn Contender>> {
     ]
 }
 
-/// The dense mesher on one kind of sample.
+/// The dense mesher for one sample type.
 struct Dense<S> {
     name: &'static str,
     normals: Normals,

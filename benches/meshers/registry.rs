@@ -3,7 +3,7 @@
 use crate::contender::Contender;
 use crate::{bricks, fast_surface_nets, isosurface, mcubes, ours, transvoxel};
 
-/// Everything that meshes single grids. The first one, dense f32 with unit normals, is what the others are compared to.
+/// All contenders for single grids. The others are compared with the first one, dense f32 with unit normals.
 pub fn all() -> Vec<Box<dyn Contender>> {
     let mut all = ours::with_normals();
     all.extend(ours::without_normals());
@@ -14,7 +14,7 @@ pub fn all() -> Vec<Box<dyn Contender>> {
     all
 }
 
-/// What meshes the stream of chunks.
+/// All contenders for the streams of chunks.
 pub fn of_streams() -> Vec<Box<dyn Contender>> {
     let mut all = ours::with_normals();
     all.push(Box::new(bricks::Bricked::default()));

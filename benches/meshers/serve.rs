@@ -1,7 +1,8 @@
-//! One mesh per request, so that another program can time its mesher and ours in turn.
+//! Meshes on request, so that another program can time its mesher and ours in turns.
 //!
-//! A request is a line: `FIELD SIZE cut|closed CONTENDER`, the contender's name to the end of the line. The answer is a
-//! line of JSON: nanoseconds of one call, after one that is not timed; for closed grids the topology too.
+//! A request is a line `FIELD SIZE cut|closed CONTENDER`, where the contender's name extends to the end of the line.
+//! The answer is a line of JSON: the nanoseconds of one call, after an untimed one; for closed grids also the
+//! topology.
 
 use std::io::{self, BufRead, Write};
 
@@ -41,7 +42,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// Answers until the input ends.
+/// Answers requests until the input ends.
 pub fn run() -> io::Result<()> {
     let mut contenders = registry::all();
     let mut held: Option<(Field, usize, Border, Grid)> = None;

@@ -1,4 +1,4 @@
-//! The rows of the tables, and how they are printed.
+//! The rows of the tables, and their formatting.
 
 use std::fmt::Write;
 
@@ -9,13 +9,13 @@ use crate::fields::Field;
 use crate::timing::{Spread, Times};
 use crate::{fast_surface_nets, ours};
 
-/// What was meshed.
+/// The input that was meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Input {
-    /// One grid of so many samples along a side, again and again.
+    /// One grid with this number of samples along a side, meshed repeatedly.
     Grid(usize),
-    /// So many chunks, once each.
+    /// This number of chunks, meshed once each.
     Stream(usize),
 }
 
@@ -30,15 +30,15 @@ pub struct Row {
     pub name: &'static str,
     /// What its meshes hold.
     pub class: Class,
-    /// Triangles of all that is timed in one round of a grid, or in the whole stream.
+    /// Triangles that are timed in one round of a grid, or in the whole stream.
     pub triangles: usize,
-    /// Rounds, or chunks.
+    /// Number of rounds, or of chunks.
     pub rounds: usize,
     /// Nanoseconds per cell.
     pub per_cell: Spread,
-    /// Our times over this one's, round by round: with normals where this one has some.
+    /// Our times divided by this contender's, round by round; with normals if it has normals.
     pub ratio: Option<Spread>,
-    /// Our times without normals over this one's.
+    /// Our times without normals divided by this contender's.
     pub bare_ratio: Option<Spread>,
 }
 
@@ -49,7 +49,7 @@ pub fn rows(field: Field, input: Input, cells: usize, times: &[Times]) -> Vec<Ro
     let row = |times: &Times| {
         let has_normals = times.class.shading != Shading::None;
         let with_normals = reference.filter(|_| has_normals);
-        // fast-surface-nets can't leave its normals out; it is what games use who need none, too.
+        // fast-surface-nets cannot omit its normals; games that need none use it as well.
         let without = bare.filter(|_| !has_normals || times.name == fast_surface_nets::NAME);
         Row {
             field,
@@ -66,7 +66,7 @@ pub fn rows(field: Field, input: Input, cells: usize, times: &[Times]) -> Vec<Ro
     times.iter().map(row).collect()
 }
 
-/// The classes that are compared, each on its own.
+/// The classes, each of which is compared separately.
 const SECTIONS: [(&str, fn(&Row) -> bool, fn(&Row) -> Option<Spread>); 3] = [
     (
         "with normals, shared vertices",
@@ -114,7 +114,7 @@ fn is_reference(row: &Row) -> bool {
     [ours::REFERENCE, ours::REFERENCE_BARE].contains(&row.name)
 }
 
-/// A name, with what sets its meshes apart from ours in the same section.
+/// A name, with the differences from our meshes in the same section.
 fn label(row: &Row) -> String {
     let note = match row.class {
         Class { shading: Shading::Gradients, .. } => " (normals not unit)",

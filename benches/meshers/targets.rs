@@ -1,4 +1,4 @@
-//! What our mesher is meant to reach against fast-surface-nets, and whether it did.
+//! Performance targets of our mesher relative to fast-surface-nets, and whether they are met.
 
 use std::fmt::Write;
 
@@ -16,9 +16,9 @@ pub struct Target {
     pub what: String,
     /// The ratio that was measured.
     pub ratio: Spread,
-    /// The largest median that will do.
+    /// The largest median that meets the target.
     pub limit: f64,
-    /// Was it reached?
+    /// Whether the target is met.
     pub met: bool,
 }
 
@@ -39,7 +39,7 @@ fn limit_without(input: Input) -> Option<f64> {
     matches!(input, Input::Grid(64..)).then_some(0.20)
 }
 
-/// The targets of these rows.
+/// The targets for these rows.
 pub fn targets(rows: &[Row]) -> Vec<Target> {
     let mut targets = Vec::new();
     for row in rows.iter().filter(|row| row.name == fast_surface_nets::NAME) {
@@ -59,7 +59,7 @@ pub fn targets(rows: &[Row]) -> Vec<Target> {
     targets
 }
 
-/// A line per target.
+/// Formats one line per target.
 pub fn print(targets: &[Target]) -> String {
     let mut text = format!("\ntargets: our time over that of {}\n", fast_surface_nets::NAME);
     for Target { what, ratio, limit, met } in targets {

@@ -1,4 +1,4 @@
-//! Clocks: every contender once per round, in an order that turns, and what the rounds say in pairs.
+//! Timing: every contender once per round, in rotating order, and paired statistics.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -14,25 +14,25 @@ pub struct Times {
     pub name: &'static str,
     /// What its meshes hold.
     pub class: Class,
-    /// Triangles of all the meshes that were timed together.
+    /// Triangles of all meshes that were timed together.
     pub triangles: usize,
     /// Nanoseconds, one per round.
     pub rounds: Vec<f64>,
 }
 
-/// A median and the quartiles beside it.
+/// Median and quartiles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// A quarter of the numbers are below.
+    /// The lower quartile.
     pub low: f64,
-    /// Half of them.
+    /// The median.
     pub median: f64,
-    /// Three quarters.
+    /// The upper quartile.
     pub high: f64,
 }
 
 impl Spread {
-    /// Of some numbers.
+    /// The spread of some numbers.
     pub fn of(numbers: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = numbers.into_iter().collect();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -46,12 +46,12 @@ impl Times {
         Self { name: contender.name(), class: contender.class(), triangles: 0, rounds: Vec::new() }
     }
 
-    /// Times divided by a number of cells.
+    /// Times per cell.
     pub fn per_cell(&self, cells: usize) -> Spread {
         Spread::of(self.rounds.iter().map(|time| time / cells as f64))
     }
 
-    /// These times as parts of another's, round by round.
+    /// Ratios to another contender's times, round by round.
     pub fn over(&self, other: &Self) -> Spread {
         Spread::of(self.rounds.iter().zip(&other.rounds).map(|(own, other)| own / other))
     }
@@ -60,23 +60,23 @@ impl Times {
 /// How long a grid is timed.
 #[derive(Clone, Copy)]
 pub struct Patience {
-    /// Rounds at least.
+    /// Minimum number of rounds.
     pub least: usize,
-    /// Rounds at most.
+    /// Maximum number of rounds.
     pub most: usize,
-    /// No further round begins after this, once there are enough.
+    /// Once there are enough rounds, no further one begins after this time.
     pub budget: Duration,
 }
 
-/// Nanoseconds that one mesh takes.
+/// The time of one mesh in nanoseconds.
 pub fn once(contender: &mut dyn Contender, grid: &Grid, part: Part) -> f64 {
     let start = Instant::now();
     contender.mesh(black_box(grid), part);
     start.elapsed().as_nanos() as f64
 }
 
-/// The order of a round: each contender takes one turn. Every round begins with another contender, and every other round runs
-/// backwards, so that no contender always follows the same one.
+/// The order of a round: each contender takes one turn. Every round begins with another contender, and every other
+/// round is reversed, so that no contender always follows the same one.
 fn turns(contenders: usize, round: usize) -> impl Iterator<Item = usize> {
     (0..contenders).map(move |turn| {
         let turn = if round.is_multiple_of(2) { turn } else { contenders - 1 - turn };
@@ -84,8 +84,8 @@ fn turns(contenders: usize, round: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// One grid again and again. Each call is made twice and the second one is timed, so that none pays for a cache that
-/// another has filled.
+/// Times one grid repeatedly. Each call is made twice and the second one is timed, so that no contender pays for
+/// caches that another has filled.
 pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Patience) -> Vec<Times> {
     let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
     for contender in contenders.iter_mut() {
@@ -106,12 +106,12 @@ pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Pa
     times
 }
 
-/// Many chunks, each meshed once by every contender: times are in the order of chunks. In a round, each contender gets another
-/// chunk, so that none profits from branches that another has just trained. A chunk's samples are read before every call, as a
-/// game would have just made them, so that none pays for fetching the memory.
+/// Times many chunks, each meshed once by every contender; times are in the order of chunks. Within a round each
+/// contender gets another chunk, so that none profits from branch prediction trained by another. A chunk's samples
+/// are read before every call, as if a game had just written them, so that none pays for fetching the memory.
 pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Times> {
     let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
-    // Buffers grow and tables are made before the clock runs.
+    // Buffers grow and tables are initialised before timing.
     for contender in contenders.iter_mut() {
         for chunk in chunks.iter().take(8) {
             contender.load(chunk);
@@ -137,7 +137,7 @@ pub fn stream(contenders: &mut [Box<dyn Contender>], chunks: &[Grid]) -> Vec<Tim
 /// Cells along the side of a chunk of the stream.
 pub const CHUNK_CELLS: usize = 32;
 
-/// Chunks of a stream: a sample more than cells along each side, and an apron of one on each.
+/// Chunks of a stream: one more sample than cells along each side, and an apron of one on each side.
 pub fn chunks(field: Field, count: usize) -> Vec<Grid> {
     (0..count).map(|number| field.chunk(number, CHUNK_CELLS + 3)).collect()
 }

@@ -1,4 +1,4 @@
-//! The topology of a mesh: is it closed, how many pieces and handles it has, which side is out.
+//! The topology of a mesh: whether it is closed, its components and handles, and its orientation.
 
 use std::collections::HashMap;
 
@@ -6,56 +6,56 @@ use serde::Serialize;
 
 use crate::contender::{Mesh, Sharing};
 
-/// Numbers that do not depend on the order of vertices and triangles.
+/// Figures that do not depend on the order of vertices and triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Topology {
-    /// Vertices after welding that some triangle uses.
+    /// Vertices after welding that are used by some triangle.
     pub vertices: usize,
-    /// Vertices that the mesher wrote.
+    /// Vertices in the mesher's output.
     pub written: usize,
     /// Triangles.
     pub triangles: usize,
-    /// Edges that some triangle runs along more often than others run back. None: the surface is closed.
+    /// Edges used more often in one direction than in the other. If there are none, the surface is closed.
     pub unbalanced: usize,
-    /// Edges with more than two triangles.
+    /// Edges of more than two triangles.
     pub crowded: usize,
     /// Triangles with two corners in one vertex.
     pub degenerate: usize,
-    /// Pieces that share no vertex.
+    /// Connected components.
     pub components: usize,
-    /// Vertices minus edges plus triangles: twice the pieces minus twice the handles, for closed manifolds.
+    /// Vertices minus edges plus triangles: for closed manifolds, twice the components minus twice the handles.
     pub euler: i64,
-    /// Six times the enclosed volume is positive: triangles are counter-clockwise seen from the air.
+    /// Whether the signed volume is positive: triangles are counter-clockwise seen from the air.
     pub faces_air: bool,
 }
 
-/// Why a mesh has no topology.
+/// Why the topology cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum TopologyError {
-    /// A vertex of marching cubes that is not on an edge of the lattice.
+    /// A vertex of marching cubes that is not on a lattice edge.
     #[error("vertex {vertex} at {position:?} lies on no edge of the lattice")]
     OffLattice {
-        /// Its number.
+        /// Its index.
         vertex: usize,
-        /// Where it is.
+        /// Its position.
         position: [f32; 3],
     },
-    /// An index beyond the vertices.
+    /// An index out of range.
     #[error("index {index} of {vertices} vertices")]
     Index {
         /// The index.
         index: u32,
-        /// How many vertices there are.
+        /// The number of vertices.
         vertices: usize,
     },
 }
 
 impl Topology {
-    /// Of a mesh. Vertices that are not shared are welded when they lie on the same edge of the lattice.
+    /// Computes the topology. Vertices that are not shared are welded if they lie on the same lattice edge.
     pub fn of(mesh: &Mesh, sharing: Sharing) -> Result<Self, TopologyError> {
         let (written, triangles) = (mesh.positions.len(), welded(mesh, sharing)?);
         let mut pieces = Pieces::new(written);
-        // Runs along an edge, from low to high and back.
+        // How often an edge is used from its low to its high vertex, and back.
         let mut runs: HashMap<(usize, usize), [u32; 2]> = HashMap::new();
         let mut degenerate = 0;
         for &[a, b, c] in &triangles {
@@ -81,14 +81,14 @@ impl Topology {
         })
     }
 
-    /// Handles through all pieces together, of a closed manifold.
+    /// The total genus of all components, for a closed manifold.
     pub fn genus(&self) -> i64 {
         self.components as i64 - self.euler / 2
     }
 }
 
-/// Edges of a chunk's mesh that some triangle runs along more often than others run back, but for those on a face of the
-/// chunk, where its neighbours go on: it reaches from one coordinate to another along each axis.
+/// Edges of a chunk's mesh that are used more often in one direction than in the other, except on the chunk's faces,
+/// where its neighbours continue. `faces` are the lowest and highest coordinate along each axis.
 pub fn open_inside(mesh: &Mesh, sharing: Sharing, faces: [f32; 2]) -> Result<usize, TopologyError> {
     let mut runs: HashMap<(usize, usize), i32> = HashMap::new();
     for [a, b, c] in welded(mesh, sharing)? {
@@ -103,7 +103,7 @@ pub fn open_inside(mesh: &Mesh, sharing: Sharing, faces: [f32; 2]) -> Result<usi
     Ok(runs.into_iter().filter(|&(edge, more)| more != 0 && !is_on_face(edge)).count())
 }
 
-/// The corners of all triangles. Vertices that are not shared are those on the same edge of the lattice.
+/// The corners of all triangles after welding of unshared vertices on the same lattice edge.
 fn welded(mesh: &Mesh, sharing: Sharing) -> Result<Vec<[usize; 3]>, TopologyError> {
     let written = mesh.positions.len();
     if let Some(&index) = mesh.indices.iter().find(|&&index| index as usize >= written) {
@@ -128,7 +128,7 @@ fn volume(mesh: &Mesh) -> f64 {
     mesh.indices.chunks_exact(3).map(of_triangle).sum()
 }
 
-/// For each vertex, the first one on the same edge of the lattice.
+/// For each vertex, the first one on the same lattice edge.
 fn weld(positions: &[[f32; 3]]) -> Result<Vec<usize>, TopologyError> {
     let mut first = HashMap::new();
     let numbered = positions.iter().enumerate().map(|(vertex, &position)| {
@@ -138,8 +138,8 @@ fn weld(positions: &[[f32; 3]]) -> Result<Vec<usize>, TopologyError> {
     numbered.collect()
 }
 
-/// The axis and the lower end of the edge that a position lies on: one coordinate is a fraction, two are not, within
-/// what rounding does to them. Programs round differently, but never to another edge.
+/// The axis and lower end of the lattice edge on which a position lies: up to rounding, at most one coordinate is not
+/// an integer. Programs round differently, but never to another edge.
 fn lattice_edge(position: [f32; 3]) -> Option<(usize, [i32; 3])> {
     const ROUNDING: f32 = 5e-4;
     let off = position.map(|along| (along - along.round()).abs());
@@ -150,7 +150,7 @@ fn lattice_edge(position: [f32; 3]) -> Option<(usize, [i32; 3])> {
     on_edge.then_some((axis, low))
 }
 
-/// Which vertices hang together.
+/// Connected components of vertices (union-find).
 struct Pieces {
     parent: Vec<usize>,
 }

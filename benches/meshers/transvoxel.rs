@@ -1,8 +1,9 @@
-//! transvoxel, without transition sides: marching cubes with shared vertices and unit normals, which can't be left out.
+//! transvoxel without transition sides: marching cubes with shared vertices and unit normals, which cannot be turned
+//! off.
 //!
-//! It walks z innermost, so its axes are named backwards here: its z is the grid's x, and both read memory in order. It
-//! reads samples through a block type of the caller's and writes through a mesh builder of the caller's, as its
-//! documentation advises; its own ones copy the samples and start with empty vectors.
+//! The crate walks z innermost, so its axes are swapped here: its z is the grid's x, and both read memory in order.
+//! Samples are read through a custom block type and written through a custom mesh builder, as its documentation
+//! advises; its built-in ones copy the samples and start with empty vectors.
 
 use transvoxel::prelude::*;
 use transvoxel::structs::grid_point::GridPoint;
@@ -21,7 +22,7 @@ pub struct Transvoxel {
     buffers: Buffers,
 }
 
-/// What it appends vertices and triangles to.
+/// The buffers to which it appends vertices and triangles.
 #[derive(Default)]
 struct Buffers {
     positions: Vec<[f32; 3]>,
@@ -53,12 +54,12 @@ impl MeshBuilder<f32, f32> for &mut Buffers {
     }
 
     fn add_triangle(&mut self, a: VertexIndex, b: VertexIndex, c: VertexIndex) {
-        // The axes are a mirror image.
+        // Swapping axes mirrors the mesh, so the winding is reversed.
         self.indices.extend([a.0 as u32, c.0 as u32, b.0 as u32]);
     }
 }
 
-/// Samples as the crate wants them: positive in what is solid. Beyond the border the outermost sample goes on.
+/// Samples as the crate expects them: positive is solid. Beyond the border the outermost sample is repeated.
 struct Samples<'a> {
     block: Block<f32>,
     samples: &'a [f32],
@@ -87,7 +88,7 @@ impl Contender for Transvoxel {
     }
 
     fn mesh(&mut self, grid: &Grid, part: Part) {
-        assert_eq!(part, Part::Whole, "takes no part in streams");
+        assert_eq!(part, Part::Whole, "does not support streams");
         let cells = grid.size - 1;
         let samples = Samples { block: Block::new([0.0; 3], cells as f32, cells), samples: &grid.samples };
         self.buffers.positions.clear();

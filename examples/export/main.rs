@@ -1,4 +1,4 @@
-//! Plays a script of edits over a heightmap and writes what is drawn, and a report about it. Needs no Bevy.
+//! Plays a script of edits over a heightmap, and writes the drawn mesh and a report. Does not use Bevy.
 //!
 //! ```text
 //! cargo run --release --no-default-features --example export -- \
@@ -16,8 +16,9 @@
 //! {"shape":"cone","base":[20,60,20],"axis":[0,9,0],"radius":5,"op":"paint","material":3}
 //! ```
 //!
-//! `mesh.obj` holds every drawn triangle with exact positions: y up, one unit a voxel, a group for each tile and chunk,
-//! vertices of neighbours not welded. `report.json` tells hash, scenarios, counts, bytes, seams and timings.
+//! `mesh.obj` holds every drawn triangle with exact positions: y up, one unit per voxel, one group per tile and chunk.
+//! Vertices of neighbouring parts are not welded. `report.json` has the hash, scenarios, counts, bytes, seams and
+//! timings.
 //!
 //! | exit code | when |
 //! | --- | --- |
@@ -25,7 +26,7 @@
 //! | 1 | the files could not be written |
 //! | 2 | an argument, the image or a line of the edits is bad: the reason goes to stderr |
 //!
-//! Unless the exit code is 0, nothing is left behind.
+//! Unless the exit code is 0, no files are left behind.
 
 #[path = "../shared/brush_lines.rs"]
 mod brush_lines;
@@ -116,7 +117,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The whole command: everything that may be wrong with the input is found before the first byte is written.
+/// The whole command. All input is validated before the first byte is written.
 fn export(args: &Args) -> Result<Report, ExportError> {
     let start = Instant::now();
     let edits = script::read(&args.edits)?;
@@ -160,8 +161,8 @@ fn read_ground(args: &Args) -> Result<Ground, ExportError> {
         .and_then(|image| Ground::from_image(&image, &scale))
         .map_err(|reason| ExportError::Heights { path: args.heights.clone(), reason })
 }
-
-/// Reads a file, but not without end: the decoder then says that it is too large.
+/// Reads at most `limit` bytes of a file, so that endless ones end too; the decoder then reports that it is too large.
+/// Reads a file up to the limit and one byte more: the decoder then reports that it is too large.
 fn read_at_most(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(limit).read_to_end(&mut bytes)?;

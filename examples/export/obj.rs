@@ -1,4 +1,4 @@
-//! Writes everything that is drawn as a Wavefront OBJ file.
+//! Writes the drawn mesh as a Wavefront OBJ file.
 
 use std::io::{self, Write};
 
@@ -7,7 +7,7 @@ use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
 use glam::{I64Vec3, IVec3};
 
-/// Writes all tiles and chunks of a world, each as a group, and returns how many bytes that took.
+/// Writes all tiles and chunks of a world, one group each, and returns the number of bytes.
 pub fn write(world: &World, out: &mut impl Write) -> io::Result<u64> {
     let mut obj = ObjWriter { out, text: String::new(), vertices: 0, bytes: 0 };
     obj.text.push_str(
@@ -24,7 +24,7 @@ struct ObjWriter<'a, W> {
     out: &'a mut W,
     /// The lines of the current group.
     text: String,
-    /// Vertices of the groups before; OBJ counts them through.
+    /// Vertices of the previous groups: OBJ numbers vertices across groups.
     vertices: usize,
     bytes: u64,
 }
@@ -35,7 +35,7 @@ impl<W: Write> ObjWriter<'_, W> {
             Drawn::Tile(tile) => format!("g tile_{}_{}\n", tile.x, tile.z),
             Drawn::Chunk(chunk) => format!("g chunk_{}_{}_{}\n", chunk.x, chunk.y, chunk.z),
         };
-        // A tile keeps the vertices of ground that was dug away; only those in use are written.
+        // A tile still contains the vertices of ground that was dug away; only those in use are written.
         let mut numbers = vec![0; mesh.vertices.len()];
         let origin = origin.as_i64vec3() * i64::from(SNAP);
         for index in mesh.indices.iter() {
@@ -70,10 +70,10 @@ impl<W: Write> ObjWriter<'_, W> {
     }
 }
 
-/// Writes a position given in 1/4096 voxel as the decimal number of voxels that it is exactly.
+/// Appends a position given in 1/4096 voxel as an exact decimal number of voxels.
 pub fn push_voxels(text: &mut String, steps: i64) {
     const SNAPS: u64 = SNAP as u64;
-    /// 10^12 / 4096: twelve digits hold every fraction.
+    /// 10^12 / 4096: twelve digits represent every fraction exactly.
     const PER_STEP: u64 = 1_000_000_000_000 / SNAPS;
     let (whole, rest) = (steps.unsigned_abs() / SNAPS, steps.unsigned_abs() % SNAPS);
     if steps < 0 {

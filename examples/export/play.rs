@@ -1,4 +1,4 @@
-//! Plays edits, transaction by transaction, with the time that each takes.
+//! Plays edits, transaction by transaction, and times each of them.
 
 use std::time::{Duration, Instant};
 
@@ -7,13 +7,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::script::ScriptedEdit;
 
-/// What came of a script.
+/// The result of a script.
 pub struct Played {
-    /// The receipt of each edit with the line it stands on, in order.
+    /// The receipt of each edit with its line number, in order.
     pub receipts: Vec<(usize, Receipt)>,
     /// How long each transaction took, from the first edit queued to the commit.
     pub transactions: Vec<Duration>,
-    /// Most edits in one transaction.
+    /// Largest number of edits in a transaction.
     pub batch: usize,
 }
 
@@ -23,7 +23,7 @@ pub fn play(terrain: &mut Terrain, edits: &[ScriptedEdit], batch: usize) -> Play
     let bar = ProgressBar::new(edits.len() as u64)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let mut played = Played { receipts: Vec::with_capacity(edits.len()), transactions: Vec::new(), batch };
-    // However large a batch is, it is one transaction.
+    // Whatever its size, a batch has to be a single transaction.
     terrain.set_work_limits(WorkLimits::UNBOUNDED);
     for edits in edits.chunks(batch) {
         let start = Instant::now();
@@ -36,7 +36,7 @@ pub fn play(terrain: &mut Terrain, edits: &[ScriptedEdit], batch: usize) -> Play
     played
 }
 
-/// One transaction; nobody else changes this terrain, so its commit is never stale.
+/// Runs one transaction. Nothing else changes this terrain, so the commit is never stale.
 fn transact(terrain: &mut Terrain, edits: &[ScriptedEdit]) -> Vec<Receipt> {
     terrain.submit_edits(edits.iter().map(|scripted| &scripted.edit));
     let commit = terrain.begin().map(|transaction| transaction.run());

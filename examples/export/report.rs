@@ -1,4 +1,4 @@
-//! The report: what came of the edits, and what the world is like after them.
+//! The report: the outcomes of the edits, and figures of the resulting world.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,16 +12,16 @@ use serde::Serialize;
 
 use crate::play::Played;
 
-/// What `report.json` holds. All but `timings` is the same for the same input, on every machine.
+/// The content of `report.json`. Everything except `timings` is the same on every machine for the same input.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// Hash of the ground and every edited sample, in hexadecimal.
     pub hash: String,
     pub world: WorldFigures,
     pub edits: EditFigures,
-    /// How often each of the paper's five scenarios took place.
+    /// How often each of the paper's five scenarios occurred.
     pub scenarios: ScenarioCounts,
-    /// Regions of edits.
+    /// Edited regions.
     pub fields: usize,
     /// Chunks that draw something.
     pub chunks: usize,
@@ -50,9 +50,9 @@ pub struct WorldFigures {
 
 #[derive(Debug, Serialize)]
 pub struct EditFigures {
-    /// Edits that were accepted.
+    /// Accepted edits.
     pub applied: usize,
-    /// Edits that were not, with the line they stand on.
+    /// Rejected edits, with their line numbers.
     pub rejected: Vec<RejectedEdit>,
     /// Voxels dug away, filled and repainted, by material.
     pub removed: BTreeMap<u8, u64>,
@@ -70,7 +70,7 @@ pub struct RejectedEdit {
 pub struct ByteFigures {
     #[serde(flatten)]
     pub world: Memory,
-    /// All but the ground.
+    /// All of it except the ground.
     pub edits: usize,
     /// Length of `mesh.obj`.
     pub mesh_obj: u64,
@@ -89,34 +89,34 @@ pub struct SeamFigures {
     pub nonmanifold_vertices: usize,
     pub degenerate: usize,
     pub euler: i64,
-    /// Largest angle between the normals of vertices at one place, degrees.
+    /// Largest angle between the normals of vertices at the same position, in degrees.
     pub worst_normal_jump: f64,
-    /// A place, in voxels, for each kind of fault that was found.
+    /// One position, in voxels, for each kind of fault that was found.
     pub first: BTreeMap<String, [f64; 3]>,
 }
 
-/// How long it all took, in milliseconds.
+/// Timings in milliseconds.
 #[derive(Debug, Default, Serialize)]
 pub struct Timings {
     /// Reading the edits and the image.
     pub load_ms: f64,
     pub transactions: usize,
-    /// Most edits in a transaction.
+    /// Largest number of edits in a transaction.
     pub batch: usize,
-    /// One transaction: half of them took at most this long, 99 of 100, and the longest.
+    /// Time per transaction: median, 99th percentile and maximum.
     pub transaction_p50_ms: f64,
     pub transaction_p99_ms: f64,
     pub transaction_max_ms: f64,
     /// All transactions together.
     pub play_ms: f64,
-    /// Looking at every seam of the world.
+    /// Checking every seam of the world.
     pub check_ms: f64,
     /// Writing `mesh.obj`.
     pub write_ms: f64,
 }
 
 impl Report {
-    /// Looks at the whole world. The length of `mesh.obj` and what happens outside are still to be filled in.
+    /// Computes the report of a world. The length of `mesh.obj` and the other timings are filled in later.
     pub fn new(world: &World, played: &Played) -> Self {
         let mut timings = Timings::transactions(played);
         let start = Instant::now();
@@ -151,7 +151,7 @@ impl Report {
     }
 }
 
-/// What the command says at its end.
+/// The summary that the command prints.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { edits, scenarios, seams, timings, .. } = self;
@@ -237,7 +237,7 @@ impl Timings {
     }
 }
 
-/// The time in milliseconds that `percent` of the sorted times do not exceed (nearest rank); 0 where there is none.
+/// The time in milliseconds that `percent` of the sorted times do not exceed (nearest rank); 0 if there are none.
 fn percentile(sorted: &[Duration], percent: usize) -> f64 {
     let rank = (sorted.len() * percent).div_ceil(100).max(1);
     sorted.get(rank - 1).map_or(0.0, |time| time.as_secs_f64() * 1e3)

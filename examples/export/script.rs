@@ -1,4 +1,4 @@
-//! Reads edits, one JSON object a line.
+//! Reads edits, one JSON object per line.
 
 use std::fmt;
 use std::fs::File;
@@ -10,21 +10,21 @@ use bevy_burrow::brush::Edit;
 use crate::ExportError;
 use crate::brush_lines::{Fault, Line, Lines};
 
-/// An edit and the line it stands on, from 1.
+/// An edit and its line number, from 1.
 #[derive(Debug)]
 pub struct ScriptedEdit {
     pub line: usize,
     pub edit: Edit,
 }
 
-/// Every bad line of a script; shown one a line, as compilers do.
+/// Every bad line of a script; displayed one per line, like compiler errors.
 #[derive(Debug)]
 pub struct BadLines {
     path: PathBuf,
     lines: Vec<(usize, String)>,
 }
 
-/// How many bad lines are shown.
+/// The largest number of bad lines that are displayed.
 const SHOWN: usize = 20;
 
 impl std::error::Error for BadLines {}
@@ -43,7 +43,7 @@ impl fmt::Display for BadLines {
     }
 }
 
-/// Reads a script whole, or says what is wrong with each bad line.
+/// Reads a whole script, or returns the faults of all bad lines.
 pub fn read(path: &Path) -> Result<Vec<ScriptedEdit>, ExportError> {
     let failed = |reason| ExportError::Read { path: path.into(), reason };
     let script = BufReader::new(File::open(path).map_err(failed)?);
@@ -61,7 +61,7 @@ pub fn read(path: &Path) -> Result<Vec<ScriptedEdit>, ExportError> {
     if bad.is_empty() { Ok(edits) } else { Err(BadLines { path: path.into(), lines: bad }.into()) }
 }
 
-/// The edit that a line asks for.
+/// The edit on a line.
 fn edit(line: &Line) -> Result<Edit, String> {
     match line {
         Line::Brush(brush) => Edit::quantize(brush).map_err(|error| error.to_string()),

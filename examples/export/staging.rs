@@ -1,19 +1,19 @@
-//! Files that appear under their own names only when all of them are whole.
+//! Writes files under temporary names, and renames them only when all of them are complete.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Files under temporary names in one folder. Unless [`publish`](Self::publish) succeeds, it leaves nothing behind.
+/// Files under temporary names in one folder. They are removed unless [`publish`](Self::publish) succeeds.
 pub struct Staging {
     folder: PathBuf,
-    /// Folders that were made for it, innermost first.
+    /// Folders that were created for it, innermost first.
     made: Vec<PathBuf>,
     names: Vec<&'static str>,
 }
 
 impl Staging {
-    /// Makes the folder if it is not there.
+    /// Creates the folder if it does not exist.
     pub fn new(folder: &Path) -> io::Result<Self> {
         let missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let made = folder.ancestors().take_while(missing).map(Path::to_path_buf).collect();
@@ -22,7 +22,7 @@ impl Staging {
         Ok(staging)
     }
 
-    /// Writes a file that is to get `name`, and returns what `content` returns.
+    /// Writes a file that will be named `name`, and returns the result of `content`.
     pub fn write<T>(
         &mut self,
         name: &'static str,
@@ -36,7 +36,7 @@ impl Staging {
         Ok(result)
     }
 
-    /// Gives all files their names, over what had them before; where one can't have its name, none gets it.
+    /// Renames all files to their names, replacing existing files. If one rename fails, all are undone.
     pub fn publish(mut self) -> io::Result<()> {
         for (number, name) in self.names.iter().enumerate() {
             if let Err(error) = self.put_in_place(name) {
@@ -51,7 +51,7 @@ impl Staging {
         Ok(())
     }
 
-    /// Gives a file its name; what had it is kept aside.
+    /// Renames a file to its name; an existing file is kept under another name.
     fn put_in_place(&self, name: &str) -> io::Result<()> {
         self.check_is_no_folder(name)?;
         let (place, earlier) = (self.folder.join(name), self.earlier(name));
@@ -62,7 +62,7 @@ impl Staging {
         fs::rename(self.staged(name), &place).inspect_err(|_| drop(fs::rename(&earlier, &place)))
     }
 
-    /// What had the name before has it again. What can't be done here can't be helped either.
+    /// Restores the file that had the name before. Errors are ignored, as nothing more can be done.
     fn take_back(&self, name: &str) {
         let place = self.folder.join(name);
         let _ = fs::rename(&place, self.staged(name));
@@ -80,7 +80,7 @@ impl Staging {
         self.folder.join(format!(".{name}.{}.part", std::process::id()))
     }
 
-    /// Where a file waits that has the name so far.
+    /// The temporary name of a file that had the name before.
     fn earlier(&self, name: &str) -> PathBuf {
         self.folder.join(format!(".{name}.{}.earlier", std::process::id()))
     }
@@ -88,7 +88,7 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // Files that were published are no longer here under their temporary names.
+        // Published files no longer have their temporary names.
         for name in &self.names {
             let _ = fs::remove_file(self.staged(name));
         }

@@ -1,5 +1,5 @@
-//! The command as its users meet it: files in, files and exit codes out. Meshes are checked by an own reader of OBJ
-//! files that knows nothing of the library's seam validator.
+//! Tests of the command from outside: files in, files and exit codes out. Meshes are checked by a separate OBJ reader
+//! that is independent of the library's seam validator.
 
 use std::collections::HashMap;
 use std::fs;
@@ -16,7 +16,7 @@ use crate::{Args, export};
 
 const DIG: &str = r#"{"shape":"sphere","center":[9,30,9],"radius":4,"op":"dig"}"#;
 
-/// An empty folder that goes when the test ends.
+/// A temporary folder that is removed when dropped.
 struct Desk(PathBuf);
 
 impl Desk {
@@ -50,7 +50,7 @@ impl Desk {
         self.put_image(&(0..41 * 34).map(|i| hill(i) as u8).collect::<Vec<_>>(), 41)
     }
 
-    /// Runs the command; gives the exit code and what it says on stderr.
+    /// Runs the command; returns the report, or the exit code and the text on stderr.
     fn run(&self, edits: &Path, more: &[&str]) -> Result<Value, (u8, String)> {
         let (heights, out) = (self.path("heights.png"), self.path("out"));
         let mut line = vec!["export".as_ref(), "--heights".as_ref(), heights.as_os_str()];
@@ -74,7 +74,7 @@ impl Drop for Desk {
     }
 }
 
-/// A mesh read back: places in voxels, triangles as indices from 0, names of groups.
+/// A parsed mesh: positions in voxels, triangle indices from 0, and group names.
 #[derive(Default)]
 struct Obj {
     places: Vec<[f64; 3]>,
@@ -100,7 +100,7 @@ impl Obj {
         obj
     }
 
-    /// Edges off the rim that are not run through exactly once each way, with equal places taken as one.
+    /// Edges away from the rim that are not used exactly once in each direction; equal positions count as one vertex.
     fn loose_edges(&self, width: f64, depth: f64) -> Vec<[[f64; 3]; 2]> {
         let key = |place: [f64; 3]| place.map(|v| (v + 0.0).to_bits());
         let mut balance: HashMap<_, (i32, i32, [[f64; 3]; 2])> = HashMap::new();
@@ -240,7 +240,7 @@ fn bad_lines_are_named_and_nothing_is_written() {
         assert!(!desk.path("out").exists(), "{line}: something was written");
     }
     desk.run(&desk.put("edits.jsonl", format!("\u{feff}{DIG}\n")), &[])
-        .expect("a mark of the encoding is no fault");
+        .expect("a byte order mark is allowed");
     fs::remove_dir_all(desk.path("out")).expect("the folder");
     let (code, message) = desk.run(&desk.put("edits.jsonl", b"\xff\xfe\n{\n"), &[]).unwrap_err();
     assert!(code == 2 && message.contains("line 1: the line is not UTF-8") && message.contains("line 2: "));
@@ -292,7 +292,7 @@ fn a_folder_that_cannot_be_written_is_another_matter_than_bad_input() {
     desk.put("out", "a file where the folder should be");
     assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
     fs::remove_file(desk.path("out")).expect("the file");
-    // The report's name is taken, which is found only after the mesh was staged.
+    // A folder has the report's name, which is only found after the mesh was staged.
     fs::create_dir_all(desk.path("out/report.json")).expect("a folder");
     assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
     assert_eq!(fs::read_dir(desk.path("out")).expect("the folder").count(), 1, "something was left behind");
@@ -309,11 +309,11 @@ fn files_get_their_names_together_or_not_at_all() {
         }
         staging
     };
-    // Somebody takes the second name while the files are written.
+    // A folder takes the second name while the files are written.
     for before in [None, Some("first".to_string())] {
         let staging = stage("second");
         fs::create_dir(desk.path("b")).expect("a folder");
-        assert!(staging.publish().is_err() && read() == before, "the first file was not taken back");
+        assert!(staging.publish().is_err() && read() == before, "the first rename was not undone");
         fs::remove_dir(desk.path("b")).expect("the folder");
         stage("first").publish().expect("both names are free");
         assert_eq!(read().as_deref(), Some("first"));

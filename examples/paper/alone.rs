@@ -1,4 +1,4 @@
-//! A test in a process of its own: what it takes there, and what its edits cost where nothing has been allocated before.
+//! Plays a test in a separate process: its memory, and the time of its edits when no memory was allocated before.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -12,21 +12,21 @@ use crate::full::{DenseField, FullWorld, Output};
 use crate::play::{self, Played};
 use crate::setup::{Setup, Subject};
 
-/// Both runs of a test that a process played, and nothing else.
+/// Both runs of a test in a process that does nothing else.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Alone {
-    /// Kilobytes in memory (resident set) with the landscape made and nothing else; `None` where the system does not tell.
+    /// Resident memory in kilobytes with only the landscape created; `None` where the system does not report it.
     pub start: Option<u64>,
     pub first: AloneRun,
     pub second: AloneRun,
 }
 
-/// One of them.
+/// One of the runs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AloneRun {
-    /// Kilobytes in memory when it was over.
+    /// Resident memory in kilobytes at its end.
     pub resident: Option<u64>,
-    /// What each edit took.
+    /// The time of each edit.
     pub laps: Vec<Lap>,
 }
 
@@ -62,7 +62,7 @@ impl Alone {
         Ok(Self { start, first, second })
     }
 
-    /// Plays both runs in a process of its own; `None` where none can be started.
+    /// Plays both runs in a separate process; `None` if none can be started.
     pub fn apart(subject: Subject, setup: &Setup) -> Option<Self> {
         let child = Command::new(std::env::current_exe().ok()?)
             .args(["--alone", &subject.key()])
@@ -75,7 +75,7 @@ impl Alone {
     }
 }
 
-/// Kilobytes that this process has in memory.
+/// Resident memory of this process in kilobytes.
 fn resident() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -1,11 +1,11 @@
-//! What computes a transaction: the CPU, or a GPU as the paper's Tables 3 and 4 have it.
+//! The backend that runs transactions: the CPU, or a GPU as in the paper's Tables 3 and 4.
 
 use std::time::Duration;
 
 use bevy_burrow::backend::{Backend as Kind, Engine, EngineState};
 use bevy_burrow::terrain::{Commit, Transaction};
 
-/// Who does the work.
+/// The processor that does the work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backend {
     Cpu,
@@ -14,7 +14,7 @@ pub enum Backend {
 
 /// Runs transactions to their commits.
 pub struct Runner {
-    /// The card's; without one, the processor does it.
+    /// The CUDA engine, or `None` for the CPU.
     engine: Option<Engine>,
 }
 
@@ -26,13 +26,13 @@ impl Runner {
         }
     }
 
-    /// Stages that a card left to the processor, so far.
+    /// The number of stages so far that a card left to the CPU.
     pub fn left_over(&self) -> u64 {
         self.engine.as_ref().map_or(0, |engine| engine.figures().cpu)
     }
 }
 
-/// Why a backend computes nothing here.
+/// Why a backend is not available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no {0} backend on this machine")]
 pub struct NoBackend(pub &'static str);
@@ -40,7 +40,7 @@ pub struct NoBackend(pub &'static str);
 impl Backend {
     pub const ALL: [Self; 2] = [Self::Cpu, Self::Cuda];
 
-    /// The backend, ready to run.
+    /// Opens the backend.
     pub fn open(self) -> Result<Runner, NoBackend> {
         let kind = match self {
             Self::Cpu => return Ok(Runner { engine: None }),
@@ -53,7 +53,7 @@ impl Backend {
         }
     }
 
-    /// Backends that compute nothing here, and why.
+    /// The backends that are not available, and why.
     pub fn missing() -> Vec<(Self, NoBackend)> {
         Self::ALL.into_iter().filter_map(|backend| Some((backend, backend.open().err()?))).collect()
     }

@@ -1,20 +1,20 @@
-//! Two clocks: the time that passes, as the paper took it, and the processor time of this thread, which leaves out what
-//! else the machine does meanwhile. On a busy machine the first one makes long edits longer than short ones.
+//! Two clocks: the wall clock, as in the paper, and the processor time of this thread, which excludes other load. On
+//! a busy machine, long edits lose more wall-clock time to other processes than short ones.
 
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-/// Seconds that something took.
+/// Seconds measured by both clocks.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Lap {
     /// By the wall clock.
     pub seconds: f64,
-    /// Of the processor; those of the wall clock where the system does not tell.
+    /// Processor time; the wall-clock time where the system does not report it.
     pub processor: f64,
 }
 
-/// Calls `work` and takes its time.
+/// Calls `work` and measures its time.
 pub fn time<T>(work: impl FnOnce() -> T) -> (Lap, T) {
     let before = processor();
     let start = Instant::now();
@@ -24,10 +24,10 @@ pub fn time<T>(work: impl FnOnce() -> T) -> (Lap, T) {
     (Lap { seconds, processor }, result)
 }
 
-/// Is the processor's time known?
+/// Whether processor time is available.
 pub const IS_KNOWN: bool = cfg!(target_os = "linux");
 
-/// Seconds that the processor spent on this thread.
+/// Processor time of this thread in seconds.
 #[cfg(target_os = "linux")]
 fn processor() -> Option<f64> {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);

@@ -1,4 +1,4 @@
-//! Full fields against the hybrid: do they hold the same ground, and is the same drawn?
+//! Compares the full fields with the hybrid: the same ground, and the same surface?
 
 use std::collections::HashMap;
 
@@ -13,19 +13,19 @@ use crate::full::{DenseField, FullWorld, stored};
 use crate::play;
 use crate::published::CHUNK_SIZES;
 
-/// How far the dense field and a world agree.
+/// Agreement between the dense field and a world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Ground {
     /// Lattice points that were compared.
     pub points: usize,
     /// Points that are solid in one and air in the other.
     pub otherwise_solid: usize,
-    /// Points of another density.
+    /// Points with different densities.
     pub otherwise_dense: usize,
 }
 
 impl Ground {
-    /// Looks at every lattice point of the cube.
+    /// Compares every lattice point of the cube.
     pub fn compare(field: &DenseField, world: &World) -> Self {
         let view = world.samples();
         let mut ground = Self::default();
@@ -39,25 +39,25 @@ impl Ground {
     }
 }
 
-/// How far a world of marching cubes alone draws what the hybrid draws.
+/// Agreement between the surfaces of the full field and of the hybrid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Surface {
-    /// Triangles of marching cubes that the hybrid draws.
+    /// Marching-cubes triangles of the hybrid.
     pub triangles: usize,
-    /// Those that the full field lacks.
+    /// Those that are missing in the full field.
     pub missing: usize,
-    /// Triangles of the full field that the hybrid lacks, though its marching cubes draw their cells.
+    /// Triangles of the full field that are missing in the hybrid, in cells that it draws with marching cubes.
     pub extra: usize,
-    /// Corners of the hybrid's triangles that have other materials in the full field.
+    /// Triangle corners whose materials differ.
     pub other_materials: usize,
-    /// The same for normals, off the border between marching cubes and heightmap. At the border they are the heightmap's.
+    /// Triangle corners whose normals differ, except at the border to the heightmap, where the hybrid uses its normals.
     pub other_normals: usize,
 }
 
-/// Three positions in the world, the lowest first, in the order in which they are run through.
+/// The three positions of a triangle in the world, the lowest first, in winding order.
 type Key = [[i32; 3]; 3];
 
-/// Triangles by their positions; each holds its corners in the same order.
+/// Triangles by their positions; the corners of each are in the same order.
 fn keyed(mesh: &SurfaceMesh, origin: IVec3) -> impl Iterator<Item = (Key, [Vertex; 3])> {
     mesh.triangles().map(move |mut corners| {
         for corner in &mut corners {
@@ -71,7 +71,7 @@ fn keyed(mesh: &SurfaceMesh, origin: IVec3) -> impl Iterator<Item = (Key, [Verte
 }
 
 impl Surface {
-    /// Looks at every triangle.
+    /// Compares every triangle.
     pub fn compare(full: &FullWorld, world: &World) -> Self {
         let mut surface = Self::default();
         let mut others: HashMap<Key, [Vertex; 3]> = keyed(&full.mesh(), IVec3::ZERO).collect();
@@ -99,7 +99,7 @@ impl Surface {
     }
 }
 
-/// The cells that touch a place over the ground, of which there are up to four; `scale` steps make a voxel.
+/// The up to four cells that touch a position in x and z, given in units of `1 / scale` voxel.
 fn cells_at(world: &World, x: i32, z: i32, scale: i32) -> impl Iterator<Item = Column> {
     let low = move |at: i32| (at - 1).div_euclid(scale);
     let cells = (low(z)..=z.div_euclid(scale)).flat_map(move |cell_z| {
@@ -109,7 +109,7 @@ fn cells_at(world: &World, x: i32, z: i32, scale: i32) -> impl Iterator<Item = C
     cells.filter(move |&cell| grid.has_cell(cell))
 }
 
-/// Does the hybrid draw a cell here as heightmap and another one as marching cubes?
+/// Whether the hybrid draws one cell here as heightmap and another one with marching cubes.
 fn is_at_border(world: &World, position: IVec3) -> bool {
     let volumetric = |wanted| {
         cells_at(world, position.x, position.z, SNAP).any(|cell| world.mask().contains(cell) == wanted)
@@ -117,14 +117,14 @@ fn is_at_border(world: &World, position: IVec3) -> bool {
     volumetric(true) && volumetric(false)
 }
 
-/// Does the hybrid draw the cell of this triangle as heightmap?
+/// Whether the hybrid draws the cell of this triangle as heightmap.
 fn is_heightmap(world: &World, key: &Key) -> bool {
-    // Three times the middle of the triangle, which lies in its cell or on its rim.
+    // Three times the triangle's centroid, which lies in its cell or on the cell's boundary.
     let [x, _, z] = [0, 1, 2].map(|axis| key.iter().map(|corner| corner[axis]).sum::<i32>());
     cells_at(world, x, z, 3 * SNAP).any(|cell| !world.mask().contains(cell))
 }
 
-/// Plays both runs on both full fields and on a terrain, and compares all that there is after each.
+/// Plays both runs on both full fields and on a terrain, and compares them after each run.
 pub fn all(scene: &Scene) -> Result<[(Ground, Surface); 2], PaperError> {
     let mut field = DenseField::new(&scene.ground)?;
     let mut full = FullWorld::new(scene)?;

@@ -1,4 +1,4 @@
-//! The landscape and the hundred edits: the same for the same seed, on every machine.
+//! The landscape and the hundred edits, which depend only on the seed.
 
 use std::sync::Arc;
 
@@ -8,20 +8,20 @@ use bevy_burrow::prelude::{Brush, Shape};
 use bevy_burrow::terrain::{Terrain, TerrainError, TerrainSettings};
 use glam::{Quat, Vec3, Vec4};
 
-/// What is built, so that it can be told from the ground.
+/// The material that is built, distinct from the ground's.
 const BUILT: MaterialId = MaterialId(3);
 
-/// Voxels that edits keep off the rim, so that each lies in the world with all of its shape.
+/// Distance of edits from the rim in voxels, so that each shape lies entirely in the world.
 const MARGIN: f32 = 20.0;
 
 /// The paper's two runs over the same places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Run {
-    /// On untouched ground: nothing is allocated.
+    /// On untouched ground: no fields exist.
     First,
-    /// The same shapes at the same places with the polarity reversed, so that each edit has something to do: what was
-    /// dug is filled, what was built is dug.
+    /// The same shapes at the same places with reversed polarity, so that each edit changes something: what was dug
+    /// is filled, what was built is dug.
     Second,
 }
 
@@ -36,13 +36,13 @@ impl Run {
     }
 }
 
-/// What is edited, and how.
+/// The landscape and the edits.
 pub struct Scene {
     pub ground: Arc<Ground>,
     shapes: Vec<Planned>,
 }
 
-/// A shape, how large it is (radius or half side), and whether the first run digs it.
+/// A shape, its size (radius or half extent), and whether the first run digs it.
 #[derive(Clone, Copy)]
 struct Planned {
     shape: Shape,
@@ -62,7 +62,8 @@ impl Scene {
             base: height * 0.5,
             ..NoiseHeights::default()
         };
-        // Cells are one fewer than columns: the lattice has exactly `side` points along each axis, as the full field.
+        // There is one cell less than columns: like the full field, the lattice has exactly `side` points along each
+        // axis.
         let ground = Ground::from_noise(side - 1, side - 1, &hills)?;
         let mut random = fastrand::Rng::with_seed(seed);
         let shapes = (0..count).map(|_| shape(&mut random, &ground)).collect();
@@ -75,7 +76,7 @@ impl Scene {
         Terrain::new(self.ground.clone(), &settings)
     }
 
-    /// The brushes of a run in order.
+    /// The brushes of a run, in order.
     pub fn brushes(&self, run: Run) -> Vec<Brush> {
         let brush = |(tag, &Planned { shape, digs, .. }): (u64, &Planned)| {
             let digs = digs == (run == Run::First);
@@ -85,18 +86,18 @@ impl Scene {
         (0..).zip(&self.shapes).map(brush).collect()
     }
 
-    /// How many edits dig in the first run.
+    /// The number of edits that dig in the first run.
     pub fn digs(&self) -> usize {
         self.shapes.iter().filter(|planned| planned.digs).count()
     }
 
-    /// How large each edit is, in voxels: the radius of a ball, the longest half side of a box, half of the axis of a
+    /// The size of each edit in voxels: the radius of a ball, the largest half extent of a box, half of the axis of a
     /// capsule or cylinder.
     pub fn sizes(&self) -> Vec<f64> {
         self.shapes.iter().map(|planned| f64::from(planned.size)).collect()
     }
 
-    /// The part of columns steeper than 45 degrees, and the steepest one's rise over run.
+    /// The share of columns steeper than 45 degrees, and the steepest slope.
     pub fn steepness(&self) -> (f64, f64) {
         let (width, depth) = (self.ground.width(), self.ground.depth());
         let columns = (0..=depth).flat_map(|z| (0..=width).map(move |x| Column::new(x, z)));
@@ -114,10 +115,10 @@ fn shape(random: &mut fastrand::Rng, ground: &Ground) -> Planned {
     let surface = ground.height(Column::new(x as i32, z as i32)) as f32 / ONE as f32;
     let size = between(2.0, 9.0);
     let digs = between(0.0, 1.0) < 0.5;
-    // Digs go into the ground and buildings stand on it; both cross the surface.
+    // Digs go into the ground and buildings stand on it; both intersect the surface.
     let depth = between(0.0, 0.7) * size * if digs { -1.0 } else { 1.0 };
     let center = Vec3::new(x, surface + depth, z);
-    // No sine: its last bit differs from machine to machine.
+    // No sine, whose last bit differs between machines.
     let turn = Vec4::from_array([(); 4].map(|()| between(-1.0, 1.0))).normalize_or(Vec4::W);
     let turn = Quat::from_vec4(turn);
     let arm = turn * Vec3::Y * size;

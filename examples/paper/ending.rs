@@ -1,4 +1,4 @@
-//! What there is after a run: facts that each repeat must come to again, and bytes.
+//! The result of a run: facts that must be the same in each repeat, and bytes.
 
 use std::panic::resume_unwind;
 
@@ -7,12 +7,12 @@ use bevy_burrow::terrain::{Memory, Terrain, World};
 
 use crate::full::{DenseField, FullWorld};
 
-/// What there is after a run.
+/// The result of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Ending {
     /// Triangles of the whole terrain, as drawn.
     pub triangles: usize,
-    /// Of a world; not known of a dense field.
+    /// Facts about the world; `None` for a dense field.
     pub world: Option<EndingWorld>,
     /// Bytes of a dense field's samples.
     pub sample_bytes: usize,
@@ -20,12 +20,12 @@ pub struct Ending {
     pub mesh_bytes: usize,
 }
 
-/// What there is of a world after a run.
+/// Facts about the world after a run.
 #[derive(Clone, Copy, Debug)]
 pub struct EndingWorld {
-    /// Of all samples; the same for all chunk sizes.
+    /// Hash of all samples; the same for all chunk sizes.
     pub hash: u64,
-    /// Is all that is drawn one closed surface?
+    /// Whether the drawn surface is closed.
     pub is_flawless: bool,
     pub data: Memory,
 }
@@ -36,8 +36,8 @@ impl EndingWorld {
     }
 }
 
-/// Looks at what there is in a thread that has memory of its own: glibc would give back what a look frees in the middle of
-/// some later edit, where that takes ten times as long as the edit.
+/// Inspects the result in a separate thread, which has its own allocator arena: otherwise glibc would return the freed
+/// memory to the system during some later edit, which takes ten times as long as the edit.
 fn aside<T: Send>(look: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|scope| scope.spawn(look).join().unwrap_or_else(|panic| resume_unwind(panic)))
 }
@@ -65,17 +65,17 @@ impl Ending {
         }
     }
 
-    /// Bytes of ground and samples, with all that is kept besides, history aside.
+    /// Bytes of ground, samples and derived data, except history.
     pub fn data_bytes(&self) -> usize {
         self.world.map_or(self.sample_bytes, |world| world.data.ground + world.data.edits())
     }
 
-    /// Bytes of what can be undone.
+    /// Bytes of the undo history.
     pub fn undo_bytes(&self) -> usize {
         self.world.map_or(0, |world| world.data.undo)
     }
 
-    /// Did the same come out?
+    /// Whether both results are the same.
     pub fn agrees(&self, other: &Self) -> bool {
         let facts =
             |ending: &Self| (ending.triangles, ending.world.map(|world| (world.hash, world.is_flawless)));

@@ -1,4 +1,4 @@
-//! What may stop the experiment.
+//! Errors of the experiment.
 
 use std::io;
 use std::path::PathBuf;

@@ -1,16 +1,16 @@
-//! The machine and the build that the figures come from, as far as they can be known.
+//! The machine and the build that the figures come from, as far as they are known.
 
 use std::fs;
 use std::process::Command;
 
-/// What a reader of timings wants to know.
+/// Information about the machine for readers of the timings.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Machine {
     pub cpu: String,
-    /// Threads that the machine runs at once.
+    /// Number of hardware threads.
     pub threads: usize,
     pub system: String,
-    /// What `make paper` built it with; else what `rustc --version` says now, though another may have built it.
+    /// The compiler that `make paper` used; otherwise what `rustc --version` reports now, which may differ.
     pub rustc: String,
     pub is_optimised: bool,
 }
@@ -18,7 +18,7 @@ pub struct Machine {
 const UNKNOWN: &str = "n/a";
 
 impl Machine {
-    /// Asks this machine.
+    /// Queries this machine.
     pub fn here() -> Self {
         Self {
             cpu: cpu().unwrap_or_else(|| UNKNOWN.into()),

@@ -1,12 +1,12 @@
-//! The experiment of the paper behind this crate, done again: P. Andersson and S. Johansson, *Rendering with Marching
-//! Cubes, looking at Hybrid Solutions* (2012), Tables 1 to 5. Needs no Bevy.
+//! Reproduces the experiment of the paper behind this crate: P. Andersson and S. Johansson, *Rendering with Marching
+//! Cubes, looking at Hybrid Solutions* (2012), Tables 1 to 5. Does not use Bevy.
 //!
 //! ```text
 //! cargo run --release --no-default-features --example paper -- --out out/paper --results docs/RESULTS.md
 //! ```
 //!
-//! A hundred edits on a terrain of 256 x 256 columns, in chunks of 25, 50, 75 and 100 cells and as one field of marching
-//! cubes; a first run on untouched ground, a second one at the same places. In `--out` it leaves
+//! A hundred edits on a terrain of 256 x 256 columns, in chunks of 25, 50, 75 and 100 cells and as one field of
+//! marching cubes; a first run on untouched ground, a second one at the same places. It writes to `--out`:
 //!
 //! | file | what it holds |
 //! | --- | --- |
@@ -15,8 +15,8 @@
 //! | `RESULTS.md` | all tables beside the paper's figures |
 //! | `plots/*.svg` | the plots that the page shows |
 //!
-//! It fails when a check does: seams, equal worlds in all chunk sizes, ground and surface of the full fields against the
-//! hybrid's. With `--results` the page goes there as well if all holds, and the plots into `plots/` beside it.
+//! It fails if a check fails: seams, equal worlds for all chunk sizes, ground and surface of the full fields against
+//! the hybrid. If all checks pass, `--results` also copies the page there, and the plots into `plots/` beside it.
 
 mod alone;
 mod backend;
@@ -104,7 +104,7 @@ fn run(args: &Args) -> Result<(), PaperError> {
         println!("{}", serde_json::to_string(&alone)?);
         return Ok(());
     }
-    // A folder that cannot be written is found before the long work.
+    // Check the folders now, before the long measurements.
     let page = args.results.as_deref().map(folder_of);
     [Some(args.out.as_path()), page].into_iter().flatten().try_for_each(try_folder)?;
     let measurements = pool.install(|| {
@@ -121,7 +121,7 @@ fn run(args: &Args) -> Result<(), PaperError> {
     println!("{}", report::checks(&measurements));
     println!("{}", report::ratio_table(&report::ratios(&measurements)));
     write(&measurements, &machine, &args.out)?;
-    // What does not hold is not published.
+    // Results are only published if all checks passed.
     let faults = report::faults(&measurements);
     if !faults.is_empty() {
         return Err(PaperError::Faults(faults.join("\n")));
@@ -129,7 +129,7 @@ fn run(args: &Args) -> Result<(), PaperError> {
     args.results.as_deref().map_or(Ok(()), |results| publish(&args.out, results))
 }
 
-/// A bar of runs, drawn between them and never during one.
+/// A progress bar, which is only drawn between runs.
 fn progress_bar(setup: &Setup) -> ProgressBar {
     let backends = backend::Backend::ALL.into_iter().filter(|backend| backend.open().is_ok()).count();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed}, {eta} left");
@@ -137,7 +137,7 @@ fn progress_bar(setup: &Setup) -> ProgressBar {
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// Writes everything into the folder, plots first: the page shows them.
+/// Writes all files into the folder, plots first, as the page refers to them.
 fn write(measurements: &Measurements, machine: &Machine, out: &Path) -> Result<(), PaperError> {
     let plots = out.join("plots");
     make_folder(&plots)?;
@@ -149,7 +149,7 @@ fn write(measurements: &Measurements, machine: &Machine, out: &Path) -> Result<(
     write_file(&out.join("RESULTS.md"), &report::document(measurements, machine))
 }
 
-/// Copies the page and its plots to where it is read.
+/// Copies the page and its plots to their published place.
 fn publish(out: &Path, results: &Path) -> Result<(), PaperError> {
     let plots = folder_of(results).join("plots");
     make_folder(&plots)?;
@@ -161,7 +161,7 @@ fn folder_of(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
 }
 
-/// Makes a folder and one for plots in it, and tries to write into both.
+/// Creates a folder and its `plots` folder, and checks that both are writable.
 fn try_folder(folder: &Path) -> Result<(), PaperError> {
     [folder.to_owned(), folder.join("plots")].iter().try_for_each(|folder| {
         make_folder(folder)?;
@@ -180,7 +180,7 @@ fn write_file(path: &Path, content: &str) -> Result<(), PaperError> {
 }
 
 fn copy(from: &Path, to: &Path) -> Result<(), PaperError> {
-    // A file copied onto itself would be emptied.
+    // Copying a file onto itself would empty it.
     if fs::canonicalize(from).ok() == fs::canonicalize(to).ok() {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! The experiment: every test of the paper that this machine can run, repeated, with what holds after each.
+//! The experiment: every test of the paper that this machine can run, repeated, with checks after each run.
 
 use bevy_burrow::terrain::{ScenarioCounts, Terrain};
 
@@ -14,44 +14,44 @@ use crate::play::{self, Played};
 use crate::published::CHUNK_SIZES;
 use crate::setup::{Setup, Subject};
 
-/// One run of one subject, all repeats.
+/// One run of one subject, with all repeats.
 #[derive(Clone, Debug)]
 pub struct Measured {
     pub subject: Subject,
     pub run: Run,
     /// Seconds of each edit, by repeat.
     pub repeats: Vec<Vec<f64>>,
-    /// The same in processor time. With several threads it is not known, and these are the seconds.
+    /// The same in processor time. With several threads it is not available, and these are wall-clock seconds.
     pub processor: Vec<Vec<f64>>,
-    /// Voxels that each edit dug away or filled; not known of a dense field.
+    /// Voxels that each edit dug or filled; `None` for a dense field.
     pub voxels: Vec<u64>,
-    /// Edits that changed no sample, and that changed no mesh, in one repeat.
+    /// Number of edits in one repeat that changed no sample, and that changed no mesh.
     pub unchanged: usize,
     pub undrawn: usize,
-    /// The same run in processes that play one test each; none where no process can be started.
+    /// The same run in processes that play a single test; empty where no process can be started.
     pub alone: Vec<AloneRun>,
     pub ending: Ending,
 }
 
-/// All that was measured.
+/// All measurements.
 pub struct Measurements {
     pub setup: Setup,
     pub measured: Vec<Measured>,
-    /// Backends of the paper that are not here.
+    /// Backends of the paper that are not available.
     pub missing: Vec<(Backend, NoBackend)>,
-    /// Full fields against the hybrid world, after each run.
+    /// Comparison of the full fields with the hybrid, after each run.
     pub agreement: [(Ground, Surface); 2],
-    /// The paper's five scenarios, first run, by chunk size.
+    /// The paper's five scenarios in the first run, by chunk size.
     pub scenarios: Vec<(u32, ScenarioCounts)>,
     pub digs: usize,
-    /// Radius or half side of each edit.
+    /// Radius or half extent of each edit.
     pub sizes: Vec<f64>,
-    /// Part of columns steeper than 45 degrees, and the steepest rise over run.
+    /// Share of columns steeper than 45 degrees, and the steepest slope.
     pub steepness: (f64, f64),
 }
 
 impl Measured {
-    /// Kilobytes of a process after the run.
+    /// Resident memory in kilobytes of a process after the run.
     pub fn resident(&self) -> Option<u64> {
         self.alone.first()?.resident
     }
@@ -62,14 +62,14 @@ impl Measurements {
         self.measured.iter().find(|measured| measured.subject == subject && measured.run == run)
     }
 
-    /// The hybrid's runs with a backend, in order of chunk sizes; none where the backend is missing.
+    /// The hybrid's runs on a backend, by chunk size; empty if the backend is missing.
     pub fn hybrid(&self, backend: Backend, run: Run) -> Vec<&Measured> {
         let of = |chunk_size| self.get(Subject::Hybrid { backend, chunk_size }, run);
         CHUNK_SIZES.into_iter().filter_map(of).collect()
     }
 }
 
-/// Runs the experiment on all backends but those that are missing; `progress` is told after each run of edits.
+/// Runs the experiment on all backends except missing ones; `progress` is called after each run of edits.
 pub fn measure(
     setup: Setup,
     missing: Vec<(Backend, NoBackend)>,
@@ -82,8 +82,8 @@ pub fn measure(
     subjects.extend(Output::BOTH.map(Subject::Full));
 
     let mut measured: Vec<Measured> = Vec::new();
-    // Repeats outside: what else the machine does meanwhile falls on all subjects alike. So does what the one before
-    // leaves behind: none always follows the same one.
+    // Repeats are the outer loop, so that other load and the state left by the previous test affect all subjects
+    // alike: none always follows the same one.
     let (mut rng, mut order) = (fastrand::Rng::with_seed(setup.seed), subjects.clone());
     for _ in 0..setup.repeats {
         for &subject in &order {
@@ -119,7 +119,7 @@ pub fn measure(
         rng.shuffle(&mut order);
     }
     for &subject in &subjects {
-        // Of full fields, only what they take in memory is asked.
+        // For full fields, only their memory is measured in separate processes.
         let times = if matches!(subject, Subject::Full(_)) { 1 } else { setup.repeats };
         let alone: Option<Vec<Alone>> = (0..times).map(|_| Alone::apart(subject, &setup)).collect();
         let alone = alone.unwrap_or_default();
@@ -139,7 +139,7 @@ pub fn measure(
     })
 }
 
-/// Puts a repeat to those before it; what holds after it must be what held after them.
+/// Adds a repeat to the earlier ones; its result must equal theirs.
 fn keep(
     measured: &mut Vec<Measured>,
     threads: usize,
@@ -175,13 +175,13 @@ fn keep(
     }
 }
 
-/// Seconds of laps by both clocks. With several threads, the processor's is not known, and the other takes its place.
+/// Seconds by both clocks. With several threads, processor time is not available, and wall-clock time replaces it.
 pub fn both_clocks(laps: &[Lap], threads: usize) -> (Vec<f64>, Vec<f64>) {
     let processor = |lap: &Lap| if threads == 1 { lap.processor } else { lap.seconds };
     (laps.iter().map(|lap| lap.seconds).collect(), laps.iter().map(processor).collect())
 }
 
-/// Which of the paper's scenarios the first run consists of.
+/// Counts the paper's scenarios in the first run.
 fn count_scenarios(scene: &Scene) -> Result<Vec<(u32, ScenarioCounts)>, PaperError> {
     let count = |chunk_size| {
         let mut terrain: Terrain = scene.terrain(chunk_size)?;

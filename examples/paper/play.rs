@@ -1,5 +1,5 @@
-//! Plays the edits of one run and takes the time of each, as the paper did: from the start of an edit until its meshes
-//! are ready. Nothing else happens in between.
+//! Plays the edits of one run and times each, as in the paper: from the start of an edit until its meshes are ready.
+//! Nothing else happens in between.
 
 use std::hint::black_box;
 
@@ -11,12 +11,12 @@ use crate::clock::{self, Lap};
 use crate::error::PaperError;
 use crate::full::{DenseField, FullWorld};
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Played {
-    /// What each edit took.
+    /// The time of each edit.
     pub laps: Vec<Lap>,
-    /// Voxels that each edit dug away or filled; not known of a dense field.
+    /// Voxels that each edit dug or filled; `None` for a dense field.
     pub voxels: Vec<u64>,
     /// Edits that changed no sample.
     pub unchanged: usize,
@@ -25,7 +25,7 @@ pub struct Played {
 }
 
 impl Played {
-    /// Counts what an edit changed.
+    /// Records what an edit changed.
     fn look_at(&mut self, receipts: &[Receipt]) {
         let applied = || receipts.iter().filter_map(|receipt| receipt.outcome.as_ref().ok());
         let voxels = |applied: &Applied| applied.removed.total() + applied.added.total();
@@ -34,8 +34,8 @@ impl Played {
     }
 }
 
-/// Plays edits on a terrain, one transaction each: brush in, world committed, vertex and index buffers of all changed
-/// chunks and tiles in hand.
+/// Plays edits on a terrain, one transaction each. A timing covers the brush, the commit, and the vertex and index
+/// buffers of all changed chunks and tiles.
 pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Result<Played, PaperError> {
     let (mut played, left_before) = (Played::default(), runner.left_over());
     for brush in brushes {
@@ -43,7 +43,7 @@ pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Resu
             terrain.submit(brush);
             let transaction = terrain.begin().ok_or(PaperError::Busy)?;
             let mut commit = runner.run(transaction);
-            // The caller's now; a game uploads them.
+            // The caller owns the meshes now; a game would upload them.
             let meshes = black_box(std::mem::take(&mut commit.meshes));
             Ok((terrain.commit(commit)?, meshes))
         });
@@ -52,14 +52,14 @@ pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Resu
         played.look_at(&receipts);
         played.undrawn += usize::from(meshes.chunks.is_empty() && meshes.tiles.is_empty());
     }
-    // Where there is nothing to do, nothing is sent to a card.
+    // An edit that changes nothing is not sent to the card.
     match runner.left_over() - left_before {
         left if left <= played.undrawn as u64 => Ok(played),
         left => Err(PaperError::LeftTheCard(left)),
     }
 }
 
-/// Plays edits on the full field with the hybrid's output: the same transaction, then the whole mesh made again.
+/// Plays edits on the full field with the hybrid's output: the same transaction, then a rebuild of the whole mesh.
 pub fn same(full: &mut FullWorld, brushes: &[Brush]) -> Played {
     let mut played = Played::default();
     for brush in brushes {
@@ -71,7 +71,7 @@ pub fn same(full: &mut FullWorld, brushes: &[Brush]) -> Played {
     played
 }
 
-/// Plays edits on the dense field: samples changed, positions and normals of the whole mesh made again.
+/// Plays edits on the dense field: changes samples, then rebuilds positions and normals of the whole mesh.
 pub fn bare(field: &mut DenseField, brushes: &[Brush]) -> Result<Played, PaperError> {
     let mut played = Played::default();
     for brush in brushes {

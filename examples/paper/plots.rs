@@ -28,15 +28,15 @@ pub const PLOTS: [(&str, &str); 6] = [
 
 const SIZE: (u32, u32) = (820, 460);
 
-/// Paper's CPU and GPU, then ours.
+/// Colours of the paper's CPU and GPU, then ours.
 const WHO: [RGBColor; 4] =
     [RGBColor(165, 165, 165), RGBColor(100, 100, 100), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
-/// The full fields, then the hybrid's chunk sizes.
+/// Colours of the full fields, then of the hybrid's chunk sizes.
 const FULL: [RGBColor; 2] = [RGBColor(60, 60, 60), RGBColor(160, 160, 160)];
 const CHUNKS: [RGBColor; 4] =
     [RGBColor(31, 119, 180), RGBColor(44, 160, 44), RGBColor(255, 127, 14), RGBColor(148, 103, 189)];
 
-/// A named row of values; those that are missing are not drawn.
+/// A named row of values; missing ones are not drawn.
 #[derive(Clone)]
 struct Row {
     name: String,
@@ -71,7 +71,7 @@ fn total(measured: &Measured) -> f64 {
     Statistics::of(&measured.repeats).total
 }
 
-/// For both backends the paper's values of each chunk size, and ours where there are any.
+/// For both backends the paper's values of each chunk size, and ours where available.
 fn rows(
     measurements: &Measurements,
     run: Run,
@@ -119,7 +119,7 @@ fn chunked_and_full(measurements: &Measurements) -> Vec<Row> {
     ]
 }
 
-/// Each edit's median over the repeats in milliseconds of the processor.
+/// Each edit's median over the repeats, in milliseconds of processor time.
 fn latencies(measurements: &Measurements) -> Vec<Row> {
     let second = measurements.measured.iter().filter(|measured| measured.run == Run::Second);
     let mut chunk_colors = CHUNKS.into_iter().cycle();
@@ -137,7 +137,7 @@ fn latencies(measurements: &Measurements) -> Vec<Row> {
     second.map(&mut row).collect()
 }
 
-/// The range of all values with room for the legend above, for a logarithmic axis.
+/// The range of all values, with room for the legend above, for a logarithmic axis.
 fn range(rows: &[Row]) -> Range<f64> {
     let values = || rows.iter().flat_map(|row| &row.values).flatten().filter(|value| **value > 0.0);
     let low = values().copied().fold(f64::INFINITY, f64::min);

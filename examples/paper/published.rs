@@ -1,4 +1,4 @@
-//! The figures that the paper prints: P. Andersson and S. Johansson, *Rendering with Marching Cubes, looking at Hybrid
+//! The figures printed in the paper: P. Andersson and S. Johansson, *Rendering with Marching Cubes, looking at Hybrid
 //! Solutions* (2012), Tables 1 to 5. Seconds for 100 edits, kilobytes of the process.
 
 use crate::backend::Backend;
@@ -7,17 +7,17 @@ use crate::edits::Run;
 /// Chunk sizes of Tables 1 to 4, in columns from left to right.
 pub const CHUNK_SIZES: [u32; 4] = [25, 50, 75, 100];
 
-/// Edits in a run: the total is a hundred times the average, but for three averages that the paper gives in other digits
-/// (Table 3, chunk size 100; Table 4, chunk size 50; Table 5, second run). All stand here as printed.
+/// Edits in a run: the total is a hundred times the average, except for three averages that the paper gives with other
+/// digits (Table 3, chunk size 100; Table 4, chunk size 50; Table 5, second run). All are given here as printed.
 pub const EDITS: usize = 100;
 
-/// Times that each scenario was repeated.
+/// Repeats of each scenario.
 pub const REPEATS: usize = 10;
 
-/// Tests that the paper counts: 4 scenarios x 3 solutions (CPU, GPU, full field) x 2 runs x 10 repeats.
+/// Number of tests in the paper: 4 scenarios x 3 solutions (CPU, GPU, full field) x 2 runs x 10 repeats.
 pub const TESTS: usize = 240;
 
-/// The machine of the paper.
+/// The paper's machine.
 pub const MACHINE: &str = "Intel Core i5-2500 (4 cores), GeForce GTX 570, 4 GB";
 
 /// One column of a table.

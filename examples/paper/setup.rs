@@ -1,4 +1,4 @@
-//! How large the experiment is, and what it tests.
+//! The size of the experiment, and its subjects.
 
 use crate::backend::Backend;
 use crate::edits::{Run, Scene};
@@ -6,7 +6,7 @@ use crate::error::PaperError;
 use crate::full::Output;
 use crate::published::CHUNK_SIZES;
 
-/// How large the experiment is.
+/// The size of the experiment.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Setup {
     /// Lattice points along each side of the terrain.
@@ -23,18 +23,18 @@ impl Setup {
         Ok(Scene::new(self.side, self.edits, self.seed)?)
     }
 
-    /// The same setup as arguments of this program.
+    /// This setup as command-line arguments.
     pub fn arguments(&self) -> Vec<String> {
         vec!["--threads".into(), self.threads.to_string()]
     }
 
-    /// Runs of a hundred edits that the experiment makes with the backends that are there.
+    /// Number of runs of a hundred edits, with this number of available backends.
     pub fn tests(&self, backends: usize) -> usize {
         (backends * CHUNK_SIZES.len() + Output::BOTH.len()) * Run::BOTH.len() * self.repeats
     }
 }
 
-/// What is tested.
+/// The subject of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subject {
     /// Heightmap and marching cubes, in chunks.
@@ -44,7 +44,7 @@ pub enum Subject {
 }
 
 impl Subject {
-    /// Its name in files and arguments.
+    /// The name in files and arguments.
     pub fn key(self) -> String {
         match self {
             Self::Hybrid { backend, chunk_size } => {
@@ -54,7 +54,7 @@ impl Subject {
         }
     }
 
-    /// Its name on the page.
+    /// The name in the document.
     pub fn title(self) -> String {
         match self {
             Self::Hybrid { backend, chunk_size } => format!("{} {chunk_size}", backend.title()),
@@ -62,7 +62,7 @@ impl Subject {
         }
     }
 
-    /// Every test of the paper.
+    /// Every subject of the paper.
     pub fn all() -> impl Iterator<Item = Self> {
         let hybrid = |backend| CHUNK_SIZES.map(|chunk_size| Self::Hybrid { backend, chunk_size });
         Backend::ALL.into_iter().flat_map(hybrid).chain(Output::BOTH.map(Self::Full))

@@ -1,24 +1,24 @@
 //! Statistics of timings: those of the paper's tables, and medians.
 
-/// What the paper's tables tell of a run, in seconds.
+/// The statistics in the paper's tables, and medians, of one run in seconds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Statistics {
-    /// All edits of a run together, mean of the repeats.
+    /// Total of all edits of a run, mean of the repeats.
     pub total: f64,
-    /// One edit, mean of all edits and repeats.
+    /// Average of an edit over all edits and repeats.
     pub average: f64,
     /// The longest single edit of all repeats.
     pub max: f64,
-    /// The shortest.
+    /// The shortest single edit of all repeats.
     pub min: f64,
-    /// Half of all edits took no longer.
+    /// The median of all edits.
     pub median: f64,
-    /// 99 of 100 took no longer.
+    /// The 99th percentile of all edits.
     pub p99: f64,
 }
 
 impl Statistics {
-    /// Of the timings of each edit, by repeat; all 0 where there are none.
+    /// Computes the statistics of each edit's timings, by repeat; all 0 if there are none.
     pub fn of(repeats: &[Vec<f64>]) -> Self {
         let sorted = sorted(repeats.iter().flatten().copied());
         let sum: f64 = sorted.iter().sum();
@@ -33,17 +33,17 @@ impl Statistics {
     }
 }
 
-/// The median; 0 of nothing.
+/// The median; 0 if there are no values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     middle(&sorted(values))
 }
 
-/// The value that `percent` of all values do not exceed, of 0 the least.
+/// The value that `percent` of all values do not exceed; for 0, the smallest value.
 pub fn percentile_of(values: &[f64], percent: usize) -> f64 {
     percentile(&sorted(values.iter().copied()), percent)
 }
 
-/// Each edit's median over the repeats: what it takes, without what else the machine did meanwhile.
+/// Each edit's median over the repeats, which suppresses other load on the machine.
 pub fn by_edit(repeats: &[Vec<f64>]) -> Vec<f64> {
     let edits = repeats.iter().map(Vec::len).min().unwrap_or(0);
     (0..edits).map(|edit| median(repeats.iter().map(|repeat| repeat[edit]))).collect()

@@ -1,4 +1,4 @@
-//! The experiment in small: what its figures stand on.
+//! Tests of the experiment at a small size.
 
 use std::fs;
 use std::path::PathBuf;
@@ -21,10 +21,10 @@ use crate::{Args, play, plots, publish, report, write};
 const SMALL: Setup = Setup { side: 72, edits: 10, repeats: 2, threads: 1, seed: 7 };
 
 fn measurements() -> Measurements {
-    // Whatever this machine has: pages and tables look the same on all.
+    // Without CUDA on any machine, so that pages and tables are the same everywhere.
     let mut all =
         measure(SMALL, vec![(Backend::Cuda, NoBackend("CUDA"))], || ()).expect("a small experiment");
-    // The program that runs these tests does not play one when asked.
+    // The test program cannot play a single test in a separate process, so this process does.
     assert!(all.measured.iter().all(|measured| measured.alone.is_empty()));
     for measured in &mut all.measured {
         let alone = (0..2).map(|_| Alone::here(measured.subject, &SMALL).expect("a small experiment"));
@@ -33,7 +33,7 @@ fn measurements() -> Measurements {
     all
 }
 
-/// An empty folder that goes when the test ends.
+/// A temporary folder that is removed when dropped.
 struct Desk(PathBuf);
 
 impl Desk {
@@ -107,7 +107,7 @@ fn the_papers_averages_are_hundredths_of_their_totals() {
         Backend::ALL.into_iter().flat_map(of).flatten().chain(full)
     };
     let odd = columns().filter(|column| (column.total / 100.0 - column.average).abs() > 1.5e-6);
-    // Three averages of the paper are none: Table 3, chunk size 100; Table 4, chunk size 50; Table 5, second run.
+    // Except for three averages of the paper: Table 3, chunk size 100; Table 4, chunk size 50; Table 5, second run.
     assert_eq!(odd.map(|column| column.total).collect::<Vec<_>>(), [7.212891, 2.350781, 29.792974]);
     assert!(columns().all(|column| column.min < column.average && column.average < column.max));
 }
@@ -259,7 +259,7 @@ fn everything_is_written_and_published() {
     write(&measurements, &Machine::here(), &out).expect("a writable folder");
     publish(&out, &results).expect("a writable folder");
 
-    // The page may be read where it was written.
+    // The page may be published where it was written.
     publish(&out, &out.join("RESULTS.md")).expect("a writable folder");
 
     let csv = fs::read_to_string(out.join("timings.csv")).expect("timings");

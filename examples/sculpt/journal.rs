@@ -1,4 +1,4 @@
-//! A line on standard output for whatever happened: what was done can be followed, and checked by a script.
+//! Prints a line to standard output for every event, so that a script can follow and check the example.
 
 #[path = "../shared/steps.rs"]
 mod steps;
@@ -34,7 +34,7 @@ fn tells_all(tells: Res<TellAll>) -> bool {
     tells.0
 }
 
-/// The ground's textures take a moment: from now on it can be seen.
+/// Reports when the ground's textures have loaded, and it is visible.
 fn tell_look(
     dressed: Query<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>,
     mut is_told: Local<bool>,
@@ -91,7 +91,7 @@ fn tell_tool(tool: Res<BrushTool>) {
     }
 }
 
-/// Where the panel's widgets are whenever that changes: `tools/drive.py` clicks on them.
+/// Prints the positions of the panel's widgets whenever they change; `tools/drive.py` clicks on them.
 fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
     if !tells.0 || !places.is_changed() {
         return;
@@ -104,6 +104,6 @@ fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
     }
 }
 
-/// Should frames, pipelines and places be told? To be there before [`JournalPlugin`].
+/// Whether frames, pipelines and positions are printed. Must be inserted before [`JournalPlugin`].
 #[derive(Resource, Default)]
 pub struct TellAll(pub bool);

@@ -1,4 +1,4 @@
-//! `sculpt`: a landscape like in an editor, with the panel, a free camera and every operation.
+//! `sculpt`: a landscape editor with the panel, a free camera and every operation.
 //!
 //! ```text
 //! cargo run --release --features examples --example sculpt
@@ -17,10 +17,10 @@
 //! | `H` | takes the height under the mouse for levelling |
 //! | `F1` | shows and hides the panel |
 //! | `F12` | saves a picture |
-//! | a PNG dropped on the window | is stamped from now on, as with `--stamp`: plain grey, white is high |
+//! | a PNG dropped on the window | becomes the stamp, as with `--stamp`: plain grey, white is high |
 //! | `Esc` | quits |
 //!
-//! With `--headless`, or without a display, a script sculpts instead and leaves pictures in `--out`, the panel in them.
+//! With `--headless`, or without a display, a script sculpts instead and saves pictures, panel included, in `--out`.
 //! Each stroke's receipt is a line on standard output.
 //!
 //! | file | subject |
@@ -29,7 +29,7 @@
 //! | `stroke.rs` | aim, preview, strokes, keys |
 //! | `stamps.rs` | stamps from files |
 //! | `journal.rs` | a line for each receipt |
-//! | `script.rs` | what it does without a window |
+//! | `script.rs` | the script for `--headless` |
 
 #[path = "../shared/display.rs"]
 mod display;
@@ -101,7 +101,7 @@ fn main() -> ExitCode {
     app.run().report()
 }
 
-/// Everything that needs no window.
+/// Everything that does not need a window.
 fn editor(app: &mut App, options: &Options) {
     app.insert_resource(journal::TellAll(options.tell)).add_plugins((
         BurrowPlugins,

@@ -17,7 +17,7 @@ use software::draws_in_software;
 const SIDE: u32 = 256;
 const SKY: Color = Color::srgb(0.62, 0.74, 0.88);
 
-/// Where the script works, and where the camera looks at first.
+/// The centre of the script's edits, at which the camera looks at first.
 pub const MIDDLE: Vec3 = Vec3::new(128.0, 0.0, 128.0);
 
 pub struct ScenePlugin;
@@ -64,7 +64,7 @@ fn sun_and_camera(mut commands: Commands, adapter: Option<Res<RenderAdapterInfo>
         Tonemapping::AcesFitted,
         Msaa::Off,
         DistanceFog { color: SKY, falloff: FogFalloff::Linear { start: 180.0, end: 420.0 }, ..default() },
-        // The wheel is for the brush.
+        // The mouse wheel changes the brush size.
         FreeCamera { scroll_factor: 0.0, ..flight::free_camera(24.0, 80.0) },
         Transform::from_translation(MIDDLE + Vec3::new(-26.0, 62.0, 58.0))
             .looking_at(MIDDLE + Vec3::Y * 4.0, Vec3::Y),

@@ -1,4 +1,4 @@
-//! Without a window: a script sculpts, and the camera draws into an image, the panel included.
+//! Headless mode: a script sculpts, and the camera renders into an image, panel included.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -57,7 +57,7 @@ pub fn play(options: &Options) -> Result {
     stage.frames(40);
     stage.shoot("1_dug_and_built")?;
 
-    // Sculpt: each operation at a place of its own, and last the image of a file.
+    // Sculpt: each operation at its own place, and finally the stamp from a file.
     let before = stage.strokes;
     let soft = |tool: &mut BrushTool| (tool.radius, tool.falloff, tool.strength) = (9.0, 6.0, 1.0);
     for (operation, place, strokes) in [
@@ -91,7 +91,7 @@ pub fn play(options: &Options) -> Result {
     stage.frames(40);
     stage.shoot("2_sculpted")?;
 
-    // Back to before the sculpting, and forth again.
+    // Undo all sculpting, and redo it.
     for _ in 0..sculpted {
         stage.step(PanelAction::Undo)?;
     }
@@ -101,7 +101,7 @@ pub fn play(options: &Options) -> Result {
         stage.step(PanelAction::Redo)?;
     }
 
-    // What the model holds.
+    // The debug views.
     let debug = BurrowDebug { chunks: true, fields: true, mask: true, rings: true, ..default() };
     stage.app.world_mut().insert_resource(debug);
     stage.frames(40);
@@ -125,7 +125,7 @@ impl Stage {
         Ok(Self { app, camera, photographer, folder: options.out.clone(), strokes: 0 })
     }
 
-    /// From now on pictures have another size.
+    /// Changes the size of the pictures.
     fn resize(&mut self, width: u32, height: u32) {
         self.photographer = Photographer::new(&mut self.app, self.camera, (width, height));
     }
@@ -141,14 +141,14 @@ impl Stage {
         })
     }
 
-    /// Takes a fresh tool, and sets it up.
+    /// Selects a fresh tool, and configures it.
     fn take(&mut self, operation: ToolOperation, shape: ToolShape, set_up: impl FnOnce(&mut BrushTool)) {
         let mut tool = BrushTool { operation, shape, ..default() };
         set_up(&mut tool);
         self.app.world_mut().insert_resource(tool);
     }
 
-    /// A step through history, and the frames until it is taken.
+    /// Takes a history step, and draws frames until it is done.
     fn step(&mut self, action: PanelAction) -> Result {
         let redos = |world: &mut World| {
             let mut terrains = world.query::<&Terrain>();
@@ -163,7 +163,7 @@ impl Stage {
         self.app.world_mut().write_message(action);
     }
 
-    /// Points at the ground at an offset from the middle.
+    /// Aims at the ground at an offset from the middle.
     fn aim(&mut self, offset: Vec2) -> Option<TerrainHit> {
         let world = self.app.world_mut();
         let mut terrains = world.query::<(Entity, &Terrain)>();
@@ -182,7 +182,7 @@ impl Stage {
         Some(aim)
     }
 
-    /// One stroke, and the frames until its receipt is there.
+    /// Applies one stroke, and draws frames until its receipt arrives.
     fn stroke(&mut self, offset: Vec2) -> Result {
         let hit = self.aim(offset).ok_or("the script works outside the landscape")?;
         self.strokes += 1;

@@ -1,4 +1,4 @@
-//! Stamps from files: what `--stamp` names, and what is dropped on the window.
+//! Stamps from files: named by `--stamp`, or dropped on the window.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -11,14 +11,14 @@ use bevy_burrow::ground::ImageError;
 use bevy_burrow::panel::{BrushTool, StampImage, ToolOperation};
 use bevy_burrow::prelude::*;
 
-/// What the script stamps unless told otherwise.
+/// The script's default stamp.
 const CRATER: &[u8] = include_bytes!("../../assets/stamps/crater.png");
 
-/// No stamp has more samples, and none that has so many is a larger file unless something else is in it.
+/// No valid stamp is larger than this; a larger file must contain something else.
 const LIMITS: ImageLimits =
     ImageLimits { max_file_bytes: 4 << 20, max_width: 256, max_height: 256, max_alloc_bytes: 16 << 20 };
 
-/// Files that are dropped on the window become what is stamped.
+/// Uses files that are dropped on the window as stamps.
 pub struct DropPlugin;
 
 impl Plugin for DropPlugin {
@@ -27,21 +27,21 @@ impl Plugin for DropPlugin {
     }
 }
 
-/// Why a file is no stamp.
+/// Why a file cannot be used as a stamp.
 #[derive(Debug, thiserror::Error)]
 pub enum StampError {
-    /// It can't be read.
+    /// The file cannot be read.
     #[error("it can't be read: {0}")]
     File(#[from] io::Error),
-    /// It is no grey PNG, or too large.
+    /// The file is not a grey PNG, or is too large.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// No brush takes it.
+    /// The image is not valid for a brush.
     #[error(transparent)]
     Brush(#[from] BrushError),
 }
 
-/// Stamps with a file's image from now on. Where that is none, the log says why, and the tool stays as it is.
+/// Uses a file's image as the stamp. On an error, it is logged, and the tool stays as it is.
 pub fn take(file: &Path, tool: &mut impl DerefMut<Target = BrushTool>) {
     match read(file) {
         Ok(stamp) => {
@@ -52,7 +52,7 @@ pub fn take(file: &Path, tool: &mut impl DerefMut<Target = BrushTool>) {
     }
 }
 
-/// A file's image, or else the crater.
+/// A file's image, or the crater if there is no file.
 pub fn read_or_crater(file: Option<&Path>) -> Result<StampImage> {
     Ok(match file {
         Some(file) => read(file).map_err(|why| format!("{} is no stamp: {why}", file.display()))?,
@@ -70,14 +70,14 @@ fn take_dropped(mut drops: MessageReader<FileDragAndDrop>, mut tool: ResMut<Brus
 
 fn read(file: &Path) -> Result<StampImage, StampError> {
     let mut bytes = Vec::new();
-    // A byte more than is allowed, so that a file that is too large is told from one that is just not.
+    // One byte more than the limit, to detect larger files.
     File::open(file)?.take(LIMITS.max_file_bytes + 1).read_to_end(&mut bytes)?;
     decode(file.file_stem().unwrap_or_default().to_string_lossy().into_owned(), &bytes)
 }
 
 fn decode(name: String, png: &[u8]) -> Result<StampImage, StampError> {
     let image = Arc::new(GreyImage::decode_png(png, &LIMITS)?);
-    // What no brush takes is refused now, and not at each stroke.
+    // Images that no brush accepts are refused now, and not at each stroke.
     let stamp = Stamp::new(Arc::clone(&image), Vec3::ZERO, Vec2::splat(2.0), 1.0);
     Edit::quantize(&Brush::stamp(Shape::sphere(Vec3::ZERO, 1.0), stamp))?;
     Ok(StampImage::new(name, image))

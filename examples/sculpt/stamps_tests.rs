@@ -1,4 +1,4 @@
-//! Facts about stamps from files.
+//! Tests of stamps from files.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use super::*;
 
 const CRATER_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/stamps/crater.png");
 
-/// An empty folder of a test's own.
+/// An empty temporary folder.
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("sculpt_stamps_{}_{name}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
@@ -16,7 +16,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// The tool after these files were dropped on the window, one after the other.
+/// The tool after these files were dropped on the window, one by one.
 fn drop_files(files: &[&Path]) -> BrushTool {
     let mut app = App::new();
     app.init_resource::<BrushTool>().add_plugins(DropPlugin);
@@ -86,7 +86,7 @@ fn a_broken_file_changes_nothing() {
         (draw("dot.png", 1, 1), |why| matches!(why, StampError::Brush(BrushError::StampSize { .. }))),
     ];
     for (file, is_told) in &cases {
-        let why = read(file).expect_err("no stamp");
+        let why = read(file).expect_err("not a valid stamp");
         assert!(is_told(&why), "{}: {why:?}", file.display());
         assert_eq!(drop_files(&[file]), BrushTool::default(), "{}", file.display());
     }

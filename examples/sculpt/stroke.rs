@@ -1,4 +1,4 @@
-//! Strokes: where the brush is, how it looks there, and what the mouse and keys do with it.
+//! Strokes: aiming, the preview of the brush, and mouse and key bindings.
 
 #[path = "../shared/gizmos.rs"]
 mod gizmos;
@@ -16,14 +16,14 @@ use bevy_burrow::panel::{
 };
 use bevy_burrow::prelude::*;
 
-/// How far the brush reaches, in metres.
+/// The reach of the brush in metres.
 const REACH: f32 = 400.0;
 
-/// Where the pointer meets the ground, if it does.
+/// Where the pointer hits the ground, if it does.
 #[derive(Resource, Default)]
 pub struct Aim(pub Option<TerrainHit>);
 
-/// Strokes so far.
+/// The number of strokes so far.
 #[derive(Resource, Default)]
 struct Strokes {
     count: u64,
@@ -76,7 +76,7 @@ fn aim(
     aim.0 = ray.and_then(|ray| terrains.raycast(ray, REACH));
 }
 
-/// A brush at the first press, then at the tool's rate.
+/// Applies a brush at the first press, then at the tool's rate.
 fn stroke(
     time: Res<Time>,
     mouse: Res<ButtonInput<MouseButton>>,
@@ -143,7 +143,8 @@ fn keys(
     }
 }
 
-/// Steps through history. By messages: to `ButtonInput<Key>`, a `Z` that comes up as `z`, after Shift, is held for ever.
+/// Undo and redo. Reads keyboard messages, because `ButtonInput<Key>` never releases a `Z` that comes up as `z` after
+/// Shift was released.
 fn step(
     mut presses: MessageReader<KeyboardInput>,
     keys: Res<ButtonInput<KeyCode>>,
@@ -161,8 +162,8 @@ fn step(
     }
 }
 
-/// The letter on a key: by the layout, as QWERTZ and AZERTY have Z elsewhere than QWERTY. Where the layout has other
-/// letters than Latin ones, by its place on QWERTY.
+/// The letter on a key, by the keyboard layout: QWERTZ and AZERTY have Z elsewhere than QWERTY. For layouts without
+/// Latin letters, the key's position on QWERTY counts.
 fn letter(press: &KeyboardInput) -> Option<char> {
     match (&press.logical_key, press.key_code) {
         (Key::Character(text), _) if text.bytes().all(|byte| byte.is_ascii_graphic()) => {
@@ -174,7 +175,7 @@ fn letter(press: &KeyboardInput) -> Option<char> {
     }
 }
 
-/// The camera stands still while the panel has pointer or keyboard, and while Control makes commands of its keys.
+/// The camera stands still while the panel uses pointer or keyboard, and while Control turns its keys into commands.
 fn hold_camera(
     input: Res<PanelInput>,
     keys: Res<ButtonInput<KeyCode>>,
@@ -182,7 +183,7 @@ fn hold_camera(
     mut cameras: Query<&mut FreeCameraState>,
 ) {
     for mut camera in &mut cameras {
-        // A look around that began outside goes on over the panel.
+        // A look around that began outside the panel continues over it.
         let goes_on =
             camera.enabled && mouse.pressed(MouseButton::Right) && !mouse.just_pressed(MouseButton::Right);
         let is_command = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);

@@ -1,7 +1,7 @@
-//! Scripts of brushes, a JSON object a line. Examples read them in common; each takes this in by its path.
+//! Scripts of brushes, one JSON object per line. Shared by examples, which include this file by path.
 //!
-//! A line is a brush as [`Brush`] describes it, in voxels, or a step through history: `{"undo":true}` or `{"redo":true}`.
-//! Blank lines and lines that start with `#` count for nothing.
+//! A line is a [`Brush`] in voxels, or a history step: `{"undo":true}` or `{"redo":true}`. Blank lines and lines that
+//! start with `#` are skipped.
 
 use std::fmt;
 use std::io::{self, BufRead, Read};
@@ -10,10 +10,10 @@ use bevy_burrow::brush::Brush;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-/// No line has so many bytes; the largest stamp takes half a million. What is longer is no script, and would fill memory.
+/// Longest line in bytes; the largest stamp takes half a million. Longer lines would only fill memory.
 const LONGEST: u64 = 1 << 24;
 
-/// What a line says.
+/// The content of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Line {
     Brush(Brush),
@@ -24,9 +24,9 @@ pub enum Line {
 /// What is wrong with a script.
 #[derive(Debug)]
 pub enum Fault {
-    /// A line says nothing that can be done. Others may follow.
+    /// A line is invalid. Others may follow.
     Line { number: usize, reason: String },
-    /// It can't be read. Nothing follows.
+    /// The script cannot be read. Nothing follows.
     End(io::Error),
 }
 
@@ -39,10 +39,10 @@ impl fmt::Display for Fault {
     }
 }
 
-/// The lines of a script that say something, with their numbers from 1; each is read when it is asked for.
+/// The non-empty lines of a script, with their numbers from 1; each is read when it is requested.
 pub struct Lines<R> {
     reader: R,
-    /// The line that was read last.
+    /// The most recently read line.
     number: usize,
     bytes: Vec<u8>,
     is_over: bool,
@@ -74,7 +74,7 @@ impl<R: BufRead> Iterator for Lines<R> {
             match self.read() {
                 Ok(true) => {}
                 Ok(false) => break,
-                // It would fail again, and for ever.
+                // Reading would fail again, for ever.
                 Err(error) => {
                     self.is_over = true;
                     return Some(Err(Fault::End(error)));
@@ -92,14 +92,14 @@ impl<R: BufRead> Iterator for Lines<R> {
     }
 }
 
-/// Has a line the fields of a step? Asked first, so that what is wrong with it is told of what it wants to be.
+/// Whether a line has the fields of a history step. Parsed first, so that errors refer to the right kind of line.
 #[derive(Deserialize)]
 struct Kind {
     undo: Option<IgnoredAny>,
     redo: Option<IgnoredAny>,
 }
 
-/// A step through history as it is written.
+/// A history step in JSON.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Step {
@@ -107,16 +107,16 @@ struct Step {
     redo: Option<bool>,
 }
 
-/// What a line says; nothing on a blank one or a comment.
+/// Parses a line; `None` for a blank line or a comment.
 fn parse(line: &[u8]) -> Result<Option<Line>, String> {
     let text = std::str::from_utf8(line).map_err(|_| "the line is not UTF-8")?;
-    // Some editors begin a file with a mark of its encoding.
+    // Some editors begin a file with a byte order mark.
     let text = text.trim_start_matches('\u{feff}').trim_end();
     let start = text.trim_start();
     if start.is_empty() || start.starts_with('#') {
         return Ok(None);
     }
-    // Serde would take an array for the fields in their order.
+    // Serde would accept an array of the fields in order.
     if !start.starts_with('{') {
         return Err("expected a JSON object in braces".into());
     }
@@ -131,7 +131,7 @@ fn parse(line: &[u8]) -> Result<Option<Line>, String> {
     Ok(Some(Line::Brush(read(text)?)))
 }
 
-/// Reads a JSON object; the line's number is for the caller to tell.
+/// Parses a JSON object; the caller adds the line number to errors.
 fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     serde_json::from_str(text).map_err(|error| {
         let reason = error.to_string();
@@ -205,7 +205,7 @@ mod tests {
         assert_eq!(script.position(), ("# words\n{\n".len() + DIG.len() + 1) as u64);
     }
 
-    /// What a folder is to a reader.
+    /// A reader that fails, like that of a folder.
     struct Folder;
 
     impl Read for Folder {

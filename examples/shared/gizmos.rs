@@ -1,8 +1,8 @@
-//! How brushes are drawn before they are used. Examples have it in common; each takes it in by its path.
+//! Gizmo settings for brush previews. Shared by examples, which include this file by path.
 
 use bevy::prelude::*;
 
-/// A brush is half inside the ground, and all of it should be seen.
+/// Draws gizmos through the ground: half of a brush is inside it, but all of it should be visible.
 pub fn show_through_ground(mut store: ResMut<GizmoConfigStore>) {
     let (config, _) = store.config_mut::<DefaultGizmoConfigGroup>();
     config.depth_bias = -1.0;

@@ -1,4 +1,4 @@
-//! An app without a window. Examples, benchmarks and tests have it in common; each takes it in by its path.
+//! An app without a window. Shared by examples, benchmarks and tests, which include this file by path.
 
 use std::any::Any;
 use std::panic;
@@ -14,11 +14,11 @@ use bevy::render::settings::{RenderCreation, RenderResources, WgpuSettings};
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 
-/// A renderer without a window, if there is an adapter for one, be it in software. Where there is none, it says why.
+/// A renderer without a window, if there is an adapter, possibly in software. Otherwise it prints the reason.
 pub fn find_renderer() -> Option<RenderResources> {
     let settings = WgpuSettings::default();
     let backends = settings.backends?;
-    // Bevy panics where there is none, and prints it; here that is an answer and no accident.
+    // Without an adapter Bevy panics and prints a message; here that is an expected outcome.
     let hook = panic::take_hook();
     panic::set_hook(Box::new(|_| {}));
     let found = panic::catch_unwind(|| bevy::tasks::block_on(initialize_renderer(backends, None, &settings)));
@@ -26,17 +26,17 @@ pub fn find_renderer() -> Option<RenderResources> {
     found.inspect_err(|panic| eprintln!("no renderer: {}", reason(&**panic))).ok()
 }
 
-/// What a panic said.
+/// The message of a panic.
 fn reason(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no reason was given")
 }
 
-/// Bevy's plugins and what `add` adds, ready for the first frame. Without a renderer all goes on, and nothing is drawn.
+/// Bevy's plugins and what `add` adds, ready for the first frame. Without a renderer, the app runs but draws nothing.
 pub fn build(renderer: Option<RenderResources>, add: impl FnOnce(&mut App)) -> App {
     let (render_creation, filter) = match renderer {
         Some(renderer) => (RenderCreation::Manual(renderer), ""),
-        // The absence of a renderer is told once, in plain words, and not by everyone who misses it.
+        // A missing renderer is reported once by `find_renderer`, not by every plugin that needs it.
         None => {
             let settings = WgpuSettings { backends: None, ..default() };
             (settings.into(), "bevy_render=off,bevy_gizmos_render=off,bevy_gltf=off")
@@ -48,7 +48,7 @@ pub fn build(renderer: Option<RenderResources>, add: impl FnOnce(&mut App)) -> A
         .set(LogPlugin { level: Level::WARN, filter: filter.into(), ..default() })
         .disable::<WinitPlugin>()
         .disable::<PipelinedRenderingPlugin>();
-    // A process has one logger, whichever of its apps comes first.
+    // A process has a single logger, which the first of its apps installs.
     static LOGS: AtomicBool = AtomicBool::new(false);
     if LOGS.swap(true, Ordering::Relaxed) {
         plugins = plugins.disable::<LogPlugin>();

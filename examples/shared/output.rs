@@ -1,10 +1,10 @@
-//! Lines on standard output for whoever reads them. Examples write them in common; each takes this in by its path.
+//! Lines on standard output and standard error. Shared by examples, which include this file by path.
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 use std::process;
 
-/// Writes a line. Where nobody reads any more, as behind `| head`, the program ends without a word.
+/// Writes a line. If the pipe is closed, as by `| head`, the program exits silently.
 pub fn say(line: Arguments<'_>) {
     match writeln!(io::stdout(), "{line}") {
         Ok(()) => {}
@@ -16,7 +16,7 @@ pub fn say(line: Arguments<'_>) {
     }
 }
 
-/// Writes a line on standard error, if anybody reads that.
+/// Writes a line on standard error; errors are ignored.
 pub fn complain(line: Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{line}");
 }

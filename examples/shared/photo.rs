@@ -1,4 +1,4 @@
-//! Pictures of what a camera sees, without a window. Examples have it in common; each takes it in by its path.
+//! Saves pictures of a camera's view without a window. Shared by examples, which include this file by path.
 
 #[path = "pixels.rs"]
 pub mod pixels;
@@ -14,24 +14,24 @@ use bevy::render::render_resource::{PollType, TextureFormat};
 use bevy::render::renderer::RenderDevice;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured, save_to_disk};
 
-/// Longest wait for anything.
+/// The longest wait for any event.
 pub const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Pictures that lie on the disk, as far as the renderer told.
+/// The number of pictures that were saved.
 #[derive(Resource, Default)]
 pub struct Developed(pub usize);
 
-/// A camera that draws into an image, and only while pictures are taken: in software a frame takes long.
+/// A camera that renders into an image. It renders only while pictures are taken, as a frame in software is slow.
 pub struct Photographer {
     camera: Entity,
-    /// What it draws into.
+    /// Its render target.
     pub film: Handle<Image>,
-    /// Does it draw between pictures too?
+    /// Whether the camera also renders between pictures.
     pub draws_all: bool,
 }
 
 impl Photographer {
-    /// Takes a camera over.
+    /// Makes a camera render into an image of this size.
     pub fn new(app: &mut App, camera: Entity, (width, height): (u32, u32)) -> Self {
         app.init_resource::<Developed>();
         let image = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
@@ -42,17 +42,17 @@ impl Photographer {
         photographer
     }
 
-    /// Does the camera draw?
+    /// Switches the camera on or off.
     pub fn film_runs(&self, app: &mut App, runs: bool) {
         if let Some(mut camera) = app.world_mut().get_mut::<Camera>(self.camera) {
             camera.is_active = runs;
         }
     }
 
-    /// Takes a picture after a few frames: lights need some to find what they shine on.
+    /// Takes a picture after a few frames, in which lights and shadows settle.
     ///
     /// # Errors
-    /// When it is not written, or shows nothing.
+    /// If it is not written, or is blank.
     #[allow(dead_code, reason = "for those who don't count the frames themselves")]
     pub fn shoot(&self, app: &mut App, path: &Path) -> Result {
         self.shoot_after(5, app, path, draw)?;
@@ -60,11 +60,11 @@ impl Photographer {
         Ok(())
     }
 
-    /// Takes a picture after so many frames, or more of them while shaders are missing. `draw` is to draw a frame to its
-    /// end.
+    /// Takes a picture after `frames` frames, or more while shaders are missing. `draw` has to draw a frame and wait
+    /// for its end.
     ///
     /// # Errors
-    /// When it is not written, or shows nothing.
+    /// If it is not written, or is blank.
     pub fn shoot_after(
         &self,
         frames: usize,
@@ -72,7 +72,7 @@ impl Photographer {
         path: &Path,
         mut draw: impl FnMut(&mut App),
     ) -> Result {
-        // An old one would be taken for it.
+        // A picture from an earlier run must not count.
         if path.exists() {
             std::fs::remove_file(path).map_err(|error| format!("{}: {error}", path.display()))?;
         }
@@ -96,21 +96,21 @@ impl Photographer {
     }
 }
 
-/// Asks again and again; whoever asks lets frames go by.
+/// Evaluates a condition until it holds; the closure has to update the app.
 ///
 /// # Errors
-/// When it takes too long.
+/// If it takes too long.
 pub fn wait_until(app: &mut App, mut is_so: impl FnMut(&mut App) -> bool) -> Result {
     let start = Instant::now();
     while !is_so(app) {
         if start.elapsed() > PATIENCE {
-            return Err("waited in vain".into());
+            return Err("timed out".into());
         }
     }
     Ok(())
 }
 
-/// Draws frames until something is so; none where it is so already.
+/// Draws frames until a condition holds; none if it holds already.
 fn draw_until(app: &mut App, mut draw: impl FnMut(&mut App), is_so: impl Fn(&App) -> bool) -> Result {
     wait_until(app, |app| {
         let is_over = is_so(app);
@@ -121,16 +121,16 @@ fn draw_until(app: &mut App, mut draw: impl FnMut(&mut App), is_so: impl Fn(&App
     })
 }
 
-/// A frame, drawn to its end.
+/// Draws a frame and waits for its end.
 pub fn draw(app: &mut App) {
     app.update();
     finish_drawing(app);
 }
 
-/// Waits until all that was to be drawn is drawn.
+/// Waits until the GPU has finished.
 pub fn finish_drawing(app: &App) {
     if let Some(device) = app.world().get_resource::<RenderDevice>() {
-        // An error here is the device's end, and shows as a missing picture.
+        // An error means that the device is lost, which shows as a missing picture.
         let _ = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
     }
 }

@@ -1,14 +1,14 @@
-//! Does a picture show anything? Examples have it in common; each takes it in by its path.
+//! Checks the content of pictures. Shared by examples, which include this file by path.
 
 use std::io;
 use std::path::Path;
 
 use image::Rgb;
 
-/// Differences of a channel up to this are noise of a renderer.
+/// Channel differences up to this are noise of a renderer.
 const NOISE: u8 = 6;
 
-/// Is there a picture that shows more than one colour? One that can't be read shows nothing.
+/// Whether a picture exists and shows more than one colour. An unreadable one counts as blank.
 pub fn show_something(path: &Path) -> bool {
     let Ok(picture) = image::open(path) else { return false };
     let picture = picture.to_rgb8();
@@ -17,24 +17,24 @@ pub fn show_something(path: &Path) -> bool {
     pixels.any(|pixel| pixel.0.iter().zip(first.0).any(|(a, b)| a.abs_diff(b) > NOISE))
 }
 
-/// What a picture shows: shares of its pixels that are 1 together.
+/// Shares of a picture's pixels by colour, with sum 1.
 #[derive(Clone, Copy, Debug)]
 #[allow(dead_code, reason = "for tests")]
 pub struct Shares {
-    /// Nothing at all: so dark is no ground that light falls on.
+    /// Black: darker than any lit ground.
     pub black: f32,
-    /// More blue than anything else.
+    /// Mostly blue: sky.
     pub sky: f32,
-    /// All the rest.
+    /// The rest: ground.
     pub ground: f32,
 }
 
 #[allow(dead_code, reason = "for tests")]
 impl Shares {
-    /// Of a picture in a file.
+    /// The shares of a picture in a file.
     ///
     /// # Errors
-    /// When it can't be read; names the file.
+    /// If it cannot be read; the message names the file.
     pub fn of(path: &Path) -> io::Result<Self> {
         let at = |error: image::ImageError| io::Error::other(format!("{}: {error}", path.display()));
         let picture = image::open(path).map_err(at)?.into_rgb8();
@@ -49,10 +49,10 @@ impl Shares {
     }
 }
 
-/// Was a PNG file written to its end? On a full disk it is there, but not all of it.
+/// Whether a PNG file is complete. On a full disk it may be truncated.
 ///
 /// # Errors
-/// When it was not, or can't be read; names the file.
+/// If it is incomplete or cannot be read; the message names the file.
 #[allow(dead_code, reason = "for those who take pictures of one colour too")]
 pub fn check_is_whole(path: &Path) -> io::Result<()> {
     const END: &[u8] = b"IEND\xaeB`\x82";
@@ -75,11 +75,11 @@ mod tests {
         let mut picture = RgbImage::from_pixel(64, 64, Rgb([90, 120, 60]));
         picture.put_pixel(3, 3, Rgb([92, 118, 60]));
         picture.save(&path).expect("a file");
-        assert!(!show_something(&path), "noise is nothing");
+        assert!(!show_something(&path), "noise counts as blank");
         picture.put_pixel(40, 50, Rgb([130, 120, 60]));
         picture.save(&path).expect("a file");
         assert!(show_something(&path) && check_is_whole(&path).is_ok());
-        // A disk that got full.
+        // A file truncated by a full disk.
         let bytes = std::fs::read(&path).expect("the file");
         std::fs::write(&path, &bytes[..bytes.len() - 9]).expect("a shorter one");
         assert!(check_is_whole(&path).is_err_and(|error| error.to_string().contains("picture.png")));

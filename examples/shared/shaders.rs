@@ -1,10 +1,10 @@
-//! What waits for its shader is not drawn. Examples and tests have this in common; each takes it in by its path.
+//! Detects pending shaders, whose meshes are not drawn. Shared by examples and tests, which include this file by path.
 
 use bevy::app::App;
 use bevy::render::RenderApp;
 use bevy::render::render_resource::PipelineCache;
 
-/// Is something left out of pictures, because its shader is still on its way?
+/// Whether a picture would be incomplete, because a shader is still being compiled.
 pub fn are_missing(app: &App) -> bool {
     let render = app.get_sub_app(RenderApp);
     let pipelines = render.and_then(|render| render.world().get_resource::<PipelineCache>());

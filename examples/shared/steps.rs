@@ -1,4 +1,4 @@
-//! What steps through history are called on standard output. Examples have it in common; each takes it in by its path.
+//! Names of history steps on standard output. Shared by examples, which include this file by path.
 
 use bevy_burrow::terrain::HistoryStep;
 

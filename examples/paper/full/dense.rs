@@ -1,4 +1,4 @@
-//! The whole terrain as one dense field: a cube of samples, and positions and normals of its whole surface.
+//! The whole terrain as one dense field: a cube of samples, with positions and normals of its whole surface.
 
 use bevy_burrow::brush::{BAND, Brush, DEPTH, Edit, Operation};
 use bevy_burrow::dense::{DenseGrid, DenseGridError, DenseMesh, DenseMesher, Normals};
@@ -8,23 +8,24 @@ use glam::IVec3;
 
 use crate::error::PaperError;
 
-/// A cube of samples and the one mesh over it.
+/// A cube of samples and its mesh.
 pub struct DenseField {
     /// Lattice points along each axis.
     side: usize,
-    /// Densities in 1/256 voxel, negative is solid; x fastest, then y, then z.
+    /// Densities in 1/256 voxel, negative is solid; x varies fastest, then y, then z.
     samples: Vec<i16>,
     mesher: DenseMesher,
     mesh: DenseMesh,
 }
 
-/// A density as a sample holds it, in the dense field as in the bricks of a world.
+/// A density as stored in a sample, in the dense field and in bricks alike.
 pub fn stored(distance: i32) -> i16 {
     distance.clamp(-i32::from(i16::MAX), i32::from(i16::MAX)) as i16
 }
 
 impl DenseField {
-    /// The ground's lattice points from y = 0 to the height of the cube, meshed once: all is allocated from the start.
+    /// The ground's lattice points from y = 0 to the height of the cube, meshed once, so that all buffers are
+    /// allocated.
     pub fn new(ground: &Ground) -> Result<Self, PaperError> {
         let side = ground.width() as usize + 1;
         let samples = Cube(side as i32).lines().map(|point| stored(ground.distance(point))).collect();
@@ -39,8 +40,8 @@ impl DenseField {
         Ok(())
     }
 
-    /// Edits the samples in the edit's reach and nothing else, then makes the whole mesh again. Says how many samples
-    /// changed.
+    /// Edits only the samples within the edit's reach, then rebuilds the whole mesh. Returns the number of changed
+    /// samples.
     pub fn edit(&mut self, brush: &Brush) -> Result<usize, PaperError> {
         let edit = Edit::quantize(brush)?;
         let changed = self.apply(&edit);
@@ -48,7 +49,7 @@ impl DenseField {
         Ok(changed)
     }
 
-    /// The rule by which a world's samples change as well.
+    /// Applies an edit by the same rule as a world does.
     fn apply(&mut self, edit: &Edit) -> usize {
         let Some(reach) = edit.reach().intersection(Cube(self.side as i32).points()) else { return 0 };
         let (evaluator, operation) = (edit.evaluator(), edit.operation());
@@ -86,7 +87,7 @@ impl DenseField {
         Cube(self.side as i32).lines().zip(self.samples.iter().copied())
     }
 
-    /// The mesh as it is now.
+    /// The current mesh.
     pub fn mesh(&self) -> &DenseMesh {
         &self.mesh
     }

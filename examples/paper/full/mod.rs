@@ -1,5 +1,4 @@
-//! The whole terrain as one field of marching cubes, as in the paper's Table 5: all of its mesh is made again at each
-//! edit.
+//! The whole terrain as one field of marching cubes, as in the paper's Table 5: each edit rebuilds the whole mesh.
 
 mod dense;
 mod world;
@@ -7,11 +6,11 @@ mod world;
 pub use dense::{DenseField, stored};
 pub use world::FullWorld;
 
-/// What the full field is meshed with.
+/// The mesher of the full field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// The hybrid's mesher, for the hybrid's vertices: integer positions, materials, the heightmap's normals where nothing
-    /// was edited.
+    /// The hybrid's mesher with the hybrid's vertices: integer positions, materials, and the heightmap's normals on
+    /// unedited ground.
     Same,
     /// The library's dense mesher: positions and gradient normals only.
     Bare,
@@ -20,7 +19,7 @@ pub enum Output {
 impl Output {
     pub const BOTH: [Self; 2] = [Self::Same, Self::Bare];
 
-    /// Its name in files and arguments.
+    /// The name in files and arguments.
     pub const fn key(self) -> &'static str {
         match self {
             Self::Same => "full_same_output",
@@ -28,7 +27,7 @@ impl Output {
         }
     }
 
-    /// Its name on the page.
+    /// The name in the document.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Same => "same output",

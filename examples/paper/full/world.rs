@@ -12,24 +12,24 @@ use glam::{IVec3, Vec3};
 use crate::edits::Scene;
 use crate::error::PaperError;
 
-/// Cells along a chunk's side: whole bricks, so that no block is cut in two.
+/// Cells along a chunk's side: a multiple of the brick size, so that no block is cut.
 const CHUNK_SIZE: u32 = 32;
 
-/// A terrain, and one vertex and one index buffer over all of it, none of which is left to the heightmap.
+/// A terrain with one vertex and one index buffer over all of it; no cell is drawn by the heightmap.
 pub struct FullWorld {
     terrain: Terrain,
-    /// Every cell of the world. The terrain's own mask has only those that were edited.
+    /// A mask of every cell of the world. The terrain's own mask only has edited cells.
     mask: Mask,
     /// Every block of the cube, by stacks, from below.
     blocks: Vec<Block>,
     mesher: Mesher,
-    /// The blocks' surfaces; their vertices are the vertex buffer.
+    /// The blocks' surfaces; their vertices form the vertex buffer.
     parts: Parts,
     indices: Vec<u32>,
 }
 
 impl FullWorld {
-    /// The ground from y = 0 to the height of the cube, meshed once: all is allocated from the start.
+    /// The ground from y = 0 to the height of the cube, meshed once, so that all buffers are allocated.
     pub fn new(scene: &Scene) -> Result<Self, PaperError> {
         let terrain = scene.terrain(CHUNK_SIZE)?;
         let mut full = Self {
@@ -44,7 +44,7 @@ impl FullWorld {
         Ok(full)
     }
 
-    /// The usual transaction, then the whole mesh again.
+    /// Runs the usual transaction, then rebuilds the whole mesh.
     pub fn edit(&mut self, brush: &Brush) -> Vec<Receipt> {
         let receipts = self.terrain.apply([brush]);
         self.remesh();
@@ -58,7 +58,7 @@ impl FullWorld {
         self.parts.clear();
         self.indices.clear();
         self.mesher.mesh(&view, &self.blocks, &mut self.parts);
-        // Parts count positions from their chunk and indices from their own first vertex.
+        // Each part's positions are relative to its chunk, and its indices to its own first vertex.
         let Parts { list, vertices, indices } = &mut self.parts;
         let (mut vertex, mut index) = (0, 0);
         for part in list {
@@ -73,12 +73,12 @@ impl FullWorld {
         self.terrain.world()
     }
 
-    /// Bytes of its ground and samples, with all that is kept besides.
+    /// Bytes of the world's ground, samples and derived data.
     pub fn memory(&self) -> Memory {
         self.terrain.memory()
     }
 
-    /// The vertex buffer, in 1/4096 voxel of the world.
+    /// The vertex buffer; positions in 1/4096 voxel.
     pub fn vertices(&self) -> &[Vertex] {
         &self.parts.vertices
     }
@@ -88,7 +88,7 @@ impl FullWorld {
         &self.indices
     }
 
-    /// A copy of both buffers.
+    /// A copy of both buffers as a mesh.
     pub fn mesh(&self) -> SurfaceMesh {
         let indices = Indices::new(self.vertices().len(), self.indices.clone());
         SurfaceMesh { vertices: self.vertices().to_vec(), indices }
@@ -99,7 +99,7 @@ impl FullWorld {
         size_of_val(self.vertices()) + size_of_val(self.indices())
     }
 
-    /// Is the mesh one closed surface?
+    /// Checks that the mesh is a closed surface.
     pub fn check_seams(&self) -> SeamReport {
         let mut checker = SeamChecker::default();
         checker.add(&self.mesh(), IVec3::ZERO);
@@ -107,7 +107,7 @@ impl FullWorld {
     }
 }
 
-/// All cells of the world: the mask of one that is painted all over.
+/// A mask of all cells: that of a world that is painted all over.
 fn whole_mask(scene: &Scene) -> Result<Mask, PaperError> {
     let mut painted = scene.terrain(CHUNK_SIZE)?;
     let (low, high) = scene.ground.height_range();

@@ -1,4 +1,4 @@
-//! What must hold for the figures to mean anything, run by run.
+//! Checks of each run, without which the figures would mean nothing.
 
 use std::fmt::Write;
 
@@ -30,7 +30,7 @@ pub fn checks(measurements: &Measurements) -> Table {
     table
 }
 
-/// What the comparison of full fields and hybrid found, in words.
+/// The comparison of full fields and hybrid, in words.
 pub fn agreement(measurements: &Measurements) -> String {
     let mut text = String::new();
     for (run, (ground, surface)) in Run::BOTH.into_iter().zip(measurements.agreement) {
@@ -59,7 +59,7 @@ pub fn agreement(measurements: &Measurements) -> String {
     text
 }
 
-/// What must hold and does not; nothing, if all is well.
+/// The failed checks; empty if all is well.
 pub fn faults(measurements: &Measurements) -> Vec<String> {
     let mut faults = Vec::new();
     for run in Run::BOTH {
@@ -72,7 +72,7 @@ pub fn faults(measurements: &Measurements) -> Vec<String> {
                     faults.push(format!("{name}: the seams have faults"));
                 }
             }
-            // An edit may fall on what another one of the same run made; not many do.
+            // An edit may coincide with an earlier one of the same run; only a few may.
             if measured.unchanged * 10 > measurements.setup.edits {
                 faults.push(format!("{name}: {} edits changed nothing", measured.unchanged));
             }

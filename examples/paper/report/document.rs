@@ -1,4 +1,4 @@
-//! The document: tables, ratios, checks and plots in one page of Markdown.
+//! The document: tables, ratios, checks and plots on one page of Markdown.
 
 use std::fmt::Write;
 
@@ -86,7 +86,7 @@ fn write(page: &mut String, measurements: &Measurements, machine: &Machine) -> s
     differences(page)
 }
 
-/// What stands behind the ratios of full field and hybrid.
+/// Background figures for the ratios of full field and hybrid.
 fn gains(page: &mut String, measurements: &Measurements) -> std::fmt::Result {
     for output in Output::BOTH {
         let Some(full) = measurements.get(Subject::Full(output), Run::Second) else { continue };
@@ -111,7 +111,7 @@ fn voxels(measurements: &Measurements) -> Option<&[u64]> {
     Some(&hybrid.first()?.voxels)
 }
 
-/// How large the edits are.
+/// The sizes of the edits.
 fn sizes(measurements: &Measurements) -> String {
     let tenths =
         |values: Vec<f64>| [0, 10, 50, 90, 100].map(|percent| stats::percentile_of(&values, percent));
@@ -236,7 +236,7 @@ fn scenarios(page: &mut String, measurements: &Measurements) -> std::fmt::Result
     writeln!(page, "{table}")
 }
 
-/// What is compared with what, for readers who want to know how fair it is.
+/// The differences between the compared programs, so that readers can judge the fairness of the comparison.
 fn differences(page: &mut String) -> std::fmt::Result {
     writeln!(
         page,

@@ -1,4 +1,4 @@
-//! The figures as files for other programs: each timing as CSV, everything that was concluded as JSON.
+//! The figures as files for other programs: every timing as CSV, all conclusions as JSON.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::measure::{Measured, Measurements};
 use crate::stats::Statistics;
 
-/// Every single timing: `test,run,repeat,edit,seconds,processor_seconds`.
+/// Every timing: `test,run,repeat,edit,seconds,processor_seconds`.
 pub fn timings(measurements: &Measurements) -> String {
     let mut csv = String::from("test,run,repeat,edit,seconds,processor_seconds\n");
     for measured in &measurements.measured {

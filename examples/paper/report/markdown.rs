@@ -1,4 +1,4 @@
-//! Tables in Markdown whose columns also line up on a terminal.
+//! Markdown tables whose columns also line up in a terminal.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ pub struct Table {
     pub title: String,
     pub header: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// A line below the table; none where it is empty.
+    /// A line below the table; omitted if empty.
     pub note: String,
 }
 
@@ -34,7 +34,7 @@ impl fmt::Display for Table {
         for (number, line) in lines().enumerate() {
             for (column, &width) in widths.iter().enumerate() {
                 let cell = line.get(column).map_or("", String::as_str);
-                // Names to the left, figures to the right.
+                // Names are left-aligned, figures right-aligned.
                 match column {
                     0 => write!(f, "| {cell:<width$} ")?,
                     _ => write!(f, "| {cell:>width$} ")?,
@@ -74,7 +74,7 @@ pub fn kilobytes(bytes: usize) -> String {
     format!("{} K", thousands(bytes.div_ceil(1024) as u64))
 }
 
-/// Three significant digits, more before the point.
+/// Three significant digits; all digits before the decimal point.
 pub fn significant(value: f64) -> String {
     match value.abs() {
         high if high >= 100.0 => format!("{value:.0}"),

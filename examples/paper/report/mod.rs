@@ -1,4 +1,4 @@
-//! What the measurements say: tables in the paper's shape, ratios against targets, a document, files.
+//! Reports of the measurements: tables in the paper's layout, ratios against targets, a document, files.
 
 mod checks;
 mod document;

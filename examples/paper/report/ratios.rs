@@ -1,4 +1,4 @@
-//! Ratios: what the paper concludes from its tables, and what this reproduction must reach.
+//! Ratios: the paper's conclusions from its tables, and the targets of this reproduction.
 
 use super::markdown::{Table, significant};
 use crate::backend::Backend;
@@ -13,7 +13,7 @@ use crate::stats::{self, Statistics};
 /// How many times faster an edit of the hybrid must be than one of the full field, in the median.
 pub const FASTER: f64 = 300.0;
 
-/// What a ratio must be here.
+/// The target of a ratio.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Target {
@@ -26,15 +26,15 @@ pub enum Target {
 pub struct Ratio {
     pub what: String,
     pub paper: Option<f64>,
-    /// From totals and averages, as the paper does it.
+    /// From totals and averages, as in the paper.
     pub here: Option<f64>,
-    /// The same with each edit's processor time, median of its repeats.
+    /// From processor time: the median of each edit's repeats.
     pub by_processor: Option<f64>,
     pub target: Option<Target>,
 }
 
 impl Ratio {
-    /// Is the target reached, by processor time where there is one? `None` without a target or a figure.
+    /// Whether the target is reached, by processor time if available. `None` without a target or a figure.
     pub fn is_met(&self) -> Option<bool> {
         let here = self.by_processor.or(self.here)?;
         Some(match self.target? {
@@ -44,7 +44,7 @@ impl Ratio {
     }
 }
 
-/// The average of an edit in two ways: of all timings, and of each edit's median in processor time.
+/// The average time of an edit in two ways: over all timings, and over each edit's median processor time.
 #[derive(Clone, Copy)]
 struct Averages {
     plain: f64,
@@ -60,12 +60,12 @@ impl Averages {
     }
 }
 
-/// Timings of the processes that played a run alone: seconds of each edit by repeat, and the same in processor time.
+/// Timings from the separate processes: seconds of each edit by repeat, and the same in processor time.
 pub fn alone(measured: &Measured, threads: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
     measured.alone.iter().map(|alone| both_clocks(&alone.laps, threads)).unzip()
 }
 
-/// Every ratio that the paper draws, and those that have a target.
+/// Every ratio in the paper, and those with a target.
 pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
     let cpu = |chunk_size| Subject::Hybrid { backend: Backend::Cpu, chunk_size };
     let averages = |subject, run| {
@@ -96,7 +96,7 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
         for output in Output::BOTH {
             ratios.push(divide(
                 format!("full over hybrid {chunk_size}, {}, total, second run", output.title()),
-                // The paper has one full field, whose output is that of its hybrid.
+                // The paper has a single full field, with the same output as its hybrid.
                 (output == Output::Same).then(|| paper_full / paper(Backend::Cpu, second, at).total),
                 averages(Subject::Full(output), second),
                 averages(cpu(chunk_size), second),
@@ -164,8 +164,7 @@ pub fn ratios(measurements: &Measurements) -> Vec<Ratio> {
     ratios
 }
 
-/// For each edit of the second run how many times longer one test takes than another, by its medians: of the time that
-/// passed, and of the processor's.
+/// For each edit of the second run, the ratio of its median times in two tests: by wall clock and by processor time.
 pub fn by_edit(measurements: &Measurements, above: Subject, below: Subject) -> Option<[Vec<f64>; 2]> {
     let (above, below) = (measurements.get(above, Run::Second)?, measurements.get(below, Run::Second)?);
     let divide = |of: fn(&Measured) -> &[Vec<f64>]| {

@@ -1,4 +1,4 @@
-//! How many times faster than re-meshing everything an edit is, by its size.
+//! The speedup of an edit over re-meshing everything, by the size of the edit.
 
 use super::markdown::{Table, significant, thousands};
 use super::ratios::by_edit;
@@ -10,10 +10,10 @@ use crate::published::CHUNK_SIZES;
 use crate::setup::Subject;
 use crate::stats;
 
-/// Into how many parts the edits are cut, from small to large.
+/// The number of parts into which the edits are divided, from small to large.
 const PARTS: usize = 5;
 
-/// Medians of the edits of each size, by processor time; `None` where one of the tests was not played.
+/// Medians of the edits in each part, by processor time; `None` if one of the tests was not played.
 pub fn by_size(measurements: &Measurements) -> Option<Table> {
     let chunk_size = CHUNK_SIZES[0];
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size };
@@ -42,7 +42,7 @@ pub fn by_size(measurements: &Measurements) -> Option<Table> {
     Some(table)
 }
 
-/// Edits by their voxels, from small to large, in parts of the same length or one more.
+/// Indices of the edits by number of voxels, from small to large, in parts of equal length or one more.
 pub fn parts(voxels: &[u64]) -> Vec<Vec<usize>> {
     let mut edits: Vec<usize> = (0..voxels.len()).collect();
     edits.sort_by_key(|&edit| voxels[edit]);

@@ -1,4 +1,4 @@
-//! Tables 1 to 5, the paper's figures and ours side by side.
+//! Tables 1 to 5, with the paper's figures and ours side by side.
 
 use super::markdown::{Table, kilobytes, thousands};
 use super::ratios::alone;
@@ -42,7 +42,7 @@ fn published_time(seconds: f64) -> String {
     format!("{seconds:.6}")
 }
 
-/// One digit more than the paper's: our times are shorter.
+/// One digit more than in the paper, as our times are shorter.
 fn time(seconds: f64) -> String {
     format!("{seconds:.7}")
 }
@@ -95,14 +95,14 @@ fn full(measurements: &Measurements) -> Table {
     table
 }
 
-/// What a column shows.
+/// The content of a column.
 enum Shown<'a> {
     Paper(Column),
     Here(&'a Measured),
     Nothing,
 }
 
-/// Puts in the rows that all tables share.
+/// Adds the rows that all tables share.
 fn fill(table: &mut Table, columns: &[Shown]) {
     for (name, published, measured) in ROWS {
         let figures = columns.iter().map(|column| match column {
@@ -114,7 +114,7 @@ fn fill(table: &mut Table, columns: &[Shown]) {
     }
 }
 
-/// A row of bytes, which the paper does not have.
+/// Adds a row of bytes, which the paper does not have.
 fn extra(table: &mut Table, name: &str, columns: &[Shown], bytes: impl Fn(&Ending) -> usize) {
     let figures = columns.iter().map(|column| match column {
         Shown::Here(here) => kilobytes(bytes(&here.ending)),
@@ -123,7 +123,7 @@ fn extra(table: &mut Table, name: &str, columns: &[Shown], bytes: impl Fn(&Endin
     table.row(std::iter::once(name.to_owned()).chain(figures));
 }
 
-/// How times are spread, in microseconds: what totals and averages do not tell.
+/// The distribution of times in microseconds, which totals and averages do not show.
 pub fn medians(measurements: &Measurements) -> Table {
     let header = [
         "us an edit",
