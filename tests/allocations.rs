@@ -30,7 +30,7 @@ fn blocks(world: &World) -> Vec<Block> {
 }
 
 #[test]
-fn meshing_takes_no_memory_once_it_is_warm() {
+fn repeated_meshing_does_not_allocate() {
     for seed in 0..20 {
         let terrain = worlds::random_world(&mut fastrand::Rng::with_seed(seed), seed);
         let (world, blocks) = (terrain.world(), blocks(terrain.world()));
@@ -47,7 +47,7 @@ fn meshing_takes_no_memory_once_it_is_warm() {
 }
 
 #[test]
-fn dense_meshing_takes_no_memory_once_it_is_warm() {
+fn repeated_dense_meshing_does_not_allocate() {
     let mut rng = fastrand::Rng::with_seed(1);
     let (mut mesher, mut mesh) = (DenseMesher::new(), DenseMesh::default());
     for size in [[40, 33, 20], [70, 9, 9], [5, 70, 8]] {
@@ -61,7 +61,7 @@ fn dense_meshing_takes_no_memory_once_it_is_warm() {
 }
 
 #[test]
-fn an_edit_takes_memory_for_what_it_leaves_behind() {
+fn the_allocations_of_an_edit_are_bounded() {
     let mut terrain =
         Terrain::new(worlds::real_ground(), &TerrainSettings::default()).expect("valid settings");
     let mut most = [0; 2];

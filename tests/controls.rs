@@ -279,7 +279,7 @@ fn without_rule_2_the_mask_leaves_holes() {
 }
 
 #[test]
-fn without_rule_3_the_ring_gapes() {
+fn without_rule_3_the_ring_has_gaps() {
     expect_open(Fault::StraightRing);
 }
 
@@ -299,7 +299,7 @@ fn a_complement_symmetric_case_table_leaves_holes() {
 }
 
 #[test]
-fn with_gradients_at_the_masks_border_shading_jumps_there() {
+fn gradient_normals_at_the_masks_border_make_shading_jump() {
     let terrain = control_world();
     let report = check(terrain.world(), &Plain::draw(terrain.world(), Fault::GradientNormals));
     // Only the shading is wrong.
@@ -328,7 +328,7 @@ fn rule_6_a_dig_leaves_the_deep_rock_alone() {
 }
 
 #[test]
-fn the_crate_draws_what_the_plain_rules_draw() {
+fn the_crate_draws_what_the_reference_draws() {
     for index in 0..worlds::world_count(60) {
         let terrain = worlds::random_world(&mut Rng::with_seed(1000 + index), index);
         let world = terrain.world();

@@ -161,7 +161,7 @@ fn two_runs_make_the_same_world_and_the_same_meshes() {
 }
 
 #[test]
-fn the_number_of_threads_does_not_show() {
+fn worlds_do_not_depend_on_the_number_of_threads() {
     let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
     for seed in 100..116 {
         let (ground, brushes) = random_script(seed);
@@ -182,7 +182,7 @@ fn the_number_of_threads_does_not_show() {
 }
 
 #[test]
-fn the_number_of_threads_does_not_show_in_what_is_refused_or_comes_off() {
+fn refusals_and_loose_pieces_do_not_depend_on_the_number_of_threads() {
     let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
     let (mut refused, mut loose) = (0, 0);
     for seed in 700..712 {
@@ -302,7 +302,7 @@ fn the_chunk_size_changes_neither_samples_nor_picture() {
 }
 
 #[test]
-fn the_chunk_size_does_not_show_in_what_is_refused_or_comes_off() {
+fn refusals_and_loose_pieces_do_not_depend_on_the_chunk_size() {
     let (mut refused, mut loose) = (0, 0);
     for seed in 600..612 {
         let script = HardScript::new(seed);
@@ -492,7 +492,7 @@ fn falling_script() -> Vec<Brush> {
 }
 
 #[test]
-fn worlds_meshes_and_loose_pieces_have_the_same_bits_on_every_machine() {
+fn worlds_meshes_and_loose_pieces_are_the_same_on_every_machine() {
     let ground = Arc::new(golden_ground());
     let mut found: Vec<(&str, u64)> = Vec::new();
 

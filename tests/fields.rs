@@ -273,7 +273,7 @@ fn samples_of_the_far_rim_belong_to_the_last_chunk() {
 }
 
 #[test]
-fn fields_keep_their_laws_whatever_is_dug() {
+fn field_invariants_hold_under_random_edits() {
     let mut merges = 0;
     for seed in 0..120 {
         let mut rng = Rng::with_seed(7000 + seed);
@@ -324,7 +324,7 @@ fn fields_keep_their_laws_whatever_is_dug() {
 }
 
 #[test]
-fn the_news_of_a_commit_are_the_difference_of_its_fields() {
+fn the_field_events_of_a_commit_are_the_difference_of_its_fields() {
     use bevy_burrow::terrain::FieldNews;
     use std::collections::BTreeMap;
 
@@ -386,7 +386,7 @@ fn the_news_of_a_commit_are_the_difference_of_its_fields() {
 }
 
 #[test]
-fn news_of_a_chain_of_merges_name_the_field_that_is_left() {
+fn a_chain_of_merges_reports_the_surviving_field() {
     use bevy_burrow::terrain::FieldNews;
 
     let mut terrain = level(64, 1, 10);

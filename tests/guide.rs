@@ -148,7 +148,7 @@ fn unknown_names(text: &str, makefile: &str, manifest: &str) -> Vec<String> {
 }
 
 #[test]
-fn links_lead_somewhere() {
+fn links_resolve() {
     let mut count = 0;
     for page in documents() {
         let text = read(&page);
@@ -190,7 +190,7 @@ fn pages_with_programs_are_documentation_tests() {
 }
 
 #[test]
-fn what_is_wrong_is_found() {
+fn broken_links_and_unknown_names_are_found() {
     let page = root().join("README.md");
     let text = "# A heading, with `code`\n[a](src) [b](nowhere.md) [c](#a-heading-with-code) [d](#none)\n`[e](no)`\n\
                 ```\n[f](no)\n```\n![g](docs/none.png) [h](CHANGELOG.md#changelog) [i](CHANGELOG.md#none) [j](https://k)";

@@ -131,7 +131,7 @@ fn everything(world: &World) -> LatticeBox {
 }
 
 #[test]
-fn pieces_are_those_of_brute_force() {
+fn pieces_equal_those_of_brute_force() {
     let (mut found, mut bounded) = (0, 0);
     for index in 0..world_count(1000) {
         let mut rng = Rng::with_seed(51_000 + index);
@@ -383,7 +383,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
 }
 
 #[test]
-fn what_falls_does_not_depend_on_how_edits_are_batched() {
+fn loose_pieces_do_not_depend_on_how_edits_are_batched() {
     let mut fallen = 0;
     for index in 0..world_count(60) {
         let mut rng = Rng::with_seed(53_000 + index);
@@ -418,7 +418,7 @@ fn what_falls_does_not_depend_on_how_edits_are_batched() {
 }
 
 #[test]
-fn adds_that_run_after_each_other_keep_what_was_dug_before_them() {
+fn dependent_adds_keep_the_digs_before_them() {
     let at = |x: f32, y: f32| Vec3::new(x, y, 20.0);
     let brushes = [
         Brush::dig(Shape::sphere(at(20.0, 10.0), 4.0)),
@@ -474,7 +474,7 @@ fn a_slab_falls_when_its_pillar_is_sawn_through() {
 }
 
 #[test]
-fn paint_and_add_cut_nothing_off_and_what_is_large_is_tied() {
+fn paint_and_add_cut_nothing_off_and_large_pieces_stay() {
     let mut terrain = table();
     terrain.set_loose(Some(LooseSettings { largest: 1000, crumbs: 1000, debris: 0 }));
     let hash = |terrain: &Terrain| terrain.world().hash();
@@ -494,7 +494,7 @@ fn paint_and_add_cut_nothing_off_and_what_is_large_is_tied() {
 }
 
 #[test]
-fn the_surface_connects_what_neighbours_do() {
+fn every_triangle_lies_within_one_component_of_its_cube() {
     // All corners that a triangle touches are connected within its cube by steps along solid corners.
     for (case, drawn) in cases::table().iter().enumerate() {
         let part = |corner: usize| {

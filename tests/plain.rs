@@ -49,7 +49,7 @@ fn blocks(world: &World) -> Vec<Block> {
 }
 
 #[test]
-fn every_block_has_the_bits_of_the_mesher_by_the_book() {
+fn every_block_equals_the_reference_meshers() {
     let count = worlds::world_count(200);
     let (mut triangles, mut parts, mut mesher) = (0, Parts::default(), Mesher::default());
     for seed in 0..count {

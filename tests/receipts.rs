@@ -274,7 +274,7 @@ fn every_brush_gets_its_receipt_in_order_and_under_its_tag() {
 }
 
 #[test]
-fn what_waits_gets_its_receipt_before_what_comes_later() {
+fn queued_edits_get_their_receipts_before_later_ones() {
     let ground = Ground::flat(40, 40, 10.0).expect("finite heights");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     let at = |x: f32| Shape::sphere(Vec3::new(x, 10.0, 20.0), 3.0);

@@ -43,7 +43,7 @@ fn drawn(world: &World) -> Vec<(Drawn, SurfaceMesh)> {
 }
 
 #[test]
-fn rules_for_what_nothing_is_made_of_are_refused() {
+fn rules_for_the_ground_placeholder_material_are_refused() {
     let ground = Ground::flat(32, 32, 10.0).expect("valid ground");
     let mut terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     let hard = DiggingRules::default().with_hardness(MaterialId(0), 100);
@@ -92,7 +92,7 @@ fn what_is_protected_or_unbreakable_stays() {
 }
 
 #[test]
-fn rules_that_are_against_nothing_change_nothing() {
+fn rules_that_refuse_nothing_change_nothing() {
     let (none, nowhere) = (DiggingRules::default, MaterialId(200));
     let far = LatticeBox::point(IVec3::new(3, 32_000, 3));
     // The first applies to every edit, the second to those of less than full power, the last to almost none.
@@ -136,7 +136,7 @@ fn boxes_of_no_account() -> Vec<LatticeBox> {
 }
 
 #[test]
-fn any_number_of_boxes_elsewhere_changes_nothing() {
+fn protected_boxes_elsewhere_change_nothing() {
     let protected = boxes_of_no_account();
     for seed in 300..300 + worlds::world_count(30) {
         let (ground, chunk_size, own, brushes) = script(seed);
@@ -159,7 +159,7 @@ fn any_number_of_boxes_elsewhere_changes_nothing() {
 }
 
 #[test]
-fn boxes_are_one_with_all_that_they_are_cut_into() {
+fn a_protected_box_equals_the_parts_that_it_is_cut_into() {
     for seed in 400..400 + worlds::world_count(20) {
         let (ground, chunk_size, rules, brushes) = script(seed);
         let cut = |own: &LatticeBox| own.points().map(LatticeBox::point).collect::<Vec<_>>();
@@ -174,7 +174,7 @@ fn boxes_are_one_with_all_that_they_are_cut_into() {
 }
 
 #[test]
-fn a_box_of_all_numbers_protects_everything() {
+fn a_box_over_the_whole_integer_range_protects_everything() {
     let all = LatticeBox { min: IVec3::MIN, max: IVec3::MAX };
     for seed in 500..510 {
         let (ground, chunk_size, _, brushes) = script(seed);
@@ -192,7 +192,7 @@ fn a_box_of_all_numbers_protects_everything() {
 }
 
 #[test]
-fn what_falls_takes_nothing_along_that_is_protected() {
+fn removing_a_loose_piece_changes_no_protected_sample() {
     let ground = Arc::new(Ground::flat(64, 64, 10.0).expect("valid"));
     let cuboid = |center: Vec3, half: Vec3| Brush::add(Shape::cuboid(center, half), MaterialId(2));
     let pillar = cuboid(Vec3::new(32.0, 14.0, 32.0), Vec3::new(1.2, 8.0, 1.2));
@@ -223,7 +223,7 @@ fn what_falls_takes_nothing_along_that_is_protected() {
 }
 
 #[test]
-fn hardness_has_two_ends() {
+fn hardness_and_power_have_their_documented_limits() {
     let ground = Arc::new(Ground::flat(40, 40, 20.5).expect("valid"));
     let dig = |power| Brush::dig(Shape::sphere(Vec3::new(20.0, 20.0, 20.0), 5.0)).with_power(power);
     let removed = |hardness, power| {
@@ -241,7 +241,7 @@ fn hardness_has_two_ends() {
 }
 
 #[test]
-fn under_rules_neither_batches_nor_threads_show() {
+fn results_under_rules_do_not_depend_on_batches_or_threads() {
     let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
     for seed in 200..200 + worlds::world_count(30) {
         let (ground, chunk_size, rules, brushes) = script(seed);
@@ -261,7 +261,7 @@ fn under_rules_neither_batches_nor_threads_show() {
 }
 
 #[test]
-fn a_weak_tool_takes_its_time_and_gets_there() {
+fn a_weak_tool_needs_more_digs_for_the_same_hole() {
     let ground = Arc::new(Ground::flat(64, 64, 30.25).expect("valid"));
     let shape = Shape::capsule(Vec3::new(28.0, 28.0, 32.0), Vec3::new(36.0, 22.0, 32.0), 5.0);
     let rules = DiggingRules::default().with_hardness(MaterialId(0), 120);
@@ -337,7 +337,7 @@ fn receipts_tell_what_was_refused_and_why() {
 }
 
 #[test]
-fn rules_can_be_taken_back() {
+fn rules_can_be_removed() {
     let ground = Arc::new(Ground::flat(40, 40, 10.0).expect("valid"));
     let mut terrain = terrain(&ground, 32, &DiggingRules::default().with_bedrock(100));
     let dig = Brush::dig(Shape::sphere(Vec3::new(20.0, 10.0, 20.0), 4.0));
@@ -354,7 +354,7 @@ fn rules_can_be_taken_back() {
 }
 
 #[test]
-fn what_is_built_on_ground_that_stays_is_dug_off_without_a_scar() {
+fn additions_on_protected_ground_are_dug_off_without_a_trace() {
     let ground = Arc::new(Ground::flat(32, 32, 19.9).expect("valid"));
     let below = LatticeBox::new(IVec3::new(0, -100, 0), IVec3::new(32, 19, 32)).expect("in order");
     let none = DiggingRules::default;

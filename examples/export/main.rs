@@ -161,8 +161,8 @@ fn read_ground(args: &Args) -> Result<Ground, ExportError> {
         .and_then(|image| Ground::from_image(&image, &scale))
         .map_err(|reason| ExportError::Heights { path: args.heights.clone(), reason })
 }
+
 /// Reads at most `limit` bytes of a file, so that endless ones end too; the decoder then reports that it is too large.
-/// Reads a file up to the limit and one byte more: the decoder then reports that it is too large.
 fn read_at_most(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(limit).read_to_end(&mut bytes)?;

@@ -285,7 +285,7 @@ fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_another_matter_than_bad_input() {
+fn an_unwritable_folder_has_another_exit_code_than_bad_input() {
     let desk = Desk::new();
     desk.put_hills();
     let edits = desk.put("edits.jsonl", DIG);

@@ -51,7 +51,7 @@ impl Drop for Desk {
 }
 
 #[test]
-fn a_seed_is_one_experiment() {
+fn a_seed_determines_the_experiment() {
     let scene = |seed| Scene::new(72, 30, seed).expect("valid hills");
     for run in Run::BOTH {
         assert_eq!(scene(7).brushes(run), scene(7).brushes(run));
@@ -113,7 +113,7 @@ fn the_papers_averages_are_hundredths_of_their_totals() {
 }
 
 #[test]
-fn every_run_changes_the_ground_and_ends_alike_in_all_chunk_sizes() {
+fn every_run_changes_the_ground_and_ends_equal_for_all_chunk_sizes() {
     let measurements = measurements();
     let mut hashes = Vec::new();
     for run in Run::BOTH {
@@ -174,7 +174,7 @@ fn the_full_field_draws_the_hybrids_triangles_and_is_closed() {
 }
 
 #[test]
-fn both_full_fields_have_a_triangle_for_a_triangle() {
+fn both_full_fields_have_the_same_number_of_triangles() {
     let scene = SMALL.scene().expect("valid hills");
     let mut field = DenseField::new(&scene.ground).expect("a cube");
     let mut full = FullWorld::new(&scene).expect("valid hills");
@@ -281,7 +281,7 @@ fn everything_is_written_and_published() {
 }
 
 #[test]
-fn the_process_knows_its_memory() {
+fn the_process_reports_its_memory() {
     let hybrid = Subject::Hybrid { backend: Backend::Cpu, chunk_size: 25 };
     for subject in Output::BOTH.map(Subject::Full).into_iter().chain([hybrid]) {
         let alone = Alone::here(subject, &SMALL).expect("a small experiment");

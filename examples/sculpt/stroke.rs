@@ -205,7 +205,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn undo_and_redo_are_where_the_layout_has_their_letters() {
+    fn undo_and_redo_follow_the_keyboard_layout() {
         let on = |key_code, text: &str| {
             let (logical_key, state, window) =
                 (Key::Character(text.into()), ButtonState::Pressed, Entity::PLACEHOLDER);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_ctrl_shift_z_counts_though_shift_was_let_go_of_first() {
+    fn ctrl_shift_z_works_again_after_shift_was_released_first() {
         let mut app = App::new();
         app.add_message::<KeyboardInput>().add_message::<PanelAction>().add_systems(Update, step);
         let mut keys = ButtonInput::<KeyCode>::default();

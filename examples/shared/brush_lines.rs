@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_of_the_encoding_is_no_part_of_the_first_line() {
+    fn a_byte_order_mark_is_skipped() {
         let script = format!("\u{feff}{DIG}\n\u{feff}# words\n");
         let lines: Vec<_> = Lines::new(script.as_bytes()).map(|line| line.expect("a good line")).collect();
         assert_eq!(lines, [(1, dig())]);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_not_be_read_ends_the_script() {
+    fn a_read_error_ends_the_script() {
         let mut lines = Lines::new(BufReader::new(Folder));
         assert!(matches!(lines.next(), Some(Err(Fault::End(_)))));
         assert!(lines.next().is_none());

@@ -33,7 +33,7 @@ fn evaluator() -> Evaluator {
 }
 
 #[test]
-fn a_point_of_any_numbers_has_a_sample() {
+fn every_lattice_point_has_a_sample() {
     let (terrain, evaluator) = (dug(), evaluator());
     let world = terrain.world();
     let (samples, ground, grid) = (world.samples(), world.ground(), world.grid());
@@ -59,7 +59,7 @@ fn a_point_of_any_numbers_has_a_sample() {
 }
 
 #[test]
-fn chunks_and_tiles_of_any_numbers_draw_something_or_nothing() {
+fn meshes_of_arbitrary_chunks_and_tiles_return() {
     let terrain = dug();
     let world = terrain.world();
     let grid = world.grid();
@@ -77,7 +77,7 @@ fn chunks_and_tiles_of_any_numbers_draw_something_or_nothing() {
 }
 
 #[test]
-fn boxes_of_any_numbers_hold_something_or_nothing() {
+fn queries_of_arbitrary_boxes_return() {
     let (mut terrain, evaluator) = (dug(), evaluator());
     terrain.apply([Brush::add(Shape::sphere(Vec3::new(7.0, 40.0, 6.0), 2.0), MaterialId(3))]);
     terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(2.0, 3.0, 2.0), 1.0)));

@@ -32,7 +32,7 @@ fn a_stale_commit_is_refused_and_loses_nothing() {
 }
 
 #[test]
-fn a_transaction_that_was_given_up_is_not_committed_beside_its_successor() {
+fn a_cancelled_transaction_is_not_committed_beside_its_successor() {
     let dig = |x: f32, tag: u64| Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 6.0), 2.0)).with_tag(tag);
     let mut terrain = small_terrain();
     terrain.submit(&dig(3.0, 1));
@@ -72,7 +72,7 @@ fn a_commit_of_another_terrain_is_refused() {
 }
 
 #[test]
-fn edits_that_were_given_up_are_queued_again_in_order() {
+fn cancelled_edits_are_queued_again_in_order() {
     let mut terrain = small_terrain();
     let tags = |terrain: &mut Terrain| -> Vec<u64> {
         let transaction = terrain.begin().expect("edits wait");

@@ -11,7 +11,7 @@ use crate::play::{any_brush, any_ground, any_place};
 use crate::worlds::{random_brush, random_ground, world_count};
 
 #[test]
-fn batches_and_threads_do_not_show() {
+fn results_do_not_depend_on_batches_or_threads() {
     let pools = [1, 3].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
     for seed in 0..world_count(30) / 3 {
         let run = |pool: &rayon::ThreadPool, batch: usize| {
@@ -40,7 +40,7 @@ fn batches_and_threads_do_not_show() {
 }
 
 #[test]
-fn memory_is_what_the_world_gives_back() {
+fn the_reported_memory_is_what_dropping_a_terrain_frees() {
     for seed in 0..24 {
         let mut rng = Rng::with_seed(seed);
         let (ground, chunk_size) = random_ground(&mut rng, seed);

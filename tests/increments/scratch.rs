@@ -10,7 +10,7 @@ use crate::witness::Witness;
 use crate::worlds::world_count;
 
 #[test]
-fn after_every_commit_all_is_as_if_made_from_scratch() {
+fn every_commit_equals_a_world_made_from_scratch() {
     for seed in 0..world_count(30) {
         let mut rng = Rng::with_seed(seed);
         let (ground, chunk_size) = any_ground(&mut rng, seed);
@@ -39,7 +39,7 @@ fn a_normal_that_only_changes_the_sign_of_its_zeros_is_redrawn() {
 }
 
 #[test]
-fn at_the_ends_of_the_lattice_all_is_as_if_made_from_scratch() {
+fn commits_at_the_ends_of_the_lattice_equal_worlds_made_from_scratch() {
     for (i, base) in [32_768.0, 32_767.5, 32_761.0, -32_768.0, -32_767.25, -32_760.0].into_iter().enumerate()
     {
         let mut rng = Rng::with_seed(i as u64);
@@ -52,7 +52,7 @@ fn at_the_ends_of_the_lattice_all_is_as_if_made_from_scratch() {
 }
 
 #[test]
-fn on_a_cliff_of_sixty_thousand_voxels_all_is_as_if_made_from_scratch() {
+fn commits_on_a_huge_cliff_equal_worlds_made_from_scratch() {
     for seed in 0..2 {
         let mut rng = Rng::with_seed(seed);
         let height = |x: i32, z: i32| if x + z > 9 { 30_000.5 } else { -30_000.25 - f64::from(z) };
@@ -69,7 +69,7 @@ fn on_a_cliff_of_sixty_thousand_voxels_all_is_as_if_made_from_scratch() {
 }
 
 #[test]
-fn large_brushes_over_small_ones_are_as_if_made_from_scratch() {
+fn large_brushes_over_small_ones_equal_worlds_made_from_scratch() {
     let mut rng = Rng::with_seed(7);
     let (ground, _) = any_ground(&mut rng, 2);
     let ground = Ground::from_fn(70, 60, |x, z| {

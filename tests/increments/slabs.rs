@@ -75,7 +75,7 @@ fn at(x: i32, y: f32, z: i32) -> Vec3 {
 }
 
 #[test]
-fn more_bricks_than_one_thread_looks_at_are_drawn_as_few_are() {
+fn more_bricks_than_one_slab_give_the_same_meshes() {
     // A row of balls from the first slab of bricks to the last; their ends lie at all offsets within a brick.
     for (shift, chunk_size) in [(0, 32), (3, 25)] {
         let height = |x: i32, z: i32| 20.0 + f64::from(x * 7 % 11 + z * 5 % 13) * 0.4;
@@ -105,7 +105,7 @@ fn more_bricks_than_one_thread_looks_at_are_drawn_as_few_are() {
 }
 
 #[test]
-fn more_bricks_than_one_batch_holds_are_what_few_are() {
+fn more_bricks_than_fit_into_one_batch_give_the_same_world() {
     // Columns of air that together form one hall of ten thousand bricks; some of them break through the surface.
     let height = |x: i32, z: i32| 39.0 + f64::from(x * z % 5) * 0.3;
     let ground = Ground::from_fn(268, 268, height).expect("finite heights");
@@ -122,7 +122,7 @@ fn more_bricks_than_one_batch_holds_are_what_few_are() {
 }
 
 #[test]
-fn edits_with_too_many_bricks_around_them_for_one_list_are_what_single_ones_are() {
+fn edits_near_too_many_bricks_for_one_list_equal_single_edits() {
     // Diagonal shafts in boxes of some 300,000 bricks, all through one place in the middle.
     let ground = Ground::flat(400, 400, 0.0).expect("valid");
     let shaft = |i: i32| {

@@ -52,7 +52,7 @@ fn a_falloff_wider_than_the_shape_is_deep_ends_in_its_middle() {
 }
 
 #[test]
-fn in_the_middle_of_a_soft_brush_all_of_the_change_is_made() {
+fn the_full_change_is_made_in_the_middle_of_a_soft_brush() {
     let at = |y: f32| Vec3::new(16.0, y, 16.0);
     let middle = IVec3::new(16, 10, 16);
     for (shape, outwards) in [

@@ -19,7 +19,7 @@ fn sleeps(stage: &Stage, body: Entity) -> bool {
 }
 
 #[test]
-fn a_sleeping_ball_falls_when_it_is_dug_away_under_it_and_others_sleep_on() {
+fn a_sleeping_ball_falls_when_its_ground_is_dug_and_others_keep_sleeping() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let near = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     let far = stage.ball(Vec3::new(27.0, 8.5, 27.0), 0.5, Vec3::ZERO);
@@ -34,7 +34,7 @@ fn a_sleeping_ball_falls_when_it_is_dug_away_under_it_and_others_sleep_on() {
 }
 
 #[test]
-fn who_sleeps_on_ground_that_goes_or_moves_is_woken() {
+fn bodies_sleeping_on_ground_that_is_removed_or_moved_are_woken() {
     let ways: [(&str, fn(&mut Stage, Entity)); 4] = [
         ("the terrain is despawned", |stage, terrain| {
             stage.app.world_mut().despawn(terrain);
@@ -66,7 +66,7 @@ fn who_sleeps_on_ground_that_goes_or_moves_is_woken() {
 }
 
 #[test]
-fn who_is_built_over_comes_out_on_top() {
+fn bodies_that_are_built_over_are_lifted_on_top() {
     let (mut stage, terrain) = Stage::with_ground(level(64, 1.0));
     let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     let person = stage.character(Vec3::new(21.0, 8.0, 22.0), Vec2::ZERO);
@@ -81,7 +81,7 @@ fn who_is_built_over_comes_out_on_top() {
 }
 
 #[test]
-fn who_is_built_over_in_part_is_not_squeezed_into_the_ground() {
+fn bodies_that_are_partly_built_over_are_not_squeezed_into_the_ground() {
     let mut rng = Rng::with_seed(5);
     let (mut stage, terrain) = Stage::with_ground(level(256, 1.0));
     let places = (0..20)
@@ -111,7 +111,7 @@ fn who_is_built_over_in_part_is_not_squeezed_into_the_ground() {
 }
 
 #[test]
-fn what_ground_lets_through_is_not_lifted_out_of_it() {
+fn bodies_that_do_not_collide_with_ground_are_not_lifted() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let ghosts = [20.0, 24.0].map(|x| {
         let ghost = stage.ball(Vec3::new(x, 7.4, 20.0), 0.5, Vec3::ZERO);
@@ -155,7 +155,7 @@ fn colliders_are_the_surface_that_the_model_has_at_every_scale() {
 }
 
 #[test]
-fn hidden_triangles_are_no_colliders() {
+fn colliders_only_have_drawn_triangles() {
     let (mut stage, terrain) = Stage::with_ground(level(48, 1.0));
     stage.dig([pit(16.0, 8.0, 16.0, 4.0), pit(30.0, 5.0, 24.0, 4.0)]);
     let drawn: usize = stage.terrain(terrain).world().drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
@@ -202,7 +202,7 @@ fn a_walker_climbs_steps_and_hills_and_stops_at_walls() {
 }
 
 #[test]
-fn a_walker_jumps_as_high_as_it_should_and_stands_still_when_told_nothing() {
+fn a_walker_jumps_to_its_jump_height_and_stands_still_without_input() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let person = stage.character(Vec3::new(20.0, 8.0, 10.0), Vec2::ZERO);
     stage.frames(seconds(1.0));
@@ -239,7 +239,7 @@ fn a_loose_piece_becomes_a_body_with_its_volume() {
 }
 
 #[test]
-fn what_is_dug_while_time_stands_still_does_not_pile_up() {
+fn edits_during_a_pause_do_not_pile_up() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     stage.frames(seconds(4.0));
@@ -259,7 +259,7 @@ fn what_is_dug_while_time_stands_still_does_not_pile_up() {
 }
 
 #[test]
-fn nobody_is_lifted_onto_ground_that_is_not_shown_yet() {
+fn no_body_is_lifted_onto_ground_that_is_not_shown_yet() {
     let (mut stage, entity) = Stage::with_ground(level(64, 1.0));
     let ball = stage.ball(Vec3::new(20.0, 8.5, 20.0), 0.5, Vec3::ZERO);
     stage.frames(4);
@@ -275,7 +275,7 @@ fn nobody_is_lifted_onto_ground_that_is_not_shown_yet() {
 }
 
 #[test]
-fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
+fn a_body_whose_colliders_are_outside_the_ground_is_not_lifted() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let rock = Shape::cuboid(Vec3::new(30.0, 9.5, 20.0), Vec3::splat(2.0));
     stage.dig([Brush::add(rock, MaterialId(2))]);
@@ -300,7 +300,7 @@ fn what_has_its_middle_in_the_ground_and_is_not_there_itself_is_not_lifted() {
 }
 
 #[test]
-fn who_is_put_into_the_ground_is_lifted_and_what_is_buried_on_purpose_stays() {
+fn bodies_put_into_the_ground_are_lifted_unless_buried_on_purpose() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     // In ground that never changed.
     let deep = |x: f32| Vec3::new(x, -30.0, 20.0);
@@ -314,7 +314,7 @@ fn who_is_put_into_the_ground_is_lifted_and_what_is_buried_on_purpose_stays() {
 }
 
 #[test]
-fn ground_that_changes_is_to_bodies_what_the_game_says_by_then() {
+fn changed_ground_uses_the_current_collision_settings_of_the_game() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let before = stage.ground();
     let plain = GroundContact::default();

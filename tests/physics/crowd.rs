@@ -151,13 +151,13 @@ impl Buried {
 }
 
 #[test]
-fn nobody_falls_through_ground_that_is_dug_and_built_under_a_crowd() {
+fn no_body_falls_through_ground_that_is_dug_and_built_under_a_crowd() {
     let figures = play(true);
     println!("{} were built over, or squeezed, and lifted", figures.lifted);
 }
 
 #[test]
-fn hardly_anybody_is_lifted_where_a_crowd_only_digs() {
+fn few_bodies_are_lifted_where_a_crowd_only_digs() {
     let figures = play(false);
     println!("{} got stuck in cracks, and were lifted", figures.lifted);
     assert!(figures.lifted <= crowd() as u64 / 20, "{} of {} were lifted", figures.lifted, crowd());

@@ -88,7 +88,7 @@ fn drawn(stage: &mut Stage) -> Vec<(Vec3, Entity)> {
 }
 
 #[test]
-fn a_piece_of_a_terrain_without_colours_is_drawn_all_the_same() {
+fn a_piece_of_a_terrain_without_colours_is_drawn() {
     let (mut stage, terrain) = furnish(Stage::with_meshes(), 1.0, Vec3::ZERO, 1e9);
     stage.send(saw(1.0, Vec3::ZERO));
     stage.frames_until("the saw cuts", |stage| stage.terrain(terrain).is_busy());
@@ -148,7 +148,7 @@ fn a_piece_is_drawn_in_the_frame_in_which_the_ground_loses_it() {
 }
 
 #[test]
-fn a_boulder_that_rolls_is_never_taken_for_one_in_the_ground() {
+fn a_rolling_boulder_does_not_count_as_buried() {
     let (mut stage, _) = stage(1.0, Vec3::ZERO, 1e9);
     // A boulder rounder than its bounding box, whose corners turn through the ground.
     stage.dig([Brush::add(Shape::sphere(SLAB + Vec3::new(0.0, 6.0, 0.0), 7.0), MaterialId(2))]);
@@ -160,7 +160,7 @@ fn a_boulder_that_rolls_is_never_taken_for_one_in_the_ground() {
 }
 
 #[test]
-fn what_fell_makes_room_for_ground_that_comes_back() {
+fn an_undo_removes_the_debris_of_restored_ground() {
     let (mut stage, _) = stage(1.0, Vec3::ZERO, 1e9);
     let hash = {
         let world = stage.app.world_mut();
@@ -176,7 +176,7 @@ fn what_fell_makes_room_for_ground_that_comes_back() {
 }
 
 #[test]
-fn debris_crumbles_in_its_time_and_goes_with_its_terrain() {
+fn debris_crumbles_after_its_time_and_is_despawned_with_its_terrain() {
     let (mut stage, terrain) = stage(1.0, Vec3::ZERO, 0.5);
     stage.dig([saw(1.0, Vec3::ZERO)]);
     stage.frames_until("it crumbles", |stage| stage.app.world().resource::<Crumbled>().0 == 1);

@@ -6,7 +6,7 @@ use bevy_burrow::physics::{CharacterSteering, EdgeWalls};
 use crate::stage::{STEP, Stage, level};
 
 #[test]
-fn nobody_walks_or_jumps_off_a_terrain_with_walls() {
+fn walkers_cannot_leave_a_terrain_with_walls() {
     for (side, size) in [(64, 1.0), (64, 0.5)] {
         let (mut stage, terrain) = Stage::with_ground(level(side, size));
         stage.app.world_mut().entity_mut(terrain).insert(EdgeWalls::default());

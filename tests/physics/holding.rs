@@ -42,7 +42,7 @@ fn get<C: Component + Clone>(stage: &Stage, body: Entity) -> Option<C> {
 }
 
 #[test]
-fn who_is_teleported_over_ground_without_colliders_is_held_before_the_next_step() {
+fn a_body_teleported_over_ground_without_colliders_is_held_before_the_next_step() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(256, 1.0));
     source(&mut stage, 40.0, 40.0);
@@ -73,7 +73,7 @@ fn who_is_teleported_over_ground_without_colliders_is_held_before_the_next_step(
 }
 
 #[test]
-fn axes_that_a_game_locks_or_frees_on_a_held_body_are_so_when_it_is_let_go() {
+fn axes_locked_or_freed_on_a_held_body_stay_so_after_its_release() {
     let locks: [Option<LockedAxes>; 2] = [Some(LockedAxes::ROTATION_LOCKED), None];
     for locked in locks {
         let (mut stage, ball) = held_ball();
@@ -94,7 +94,7 @@ fn axes_that_a_game_locks_or_frees_on_a_held_body_are_so_when_it_is_let_go() {
 }
 
 #[test]
-fn a_game_that_lets_go_of_a_held_body_leaves_no_axis_locked() {
+fn a_body_released_by_the_game_has_no_locked_axis() {
     let (mut stage, ball) = held_ball();
     stage.app.world_mut().entity_mut(ball).remove::<HeldByGround>();
     assert!(get::<LockedAxes>(&stage, ball).is_none());
@@ -107,7 +107,7 @@ fn a_game_that_lets_go_of_a_held_body_leaves_no_axis_locked() {
 }
 
 #[test]
-fn a_held_body_goes_on_with_the_velocity_that_the_game_gave_it() {
+fn a_released_body_has_the_velocity_that_the_game_gave_it() {
     let (mut stage, ball) = held_ball();
     let place = stage.place(ball);
     stage.app.world_mut().entity_mut(ball).insert(LinearVelocity(Vec3::X * 6.0));
@@ -131,14 +131,14 @@ fn asleep_on_the_way() -> (Stage, Entity) {
 }
 
 #[test]
-fn who_fell_asleep_while_it_was_held_goes_on_when_there_is_ground_where_it_was_going() {
+fn a_held_body_that_fell_asleep_continues_when_there_is_ground() {
     let (mut stage, ball) = asleep_on_the_way();
     source(&mut stage, 100.0, 120.0);
     stage.frames_until("it goes on", |stage| !stage.is_held(ball));
 }
 
 #[test]
-fn a_body_that_is_held_can_be_stopped_though_it_sleeps() {
+fn a_sleeping_held_body_can_be_stopped() {
     let (mut stage, ball) = asleep_on_the_way();
     let mut held = stage.app.world_mut().get_mut::<HeldByGround>(ball).expect("it is held");
     held.velocity = Vec3::ZERO;
@@ -147,7 +147,7 @@ fn a_body_that_is_held_can_be_stopped_though_it_sleeps() {
 }
 
 #[test]
-fn what_ground_lets_through_is_not_held() {
+fn bodies_that_do_not_collide_with_ground_are_not_held() {
     let (mut stage, solid) = held_ball();
     let ghosts = [20.0, 24.0, 28.0, 32.0].map(|x| stage.ball(Vec3::new(x, 8.6, 20.0), 0.5, Vec3::X * 2.0));
     let world = stage.app.world_mut();
@@ -178,7 +178,7 @@ fn on_an_arm(stage: &mut Stage, x: f32, arm: f32) -> Entity {
 }
 
 #[test]
-fn a_body_is_held_for_want_of_ground_below_its_colliders_wherever_it_is_itself() {
+fn a_body_is_held_if_ground_is_missing_below_its_colliders() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(256, 1.0));
     // Colliders up to x = 64.
@@ -211,7 +211,7 @@ fn a_held_source_gets_ground_below_all_of_its_colliders() {
 }
 
 #[test]
-fn a_held_body_that_moves_no_longer_by_itself_is_let_go() {
+fn a_held_body_that_is_no_longer_dynamic_is_released() {
     for kind in [RigidBody::Kinematic, RigidBody::Static] {
         let (mut stage, ball) = held_ball();
         let place = stage.place(ball);
@@ -228,7 +228,7 @@ fn a_held_body_that_moves_no_longer_by_itself_is_let_go() {
 }
 
 #[test]
-fn who_flies_into_a_hill_without_colliders_is_held_before_it() {
+fn a_body_flying_into_a_hill_without_colliders_is_held_before_it() {
     let mut stage = Stage::new();
     let mut terrain = level(256, 1.0);
     // The hill begins at x = 150, and is higher than the flight.
@@ -242,7 +242,7 @@ fn who_flies_into_a_hill_without_colliders_is_held_before_it() {
 }
 
 #[test]
-fn nobody_waits_for_ground_where_the_game_took_the_tile_away() {
+fn no_body_is_held_over_a_tile_that_the_game_despawned() {
     let (mut stage, ball) = held_ball();
     let tile = |stage: &mut Stage| {
         let world = stage.app.world_mut();
@@ -262,7 +262,7 @@ fn nobody_waits_for_ground_where_the_game_took_the_tile_away() {
 }
 
 #[test]
-fn on_a_server_that_keeps_bodies_out_of_the_hierarchy_they_are_held_and_lifted_too() {
+fn a_server_without_transforms_holds_and_lifts_bodies() {
     let mut app = App::new();
     let (position_to_transform, transform_to_position) = (false, false);
     app.insert_resource(PhysicsTransformConfig { position_to_transform, transform_to_position, ..default() });

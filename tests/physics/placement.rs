@@ -34,7 +34,7 @@ fn colliders_go_along_with_ground_that_turns_slowly() {
 }
 
 #[test]
-fn who_is_in_the_ground_comes_out_where_that_ground_has_its_air() {
+fn bodies_in_a_turned_terrain_are_lifted_along_its_up_axis() {
     for angle in [0.0, 0.6, FRAC_PI_2, PI] {
         let turn = Quat::from_rotation_z(angle);
         let mut stage = Stage::new();
@@ -52,7 +52,7 @@ fn who_is_in_the_ground_comes_out_where_that_ground_has_its_air() {
 }
 
 #[test]
-fn below_a_scaled_parent_sources_reach_as_far_and_bodies_are_held_as_high_up() {
+fn a_scaled_parent_changes_neither_the_reach_of_sources_nor_the_holding_of_bodies() {
     let mut stage = Stage::new();
     let world = stage.app.world_mut();
     let parent = world.spawn(Transform::from_scale(Vec3::splat(0.1))).id();
@@ -80,7 +80,7 @@ fn pushed(shape: &GroundShape, triangle: u32, normal: Vec3) -> Option<Vec3> {
 }
 
 #[test]
-fn a_scaled_shape_is_that_of_larger_voxels() {
+fn a_scaled_shape_equals_that_of_larger_voxels() {
     let mut terrain = level(32, 1.0);
     terrain.apply([pit(14.0, 8.0, 14.0, 4.3)]);
     let surface = terrain.world().tile_mesh(TilePos { x: 0, z: 0 });

@@ -68,7 +68,7 @@ fn a_body_without_ground_is_held_until_a_source_comes() {
 }
 
 #[test]
-fn a_source_that_races_along_never_leaves_its_body_without_ground() {
+fn a_fast_source_always_has_ground_below_its_body() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(512, 1.0));
     let ball = stage.ball(Vec3::new(10.0, 8.6, 250.0), 0.5, Vec3::X * 60.0);
@@ -82,7 +82,7 @@ fn a_source_that_races_along_never_leaves_its_body_without_ground() {
 }
 
 #[test]
-fn a_source_that_is_held_has_ground_made_where_it_was_going() {
+fn colliders_are_built_where_a_held_source_was_going() {
     // The ground that each needs next lies outside its radius: ahead, to both sides, or below its rim.
     let cases = [
         (Vec3::X * 60.0, 0.5, 1.0),
@@ -107,7 +107,7 @@ fn a_source_that_is_held_has_ground_made_where_it_was_going() {
 }
 
 #[test]
-fn edits_far_from_all_sources_are_there_when_one_comes() {
+fn edits_far_from_all_sources_have_colliders_when_a_source_comes() {
     let mut stage = Stage::new();
     let terrain = stage.app.world_mut().spawn(level(256, 1.0)).id();
     let source = stage
@@ -137,7 +137,7 @@ fn edits_far_from_all_sources_are_there_when_one_comes() {
 }
 
 #[test]
-fn what_is_dug_just_beyond_a_source_is_ground_for_those_who_are_there() {
+fn edits_just_outside_a_sources_radius_update_existing_colliders() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(256, 1.0));
     let place = Transform::from_xyz(56.0, 8.0, 40.0);
@@ -168,7 +168,7 @@ fn colliders_go_with_their_terrain() {
 }
 
 #[test]
-fn no_collider_is_of_ground_that_is_not_shown_yet() {
+fn no_collider_is_newer_than_the_shown_ground() {
     let (mut stage, entity) = Stage::with_ground(level(192, 1.0));
     for number in 0..6 {
         // A change made by the game is loaded in the background and shown once complete. Meanwhile a part loses its
@@ -208,7 +208,7 @@ fn a_collider_that_a_game_despawns_is_made_again() {
 }
 
 #[test]
-fn colliders_on_their_way_do_not_keep_the_world_from_being_edited_in_place() {
+fn pending_colliders_hold_no_reference_to_the_world() {
     let (mut stage, entity) = Stage::with_ground(level(256, 1.0));
     for _ in 0..8 {
         let bodies = stage.ground();
@@ -230,7 +230,7 @@ fn colliders_on_their_way_do_not_keep_the_world_from_being_edited_in_place() {
 }
 
 #[test]
-fn upkeep_looks_only_where_something_happens() {
+fn upkeep_visits_only_changed_places() {
     let mut stage = Stage::new();
     stage.app.world_mut().spawn(level(1024, 1.0));
     let place = |number: i32| {
@@ -262,7 +262,7 @@ fn upkeep_looks_only_where_something_happens() {
 }
 
 #[test]
-fn an_app_without_a_physics_engine_runs_all_the_same() {
+fn an_app_without_a_physics_engine_still_runs() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, BurrowPlugins, TerrainPhysicsPlugin))
         .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(STEP)));

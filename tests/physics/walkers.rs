@@ -25,7 +25,7 @@ fn a_walker_is_not_in_the_way_of_its_own_shield() {
 }
 
 #[test]
-fn a_trigger_over_a_step_is_nothing_to_stumble_on() {
+fn a_walker_ignores_a_trigger_over_a_step() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     for z in [20.0, 40.0] {
         let step = (Collider::cuboid(10.0, 1.0, 8.0), Transform::from_xyz(25.0, 7.8, z));
@@ -47,7 +47,7 @@ fn a_trigger_over_a_step_is_nothing_to_stumble_on() {
 }
 
 #[test]
-fn a_walker_takes_a_step_however_slow_it_is_and_comes_down_again() {
+fn a_walker_climbs_and_descends_a_step_at_any_speed() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let mut walkers = Vec::new();
     for (row, top) in [(15.0, 0.3), (30.0, 0.5), (45.0, 0.58)] {
@@ -77,7 +77,7 @@ fn a_walker_takes_a_step_however_slow_it_is_and_comes_down_again() {
 }
 
 #[test]
-fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
+fn a_walker_does_not_sink_when_the_ground_below_it_is_remeshed() {
     let (mut stage, _) = Stage::with_ground(level(160, 1.0));
     let start =
         |number: usize| Vec3::new(6.0 + 1.3 * (number % 4) as f32, 8.0, 6.5 + 6.1 * (number / 4) as f32);
@@ -101,7 +101,7 @@ fn a_walker_does_not_sink_where_the_ground_is_drawn_anew_below_it() {
 }
 
 #[test]
-fn a_walker_below_a_parent_walks_in_the_world() {
+fn a_walker_with_a_parent_walks_in_world_space() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let turned = Quat::from_rotation_y(1.2);
     let vehicle = Transform::from_xyz(12.0, 3.0, 7.0).with_rotation(turned).with_scale(Vec3::splat(2.0));
@@ -175,7 +175,7 @@ fn a_walker_that_is_given_another_character_keeps_its_feet_on_the_ground() {
 }
 
 #[test]
-fn who_becomes_a_walker_again_gets_its_capsule_again() {
+fn a_walker_whose_character_was_removed_gets_its_capsule_again() {
     let (mut stage, _) = Stage::with_ground(level(64, 1.0));
     let walker = stage.character(Vec3::new(20.0, 8.0, 30.0), Vec2::ZERO);
     stage.frames(2);

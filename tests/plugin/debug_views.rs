@@ -100,7 +100,7 @@ fn no_view_draws_more_lines_than_allowed() {
 }
 
 #[test]
-fn lines_go_with_their_terrain() {
+fn debug_lines_are_despawned_with_their_terrain() {
     let (mut stage, terrain) = dug_stage();
     switch(&mut stage, DebugView::Chunks, true);
     let other = stage.spawn_at(level(0.5), Vec3::new(200.0, 0.0, 0.0));

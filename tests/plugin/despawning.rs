@@ -25,7 +25,7 @@ fn assert_works(stage: &mut Stage) {
 }
 
 #[test]
-fn nothing_is_left_of_a_terrain_that_goes_with_a_transaction_under_way() {
+fn nothing_is_left_of_a_terrain_despawned_during_a_transaction() {
     let mut stage = Stage::drawing();
     for frames in 0..6 {
         let terrain = stage.show(steep());
@@ -42,7 +42,7 @@ fn nothing_is_left_of_a_terrain_that_goes_with_a_transaction_under_way() {
 }
 
 #[test]
-fn nothing_is_left_of_a_terrain_that_goes_while_it_loads() {
+fn nothing_is_left_of_a_terrain_despawned_while_it_loads() {
     let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 2, ..default() });
     for frames in 0..24 {
         let mut model = steep();
@@ -78,7 +78,7 @@ fn stage_that_leaves<M>(leave: impl IntoScheduleConfigs<bevy::ecs::system::Sched
 }
 
 #[test]
-fn a_terrain_may_go_in_the_frame_of_its_commit() {
+fn a_terrain_may_be_despawned_in_the_frame_of_its_commit() {
     let leave =
         leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
     let mut stage = stage_that_leaves(leave);
@@ -105,7 +105,7 @@ fn a_terrain_may_go_in_the_frame_of_its_commit() {
 }
 
 #[test]
-fn no_news_is_told_of_what_went_with_its_terrain() {
+fn no_event_is_triggered_for_entities_despawned_with_their_terrain() {
     let leave =
         leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
     let mut stage = stage_that_leaves(leave);
@@ -143,7 +143,7 @@ fn no_news_is_told_of_what_went_with_its_terrain() {
 }
 
 #[test]
-fn a_terrain_may_go_in_the_frame_that_would_show_it() {
+fn a_terrain_may_be_despawned_in_the_frame_that_would_show_it() {
     let mut stage = stage_that_leaves(leave.before_ignore_deferred(BurrowSystems::Load));
     for rest in [false, true] {
         stage.spawn(steep());
@@ -159,7 +159,7 @@ fn a_terrain_may_go_in_the_frame_that_would_show_it() {
 }
 
 #[test]
-fn a_terrain_may_go_in_the_frame_that_spawned_it() {
+fn a_terrain_may_be_despawned_in_the_frame_that_spawned_it() {
     let mut stage = stage_that_leaves(leave.before_ignore_deferred(BurrowSystems::Load));
     stage.frame();
     stage.spawn(steep());
@@ -170,7 +170,7 @@ fn a_terrain_may_go_in_the_frame_that_spawned_it() {
 }
 
 #[test]
-fn a_terrain_may_go_in_the_frame_of_a_brush() {
+fn a_terrain_may_be_despawned_in_the_frame_of_a_brush() {
     // The empty system makes Bevy apply the commit's commands before `leave`, and adds none itself.
     let leave =
         (|| (), leave).chain().after(BurrowSystems::Commit).before_ignore_deferred(BurrowSystems::Begin);
@@ -184,7 +184,7 @@ fn a_terrain_may_go_in_the_frame_of_a_brush() {
 }
 
 #[test]
-fn each_brush_of_a_terrain_that_goes_still_gets_its_receipt() {
+fn each_brush_of_a_despawned_terrain_gets_its_receipt() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
@@ -196,7 +196,7 @@ fn each_brush_of_a_terrain_that_goes_still_gets_its_receipt() {
 }
 
 #[test]
-fn a_tile_or_chunk_that_a_game_despawns_is_not_missed() {
+fn despawning_a_tile_or_chunk_causes_no_error() {
     let mut stage = Stage::drawing();
     stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
@@ -212,7 +212,7 @@ fn a_tile_or_chunk_that_a_game_despawns_is_not_missed() {
 }
 
 #[test]
-fn a_terrain_goes_with_all_its_children_when_a_system_despawns_it() {
+fn despawning_a_terrain_despawns_all_its_children() {
     let mut stage = Stage::drawing();
     stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
@@ -239,7 +239,7 @@ fn look_behind(
 }
 
 #[test]
-fn tiles_go_from_the_end_of_their_terrains_children() {
+fn tiles_are_despawned_from_the_end_of_their_terrains_children() {
     // Bevy searches the children from the end, so any other order is slow with thousands of them.
     let mut stage = Stage::drawing();
     stage.app.init_resource::<Behind>().add_observer(look_behind);

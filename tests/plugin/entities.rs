@@ -121,7 +121,7 @@ fn entities_are_those_of_the_model_after_every_commit() {
 }
 
 #[test]
-fn news_tell_what_happened_to_every_chunk_and_field() {
+fn events_report_every_change_of_chunks_and_fields() {
     let mut stage = listening(Stage::drawing());
     let terrain = stage.show(steep());
     assert_eq!(told(&mut stage), []);
@@ -219,7 +219,7 @@ fn two_pits_that_meet_become_one_field() {
 }
 
 #[test]
-fn a_terrain_that_was_dug_before_tells_its_chunks_and_fields_as_it_appears() {
+fn a_terrain_spawned_with_edits_reports_its_chunks_and_fields() {
     let mut model = steep();
     model.apply(random_brushes(23, 30));
     let mut stage = listening(Stage::drawing());
@@ -240,7 +240,7 @@ fn a_terrain_that_was_dug_before_tells_its_chunks_and_fields_as_it_appears() {
 struct Seen(usize);
 
 #[test]
-fn a_chunk_has_its_new_mesh_when_its_news_is_told() {
+fn a_chunk_has_its_new_mesh_when_its_event_is_triggered() {
     let mut stage = Stage::drawing();
     let see = |entity: Entity, drawn: &Query<&Mesh3d>, meshes: &Assets<Mesh>, seen: &mut Seen| {
         let mesh = drawn.get(entity).ok().and_then(|mesh| meshes.get(&mesh.0));
@@ -273,7 +273,7 @@ fn a_chunk_has_its_new_mesh_when_its_news_is_told() {
 }
 
 #[test]
-fn a_chunk_that_draws_nothing_any_more_keeps_its_entity_without_a_mesh() {
+fn a_chunk_that_becomes_empty_keeps_its_entity_without_a_mesh() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(level(1.0));
     // This chunk contains only a rock in the air.

@@ -179,7 +179,7 @@ impl bevy::asset::AssetLoader for Pictures {
 }
 
 #[test]
-fn pictures_of_a_game_stay_pictures() {
+fn a_games_own_images_still_load_as_images() {
     let folder = Folder::new("pictures");
     folder.put("colours.png", &png(image::RgbImage::new(4, 4).into()));
     let assets = AssetPlugin { file_path: folder.0.to_string_lossy().into_owned(), ..default() };

@@ -49,7 +49,7 @@ fn no_frame_of_500_brushes_shows_a_hole_and_each_brush_has_one_receipt_in_order(
 }
 
 #[test]
-fn a_single_swap_withheld_is_a_hole() {
+fn a_single_missing_mesh_swap_is_detected_as_a_hole() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(steep());
     let height = stage.terrain(terrain).world().height(24.0, 24.0).expect("inside the world") as f32;

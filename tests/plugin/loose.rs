@@ -19,7 +19,7 @@ fn saw() -> Brush {
 }
 
 #[test]
-fn what_breaks_off_is_told_with_its_mesh() {
+fn a_piece_that_breaks_off_is_reported_with_its_mesh() {
     let mut model = table();
     model.set_loose(Some(LooseGround { debris: 9000, ..default() }.into()));
     model.apply([saw()]);
@@ -54,7 +54,7 @@ fn what_breaks_off_is_told_with_its_mesh() {
 }
 
 #[test]
-fn a_game_that_edits_by_itself_finds_what_it_cuts_off_before_any_brush() {
+fn loose_pieces_of_a_games_own_edits_are_found_before_any_brush() {
     let loose = LooseGround { debris: 9000, ..default() };
     let spawns: [fn(&mut World, LooseGround) -> Entity; 3] = [
         |world, loose| world.spawn((table(), loose)).id(),

@@ -86,7 +86,7 @@ fn a_material_of_the_games_own_is_propagated() {
 }
 
 #[test]
-fn a_material_that_is_taken_off_a_terrain_is_taken_off_its_tiles() {
+fn a_material_removed_from_a_terrain_is_removed_from_its_tiles() {
     let mut stage = stage();
     let terrain = stage.show(level(1.0));
     let standard = add(&mut stage, StandardMaterial::default());
@@ -116,7 +116,7 @@ fn worn(stage: &Stage, piece: Entity) -> (Option<Handle<StandardMaterial>>, Opti
 }
 
 #[test]
-fn pieces_wear_what_their_terrain_wears() {
+fn pieces_have_the_material_of_their_terrain() {
     let mut stage = stage();
     let terrain = stage.show(level(1.0));
     let [first, second] = [(); 2].map(|()| add(&mut stage, StandardMaterial::default()));
@@ -132,7 +132,7 @@ fn pieces_wear_what_their_terrain_wears() {
 }
 
 #[test]
-fn a_piece_keeps_the_material_that_it_came_with_until_the_terrain_gets_another_one() {
+fn a_piece_keeps_its_own_material_until_the_terrains_material_changes() {
     let mut stage = stage();
     let terrain = stage.show(level(1.0));
     let [first, second, own] = [(); 3].map(|()| add(&mut stage, StandardMaterial::default()));
@@ -151,7 +151,7 @@ fn a_piece_keeps_the_material_that_it_came_with_until_the_terrain_gets_another_o
 }
 
 #[test]
-fn a_piece_that_comes_with_the_terrains_material_keeps_its_own() {
+fn a_piece_spawned_with_its_own_material_keeps_it() {
     let mut stage = stage();
     let terrain = stage.show(level(1.0));
     let [first, own] = [(); 2].map(|()| add(&mut stage, StandardMaterial::default()));

@@ -17,7 +17,7 @@ fn model(stage: &mut Stage, terrain: Entity) -> Mut<'_, Terrain> {
 }
 
 #[test]
-fn a_stroke_over_many_frames_is_one_step_whenever_its_transactions_are() {
+fn a_stroke_over_many_frames_and_transactions_is_one_undo_step() {
     for pause in [0, 1, 5] {
         let mut stage = Stage::drawing().hearing::<HistoryMoved>();
         let terrain = stage.show(steep());
@@ -63,7 +63,7 @@ fn brushes_of_one_frame_are_one_step_and_those_of_another_are_not() {
 }
 
 #[test]
-fn rules_bind_brushes_that_are_sent_after_them_and_no_others() {
+fn rules_apply_only_to_brushes_sent_after_them() {
     let mut stage = Stage::server();
     let terrain = stage.show(level(1.0));
     let rock = DiggingRules::default().with_bedrock(i32::MAX);
@@ -84,7 +84,7 @@ fn rules_bind_brushes_that_are_sent_after_them_and_no_others() {
 }
 
 #[test]
-fn too_much_at_once_is_answered_in_its_frame_and_a_player_is_heard_soon() {
+fn brushes_beyond_the_limit_are_refused_at_once_and_a_players_digs_are_applied() {
     let mut stage = Stage::server();
     let mut ground = steep();
     let limits = WorkLimits { transaction: 500, waiting: 5_000 };
@@ -133,7 +133,7 @@ fn shown(stage: &mut Stage) -> BTreeMap<Entity, u64> {
 }
 
 #[test]
-fn of_what_a_game_changes_by_itself_only_that_is_meshed_anew() {
+fn only_changed_parts_of_a_games_own_edits_are_meshed_again() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(steep());
     stage.send(dig(50.0, 8.0, 50.0, 4.0));
@@ -187,7 +187,7 @@ impl SurfaceProcessor for Faulty {
 }
 
 #[test]
-fn a_processor_that_panics_does_not_take_the_ground_along() {
+fn a_panicking_processor_does_not_stop_commits() {
     let mut stage = Stage::drawing();
     stage.app.world_mut().resource_mut::<SurfaceProcessors>().add(Faulty);
     let terrain = stage.show(steep());

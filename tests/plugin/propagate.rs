@@ -16,7 +16,7 @@ fn all_have(stage: &mut Stage, layer: Option<usize>) -> bool {
 }
 
 #[test]
-fn layers_are_handed_on_to_tiles_chunks_and_pieces() {
+fn layers_are_propagated_to_tiles_chunks_and_pieces() {
     let mut stage = Stage::drawing();
     let terrain = stage.spawn(steep());
     stage.app.world_mut().entity_mut(terrain).insert(RenderLayers::layer(2));
@@ -44,7 +44,7 @@ fn layers_are_handed_on_to_tiles_chunks_and_pieces() {
 }
 
 #[test]
-fn a_piece_that_comes_with_layers_keeps_them_and_other_terrains_have_their_own() {
+fn layers_of_a_pieces_own_are_kept_and_each_terrain_has_its_own() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(level(1.0));
     stage.app.world_mut().entity_mut(terrain).insert(RenderLayers::layer(2));

@@ -39,7 +39,7 @@ fn to_world(local: bevy::math::DVec3) -> Vec3 {
 }
 
 #[test]
-fn rays_in_world_space_meet_what_the_model_says() {
+fn rays_in_world_space_agree_with_the_model() {
     let (mut stage, terrain, model) = dug();
     let mut rng = Rng::with_seed(3);
     let (mut hits, mut inside) = (0, 0);
@@ -106,7 +106,7 @@ fn heights_and_spans_in_world_space_are_those_of_the_model() {
 }
 
 #[test]
-fn ground_is_ready_when_no_edit_is_on_its_way() {
+fn ground_is_ready_when_no_edit_is_pending() {
     let mut stage = Stage::drawing();
     let settings = TerrainSettings { chunk_size: 16, voxel_size: VOXEL };
     stage.spawn_at(Terrain::new(hills(), &settings).expect("valid settings"), PLACE);
@@ -158,7 +158,7 @@ fn turned() -> (Stage, Transform, Terrain) {
 }
 
 #[test]
-fn rays_meet_a_turned_terrain_where_it_is() {
+fn rays_hit_a_turned_terrain_where_it_is() {
     let (mut stage, place, model) = turned();
     let (mut hits, mut alike) = (0, 0);
     for index in 0..100 {
@@ -236,7 +236,7 @@ fn where_terrains_overlap_the_topmost_one_and_the_nearest_one_answer() {
 }
 
 #[test]
-fn no_ground_of_a_turned_terrain_is_ready_where_an_edit_is_on_its_way() {
+fn ground_of_a_turned_terrain_is_not_ready_where_an_edit_is_pending() {
     let mut stage = Stage::drawing();
     let place = Transform::from_rotation(Quat::from_rotation_y(std::f32::consts::FRAC_PI_4));
     stage.app.world_mut().spawn((crate::stage::level(1.0), place));
@@ -256,7 +256,7 @@ fn no_ground_of_a_turned_terrain_is_ready_where_an_edit_is_on_its_way() {
 }
 
 #[test]
-fn nothing_is_ready_without_a_terrain_nor_where_a_corner_is_no_number() {
+fn nothing_is_ready_without_a_terrain_or_for_nan_corners() {
     let mut stage = Stage::drawing();
     let everywhere = |terrains: &Terrains| terrains.is_ready(Vec3::NEG_INFINITY, Vec3::INFINITY);
     assert!(!ask(&mut stage, everywhere), "there is none");

@@ -159,7 +159,7 @@ fn a_bad_brush_among_good_ones_leaves_them_alone() {
 }
 
 #[test]
-fn a_dig_in_the_air_is_a_receipt_without_change() {
+fn a_dig_in_the_air_gets_a_receipt_without_change() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(level(1.0));
     let before = stage.hash(terrain);

@@ -29,7 +29,7 @@ fn a_model_that_the_game_edits_itself_is_shown_whole() {
 }
 
 #[test]
-fn while_a_world_is_loaded_again_the_old_one_is_shown_whole_and_ground_is_not_ready() {
+fn the_old_world_is_shown_whole_while_a_new_one_loads() {
     let mut stage = Stage::drawing().with_settings(BurrowSettings { loads_per_frame: 4, ..default() });
     let terrain = stage.show(steep());
     let mut model = stage.app.world_mut().get_mut::<Terrain>(terrain).expect("a terrain");
@@ -127,7 +127,7 @@ fn nothing_is_left_of_a_terrain_whose_component_is_removed() {
 }
 
 #[test]
-fn a_terrain_that_is_taken_off_in_the_middle_of_a_transaction_works_elsewhere() {
+fn a_terrain_removed_during_a_transaction_works_on_another_entity() {
     let mut stage = Stage::drawing();
     let first = stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0).with_tag(1));
@@ -153,7 +153,7 @@ fn a_terrain_that_is_taken_off_in_the_middle_of_a_transaction_works_elsewhere() 
 }
 
 #[test]
-fn terrains_that_change_places_in_the_middle_of_their_transactions_go_on() {
+fn terrains_swapped_during_their_transactions_continue() {
     let mut stage = Stage::drawing();
     let (first, second) = (stage.spawn(steep()), stage.spawn_at(level(1.0), Vec3::X * 500.0));
     stage.settle();
@@ -176,7 +176,7 @@ fn terrains_that_change_places_in_the_middle_of_their_transactions_go_on() {
 }
 
 #[test]
-fn a_terrain_that_is_put_elsewhere_keeps_the_size_of_its_voxels() {
+fn a_terrain_moved_to_another_entity_keeps_its_voxel_size() {
     let mut stage = Stage::drawing();
     let terrain = stage.show(level(0.5));
     stage.app.world_mut().entity_mut(terrain).insert(Transform::from_xyz(8.0, 0.0, 0.0));

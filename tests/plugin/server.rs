@@ -62,7 +62,7 @@ fn questions_are_answered_on_a_server_too() {
 }
 
 #[test]
-fn a_server_hears_of_a_chunk_that_is_dug_again() {
+fn a_server_is_notified_of_a_chunk_that_is_dug_again() {
     #[derive(Resource, Default)]
     struct Told(Vec<Entity>);
 

@@ -94,7 +94,7 @@ fn a_targeted_brush_changes_its_target_alone() {
 }
 
 #[test]
-fn a_brush_for_a_terrain_that_is_gone_is_refused() {
+fn a_brush_for_a_despawned_terrain_is_refused() {
     let (mut stage, first, second) = pair();
     stage.app.world_mut().despawn(second);
     let no_terrain = stage.app.world_mut().spawn_empty().id();
@@ -166,7 +166,7 @@ fn a_stretched_terrain_is_dug_where_brushes_are_in_the_world() {
 }
 
 #[test]
-fn a_terrain_that_refuses_a_brush_says_so_though_another_one_takes_it() {
+fn each_terrain_reports_its_own_refusal_of_a_brush() {
     let mut stage = Stage::drawing();
     let (coarse, fine) = (stage.spawn(level(1.0)), stage.spawn(level(0.5)));
     stage.settle();
@@ -180,7 +180,7 @@ fn a_terrain_that_refuses_a_brush_says_so_though_another_one_takes_it() {
 }
 
 #[test]
-fn a_brush_that_reaches_no_terrain_lies_outside_whatever_they_think_of_it() {
+fn a_brush_that_reaches_no_terrain_is_rejected_as_outside() {
     let (mut stage, ..) = pair();
     stage.send(dig(-500.0, 8.0, 30.0, 0.1));
     stage.frame();
@@ -193,7 +193,7 @@ fn a_brush_that_reaches_no_terrain_lies_outside_whatever_they_think_of_it() {
 struct Changes(Vec<Entity>);
 
 #[test]
-fn a_brush_does_not_count_as_a_change_of_terrains_that_it_does_not_reach() {
+fn a_brush_does_not_mark_terrains_out_of_reach_as_changed() {
     let (mut stage, first, second) = pair();
     stage.app.init_resource::<Changes>().add_systems(
         Last,

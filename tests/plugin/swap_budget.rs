@@ -38,7 +38,7 @@ fn dig_both(stage: &mut Stage, terrains: [Entity; 2], x: f32) -> u64 {
 }
 
 #[test]
-fn commits_over_the_budget_land_in_different_frames_each_whole() {
+fn commits_over_the_budget_are_shown_whole_in_different_frames() {
     let (mut stage, terrains) = pair(1);
     for round in 0..5 {
         assert_eq!(dig_both(&mut stage, terrains, 8.0 + 8.0 * round as f32), 1);
@@ -47,14 +47,14 @@ fn commits_over_the_budget_land_in_different_frames_each_whole() {
 }
 
 #[test]
-fn commits_within_the_budget_land_in_one_frame() {
+fn commits_within_the_budget_are_shown_in_one_frame() {
     let (mut stage, terrains) = pair(256);
     // In most rounds both transactions finish in time.
     assert!((0..5).any(|round| dig_both(&mut stage, terrains, 8.0 + 8.0 * round as f32) == 2));
 }
 
 #[test]
-fn terrains_that_are_dug_all_the_time_do_not_keep_another_one_waiting() {
+fn constantly_dug_terrains_do_not_starve_another_one() {
     for waiting in 0..3 {
         let mut stage = Stage::drawing().with_settings(BurrowSettings { swaps_per_frame: 1, ..default() });
         let terrains = [0.0, 1.0, 2.0].map(|index| {

@@ -87,7 +87,7 @@ fn columns_cross_what_is_drawn() {
 }
 
 #[test]
-fn what_is_solid_is_what_the_samples_say() {
+fn is_solid_agrees_with_the_samples() {
     let (mut points, mut solid) = (0, 0);
     for (name, terrain) in dug_worlds() {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(79));

@@ -6,7 +6,7 @@ use glam::DVec3;
 use crate::asked::small_terrain;
 
 #[test]
-fn numbers_that_mean_nothing_have_no_answer() {
+fn queries_with_non_finite_numbers_have_no_answer() {
     let terrain = small_terrain();
     let world = terrain.world();
     let (place, down) = (DVec3::new(20.5, 40.0, 15.2), DVec3::NEG_Y);
@@ -72,7 +72,7 @@ fn outside_the_world_there_is_nothing() {
 }
 
 #[test]
-fn numbers_of_any_size_end_in_an_answer() {
+fn queries_with_numbers_of_any_magnitude_return() {
     let terrain = small_terrain();
     let world = terrain.world();
     let tiny = f64::from_bits(1);

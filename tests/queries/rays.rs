@@ -215,7 +215,7 @@ fn rays_hit_what_is_drawn() {
 }
 
 #[test]
-fn only_the_direction_of_a_direction_counts() {
+fn the_length_of_a_direction_does_not_matter() {
     let terrain = small_terrain();
     let world = terrain.world();
     let mut rng = Rng::with_seed(9);
@@ -238,7 +238,7 @@ fn only_the_direction_of_a_direction_counts() {
 }
 
 #[test]
-fn rays_slip_through_no_edge() {
+fn rays_do_not_slip_through_edges() {
     let mut rays = 0;
     for (name, terrain) in dug_worlds().chain([("small".to_string(), small_terrain())]) {
         let (world, mut rng) = (terrain.world(), Rng::with_seed(12));

@@ -7,7 +7,7 @@ use glam::{IVec3, Vec3};
 use crate::asked::small_terrain;
 
 #[test]
-fn a_place_is_ready_unless_an_edit_is_on_its_way_to_it() {
+fn a_place_is_ready_unless_an_edit_is_pending_there() {
     let mut terrain = small_terrain();
     let around = |x: i32, y: i32, z: i32, by: i32| LatticeBox::point(IVec3::new(x, y, z)).grown(by);
     let (here, there) = (around(10, 10, 10, 3), around(35, 10, 25, 3));

@@ -38,7 +38,7 @@ fn nothing_changes_outside_the_shape() {
 }
 
 #[test]
-fn new_ground_is_what_lies_below_or_beside_it_or_what_it_is_told() {
+fn new_ground_has_the_material_below_or_beside_it_or_the_given_one() {
     let mut terrain = terrain(Ground::flat(64, 64, 20.0).expect("valid"));
     let half = Vec3::new(40.0, 2.0, 64.0);
     terrain.apply([Brush::paint(Shape::cuboid(Vec3::new(0.0, 19.0, 32.0), half), MaterialId(5))]);

@@ -47,7 +47,7 @@ fn a_cave_lowered_far_and_raised_again_is_as_large_as_before() {
 }
 
 #[test]
-fn a_pit_whose_ground_is_forgotten_is_filled_again_by_raising_on() {
+fn a_pit_lowered_beyond_the_stored_range_is_filled_by_further_raising() {
     let mut terrain = terrain(Ground::flat(64, 64, 20.0).expect("valid"));
     let shape = Shape::sphere(Vec3::new(32.0, 20.0, 32.0), 10.0);
     let (lower, raise) = (Brush::lower(shape, 50.0), Brush::raise(shape, 50.0));
@@ -138,7 +138,7 @@ fn check_strokes(rng: &mut Rng, terrain: &mut Terrain, is_natural: bool, found: 
 }
 
 #[test]
-fn what_was_lowered_or_raised_comes_back() {
+fn lower_and_raise_restore_each_other() {
     let mut found = Found::default();
     for seed in 0..world_count(60) {
         let mut rng = Rng::with_seed(seed);

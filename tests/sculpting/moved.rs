@@ -8,7 +8,7 @@ use glam::{IVec3, Vec3};
 use crate::measured::{CLOSE, assert_closed, bumpy, dug, heights, terrain};
 
 #[test]
-fn what_was_raised_and_lowered_again_is_as_it_was() {
+fn raising_and_lowering_restores_the_surface() {
     let mut rng = Rng::with_seed(8);
     for mut terrain in [terrain(bumpy(6.0)), dug(bumpy(3.0))] {
         let before = terrain.snapshot();

@@ -44,7 +44,7 @@ fn level_ground_is_smooth_at_the_rim_too() {
 }
 
 #[test]
-fn rules_hold_nothing_beyond_the_rim() {
+fn rules_do_not_apply_outside_the_world() {
     // Hard ground under a soft heap, and a protected box outside the world.
     let beyond = LatticeBox { min: IVec3::new(65, 0, 0), max: IVec3::new(90, 60, 64) };
     let rules = DiggingRules::default().with_hardness(MaterialId(0), 200).with_protected(beyond);
@@ -68,7 +68,7 @@ fn rules_hold_nothing_beyond_the_rim() {
 }
 
 #[test]
-fn nothing_comes_from_beyond_the_rim() {
+fn raise_and_lower_at_the_rim_use_no_samples_outside_the_world() {
     for x in PLACES {
         // In the middle of a pit's air, and of a tower.
         let air = world(x, |x| {

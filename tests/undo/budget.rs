@@ -13,7 +13,7 @@ use crate::state::State;
 use crate::worlds::{random_ground, world_count};
 
 #[test]
-fn history_takes_the_bytes_it_says_and_stays_within_its_budget() {
+fn history_takes_the_reported_bytes_and_stays_within_its_budget() {
     let mut full = 0;
     for index in 0..world_count(40) {
         let mut rng = Rng::with_seed(4200 + index);
@@ -62,7 +62,7 @@ fn uniform_bricks(world: &World) -> usize {
 }
 
 #[test]
-fn a_large_hole_and_its_filling_are_undone_and_cost_what_they_say() {
+fn undoing_a_large_hole_and_its_filling_takes_the_reported_memory() {
     let ground = Ground::from_fn(72, 70, |x, z| 40.0 + f64::from(x * 5 % 7 + z * 3 % 5) * 0.3);
     let mut terrain =
         Terrain::new(ground.expect("finite heights"), &TerrainSettings::default()).expect("valid settings");

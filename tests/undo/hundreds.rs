@@ -123,7 +123,7 @@ impl Walker {
 }
 
 #[test]
-fn five_hundred_edits_of_every_kind_are_undone_and_redone_to_the_bit() {
+fn five_hundred_edits_of_every_kind_are_undone_and_redone_exactly() {
     let starts: [Start; 2] = [(8, 128, 0, 530), (0, 8, 2, 500)];
     let mut account = Account::default();
     for start in starts {
@@ -142,7 +142,7 @@ fn five_hundred_edits_of_every_kind_are_undone_and_redone_to_the_bit() {
 }
 
 #[test]
-fn of_five_hundred_edits_a_tight_budget_keeps_the_last() {
+fn a_tight_budget_keeps_the_last_of_five_hundred_edits() {
     let starts: [(Start, usize); 2] = [((12, 25, 3, 511), 300_000), ((0, 8, 2, 500), 990_000)];
     let (mut account, mut lost) = (Account::default(), 0);
     for (start, budget) in starts {

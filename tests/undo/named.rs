@@ -15,7 +15,7 @@ fn level() -> Terrain {
 }
 
 #[test]
-fn steps_keep_their_place_among_brushes() {
+fn history_steps_keep_their_order_among_brushes() {
     let mut terrain = level();
     let pristine = terrain.world().hash();
     terrain.submit_undo();
@@ -57,7 +57,7 @@ fn edits_that_change_nothing_are_no_steps_and_leave_what_can_be_redone() {
 }
 
 #[test]
-fn a_step_that_is_given_up_is_not_lost() {
+fn a_cancelled_step_is_not_lost() {
     let mut terrain = level();
     let pristine = terrain.world().hash();
     terrain.apply([ball(10.0, 10.0, 10.0, 3.0)]);
@@ -78,7 +78,7 @@ fn a_step_that_is_given_up_is_not_lost() {
 }
 
 #[test]
-fn fields_come_back_under_their_names_and_new_ones_get_new_names() {
+fn restored_fields_keep_their_ids_and_new_fields_get_new_ids() {
     let mut terrain = level();
     let field = |terrain: &mut Terrain, brush: Brush| {
         terrain.apply([brush])[0].outcome.as_ref().expect("it reaches the world").chunks[0].field
@@ -106,7 +106,7 @@ fn fields_come_back_under_their_names_and_new_ones_get_new_names() {
 }
 
 #[test]
-fn answers_that_nobody_takes_do_not_pile_up() {
+fn unread_answers_do_not_pile_up() {
     let mut terrain = level();
     for _ in 0..70_000 {
         terrain.submit_undo();

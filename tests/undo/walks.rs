@@ -10,7 +10,7 @@ use crate::state::{Screen, State};
 use crate::worlds::{random_ground, world_count};
 
 #[test]
-fn walks_through_history_meet_the_states_that_were() {
+fn walks_through_history_restore_the_earlier_states() {
     let (mut moved, mut account) = (0, Account::default());
     for index in 0..world_count(60) {
         let mut rng = Rng::with_seed(4100 + index);
