@@ -84,7 +84,7 @@ impl Lattice for Borderless<'_> {
 }
 
 /// The reference implementation: draws a world cell by cell, as the rules are written.
-struct Plain<'a> {
+struct ReferenceMesher<'a> {
     view: WorldView<'a>,
     fault: Fault,
     /// Lowest and highest edited y of each column that has any.
@@ -92,7 +92,7 @@ struct Plain<'a> {
     triangles: Vec<[Vertex; 3]>,
 }
 
-impl<'a> Plain<'a> {
+impl<'a> ReferenceMesher<'a> {
     fn draw(world: &'a World, fault: Fault) -> Vec<[Vertex; 3]> {
         let mut edited: HashMap<Column, (i32, i32)> = HashMap::new();
         for (pos, brick) in world.bricks() {
@@ -101,23 +101,23 @@ impl<'a> Plain<'a> {
                 *range = (range.0.min(point.y), range.1.max(point.y));
             }
         }
-        let mut plain = Self { view: world.view(), fault, edited, triangles: Vec::new() };
+        let mut reference = Self { view: world.view(), fault, edited, triangles: Vec::new() };
         let grid = world.grid();
         for z in 0..grid.depth() {
             for x in 0..grid.width() {
                 let cell = Column::new(x, z);
-                if plain.is_volumetric(cell) {
-                    plain.march(cell, |_| true);
+                if reference.is_volumetric(cell) {
+                    reference.march(cell, |_| true);
                 } else {
                     let sheet = cell_sheet(world.ground(), cell);
                     if fault != Fault::HeightmapOnly {
-                        plain.march(cell, |y| !sheet.contains(&y));
+                        reference.march(cell, |y| !sheet.contains(&y));
                     }
-                    plain.heightmap_cell(cell);
+                    reference.heightmap_cell(cell);
                 }
             }
         }
-        plain.triangles
+        reference.triangles
     }
 
     fn is_sheet_edited(&self, columns: &[Column], of: &[Column]) -> bool {
@@ -256,13 +256,13 @@ fn control_world() -> Terrain {
 #[test]
 fn unbroken_rules_draw_a_flawless_world() {
     let terrain = control_world();
-    let report = check(terrain.world(), &Plain::draw(terrain.world(), Fault::None));
+    let report = check(terrain.world(), &ReferenceMesher::draw(terrain.world(), Fault::None));
     assert!(report.is_flawless(), "{report}");
 }
 
 fn expect_open(fault: Fault) {
     let terrain = control_world();
-    let report = check(terrain.world(), &Plain::draw(terrain.world(), fault));
+    let report = check(terrain.world(), &ReferenceMesher::draw(terrain.world(), fault));
     assert!(report.open > 0, "{fault:?} went unnoticed: {report}");
 }
 
@@ -301,7 +301,7 @@ fn a_complement_symmetric_case_table_leaves_holes() {
 #[test]
 fn gradient_normals_at_the_masks_border_make_shading_jump() {
     let terrain = control_world();
-    let report = check(terrain.world(), &Plain::draw(terrain.world(), Fault::GradientNormals));
+    let report = check(terrain.world(), &ReferenceMesher::draw(terrain.world(), Fault::GradientNormals));
     // Only the shading is wrong.
     assert!(report.is_closed() && report.first.is_empty(), "{report}");
     assert!(report.worst_normal_jump > 1.0, "gradients went unnoticed: {report}");
@@ -338,15 +338,20 @@ fn the_crate_draws_what_the_reference_draws() {
             triangle.map(|place| place.to_array())
         };
         let places = |triangle: [Vertex; 3]| triangle.map(|vertex| vertex.position);
-        let plain = Plain::draw(world, Fault::None).into_iter();
-        let mut plain: Vec<_> = plain.map(|triangle| canonical(places(triangle))).collect();
+        let reference = ReferenceMesher::draw(world, Fault::None).into_iter();
+        let mut reference: Vec<_> = reference.map(|triangle| canonical(places(triangle))).collect();
         let mut drawn = Vec::new();
         for (what, mesh) in world.drawn() {
             let origin = world.origin(what) * SNAP;
             drawn.extend(mesh.triangles().map(|t| canonical(t.map(|vertex| vertex.position + origin))));
         }
-        plain.sort_unstable();
+        reference.sort_unstable();
         drawn.sort_unstable();
-        assert!(plain == drawn, "world {index}: {} plain triangles, {} drawn", plain.len(), drawn.len());
+        assert!(
+            reference == drawn,
+            "world {index}: {} reference triangles, {} drawn",
+            reference.len(),
+            drawn.len()
+        );
     }
 }

@@ -12,7 +12,7 @@ use bevy_burrow::terrain::World;
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
-use worlds::{plainly_applied, random_brush, random_brush_at_a_face, random_ground};
+use worlds::{random_brush, random_brush_at_a_face, random_ground, reference_density};
 
 /// The difference of two worlds within a box, sample by sample.
 #[derive(Default, Debug)]
@@ -228,7 +228,7 @@ fn samples_farther_than_two_voxels_outside_a_shape_stay_as_they_are() {
                 near += 1;
                 untouched += usize::from(same);
                 // Near the shape, samples are exactly what the operation gives.
-                let expected = plainly_applied(&brush.operation, old.distance(point), outside);
+                let expected = reference_density(&brush.operation, old.distance(point), outside);
                 let stored = expected.clamp(-32_767, 32_767);
                 let unedited = !new.is_edited(point) && new.distance(point) == expected;
                 assert!(unedited || new.distance(point) == stored, "world {seed}: {point} of {brush:?}");

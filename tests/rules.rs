@@ -120,7 +120,7 @@ fn rules_that_refuse_nothing_change_nothing() {
 }
 
 /// Boxes that protect no existing ground: far away, outside the world, inverted, and at the limits of the integers.
-fn boxes_of_no_account() -> Vec<LatticeBox> {
+fn boxes_without_effect() -> Vec<LatticeBox> {
     let far = |i: i32| LatticeBox::point(IVec3::new(i % 100 - 50, 20_000 + i, i / 10 - 50)).grown(i % 7);
     let (low, high) = (IVec3::MIN, IVec3::MAX);
     let strange = [
@@ -137,7 +137,7 @@ fn boxes_of_no_account() -> Vec<LatticeBox> {
 
 #[test]
 fn protected_boxes_elsewhere_change_nothing() {
-    let protected = boxes_of_no_account();
+    let protected = boxes_without_effect();
     for seed in 300..300 + worlds::world_count(30) {
         let (ground, chunk_size, own, brushes) = script(seed);
         // Without other rules, and in addition to rules that matter.
@@ -213,7 +213,7 @@ fn removing_a_loose_piece_changes_no_protected_sample() {
     };
     // Air next to the slab, among a thousand boxes far away.
     let beside = LatticeBox::new(IVec3::new(39, 18, 20), IVec3::new(42, 26, 44)).expect("not empty");
-    let rules = DiggingRules { protected: boxes_of_no_account(), ..Default::default() };
+    let rules = DiggingRules { protected: boxes_without_effect(), ..Default::default() };
     let (changed, fates) = fall(rules.clone(), beside);
     assert!(changed > 50 && fates == [PieceFate::Removed]);
     assert_eq!(fall(rules.clone().with_protected(beside), beside), (0, vec![PieceFate::Removed]));

@@ -48,13 +48,13 @@ struct Engines {
 
 /// Which engine.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Who {
+enum EngineKind {
     Cpu,
     Cuda,
     Auto,
 }
 
-impl Who {
+impl EngineKind {
     const ALL: [Self; 3] = [Self::Cpu, Self::Cuda, Self::Auto];
 
     const fn name(self) -> &'static str {
@@ -67,13 +67,20 @@ impl Engines {
     ///
     /// # Panics
     /// Panics if the card left any stage to the CPU, whose time would then count as the card's.
-    fn run(&self, transaction: Transaction, who: Who, times: &mut Times) -> Commit {
+    fn run(&self, transaction: Transaction, who: EngineKind, times: &mut Times) -> Commit {
         let engine = [&self.cpu, &self.cuda, &self.auto][who as usize];
         let commit = transaction.run_on(engine);
         let choices = engine.figures().choices;
-        assert!(who == Who::Cpu || matches!(engine.state(), EngineState::Cuda(_)), "{:?}", engine.state());
+        assert!(
+            who == EngineKind::Cpu || matches!(engine.state(), EngineState::Cuda(_)),
+            "{:?}",
+            engine.state()
+        );
         let is_there = |choice: &Choice| choice.is_cuda || choice.amount == 0;
-        assert!(who != Who::Cuda || choices.iter().all(is_there), "the CPU did the card's work: {choices:?}");
+        assert!(
+            who != EngineKind::Cuda || choices.iter().all(is_there),
+            "the CPU did the card's work: {choices:?}"
+        );
         times.push(&commit.stages, &choices);
         commit
     }
@@ -84,7 +91,7 @@ impl Engines {
         &self,
         terrain: &mut Terrain,
         brushes: impl IntoIterator<Item = Brush>,
-        who: Who,
+        who: EngineKind,
         times: &mut Times,
     ) -> f64 {
         terrain.submit_all(brushes);
@@ -210,7 +217,7 @@ fn bulk(engines: &Engines, are_rough: bool) {
     for round in 0..12 {
         let mut hashes = Vec::new();
         let mut wholes = [[0.0; 2]; 2];
-        let mut contenders = [(Who::Cpu, &mut cpu), (Who::Cuda, &mut cuda)];
+        let mut contenders = [(EngineKind::Cpu, &mut cpu), (EngineKind::Cuda, &mut cuda)];
         contenders.rotate_left(round % 2);
         for (who, times) in contenders {
             let mut terrain = level.terrain();
@@ -280,15 +287,15 @@ fn one_field(engines: &Engines) {
         for round in 0..30 {
             let mut discarded = [(); 3].map(|()| Times::default());
             let kept = if round < 6 { &mut discarded } else { &mut samples };
-            let dig_all = |who: Who, times: &mut Times| {
+            let dig_all = |who: EngineKind, times: &mut Times| {
                 let mut terrain = level::one_field(size, round);
                 drop(engines.run(terrain.begin().expect("a brush waits"), who, times));
             };
             for who in turns(round as usize) {
                 match who {
-                    0 => one.install(|| dig_all(Who::Cpu, &mut kept[0])),
-                    1 => dig_all(Who::Cpu, &mut kept[1]),
-                    _ => dig_all(Who::Cuda, &mut kept[2]),
+                    0 => one.install(|| dig_all(EngineKind::Cpu, &mut kept[0])),
+                    1 => dig_all(EngineKind::Cpu, &mut kept[1]),
+                    _ => dig_all(EngineKind::Cuda, &mut kept[2]),
                 }
             }
         }
@@ -306,13 +313,13 @@ fn brush(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
     for (round, at) in landscape::Places::new(600).iter().enumerate() {
         for who in turns(round) {
             let (mut discarded, terrain) = (Times::default(), &mut terrains[who]);
-            engines.play(terrain, [dig(at, 4.0)], Who::ALL[who], &mut discarded);
+            engines.play(terrain, [dig(at, 4.0)], EngineKind::ALL[who], &mut discarded);
             let kept = if round < 102 { &mut discarded } else { &mut times[who] };
-            engines.play(terrain, [brush(at + Vec3::splat(2.0), 4.0)], Who::ALL[who], kept);
+            engines.play(terrain, [brush(at + Vec3::splat(2.0), 4.0)], EngineKind::ALL[who], kept);
         }
     }
     assert_same(&terrains);
-    for (who, times) in Who::ALL.into_iter().zip(&times) {
+    for (who, times) in EngineKind::ALL.into_iter().zip(&times) {
         times.print(who.name());
     }
 }
@@ -340,7 +347,7 @@ fn sweep(engines: &Engines, brush: fn(Vec3, f32) -> Brush) {
             for who in turns(round) {
                 let mut discarded = Times::default();
                 let kept = if round < 6 { &mut discarded } else { &mut times[who] };
-                taken[who] = engines.play(&mut terrains[who], brushes(), Who::ALL[who], kept);
+                taken[who] = engines.play(&mut terrains[who], brushes(), EngineKind::ALL[who], kept);
             }
             blocks = engines.auto.figures().choices.back().map_or(blocks, |choice| choice.amount);
             if round >= 6 {

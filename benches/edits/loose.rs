@@ -27,11 +27,11 @@ const CUT: f32 = 3.0;
 /// The height of bodies above the ground under their necks.
 const LIFT: f32 = 26.0;
 
-/// The index in [`looks`] of the setting that reports pieces, and leaves them where they are.
+/// The index in [`searches`] of the setting that reports pieces, and leaves them where they are.
 const REPORTED: usize = 1;
 
 /// The search settings that are compared, from no search on.
-fn looks() -> [(&'static str, Option<LooseSettings>); 3] {
+fn searches() -> [(&'static str, Option<LooseSettings>); 3] {
     [
         ("nobody looks", None),
         ("reported", Some(LooseSettings::default())),
@@ -112,13 +112,13 @@ fn bring_back(terrain: &mut Terrain, hash: u64) {
 
 /// Does the same digs with every setting in turns, and prints the time of each and the cost of the search.
 fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
-    let (looks, before) = (looks(), terrain.world().hash());
-    let mut played = looks.map(|_| Played::default());
+    let (searches, before) = (searches(), terrain.world().hash());
+    let mut played = searches.map(|_| Played::default());
     let (mut dug, mut found) = (Sample::default(), Sample::default());
     // Each setting digs at other places within a turn, so that none profits from caches that another has just warmed.
-    let first = |look: usize| look * digs.len() / looks.len();
+    let first = |look: usize| look * digs.len() / searches.len();
     for turn in 0..digs.len() {
-        for (look, (_, settings)) in looks.iter().enumerate() {
+        for (look, (_, settings)) in searches.iter().enumerate() {
             terrain.set_loose(*settings);
             let applied = played[look].play(terrain, &digs[(turn + first(look)) % digs.len()]);
             dug.push(applied.removed.total() as f64);
@@ -138,7 +138,7 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
         bring_back(terrain, before);
     }
 
-    for ((look, _), played) in looks.iter().zip(&played) {
+    for ((look, _), played) in searches.iter().zip(&played) {
         stages::row(&format!("{name}: {look}"), played);
     }
     // In the order of the digs.
@@ -149,7 +149,7 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
         times
     };
     let alone = times(0);
-    for (look, (what, _)) in looks.iter().enumerate().skip(1) {
+    for (look, (what, _)) in searches.iter().enumerate().skip(1) {
         let own = times(look);
         let pairs = || own.iter().zip(&alone);
         let more: Sample = pairs().map(|(with, without)| (with - without) * 1e6).collect();

@@ -43,7 +43,7 @@ use check::Finding;
 use fields::{Border, Field};
 use table::{Input, Row};
 use targets::Target;
-use timing::Patience;
+use timing::RoundLimits;
 
 /// Times dense meshing on the same grids, ours beside public crates.
 #[derive(Parser)]
@@ -158,16 +158,16 @@ fn check_streams(args: &Args) -> bool {
 }
 
 fn time_grids(args: &Args) -> Vec<Row> {
-    let patience = if args.quick {
-        Patience { least: 5, most: 21, budget: Duration::from_millis(300) }
+    let limits = if args.quick {
+        RoundLimits { least: 5, most: 21, budget: Duration::from_millis(300) }
     } else {
-        Patience { least: 15, most: 201, budget: Duration::from_secs(4) }
+        RoundLimits { least: 15, most: 201, budget: Duration::from_secs(4) }
     };
     let mut all = Vec::new();
     for &field in &args.fields {
         for &size in &args.sizes {
             let grid = field.grid(size, Border::Cut);
-            let times = timing::one_grid(&mut registry::all(), &grid, patience);
+            let times = timing::one_grid(&mut registry::all(), &grid, limits);
             let rows = table::rows(field, Input::Grid(size), grid.cells(), &times);
             print!("{}", table::print(&rows, grid.cells()));
             all.extend(rows);

@@ -59,7 +59,7 @@ impl Times {
 
 /// How long a grid is timed.
 #[derive(Clone, Copy)]
-pub struct Patience {
+pub struct RoundLimits {
     /// Minimum number of rounds.
     pub least: usize,
     /// Maximum number of rounds.
@@ -86,14 +86,14 @@ fn turns(contenders: usize, round: usize) -> impl Iterator<Item = usize> {
 
 /// Times one grid repeatedly. Each call is made twice and the second one is timed, so that no contender pays for
 /// caches that another has filled.
-pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, patience: Patience) -> Vec<Times> {
+pub fn one_grid(contenders: &mut [Box<dyn Contender>], grid: &Grid, limits: RoundLimits) -> Vec<Times> {
     let mut times: Vec<Times> = contenders.iter().map(|contender| Times::new(&**contender)).collect();
     for contender in contenders.iter_mut() {
         contender.load(grid);
     }
     let start = Instant::now();
-    for round in 0..patience.most {
-        if round >= patience.least && start.elapsed() > patience.budget {
+    for round in 0..limits.most {
+        if round >= limits.least && start.elapsed() > limits.budget {
             break;
         }
         for turn in turns(contenders.len(), round) {

@@ -17,9 +17,9 @@ use crate::{Args, export};
 const DIG: &str = r#"{"shape":"sphere","center":[9,30,9],"radius":4,"op":"dig"}"#;
 
 /// A temporary folder that is removed when dropped.
-struct Desk(PathBuf);
+struct TempFolder(PathBuf);
 
-impl Desk {
+impl TempFolder {
     fn new() -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -68,7 +68,7 @@ impl Desk {
     }
 }
 
-impl Drop for Desk {
+impl Drop for TempFolder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -128,9 +128,9 @@ impl Obj {
 #[test]
 fn every_edge_of_the_mesh_joins_two_triangles() {
     for (chunk_size, batch) in [("8", "1"), ("25", "3"), ("32", "100")] {
-        let desk = Desk::new();
-        desk.put_hills();
-        let edits = desk.put(
+        let temp = TempFolder::new();
+        temp.put_hills();
+        let edits = temp.put(
             "edits.jsonl",
             r#"# A pit over a chunk corner, a tunnel, a bridge, a turned box, a cone at the rim, paint, and a cave.
 {"shape":"sphere","center":[8,32,8],"radius":5,"op":"dig"}
@@ -143,8 +143,8 @@ fn every_edge_of_the_mesh_joins_two_triangles() {
 {"shape":"sphere","center":[12,12,25],"radius":4,"op":"dig","roughness":{"amplitude":1,"scale":3,"seed":1},"tag":7}"#,
         );
         let report =
-            desk.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
-        let mesh = desk.mesh();
+            temp.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
+        let mesh = temp.mesh();
         assert_eq!(mesh.loose_edges(40.0, 33.0), Vec::<[[f64; 3]; 2]>::new(), "chunk size {chunk_size}");
         assert_eq!(report["seams"]["flawless"], true);
         assert_eq!(report["seams"]["triangles"], mesh.triangles.len());
@@ -159,10 +159,10 @@ fn every_edge_of_the_mesh_joins_two_triangles() {
 
 #[test]
 fn the_checker_finds_a_missing_triangle() {
-    let desk = Desk::new();
-    desk.put_hills();
-    desk.run(&desk.put("edits.jsonl", DIG), &[]).expect("a good script");
-    let mut mesh = desk.mesh();
+    let temp = TempFolder::new();
+    temp.put_hills();
+    temp.run(&temp.put("edits.jsonl", DIG), &[]).expect("a good script");
+    let mut mesh = temp.mesh();
     let inner =
         |triangle: &[usize; 3]| triangle.iter().all(|&index| (5.0..28.0).contains(&mesh.places[index][0]));
     let at = mesh.triangles.iter().rposition(inner).expect("an inner triangle");
@@ -172,17 +172,17 @@ fn the_checker_finds_a_missing_triangle() {
 
 #[test]
 fn image_columns_run_along_x_and_samples_are_lattice_heights() {
-    let desk = Desk::new();
-    desk.put_image(&[0, 51, 102, 153, 204, 255], 3);
-    let none = desk.put("edits.jsonl", "\n# nothing to do\n");
-    desk.run(&none, &["--chunk-size", "8"]).expect("an empty script");
-    let mut places = desk.mesh().places;
+    let temp = TempFolder::new();
+    temp.put_image(&[0, 51, 102, 153, 204, 255], 3);
+    let none = temp.put("edits.jsonl", "\n# nothing to do\n");
+    temp.run(&none, &["--chunk-size", "8"]).expect("an empty script");
+    let mut places = temp.mesh().places;
     places.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
     let at = |x: f64, z: f64| [x, 51.0 * (x + 3.0 * z), z];
     assert_eq!(places, [at(0., 0.), at(0., 1.), at(1., 0.), at(1., 1.), at(2., 0.), at(2., 1.)]);
 
     let report =
-        desk.run(&none, &["--height-range", "-8", "16.5", "--voxels-per-sample", "4"]).expect("valid");
+        temp.run(&none, &["--height-range", "-8", "16.5", "--voxels-per-sample", "4"]).expect("valid");
     assert_eq!(report["world"]["heights"], serde_json::json!([-8.0, 16.5]));
     assert_eq!((&report["world"]["width"], &report["world"]["depth"]), (&8.into(), &4.into()));
 }
@@ -190,11 +190,11 @@ fn image_columns_run_along_x_and_samples_are_lattice_heights() {
 #[test]
 fn hash_and_samples_depend_on_neither_chunks_nor_batches() {
     let hashes = [("8", "1"), ("100", "1"), ("25", "2")].map(|(chunk_size, batch)| {
-        let desk = Desk::new();
-        desk.put_hills();
-        let edits = desk.put("edits.jsonl", format!("{DIG}\n{}", DIG.replace("9,30,9", "12,30,11")));
+        let temp = TempFolder::new();
+        temp.put_hills();
+        let edits = temp.put("edits.jsonl", format!("{DIG}\n{}", DIG.replace("9,30,9", "12,30,11")));
         let report =
-            desk.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
+            temp.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
         (report["hash"].clone(), report["bricks"].clone(), report["edits"]["removed"].clone())
     });
     assert!(hashes[0] == hashes[1] && hashes[1] == hashes[2], "{hashes:?}");
@@ -202,19 +202,19 @@ fn hash_and_samples_depend_on_neither_chunks_nor_batches() {
 
 #[test]
 fn an_edit_outside_the_world_is_reported_with_its_line() {
-    let desk = Desk::new();
-    desk.put_hills();
+    let temp = TempFolder::new();
+    temp.put_hills();
     let outside = DIG.replace("9,30,9", "-500,30,9");
     let report =
-        desk.run(&desk.put("edits.jsonl", format!("{DIG}\n\n{outside}\n")), &[]).expect("a good script");
+        temp.run(&temp.put("edits.jsonl", format!("{DIG}\n\n{outside}\n")), &[]).expect("a good script");
     let rejected = serde_json::json!([{ "line": 3, "reason": "the brush lies outside the world" }]);
     assert_eq!((&report["edits"]["applied"], &report["edits"]["rejected"]), (&1.into(), &rejected));
 }
 
 #[test]
 fn bad_lines_are_named_and_nothing_is_written() {
-    let desk = Desk::new();
-    desk.put_hills();
+    let temp = TempFolder::new();
+    temp.put_hills();
     for (line, reason) in [
         ("{", "EOF while parsing"),
         ("[]", "expected a JSON object"),
@@ -234,40 +234,40 @@ fn bad_lines_are_named_and_nothing_is_written() {
         ("{\"shape\":\"\u{0}\"}", "control character"),
     ] {
         let (code, message) =
-            desk.run(&desk.put("edits.jsonl", format!("{DIG}\n{line}\n")), &[]).unwrap_err();
+            temp.run(&temp.put("edits.jsonl", format!("{DIG}\n{line}\n")), &[]).unwrap_err();
         assert_eq!(code, 2, "{message}");
         assert!(message.contains("edits.jsonl: line 2: ") && message.contains(reason), "{line}: {message}");
-        assert!(!desk.path("out").exists(), "{line}: something was written");
+        assert!(!temp.path("out").exists(), "{line}: something was written");
     }
-    desk.run(&desk.put("edits.jsonl", format!("\u{feff}{DIG}\n")), &[])
+    temp.run(&temp.put("edits.jsonl", format!("\u{feff}{DIG}\n")), &[])
         .expect("a byte order mark is allowed");
-    fs::remove_dir_all(desk.path("out")).expect("the folder");
-    let (code, message) = desk.run(&desk.put("edits.jsonl", b"\xff\xfe\n{\n"), &[]).unwrap_err();
+    fs::remove_dir_all(temp.path("out")).expect("the folder");
+    let (code, message) = temp.run(&temp.put("edits.jsonl", b"\xff\xfe\n{\n"), &[]).unwrap_err();
     assert!(code == 2 && message.contains("line 1: the line is not UTF-8") && message.contains("line 2: "));
-    let (_, message) = desk.run(&desk.put("edits.jsonl", "{\n".repeat(30)), &[]).unwrap_err();
+    let (_, message) = temp.run(&temp.put("edits.jsonl", "{\n".repeat(30)), &[]).unwrap_err();
     assert!(message.lines().count() == 21 && message.ends_with("10 more bad lines"), "{message}");
 }
 
 #[test]
 fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
-    let desk = Desk::new();
-    let edits = desk.put("edits.jsonl", DIG);
+    let temp = TempFolder::new();
+    let edits = temp.put("edits.jsonl", DIG);
     let refused = |edits: &Path, more: &[&str], reason: &str| {
-        let (code, message) = desk.run(edits, more).unwrap_err();
+        let (code, message) = temp.run(edits, more).unwrap_err();
         assert!(code == 2 && message.contains(reason), "{more:?}: {code} {message}");
-        assert!(!desk.path("out").exists(), "{more:?}: something was written");
+        assert!(!temp.path("out").exists(), "{more:?}: something was written");
     };
     refused(&edits, &[], "heights.png: No such file");
-    desk.put("heights.png", "no image at all");
+    temp.put("heights.png", "no image at all");
     refused(&edits, &[], "heights.png: the image cannot be decoded");
-    desk.put_image(&[1, 2, 3], 3);
+    temp.put_image(&[1, 2, 3], 3);
     refused(&edits, &[], "spans no cell");
-    image::save_buffer(desk.path("heights.png"), &[0; 12], 2, 2, image::ExtendedColorType::Rgb8)
+    image::save_buffer(temp.path("heights.png"), &[0; 12], 2, 2, image::ExtendedColorType::Rgb8)
         .expect("an image");
     refused(&edits, &[], "heights need plain grey");
-    desk.put_hills();
-    refused(&desk.path("none.jsonl"), &[], "none.jsonl: No such file");
-    refused(&desk.0, &[], "Is a directory");
+    temp.put_hills();
+    refused(&temp.path("none.jsonl"), &[], "none.jsonl: No such file");
+    refused(&temp.0, &[], "Is a directory");
     for (more, reason) in [
         (&["--chunk-size", "7"][..], "chunk size 7 is not in 8..=128"),
         (&["--chunk-size", "129"], "chunk size 129"),
@@ -286,24 +286,24 @@ fn bad_arguments_and_files_are_refused_and_nothing_is_written() {
 
 #[test]
 fn an_unwritable_folder_has_another_exit_code_than_bad_input() {
-    let desk = Desk::new();
-    desk.put_hills();
-    let edits = desk.put("edits.jsonl", DIG);
-    desk.put("out", "a file where the folder should be");
-    assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
-    fs::remove_file(desk.path("out")).expect("the file");
+    let temp = TempFolder::new();
+    temp.put_hills();
+    let edits = temp.put("edits.jsonl", DIG);
+    temp.put("out", "a file where the folder should be");
+    assert_eq!(temp.run(&edits, &[]).unwrap_err().0, 1);
+    fs::remove_file(temp.path("out")).expect("the file");
     // A folder has the report's name, which is only found after the mesh was staged.
-    fs::create_dir_all(desk.path("out/report.json")).expect("a folder");
-    assert_eq!(desk.run(&edits, &[]).unwrap_err().0, 1);
-    assert_eq!(fs::read_dir(desk.path("out")).expect("the folder").count(), 1, "something was left behind");
+    fs::create_dir_all(temp.path("out/report.json")).expect("a folder");
+    assert_eq!(temp.run(&edits, &[]).unwrap_err().0, 1);
+    assert_eq!(fs::read_dir(temp.path("out")).expect("the folder").count(), 1, "something was left behind");
 }
 
 #[test]
 fn files_get_their_names_together_or_not_at_all() {
-    let desk = Desk::new();
-    let read = || fs::read_to_string(desk.path("a")).ok();
+    let temp = TempFolder::new();
+    let read = || fs::read_to_string(temp.path("a")).ok();
     let stage = |content: &str| {
-        let mut staging = Staging::new(&desk.0).expect("a folder");
+        let mut staging = Staging::new(&temp.0).expect("a folder");
         for name in ["a", "b"] {
             staging.write(name, |out| out.write_all(content.as_bytes())).expect("a file");
         }
@@ -312,13 +312,13 @@ fn files_get_their_names_together_or_not_at_all() {
     // A folder takes the second name while the files are written.
     for before in [None, Some("first".to_string())] {
         let staging = stage("second");
-        fs::create_dir(desk.path("b")).expect("a folder");
+        fs::create_dir(temp.path("b")).expect("a folder");
         assert!(staging.publish().is_err() && read() == before, "the first rename was not undone");
-        fs::remove_dir(desk.path("b")).expect("the folder");
+        fs::remove_dir(temp.path("b")).expect("the folder");
         stage("first").publish().expect("both names are free");
         assert_eq!(read().as_deref(), Some("first"));
-        assert_eq!(fs::read_dir(&desk.0).expect("the folder").count(), 2, "something was left behind");
-        fs::remove_file(desk.path("b")).expect("the file");
+        assert_eq!(fs::read_dir(&temp.0).expect("the folder").count(), 2, "something was left behind");
+        fs::remove_file(temp.path("b")).expect("the file");
     }
 }
 

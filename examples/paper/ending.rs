@@ -38,20 +38,20 @@ impl EndingWorld {
 
 /// Inspects the result in a separate thread, which has its own allocator arena: otherwise glibc would return the freed
 /// memory to the system during some later edit, which takes ten times as long as the edit.
-fn aside<T: Send>(look: impl FnOnce() -> T + Send) -> T {
+fn in_own_thread<T: Send>(look: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|scope| scope.spawn(look).join().unwrap_or_else(|panic| resume_unwind(panic)))
 }
 
 impl Ending {
     pub fn of_terrain(terrain: &Terrain) -> Self {
         let world = terrain.world();
-        let seams = aside(|| world.check_seams());
+        let seams = in_own_thread(|| world.check_seams());
         let (triangles, world) = (seams.triangles, EndingWorld::new(world, &seams, terrain.memory()));
         Self { triangles, world: Some(world), sample_bytes: 0, mesh_bytes: 0 }
     }
 
     pub fn of_full(full: &FullWorld) -> Self {
-        let seams = aside(|| full.check_seams());
+        let seams = in_own_thread(|| full.check_seams());
         let world = Some(EndingWorld::new(full.world(), &seams, full.memory()));
         Self { triangles: seams.triangles, world, sample_bytes: 0, mesh_bytes: full.mesh_bytes() }
     }

@@ -34,9 +34,9 @@ fn measurements() -> Measurements {
 }
 
 /// A temporary folder that is removed when dropped.
-struct Desk(PathBuf);
+struct TempFolder(PathBuf);
 
-impl Desk {
+impl TempFolder {
     fn new(name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("bevy_burrow-paper-{}-{name}", std::process::id()));
         fs::create_dir_all(&folder).expect("a folder for temporary files");
@@ -44,7 +44,7 @@ impl Desk {
     }
 }
 
-impl Drop for Desk {
+impl Drop for TempFolder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -253,8 +253,8 @@ fn the_papers_ratios_are_those_of_its_text() {
 
 #[test]
 fn everything_is_written_and_published() {
-    let desk = Desk::new("files");
-    let (out, results) = (desk.0.join("out"), desk.0.join("docs/RESULTS.md"));
+    let temp = TempFolder::new("files");
+    let (out, results) = (temp.0.join("out"), temp.0.join("docs/RESULTS.md"));
     let measurements = measurements();
     write(&measurements, &Machine::here(), &out).expect("a writable folder");
     publish(&out, &results).expect("a writable folder");
@@ -274,7 +274,7 @@ fn everything_is_written_and_published() {
     let page = fs::read_to_string(&results).expect("the page");
     assert_eq!(fs::read_to_string(out.join("RESULTS.md")).expect("the page"), page);
     for (file, _) in plots::PLOTS {
-        let plot = fs::read_to_string(desk.0.join("docs/plots").join(file)).expect("a plot");
+        let plot = fs::read_to_string(temp.0.join("docs/plots").join(file)).expect("a plot");
         assert!(plot.starts_with("<svg") && plot.trim_end().ends_with("</svg>") && plot.len() < 100_000);
         assert!(page.contains(&format!("(plots/{file})")));
     }

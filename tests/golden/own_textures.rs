@@ -23,7 +23,7 @@ fn plain(studio: &mut Studio, texel: [u8; 4]) -> GroundTextures {
 }
 
 /// Draws the ground with these textures from now on.
-fn dress(studio: &mut Studio, textures: GroundTextures) {
+fn set_textures(studio: &mut Studio, textures: GroundTextures) {
     studio.app.world_mut().insert_resource(textures);
     studio.app.update();
     studio.until("textures", |app| app.world().resource::<GroundLoading>().is_ready());
@@ -37,7 +37,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let own = studio.app.world().resource::<GroundTextures>().clone();
     let before = studio.picture();
     let textures = plain(studio, [200, 20, 200, 128]);
-    dress(studio, textures);
+    set_textures(studio, textures);
     let mauve = studio.picture();
     let is_mauve = |texel: &&image::Rgb<u8>| {
         let [red, green, blue] = texel.0.map(u32::from);
@@ -48,7 +48,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     album.check(share > 0.99, || {
         format!("only {share} of the picture has the colour of the game's own textures")
     });
-    dress(studio, own);
+    set_textures(studio, own);
     let (apart, _) = flip(&before, &studio.picture());
     album.check(apart < 1e-4, || format!("the crate's own textures were not restored: FLIP {apart:.5}"));
 }

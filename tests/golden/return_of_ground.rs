@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_burrow::prelude::*;
 
 use crate::album::{Album, flip};
-use crate::studio::{PATIENCE, Studio};
+use crate::studio::{Studio, TIMEOUT};
 
 /// Height of the level ground: the middle of a chunk, so that the whole surface is in one layer of chunks.
 const HEIGHT: f64 = 16.0;
@@ -46,7 +46,7 @@ fn while_looking(studio: &mut Studio, message: impl Message) {
     let (before, start) = (commits(studio), Instant::now());
     studio.app.world_mut().write_message(message);
     while commits(studio) == before {
-        assert!(start.elapsed() < PATIENCE, "nothing is committed");
+        assert!(start.elapsed() < TIMEOUT, "nothing is committed");
         studio.app.update();
     }
 }

@@ -19,7 +19,7 @@ use crate::{offscreen, shaders};
 pub const SIZE: (u32, u32) = (480, 270);
 
 /// The longest wait for any event.
-pub const PATIENCE: Duration = Duration::from_secs(120);
+pub const TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Only one studio runs at a time: a software renderer uses all cores.
 static OPEN: Mutex<()> = Mutex::new(());
@@ -157,14 +157,14 @@ impl Studio {
     /// Updates the app until `done` returns true.
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut App) -> bool) {
         // The camera is off meanwhile, to save time.
-        self.film_runs(false);
+        self.set_camera_active(false);
         let start = Instant::now();
         while !done(&mut self.app) {
-            assert!(start.elapsed() < PATIENCE, "timed out waiting for {what}");
+            assert!(start.elapsed() < TIMEOUT, "timed out waiting for {what}");
             self.app.update();
             std::thread::sleep(Duration::from_millis(1));
         }
-        self.film_runs(true);
+        self.set_camera_active(true);
     }
 
     /// Takes a picture, after a few frames in which lights and shadows settle.
@@ -175,7 +175,7 @@ impl Studio {
         // Meshes are not drawn before their shaders are compiled.
         let waiting = Instant::now();
         while shaders::are_missing(&self.app) {
-            assert!(waiting.elapsed() < PATIENCE, "a shader was not compiled in time");
+            assert!(waiting.elapsed() < TIMEOUT, "a shader was not compiled in time");
             self.app.update();
         }
         let taken = Arc::new(Mutex::new(None));
@@ -192,11 +192,11 @@ impl Studio {
                     data.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
                 return RgbImage::from_raw(self.size.0, self.size.1, rgb).expect("a whole picture");
             }
-            assert!(start.elapsed() < PATIENCE, "no picture was taken");
+            assert!(start.elapsed() < TIMEOUT, "no picture was taken");
         }
     }
 
-    fn film_runs(&mut self, runs: bool) {
+    fn set_camera_active(&mut self, runs: bool) {
         if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
             camera.is_active = runs;
         }

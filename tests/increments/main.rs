@@ -2,6 +2,7 @@
 //! receipts, mask, meshes and shared bricks. The references here go sample by sample and cell by cell.
 
 mod bits;
+mod checked_terrain;
 mod meshes;
 mod naive;
 mod play;
@@ -10,6 +11,5 @@ mod scratch;
 mod slabs;
 mod soft;
 mod state;
-mod witness;
 #[path = "../worlds/mod.rs"]
 mod worlds;

@@ -10,9 +10,9 @@ use bevy_burrow::terrain::{MeshUpdates, World};
 use glam::IVec3;
 
 use crate::bits::{mesh_bits, sorted};
-use crate::witness::Witness;
+use crate::checked_terrain::CheckedTerrain;
 
-impl Witness {
+impl CheckedTerrain {
     /// Meshes that are only ever updated by commits equal those of the world.
     pub fn check_updates(&mut self, meshes: &MeshUpdates, what: &str) {
         let world = self.terrain.world();

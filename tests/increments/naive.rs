@@ -6,8 +6,8 @@ use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use glam::{IVec2, IVec3, Quat, Vec3};
 
-use crate::witness::{Effect, Witness};
-use crate::worlds::plainly_applied;
+use crate::checked_terrain::{CheckedTerrain, Effect};
+use crate::worlds::reference_density;
 
 /// The largest stored density.
 const FARTHEST: i32 = 32_767;
@@ -70,7 +70,7 @@ fn from_relief(point: IVec3, stamp: &Stamp) -> (i32, i32) {
     (beside, from.y - relief as i32)
 }
 
-impl Witness {
+impl CheckedTerrain {
     /// The new density of a sample under a sculpting operation, as the crate's documentation defines it.
     fn sculpted(&self, brush: &Brush, point: IVec3, outside: i32) -> Option<i32> {
         let (mut deepest, mut outside) = (deepest(&brush.shape), outside);
@@ -232,7 +232,7 @@ impl Witness {
                 let stored = self.samples.get(&point).copied();
                 let before = stored.map_or_else(|| ground.distance(point), |(distance, _)| distance);
                 let own = stored.map_or(MaterialId::GROUND, |(_, material)| material);
-                let after = plainly_applied(&edit.operation(), before, outside);
+                let after = reference_density(&edit.operation(), before, outside);
                 let number = after.clamp(-32767, 32767);
                 match edit.operation() {
                     operation if operation.is_sculpting() => {

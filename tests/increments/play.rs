@@ -8,7 +8,7 @@ use bevy_burrow::terrain::World;
 use fastrand::Rng;
 use glam::{Quat, Vec2, Vec3};
 
-use crate::witness::Witness;
+use crate::checked_terrain::CheckedTerrain;
 
 /// A brush of any shape and operation, rough or smooth, with about this radius and position.
 pub fn any_brush(rng: &mut Rng, place: Vec3, radius: f32) -> Brush {
@@ -87,10 +87,10 @@ pub fn any_place(rng: &mut Rng, ground: &Ground) -> Vec3 {
     Vec3::new(x, y.clamp(-32_768.0, 32_768.0), z)
 }
 
-pub fn play(witness: &mut Witness, rng: &mut Rng, transactions: usize, most: f32, what: &str) {
+pub fn play(checked: &mut CheckedTerrain, rng: &mut Rng, transactions: usize, most: f32, what: &str) {
     let mut held: Vec<(Arc<World>, u64, usize)> = Vec::new();
     for i in 0..transactions {
-        let ground = witness.terrain.world();
+        let ground = checked.terrain.world();
         let count = if rng.u32(0..4) == 0 { rng.usize(2..6) } else { 1 };
         let brushes: Vec<Brush> = (0..count)
             .map(|tag| {
@@ -100,11 +100,11 @@ pub fn play(witness: &mut Witness, rng: &mut Rng, transactions: usize, most: f32
             })
             .collect();
         if rng.bool() {
-            let world = witness.terrain.snapshot();
+            let world = checked.terrain.snapshot();
             let (hash, triangles) = fingerprint(&world);
             held.push((world, hash, triangles));
         }
-        witness.apply(&brushes, &format!("{what}, transaction {i}"));
+        checked.apply(&brushes, &format!("{what}, transaction {i}"));
         for (world, hash, triangles) in &held {
             assert_eq!(fingerprint(world), (*hash, *triangles), "{what}: a snapshot changed");
         }

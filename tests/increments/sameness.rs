@@ -51,12 +51,12 @@ fn the_reported_memory_is_what_dropping_a_terrain_frees() {
         // Undo and redo may leave spare capacity in lists, which has to be reported as well.
         (0..seed % 4 * 3).for_each(|_| drop(terrain.undo()));
         (0..seed % 3).for_each(|_| drop(terrain.redo()));
-        let told = terrain.memory();
-        let blocks = told.samples / Brick::BYTES + terrain.world().drawn().count() + 2;
+        let reported = terrain.memory();
+        let blocks = reported.samples / Brick::BYTES + terrain.world().drawn().count() + 2;
         let given_back = allocation_counter::measure(|| drop(terrain)).bytes_current.unsigned_abs() as usize;
         // Two reference counts precede each shared allocation; the rest are the terrain's own lists.
-        let least = told.total();
-        assert!((least..=least + blocks * 16 + 2048).contains(&given_back), "{given_back}, not {told:?}");
+        let least = reported.total();
+        assert!((least..=least + blocks * 16 + 2048).contains(&given_back), "{given_back}, not {reported:?}");
     }
 }
 

@@ -3,7 +3,7 @@
 use bevy_burrow::prelude::*;
 use glam::{IVec3, Vec2, Vec3};
 
-use crate::witness::Witness;
+use crate::checked_terrain::CheckedTerrain;
 
 /// Every shape, including one that is deepest along its axis and one that is deepest across it.
 fn shapes(at: Vec3) -> [Shape; 8] {
@@ -40,12 +40,12 @@ fn a_falloff_wider_than_the_shape_is_deep_ends_in_its_middle() {
     let ground =
         || Ground::from_fn(31, 29, |x, z| 12.0 + f64::from(x * 5 % 7 + z * 3 % 5) * 0.3).expect("finite");
     for (number, shape) in shapes(at).into_iter().enumerate() {
-        let mut witness = Witness::new(ground(), 16);
+        let mut checked = CheckedTerrain::new(ground(), 16);
         for brush in operations(shape, at) {
             let what = format!("shape {number}, {:?}", brush.operation);
             // A falloff about as wide as the depth; a much wider one gives the same result.
             for falloff in [3.0, 64.0] {
-                witness.apply(&[brush.clone().with_falloff(falloff)], &what);
+                checked.apply(&[brush.clone().with_falloff(falloff)], &what);
             }
         }
     }

@@ -9,9 +9,9 @@ use bevy_burrow::terrain::FieldNews;
 use bevy_burrow::volume::Brick;
 
 use crate::bits::mix;
-use crate::witness::{Effect, Witness};
+use crate::checked_terrain::{CheckedTerrain, Effect};
 
-impl Witness {
+impl CheckedTerrain {
     pub fn check_receipt(&mut self, receipt: &Receipt, brush: &Brush, what: &str) {
         assert_eq!(receipt.tag, brush.tag, "{what}");
         let Ok(edit) = Edit::quantize(brush) else {
@@ -24,7 +24,7 @@ impl Witness {
             return;
         };
         let tally = |tally: &bevy_burrow::volume::MaterialCounts| tally.iter().collect::<BTreeMap<_, _>>();
-        let told = Effect {
+        let reported = Effect {
             chunks: applied.chunks.iter().map(|part| part.chunk).collect(),
             bounds: applied.bounds,
             removed: tally(&applied.removed),
@@ -32,7 +32,7 @@ impl Witness {
             painted: tally(&applied.painted),
         };
         assert!(applied.chunks.is_sorted_by_key(|part| part.chunk), "{what}: chunks in order");
-        assert!(told == expected, "{what}: {brush:?}\ntold {told:?}\nexpected {expected:?}");
+        assert!(reported == expected, "{what}: {brush:?}\nreported {reported:?}\nexpected {expected:?}");
     }
 
     /// Samples, solid bits, edited bits and hash.

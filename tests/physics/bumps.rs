@@ -53,7 +53,7 @@ fn forget_neighbours(stage: &mut Stage) {
     stage.frame();
 }
 
-fn lay(ground: Ground8, voxel_size: f32) -> Stage {
+fn spawn_ground(ground: Ground8, voxel_size: f32) -> Stage {
     if ground == Ground8::OnePiece {
         let mut stage = Stage::new();
         let slab = Collider::cuboid(200.0, 2.0, 100.0);
@@ -103,7 +103,7 @@ fn travel(stage: &mut Stage, bodies: [Entity; 2], level: f32, voxel_size: f32) -
 
 /// Two balls roll along x.
 fn roll(ground: Ground8, voxel_size: f32, speed: f32) -> [Ride; 2] {
-    let mut stage = lay(ground, voxel_size);
+    let mut stage = spawn_ground(ground, voxel_size);
     let level = 8.0 * voxel_size + 0.5;
     let balls = LANES.map(|lane| stage.ball(Vec3::new(2.0, level, lane), 0.5, Vec3::X * speed));
     travel(&mut stage, balls, level, voxel_size)
@@ -111,7 +111,7 @@ fn roll(ground: Ground8, voxel_size: f32, speed: f32) -> [Ride; 2] {
 
 /// Two characters walk along x.
 fn walk(ground: Ground8, voxel_size: f32) -> [Ride; 2] {
-    let mut stage = lay(ground, voxel_size);
+    let mut stage = spawn_ground(ground, voxel_size);
     let top = 8.0 * voxel_size;
     let people = LANES.map(|lane| stage.character(Vec3::new(2.0, top + 0.02, lane), Vec2::X));
     travel(&mut stage, people, top + Character::default().height / 2.0, voxel_size)
@@ -150,7 +150,7 @@ fn a_walker_feels_neither_seams_nor_borders() {
 fn a_ball_feels_the_triangles_of_a_plain_mesh() {
     let mut worst = 0.0f32;
     for lane in [30.3, 32.0] {
-        let mut stage = lay(Ground8::Tiles, 1.0);
+        let mut stage = spawn_ground(Ground8::Tiles, 1.0);
         forget_neighbours(&mut stage);
         let mut heights = Vec::new();
         let ball = stage.ball(Vec3::new(2.0, 8.5, lane), 0.5, Vec3::X * 12.0);

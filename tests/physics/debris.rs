@@ -17,10 +17,10 @@ struct Crumbled(usize);
 
 /// A stage with such a table on a terrain at `place`, and its entity. Pieces stay for `stay` seconds.
 fn stage(voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
-    furnish(Stage::new(), voxel_size, place, stay)
+    with_table(Stage::new(), voxel_size, place, stay)
 }
 
-fn furnish(stage: Stage, voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
+fn with_table(stage: Stage, voxel_size: f32, place: Vec3, stay: f32) -> (Stage, Entity) {
     let mut terrain = level(64, voxel_size);
     // The terrain's own coordinates are in voxels.
     terrain.apply([
@@ -89,7 +89,7 @@ fn drawn(stage: &mut Stage) -> Vec<(Vec3, Entity)> {
 
 #[test]
 fn a_piece_of_a_terrain_without_colours_is_drawn() {
-    let (mut stage, terrain) = furnish(Stage::with_meshes(), 1.0, Vec3::ZERO, 1e9);
+    let (mut stage, terrain) = with_table(Stage::with_meshes(), 1.0, Vec3::ZERO, 1e9);
     stage.send(saw(1.0, Vec3::ZERO));
     stage.frames_until("the saw cuts", |stage| stage.terrain(terrain).is_busy());
     stage.app.world_mut().entity_mut(terrain).remove::<MaterialColors>();
@@ -116,7 +116,7 @@ fn look(
 #[test]
 fn a_piece_is_drawn_in_the_frame_in_which_the_ground_loses_it() {
     for (voxel_size, place) in [(1.0, Vec3::ZERO), (0.5, Vec3::new(100.0, -20.0, 7.0))] {
-        let (mut stage, _) = furnish(Stage::with_meshes(), voxel_size, place, 1e9);
+        let (mut stage, _) = with_table(Stage::with_meshes(), voxel_size, place, 1e9);
         stage.app.init_resource::<Seen>().add_systems(Last, look);
         stage.send(saw(voxel_size, place));
         let mut homes = Vec::new();

@@ -15,10 +15,10 @@ use bevy_burrow::prelude::*;
 pub const STEP: f32 = 1.0 / 64.0;
 
 /// How long a stage waits before it gives up: the machine may be busy.
-const PATIENCE: Duration = Duration::from_secs(300);
+const TIMEOUT: Duration = Duration::from_secs(300);
 
 /// Sleep between two frames, so that tasks can proceed.
-const NAP: Duration = Duration::from_micros(500);
+const FRAME_SLEEP: Duration = Duration::from_micros(500);
 
 /// The receipts so far.
 #[derive(Resource, Default)]
@@ -94,12 +94,12 @@ impl Stage {
     /// Updates frames until a condition holds. Panics if it never does.
     pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
-        while start.elapsed() < PATIENCE {
+        while start.elapsed() < TIMEOUT {
             self.frame();
             if is_so(self) {
                 return;
             }
-            std::thread::sleep(NAP);
+            std::thread::sleep(FRAME_SLEEP);
         }
         panic!("timed out waiting until {what}");
     }

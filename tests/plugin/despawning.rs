@@ -56,13 +56,17 @@ fn nothing_is_left_of_a_terrain_despawned_while_it_loads() {
     assert_works(&mut stage);
 }
 
-/// Tells [`leave`] to despawn the terrains.
+/// Tells [`despawn_terrains`] to despawn the terrains.
 #[derive(Resource, Default)]
-struct Leaving(bool);
+struct DespawnNow(bool);
 
 /// A game's own system that despawns all terrains.
-fn leave(mut commands: Commands, mut leaving: ResMut<Leaving>, terrains: Query<Entity, With<Terrain>>) {
-    if std::mem::take(&mut leaving.0) {
+fn despawn_terrains(
+    mut commands: Commands,
+    mut despawn_now: ResMut<DespawnNow>,
+    terrains: Query<Entity, With<Terrain>>,
+) {
+    if std::mem::take(&mut despawn_now.0) {
         for terrain in &terrains {
             commands.entity(terrain).despawn();
         }
@@ -71,17 +75,20 @@ fn leave(mut commands: Commands, mut leaving: ResMut<Leaving>, terrains: Query<E
 
 /// A stage whose game despawns terrains during the plugin's own systems: its command is applied just before the
 /// plugin's commands. Systems without an explicit order may be scheduled like that.
-fn stage_that_leaves<M>(leave: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>) -> Stage {
+fn stage_that_despawns<M>(
+    despawn_terrains: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>,
+) -> Stage {
     let mut stage = Stage::drawing();
-    stage.app.init_resource::<Leaving>().add_systems(Update, leave);
+    stage.app.init_resource::<DespawnNow>().add_systems(Update, despawn_terrains);
     stage
 }
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_of_its_commit() {
-    let leave =
-        leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
-    let mut stage = stage_that_leaves(leave);
+    let despawn_terrains = despawn_terrains
+        .after_ignore_deferred(BurrowSystems::Collect)
+        .before_ignore_deferred(BurrowSystems::Commit);
+    let mut stage = stage_that_despawns(despawn_terrains);
     let mut met = 0;
     for round in 0..20 {
         stage.show(steep());
@@ -92,7 +99,7 @@ fn a_terrain_may_be_despawned_in_the_frame_of_its_commit() {
         stage.frame();
         // Longer and longer waits, for slow machines.
         (0..1 << (round / 2).min(6)).for_each(|_| stage.rest());
-        stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+        stage.app.world_mut().resource_mut::<DespawnNow>().0 = true;
         stage.frame();
         met += u32::from(stage.figures().commits > commits);
         assert_clean(&mut stage, "in the frame of a commit");
@@ -106,9 +113,10 @@ fn a_terrain_may_be_despawned_in_the_frame_of_its_commit() {
 
 #[test]
 fn no_event_is_triggered_for_entities_despawned_with_their_terrain() {
-    let leave =
-        leave.after_ignore_deferred(BurrowSystems::Collect).before_ignore_deferred(BurrowSystems::Commit);
-    let mut stage = stage_that_leaves(leave);
+    let despawn_terrains = despawn_terrains
+        .after_ignore_deferred(BurrowSystems::Collect)
+        .before_ignore_deferred(BurrowSystems::Commit);
+    let mut stage = stage_that_despawns(despawn_terrains);
     stage.app.add_observer(|on: On<ChunkCreated>, all: Query<&Chunk>| {
         assert!(all.contains(on.entity), "no such chunk")
     });
@@ -136,7 +144,7 @@ fn no_event_is_triggered_for_entities_despawned_with_their_terrain() {
         }
         stage.frame();
         stage.rest();
-        stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+        stage.app.world_mut().resource_mut::<DespawnNow>().0 = true;
         stage.frame();
         assert_clean(&mut stage, "in the frame of a commit");
     }
@@ -144,14 +152,14 @@ fn no_event_is_triggered_for_entities_despawned_with_their_terrain() {
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_that_would_show_it() {
-    let mut stage = stage_that_leaves(leave.before_ignore_deferred(BurrowSystems::Load));
+    let mut stage = stage_that_despawns(despawn_terrains.before_ignore_deferred(BurrowSystems::Load));
     for rest in [false, true] {
         stage.spawn(steep());
         stage.frame();
         if rest {
             stage.rest();
         }
-        stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+        stage.app.world_mut().resource_mut::<DespawnNow>().0 = true;
         stage.frame();
         assert_clean(&mut stage, "in the frame that would show it");
     }
@@ -160,10 +168,10 @@ fn a_terrain_may_be_despawned_in_the_frame_that_would_show_it() {
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_that_spawned_it() {
-    let mut stage = stage_that_leaves(leave.before_ignore_deferred(BurrowSystems::Load));
+    let mut stage = stage_that_despawns(despawn_terrains.before_ignore_deferred(BurrowSystems::Load));
     stage.frame();
     stage.spawn(steep());
-    stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+    stage.app.world_mut().resource_mut::<DespawnNow>().0 = true;
     stage.frame();
     assert_clean(&mut stage, "in its first frame");
     assert_works(&mut stage);
@@ -171,13 +179,15 @@ fn a_terrain_may_be_despawned_in_the_frame_that_spawned_it() {
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_of_a_brush() {
-    // The empty system makes Bevy apply the commit's commands before `leave`, and adds none itself.
-    let leave =
-        (|| (), leave).chain().after(BurrowSystems::Commit).before_ignore_deferred(BurrowSystems::Begin);
-    let mut stage = stage_that_leaves(leave);
+    // The empty system makes Bevy apply the commit's commands before `despawn_terrains`, and adds none itself.
+    let despawn_terrains = (|| (), despawn_terrains)
+        .chain()
+        .after(BurrowSystems::Commit)
+        .before_ignore_deferred(BurrowSystems::Begin);
+    let mut stage = stage_that_despawns(despawn_terrains);
     stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
-    stage.app.world_mut().resource_mut::<Leaving>().0 = true;
+    stage.app.world_mut().resource_mut::<DespawnNow>().0 = true;
     stage.frame();
     assert_clean(&mut stage, "in the frame of a brush");
     assert_works(&mut stage);
@@ -225,32 +235,33 @@ fn despawning_a_terrain_despawns_all_its_children() {
 
 /// For each despawned tile, the number of its terrain's children after it.
 #[derive(Resource, Default)]
-struct Behind(Vec<usize>);
+struct ChildrenAfter(Vec<usize>);
 
-fn look_behind(
+fn count_children_after(
     gone: On<Despawn, Tile>,
     tiles: Query<&ChildOf>,
     terrains: Query<&Children>,
-    mut behind: ResMut<Behind>,
+    mut counts: ResMut<ChildrenAfter>,
 ) {
     let terrain = tiles.get(gone.entity).expect("below its terrain").parent();
     let mut from_the_end = terrains.get(terrain).expect("with children").iter().rev();
-    behind.0.push(from_the_end.position(|child| child == gone.entity).expect("one of them"));
+    counts.0.push(from_the_end.position(|child| child == gone.entity).expect("one of them"));
 }
 
 #[test]
 fn tiles_are_despawned_from_the_end_of_their_terrains_children() {
     // Bevy searches the children from the end, so any other order is slow with thousands of them.
     let mut stage = Stage::drawing();
-    stage.app.init_resource::<Behind>().add_observer(look_behind);
-    let behind = |stage: &mut Stage| std::mem::take(&mut stage.app.world_mut().resource_mut::<Behind>().0);
+    stage.app.init_resource::<ChildrenAfter>().add_observer(count_children_after);
+    let behind =
+        |stage: &mut Stage| std::mem::take(&mut stage.app.world_mut().resource_mut::<ChildrenAfter>().0);
     let terrain = stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
     stage.settle();
     let own = stage.app.world_mut().spawn(ChildOf(terrain)).id();
     stage.app.world_mut().entity_mut(terrain).insert(level(1.0));
     stage.frames_until("another terrain is shown", |stage| {
-        !stage.app.world().resource::<Behind>().0.is_empty()
+        !stage.app.world().resource::<ChildrenAfter>().0.is_empty()
     });
     assert_eq!(behind(&mut stage), [1; 16], "the game's own child stays behind them");
     stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();

@@ -10,7 +10,7 @@ use crate::stage::{Stage, dig, level, random_brushes, steep};
 
 /// An event, with the entity's component at that moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum News {
+enum TerrainEvent {
     ChunkCreated(Entity, Chunk),
     ChunkChanged(Entity, Chunk),
     FieldCreated(Entity, Field),
@@ -20,40 +20,40 @@ enum News {
 }
 
 #[derive(Resource, Default)]
-struct Told(Vec<News>);
+struct RecordedEvents(Vec<TerrainEvent>);
 
 /// A stage that records all events. Each must name an existing entity with its component.
-fn listening(mut stage: Stage) -> Stage {
+fn with_recorded_events(mut stage: Stage) -> Stage {
     stage
         .app
-        .init_resource::<Told>()
-        .add_observer(|on: On<ChunkCreated>, chunks: Query<&Chunk>, mut told: ResMut<Told>| {
-            told.0.push(News::ChunkCreated(on.entity, *chunks.get(on.entity).expect("a chunk")));
+        .init_resource::<RecordedEvents>()
+        .add_observer(|on: On<ChunkCreated>, chunks: Query<&Chunk>, mut events: ResMut<RecordedEvents>| {
+            events.0.push(TerrainEvent::ChunkCreated(on.entity, *chunks.get(on.entity).expect("a chunk")));
         })
-        .add_observer(|on: On<ChunkChanged>, chunks: Query<&Chunk>, mut told: ResMut<Told>| {
-            told.0.push(News::ChunkChanged(on.entity, *chunks.get(on.entity).expect("a chunk")));
+        .add_observer(|on: On<ChunkChanged>, chunks: Query<&Chunk>, mut events: ResMut<RecordedEvents>| {
+            events.0.push(TerrainEvent::ChunkChanged(on.entity, *chunks.get(on.entity).expect("a chunk")));
         })
-        .add_observer(|on: On<FieldCreated>, fields: Query<&Field>, mut told: ResMut<Told>| {
-            told.0.push(News::FieldCreated(on.entity, *fields.get(on.entity).expect("a field")));
+        .add_observer(|on: On<FieldCreated>, fields: Query<&Field>, mut events: ResMut<RecordedEvents>| {
+            events.0.push(TerrainEvent::FieldCreated(on.entity, *fields.get(on.entity).expect("a field")));
         })
-        .add_observer(|on: On<FieldChanged>, fields: Query<&Field>, mut told: ResMut<Told>| {
-            told.0.push(News::FieldChanged(on.entity, *fields.get(on.entity).expect("a field")));
+        .add_observer(|on: On<FieldChanged>, fields: Query<&Field>, mut events: ResMut<RecordedEvents>| {
+            events.0.push(TerrainEvent::FieldChanged(on.entity, *fields.get(on.entity).expect("a field")));
         })
-        .add_observer(|on: On<FieldMerged>, fields: Query<&Field>, mut told: ResMut<Told>| {
+        .add_observer(|on: On<FieldMerged>, fields: Query<&Field>, mut events: ResMut<RecordedEvents>| {
             assert!(
                 fields.contains(on.entity) && fields.contains(on.into),
                 "both fields exist when the merge is reported"
             );
-            told.0.push(News::FieldMerged { gone: on.entity, into: on.into });
+            events.0.push(TerrainEvent::FieldMerged { gone: on.entity, into: on.into });
         })
-        .add_observer(|on: On<Remove, Field>, mut told: ResMut<Told>| {
-            told.0.push(News::FieldRemoved(on.entity))
+        .add_observer(|on: On<Remove, Field>, mut events: ResMut<RecordedEvents>| {
+            events.0.push(TerrainEvent::FieldRemoved(on.entity))
         });
     stage
 }
 
-fn told(stage: &mut Stage) -> Vec<News> {
-    std::mem::take(&mut stage.app.world_mut().resource_mut::<Told>().0)
+fn take_events(stage: &mut Stage) -> Vec<TerrainEvent> {
+    std::mem::take(&mut stage.app.world_mut().resource_mut::<RecordedEvents>().0)
 }
 
 /// Fields by id, with their entities and the chunks above them.
@@ -122,9 +122,9 @@ fn entities_are_those_of_the_model_after_every_commit() {
 
 #[test]
 fn events_report_every_change_of_chunks_and_fields() {
-    let mut stage = listening(Stage::drawing());
+    let mut stage = with_recorded_events(Stage::drawing());
     let terrain = stage.show(steep());
-    assert_eq!(told(&mut stage), []);
+    assert_eq!(take_events(&mut stage), []);
     let (mut kinds, mut before) = ([0; 6], BTreeMap::new());
     let mut chunks: HashMap<Entity, Chunk> = HashMap::new();
     for burst in random_brushes(22, 200).chunks(3) {
@@ -132,31 +132,31 @@ fn events_report_every_change_of_chunks_and_fields() {
         stage.settle();
         let after = fields(&mut stage);
         let mut rest = before.clone();
-        for news in told(&mut stage) {
-            match news {
-                News::ChunkCreated(entity, chunk) => {
+        for event in take_events(&mut stage) {
+            match event {
+                TerrainEvent::ChunkCreated(entity, chunk) => {
                     kinds[0] += 1;
                     assert_eq!(chunks.insert(entity, chunk), None, "a chunk is created once");
                 }
-                News::ChunkChanged(entity, chunk) => {
+                TerrainEvent::ChunkChanged(entity, chunk) => {
                     kinds[1] += 1;
                     assert_eq!(chunks.get(&entity), Some(&chunk), "only what was created changes");
                 }
-                News::FieldCreated(entity, field) => {
+                TerrainEvent::FieldCreated(entity, field) => {
                     kinds[2] += 1;
                     assert!(!before.contains_key(&field.id));
                     let (now, component, _) = after[&field.id];
                     assert_eq!((now, component), (entity, field));
                     rest.insert(field.id, after[&field.id]);
                 }
-                News::FieldChanged(entity, field) => {
+                TerrainEvent::FieldChanged(entity, field) => {
                     kinds[3] += 1;
                     let (now, component, _) = after[&field.id];
                     assert_eq!((now, component), (entity, field));
                     assert_ne!(before[&field.id].1, field, "it did change");
                     rest.insert(field.id, after[&field.id]);
                 }
-                News::FieldMerged { gone, into } => {
+                TerrainEvent::FieldMerged { gone, into } => {
                     kinds[4] += 1;
                     let (_, (_, old, chunk)) =
                         before.iter().find(|(_, field)| field.0 == gone).expect("it was there");
@@ -168,7 +168,7 @@ fn events_report_every_change_of_chunks_and_fields() {
                     rest.remove(&old.id);
                     assert!(stage.app.world().get_entity(gone).is_err(), "its entity is despawned");
                 }
-                News::FieldRemoved(entity) => {
+                TerrainEvent::FieldRemoved(entity) => {
                     kinds[5] += 1;
                     assert!(before.values().any(|field| field.0 == entity));
                 }
@@ -177,7 +177,7 @@ fn events_report_every_change_of_chunks_and_fields() {
         assert_eq!(rest, after, "every difference was reported");
         before = after;
     }
-    assert!(kinds.iter().all(|&count| count > 5), "every kind of news came: {kinds:?}");
+    assert!(kinds.iter().all(|&count| count > 5), "every kind of event came: {kinds:?}");
     assert_eq!(kinds[4], kinds[5], "fields are only removed by merging");
     assert_eq!(chunks.len(), stage.count::<Chunk>());
     assert_entities(&mut stage, terrain);
@@ -185,7 +185,7 @@ fn events_report_every_change_of_chunks_and_fields() {
 
 #[test]
 fn two_pits_that_meet_become_one_field() {
-    for mut stage in [listening(Stage::drawing()), listening(Stage::server())] {
+    for mut stage in [with_recorded_events(Stage::drawing()), with_recorded_events(Stage::server())] {
         let mut model = level(1.0);
         let receipts = model.apply([dig(24.0, 8.0, 21.0, 1.0), dig(24.0, 8.0, 27.0, 1.0)]);
         assert!(
@@ -201,12 +201,12 @@ fn two_pits_that_meet_become_one_field() {
         stage.settle();
         assert_eq!((stage.count::<Chunk>(), stage.count::<Field>()), (1, 2));
         let pits: Vec<Entity> = fields(&mut stage).values().map(|field| field.0).collect();
-        told(&mut stage);
+        take_events(&mut stage);
         stage.send(dig(24.0, 8.0, 24.0, 2.0));
         stage.settle();
-        let news = told(&mut stage);
-        assert!(news.contains(&News::FieldMerged { gone: pits[1], into: pits[0] }), "{news:?}");
-        assert!(news.contains(&News::FieldRemoved(pits[1])), "{news:?}");
+        let events = take_events(&mut stage);
+        assert!(events.contains(&TerrainEvent::FieldMerged { gone: pits[1], into: pits[0] }), "{events:?}");
+        assert!(events.contains(&TerrainEvent::FieldRemoved(pits[1])), "{events:?}");
         assert_eq!(stage.with_component::<Field>(), [pits[0]], "the older one goes on");
         let Ok(applied) = &stage.receipts()[2].receipt.outcome else { panic!("refused") };
         assert_eq!(applied.chunks[0].scenario, Scenario::Merged { fields: 2 });
@@ -222,14 +222,14 @@ fn two_pits_that_meet_become_one_field() {
 fn a_terrain_spawned_with_edits_reports_its_chunks_and_fields() {
     let mut model = steep();
     model.apply(random_brushes(23, 30));
-    let mut stage = listening(Stage::drawing());
+    let mut stage = with_recorded_events(Stage::drawing());
     let terrain = stage.show(model);
     assert_entities(&mut stage, terrain);
-    let news = told(&mut stage);
-    let count = |is: fn(&News) -> bool| news.iter().filter(|news| is(news)).count();
-    assert_eq!(count(|news| matches!(news, News::ChunkCreated(..))), stage.count::<Chunk>());
-    assert_eq!(count(|news| matches!(news, News::FieldCreated(..))), stage.count::<Field>());
-    assert_eq!(news.len(), stage.count::<Chunk>() + stage.count::<Field>());
+    let events = take_events(&mut stage);
+    let count = |is: fn(&TerrainEvent) -> bool| events.iter().filter(|event| is(event)).count();
+    assert_eq!(count(|event| matches!(event, TerrainEvent::ChunkCreated(..))), stage.count::<Chunk>());
+    assert_eq!(count(|event| matches!(event, TerrainEvent::FieldCreated(..))), stage.count::<Field>());
+    assert_eq!(events.len(), stage.count::<Chunk>() + stage.count::<Field>());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));
     stage.settle();
     assert_entities(&mut stage, terrain);

@@ -10,7 +10,7 @@ const ALL: Undo = Undo { terrain: None };
 
 #[test]
 fn frames_show_what_was_undone_and_redone() {
-    let mut stage = Stage::drawing().hearing::<HistoryMoved>();
+    let mut stage = Stage::drawing().recording::<HistoryMoved>();
     let terrain = stage.show(steep());
     let mut states = vec![stage.hash(terrain)];
     for burst in random_brushes(31, 60).chunks(6) {
@@ -24,14 +24,14 @@ fn frames_show_what_was_undone_and_redone() {
         (0..last).rev().map(|at| (HistoryStep::Undo, at)).chain((1..=last).map(|at| (HistoryStep::Redo, at)))
     {
         match step {
-            HistoryStep::Undo => stage.tell(Undo { terrain: Some(terrain) }),
-            HistoryStep::Redo => stage.tell(Redo { terrain: Some(terrain) }),
+            HistoryStep::Undo => stage.write(Undo { terrain: Some(terrain) }),
+            HistoryStep::Redo => stage.write(Redo { terrain: Some(terrain) }),
         }
-        stage.frames_until("the step is told", |stage| {
+        stage.frames_until("the step is reported", |stage| {
             let is_whole = stage.is_settled();
-            let heard = stage.heard::<HistoryMoved>();
-            assert_eq!(heard.is_empty(), !is_whole, "it is reported in the frame of its commit");
-            assert!(heard.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.step == step));
+            let recorded = stage.recorded::<HistoryMoved>();
+            assert_eq!(recorded.is_empty(), !is_whole, "it is reported in the frame of its commit");
+            assert!(recorded.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.step == step));
             is_whole
         });
         assert_eq!(stage.hash(terrain), states[expected]);
@@ -46,19 +46,19 @@ fn frames_show_what_was_undone_and_redone() {
 #[test]
 fn steps_come_after_the_brushes_of_their_frame() {
     for stage in [Stage::drawing(), Stage::server()] {
-        let mut stage = stage.hearing::<HistoryMoved>();
+        let mut stage = stage.recording::<HistoryMoved>();
         let terrain = stage.show(level(1.0));
         let pristine = stage.hash(terrain);
-        stage.tell(ALL);
+        stage.write(ALL);
         stage.send(dig(20.0, 8.0, 20.0, 4.0));
         stage.send_to(terrain, dig(40.0, 8.0, 20.0, 4.0));
         stage.settle();
         assert_eq!(stage.hash(terrain), pristine, "both brushes are one step");
         assert_eq!(stage.receipts().len(), 2);
-        stage.tell(Redo::default());
-        stage.tell(ALL);
+        stage.write(Redo::default());
+        stage.write(ALL);
         stage.settle();
-        let steps: Vec<_> = stage.heard::<HistoryMoved>().into_iter().map(|moved| moved.receipt).collect();
+        let steps: Vec<_> = stage.recorded::<HistoryMoved>().into_iter().map(|moved| moved.receipt).collect();
         let outcomes: Vec<_> = steps.iter().map(|receipt| (receipt.step, receipt.outcome.is_ok())).collect();
         // Undo comes before redo, whichever was sent first.
         let nothing = Err(HistoryRejection::NothingToUndo);
@@ -77,38 +77,39 @@ fn steps_come_after_the_brushes_of_their_frame() {
 
 #[test]
 fn every_step_is_answered_by_every_terrain_that_it_is_for() {
-    let mut stage = Stage::server().hearing::<HistoryMoved>();
-    stage.tell(ALL);
+    let mut stage = Stage::server().recording::<HistoryMoved>();
+    stage.write(ALL);
     stage.frames(2);
-    let heard = stage.heard::<HistoryMoved>();
-    let [HistoryMoved { terrain: None, receipt }] = &heard[..] else { panic!("{heard:?}") };
+    let recorded = stage.recorded::<HistoryMoved>();
+    let [HistoryMoved { terrain: None, receipt }] = &recorded[..] else { panic!("{recorded:?}") };
     assert_eq!(receipt.outcome, Err(HistoryRejection::TerrainGone));
 
     let (a, b) = (stage.show(level(1.0)), stage.spawn_at(level(1.0), Vec3::X * 500.0));
     stage.settle();
     stage.send(dig(20.0, 8.0, 20.0, 4.0));
     stage.settle();
-    stage.tell(ALL);
+    stage.write(ALL);
     stage.settle();
     stage.frames(1);
-    let heard = stage.heard::<HistoryMoved>();
-    assert_eq!(heard.len(), 2);
-    let of = |terrain| heard.iter().find(|moved| moved.terrain == Some(terrain)).map(|m| &m.receipt.outcome);
+    let recorded = stage.recorded::<HistoryMoved>();
+    assert_eq!(recorded.len(), 2);
+    let of =
+        |terrain| recorded.iter().find(|moved| moved.terrain == Some(terrain)).map(|m| &m.receipt.outcome);
     assert!(of(a).is_some_and(|outcome| outcome.is_ok()));
     assert_eq!(of(b), Some(&Err(HistoryRejection::NothingToUndo)));
 
     // One terrain that is despawned while a step waits, and one that is despawned already.
     stage.send(dig(20.0, 8.0, 20.0, 4.0));
-    stage.tell(Undo { terrain: Some(a) });
+    stage.write(Undo { terrain: Some(a) });
     stage.frame();
     stage.app.world_mut().despawn(a);
-    stage.tell(Redo { terrain: Some(a) });
+    stage.write(Redo { terrain: Some(a) });
     stage.frames(3);
-    let heard: Vec<_> = stage
-        .heard::<HistoryMoved>()
+    let recorded: Vec<_> = stage
+        .recorded::<HistoryMoved>()
         .into_iter()
         .map(|moved| (moved.terrain, moved.receipt.outcome))
         .collect();
     let gone = || (Some(a), Err(HistoryRejection::TerrainGone));
-    assert_eq!(heard, [gone(), gone()]);
+    assert_eq!(recorded, [gone(), gone()]);
 }

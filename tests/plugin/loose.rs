@@ -24,14 +24,14 @@ fn a_piece_that_breaks_off_is_reported_with_its_mesh() {
     model.set_loose(Some(LooseGround { debris: 9000, ..default() }.into()));
     model.apply([saw()]);
     for (is_drawing, stage) in [(true, Stage::drawing()), (false, Stage::server())] {
-        let mut stage = stage.hearing::<LoosePieceFound>();
+        let mut stage = stage.recording::<LoosePieceFound>();
         let terrain = stage.show(table());
         stage.app.world_mut().entity_mut(terrain).insert(LooseGround { debris: 9000, ..default() });
         stage.send(saw());
         stage.settle();
         assert_eq!(stage.hash(terrain), model.world().hash());
-        let heard = stage.heard::<LoosePieceFound>();
-        let [found] = &heard[..] else { panic!("one piece: {heard:?}") };
+        let recorded = stage.recorded::<LoosePieceFound>();
+        let [found] = &recorded[..] else { panic!("one piece: {recorded:?}") };
         assert_eq!((found.terrain, found.tag, found.piece.fate), (terrain, 9, PieceFate::BrokeOff));
         assert_eq!(found.origin(), found.piece.bounds.min.as_vec3());
         let mesh = found.mesh(&model, &MaterialColors::default()).expect("it broke off");
@@ -42,13 +42,13 @@ fn a_piece_that_breaks_off_is_reported_with_its_mesh() {
             stage.assert_whole(terrain, "without the slab");
         }
         // An undo restores it together with the ground of the cut.
-        stage.tell(Undo { terrain: None });
+        stage.write(Undo { terrain: None });
         stage.settle();
         assert_eq!(stage.hash(terrain), table().world().hash());
         stage.app.world_mut().entity_mut(terrain).remove::<LooseGround>();
         stage.send(saw());
         stage.settle();
-        assert!(stage.heard::<LoosePieceFound>().is_empty(), "the search is off");
+        assert!(stage.recorded::<LoosePieceFound>().is_empty(), "the search is off");
         assert_ne!(stage.hash(terrain), model.world().hash());
     }
 }

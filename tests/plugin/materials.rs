@@ -22,18 +22,18 @@ fn stage() -> Stage {
 }
 
 /// Whether all tiles and chunks of a terrain have this material and no other.
-fn wears<M: Material>(stage: &mut Stage, terrain: Entity, material: &Handle<M>) -> bool {
+fn all_have_material<M: Material>(stage: &mut Stage, terrain: Entity, material: &Handle<M>) -> bool {
     let world = stage.app.world_mut();
     let mut drawn =
         world.query_filtered::<(Option<&MeshMaterial3d<M>>, &ChildOf), Or<(With<Tile>, With<Chunk>)>>();
     let mut all = drawn.iter(world).filter(|(_, parent)| parent.parent() == terrain);
-    all.all(|(worn, _)| worn.is_some_and(|worn| worn.0 == *material))
+    all.all(|(found, _)| found.is_some_and(|found| found.0 == *material))
 }
 
-fn is_bare<M: Material>(stage: &mut Stage) -> bool {
+fn has_no_material<M: Material>(stage: &mut Stage) -> bool {
     let world = stage.app.world_mut();
-    let mut worn = world.query_filtered::<&MeshMaterial3d<M>, Or<(With<Tile>, With<Chunk>)>>();
-    worn.iter(world).count() == 0
+    let mut found = world.query_filtered::<&MeshMaterial3d<M>, Or<(With<Tile>, With<Chunk>)>>();
+    found.iter(world).count() == 0
 }
 
 fn add<M: Material>(stage: &mut Stage, material: M) -> Handle<M> {
@@ -48,31 +48,31 @@ fn is_propagated<M: Material + Default>(mut stage: Stage) {
     let terrain = stage.spawn(model);
     stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(first.clone()));
     stage.frames_until("the terrain is shown", |stage| stage.count::<Mesh3d>() > 0);
-    assert!(wears(&mut stage, terrain, &first), "in the first frame that shows it");
+    assert!(all_have_material(&mut stage, terrain, &first), "in the first frame that shows it");
 
     let chunks = stage.count::<Chunk>();
     for brush in random_brushes(20, 20) {
         stage.send(brush);
         stage.frame();
-        assert!(wears(&mut stage, terrain, &first), "in every frame, new chunks too");
+        assert!(all_have_material(&mut stage, terrain, &first), "in every frame, new chunks too");
     }
     stage.settle();
-    assert!(stage.count::<Chunk>() > chunks && wears(&mut stage, terrain, &first));
+    assert!(stage.count::<Chunk>() > chunks && all_have_material(&mut stage, terrain, &first));
 
     stage.app.world_mut().get_mut::<MeshMaterial3d<M>>(terrain).expect("a material").0 = second.clone();
     stage.frame();
-    assert!(wears(&mut stage, terrain, &second), "in the frame after a change");
+    assert!(all_have_material(&mut stage, terrain, &second), "in the frame after a change");
     stage.send(dig(30.0, -20.0, 30.0, 6.0));
     stage.settle();
-    assert!(wears(&mut stage, terrain, &second));
+    assert!(all_have_material(&mut stage, terrain, &second));
 
     // A terrain may get its material late, and another terrain has its own.
     let other = stage.spawn_at(level(1.0), Vec3::new(200.0, 0.0, 0.0));
     stage.settle();
-    assert!(!wears(&mut stage, other, &first) && wears(&mut stage, terrain, &second));
+    assert!(!all_have_material(&mut stage, other, &first) && all_have_material(&mut stage, terrain, &second));
     stage.app.world_mut().entity_mut(other).insert(MeshMaterial3d(first.clone()));
     stage.frame();
-    assert!(wears(&mut stage, other, &first) && wears(&mut stage, terrain, &second));
+    assert!(all_have_material(&mut stage, other, &first) && all_have_material(&mut stage, terrain, &second));
 }
 
 #[test]
@@ -93,11 +93,11 @@ fn a_material_removed_from_a_terrain_is_removed_from_its_tiles() {
     let glow = add(&mut stage, Glow::default());
     stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(standard.clone()));
     stage.frame();
-    assert!(wears(&mut stage, terrain, &standard));
+    assert!(all_have_material(&mut stage, terrain, &standard));
     // With both materials, tiles would be drawn twice.
     exchange(&mut stage, terrain, &glow);
-    assert!(wears(&mut stage, terrain, &glow));
-    assert!(is_bare::<StandardMaterial>(&mut stage), "tiles still have the standard material");
+    assert!(all_have_material(&mut stage, terrain, &glow));
+    assert!(has_no_material::<StandardMaterial>(&mut stage), "tiles still have the standard material");
 }
 
 /// Replaces a terrain's standard material by the game's own.
@@ -108,11 +108,11 @@ fn exchange(stage: &mut Stage, terrain: Entity, glow: &Handle<Glow>) {
 }
 
 /// The materials of a piece: the standard material, and the game's own.
-fn worn(stage: &Stage, piece: Entity) -> (Option<Handle<StandardMaterial>>, Option<Handle<Glow>>) {
+fn materials_of(stage: &Stage, piece: Entity) -> (Option<Handle<StandardMaterial>>, Option<Handle<Glow>>) {
     let piece = stage.app.world().entity(piece);
     let standard = piece.get::<MeshMaterial3d<StandardMaterial>>();
     let glow = piece.get::<MeshMaterial3d<Glow>>();
-    (standard.map(|worn| worn.0.clone()), glow.map(|worn| worn.0.clone()))
+    (standard.map(|found| found.0.clone()), glow.map(|found| found.0.clone()))
 }
 
 #[test]
@@ -125,10 +125,10 @@ fn pieces_have_the_material_of_their_terrain() {
     for material in [first, second] {
         stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(material.clone()));
         stage.frame();
-        assert_eq!(worn(&stage, piece), (Some(material), None));
+        assert_eq!(materials_of(&stage, piece), (Some(material), None));
     }
     exchange(&mut stage, terrain, &glow);
-    assert_eq!(worn(&stage, piece), (None, Some(glow)));
+    assert_eq!(materials_of(&stage, piece), (None, Some(glow)));
 }
 
 #[test]
@@ -141,13 +141,13 @@ fn a_piece_keeps_its_own_material_until_the_terrains_material_changes() {
     let piece = GroundPiece { terrain, origin: IVec3::ZERO };
     let piece = stage.app.world_mut().spawn((piece, MeshMaterial3d(own.clone()))).id();
     stage.frame();
-    assert_eq!(worn(&stage, piece), (Some(own.clone()), None));
+    assert_eq!(materials_of(&stage, piece), (Some(own.clone()), None));
     stage.app.world_mut().entity_mut(terrain).remove::<MeshMaterial3d<StandardMaterial>>();
     stage.frame();
-    assert_eq!(worn(&stage, piece), (Some(own), None), "it did not come from the terrain");
+    assert_eq!(materials_of(&stage, piece), (Some(own), None), "it did not come from the terrain");
     stage.app.world_mut().entity_mut(terrain).insert(MeshMaterial3d(second.clone()));
     stage.frame();
-    assert_eq!(worn(&stage, piece), (Some(second), None));
+    assert_eq!(materials_of(&stage, piece), (Some(second), None));
 }
 
 #[test]
@@ -160,7 +160,7 @@ fn a_piece_spawned_with_its_own_material_keeps_it() {
     let piece = stage.app.world_mut().spawn((piece, MeshMaterial3d(own.clone()))).id();
     stage.frame();
     stage.frame();
-    assert_eq!(worn(&stage, piece), (Some(own), None));
+    assert_eq!(materials_of(&stage, piece), (Some(own), None));
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn model(stage: &mut Stage, terrain: Entity) -> Mut<'_, Terrain> {
 #[test]
 fn a_stroke_over_many_frames_and_transactions_is_one_undo_step() {
     for pause in [0, 1, 5] {
-        let mut stage = Stage::drawing().hearing::<HistoryMoved>();
+        let mut stage = Stage::drawing().recording::<HistoryMoved>();
         let terrain = stage.show(steep());
         let pristine = stage.hash(terrain);
         for (number, brush) in random_brushes(41, 24).into_iter().enumerate() {
@@ -34,11 +34,11 @@ fn a_stroke_over_many_frames_and_transactions_is_one_undo_step() {
         stage.settle();
         assert_eq!(stage.terrain(terrain).history().undos, 3, "{pause}");
         for stroke in (0..3).rev() {
-            stage.tell(Undo::default());
+            stage.write(Undo::default());
             stage.settle();
-            let heard = stage.heard::<HistoryMoved>();
+            let recorded = stage.recorded::<HistoryMoved>();
             let tags =
-                heard.iter().flat_map(|moved| &moved.receipt.outcome).flat_map(|restored| &restored.tags);
+                recorded.iter().flat_map(|moved| &moved.receipt.outcome).flat_map(|restored| &restored.tags);
             let tags: Vec<u64> = tags.copied().collect();
             assert!(!tags.is_empty() && tags.iter().all(|tag| tag / 8 == stroke), "{pause}: {tags:?}");
             assert!(tags.is_sorted());

@@ -64,18 +64,17 @@ fn questions_are_answered_on_a_server_too() {
 #[test]
 fn a_server_is_notified_of_a_chunk_that_is_dug_again() {
     #[derive(Resource, Default)]
-    struct Told(Vec<Entity>);
+    struct ChangedChunks(Vec<Entity>);
 
     for mut stage in [Stage::drawing(), Stage::server()] {
-        stage
-            .app
-            .init_resource::<Told>()
-            .add_observer(|changed: On<ChunkChanged>, mut all: ResMut<Told>| all.0.push(changed.entity));
+        stage.app.init_resource::<ChangedChunks>().add_observer(
+            |changed: On<ChunkChanged>, mut all: ResMut<ChangedChunks>| all.0.push(changed.entity),
+        );
         stage.show(level(1.0));
         let mut deepen = |radius| {
             stage.send(dig(24.0, 8.0, 24.0, radius));
             stage.settle();
-            (stage.with_component::<Chunk>(), stage.app.world().resource::<Told>().0.clone())
+            (stage.with_component::<Chunk>(), stage.app.world().resource::<ChangedChunks>().0.clone())
         };
         let (chunks, changed) = deepen(3.0);
         assert_eq!((chunks.len(), changed), (1, vec![]), "it is new");

@@ -10,13 +10,13 @@ use fastrand::Rng;
 use crate::worlds;
 
 /// How long a stage waits before it gives up: the machine may be busy.
-const PATIENCE: Duration = Duration::from_secs(300);
+const TIMEOUT: Duration = Duration::from_secs(300);
 
 /// Sleep between two frames, so that tasks can proceed.
-const NAP: Duration = Duration::from_micros(500);
+const FRAME_SLEEP: Duration = Duration::from_micros(500);
 
 /// Longer than small transactions take.
-const REST: Duration = Duration::from_millis(60);
+const TRANSACTION_TIME: Duration = Duration::from_millis(60);
 
 /// Every receipt so far.
 #[derive(Resource, Default)]
@@ -24,7 +24,7 @@ struct Receipts(Vec<BrushApplied>);
 
 /// Every message of one kind so far.
 #[derive(Resource)]
-struct Heard<M: Message>(Vec<M>);
+struct Recorded<M: Message>(Vec<M>);
 
 /// The terrains that reported that they are ready.
 #[derive(Resource, Default)]
@@ -66,22 +66,23 @@ impl Stage {
     }
 
     /// Makes the app record messages of one more kind.
-    pub fn hearing<M: Message + Clone>(mut self) -> Self {
-        self.app
-            .insert_resource(Heard::<M>(Vec::new()))
-            .add_systems(Last, |mut new: MessageReader<M>, mut heard: ResMut<Heard<M>>| {
-                heard.0.extend(new.read().cloned())
-            });
+    pub fn recording<M: Message + Clone>(mut self) -> Self {
+        self.app.insert_resource(Recorded::<M>(Vec::new())).add_systems(
+            Last,
+            |mut new: MessageReader<M>, mut recorded: ResMut<Recorded<M>>| {
+                recorded.0.extend(new.read().cloned())
+            },
+        );
         self
     }
 
     /// The messages recorded since the last call.
-    pub fn heard<M: Message>(&mut self) -> Vec<M> {
-        std::mem::take(&mut self.app.world_mut().resource_mut::<Heard<M>>().0)
+    pub fn recorded<M: Message>(&mut self) -> Vec<M> {
+        std::mem::take(&mut self.app.world_mut().resource_mut::<Recorded<M>>().0)
     }
 
     /// Writes any message, to be read in the next frame.
-    pub fn tell<M: Message>(&mut self, message: M) {
+    pub fn write<M: Message>(&mut self, message: M) {
         self.app.world_mut().write_message(message).expect("the plugin added the message");
     }
 
@@ -130,24 +131,24 @@ impl Stage {
     pub fn frames(&mut self, count: usize) {
         for _ in 0..count {
             self.frame();
-            std::thread::sleep(NAP);
+            std::thread::sleep(FRAME_SLEEP);
         }
     }
 
     /// Sleeps, so that small running transactions finish before the next frame.
     pub fn rest(&self) {
-        std::thread::sleep(REST);
+        std::thread::sleep(TRANSACTION_TIME);
     }
 
     /// Updates frames, at least one, until a condition holds. Panics if it never does.
     pub fn frames_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
-        while start.elapsed() < PATIENCE {
+        while start.elapsed() < TIMEOUT {
             self.frame();
             if is_so(self) {
                 return;
             }
-            std::thread::sleep(NAP);
+            std::thread::sleep(FRAME_SLEEP);
         }
         panic!("timed out waiting until {what}");
     }

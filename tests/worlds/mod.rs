@@ -98,7 +98,7 @@ fn random_center(rng: &mut Rng, ground: &Ground, dig: bool, radius: f32) -> Vec3
 }
 
 /// The result of a dig or an add on a sample by definition. Other operations keep densities or depend on more samples.
-pub fn plainly_applied(operation: &Operation, before: i32, outside: i32) -> i32 {
+pub fn reference_density(operation: &Operation, before: i32, outside: i32) -> i32 {
     // A shape counts as at most four voxels deep.
     let outside = outside.max(-1024);
     match operation {

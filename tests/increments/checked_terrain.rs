@@ -24,7 +24,7 @@ pub struct Effect {
 }
 
 /// A terrain under test and a reference world that is edited sample by sample.
-pub struct Witness {
+pub struct CheckedTerrain {
     pub terrain: Terrain,
     pub samples: Samples,
     /// Meshes that are only ever updated by commits.
@@ -38,7 +38,7 @@ pub struct Witness {
     pub is_meshed_again: bool,
 }
 
-impl Witness {
+impl CheckedTerrain {
     pub fn new(ground: Ground, chunk_size: u32) -> Self {
         let settings = TerrainSettings { chunk_size, ..Default::default() };
         let terrain = Terrain::new(ground, &settings).expect("valid settings");
