@@ -100,8 +100,8 @@ fn place(terrain: &Terrain, number: i32) -> Vec3 {
 fn one_by_one(terrain: &mut Terrain, brushes: &[Brush]) {
     for brush in brushes {
         terrain.submit(brush);
-        let commit = terrain.begin().expect("a brush waits").run();
-        black_box(terrain.commit(commit).expect("nothing else commits"));
+        let commit = terrain.begin().expect("a queued brush").run();
+        black_box(terrain.commit(commit).expect("no other commit"));
     }
 }
 

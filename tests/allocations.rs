@@ -72,13 +72,13 @@ fn the_allocations_of_an_edit_are_bounded() {
         let height = terrain.world().ground().height(bevy_burrow::lattice::Column::new(x, z)) as f32 / 256.0;
         let place = Vec3::new(x as f32, height - 0.3 * (i / 10) as f32, z as f32);
         terrain.submit(&Brush::dig(Shape::sphere(place, 4.0)));
-        let transaction = terrain.begin().expect("a brush waits");
+        let transaction = terrain.begin().expect("a queued brush");
         let (commit, allocations) = count(|| transaction.run());
         let commit = commit.expect("it ran");
         assert!(!commit.meshes.chunks.is_empty());
         let most = &mut most[usize::from(i >= 10)];
         *most = allocations.max(*most);
-        terrain.commit(commit).expect("nothing else commits");
+        terrain.commit(commit).expect("no other commit");
     }
     let [fresh, dug] = most;
     println!(

@@ -259,7 +259,7 @@ fn the_meshes_of_commits_add_up_to_the_drawn_world() {
             for (drawn, mesh) in tiles.chain(chunks) {
                 shown.insert(format!("{drawn:?}"), (drawn, mesh));
             }
-            terrain.commit(commit).expect("nothing came in between");
+            terrain.commit(commit).expect("no other commit");
         }
         let mut drawn: Vec<_> = terrain.world().drawn().filter(|(_, mesh)| !mesh.is_empty()).collect();
         let mut swapped: Vec<_> = shown.into_values().filter(|(_, mesh)| !mesh.is_empty()).collect();
@@ -338,7 +338,7 @@ fn edits_sent_as_json_make_the_same_world() {
             there.submit_edit(&received);
         }
         if let Some(transaction) = there.begin() {
-            let answers = there.commit(transaction.run()).expect("nothing came in between");
+            let answers = there.commit(transaction.run()).expect("no other commit");
             let valid = |receipt: &&Receipt| !matches!(receipt.outcome, Err(Rejection::Brush(_)));
             assert!(answers.iter().eq(receipts.iter().filter(valid)), "script {seed}: receipts differ");
         }

@@ -346,9 +346,9 @@ fn the_field_events_of_a_commit_are_the_difference_of_its_fields() {
                 terrain.submit(brush);
             }
             let before = fields(terrain.world());
-            let commit = terrain.begin().expect("edits wait").run();
+            let commit = terrain.begin().expect("queued edits").run();
             let news = commit.field_news().to_vec();
-            terrain.commit(commit).expect("nothing came in between");
+            terrain.commit(commit).expect("no other commit");
             let after = fields(terrain.world());
             let mut named = BTreeSet::new();
             for (chunk, news) in news {
@@ -398,9 +398,9 @@ fn a_chain_of_merges_reports_the_surviving_field() {
     // In one transaction, b absorbs c, then a absorbs b.
     terrain.submit(&trench(28.0, 48.0));
     terrain.submit(&trench(8.0, 28.0));
-    let commit = terrain.begin().expect("edits wait").run();
+    let commit = terrain.begin().expect("queued edits").run();
     let news: Vec<FieldNews> = commit.field_news().iter().map(|&(_, news)| news).collect();
-    terrain.commit(commit).expect("nothing came in between");
+    terrain.commit(commit).expect("no other commit");
     let expected = [
         FieldNews::Changed(a),
         FieldNews::Merged { gone: b, into: a },

@@ -285,9 +285,9 @@ fn queued_edits_get_their_receipts_before_later_ones() {
             terrain.submit_edit(&edit);
         }
     }
-    let transaction = terrain.begin().expect("edits wait");
+    let transaction = terrain.begin().expect("queued edits");
     assert_eq!(transaction.len(), 13);
-    let receipts = terrain.commit(transaction.run()).expect("nothing came in between");
+    let receipts = terrain.commit(transaction.run()).expect("no other commit");
     let tags: Vec<u64> = receipts.iter().map(|receipt| receipt.tag).collect();
     assert_eq!(tags, [0, 1, 101, 2, 3, 4, 104, 5, 6, 7, 107, 8, 9]);
 }

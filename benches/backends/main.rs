@@ -95,9 +95,9 @@ impl Engines {
         times: &mut Times,
     ) -> f64 {
         terrain.submit_all(brushes);
-        let commit = self.run(terrain.begin().expect("brushes wait"), who, times);
+        let commit = self.run(terrain.begin().expect("queued brushes"), who, times);
         let took = commit.stages.whole.as_secs_f64();
-        terrain.commit(commit).expect("nothing else commits");
+        terrain.commit(commit).expect("no other commit");
         took
     }
 }
@@ -224,11 +224,11 @@ fn bulk(engines: &Engines, are_rough: bool) {
             for (pass, times) in times.iter_mut().enumerate() {
                 terrain.submit_all(level.brushes(pass, are_rough));
                 let mut discarded = Times::default();
-                let transaction = terrain.begin().expect("brushes wait");
+                let transaction = terrain.begin().expect("queued brushes");
                 let commit = engines.run(transaction, who, if round < 2 { &mut discarded } else { times });
                 wholes[who as usize][pass] = commit.stages.whole.as_secs_f64();
                 vertices = commit.meshes.chunks.iter().map(|(_, chunk)| chunk.mesh().vertices.len()).sum();
-                terrain.commit(commit).expect("nothing else commits");
+                terrain.commit(commit).expect("no other commit");
             }
             hashes.push(terrain.world().hash());
         }
@@ -259,7 +259,7 @@ fn moving() {
         let mut terrain = level.terrain();
         terrain.submit_all(level.brushes(0, false));
         let before = engine.figures();
-        let commit = terrain.begin().expect("brushes wait").run_on(&engine);
+        let commit = terrain.begin().expect("queued brushes").run_on(&engine);
         let figures = engine.figures();
         println!(
             "  {:>2}: {:>6.1} ms, {} of {} stages on the card; {:?}, {} MiB there, {} MiB pinned",
@@ -289,7 +289,7 @@ fn one_field(engines: &Engines) {
             let kept = if round < 6 { &mut discarded } else { &mut samples };
             let dig_all = |who: EngineKind, times: &mut Times| {
                 let mut terrain = level::one_field(size, round);
-                drop(engines.run(terrain.begin().expect("a brush waits"), who, times));
+                drop(engines.run(terrain.begin().expect("a queued brush"), who, times));
             };
             for who in turns(round as usize) {
                 match who {

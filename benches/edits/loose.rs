@@ -33,7 +33,7 @@ const REPORTED: usize = 1;
 /// The search settings that are compared, from no search on.
 fn searches() -> [(&'static str, Option<LooseSettings>); 3] {
     [
-        ("nobody looks", None),
+        ("no search", None),
         ("reported", Some(LooseSettings::default())),
         ("taken out, with meshes", Some(LooseSettings { debris: 1 << 15, ..Default::default() })),
     ]
@@ -228,7 +228,7 @@ pub fn section() {
                 let commit = terrain.begin().expect("there is a step").run();
                 played.stages.push(commit.stages);
                 let start = std::time::Instant::now();
-                terrain.commit(commit).expect("nothing else commits");
+                terrain.commit(commit).expect("no other commit");
                 played.commits.push(start.elapsed().as_secs_f64());
             }
             stages::row(&format!("into the ground: {name}"), &played);

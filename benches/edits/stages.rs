@@ -18,10 +18,10 @@ impl Played {
     /// Plays one more brush; returns what it changed.
     pub fn play(&mut self, terrain: &mut Terrain, brush: &Brush) -> Applied {
         terrain.submit(brush);
-        let commit = terrain.begin().expect("a brush waits").run();
+        let commit = terrain.begin().expect("a queued brush").run();
         self.stages.push(commit.stages);
         let start = Instant::now();
-        let mut receipts = terrain.commit(commit).expect("nothing else commits");
+        let mut receipts = terrain.commit(commit).expect("no other commit");
         self.commits.push(start.elapsed().as_secs_f64());
         receipts.pop().expect("each brush has a receipt").outcome.expect("a valid brush in the world")
     }
@@ -34,7 +34,7 @@ impl Played {
 
 /// Runs a transaction and returns its time in seconds.
 pub fn run(terrain: &mut Terrain) -> f64 {
-    let transaction = terrain.begin().expect("brushes wait");
+    let transaction = terrain.begin().expect("queued brushes");
     let start = Instant::now();
     let commit = transaction.run();
     let took = start.elapsed().as_secs_f64();

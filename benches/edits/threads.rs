@@ -122,7 +122,7 @@ fn ready(round: usize) -> Terrain {
 }
 
 fn transaction(round: usize) -> Stages {
-    let commit = ready(round).begin().expect("brushes wait").run();
+    let commit = ready(round).begin().expect("queued brushes").run();
     assert!(commit.meshes.chunks.len() >= 64);
     commit.stages
 }

@@ -45,7 +45,7 @@ use table::{Input, Row};
 use targets::Target;
 use timing::RoundLimits;
 
-/// Times dense meshing on the same grids, ours beside public crates.
+/// Times dense meshing with this crate and with public crates on the same grids.
 #[derive(Parser)]
 struct Args {
     /// Few rounds and short streams

@@ -75,7 +75,7 @@ struct Args {
     /// Edits in one transaction; the result is the same, only the timings differ
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     batch: u32,
-    /// Folder for mesh.obj and report.json; made if it is not there
+    /// Folder for mesh.obj and report.json; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

@@ -29,7 +29,7 @@ pub enum PaperError {
     Stale(#[from] StaleCommit),
     #[error("a terrain had no transaction to begin")]
     Busy,
-    #[error("{0}: a repeat ended otherwise than the one before")]
+    #[error("{0}: a repeat gave another result than the one before")]
     Unrepeatable(String),
     #[error(transparent)]
     Threads(#[from] rayon::ThreadPoolBuildError),

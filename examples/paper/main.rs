@@ -53,7 +53,7 @@ use setup::{Setup, Subject};
 /// Reproduces the paper's Tables 1 to 5 and writes them beside the paper's own figures.
 #[derive(Parser)]
 struct Args {
-    /// Folder for timings, summary, page and plots; made if it is not there
+    /// Folder for timings, summary, page and plots; created if missing
     #[arg(long, value_name = "DIR", default_value = "out/paper")]
     out: PathBuf,
     /// Writes the page here as well, and the plots beside it
@@ -63,13 +63,13 @@ struct Args {
     #[arg(long, value_name = "N", default_value_t = published::REPEATS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
-    /// One repeat only: to look whether all works
+    /// Only one repeat, as a quick check
     #[arg(long, conflicts_with = "repeats")]
     quick: bool,
     /// Threads that edits may use
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=256))]
     threads: u32,
-    /// Plays one test alone and prints what it took; the program asks itself this
+    /// Plays a single test and prints its measurements; the program runs itself with this option
     #[arg(long, hide = true)]
     alone: Option<Subject>,
 }

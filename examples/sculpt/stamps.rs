@@ -31,7 +31,7 @@ impl Plugin for DropPlugin {
 #[derive(Debug, thiserror::Error)]
 pub enum StampError {
     /// The file cannot be read.
-    #[error("it can't be read: {0}")]
+    #[error("the file cannot be read: {0}")]
     File(#[from] io::Error),
     /// The file is not a grey PNG, or is too large.
     #[error(transparent)]
@@ -48,14 +48,16 @@ pub fn take(file: &Path, tool: &mut impl DerefMut<Target = BrushTool>) {
             let tool = &mut **tool;
             (tool.stamp, tool.operation) = (stamp, ToolOperation::Stamp);
         }
-        Err(why) => error!("{} is no stamp: {why}", file.display()),
+        Err(why) => error!("{} cannot be used as a stamp: {why}", file.display()),
     }
 }
 
 /// A file's image, or the crater if there is no file.
 pub fn read_or_crater(file: Option<&Path>) -> Result<StampImage> {
     Ok(match file {
-        Some(file) => read(file).map_err(|why| format!("{} is no stamp: {why}", file.display()))?,
+        Some(file) => {
+            read(file).map_err(|why| format!("{} cannot be used as a stamp: {why}", file.display()))?
+        }
         None => decode("crater".into(), CRATER)?,
     })
 }

@@ -19,11 +19,11 @@ fn a_stale_commit_is_refused_and_loses_nothing() {
     // Edits that are applied at once overtake a running transaction. It is then run again together with them.
     let mut terrain = small_terrain();
     terrain.submit(&dig(3.0, 1));
-    let stale = terrain.begin().expect("an edit waits").run();
+    let stale = terrain.begin().expect("a queued edit").run();
     terrain.submit(&dig(7.0, 2));
     let receipts = terrain.apply([dig(11.0, 3)]);
     assert_eq!(receipts.iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [3]);
-    assert_eq!(terrain.world().hash(), expected, "the edits under way and queued went in as well");
+    assert_eq!(terrain.world().hash(), expected, "running and queued edits were applied as well");
     let before = terrain.snapshot();
     terrain.commit(stale).expect_err("the world has changed since");
     assert_eq!((terrain.world().hash(), terrain.world().revision()), (before.hash(), before.revision()));
@@ -36,11 +36,11 @@ fn a_cancelled_transaction_is_not_committed_beside_its_successor() {
     let dig = |x: f32, tag: u64| Brush::dig(Shape::sphere(Vec3::new(x, 8.0, 6.0), 2.0)).with_tag(tag);
     let mut terrain = small_terrain();
     terrain.submit(&dig(3.0, 1));
-    let first = terrain.begin().expect("an edit waits");
+    let first = terrain.begin().expect("a queued edit");
     // Its task seems lost, so it is cancelled and run again together with the edits sent since.
     terrain.abandon();
     terrain.submit(&dig(11.0, 2));
-    let second = terrain.begin().expect("edits wait");
+    let second = terrain.begin().expect("queued edits");
     assert_eq!(second.len(), 2);
     // The lost transaction finishes after all.
     let late = terrain.commit(first.run()).map_or(0, |receipts| receipts.len());
@@ -65,7 +65,7 @@ fn a_commit_of_another_terrain_is_refused() {
     let mut other = terrain(Ground::flat(30, 30, 2.0).expect("finite heights"), 25);
     one.submit(&Brush::dig(Shape::sphere(Vec3::new(6.0, 5.0, 6.0), 2.0)));
     other.submit(&Brush::dig(Shape::sphere(Vec3::new(20.0, 2.0, 20.0), 2.0)));
-    let commit = other.begin().expect("an edit waits").run();
+    let commit = other.begin().expect("a queued edit").run();
     let before = one.world().hash();
     assert!(one.commit(commit).is_err(), "samples of a world of 30 x 30 cells went into one of 14 x 12");
     assert_eq!(one.world().hash(), before);
@@ -75,19 +75,19 @@ fn a_commit_of_another_terrain_is_refused() {
 fn cancelled_edits_are_queued_again_in_order() {
     let mut terrain = small_terrain();
     let tags = |terrain: &mut Terrain| -> Vec<u64> {
-        let transaction = terrain.begin().expect("edits wait");
-        let receipts = terrain.commit(transaction.run()).expect("nothing came in between");
+        let transaction = terrain.begin().expect("queued edits");
+        let receipts = terrain.commit(transaction.run()).expect("no other commit");
         receipts.iter().map(|receipt| receipt.tag).collect()
     };
     let brush = |tag: u64| Brush::dig(Shape::sphere(Vec3::new(tag as f32, 8.0, 6.0), 1.5)).with_tag(tag);
-    assert!(terrain.begin().is_none(), "nothing waits");
+    assert!(terrain.begin().is_none(), "nothing is queued");
     terrain.abandon();
-    assert_eq!(terrain.queued(), 0, "nothing was under way");
+    assert_eq!(terrain.queued(), 0, "no transaction was running");
 
     for tag in 0..3 {
         terrain.submit(&brush(tag));
     }
-    let lost = terrain.begin().expect("edits wait");
+    let lost = terrain.begin().expect("queued edits");
     assert!(terrain.is_busy() && terrain.queued() == 0);
     for tag in 3..5 {
         terrain.submit(&brush(tag));
@@ -96,7 +96,7 @@ fn cancelled_edits_are_queued_again_in_order() {
     assert_eq!(terrain.queued(), 2);
     // The task is dropped together with its transaction.
     drop(lost);
-    assert!(terrain.is_busy(), "the terrain was not told");
+    assert!(terrain.is_busy(), "the terrain still counts it as running");
     terrain.abandon();
     assert!(!terrain.is_busy());
     assert_eq!(terrain.queued(), 5);
@@ -107,7 +107,7 @@ fn cancelled_edits_are_queued_again_in_order() {
 
     // Dropping a computed commit has the same effect.
     terrain.submit(&brush(7));
-    drop(terrain.begin().expect("an edit waits").run());
+    drop(terrain.begin().expect("a queued edit").run());
     terrain.submit(&brush(8));
     terrain.abandon();
     assert_eq!(tags(&mut terrain), [7, 8]);
@@ -129,7 +129,7 @@ fn edits_overtaken_by_apply_keep_their_order() {
     expected.apply(&script);
     let mut terrain = small_terrain();
     terrain.submit(&script[0]);
-    let _under_way = terrain.begin().expect("an edit waits");
+    let _under_way = terrain.begin().expect("a queued edit");
     terrain.submit(&script[1]);
     terrain.submit(&script[2]);
     terrain.apply([&script[3]]);

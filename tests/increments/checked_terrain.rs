@@ -59,12 +59,12 @@ impl CheckedTerrain {
     /// Applies brushes in one transaction and runs every check.
     pub fn apply(&mut self, brushes: &[Brush], what: &str) {
         self.terrain.submit_all(brushes);
-        let transaction = self.terrain.begin().expect("brushes wait");
+        let transaction = self.terrain.begin().expect("queued brushes");
         let mut commit = transaction.run();
         let news = commit.field_news().to_vec();
         // Taking the meshes out of the commit must not affect the world, which keeps its own.
         let meshes = std::mem::take(&mut commit.meshes);
-        let receipts = self.terrain.commit(commit).expect("nothing else commits");
+        let receipts = self.terrain.commit(commit).expect("no other commit");
         assert_eq!(receipts.len(), brushes.len(), "{what}");
         for (receipt, brush) in receipts.iter().zip(brushes) {
             self.check_receipt(receipt, brush, what);

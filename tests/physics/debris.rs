@@ -169,7 +169,7 @@ fn an_undo_removes_the_debris_of_restored_ground() {
     stage.dig([saw(1.0, Vec3::ZERO)]);
     stage.frames_until("the slab takes shape", |stage| !pieces(stage).is_empty());
     stage.app.world_mut().write_message(Undo::default()).expect("the plugin added the message");
-    stage.frames_until("it goes", |stage| pieces(stage).is_empty());
+    stage.frames_until("the debris is removed", |stage| pieces(stage).is_empty());
     let world = stage.app.world_mut();
     assert_eq!(world.query::<&Terrain>().single(world).expect("one terrain").world().hash(), hash);
     assert_eq!(world.resource::<Crumbled>().0, 0, "an undo counted as crumbling");

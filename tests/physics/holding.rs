@@ -134,7 +134,7 @@ fn asleep_on_the_way() -> (Stage, Entity) {
 fn a_held_body_that_fell_asleep_continues_when_there_is_ground() {
     let (mut stage, ball) = asleep_on_the_way();
     source(&mut stage, 100.0, 120.0);
-    stage.frames_until("it goes on", |stage| !stage.is_held(ball));
+    stage.frames_until("it is released", |stage| !stage.is_held(ball));
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn a_held_source_gets_ground_below_all_of_its_colliders() {
     stage.app.world_mut().entity_mut(body).insert(ColliderSource { radius: 1.0 });
     stage.frame();
     assert!(stage.is_held(body), "there is no collider yet");
-    stage.frames_until("it is let go", |stage| !stage.is_held(body));
+    stage.frames_until("it is released", |stage| !stage.is_held(body));
     stage.frames(60);
     assert!((stage.place(body).y - 8.5).abs() < 0.05, "{}", stage.place(body));
 }

@@ -38,7 +38,7 @@ fn ground_has_colliders_near_sources_only_and_they_move_along() {
     };
     let (count, far) = near(&mut stage, Vec2::splat(40.0));
     assert!((9..40).contains(&count) && far < 50.0, "{count} colliders, up to {far} m away");
-    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x = 200.0;
+    stage.app.world_mut().get_mut::<Transform>(source).expect("the source exists").translation.x = 200.0;
     stage.frame();
     stage.settle();
     let (count, far) = near(&mut stage, Vec2::new(200.0, 40.0));
@@ -102,7 +102,7 @@ fn colliders_are_built_where_a_held_source_was_going() {
         stage.app.world_mut().entity_mut(ball).insert(ColliderSource { radius });
         stage.frame();
         assert!(stage.is_held(ball), "there is no collider yet");
-        stage.frames_until("it is let go", |stage| !stage.is_held(ball));
+        stage.frames_until("it is released", |stage| !stage.is_held(ball));
     }
 }
 
@@ -117,7 +117,7 @@ fn edits_far_from_all_sources_have_colliders_when_a_source_comes() {
         .id();
     stage.settle();
     stage.dig([pit(200.0, 8.0, 200.0, 5.0), pit(40.0, 8.0, 40.0, 3.0)]);
-    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation =
+    stage.app.world_mut().get_mut::<Transform>(source).expect("the source exists").translation =
         Vec3::new(200.0, 8.0, 200.0);
     stage.frame();
     stage.settle();
@@ -126,7 +126,7 @@ fn edits_far_from_all_sources_have_colliders_when_a_source_comes() {
     assert!((3.3..4.0).contains(&stage.place(ball).y), "{}", stage.place(ball));
     // And back to what was dug meanwhile.
     stage.dig([pit(40.0, 5.0, 40.0, 3.0)]);
-    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation =
+    stage.app.world_mut().get_mut::<Transform>(source).expect("the source exists").translation =
         Vec3::new(40.0, 8.0, 40.0);
     stage.frame();
     stage.settle();
@@ -144,7 +144,7 @@ fn edits_just_outside_a_sources_radius_update_existing_colliders() {
     let source = stage.app.world_mut().spawn((place, ColliderSource { radius: 20.0 })).id();
     stage.settle();
     // The tile from x = 64 on keeps its collider, though it is now outside the radius.
-    stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x = 40.0;
+    stage.app.world_mut().get_mut::<Transform>(source).expect("the source exists").translation.x = 40.0;
     stage.frame();
     stage.settle();
     let ball = stage.ball(Vec3::new(72.0, 8.5, 40.0), 0.5, Vec3::ZERO);
@@ -250,7 +250,8 @@ fn upkeep_visits_only_changed_places() {
     assert!((1..40).contains(&(after_dig - before)), "{} for a pit", after_dig - before);
     for _ in 0..64 {
         for &source in &sources {
-            stage.app.world_mut().get_mut::<Transform>(source).expect("it is there").translation.x += 0.1;
+            stage.app.world_mut().get_mut::<Transform>(source).expect("the source exists").translation.x +=
+                0.1;
         }
         stage.frame();
     }

@@ -163,7 +163,7 @@ fn events_report_every_change_of_chunks_and_fields() {
                     let survivor = rest
                         .values()
                         .find(|field| field.0 == into)
-                        .expect("it goes into a field that is there");
+                        .expect("the field that it merged into exists");
                     assert_eq!(survivor.2, *chunk, "a field never leaves its chunk");
                     rest.remove(&old.id);
                     assert!(stage.app.world().get_entity(gone).is_err(), "its entity is despawned");
@@ -207,7 +207,7 @@ fn two_pits_that_meet_become_one_field() {
         let events = take_events(&mut stage);
         assert!(events.contains(&TerrainEvent::FieldMerged { gone: pits[1], into: pits[0] }), "{events:?}");
         assert!(events.contains(&TerrainEvent::FieldRemoved(pits[1])), "{events:?}");
-        assert_eq!(stage.with_component::<Field>(), [pits[0]], "the older one goes on");
+        assert_eq!(stage.with_component::<Field>(), [pits[0]], "the older field survives");
         let Ok(applied) = &stage.receipts()[2].receipt.outcome else { panic!("refused") };
         assert_eq!(applied.chunks[0].scenario, Scenario::Merged { fields: 2 });
         let (_, in_chunk) = stage.terrain(terrain).world().fields().next().expect("a chunk with fields");

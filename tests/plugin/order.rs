@@ -148,10 +148,10 @@ fn only_changed_parts_of_a_games_own_edits_are_meshed_again() {
             1 => drop(own.undo()),
             2 => {
                 own.submit(&dig(20.0, 8.0, 8.0, 3.0));
-                let mut commit = own.begin().expect("a brush waits").run();
+                let mut commit = own.begin().expect("a queued brush").run();
                 // The game takes the meshes for itself.
                 drop(std::mem::take(&mut commit.meshes));
-                own.commit(commit).expect("nothing else commits");
+                own.commit(commit).expect("no other commit");
             }
             _ => {
                 own.apply([dig(9.0, 8.0, 8.0, 3.0)]);

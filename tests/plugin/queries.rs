@@ -120,7 +120,7 @@ fn ground_is_ready_when_no_edit_is_pending() {
     let at = PLACE + Vec3::new(8.0, 2.0, 8.0);
     stage.send(dig(at.x, at.y, at.z, 2.0));
     stage.frame();
-    assert!(!ask(&mut stage, around(8.0, 8.0)), "its edit is under way");
+    assert!(!ask(&mut stage, around(8.0, 8.0)), "its edit is pending");
     assert!(ask(&mut stage, around(26.0, 26.0)), "no edit is on its way there");
     stage.settle();
     assert!(ask(&mut stage, around(8.0, 8.0)));
@@ -249,7 +249,7 @@ fn ground_of_a_turned_terrain_is_not_ready_where_an_edit_is_pending() {
         let at = place.transform_point(local + beside * 6.0);
         stage.send(dig(at.x, at.y, at.z, 1.0));
         stage.frame();
-        assert!(!ask(&mut stage, around), "an edit {beside} of the middle is under way");
+        assert!(!ask(&mut stage, around), "an edit {beside} of the middle is pending");
         stage.settle();
         assert!(ask(&mut stage, around));
     }
@@ -268,5 +268,5 @@ fn nothing_is_ready_without_a_terrain_or_for_nan_corners() {
     }
     stage.send(dig(30.0, 8.0, 30.0, 4.0));
     stage.frame();
-    assert!(!ask(&mut stage, everywhere), "an edit is under way");
+    assert!(!ask(&mut stage, everywhere), "an edit is pending");
 }

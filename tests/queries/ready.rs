@@ -22,17 +22,17 @@ fn a_place_is_ready_unless_an_edit_is_pending_there() {
     assert!(!terrain.is_ready(around(15, 10, 10, 1)));
 
     // It runs, with another one queued elsewhere.
-    let transaction = terrain.begin().expect("an edit waits");
+    let transaction = terrain.begin().expect("a queued edit");
     assert!(!terrain.is_ready(here) && terrain.is_ready(there));
     terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(35.0, 10.0, 25.0), 2.0)));
     assert!(!terrain.is_ready(here) && !terrain.is_ready(there));
     let commit = transaction.run();
     assert!(!terrain.is_ready(here), "computed, but not committed");
-    terrain.commit(commit).expect("nothing came in between");
+    terrain.commit(commit).expect("no other commit");
     assert!(terrain.is_ready(here) && !terrain.is_ready(there));
 
     // It is cancelled, and so queued again.
-    let lost = terrain.begin().expect("an edit waits");
+    let lost = terrain.begin().expect("a queued edit");
     drop(lost);
     terrain.abandon();
     assert!(terrain.is_ready(here) && !terrain.is_ready(there));

@@ -31,7 +31,7 @@ fn history_takes_the_reported_bytes_and_stays_within_its_budget() {
             }
             while let Some(transaction) = terrain.begin() {
                 let commit = transaction.run();
-                terrain.commit(commit).expect("nobody else commits");
+                terrain.commit(commit).expect("no other commit");
                 let history = terrain.history();
                 assert!(history.bytes <= budget, "world {index}: {history:?} with a budget of {budget}");
                 most = most.max(history.undos);

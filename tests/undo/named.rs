@@ -62,13 +62,13 @@ fn a_cancelled_step_is_not_lost() {
     let pristine = terrain.world().hash();
     terrain.apply([ball(10.0, 10.0, 10.0, 3.0)]);
     terrain.submit_undo();
-    let lost = terrain.begin().expect("a step waits").run();
+    let lost = terrain.begin().expect("a queued step").run();
     assert!(!terrain.is_ready(LatticeBox::point(IVec3::new(10, 10, 10))));
     assert!(terrain.is_ready(LatticeBox::point(IVec3::new(50, 10, 50))));
     terrain.abandon();
     assert!(terrain.commit(lost).is_err());
     assert!(!terrain.is_ready(LatticeBox::point(IVec3::new(10, 10, 10))));
-    let again = terrain.begin().expect("it waits again").run();
+    let again = terrain.begin().expect("the step is queued again").run();
     // The budget is removed meanwhile; the step is taken all the same.
     terrain.set_undo_budget(0);
     terrain.commit(again).expect("the step is still pending");
@@ -88,18 +88,18 @@ fn restored_fields_keep_their_ids_and_new_fields_get_new_ids() {
     let trench = Shape::capsule(Vec3::new(8.0, 10.0, 8.0), Vec3::new(20.0, 10.0, 8.0), 2.0);
     assert_eq!(field(&mut terrain, Brush::dig(trench)), a, "they merged");
     terrain.submit_undo();
-    let commit = terrain.begin().expect("a step waits").run();
+    let commit = terrain.begin().expect("a queued step").run();
     let news = commit.field_news().to_vec();
-    terrain.commit(commit).expect("nobody else commits");
+    terrain.commit(commit).expect("no other commit");
     assert_eq!(
         news.iter().map(|news| news.1).collect::<Vec<_>>(),
         [FieldNews::Changed(a), FieldNews::Created(b)]
     );
     terrain.submit_redo();
-    let commit = terrain.begin().expect("a step waits").run();
+    let commit = terrain.begin().expect("a queued step").run();
     let news: Vec<_> = commit.field_news().iter().map(|news| news.1).collect();
     assert_eq!(news, [FieldNews::Changed(a), FieldNews::Merged { gone: b, into: a }]);
-    terrain.commit(commit).expect("nobody else commits");
+    terrain.commit(commit).expect("no other commit");
     (0..3).for_each(|_| assert!(terrain.undo().outcome.is_ok()));
     let c = field(&mut terrain, ball(8.0, 10.0, 8.0, 2.0));
     assert!(c > b, "{c:?} was the id of another field");

@@ -117,7 +117,7 @@ impl Screen {
             for (chunk, surface) in &commit.meshes.chunks {
                 self.0.insert(Drawn::Chunk(*chunk), surface.mesh().clone());
             }
-            receipts.extend(terrain.commit(commit).expect("nobody else commits"));
+            receipts.extend(terrain.commit(commit).expect("no other commit"));
         }
         receipts
     }
