@@ -20,19 +20,19 @@ const FRAME: Duration = Duration::from_micros(16_667);
 
 /// When brushes were sent, by tag, and their outcomes.
 #[derive(Resource, Default)]
-struct Heard {
+struct Latencies {
     sent: HashMap<u64, Instant>,
     /// Seconds until the receipt came.
     answered: Vec<(u64, f64)>,
     refused: u64,
 }
 
-fn hear(mut receipts: MessageReader<BrushApplied>, mut heard: ResMut<Heard>) {
+fn record_receipts(mut receipts: MessageReader<BrushApplied>, mut latencies: ResMut<Latencies>) {
     for BrushApplied { receipt, .. } in receipts.read() {
-        let took = heard.sent.remove(&receipt.tag).map_or(0.0, |sent| sent.elapsed().as_secs_f64());
+        let took = latencies.sent.remove(&receipt.tag).map_or(0.0, |sent| sent.elapsed().as_secs_f64());
         match receipt.outcome {
-            Ok(_) => heard.answered.push((receipt.tag, took)),
-            Err(_) => heard.refused += 1,
+            Ok(_) => latencies.answered.push((receipt.tag, took)),
+            Err(_) => latencies.refused += 1,
         }
     }
 }
@@ -45,7 +45,7 @@ fn resident() -> f64 {
 }
 
 fn send(app: &mut App, tag: u64, brush: Brush) {
-    app.world_mut().resource_mut::<Heard>().sent.insert(tag, Instant::now());
+    app.world_mut().resource_mut::<Latencies>().sent.insert(tag, Instant::now());
     app.world_mut().write_message(brush.with_tag(tag));
 }
 
@@ -60,7 +60,9 @@ fn main() {
     let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
     let limits = terrain.work_limits();
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, BurrowPlugins)).init_resource::<Heard>().add_systems(Last, hear);
+    app.add_plugins((MinimalPlugins, BurrowPlugins))
+        .init_resource::<Latencies>()
+        .add_systems(Last, record_receipts);
     app.world_mut().spawn(terrain);
     (0..3).for_each(|_| app.update());
     let place = |number: u64, spread: u64| {
@@ -74,11 +76,11 @@ fn main() {
     let start = Instant::now();
     app.update();
     let frame = start.elapsed();
-    let refused = app.world().resource::<Heard>().refused;
+    let refused = app.world().resource::<Latencies>().refused;
     println!("{FLOOD} brushes of radius {RADIUS}: {refused} refused in their frame, which took {frame:.1?}");
 
     let (mut frames, mut most, mut next, mut dug) = (Vec::new(), before, Instant::now(), 0);
-    while dug < DIGS || !app.world().resource::<Heard>().sent.is_empty() {
+    while dug < DIGS || !app.world().resource::<Latencies>().sent.is_empty() {
         let start = Instant::now();
         if dug < DIGS && start >= next {
             send(&mut app, FLOOD + dug, Brush::dig(Shape::sphere(place(dug, 40), 4.0)));
@@ -89,16 +91,16 @@ fn main() {
         most = most.max(resident());
         std::thread::sleep(FRAME.saturating_sub(start.elapsed()));
     }
-    let heard = app.world().resource::<Heard>();
-    let flood = heard.answered.iter().filter(|(tag, _)| *tag < FLOOD);
+    let latencies = app.world().resource::<Latencies>();
+    let flood = latencies.answered.iter().filter(|(tag, _)| *tag < FLOOD);
     let last = flood.map(|(_, took)| *took).fold(0.0, f64::max);
     let mut player: Vec<f64> =
-        heard.answered.iter().filter(|(tag, _)| *tag >= FLOOD).map(|(_, took)| *took).collect();
+        latencies.answered.iter().filter(|(tag, _)| *tag >= FLOOD).map(|(_, took)| *took).collect();
     println!("work that may wait: {} bricks, which took {last:.2} s", limits.waiting);
     println!(
         "{DIGS} digs of radius 4, ten a second: {} done, {} refused; answered after p50 {:.2}, p99 {:.2} s",
         player.len(),
-        heard.refused - refused,
+        latencies.refused - refused,
         percentile(&mut player, 50),
         percentile(&mut player, 99)
     );

@@ -205,14 +205,14 @@ fn drawn_materials(world: &World) -> HashMap<IVec3, MaterialMix> {
 /// Counts of the pieces' vertices: those that the world had drawn, those of built or painted material, those at the
 /// rim of the world, and the normals compared.
 #[derive(Debug, Default)]
-struct Looks {
+struct PieceVertices {
     drawn: usize,
     built: usize,
     sides: usize,
     normals: usize,
 }
 
-impl Looks {
+impl PieceVertices {
     /// Checks that a piece looks as it did in its world, as if the ground next to it were not there.
     fn check(&mut self, world: &World, drawn: &HashMap<IVec3, MaterialMix>, piece: &LoosePiece, what: &str) {
         let (own, samples, grid) = (samples_of(piece), world.samples(), world.grid());
@@ -289,7 +289,7 @@ fn cut_off(before: &World, after: &World) -> Vec<Piece> {
 #[test]
 fn edits_take_out_what_they_cut_off_and_nothing_else() {
     let (mut removed, mut broken, mut left, mut sculpted) = (0, 0, 0, 0);
-    let mut looks = Looks::default();
+    let mut looks = PieceVertices::default();
     for index in 0..world_count(150) {
         let mut rng = Rng::with_seed(52_000 + index);
         let (ground, chunk_size) = small_world(&mut rng, index);
@@ -378,7 +378,7 @@ fn edits_take_out_what_they_cut_off_and_nothing_else() {
     println!("{removed} removed, {broken} broken off, {left} left; {sculpted} by sculpting; {looks:?}");
     assert!(removed > 50 && broken > 50 && left > 5, "{removed} removed, {broken} broken off, {left} left");
     assert!(sculpted > 10, "{sculpted} pieces were cut off by sculpting");
-    let Looks { drawn, built, sides, normals } = looks;
+    let PieceVertices { drawn, built, sides, normals } = looks;
     assert!(drawn.min(normals) > 300 && built.min(sides) > 20, "{looks:?}");
 }
 

@@ -19,9 +19,9 @@ use worlds::{random_world, real_ground, world_count};
 /// Vertices at the same position that were compared, and how many of them have several materials, by the parts that
 /// meet there.
 #[derive(Debug, Default)]
-struct Met(BTreeMap<&'static str, [usize; 2]>);
+struct MeetingVertices(BTreeMap<&'static str, [usize; 2]>);
 
-impl Met {
+impl MeetingVertices {
     fn kind(a: Drawn, b: Drawn) -> &'static str {
         match (a, b) {
             (Drawn::Tile(a), Drawn::Tile(b)) if a == b => "parts of a tile",
@@ -54,7 +54,7 @@ impl Met {
                         place.insert((drawn, own));
                         continue;
                     }
-                    Entry::Occupied(met) => *met.get(),
+                    Entry::Occupied(entry) => *entry.get(),
                 };
                 let at = place.as_dvec3() / f64::from(SNAP);
                 assert_eq!(own, theirs, "{what}: materials of {drawn:?} and {other:?} at {at}");
@@ -70,32 +70,32 @@ impl Met {
 fn random_worlds_are_flawless() {
     let worlds = world_count(300);
     let threads = std::thread::available_parallelism().map_or(2, |n| n.get() as u64);
-    let (mut triangles, mut cells, mut met) = (0, 0, Met::default());
+    let (mut triangles, mut cells, mut meeting) = (0, 0, MeetingVertices::default());
     std::thread::scope(|scope| {
         let soak = |thread: u64| {
-            let (mut triangles, mut cells, mut met) = (0, 0, Met::default());
+            let (mut triangles, mut cells, mut meeting) = (0, 0, MeetingVertices::default());
             for index in (thread..worlds).step_by(threads as usize) {
                 let terrain = random_world(&mut Rng::with_seed(index), index);
                 let report = terrain.world().check_seams();
                 assert!(report.is_flawless(), "world {index}: {report}");
-                met.check_materials(terrain.world(), &format!("world {index}"));
+                meeting.check_materials(terrain.world(), &format!("world {index}"));
                 triangles += report.triangles;
                 cells += terrain.world().mask().len();
             }
-            (triangles, cells, met)
+            (triangles, cells, meeting)
         };
         let runs: Vec<_> = (0..threads).map(|thread| scope.spawn(move || soak(thread))).collect();
         for run in runs {
             let (t, c, m) = run.join().expect("a world failed; see above");
             triangles += t;
             cells += c;
-            met.add(&m);
+            meeting.add(&m);
         }
     });
     assert!(cells > 0, "no world was dug at its surface");
-    println!("vertices that meet in seams, and those of more than one material: {met:?}");
+    println!("vertices that meet in seams, and those of more than one material: {meeting:?}");
     for kind in ["two tiles", "two chunks", "tile and chunk"] {
-        assert!(met.0.get(kind).is_some_and(|[_, mixed]| *mixed > 0), "{kind}: {met:?}");
+        assert!(meeting.0.get(kind).is_some_and(|[_, mixed]| *mixed > 0), "{kind}: {meeting:?}");
     }
     println!(
         "{worlds} worlds, {triangles} triangles, {cells} cells drawn by marching cubes: all closed, all manifold"

@@ -105,7 +105,7 @@ struct Loose {
 }
 
 /// Undoes a dig.
-fn bring_back(terrain: &mut Terrain, hash: u64) {
+fn undo_dig(terrain: &mut Terrain, hash: u64) {
     assert!(terrain.undo().outcome.is_ok(), "a dig can be undone");
     assert_eq!(terrain.world().hash(), hash, "an undone dig leaves no trace");
 }
@@ -125,7 +125,7 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
             if look == REPORTED {
                 found.push(voxels(&applied.loose));
             }
-            bring_back(terrain, before);
+            undo_dig(terrain, before);
         }
     }
     // All loose voxels of any size, untimed.
@@ -135,7 +135,7 @@ fn compare(name: &str, terrain: &mut Terrain, digs: &[Brush]) -> Loose {
     for dig in digs {
         let around = Played::default().play(terrain, dig).bounds.expect("a dig changes the ground");
         cut_off.push(voxels(&terrain.world().loose_pieces(around.grown(1), &everything)));
-        bring_back(terrain, before);
+        undo_dig(terrain, before);
     }
 
     for ((look, _), played) in searches.iter().zip(&played) {

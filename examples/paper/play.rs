@@ -26,7 +26,7 @@ pub struct Played {
 
 impl Played {
     /// Records what an edit changed.
-    fn look_at(&mut self, receipts: &[Receipt]) {
+    fn record(&mut self, receipts: &[Receipt]) {
         let applied = || receipts.iter().filter_map(|receipt| receipt.outcome.as_ref().ok());
         let voxels = |applied: &Applied| applied.removed.total() + applied.added.total();
         self.voxels.push(applied().map(voxels).sum());
@@ -49,7 +49,7 @@ pub fn hybrid(terrain: &mut Terrain, runner: &Runner, brushes: &[Brush]) -> Resu
         });
         let (receipts, meshes) = answer?;
         played.laps.push(lap);
-        played.look_at(&receipts);
+        played.record(&receipts);
         played.undrawn += usize::from(meshes.chunks.is_empty() && meshes.tiles.is_empty());
     }
     // An edit that changes nothing is not sent to the card.
@@ -66,7 +66,7 @@ pub fn same(full: &mut FullWorld, brushes: &[Brush]) -> Played {
         let (lap, receipts) = clock::time(|| full.edit(brush));
         black_box(&mut *full);
         played.laps.push(lap);
-        played.look_at(&receipts);
+        played.record(&receipts);
     }
     played
 }

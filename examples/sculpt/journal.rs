@@ -21,31 +21,31 @@ impl Plugin for JournalPlugin {
         })
         .add_systems(
             Update,
-            (tell_look, tell_receipts, tell_steps, tell_tool, tell_places).after(BurrowSystems::Commit),
+            (print_look, print_receipts, print_steps, print_tool, print_places).after(BurrowSystems::Commit),
         )
-        .add_systems(Last, told::tell_frame.run_if(tells_all));
-        if app.world().get_resource::<TellAll>().is_some_and(|tells| tells.0) {
+        .add_systems(Last, told::tell_frame.run_if(prints_all));
+        if app.world().get_resource::<PrintAll>().is_some_and(|print_all| print_all.0) {
             told::tell_pipelines(app);
         }
     }
 }
 
-fn tells_all(tells: Res<TellAll>) -> bool {
-    tells.0
+fn prints_all(print_all: Res<PrintAll>) -> bool {
+    print_all.0
 }
 
 /// Reports when the ground's textures have loaded, and it is visible.
-fn tell_look(
-    dressed: Query<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>,
-    mut is_told: Local<bool>,
+fn print_look(
+    shown: Query<(), (With<Tile>, With<MeshMaterial3d<GroundMaterial>>)>,
+    mut is_printed: Local<bool>,
 ) {
-    if !*is_told && !dressed.is_empty() {
-        *is_told = true;
+    if !*is_printed && !shown.is_empty() {
+        *is_printed = true;
         println!("dressed");
     }
 }
 
-fn tell_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Terrain>) {
+fn print_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Terrain>) {
     for BrushApplied { terrain, receipt } in receipts.read() {
         let hash = terrain
             .and_then(|terrain| terrains.get(terrain).ok())
@@ -63,7 +63,7 @@ fn tell_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Ter
     }
 }
 
-fn tell_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
+fn print_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
     for HistoryMoved { terrain, receipt } in moves.read() {
         let name = steps::name(receipt.step);
         let terrain = terrain.and_then(|terrain| terrains.get(terrain).ok());
@@ -78,7 +78,7 @@ fn tell_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>)
     }
 }
 
-fn tell_tool(tool: Res<BrushTool>) {
+fn print_tool(tool: Res<BrushTool>) {
     if tool.is_changed() {
         println!(
             "tool operation={:?} shape={:?} radius={:.2} material={} stamp={:?}",
@@ -92,8 +92,8 @@ fn tell_tool(tool: Res<BrushTool>) {
 }
 
 /// Prints the positions of the panel's widgets whenever they change; `tools/drive.py` clicks on them.
-fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
-    if !tells.0 || !places.is_changed() {
+fn print_places(places: Res<PanelPlaces>, print_all: Res<PrintAll>) {
+    if !print_all.0 || !places.is_changed() {
         return;
     }
     for (name, place) in &places.0 {
@@ -106,4 +106,4 @@ fn tell_places(places: Res<PanelPlaces>, tells: Res<TellAll>) {
 
 /// Whether frames, pipelines and positions are printed. Must be inserted before [`JournalPlugin`].
 #[derive(Resource, Default)]
-pub struct TellAll(pub bool);
+pub struct PrintAll(pub bool);

@@ -103,7 +103,7 @@ fn main() -> ExitCode {
 
 /// Everything that does not need a window.
 fn editor(app: &mut App, options: &Options) {
-    app.insert_resource(journal::TellAll(options.tell)).add_plugins((
+    app.insert_resource(journal::PrintAll(options.tell)).add_plugins((
         BurrowPlugins,
         BurrowPanelPlugin,
         BurrowDebugPlugin,

@@ -81,11 +81,11 @@ impl Photographer {
         draw_until(app, &mut draw, |app| !shaders::are_missing(app))?;
         let before = app.world().resource::<Developed>().0;
         let mut save = save_to_disk(path.to_owned());
-        let develop = move |picture: On<ScreenshotCaptured>, mut developed: ResMut<Developed>| {
+        let on_captured = move |picture: On<ScreenshotCaptured>, mut saved: ResMut<Developed>| {
             save(picture);
-            developed.0 += 1;
+            saved.0 += 1;
         };
-        app.world_mut().spawn(Screenshot::image(self.film.clone())).observe(develop);
+        app.world_mut().spawn(Screenshot::image(self.film.clone())).observe(on_captured);
         draw(app);
         self.film_runs(app, self.draws_all);
         draw_until(app, &mut draw, |app| app.world().resource::<Developed>().0 > before)?;

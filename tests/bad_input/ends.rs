@@ -9,7 +9,7 @@ use crate::terrains::{assert_flawless, terrain};
 
 /// Digs, fills and paints at several places on the surface, the rim and the corners, and checks the world after each
 /// edit.
-fn work_over(mut terrain: Terrain, rng: &mut Rng, what: &str) -> Terrain {
+fn edit_and_check(mut terrain: Terrain, rng: &mut Rng, what: &str) -> Terrain {
     let grid = terrain.world().grid();
     let (width, depth) = (grid.width(), grid.depth());
     for step in 0..6 {
@@ -56,7 +56,7 @@ fn the_smallest_and_narrowest_worlds_are_dug_without_a_hole() {
                 };
                 let ground = Ground::from_fn(width, depth, height).expect("finite heights");
                 let what = format!("{width} x {depth} cells, relief {relief}, chunks of {chunk_size}");
-                work_over(terrain(ground, chunk_size), &mut rng, &what);
+                edit_and_check(terrain(ground, chunk_size), &mut rng, &what);
             }
         }
     }
@@ -78,7 +78,8 @@ fn worlds_at_the_ends_of_the_lattice_are_dug_without_a_hole() {
         for chunk_size in [8, 25, 128] {
             let mut rng = Rng::with_seed(chunk_size.into());
             let ground = Ground::flat(12, 11, height).expect("heights within the limit");
-            let mut terrain = work_over(terrain(ground, chunk_size), &mut rng, &format!("level at {height}"));
+            let mut terrain =
+                edit_and_check(terrain(ground, chunk_size), &mut rng, &format!("level at {height}"));
             // From one end of the lattice to the next chunk, and as far out as a brush may lie.
             let end = Vec3::new(6.0, (limit * height.signum()) as f32, 6.0);
             terrain.apply([Brush::add(Shape::sphere(end, 3.0), MaterialId(2))]);

@@ -88,7 +88,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let (dug, _) = flip(&before[1], &studio.picture());
     println!("a spot of another material: FLIP {painted:.5}; a small hole in it: {dug:.5}");
     album.check(painted > 2.0 * NOISE, || format!("a painted spot was not detected: FLIP {painted:.5}"));
-    elsewhere(studio, album);
+    other_places(studio, album);
     studio.sun(Vec3::new(1.0, 0.9, 0.4));
 }
 
@@ -97,7 +97,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
 const NOISE_ON_CLIFFS: f32 = 0.03;
 
 /// The seam around a corner of four chunks, and at the steepest place.
-fn elsewhere(studio: &mut Studio, album: &mut Album) {
+fn other_places(studio: &mut Studio, album: &mut Album) {
     let world = studio.one::<Terrain>().snapshot();
     let rise = |(x, z): (i32, i32)| {
         let height = |x, z| f64::from(world.ground().height(Column::new(x, z))) / 256.0;

@@ -50,7 +50,7 @@ fn fence(stage: &mut Stage) {
 }
 
 /// A position over the world, away from its walls.
-fn somewhere(rng: &mut Rng) -> Vec2 {
+fn random_position(rng: &mut Rng) -> Vec2 {
     let mut along = || 3.0 + rng.f32() * (SIDE as f32 - 6.0);
     Vec2::new(along(), along())
 }
@@ -73,7 +73,7 @@ fn tunnels() -> impl Iterator<Item = Brush> {
 
 /// A brush near the ground, as players send them. With `builds` unset it never adds ground.
 fn edit(rng: &mut Rng, model: &Model, builds: bool) -> Brush {
-    let place = somewhere(rng);
+    let place = random_position(rng);
     let center = Vec3::new(place.x, height(model, place) + rng.f32() * 4.0 - 3.0, place.y);
     let radius = 1.5 + 2.5 * rng.f32();
     match rng.u8(0..4) {
@@ -174,7 +174,7 @@ fn play(builds: bool) -> PhysicsFigures {
 
     let mut bodies = Vec::new();
     for _ in 0..balls {
-        let place = somewhere(&mut rng);
+        let place = random_position(&mut rng);
         // Half of them start below the open sky, the others wherever there is air, tunnels included.
         let spans = stage.terrain(terrain).world().spans(place.x.into(), place.y.into());
         let span = if rng.bool() { spans.last() } else { rng.choice(spans.iter()) };
@@ -186,7 +186,7 @@ fn play(builds: bool) -> PhysicsFigures {
     }
     let mut people = Vec::new();
     for _ in 0..walkers {
-        let place = somewhere(&mut rng);
+        let place = random_position(&mut rng);
         let feet = Vec3::new(place.x, height(stage.terrain(terrain).world(), place) + 0.1, place.y);
         people.push(stage.character(feet, Vec2::from_angle(rng.f32() * 6.3)));
     }
@@ -320,7 +320,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     // Patches drawn by marching cubes that look as before, on chunk borders and away from them.
     let patches: Vec<Brush> = (0..120)
         .map(|number| {
-            let mut place = somewhere(&mut rng);
+            let mut place = random_position(&mut rng);
             if number % 2 == 0 {
                 place.x = (place.x / 16.0).round() * 16.0;
             }
@@ -332,7 +332,7 @@ fn bodies_on_gentle_hills_do_not_jump_at_seams_while_edits_fall() {
     stage.dig(patches.into_iter().chain([tunnel.brush()]));
     // The start and the direction of each body.
     let start = |stage: &Stage, rng: &mut Rng, number: usize| {
-        let (place, way) = (somewhere(rng), Vec2::from_angle(rng.f32() * 6.3));
+        let (place, way) = (random_position(rng), Vec2::from_angle(rng.f32() * 6.3));
         if number.is_multiple_of(5) {
             (tunnel.at(place), if rng.bool() { Vec2::X } else { Vec2::NEG_X })
         } else {

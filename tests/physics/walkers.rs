@@ -128,21 +128,25 @@ fn a_walker_with_a_parent_walks_in_world_space() {
 }
 
 /// The height of a walker's capsule.
-fn tall(stage: &Stage, walker: Entity) -> f32 {
+fn capsule_height(stage: &Stage, walker: Entity) -> f32 {
     let collider = stage.app.world().get::<Collider>(walker).expect("a walker has a collider");
     let aabb = collider.aabb(Vec3::ZERO, Quat::IDENTITY);
     aabb.max.y - aabb.min.y
 }
 
 /// Checks that a walker with this character stands at height 8 for half a second.
-fn stands(stage: &mut Stage, walker: Entity, character: &Character) {
+fn check_standing(stage: &mut Stage, walker: Entity, character: &Character) {
     let height = character.height;
     for _ in 0..seconds(0.5) {
         stage.frame();
         let feet = character.feet(stage.place(walker));
         assert!((feet.y - 8.0).abs() < 0.03, "{height} m tall, at {feet}");
     }
-    assert!((tall(stage, walker) - height).abs() < 0.01, "{} for {height}", tall(stage, walker));
+    assert!(
+        (capsule_height(stage, walker) - height).abs() < 0.01,
+        "{} for {height}",
+        capsule_height(stage, walker)
+    );
     assert!(stage.motion(walker).grounded);
 }
 
@@ -158,7 +162,7 @@ fn a_walker_that_crouches_is_lower_and_keeps_its_feet_on_the_ground() {
             character.clone()
         };
         let character = character(&mut stage);
-        stands(&mut stage, walker, &character);
+        check_standing(&mut stage, walker, &character);
     }
 }
 
@@ -170,7 +174,7 @@ fn a_walker_that_is_given_another_character_keeps_its_feet_on_the_ground() {
     for height in [1.0, 2.4, 1.8] {
         let character = Character { height, ..default() };
         stage.app.world_mut().entity_mut(walker).insert(character.clone());
-        stands(&mut stage, walker, &character);
+        check_standing(&mut stage, walker, &character);
     }
 }
 
@@ -183,7 +187,7 @@ fn a_walker_whose_character_was_removed_gets_its_capsule_again() {
     stage.frames(2);
     stage.app.world_mut().entity_mut(walker).insert(Character { height: 1.2, ..default() });
     stage.frames(2);
-    assert!((tall(&stage, walker) - 1.2).abs() < 0.01, "{}", tall(&stage, walker));
+    assert!((capsule_height(&stage, walker) - 1.2).abs() < 0.01, "{}", capsule_height(&stage, walker));
 }
 
 #[test]
@@ -195,6 +199,6 @@ fn a_walker_keeps_the_collider_of_the_game_while_its_size_stays() {
     for speed in [3.0, 4.0] {
         stage.app.world_mut().get_mut::<Character>(walker).expect("a walker").walk_speed = speed;
         stage.frames(2);
-        assert_eq!(tall(&stage, walker), 1.5);
+        assert_eq!(capsule_height(&stage, walker), 1.5);
     }
 }

@@ -4,8 +4,8 @@ use allocation_counter::measure;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 
-use crate::scripts::{Account, any_brush, terrain};
-use crate::state::{Screen, State};
+use crate::scripts::{EditStatistics, any_brush, terrain};
+use crate::state::{DisplayedMeshes, State};
 use crate::worlds::random_ground;
 
 const EDITS: usize = 500;
@@ -18,7 +18,7 @@ type Start = (u64, u32, u64, u64);
 struct Walker {
     name: String,
     terrain: Terrain,
-    screen: Screen,
+    displayed: DisplayedMeshes,
     budget: usize,
     /// The states to which undo and redo lead, next ones last.
     past: Vec<State>,
@@ -34,7 +34,7 @@ impl Walker {
         terrain.set_undo_budget(budget);
         let new = Self {
             name: format!("world {index}, chunks of {chunk_size}, {budget} bytes"),
-            screen: Screen::of(terrain.world()),
+            displayed: DisplayedMeshes::of(terrain.world()),
             now: State::of(terrain.world()),
             terrain,
             budget,
@@ -46,7 +46,7 @@ impl Walker {
 
     /// Runs the pending work. History is within its budget before and after.
     fn play(&mut self) -> Vec<Receipt> {
-        let receipts = self.screen.play(&mut self.terrain);
+        let receipts = self.displayed.play(&mut self.terrain);
         let history = self.terrain.history();
         assert!(history.bytes <= self.budget, "{}: {history:?}", self.name);
         assert_eq!(self.terrain.memory().undo, history.bytes, "{}", self.name);
@@ -58,13 +58,13 @@ impl Walker {
         receipts
     }
 
-    fn edit(&mut self, rng: &mut Rng, turn: usize, account: &mut Account) {
+    fn edit(&mut self, rng: &mut Rng, turn: usize, statistics: &mut EditStatistics) {
         let world = self.terrain.world();
         let brush = any_brush(rng, world.ground(), world.grid().size() as u32);
         let hash = world.hash();
         self.terrain.submit(&brush);
         let receipts = self.play();
-        account.enter(&brush, &receipts[0]);
+        statistics.record(&brush, &receipts[0]);
         let world = self.terrain.world();
         let is_changed = receipts[0].outcome.as_ref().is_ok_and(|applied| applied.bounds.is_some());
         assert_eq!(world.hash() != hash, is_changed, "{}, edit {turn}: {brush:?}", self.name);
@@ -76,7 +76,7 @@ impl Walker {
         if turn.is_multiple_of(10) {
             let report = world.check_seams();
             assert!(report.is_flawless(), "{}, edit {turn}: {report}", self.name);
-            self.screen.check(world, &self.name);
+            self.displayed.check(world, &self.name);
         }
     }
 
@@ -107,7 +107,7 @@ impl Walker {
         }
         self.now.check(self.terrain.world(), &what);
         if self.past.len().is_multiple_of(10) {
-            self.screen.check(self.terrain.world(), &what);
+            self.displayed.check(self.terrain.world(), &what);
         }
         outcome.is_ok()
     }
@@ -115,7 +115,7 @@ impl Walker {
     /// Takes as many steps as there are.
     fn walk(&mut self, step: HistoryStep) -> usize {
         let count = (0..).take_while(|_| self.step(step)).count();
-        self.screen.check(self.terrain.world(), &self.name);
+        self.displayed.check(self.terrain.world(), &self.name);
         let report = self.terrain.world().check_seams();
         assert!(report.is_flawless(), "{}: {report}", self.name);
         count
@@ -125,10 +125,10 @@ impl Walker {
 #[test]
 fn five_hundred_edits_of_every_kind_are_undone_and_redone_exactly() {
     let starts: [Start; 2] = [(8, 128, 0, 530), (0, 8, 2, 500)];
-    let mut account = Account::default();
+    let mut statistics = EditStatistics::default();
     for start in starts {
         let (mut walker, mut rng) = Walker::new(start, 64 << 20);
-        (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut account));
+        (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut statistics));
         let steps = walker.past.len();
         assert!(steps > 400, "only {steps} steps");
         assert_eq!(walker.terrain.history().undos, steps, "the budget holds all of {steps}");
@@ -138,16 +138,16 @@ fn five_hundred_edits_of_every_kind_are_undone_and_redone_exactly() {
         assert!(walker.now.is_pristine());
         assert_eq!(walker.walk(HistoryStep::Redo), steps);
     }
-    account.check(20);
+    statistics.check(20);
 }
 
 #[test]
 fn a_tight_budget_keeps_the_last_of_five_hundred_edits() {
     let starts: [(Start, usize); 2] = [((12, 25, 3, 511), 300_000), ((0, 8, 2, 500), 990_000)];
-    let (mut account, mut lost) = (Account::default(), 0);
+    let (mut statistics, mut lost) = (EditStatistics::default(), 0);
     for (start, budget) in starts {
         let (mut walker, mut rng) = Walker::new(start, budget);
-        (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut account));
+        (0..EDITS).for_each(|turn| walker.edit(&mut rng, turn, &mut statistics));
         let (steps, kept) = (walker.past.len(), walker.terrain.history().undos);
         assert!(0 < kept && kept < steps / 2, "{}: {kept} of {steps} steps are kept", walker.name);
         // A redo may take more bytes than the undo, so the oldest steps are dropped for it.
@@ -161,5 +161,5 @@ fn a_tight_budget_keeps_the_last_of_five_hundred_edits() {
         assert_eq!(-freed.bytes_current, history.bytes as i64, "{}: {history:?}", walker.name);
     }
     assert!(lost > 0, "no step was lost on the way");
-    account.check(20);
+    statistics.check(20);
 }

@@ -42,13 +42,13 @@ pub fn terrain(rng: &mut Rng, ground: Ground, chunk_size: u32, index: u64) -> Te
 
 /// How often each kind of brush was used and changed something, and the effects of rules and loose pieces.
 #[derive(Debug, Default)]
-pub struct Account {
+pub struct EditStatistics {
     kinds: BTreeMap<&'static str, (usize, usize)>,
     effects: BTreeMap<&'static str, u64>,
 }
 
-impl Account {
-    pub fn enter(&mut self, brush: &Brush, receipt: &Receipt) {
+impl EditStatistics {
+    pub fn record(&mut self, brush: &Brush, receipt: &Receipt) {
         let Ok(applied) = &receipt.outcome else { return };
         for kind in [operation(brush), shape(brush)] {
             let (came, changed) = self.kinds.entry(kind).or_default();

@@ -99,9 +99,9 @@ fn mesh_hash(mesh: &SurfaceMesh) -> u64 {
 }
 
 /// The meshes that a renderer shows if it only applies the meshes in commits.
-pub struct Screen(HashMap<Drawn, SurfaceMesh>);
+pub struct DisplayedMeshes(HashMap<Drawn, SurfaceMesh>);
 
-impl Screen {
+impl DisplayedMeshes {
     pub fn of(world: &World) -> Self {
         Self(world.drawn().collect())
     }

@@ -5,19 +5,19 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::volume::{MaterialCounts, SampleView};
 use fastrand::Rng;
 
-use crate::scripts::{Account, any_brush, terrain};
-use crate::state::{Screen, State};
+use crate::scripts::{EditStatistics, any_brush, terrain};
+use crate::state::{DisplayedMeshes, State};
 use crate::worlds::{random_ground, world_count};
 
 #[test]
 fn walks_through_history_restore_the_earlier_states() {
-    let (mut moved, mut account) = (0, Account::default());
+    let (mut moved, mut statistics) = (0, EditStatistics::default());
     for index in 0..world_count(60) {
         let mut rng = Rng::with_seed(4100 + index);
         let (ground, usual) = random_ground(&mut rng, index);
         let chunk_size = if index % 2 == 0 { usual } else { rng.u32(8..=128) };
         let mut terrain = terrain(&mut rng, ground, chunk_size, index / 4);
-        let mut screen = Screen::of(terrain.world());
+        let mut displayed = DisplayedMeshes::of(terrain.world());
         // The states before each transaction, and the states that were undone.
         let (mut past, mut future): (Vec<State>, Vec<State>) = Default::default();
         for turn in 0..rng.usize(6..24) {
@@ -26,7 +26,7 @@ fn walks_through_history_restore_the_earlier_states() {
             match rng.u32(0..5) {
                 0 | 1 if !past.is_empty() => {
                     terrain.submit_undo();
-                    screen.play(&mut terrain);
+                    displayed.play(&mut terrain);
                     future.push(now);
                     let expected = past.pop().expect("there is a past");
                     expected.check(terrain.world(), &what);
@@ -34,7 +34,7 @@ fn walks_through_history_restore_the_earlier_states() {
                 }
                 2 if !future.is_empty() => {
                     terrain.submit_redo();
-                    screen.play(&mut terrain);
+                    displayed.play(&mut terrain);
                     past.push(now);
                     let expected = future.pop().expect("there is a future");
                     expected.check(terrain.world(), &what);
@@ -46,22 +46,25 @@ fn walks_through_history_restore_the_earlier_states() {
                     let brushes: Vec<Brush> = (0..count).map(brush).collect();
                     terrain.submit_all(&brushes);
                     let undos = terrain.history().undos;
-                    let receipts = screen.play(&mut terrain);
-                    brushes.iter().zip(&receipts).for_each(|(brush, receipt)| account.enter(brush, receipt));
+                    let receipts = displayed.play(&mut terrain);
+                    brushes
+                        .iter()
+                        .zip(&receipts)
+                        .for_each(|(brush, receipt)| statistics.record(brush, receipt));
                     if terrain.history().undos > undos {
                         past.push(now);
                         future.clear();
                     }
                 }
             }
-            screen.check(terrain.world(), &what);
+            displayed.check(terrain.world(), &what);
             let history = terrain.history();
             assert_eq!((history.undos, history.redos), (past.len(), future.len()), "{what}");
         }
         assert!(terrain.world().check_seams().is_flawless(), "world {index}");
     }
     assert!(moved > 100, "only {moved} steps");
-    account.check(1);
+    statistics.check(1);
 }
 
 #[test]
