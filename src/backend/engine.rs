@@ -16,6 +16,8 @@ use crate::surface::vertex::WorldView;
 
 #[cfg(feature = "cuda")]
 use super::cuda::Cuda;
+#[cfg(feature = "cuda")]
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What transactions run on; clones share it, and so may any number of terrains.
 ///
@@ -28,6 +30,9 @@ pub struct Engine(Arc<Shared>);
 struct Shared {
     #[cfg(feature = "cuda")]
     cuda: Option<Cuda>,
+    /// Whether it was logged that a ground's own function keeps a world from the card.
+    #[cfg(feature = "cuda")]
+    has_told: AtomicBool,
     figures: Mutex<EngineFigures>,
 }
 
@@ -93,6 +98,8 @@ impl Engine {
         Self(Arc::new(Shared {
             #[cfg(feature = "cuda")]
             cuda: (settings.backend != Backend::Cpu).then(|| Cuda::new(settings)),
+            #[cfg(feature = "cuda")]
+            has_told: AtomicBool::default(),
             figures: Mutex::default(),
         }))
     }
@@ -110,7 +117,11 @@ impl Engine {
 
     #[cfg(all(test, feature = "cuda"))]
     pub(super) fn from_cuda(cuda: Cuda) -> Self {
-        Self(Arc::new(Shared { cuda: Some(cuda), figures: Mutex::default() }))
+        Self(Arc::new(Shared {
+            cuda: Some(cuda),
+            has_told: AtomicBool::default(),
+            figures: Mutex::default(),
+        }))
     }
 
     /// What it has to run on now.
@@ -194,6 +205,21 @@ impl Engine {
 }
 
 impl Shared {
+    /// The card, if it can give the same materials as the processor.
+    #[cfg(feature = "cuda")]
+    fn cuda_for(&self, ground: &Ground) -> Option<&Cuda> {
+        let cuda = self.cuda.as_ref()?;
+        if !ground.has_material_fn() {
+            return Some(cuda);
+        }
+        if !self.has_told.swap(true, Ordering::Relaxed) {
+            log::warn!(
+                "bevy_burrow does without CUDA where the ground's materials are a function of the game's own"
+            );
+        }
+        None
+    }
+
     fn remember(&self, choice: Choice) {
         let mut figures = lock(&self.figures);
         if choice.is_cuda {
@@ -212,7 +238,7 @@ impl Compute for Shared {
     fn edit(&self, work: &PreparedEdits, each: &mut dyn FnMut(&mut [EditDelta])) {
         let (start, mut choice) = (Instant::now(), Choice::of(Stage::Edit, work.jobs().len()));
         #[cfg(feature = "cuda")]
-        if let Some(cuda) = &self.cuda {
+        if let Some(cuda) = self.cuda_for(work.base.ground()) {
             let mut attempt = cuda.edit(work, &mut choice);
             match attempt.done.take() {
                 Some(delta) => each(&mut [delta]),
@@ -241,7 +267,7 @@ impl Compute for Shared {
             then(parts);
         };
         #[cfg(feature = "cuda")]
-        if let Some(cuda) = &self.cuda {
+        if let Some(cuda) = self.cuda_for(view.samples.ground()) {
             let attempt = cuda.mesh(view, blocks, &mut choice, meanwhile, &mut then);
             if attempt.done.is_none() {
                 Cpu.mesh(view, blocks, meanwhile, &mut then);

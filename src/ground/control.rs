@@ -99,7 +99,7 @@ impl Ground {
                 ColumnMaterial { base: *base, overlay, blend: 255 }
             })?,
         };
-        Ok(self.replace_materials(materials))
+        self.replace_materials(materials).with_new_tops()
     }
 
     /// Materials of each column on its own.
@@ -117,7 +117,7 @@ impl Ground {
     }
 
     /// Where a column of the world lies on an image stretched over it.
-    fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
+    pub(super) fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
         // Columns and samples are at most 16384 each, so their product fits.
         let along = |column: i32, cells: i32, samples: u32| {
             LinePosition::new(column.unsigned_abs() * (samples - 1), cells.unsigned_abs())
@@ -131,7 +131,7 @@ impl Ground {
 }
 
 /// A point on an image.
-struct ImagePoint<'a> {
+pub(super) struct ImagePoint<'a> {
     image: &'a GreyImage,
     x: LinePosition,
     z: LinePosition,
@@ -139,7 +139,7 @@ struct ImagePoint<'a> {
 
 impl ImagePoint<'_> {
     /// Grey here, 0 to 65535, linear between the four samples around.
-    fn grey(&self) -> f64 {
+    pub(super) fn grey(&self) -> f64 {
         let (x, z) = (self.x.sample, self.z.sample);
         let row = |z| lerp(self.image.grey(x, z).into(), self.image.grey(x + 1, z).into(), self.x.fraction);
         lerp(row(z), row(z + 1), self.z.fraction)

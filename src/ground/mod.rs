@@ -9,6 +9,7 @@
 //! | a grey PNG or RAW image | [`GreyImage::decode_png`], [`GreyImage::decode_raw`], then [`Ground::from_image`] |
 //! | noise | [`Ground::from_noise`] |
 //! | materials by slope, height or image | [`Ground::with_materials`] |
+//! | strata and ore below the surface | [`Ground::with_strata`], [`Ground::with_material_fn`] |
 //!
 //! The same input gives the same bits on every machine: heights and materials are computed with additions,
 //! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
@@ -26,6 +27,7 @@ mod noise_terms;
 mod png;
 mod rules;
 mod sources;
+mod strata;
 mod world;
 
 pub use control::MaterialControl;
@@ -37,6 +39,14 @@ pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
 pub use rules::MaterialRule;
+pub(crate) use strata::MaterialLookup;
+#[cfg(all(test, feature = "cuda"))]
+pub(crate) use strata::{BED, FILL, POCKET, VEIN};
+pub use strata::{
+    Bedding, MAX_COLUMN_CONDITIONS, MAX_STRATA, Span, Strata, Stratum, StratumBody, StratumBounds,
+};
+#[cfg(feature = "cuda")]
+pub(crate) use strata::{BeddingRecord, StratumRecord};
 pub use world::Ground;
 
 /// Most cells along one side of a world.

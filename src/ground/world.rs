@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::extent::Extent;
 use super::material::{ColumnMaterial, MaterialId};
+use super::strata::{Below, MaterialLookup};
 use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, ONE};
 
@@ -15,11 +16,12 @@ use crate::lattice::{Column, ONE};
 ///
 /// Immutable. Heights are in 1/256 voxel ([`ONE`] per voxel) and at most [`LIMIT`](crate::lattice::LIMIT) voxels from
 /// zero. A column beyond the rim is like the nearest one on the rim, so every question has an answer.
-#[derive(PartialEq, Eq)]
+#[derive(PartialEq)]
 pub struct Ground {
     extent: Extent,
     heights: Vec<i32>,
     materials: Materials,
+    below: Option<Below>,
     height_range: (i32, i32),
     hash: u64,
 }
@@ -75,6 +77,7 @@ impl Ground {
             extent,
             heights,
             materials: Materials::Uniform(ColumnMaterial::default()),
+            below: None,
             height_range,
             hash: 0,
         }
@@ -84,6 +87,22 @@ impl Ground {
     /// The same heights with other materials; `Columns` hold one for each column.
     pub(super) fn replace_materials(self, materials: Materials) -> Self {
         Self { materials, ..self }.hashed()
+    }
+
+    /// The same ground with something else below its surface.
+    pub(super) fn replace_below(self, below: Below) -> Self {
+        Self { below: Some(below), ..self }.hashed()
+    }
+
+    /// The same ground with what is below its surface stored otherwise.
+    pub(super) fn map_below(mut self, map: impl FnOnce(Below) -> Below) -> Self {
+        self.below = self.below.map(map);
+        self
+    }
+
+    /// What is below its surface, if more than its columns say.
+    pub(super) fn below(&self) -> Option<&Below> {
+        self.below.as_ref()
     }
 
     /// The ground with its hash up to date. Rows are hashed in parallel, then their hashes in order.
@@ -101,7 +120,7 @@ impl Ground {
             })
             .collect();
         let dims = [self.width() as u64, self.depth() as u64];
-        self.hash = hash_words(dims.into_iter().chain(rows));
+        self.hash = hash_words(dims.into_iter().chain(rows).chain(self.below_hash()));
         self
     }
 
@@ -166,7 +185,7 @@ impl Ground {
     }
 
     /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, which are what
-    /// [`Self::height`], [`Self::normal`] and [`Self::column_material`] give for each. Normals go into a list of the caller's.
+    /// [`Self::height`], [`Self::normal`] and [`Self::surface_material`] give for each. Normals go into a list of the caller's.
     /// Of columns beyond the rim, none.
     pub(crate) fn row<'a>(
         &'a self,
@@ -198,10 +217,12 @@ impl Ground {
             normals.extend(along_x.zip(along_z).map(|(x, z)| Self::normal_of([x, z])));
         }
         normals.extend((normals.len()..count).map(rim));
-        let materials = self.materials.of(row(z));
+        let tops = self.tops_of(row(z)).unwrap_or_default();
+        let of_columns = if tops.is_empty() { row(z) } else { 0..0 };
+        let tops = tops.iter().map(|&top| ColumnMaterial::solid(top));
         own.iter()
             .zip(normals.iter())
-            .zip(materials)
+            .zip(tops.chain(self.materials.of(of_columns)))
             .map(|((&height, &normal), material)| (height, normal, material))
     }
 
@@ -238,15 +259,37 @@ impl Ground {
     /// What all ground is made of, if it is the same from every surface down.
     pub(crate) fn single_material(&self) -> Option<MaterialId> {
         match self.materials {
-            Materials::Uniform(all) if all.blend == 0 || all.base == all.overlay => Some(all.base),
+            Materials::Uniform(all)
+                if self.below.is_none() && (all.blend == 0 || all.base == all.overlay) =>
+            {
+                Some(all.base)
+            }
             _ => None,
         }
     }
 
-    /// Material of a pristine voxel: down to [`OVERLAY_DEPTH`](super::OVERLAY_DEPTH) below the surface the overlay if
-    /// it covers at least half (`blend >= 128`), else the base; deeper down the base.
+    /// Material of a pristine voxel: of the first stratum that holds it; else, down to
+    /// [`OVERLAY_DEPTH`](super::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least half
+    /// (`blend >= 128`); else the column's base.
     pub fn material(&self, point: IVec3) -> MaterialId {
+        MaterialLookup::new(self).at(point)
+    }
+
+    /// What the column of a voxel gives it.
+    pub(super) fn material_of_column(&self, point: IVec3) -> MaterialId {
         self.column_material(Column::of(point)).at_distance(self.distance(point))
+    }
+
+    /// The world's column nearest to a point's.
+    pub(super) fn nearest_column(&self, point: IVec3) -> Column {
+        self.extent.clamp(Column::of(point))
+    }
+
+    /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
+    pub(super) fn squared_slope(&self, column: Column) -> u64 {
+        let steps = |along: Rise| i64::from(along.rise * 2 / along.run).unsigned_abs();
+        let [x, z] = self.rises(column).map(steps);
+        x * x + z * z
     }
 
     /// Lowest and highest height of the world, in 1/256 voxel.
@@ -265,7 +308,8 @@ impl Ground {
             Materials::Uniform(_) => 0,
             Materials::Columns(materials) => size_of_val(materials.as_slice()),
         };
-        size_of::<Self>() + size_of_val(self.heights.as_slice()) + materials
+        let below = self.below.as_ref().map_or(0, Below::bytes);
+        size_of::<Self>() + size_of_val(self.heights.as_slice()) + materials + below
     }
 }
 

@@ -216,7 +216,9 @@ impl Origin {
             materials.iter().any(|material| material.base.0 == id || (is_skin && material.overlay.0 == id))
         };
         let mix = vertex.materials;
-        let own = mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
+        // Strata of the ground's are drawn as they are, without those of the look.
+        let is_plain = ground.strata().is_none() && !ground.has_material_fn();
+        let own = is_plain && mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
         Self { depth, cover: cover.clamp(0, 255) as u8, own: if own { 255 } else { 0 } }
     }
 

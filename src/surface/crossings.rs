@@ -104,15 +104,20 @@ impl Site<'_, '_> {
             };
         let mut position = (self.base + IVec3::new(place.x, y, place.z)) * SNAP;
         position[AXIS] += step;
+        let is_lower = batch.lower_solid & flags != 0;
         let stored = if self.materials.is_any {
-            let is_lower = batch.lower_solid & flags != 0;
             self.materials.at::<AXIS>(edge, is_lower)
         } else {
             MaterialId::GROUND
         };
         let materials = match (stored, self.stack.single_mix()) {
             (MaterialId::GROUND, Some(mix)) => mix,
-            (MaterialId::GROUND, None) => self.own_materials::<AXIS>(corner, self.low.y + y, step),
+            (MaterialId::GROUND, None) => {
+                let mut solid = self.low + IVec3::new(place.x, y, place.z);
+                solid[AXIS] += i32::from(!is_lower);
+                let own = self.stack.own_material(solid);
+                own.unwrap_or_else(|| self.own_materials::<AXIS>(corner, self.low.y + y, step))
+            }
             _ => MaterialMix::pure(stored),
         };
         Vertex { position, normal, materials }

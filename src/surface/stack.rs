@@ -3,14 +3,14 @@
 
 use std::ops::RangeInclusive;
 
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 
 use super::layer_bits::{self, LayerBits, PLACES, SIDE};
 use super::mask::WINDOW;
 use super::mesh::MaterialMix;
 use super::pristine::PristineStack;
 use super::vertex::WorldView;
-use crate::ground::Ground;
+use crate::ground::{Ground, MaterialLookup};
 use crate::lattice::Column;
 
 /// A stack of bricks, all with the same x and z, and the columns around it.
@@ -31,6 +31,8 @@ pub(super) struct Stack<'a> {
     mixes: [Option<[MaterialMix; 2]>; 81],
     /// The material of all columns of the world, if they have only one.
     single: Option<MaterialMix>,
+    /// The ground's own materials, if they differ from voxel to voxel.
+    own: Option<MaterialLookup<'a>>,
 }
 
 impl<'a> Stack<'a> {
@@ -48,6 +50,7 @@ impl<'a> Stack<'a> {
             normals: [None; 81],
             mixes: [None; 81],
             single: ground.single_material().map(MaterialMix::pure),
+            own: ground.has_own_materials().then(|| MaterialLookup::new(ground)),
         }
     }
 
@@ -83,6 +86,11 @@ impl<'a> Stack<'a> {
     /// What all ground is made of, if it is the same everywhere.
     pub fn single_mix(&self) -> Option<MaterialMix> {
         self.single
+    }
+
+    /// The ground's own material at a lattice point, if it differs from voxel to voxel.
+    pub fn own_material(&self, point: IVec3) -> Option<MaterialMix> {
+        self.own.as_ref().map(|own| MaterialMix::pure(own.at(point)))
     }
 
     /// The tile's normal over a corner.

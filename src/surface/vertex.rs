@@ -102,7 +102,7 @@ pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> V
         position: (p - origin) * SNAP + UNIT[axis] * step,
         normal: lerp_normal(gradient(lattice, p), gradient(lattice, q), step),
         materials: match lattice.stored_material(solid) {
-            MaterialId::GROUND => own_materials(lattice.ground(), p, q, step),
+            MaterialId::GROUND => own_materials(lattice.ground(), [p, q], step, solid),
             stored => MaterialMix::pure(stored),
         },
     }
@@ -118,7 +118,7 @@ pub fn sheet_vertex(ground: &Ground, p: IVec3, axis: usize, origin: IVec3) -> Ve
     Vertex {
         position: (p - origin) * SNAP + UNIT[axis] * step,
         normal: heightmap_normal(ground, Column::of(p), Column::of(q), step),
-        materials: own_materials(ground, p, q, step),
+        materials: own_materials(ground, [p, q], step, if ground.distance(p) < 0 { p } else { q }),
     }
 }
 
@@ -128,7 +128,7 @@ pub fn height_vertex(ground: &Ground, column: Column, origin: IVec3) -> Vertex {
     Vertex {
         position: base + IVec3::Y * (ground.height(column) * (SNAP / ONE)),
         normal: ground.normal(column),
-        materials: MaterialMix::column(ground.column_material(column)),
+        materials: MaterialMix::column(ground.surface_material(column)),
     }
 }
 
@@ -173,9 +173,13 @@ pub(super) fn between(low: i32, high: i32, step: i32) -> i32 {
     low + ((i64::from(high) - i64::from(low)) * i64::from(step) / i64::from(SNAP)) as i32
 }
 
-/// Materials at a crossing where the ground shows its own: those of both columns, blended as the tile does. The overlay
-/// within its depth below the pristine surface, the base below.
-fn own_materials(ground: &Ground, p: IVec3, q: IVec3, step: i32) -> MaterialMix {
+/// Materials at a crossing where the ground shows its own. With strata, that of the solid end: what a dig there yields.
+/// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface, the
+/// base below.
+fn own_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
+    if ground.has_own_materials() {
+        return MaterialMix::pure(ground.material(solid));
+    }
     let (a, b) = (Column::of(p), Column::of(q));
     let depth = between(ground.height(a), ground.height(b), step) - between(p.y * ONE, q.y * ONE, step);
     let own = |column| {

@@ -2,10 +2,16 @@
 #![allow(dead_code)] // each test file uses its own part of this
 
 use bevy_burrow::brush::shapes::Cuboid;
-use bevy_burrow::ground::{GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialRule};
+use std::sync::Arc;
+
+use bevy_burrow::ground::{
+    Bedding, GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialRule, Span, Strata,
+    Stratum, StratumBounds,
+};
+use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
-use glam::{Quat, Vec3};
+use glam::{IVec3, Quat, Vec2, Vec3};
 
 /// The chunk sizes among which tests alternate.
 pub const CHUNK_SIZES: [u32; 4] = [8, 25, 32, 100];
@@ -38,8 +44,69 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
     Ground::from_fn(width, depth, |i, k| grey(x + i, z + k) * relief).expect("finite heights")
 }
 
-/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column.
+/// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column; every
+/// fifth one has strata.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
+    let (ground, chunk_size) = random_ground_without_strata(rng, index);
+    if index % 5 != 4 {
+        return (ground, chunk_size);
+    }
+    let (low, high) = ground.height_range();
+    // From numbers of its own, so that the rest of the world is the same as without strata.
+    let strata =
+        random_strata(&mut Rng::with_seed(index), [low as f32 / 256.0 - 30.0, high as f32 / 256.0 + 3.0]);
+    (ground.with_strata(&strata).expect("valid strata"), chunk_size)
+}
+
+/// Strata of all shapes with all kinds of conditions, between these heights.
+pub fn random_strata(rng: &mut Rng, [low, high]: [f32; 2]) -> Strata {
+    let between = |rng: &mut Rng, low: f32, high: f32| low + rng.f32() * (high - low);
+    let span = |rng: &mut Rng, low: f32, high: f32| {
+        let mut ends = [(); 2].map(|()| between(rng, low, high));
+        ends.sort_by(f32::total_cmp);
+        let [from, to] = ends.map(|end| (rng.u8(..3) > 0).then_some(end));
+        Span { from, to }
+    };
+    let scale = |rng: &mut Rng| 8 << rng.u32(..4);
+    let stratum = |rng: &mut Rng, material: MaterialId| {
+        let (width, share) = (scale(rng), between(rng, 0.02, 0.2));
+        let (from, thickness) = (between(rng, low, high), between(rng, 0.5, 6.0));
+        let of_shape = match rng.u8(..5) {
+            0 => Stratum::fill(material),
+            1 => Stratum::bed(material, from, thickness),
+            2 => Stratum::beds(material, from, thickness, thickness + between(rng, 0.0, 20.0)),
+            3 => Stratum::vein(material, width, share),
+            _ => Stratum::pocket(material, width, share),
+        };
+        let bounds = match rng.u8(..6) {
+            0 => {
+                let min = IVec3::new(rng.i32(-9..30), between(rng, low, high) as i32, rng.i32(-9..30));
+                StratumBounds::Box(LatticeBox { min, max: min + IVec3::splat(rng.i32(0..40)) })
+            }
+            1 => {
+                let samples = (0..12).map(|_| rng.u16(..)).collect();
+                StratumBounds::Image(Arc::new(GreyImage::from_samples(4, 3, samples).expect("an image")))
+            }
+            _ => StratumBounds::World,
+        };
+        Stratum {
+            depth: span(rng, -3.0, 30.0),
+            height: if rng.bool() { span(rng, low, high) } else { Span::ALL },
+            slope: if rng.u8(..3) == 0 { span(rng, 0.0, 1.5) } else { Span::ALL },
+            rough: if rng.bool() { between(rng, 0.0, 5.0) } else { 0.0 },
+            rough_scale: scale(rng),
+            bounds,
+            ..of_shape
+        }
+    };
+    let dip = Vec2::new(between(rng, -0.5, 0.5), between(rng, -0.5, 0.5));
+    let bedding = Bedding { dip, fold: between(rng, 0.0, 9.0), scale: scale(rng) };
+    let count = rng.u8(1..9);
+    let strata = (0..count).map(|number| stratum(rng, MaterialId(number + 10))).collect();
+    Strata { seed: rng.u32(..), bedding, strata }
+}
+
+fn random_ground_without_strata(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let (ground, chunk_size) = random_heights(rng, index);
     if !index.is_multiple_of(3) {
         return (ground, chunk_size);

@@ -8,6 +8,7 @@
 
 #define __global__
 #define __device__
+#define __noinline__
 #define __launch_bounds__(...)
 // One block runs at a time. A section of its own, so that it can be filled with rubbish before each block.
 #define __shared__ static EMULATOR_SHARED

@@ -5,6 +5,8 @@ use std::ops::Range;
 use bytemuck::Pod;
 
 use super::device::{Device, Fault, HostMemory};
+use super::layout::{Address, StrataTable, strata_table};
+use crate::ground::Ground;
 
 /// The whole input of a launch in one buffer, so that one copy uploads it.
 pub(super) struct InputBuffer {
@@ -110,6 +112,33 @@ impl InputBuffer {
         // SAFETY: `open` made the device memory at least as long as the layout, and callers wait before they open
         // it again.
         unsafe { device.upload(&*self.host, 0..layout.0, self.device) }
+    }
+}
+
+/// The section of a ground's strata; nothing without any.
+pub(super) struct StrataInput {
+    table: Option<Box<StrataTable>>,
+    section: Section,
+}
+
+impl StrataInput {
+    /// Reserves the section.
+    pub fn plan(ground: &Ground, plan: &mut StagingLayout) -> Self {
+        let table = strata_table(ground).map(Box::new);
+        let section = plan.section::<StrataTable>(table.iter().len());
+        Self { table, section }
+    }
+
+    /// Writes the table.
+    pub fn put(&self, input: &mut InputBuffer) {
+        if let Some(table) = &self.table {
+            input.put(self.section, std::slice::from_ref(&**table));
+        }
+    }
+
+    /// Its address, 0 without strata.
+    pub fn address(&self, input: &InputBuffer) -> Address {
+        if self.table.is_some() { input.address(self.section) } else { 0 }
     }
 }
 

@@ -13,7 +13,7 @@ use super::device::{Fault, Launch};
 use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::fill;
 use super::session::{Session, Uploads};
-use super::staging::StagingLayout;
+use super::staging::{StagingLayout, StrataInput};
 use crate::edits::{EditDelta, EditEffect, PreparedEdit, PreparedEdits, enter_effects};
 use crate::lattice::side_by_side;
 use output::{LONG, Target, Totals};
@@ -105,6 +105,7 @@ impl Session {
         let record_list = plan.section::<layout::EditRecord>(work.edits.len());
         let edits = plan.section::<u32>(work.jobs().len());
         let counters = plan.section::<u32>(4);
+        let strata = StrataInput::plan(work.base.ground(), &mut plan);
         stencil.iter_mut().for_each(|stencil| stencil.plan(&mut plan));
         self.input.open(&mut *self.device, &plan)?;
         let (all_jobs, edit_records, list) = self.input.entries_of(job_list, record_list, edits);
@@ -119,6 +120,7 @@ impl Session {
         };
         side_by_side(are_many, take, write_lists).0?;
         self.input.entries::<u32>(counters).fill(0);
+        strata.put(&mut self.input);
         stencil.iter_mut().for_each(|stencil| stencil.put(&mut self.input, &mut self.kept));
         let is_long = jobs.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
         self.edits.results.reserve(&mut *self.device, jobs.len(), is_long)?;
@@ -144,6 +146,7 @@ impl Session {
                 material_capacity: self.edits.materials.capacity(),
                 part_capacity: self.edits.parts.capacity(),
                 count_capacity: self.edits.counts.capacity(),
+                strata: strata.address(&self.input),
             };
             let blocks = jobs.len() as u32;
             match &stencil {

@@ -109,6 +109,7 @@ impl MeshRun {
             depth: view.grid.depth(),
             single: single_mix(view.samples.ground()),
             pad: 0,
+            strata: device.strata(view.samples.ground()),
         };
         device.launch(jobs.len(), params);
         let run = Self {

@@ -46,6 +46,11 @@ impl Device {
         address
     }
 
+    /// Copies the strata of a ground to the device; 0 without any.
+    fn strata(&mut self, ground: &Ground) -> Address {
+        strata_table(ground).map_or(0, |table| self.upload(&[table]))
+    }
+
     /// Copies values to the device.
     fn upload<T: Pod>(&mut self, values: &[T]) -> Address {
         self.place(bytemuck::cast_slice(values))

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "shapes.cuh"
+#include "strata.cuh"
 
 // How many samples a thread owns, and the layers between them.
 constexpr i32 OWN = LEN / THREADS;
@@ -44,6 +45,8 @@ struct OwnColumn {
     i32 first_y;
     i32 height;
     u32 materials;
+    // Null without strata.
+    const StrataTable* strata;
 };
 
 __device__ inline i32 own_index(i32 k) { return k * THREADS + threadIdx.x; }
@@ -143,14 +146,17 @@ struct Outcome {
     u32 counted;
 };
 
-__device__ inline u32 resolve(u32 stored, const OwnColumn& column, i32 pristine) {
-    return stored == GROUND ? ground_material(column.materials, pristine) : stored;
+// The material that a stored one stands for, `y` layers above the brick's minimum corner.
+__device__ inline u32 resolve(u32 stored, const OwnColumn& column, i32 y) {
+    if (stored != GROUND) return stored;
+    Voxel voxel = {column.low[0] + column.x, column.low[1] + y, column.low[2] + column.z, column.height, column.materials};
+    return ground_material(column.strata, voxel);
 }
 
 __device__ inline Outcome carve(
-    const EditRecord& record, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
+    const EditRecord& record, i32 outside, const OwnColumn& column, i32 k, i16& sample, u8& material
 ) {
-    i32 raw = sample, before = raw == PRISTINE ? pristine : raw;
+    i32 raw = sample, before = raw == PRISTINE ? pristine_distance(column, k) : raw, y = own_y(column, k);
     i32 depth = largest(outside, -DEPTH);
     i32 after = record.operation == DIG ? largest(before, -depth) : smallest(before, depth);
     i32 stored = smallest(largest(after, -32767), 32767);
@@ -158,26 +164,26 @@ __device__ inline Outcome carve(
     sample = (i16)stored;
     if ((before < 0) == (after < 0)) return {true, NONE};
     if (after >= 0) {
-        u32 removed = resolve(material, column, pristine);
+        u32 removed = resolve(material, column, y);
         // Air has no material.
         material = GROUND;
         return {true, removed};
     }
     if (record.operation == ADD) material = (u8)record.material;
-    return {true, resolve(material, column, pristine)};
+    return {true, resolve(material, column, y)};
 }
 
 // Changes the material of a solid sample inside the shape.
 __device__ inline Outcome paint(
-    const EditRecord& record, i32 outside, const OwnColumn& column, i32 pristine, i16& sample, u8& material
+    const EditRecord& record, i32 outside, const OwnColumn& column, i32 k, i16& sample, u8& material
 ) {
-    i32 raw = sample, before = raw == PRISTINE ? pristine : raw;
+    i32 raw = sample, before = raw == PRISTINE ? pristine_distance(column, k) : raw, y = own_y(column, k);
     u32 old = material;
     if (outside > 0 || before >= 0 || (raw != PRISTINE && old == record.material)) return {false, NONE};
     if (raw == PRISTINE) sample = (i16)largest(before, -32767);
     material = (u8)record.material;
-    u32 painted = resolve(record.material, column, pristine);
-    return {true, painted == resolve(old, column, pristine) ? NONE : painted};
+    u32 painted = resolve(record.material, column, y);
+    return {true, painted == resolve(old, column, y) ? NONE : painted};
 }
 
 // Copies the thread's samples from the base brick; without one they are pristine.
@@ -247,11 +253,11 @@ __device__ inline u32 apply(
             i32 offset[3] = {column.x, y, column.z};
             float distance = smooth_distance(record, from_origin(record, column.low, offset));
             if (record.is_rough) distance += bumps(record, noise, shared.noise, along_x, along_y, along_z);
-            i32 outside = round_distance(distance), pristine = pristine_distance(column, k);
+            i32 outside = round_distance(distance);
             i16& sample = brick.samples[index];
             u8& material = brick.materials[index];
-            outcome = record.operation == PAINT ? paint(record, outside, column, pristine, sample, material)
-                                              : carve(record, outside, column, pristine, sample, material);
+            outcome = record.operation == PAINT ? paint(record, outside, column, k, sample, material)
+                                              : carve(record, outside, column, k, sample, material);
             has_materials |= material != GROUND;
         }
         changed |= (u32)outcome.is_changed << k;
@@ -374,6 +380,7 @@ __device__ inline void edit_brick(const EditParams& params, EditMemory& shared, 
         (i32)threadIdx.x / (SIDE * SIDE),
         stack.heights[window],
         stack.columns[window],
+        params.strata,
     };
     u32 changed = 0;
     bool has_materials = had_materials, is_taken = false, is_changed = false;

@@ -49,9 +49,46 @@ struct alignas(16) Brick {
 // The columns around a stack of bricks, starting one before its first; x varies fastest.
 struct alignas(16) Stack {
     i32 heights[AREA];
-    // base | overlay << 8 | blend << 16
+    // base | overlay << 8 | blend << 16; with strata base | skin << 8 | conditions << 16
     u32 columns[AREA];
     u32 pad[2];
+};
+
+enum Body { FILL, BED, VEIN, POCKET };
+
+// A stratum. Lengths are in 1/256 voxel; ends of ranges are excluded.
+struct StratumRecord {
+    u32 material, body;
+    // The bit of its condition in a column's word; 0 without one.
+    u32 condition, seed;
+    // Width of the body's noise in voxels, as a power of two.
+    u32 scale;
+    // Veins: how far both noises may be from 0. Pockets: what the noise must exceed.
+    i32 limit;
+    // By how much noise moves ends, and its width in voxels as a power of two.
+    i32 rough;
+    u32 rough_scale;
+    i32 depth[2], height[2];
+    // Beds: lower face, thickness, distance from one to the next or 0.
+    i32 bed[3];
+    // The lowest y, and the first beyond.
+    i32 ys[2];
+};
+
+struct Bedding {
+    // In 1/65536 voxel per voxel; in 1/256 voxel.
+    i32 dip[2], fold;
+    u32 scale, seed;
+};
+
+constexpr i32 MOST_STRATA = 32;
+
+struct StrataTable {
+    Bedding bedding;
+    // The last columns of the world along x and z.
+    i32 last[2];
+    u32 count;
+    StratumRecord strata[MOST_STRATA];
 };
 
 struct ScatterJob {
@@ -142,6 +179,8 @@ struct EditParams {
     // Numbers of records, materials, parts, counts.
     u32* counters;
     u32 record_capacity, material_capacity, part_capacity, count_capacity;
+    // Null without strata.
+    const StrataTable* strata;
 };
 
 // Rules that forbid or slow down edits.
@@ -212,6 +251,8 @@ struct MeshParams {
     // Size of the world in cells.
     i32 width, depth;
     u32 is_single, single_ids, single_weights, pad;
+    // Null without strata.
+    const StrataTable* strata;
 };
 
 struct HeightsParams {
@@ -226,9 +267,10 @@ struct HeightsParams {
 
 static_assert(sizeof(Brick) == 1664 && sizeof(Stack) == 976 && sizeof(ScatterJob) == 24, "see layout/");
 static_assert(sizeof(EditJob) == 48 && sizeof(EditRecord) == 128 && sizeof(EditResult) == 32, "see layout/");
-static_assert(sizeof(SculptParams) == 152 && sizeof(StencilEditParams) == 152, "see layout/");
+static_assert(sizeof(SculptParams) == 152 && sizeof(StencilEditParams) == 160, "see layout/");
 static_assert(sizeof(Rules) == 296 && sizeof(Protected) == 24, "see layout/");
 static_assert(sizeof(EditPart) == 16 && sizeof(EditCount) == 16, "see layout/");
 static_assert(sizeof(ColumnJob) == 80 && sizeof(MeshJob) == 24 && sizeof(MeshResult) == 16, "see layout/");
-static_assert(sizeof(EditParams) == 104 && sizeof(MeshParams) == 128, "see layout/");
+static_assert(sizeof(EditParams) == 112 && sizeof(MeshParams) == 136, "see layout/");
+static_assert(sizeof(StratumRecord) == 68 && sizeof(StrataTable) == 2208, "see layout/");
 static_assert(sizeof(HeightsParams) == 128, "see layout/");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "edges.cuh"
+#include "strata.cuh"
 
 // Four material ids and their weights, one byte each.
 struct Mix {
@@ -115,6 +116,18 @@ __device__ inline Mix mix_at(
 ) {
     u32 stored = stored_material(site, edge, crossing.is_lower_solid);
     if (stored != GROUND) return pure(stored);
+    if (site.params.strata) {
+        // That of the solid end: what a dig there yields.
+        i32 end = !crossing.is_lower_solid, window = edge.window + (end ? edge.next_window : 0);
+        Voxel voxel = {
+            site.low[0] + edge.x + (edge.axis == 0 && end),
+            site.low[1] + edge.y + (edge.axis == 1 && end),
+            site.low[2] + edge.z + (edge.axis == 2 && end),
+            shared.heights[window],
+            site.stack.columns[window],
+        };
+        return pure(strata_material(*site.params.strata, voxel));
+    }
     if (site.params.is_single) return {site.params.single_ids, site.params.single_weights};
     return own_mix(site, shared.heights, edge, crossing.step);
 }

@@ -43,7 +43,10 @@ struct RuleChecker : PaddedBrick {
     __device__ i32 pace(const OwnColumn& column, i32 x, i32 y, i32 z, i32 power, u32& outcome) const {
         i32 at_y = column.low[1] + y, place = (z + 1) * WINDOW + x + 1;
         u32 material = stored_at(x, y, z);
-        if (material == GROUND) material = ground_material(stack->columns[place], at_y * ONE - stack->heights[place]);
+        if (material == GROUND) {
+            Voxel voxel = {column.low[0] + x, at_y, column.low[2] + z, stack->heights[place], stack->columns[place]};
+            material = ground_material(params.edit.strata, voxel);
+        }
         i32 hardness = params.rules->hardness[material];
         outcome = UNBREAKABLE;
         if (at_y < params.rules->bedrock || is_unbreakable(material)) return 0;

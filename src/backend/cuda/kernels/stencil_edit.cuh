@@ -34,12 +34,11 @@ struct StencilEditor : RuleChecker {
     __device__ bool paint(
         const EditRecord& record, bool is_bound, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
-        i32 pristine = sample.at[1] * ONE - column.height;
         u32 ref = shared.refs[13], old = stored(ref, sample.index);
         if (sample.outside > 0 || sample.before >= 0) return false;
         bool is_pristine = ref == NONE || params.edit.bricks[ref >> 1].samples[sample.index] == PRISTINE;
         if (!is_pristine && old == record.material) return false;
-        u32 own = resolve(old, column, pristine), painted = resolve(record.material, column, pristine), outcome = PAINTED;
+        u32 own = resolve(old, column, sample.y), painted = resolve(record.material, column, sample.y), outcome = PAINTED;
         if (is_bound) outcome = is_protected(sample.at) ? PROTECTED : is_unbreakable(own) ? UNBREAKABLE : PAINTED;
         if (own != painted) counted = outcome * 256 + (outcome == PAINTED ? painted : own);
         if (outcome != PAINTED) return false;
@@ -63,7 +62,7 @@ struct StencilEditor : RuleChecker {
     __device__ bool change(
         const EditRecord& record, const SculptParams& sculpt, const OwnColumn& column, const Sample& sample, Brick& brick, u32& counted
     ) {
-        i32 before = sample.before, after = before, pristine = sample.at[1] * ONE - column.height;
+        i32 before = sample.before, after = before;
         if (!proposed(record, sculpt, column, sample, after) || storable(after) == storable(before)) return false;
         bool was_solid = before < 0, would_be_solid = after < 0;
         u32 outcome = FATES, material = GROUND;
@@ -78,17 +77,17 @@ struct StencilEditor : RuleChecker {
         }
         if (is_refused) {
             if (was_solid) material = stored(shared.refs[13], sample.index);
-            counted = outcome * 256 + resolve(material, column, pristine);
+            counted = outcome * 256 + resolve(material, column, sample.y);
         }
         if (storable(after) == storable(before)) return false;
         brick.samples[sample.index] = (i16)storable(after);
         if (was_solid == is_solid) return true;
         if (was_solid) {
-            counted = REMOVED * 256 + resolve(brick.materials[sample.index], column, pristine);
+            counted = REMOVED * 256 + resolve(brick.materials[sample.index], column, sample.y);
             // Air has no material.
             material = GROUND;
         } else {
-            counted = ADDED * 256 + resolve(material, column, pristine);
+            counted = ADDED * 256 + resolve(material, column, sample.y);
         }
         brick.materials[sample.index] = (u8)material;
         return true;

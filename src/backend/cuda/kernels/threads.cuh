@@ -48,9 +48,3 @@ __device__ inline u32 transpose(u32 bits) {
 __device__ inline bool fits(u32 first, u32 count, u32 capacity) {
     return first <= capacity && count <= capacity - first;
 }
-
-// The material of unedited ground at this signed distance above the surface.
-__device__ inline u32 ground_material(u32 column, i32 distance) {
-    bool is_overlay = distance >= -OVERLAY_DEPTH && column >> 16 >= 128;
-    return (is_overlay ? column >> 8 : column) & 0xff;
-}

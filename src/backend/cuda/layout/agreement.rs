@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::mem::offset_of;
 
 use super::*;
+use crate::ground::{BED, BeddingRecord, FILL, MAX_STRATA, POCKET, StratumRecord, VEIN};
 
 const HEADER: &str = include_str!("../kernels/layout.cuh");
 
@@ -136,6 +137,9 @@ fn every_field_is_where_the_kernels_expect_it() {
     check! {
         Brick is BrickRecord: samples, solid, edited;
         Stack is StackRecord: heights, columns, pad;
+        StratumRecord is StratumRecord: material, body, condition, seed, scale, limit, rough, rough_scale, depth, height, bed, ys;
+        Bedding is BeddingRecord: dip, fold, scale, seed;
+        StrataTable is StrataTable: bedding, last, count, strata;
         ScatterJob is ScatterJob: to, from, bytes, pad;
         ScatterParams is ScatterParams: jobs;
         EditJob is EditJob: brick, base, target, stack, first, count, cuts, window, strides, pad;
@@ -146,7 +150,7 @@ fn every_field_is_where_the_kernels_expect_it() {
         EditPart is EditPart: job, edit, part, bounds;
         EditCount is EditCount: edit, outcome, voxels, pad;
         EditParams is EditParams: bricks, stacks, jobs, list, edit_records, results, records, materials, parts, counts, counters,
-            record_capacity, material_capacity, part_capacity, count_capacity;
+            record_capacity, material_capacity, part_capacity, count_capacity, strata;
         Rules is Rules: hardness, unbreakable, bedrock, boxes;
         Protected is Protected: min, max;
         StencilEditParams is StencilEditParams: edit, windows, sculpt_params, images, rules, look, last, pad;
@@ -154,7 +158,7 @@ fn every_field_is_where_the_kernels_expect_it() {
         MeshJob is MeshJob: window, strides, column, y, cells, pad;
         MeshResult is MeshResult: vertex, vertices, index, indices;
         MeshParams is MeshParams: bricks, stacks, windows, columns, jobs, table, results, positions, normals, mixes, indices,
-            counters, vertex_capacity, index_capacity, width, depth, single.is_single, single.ids, single.weights, pad;
+            counters, vertex_capacity, index_capacity, width, depth, single.is_single, single.ids, single.weights, pad, strata;
         HeightsParams is HeightsParams: tables, heights, noise.scale, noise.origin, noise.frequency, noise.lacunarity,
             noise.persistence, noise.weighting, noise.factor, noise.peak, noise.amplitude, noise.base, first, count, row_len,
             octaves, is_ridged, pad;
@@ -186,6 +190,10 @@ fn every_constant_is_the_same() {
     check("UNIFORM", EditResult::UNIFORM.into());
     check("HAS_MATERIALS", EditResult::HAS_MATERIALS.into());
     check("TOO_FAR", EditResult::TOO_FAR.into());
+    check("MOST_STRATA", MAX_STRATA as i64);
+    for (name, number) in [("FILL", FILL), ("BED", BED), ("VEIN", VEIN), ("POCKET", POCKET)] {
+        check(name, number.into());
+    }
     // Enumerators that the host writes as numbers.
     let numbered =
         |names: &[&str]| names.iter().zip(0..).map(|(name, n)| ((*name).to_owned(), n)).collect::<Vec<_>>();

@@ -156,6 +156,8 @@ pub(crate) struct EditParams {
     pub material_capacity: u32,
     pub part_capacity: u32,
     pub count_capacity: u32,
+    /// A [`StrataTable`](super::StrataTable), or 0.
+    pub strata: Address,
 }
 
 impl KernelParams for EditParams {

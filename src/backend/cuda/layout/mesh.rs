@@ -91,6 +91,8 @@ pub(crate) struct MeshParams {
     /// See [`single_mix`].
     pub single: SingleMix,
     pub pad: u32,
+    /// A [`StrataTable`](super::StrataTable), or 0.
+    pub strata: Address,
 }
 
 /// The material mix of the ground if it is uniform.

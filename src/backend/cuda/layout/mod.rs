@@ -10,12 +10,13 @@ mod edit;
 mod heights;
 mod mesh;
 mod stencil_edit;
+mod strata;
 
 use bytemuck::{Pod, Zeroable};
 use glam::IVec3;
 
 use crate::backend::cuda::device::{Kernel, KernelParams};
-use crate::ground::{ColumnMaterial, Ground, MaterialId};
+use crate::ground::{Ground, MaterialId};
 use crate::lattice::{Column, LatticeBox};
 use crate::volume::{Brick, Sample};
 
@@ -23,6 +24,7 @@ pub(crate) use edit::*;
 pub(crate) use heights::*;
 pub(crate) use mesh::*;
 pub(crate) use stencil_edit::*;
+pub(crate) use strata::*;
 
 /// A device address.
 pub(crate) type Address = u64;
@@ -62,7 +64,7 @@ pub(crate) struct BrickRecord {
 pub(crate) struct StackRecord {
     /// In units of 1/256 voxel.
     pub heights: [i32; 121],
-    /// `base | overlay << 8 | blend << 16`.
+    /// See `strata::column_word`.
     pub columns: [u32; 121],
     pub pad: [u32; 2],
 }
@@ -113,17 +115,14 @@ pub(crate) fn brick_of(record: &BrickRecord, materials: Option<&[u8; MATERIAL_BY
 /// The record for the stack of bricks at (x, z).
 pub(crate) fn stack_record(ground: &Ground, (x, z): (i32, i32)) -> StackRecord {
     let low = Column::new(x * 8 - 1, z * 8 - 1);
-    let word = |material: ColumnMaterial| {
-        u32::from_le_bytes([material.base.0, material.overlay.0, material.blend, 0])
-    };
     let heights = ground.heights::<11>(low);
     let mut record = StackRecord { heights: [0; 121], columns: [0; 121], pad: [0; 2] };
     record.heights.copy_from_slice(heights.as_flattened());
     match ground.single_material() {
-        Some(material) => record.columns.fill(word(ColumnMaterial::solid(material))),
+        Some(_) => record.columns.fill(column_word(ground, low)),
         None => {
             let columns = (0..11).flat_map(|z| (0..11).map(move |x| low.offset(x, z)));
-            let words = columns.map(|column| word(ground.column_material(column)));
+            let words = columns.map(|column| column_word(ground, column));
             record.columns.iter_mut().zip(words).for_each(|(place, word)| *place = word);
         }
     }

@@ -6,7 +6,7 @@ use super::device::{Fault, Launch};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
 use super::lists::{cut, fill, for_each_parallel, map};
 use super::session::{Session, Stacks, Uploads, windows};
-use super::staging::StagingLayout;
+use super::staging::{StagingLayout, StrataInput};
 use super::windows::Windows;
 use crate::ground::Ground;
 use crate::lattice::{pieces, side_by_side};
@@ -84,6 +84,7 @@ impl Session {
         let column_list = plan.section::<ColumnJob>(columns.len());
         let job_list = plan.section::<MeshJob>(blocks.len());
         let counters = plan.section::<u32>(4);
+        let strata = StrataInput::plan(ground, &mut plan);
         self.input.open(&mut *self.device, &plan)?;
         let (refs, column_jobs, jobs) = self.input.entries_of(window_list, column_list, job_list);
         let column = |_, &(place, slot): &Column| layout::column_job(view, place, slot);
@@ -93,6 +94,7 @@ impl Session {
             side_by_side(pieces.len() > 1, write_jobs, || windows.write(refs))
         });
         self.input.entries::<u32>(counters).fill(0);
+        strata.put(&mut self.input);
         self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
         self.meshes.lists.reserve(&mut *self.device, (0, 0), is_long)?;
 
@@ -117,6 +119,7 @@ impl Session {
                 depth: view.grid.depth(),
                 single: layout::single_mix(ground),
                 pad: 0,
+                strata: strata.address(&self.input),
             };
             // SAFETY: the parameters are sections of the input and lists of the session with their capacities. None
             // of them is accessed before the wait below.

@@ -112,6 +112,7 @@ impl EditRun {
             material_capacity: room.materials as u32,
             part_capacity: room.parts as u32,
             count_capacity: room.counts as u32,
+            strata: device.strata(work.base.ground()),
         };
         if work.looks_around() {
             let mut images = vec![7u16; 3];

@@ -1,0 +1,272 @@
+//! Strata: what every voxel of the pristine ground is made of, computed and never stored.
+//!
+//! [`Strata`] is a list of bodies of material, [`Stratum`], each with conditions for where it lies. A voxel is made of the
+//! first one that holds it; where none does, of what its column has ([`ColumnMaterial`](super::ColumnMaterial)). All of
+//! the model asks the same function: receipts, rules, queries, loose pieces, and the vertices that are drawn.
+//!
+//! The function is computed with integers (`records`), for a brick at a time (`in_brick`), and gives the same on every
+//! machine and on the graphics card.
+
+mod check;
+mod in_brick;
+mod lookup;
+mod of_ground;
+mod presets;
+mod records;
+#[cfg(test)]
+mod tests;
+mod value_noise;
+
+use std::sync::Arc;
+
+use glam::{IVec3, Vec2};
+use serde::{Deserialize, Serialize};
+
+use super::material::MaterialId;
+use crate::lattice::LatticeBox;
+
+pub(crate) use in_brick::BrickStrata;
+pub(crate) use lookup::MaterialLookup;
+pub(crate) use of_ground::Below;
+pub(crate) use records::StrataRecords;
+#[cfg(all(test, feature = "cuda"))]
+pub(crate) use records::{BED, FILL, POCKET, VEIN};
+#[cfg(feature = "cuda")]
+pub(crate) use records::{BeddingRecord, StratumRecord};
+
+/// Most strata of a ground.
+pub const MAX_STRATA: usize = 32;
+
+/// Most strata of a ground that ask something of a column: a slope, a box or a picture.
+pub const MAX_COLUMN_CONDITIONS: usize = 16;
+
+/// Bodies of material below the surface: soil, beds of rock, veins and pockets of ore.
+///
+/// A voxel is made of the first stratum in the list that holds it, else of its column's own material. Lengths are in
+/// voxels, and rounded to 1/256.
+///
+/// ```
+/// use bevy_burrow::prelude::*;
+/// use glam::IVec3;
+///
+/// let (soil, coal, iron) = (MaterialId(1), MaterialId(2), MaterialId(3));
+/// let strata = Strata {
+///     seed: 7,
+///     strata: vec![
+///         Stratum { depth: Span::below(3.0), ..Stratum::fill(soil) },
+///         Stratum { depth: Span::above(5.0), ..Stratum::pocket(iron, 16, 0.02) },
+///         Stratum { rough: 0.5, ..Stratum::bed(coal, -20.0, 2.0) },
+///     ],
+///     ..Strata::default()
+/// };
+/// let ground = Ground::flat(64, 64, 10.0)?.with_strata(&strata)?;
+/// assert_eq!(ground.material(IVec3::new(5, 8, 5)), soil);
+/// # Ok::<(), GroundError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Strata {
+    /// The seed of all noise.
+    pub seed: u32,
+    /// How beds lie.
+    pub bedding: Bedding,
+    /// The bodies, topmost first: at most [`MAX_STRATA`], and [`MAX_COLUMN_CONDITIONS`] with a slope or bounds.
+    pub strata: Vec<Stratum>,
+}
+
+/// How beds lie in space: level, tilted, folded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Bedding {
+    /// Voxels by which beds sink for each voxel along x and along z, -4 to 4.
+    pub dip: Vec2,
+    /// Voxels by which folds lift and lower beds, 0 to 127.
+    pub fold: f32,
+    /// How wide folds are in voxels: a power of two from 8 to 1024.
+    pub scale: u32,
+}
+
+impl Default for Bedding {
+    /// Level beds.
+    fn default() -> Self {
+        Self { dip: Vec2::ZERO, fold: 0.0, scale: 128 }
+    }
+}
+
+/// A body of one material in the ground: a shape, and the conditions under which it fills a voxel. All must hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Stratum {
+    /// What it is made of; not [`MaterialId::GROUND`].
+    pub material: MaterialId,
+    /// Its shape.
+    pub body: StratumBody,
+    /// The depth below the pristine surface, in voxels. Voxels above the surface are at depth 0.
+    pub depth: Span,
+    /// The height, in voxels.
+    pub height: Span,
+    /// The slope of the pristine surface above, as rise over run: 0 is level, 1 is 45 degrees.
+    pub slope: Span,
+    /// Voxels by which noise moves the ends of depth, height and bed up and down, 0 to 127.
+    pub rough: f32,
+    /// How wide that noise is in voxels: a power of two from 8 to 1024.
+    pub rough_scale: u32,
+    /// Distinguishes strata of the same material and shape, which otherwise lie in the same places.
+    pub seed: u32,
+    /// Where in the world it may be.
+    pub bounds: StratumBounds,
+}
+
+impl Default for Stratum {
+    /// Material 0 everywhere.
+    fn default() -> Self {
+        Self {
+            material: MaterialId(0),
+            body: StratumBody::Fill,
+            depth: Span::ALL,
+            height: Span::ALL,
+            slope: Span::ALL,
+            rough: 0.0,
+            rough_scale: 32,
+            seed: 0,
+            bounds: StratumBounds::World,
+        }
+    }
+}
+
+impl Stratum {
+    /// All that its conditions admit.
+    pub fn fill(material: MaterialId) -> Self {
+        Self { material, ..Self::default() }
+    }
+
+    /// A bed from a height on, that thick, in voxels.
+    pub fn bed(material: MaterialId, from: f32, thickness: f32) -> Self {
+        Self { body: StratumBody::Bed { from, thickness, every: None }, ..Self::fill(material) }
+    }
+
+    /// Beds that repeat.
+    pub fn beds(material: MaterialId, from: f32, thickness: f32, every: f32) -> Self {
+        Self { body: StratumBody::Bed { from, thickness, every: Some(every) }, ..Self::fill(material) }
+    }
+
+    /// Veins of this scale that hold this share of all voxels.
+    pub fn vein(material: MaterialId, scale: u32, share: f32) -> Self {
+        Self { body: StratumBody::Vein { scale, share }, ..Self::fill(material) }
+    }
+
+    /// Pockets of this scale that hold this share of all voxels.
+    pub fn pocket(material: MaterialId, scale: u32, share: f32) -> Self {
+        Self { body: StratumBody::Pocket { scale, share }, ..Self::fill(material) }
+    }
+}
+
+/// The shape of a stratum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum StratumBody {
+    /// All that its conditions admit.
+    #[default]
+    Fill,
+    /// A sheet that lies as the [`Bedding`] has it.
+    Bed {
+        /// Its lower face in voxels, where the bedding is neither tilted nor folded.
+        from: f32,
+        /// Voxels up to its upper face, more than 0.
+        thickness: f32,
+        /// The voxels after which it repeats, more than its thickness; none for a single bed.
+        every: Option<f32>,
+    },
+    /// Threads that wind through the ground.
+    Vein {
+        /// How far apart bends are in voxels: a power of two from 8 to 1024.
+        scale: u32,
+        /// The share of all voxels that it holds where its conditions admit it, more than 0 and up to 1.
+        share: f32,
+    },
+    /// Separate lumps.
+    Pocket {
+        /// How far apart lumps are in voxels, and about twice as large as they are: a power of two from 8 to 1024.
+        scale: u32,
+        /// The share of all voxels that they hold where its conditions admit them, more than 0 and up to 1.
+        share: f32,
+    },
+}
+
+/// Where in the world a stratum may be.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum StratumBounds {
+    /// Everywhere.
+    #[default]
+    World,
+    /// At the lattice points of a box, ends included.
+    Box(LatticeBox),
+    /// In columns where a picture, stretched over the world, is at least half white. Not part of the JSON form.
+    #[serde(skip)]
+    Image(Arc<super::GreyImage>),
+}
+
+/// Numbers from one on and below another; either end may be open. In JSON `[from, to]`, `null` for an open end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "(Option<f32>, Option<f32>)", into = "(Option<f32>, Option<f32>)")]
+pub struct Span {
+    /// The first number, included.
+    pub from: Option<f32>,
+    /// Where it ends, not included.
+    pub to: Option<f32>,
+}
+
+impl Span {
+    /// All numbers.
+    pub const ALL: Self = Self { from: None, to: None };
+
+    /// All numbers below one.
+    pub const fn below(to: f32) -> Self {
+        Self { from: None, to: Some(to) }
+    }
+
+    /// All numbers from one on.
+    pub const fn above(from: f32) -> Self {
+        Self { from: Some(from), to: None }
+    }
+
+    /// The numbers from one on and below another.
+    pub const fn between(from: f32, to: f32) -> Self {
+        Self { from: Some(from), to: Some(to) }
+    }
+}
+
+impl From<(Option<f32>, Option<f32>)> for Span {
+    fn from((from, to): (Option<f32>, Option<f32>)) -> Self {
+        Self { from, to }
+    }
+}
+
+impl From<Span> for (Option<f32>, Option<f32>) {
+    fn from(Span { from, to }: Span) -> Self {
+        (from, to)
+    }
+}
+
+/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep below the pristine
+/// surface, in 1/256 voxel and at least 1; `None` for what the column has.
+pub(crate) type MaterialFn = dyn Fn(IVec3, i32) -> Option<MaterialId> + Send + Sync;
+
+/// What a ground has instead of its columns' materials.
+#[derive(Clone)]
+pub(crate) enum OwnMaterials {
+    Strata { given: Arc<Strata>, records: Arc<StrataRecords> },
+    Function { id: u64, function: Arc<MaterialFn> },
+}
+
+impl PartialEq for OwnMaterials {
+    /// Functions are the same if their ids are.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Strata { given: a, .. }, Self::Strata { given: b, .. }) => a == b,
+            (Self::Function { id: a, .. }, Self::Function { id: b, .. }) => a == b,
+            _ => false,
+        }
+    }
+}

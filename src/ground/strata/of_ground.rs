@@ -1,0 +1,164 @@
+//! Grounds with strata.
+
+use std::sync::Arc;
+
+use glam::IVec3;
+use rayon::prelude::*;
+
+use super::{BrickStrata, MaterialFn, MaterialLookup, OwnMaterials, Strata, StrataRecords};
+use crate::ground::material::MaterialId;
+use crate::ground::world::Ground;
+use crate::ground::{ColumnMaterial, GroundError};
+use crate::lattice::hash::hash_words;
+use crate::lattice::{BrickPos, Column, ceil};
+
+/// What a ground has beside the materials of its columns.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Below {
+    own: OwnMaterials,
+    /// The material of the highest solid voxel of each column, row-major: what the undug surface shows.
+    tops: Vec<MaterialId>,
+}
+
+impl Below {
+    pub(crate) fn bytes(&self) -> usize {
+        size_of::<Self>() + size_of_val(self.tops.as_slice())
+    }
+}
+
+impl Ground {
+    /// The same ground with strata. Voxels that no stratum holds keep what [`Self::with_materials`] gave them, before or
+    /// after.
+    ///
+    /// Nothing is stored for a voxel, and one byte for a column. Counts for [`Self::hash`].
+    ///
+    /// # Errors
+    /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
+    /// has too little.
+    pub fn with_strata(self, strata: &Strata) -> Result<Self, GroundError> {
+        strata.check()?;
+        let records = Arc::new(StrataRecords::new(strata));
+        self.with_below(OwnMaterials::Strata { given: Arc::new(strata.clone()), records })
+    }
+
+    /// The same ground with a function of the game's own in place of [`Strata`]: given a lattice point, and how far it lies
+    /// below the pristine surface in 1/256 voxel, at least 1, it returns the material there, or `None` (or
+    /// [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
+    ///
+    /// It must always give the same for the same point, or worlds would depend on timing. `id` stands for it in
+    /// [`Self::hash`]: give another one to every function. The graphics card can't run it, so such worlds are edited and
+    /// meshed on the CPU.
+    ///
+    /// # Errors
+    /// [`GroundError::Memory`] if the machine has too little.
+    pub fn with_material_fn(
+        self,
+        id: u64,
+        function: impl Fn(IVec3, i32) -> Option<MaterialId> + Send + Sync + 'static,
+    ) -> Result<Self, GroundError> {
+        self.with_below(OwnMaterials::Function { id, function: Arc::new(function) })
+    }
+
+    /// The strata that it was given.
+    pub fn strata(&self) -> Option<&Strata> {
+        match &self.below()?.own {
+            OwnMaterials::Strata { given, .. } => Some(given),
+            OwnMaterials::Function { .. } => None,
+        }
+    }
+
+    /// The strata as numbers.
+    pub(crate) fn strata_records(&self) -> Option<&StrataRecords> {
+        match &self.below()?.own {
+            OwnMaterials::Strata { records, .. } => Some(records),
+            OwnMaterials::Function { .. } => None,
+        }
+    }
+
+    /// Do materials differ from voxel to voxel, as strata or a function have it?
+    pub(crate) fn has_own_materials(&self) -> bool {
+        self.below().is_some()
+    }
+
+    /// Is its material a function that only the CPU can ask?
+    pub fn has_material_fn(&self) -> bool {
+        self.material_fn().is_some()
+    }
+
+    pub(super) fn material_fn(&self) -> Option<&MaterialFn> {
+        match &self.below()?.own {
+            OwnMaterials::Function { function, .. } => Some(&**function),
+            OwnMaterials::Strata { .. } => None,
+        }
+    }
+
+    fn with_below(self, own: OwnMaterials) -> Result<Self, GroundError> {
+        self.replace_below(Below { own, tops: Vec::new() }).with_new_tops()
+    }
+
+    /// The same ground, with its surface as its materials are now.
+    pub(in crate::ground) fn with_new_tops(self) -> Result<Self, GroundError> {
+        if self.below().is_none() {
+            return Ok(self);
+        }
+        let tops = self.tops()?;
+        Ok(self.map_below(|below| Below { tops, ..below }))
+    }
+
+    /// The material of the highest solid voxel of each column.
+    fn tops(&self) -> Result<Vec<MaterialId>, GroundError> {
+        let extent = self.extent();
+        let mut tops: Vec<MaterialId> = extent.fill_rows(|_, _| Ok(()))?;
+        tops.par_chunks_mut(extent.row_len() * 8).enumerate().for_each(|(band, rows)| {
+            let materials = MaterialLookup::new(self);
+            for low in (0..extent.row_len()).step_by(8) {
+                for (z, row) in rows.chunks_mut(extent.row_len()).enumerate() {
+                    for (x, top) in row.iter_mut().enumerate().skip(low).take(8) {
+                        let column = Column::new(x as i32, (band * 8 + z) as i32);
+                        *top = materials.at(column.at(ceil(self.height(column)) - 1));
+                    }
+                }
+            }
+        });
+        Ok(tops)
+    }
+
+    /// What the undug surface shows over a column: the material of its highest solid voxel where the ground has strata,
+    /// otherwise the column's own, base and overlay blended.
+    pub fn surface_material(&self, column: Column) -> ColumnMaterial {
+        match self.below() {
+            Some(below) => ColumnMaterial::solid(below.tops[self.extent().index(column)]),
+            None => self.column_material(column),
+        }
+    }
+
+    /// The tops of some columns, one after the other, if there are strata.
+    pub(in crate::ground) fn tops_of(&self, columns: std::ops::Range<usize>) -> Option<&[MaterialId]> {
+        self.below().map(|below| &below.tops[columns])
+    }
+
+    /// The word for strata in the hash.
+    pub(in crate::ground) fn below_hash(&self) -> Option<u64> {
+        Some(match &self.below()?.own {
+            OwnMaterials::Strata { records, .. } => hash_words([1, records.hash]),
+            OwnMaterials::Function { id, .. } => hash_words([2, *id]),
+        })
+    }
+
+    /// The conditions of strata that a column fulfils: a bit each.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn column_conditions(&self, column: Column) -> u32 {
+        let Some(records) = self.strata_records() else { return 0 };
+        let column = self.extent().clamp(column);
+        let of = |(record, condition): (&super::StratumRecord, &Option<super::records::ColumnCondition>)| {
+            let is_met = condition.as_ref().is_some_and(|condition| condition.admits(self, column));
+            if is_met { record.condition } else { 0 }
+        };
+        records.strata.iter().zip(&records.conditions).map(of).sum()
+    }
+
+    /// The strata of a brick, if the ground has any.
+    pub(crate) fn brick_strata(&self, pos: BrickPos) -> Option<BrickStrata<'_>> {
+        self.strata_records().map(|records| BrickStrata::new(self, records, pos))
+    }
+}

@@ -1,0 +1,246 @@
+//! Strata as integers, and which of them hold a voxel. `kernels/strata.cuh` computes the same.
+
+use super::value_noise::{ValueNoise, both_within, exceeded_by};
+use super::{Span, Strata, Stratum, StratumBody, StratumBounds};
+use crate::ground::world::Ground;
+use crate::lattice::hash::{hash_words, mix};
+use crate::lattice::{Column, LatticeBox, ONE};
+use bytemuck::{Pod, Zeroable};
+
+/// Shapes, as numbers.
+pub(crate) const FILL: u32 = 0;
+pub(crate) const BED: u32 = 1;
+pub(crate) const VEIN: u32 = 2;
+pub(crate) const POCKET: u32 = 3;
+
+/// What the seeds of further noises differ by.
+const SECOND: u32 = 0x9E37_79B9;
+const ROUGH: u32 = 0x7F4A_7C15;
+
+/// A stratum but for its conditions on columns. Lengths are in 1/256 voxel; ends of ranges are not included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct StratumRecord {
+    pub material: u32,
+    pub body: u32,
+    /// The bit of its condition in [`Ground::column_conditions`]; 0 without one.
+    pub condition: u32,
+    pub seed: u32,
+    /// The width of the body's noise in voxels, as a power of two.
+    pub scale: u32,
+    /// Of veins, how far both noises may be from 0; of pockets, what the noise must exceed.
+    pub limit: i32,
+    /// By how much noise moves ends.
+    pub rough: i32,
+    /// The width of that noise in voxels, as a power of two.
+    pub rough_scale: u32,
+    pub depth: [i32; 2],
+    pub height: [i32; 2],
+    /// Of beds: lower face, thickness, distance from one to the next or 0.
+    pub bed: [i32; 3],
+    /// The lowest y, and the first beyond.
+    pub ys: [i32; 2],
+}
+
+/// How beds lie, as numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct BeddingRecord {
+    /// In 1/65536 voxel per voxel.
+    pub dip: [i32; 2],
+    /// In 1/256 voxel.
+    pub fold: i32,
+    /// The width of the noise in voxels, as a power of two.
+    pub scale: u32,
+    pub seed: u32,
+}
+
+/// What a stratum asks of a column.
+#[derive(Clone, Debug)]
+pub(super) struct ColumnCondition {
+    /// Squares of the slope, as [`Ground::squared_slope`] gives it.
+    slope: Option<[u64; 2]>,
+    bounds: StratumBounds,
+}
+
+/// The strata of a ground, ready to be asked.
+#[derive(Debug)]
+pub(crate) struct StrataRecords {
+    pub strata: Vec<StratumRecord>,
+    pub bedding: BeddingRecord,
+    pub(super) conditions: Vec<Option<ColumnCondition>>,
+    /// Hash of all of it.
+    pub hash: u64,
+}
+
+/// Voxels in 1/256.
+fn fixed(voxels: f32) -> i32 {
+    (f64::from(voxels) * f64::from(ONE)).round() as i32
+}
+
+fn ends(span: Span) -> [i32; 2] {
+    [span.from.map_or(i32::MIN, fixed), span.to.map_or(i32::MAX, fixed)]
+}
+
+impl StratumRecord {
+    fn new(stratum: &Stratum, seed: u32) -> Self {
+        let (body, scale, limit, bed) = match stratum.body {
+            StratumBody::Fill => (FILL, 8, 0, [0; 3]),
+            StratumBody::Bed { from, thickness, every } => {
+                (BED, 8, 0, [fixed(from), fixed(thickness), every.map_or(0, fixed)])
+            }
+            StratumBody::Vein { scale, share } => (VEIN, scale, both_within(share.into()), [0; 3]),
+            StratumBody::Pocket { scale, share } => (POCKET, scale, exceeded_by(share.into()), [0; 3]),
+        };
+        let words = [seed, stratum.seed, stratum.material.0.into(), body];
+        let [mut depth, height] = [ends(stratum.depth), ends(stratum.height)];
+        if depth[0] <= 0 {
+            // However rough the ends are, they leave no holes in the surface.
+            depth[0] = i32::MIN;
+        }
+        let ys = match &stratum.bounds {
+            StratumBounds::Box(LatticeBox { min, max }) => [min.y, max.y.saturating_add(1)],
+            _ => [i32::MIN, i32::MAX],
+        };
+        Self {
+            material: stratum.material.0.into(),
+            body,
+            condition: 0,
+            seed: hash_words(words.map(u64::from)) as u32,
+            scale: scale.trailing_zeros(),
+            limit,
+            rough: fixed(stratum.rough),
+            rough_scale: stratum.rough_scale.trailing_zeros(),
+            depth,
+            height,
+            bed,
+            ys,
+        }
+    }
+
+    /// The noises of veins and pockets.
+    pub(super) fn noises(&self) -> [ValueNoise; 2] {
+        [self.seed, self.seed ^ SECOND].map(|seed| ValueNoise { seed, scale: self.scale })
+    }
+
+    /// The noise that moves ends.
+    pub(super) fn roughness(&self) -> ValueNoise {
+        ValueNoise { seed: self.seed ^ ROUGH, scale: self.rough_scale }
+    }
+
+    /// Is a height, in 1/256 voxel as the bedding has it, in a bed?
+    pub(super) fn is_in_bed(&self, height: i64) -> bool {
+        let [from, thickness, every] = self.bed.map(i64::from);
+        let above = height - from;
+        let above = if every > 0 { above.rem_euclid(every) } else { above };
+        (0..thickness).contains(&above)
+    }
+}
+
+impl BeddingRecord {
+    pub(super) fn noise(&self) -> ValueNoise {
+        ValueNoise { seed: self.seed, scale: self.scale }
+    }
+
+    /// By how much a column is lifted in the bedding, in 1/256 voxel, where the noise is this.
+    pub(super) fn lift(&self, column: Column, noise: i32) -> i64 {
+        let [x, z] = self.dip.map(i64::from);
+        let dip = (x * i64::from(column.x) + z * i64::from(column.z)) >> 8;
+        dip + i64::from((self.fold * noise) >> 15)
+    }
+}
+
+impl ColumnCondition {
+    fn new(stratum: &Stratum) -> Option<Self> {
+        let Span { from, to } = stratum.slope;
+        let square = |slope: f32| {
+            let steps = (f64::from(slope.max(0.0)) * f64::from(2 * ONE)).round() as u64;
+            steps * steps
+        };
+        let slope =
+            (stratum.slope != Span::ALL).then(|| [from.map_or(0, square), to.map_or(u64::MAX, square)]);
+        stratum.has_column_condition().then(|| Self { slope, bounds: stratum.bounds.clone() })
+    }
+
+    /// May the stratum be in this column of the world?
+    pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
+        let is_inside = match &self.bounds {
+            StratumBounds::World => true,
+            StratumBounds::Box(LatticeBox { min, max }) => {
+                (min.x..=max.x).contains(&column.x) && (min.z..=max.z).contains(&column.z)
+            }
+            StratumBounds::Image(image) => ground.stretched(image, column).grey() >= 32_768.0,
+        };
+        is_inside && self.slope.is_none_or(|[from, to]| (from..to).contains(&ground.squared_slope(column)))
+    }
+
+    fn words(&self) -> Vec<u64> {
+        let [from, to] = self.slope.unwrap_or([0, u64::MAX]);
+        let mut words = vec![from, to];
+        match &self.bounds {
+            StratumBounds::World => {}
+            StratumBounds::Box(LatticeBox { min, max }) => {
+                words.extend(
+                    [min, max].iter().flat_map(|end| end.to_array()).map(|at| u64::from(at.cast_unsigned())),
+                );
+            }
+            StratumBounds::Image(image) => {
+                words.extend([u64::from(image.width()), u64::from(image.height())]);
+                words.extend(image.samples().iter().map(|&sample| u64::from(sample)));
+            }
+        }
+        words
+    }
+}
+
+impl StrataRecords {
+    /// Strata that were checked.
+    pub fn new(given: &Strata) -> Self {
+        let mut strata: Vec<_> =
+            given.strata.iter().map(|stratum| StratumRecord::new(stratum, given.seed)).collect();
+        let super::Bedding { dip, fold, scale } = given.bedding;
+        let bedding = BeddingRecord {
+            dip: dip.to_array().map(|dip| (f64::from(dip) * 65_536.0).round() as i32),
+            fold: fixed(fold),
+            scale: scale.trailing_zeros(),
+            seed: mix(given.seed.into()) as u32,
+        };
+        let conditions: Vec<_> = given.strata.iter().map(ColumnCondition::new).collect();
+        let conditioned = strata.iter_mut().zip(&conditions).filter(|(_, condition)| condition.is_some());
+        conditioned.zip(0..).for_each(|((record, _), bit)| record.condition = 1 << bit);
+        let numbers = bytemuck::cast_slice::<_, u32>(&strata)
+            .iter()
+            .chain(bytemuck::cast_slice(std::slice::from_ref(&bedding)));
+        let words = numbers.map(|&number| u64::from(number));
+        let of_columns = conditions.iter().map(|own| own.as_ref().map_or(0, |own| hash_words(own.words())));
+        let hash = hash_words(words.chain(of_columns));
+        Self { strata, bedding, conditions, hash }
+    }
+
+    /// Does a stratum hold the voxel? By definition, without what is known of a brick: [`BrickStrata`](super::BrickStrata)
+    /// gives the same.
+    #[cfg(test)]
+    pub fn holds(&self, number: usize, ground: &Ground, point: glam::IVec3) -> bool {
+        use glam::{IVec2, IVec3};
+        let (record, column) = (&self.strata[number], ground.nearest_column(point));
+        let place = IVec2::new(column.x, column.z);
+        let at = IVec3::new(column.x, point.y, column.z);
+        let height = point.y * ONE;
+        let depth = (ground.height(column) - height).max(1);
+        let flat = |noise: ValueNoise| noise.flat_within(&noise.flat_corners(place), place);
+        let moved = (record.rough * flat(record.roughness())) >> 15;
+        let noise = record.noises().map(|noise| noise.at(at));
+        (record.depth[0]..record.depth[1]).contains(&(depth + moved))
+            && (record.height[0]..record.height[1]).contains(&(height + moved))
+            && (record.ys[0]..record.ys[1]).contains(&point.y)
+            && self.conditions[number].as_ref().is_none_or(|condition| condition.admits(ground, column))
+            && match record.body {
+                BED => record.is_in_bed(
+                    i64::from(height + moved) + self.bedding.lift(column, flat(self.bedding.noise())),
+                ),
+                VEIN => noise.iter().all(|noise| noise.abs() < record.limit),
+                POCKET => noise[0] > record.limit,
+                _ => true,
+            }
+    }
+}

@@ -1,0 +1,249 @@
+//! Strata: what is drawn is what a dig yields, nothing is stored for it, and solid ground is the same as without.
+
+mod worlds;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bevy_burrow::ground::{Ground, Strata};
+use bevy_burrow::lattice::{Column, LatticeBox, SNAP};
+use bevy_burrow::prelude::*;
+use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::terrain::{Drawn, World};
+use bevy_burrow::volume::MaterialCounts;
+use fastrand::Rng;
+use glam::{IVec3, Vec3};
+use worlds::{random_brush, random_ground, random_strata, random_world};
+
+type ByMaterial = BTreeMap<MaterialId, u64>;
+
+fn counted(counts: &MaterialCounts) -> ByMaterial {
+    counts.iter().filter(|&(_, voxels)| voxels > 0).collect()
+}
+
+/// A preset, or random strata, in a random ground.
+fn ground_with_strata(rng: &mut Rng, index: u64) -> (Ground, u32) {
+    let (ground, chunk_size) = random_ground(rng, index);
+    let strata = match index % 4 {
+        0 => Strata::alpine(),
+        1 => Strata::desert(),
+        2 => Strata::mine(),
+        _ => {
+            let (low, high) = ground.height_range();
+            random_strata(rng, [low as f32 / 256.0 - 20.0, high as f32 / 256.0 + 2.0])
+        }
+    };
+    (ground.with_strata(&strata).expect("valid strata"), chunk_size)
+}
+
+fn terrain(ground: &Arc<Ground>, chunk_size: u32) -> Terrain {
+    let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
+    Terrain::new(Arc::clone(ground), &settings).expect("valid settings")
+}
+
+/// The material of a voxel: what is stored, else what the function of the ground says.
+fn material(world: &World, point: IVec3) -> MaterialId {
+    match world.samples().stored_material(point) {
+        MaterialId::GROUND => world.ground().material(point),
+        stored => stored,
+    }
+}
+
+/// Everything within reach of some digs, before them.
+fn solid_voxels(world: &World, place: LatticeBox) -> BTreeMap<[i32; 3], MaterialId> {
+    let solid = place.points().filter(|&point| world.samples().is_solid(point));
+    solid.map(|point| (point.to_array(), material(world, point))).collect()
+}
+
+#[test]
+fn ten_thousand_digs_yield_what_the_function_says() {
+    let (mut digs, mut materials) = (0, ByMaterial::new());
+    for index in 0.. {
+        if digs >= 10_000 {
+            break;
+        }
+        let rng = &mut Rng::with_seed(index);
+        let (ground, chunk_size) = ground_with_strata(rng, index);
+        let ground = Arc::new(ground);
+        let mut terrain = terrain(&ground, chunk_size);
+        for _ in 0..120 {
+            let (x, z) = (rng.i32(0..=ground.width()), rng.i32(0..=ground.depth()));
+            let height = ground.height(Column::new(x, z)) as f32 / 256.0;
+            let center = Vec3::new(x as f32 + rng.f32(), height - 12.0 * rng.f32(), z as f32 + rng.f32());
+            let shape = Shape::sphere(center, 1.0 + 3.0 * rng.f32());
+            // Some of what is dug was built or painted before.
+            if rng.u8(..4) == 0 {
+                let stored = MaterialId([3, 77, 255][rng.usize(..3)]);
+                let shape = Shape::sphere(center + Vec3::splat(1.5), 2.5);
+                terrain.apply([if rng.bool() {
+                    Brush::add(shape, stored)
+                } else {
+                    Brush::paint(shape, stored)
+                }]);
+            }
+            let reach = LatticeBox { min: center.as_ivec3() - 8, max: center.as_ivec3() + 8 };
+            let before = solid_voxels(terrain.world(), reach);
+            let receipts = terrain.apply([Brush::dig(shape)]);
+            let Ok(applied) = &receipts[0].outcome else { panic!("{receipts:?}") };
+            let mut expected = ByMaterial::new();
+            for (point, &material) in &before {
+                if !terrain.world().samples().is_solid(IVec3::from_array(*point)) {
+                    *expected.entry(material).or_default() += 1;
+                }
+            }
+            assert_eq!(counted(&applied.removed), expected, "dig {digs} in world {index}");
+            expected
+                .into_iter()
+                .for_each(|(material, voxels)| *materials.entry(material).or_default() += voxels);
+            digs += 1;
+        }
+    }
+    assert!(materials.values().filter(|&&voxels| voxels > 1000).count() > 12, "{materials:?}");
+}
+
+#[test]
+fn refused_voxels_are_those_of_the_strata_that_resist() {
+    let mut found = [0; 3];
+    for index in 0..40 {
+        let rng = &mut Rng::with_seed(index);
+        let (ground, chunk_size) = ground_with_strata(rng, index);
+        let ground = Arc::new(ground);
+        let [mut free, mut ruled] = [(); 2].map(|()| terrain(&ground, chunk_size));
+        let (unbreakable, hard) =
+            (MaterialId([0, 9, 11, 13][rng.usize(..4)]), MaterialId([4, 8, 12][rng.usize(..3)]));
+        let rules = DiggingRules::default().with_unbreakable(unbreakable).with_hardness(hard, 200);
+        ruled.set_rules(rules).expect("valid rules");
+        // Apart from each other, so that all ground is untouched.
+        for (x, z) in (8..ground.depth() - 8)
+            .step_by(16)
+            .flat_map(|z| (8..ground.width() - 8).step_by(16).map(move |x| (x, z)))
+        {
+            let height = ground.height(Column::new(x, z)) as f32 / 256.0;
+            let center = Vec3::new(x as f32, height - 10.0 * rng.f32(), z as f32);
+            let dig = Brush::dig(Shape::sphere(center, 5.0)).with_power(60);
+            let reach = LatticeBox { min: center.as_ivec3() - 8, max: center.as_ivec3() + 8 };
+            let before = solid_voxels(free.world(), reach);
+            free.apply([dig.clone()]);
+            let receipts = ruled.apply([dig]);
+            let Ok(applied) = &receipts[0].outcome else { panic!("{receipts:?}") };
+            let mut expected = [(); 3].map(|()| ByMaterial::new());
+            for (point, &material) in &before {
+                if free.world().samples().is_solid(IVec3::from_array(*point)) {
+                    continue;
+                }
+                let kind = if material == unbreakable { 1 } else { usize::from(material == hard) * 2 };
+                *expected[kind].entry(material).or_default() += 1;
+                found[kind] += 1;
+            }
+            let counts = [&applied.removed, &applied.refused.unbreakable, &applied.refused.too_hard];
+            assert_eq!(counts.map(counted), expected, "world {index}");
+        }
+    }
+    assert!(found.iter().all(|&voxels| voxels > 500), "{found:?}");
+}
+
+#[test]
+fn strata_change_no_solid_ground_and_store_nothing() {
+    for index in 0..worlds::world_count(24) {
+        let rng = &mut Rng::with_seed(index);
+        let (ground, chunk_size) = ground_with_strata(&mut rng.clone(), index);
+        let (bare, _) = random_ground(rng, index);
+        let brushes: Vec<Brush> =
+            (0..12).map(|_| random_brush(rng, &bare)).map(|brush| Brush::dig(brush.shape)).collect();
+        let [mut with, mut without] = [ground, bare].map(|ground| terrain(&Arc::new(ground), chunk_size));
+        assert_eq!(with.world().bricks().count(), 0);
+        for brush in &brushes {
+            let [a, b] = [&mut with, &mut without].map(|terrain| terrain.apply([brush]));
+            let [a, b] =
+                [a, b].map(|receipts| receipts.into_iter().next().and_then(|receipt| receipt.outcome.ok()));
+            let total = |applied: &Option<Applied>| applied.as_ref().map(|applied| applied.removed.total());
+            assert_eq!(total(&a), total(&b));
+        }
+        let bricks = |terrain: &Terrain| {
+            let bricks = terrain.world().bricks().map(|(pos, brick)| {
+                assert_eq!(brick.material_bytes(), 0, "nobody painted or built");
+                let samples: Vec<_> = brick.edited_samples(pos).collect();
+                (pos.0.to_array(), samples)
+            });
+            bricks.collect::<BTreeMap<_, _>>()
+        };
+        assert!(bricks(&with) == bricks(&without), "world {index}");
+        let faces =
+            |mesh: SurfaceMesh| (mesh.vertices.iter().map(|v| v.position).collect::<Vec<_>>(), mesh.indices);
+        for tile in with.world().grid().tiles() {
+            assert!(faces(with.world().tile_mesh(tile)) == faces(without.world().tile_mesh(tile)));
+        }
+        for chunk in with.world().drawn_chunks() {
+            assert!(faces(with.world().chunk_mesh(chunk)) == faces(without.world().chunk_mesh(chunk)));
+        }
+        // Undone, nothing is left.
+        let hash = terrain(&Arc::new(ground_with_strata(&mut Rng::with_seed(index), index).0), chunk_size)
+            .world()
+            .hash();
+        brushes.iter().for_each(|_| drop(with.undo()));
+        with.apply::<Brush>([]);
+        assert_eq!(with.world().hash(), hash);
+    }
+}
+
+#[test]
+fn hashes_do_not_depend_on_chunks_or_batches() {
+    for index in 0..12 {
+        let rng = &mut Rng::with_seed(index);
+        let (ground, _) = ground_with_strata(rng, index);
+        let brushes: Vec<Brush> = (0..10).map(|_| worlds::any_random_brush(rng, &ground)).collect();
+        let ground = Arc::new(ground);
+        let run = |chunk_size: u32, batch: usize| {
+            let mut terrain = terrain(&ground, chunk_size);
+            let receipts: Vec<Receipt> =
+                brushes.chunks(batch).flat_map(|batch| terrain.apply(batch)).collect();
+            let removed =
+                receipts.into_iter().map(|receipt| receipt.outcome.map(|applied| counted(&applied.removed)));
+            (terrain.world().hash(), removed.collect::<Vec<_>>())
+        };
+        let expected = run(32, 1);
+        for (chunk_size, batch) in [(8, 1), (25, 10), (100, 3)] {
+            assert_eq!(run(chunk_size, batch), expected, "world {index}");
+        }
+    }
+}
+
+/// Checks that each corner of a triangle shows the material of the solid end of its edge; returns how many there are.
+fn check_vertices(world: &World, mesh: &SurfaceMesh, origin: IVec3) -> usize {
+    // Tiles also have vertices that no triangle uses.
+    let vertices: Vec<_> = mesh.triangles().flatten().collect();
+    for vertex in &vertices {
+        let place = origin * SNAP + vertex.position;
+        let low = place.map(|at| at.div_euclid(SNAP));
+        let axis = (0..3).find(|&axis| place[axis].rem_euclid(SNAP) != 0);
+        let mut solid = low;
+        match axis {
+            // On a lattice point lies only the undug surface, over the highest solid voxel.
+            None => solid.y -= 1,
+            Some(axis) if !world.samples().is_solid(low) => solid[axis] += 1,
+            Some(_) => {}
+        }
+        let expected = material(world, solid);
+        let mix = vertex.materials;
+        assert_eq!((mix.ids, mix.weights), ([expected.0, 0, 0, 0], [255, 0, 0, 0]), "at {place} by {solid}");
+    }
+    vertices.len()
+}
+
+#[test]
+fn every_vertex_shows_what_a_dig_there_yields() {
+    let (mut tiles, mut chunks) = (0, 0);
+    for index in (0..worlds::world_count(100)).filter(|index| index % 5 == 4) {
+        let terrain = random_world(&mut Rng::with_seed(index), index);
+        let world = terrain.world();
+        for tile in world.grid().tiles() {
+            tiles += check_vertices(world, &world.tile_mesh(tile), world.origin(Drawn::Tile(tile)));
+        }
+        for chunk in world.drawn_chunks() {
+            chunks += check_vertices(world, &world.chunk_mesh(chunk), world.origin(Drawn::Chunk(chunk)));
+        }
+        let report = world.check_seams();
+        assert!(report.is_flawless(), "world {index}: {report}");
+    }
+    assert!(tiles > 50_000 && chunks > 10_000, "{tiles} {chunks}");
+}
