@@ -12,7 +12,7 @@ use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Density, Normals};
 use bevy_burrow::ground::MaterialId;
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 // The fields of the benchmark `meshers`, of which only a few are used here.
 #[allow(dead_code)]
@@ -31,7 +31,7 @@ fn counted_workload(work: &mut dyn FnMut()) {
 /// A name, and what to do.
 type Workload = (&'static str, fn());
 
-const WORKLOADS: [Workload; 10] = [
+const WORKLOADS: [Workload; 12] = [
     ("dense-caves", || dense(Field::Caves)),
     ("dense-chunk-i16", dense_chunk),
     ("dense-empty", || dense(Field::Empty)),
@@ -39,6 +39,8 @@ const WORKLOADS: [Workload; 10] = [
     ("dense-terrain", || dense(Field::Terrain)),
     ("dig-radius-4-dug", || dig(Digging::Dug)),
     ("dig-radius-4-fresh", || dig(Digging::Fresh)),
+    ("dig-radius-4-mine", || dig(Digging::Mine)),
+    ("dig-radius-4-mine-deep", || dig(Digging::DeepMine)),
     ("dig-radius-16", dig_wide),
     ("paint", paint),
     ("thousand-edits", thousand_edits),
@@ -82,10 +84,13 @@ fn mesh_counted<'a, S: Density + 'a>(grid: impl Fn() -> DenseGrid<'a, S>) {
     black_box(&mesh);
 }
 
+fn hills() -> NoiseHeights {
+    NoiseHeights { seed: 5, scale: 90.0, amplitude: 20.0, ..NoiseHeights::default() }
+}
+
 /// Hills of 256^2 columns in chunks of 32.
 fn terrain() -> Terrain {
-    let hills = NoiseHeights { seed: 5, scale: 90.0, amplitude: 20.0, ..NoiseHeights::default() };
-    let ground = Ground::from_noise(256, 256, &hills).expect("valid noise");
+    let ground = Ground::from_noise(256, 256, &hills()).expect("valid noise");
     Terrain::new(ground, &TerrainSettings::default()).expect("valid settings")
 }
 
@@ -117,16 +122,31 @@ enum Digging {
     Fresh,
     /// Next to earlier spheres, half a radius away.
     Dug,
+    /// Untouched ground with strata.
+    Mine,
+    /// The same, 20 voxels below the surface, where the ores are.
+    DeepMine,
 }
 
 fn dig(ground: Digging) {
     let mut terrain = terrain();
+    if matches!(ground, Digging::Mine | Digging::DeepMine) {
+        let hills =
+            Ground::from_noise(256, 256, &hills()).and_then(|ground| ground.with_strata(&Strata::mine()));
+        terrain =
+            Terrain::new(hills.expect("valid strata"), &TerrainSettings::default()).expect("valid settings");
+    }
     // The first edit of all initialises tables.
     let warm_up = Brush::dig(Shape::sphere(Vec3::new(8.0, 0.0, 8.0), 4.0));
     terrain.apply([warm_up]);
     let (first, second) = (spheres(&terrain, 4.0, 0.0, 24), spheres(&terrain, 4.0, 3.0, 24));
     match ground {
-        Digging::Fresh => counted_workload(&mut || one_by_one(&mut terrain, &first)),
+        Digging::Fresh | Digging::Mine => counted_workload(&mut || one_by_one(&mut terrain, &first)),
+        Digging::DeepMine => {
+            let deeper = |brush: &Brush| brush.transformed(Quat::IDENTITY, Vec3::NEG_Y * 20.0, 1.0);
+            let deep: Vec<_> = first.iter().map(deeper).collect();
+            counted_workload(&mut || one_by_one(&mut terrain, &deep));
+        }
         Digging::Dug => {
             one_by_one(&mut terrain, &first);
             counted_workload(&mut || one_by_one(&mut terrain, &second));

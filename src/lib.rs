@@ -299,7 +299,7 @@
 //! Without any feature the model alone is built, with no Bevy at all. Where there are threads, transactions, loads and textures
 //! have their own, whatever features of Bevy's are on.
 //!
-//! # Limits
+//! # Interval
 //!
 //! Lattice coordinates stay within 32768 voxels, a world's sides within 16384 cells. Chunks are all drawn at full detail.
 //! A terrain may be moved by whole voxels and scaled by powers of two, by
@@ -337,8 +337,9 @@ mod worlds;
 pub mod prelude {
     pub use crate::brush::{Blend, Brush, BrushError, Edit, Operation, Roughness, Shape, Stamp};
     pub use crate::ground::{
-        ColumnMaterial, Detail, GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialId,
-        MaterialRule, NoiseHeights, NoiseKind,
+        Bedding, ColumnMaterial, Detail, GreyImage, Ground, ImageLimits, ImageScale, Interval,
+        MaterialControl, MaterialId, MaterialRule, NoiseHeights, NoiseKind, Strata, Stratum, StratumBody,
+        StratumBounds,
     };
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{

@@ -160,7 +160,6 @@ pub fn game(app: &mut App, engine: BurrowEngine, settings: SettingsFile) {
         ))
         .add_plugins((
             world::landscape::LandscapePlugin,
-            world::veins::VeinsPlugin,
             world::sky::SkyPlugin,
             world::day::DayPlugin,
             world::light::LightPlugin,

@@ -16,13 +16,17 @@
 //! {"shape":"cone","base":[20,60,20],"axis":[0,9,0],"radius":5,"op":"paint","material":3}
 //! ```
 //!
+//! `--strata` gives the ground strata: a preset, or a file with [`Strata`] as JSON. `--rules` limits what brushes remove:
+//! a file with [`DiggingRules`] as JSON. `--probe` asks what lattice points of the pristine world are made of, `[x,y,z]`
+//! a line; `probes.json` has an answer for each, `{"solid":true,"material":7}`.
+//!
 //! `mesh.obj` holds every drawn triangle with exact positions: y up, one unit per voxel, one group per tile and chunk.
 //! Vertices of neighbouring parts are not welded. `report.json` has the hash, scenarios, counts, bytes, seams and
-//! timings.
+//! timings, and for each line of the edits the voxels by material: `removed`, `added`, `painted`, `refused`.
 //!
 //! | exit code | when |
 //! | --- | --- |
-//! | 0 | both files were written; edits that lie outside the world are named in the report |
+//! | 0 | all files were written; edits that lie outside the world are named in the report |
 //! | 1 | the files could not be written |
 //! | 2 | an argument, the image or a line of the edits is bad: the reason goes to stderr |
 //!
@@ -34,6 +38,7 @@ mod obj;
 #[path = "../shared/output.rs"]
 mod output;
 mod play;
+mod probes;
 mod report;
 mod script;
 mod staging;
@@ -46,9 +51,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale};
+use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale, Strata};
 use bevy_burrow::terrain::{Terrain, TerrainError, TerrainSettings, World};
+use bevy_burrow::volume::{DiggingRules, RulesError};
 use clap::Parser;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use report::{Report, milliseconds};
 use staging::Staging;
@@ -69,6 +77,15 @@ struct Args {
     /// Edits as JSON lines
     #[arg(long, value_name = "FILE")]
     edits: PathBuf,
+    /// Strata of the ground: alpine, desert or mine, or a JSON file
+    #[arg(long, value_name = "PRESET|FILE.json")]
+    strata: Option<PathBuf>,
+    /// Digging rules as a JSON file
+    #[arg(long, value_name = "FILE.json")]
+    rules: Option<PathBuf>,
+    /// Lattice points as JSON lines, [x,y,z], to be answered in probes.json
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
     /// Cells along a chunk's side, 8 to 128
     #[arg(long, value_name = "N", default_value_t = 32)]
     chunk_size: u32,
@@ -86,11 +103,17 @@ enum ExportError {
     #[error("{}: {reason}", path.display())]
     Read { path: PathBuf, reason: io::Error },
     #[error("{}: {reason}", path.display())]
-    Heights { path: PathBuf, reason: GroundError },
+    Ground { path: PathBuf, reason: GroundError },
+    #[error("{} is neither a file nor one of the presets alpine, desert and mine", .0.display())]
+    Strata(PathBuf),
     #[error(transparent)]
     Terrain(#[from] TerrainError),
     #[error(transparent)]
     Script(#[from] script::BadLines),
+    #[error("{}: {reason}", path.display())]
+    Json { path: PathBuf, reason: serde_json::Error },
+    #[error("{}: {reason}", path.display())]
+    Rules { path: PathBuf, reason: RulesError },
     #[error("{}: {reason}", path.display())]
     Write { path: PathBuf, reason: io::Error },
 }
@@ -122,28 +145,62 @@ fn export(args: &Args) -> Result<Report, ExportError> {
     let start = Instant::now();
     let edits = script::read(&args.edits)?;
     let settings = TerrainSettings { chunk_size: args.chunk_size, ..TerrainSettings::default() };
+    let probes = args.probe.as_deref().map(probes::read).transpose()?;
     let mut terrain = Terrain::new(read_ground(args)?, &settings)?;
+    if let Some(path) = &args.rules {
+        let set = terrain.set_rules(read_json::<DiggingRules>(path)?);
+        set.map_err(|reason| ExportError::Rules { path: path.clone(), reason })?;
+    }
     let load_ms = milliseconds(start);
 
     let played = play::play(&mut terrain, &edits, args.batch as usize);
     let mut report = Report::new(terrain.world(), &played);
     report.timings.load_ms = load_ms;
 
-    write(args, terrain.world(), &mut report)
+    let probes = probes.map(|points| probes::answer(terrain.world().ground(), &points));
+    write(args, terrain.world(), &mut report, probes.as_deref())
         .map_err(|reason| ExportError::Write { path: args.out.clone(), reason })?;
     Ok(report)
 }
 
-fn write(args: &Args, world: &World, report: &mut Report) -> io::Result<()> {
+fn write(
+    args: &Args,
+    world: &World,
+    report: &mut Report,
+    probes: Option<&[probes::Probe]>,
+) -> io::Result<()> {
     let start = Instant::now();
     let mut staging = Staging::new(&args.out)?;
     report.bytes.mesh_obj = staging.write("mesh.obj", |out| obj::write(world, out))?;
     report.timings.write_ms = milliseconds(start);
-    staging.write("report.json", |out| {
-        serde_json::to_writer_pretty(&mut *out, report)?;
-        out.write_all(b"\n")
-    })?;
+    staging.write("report.json", |out| write_json(out, report))?;
+    if let Some(probes) = probes {
+        staging.write("probes.json", |out| write_json(out, probes))?;
+    }
     staging.publish()
+}
+
+fn write_json(out: &mut impl Write, content: &(impl Serialize + ?Sized)) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut *out, content)?;
+    out.write_all(b"\n")
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, ExportError> {
+    let bytes =
+        read_at_most(path, MOST_JSON).map_err(|reason| ExportError::Read { path: path.into(), reason })?;
+    serde_json::from_slice(&bytes).map_err(|reason| ExportError::Json { path: path.into(), reason })
+}
+
+/// Most bytes of a file with strata or rules.
+const MOST_JSON: u64 = 1 << 24;
+
+/// The preset of that name, or the strata in a file.
+fn read_strata(name: &Path) -> Result<Strata, ExportError> {
+    match name.to_str().and_then(Strata::preset) {
+        Some(preset) => Ok(preset),
+        None if !name.exists() => Err(ExportError::Strata(name.into())),
+        None => read_json(name),
+    }
 }
 
 fn read_ground(args: &Args) -> Result<Ground, ExportError> {
@@ -156,10 +213,13 @@ fn read_ground(args: &Args) -> Result<Ground, ExportError> {
         high: args.height_range[1],
         detail: None,
     };
-    GreyImage::decode_png(&bytes, &limits)
+    let ground = GreyImage::decode_png(&bytes, &limits)
         .map_err(GroundError::from)
         .and_then(|image| Ground::from_image(&image, &scale))
-        .map_err(|reason| ExportError::Heights { path: args.heights.clone(), reason })
+        .map_err(|reason| ExportError::Ground { path: args.heights.clone(), reason })?;
+    let Some(name) = &args.strata else { return Ok(ground) };
+    let with_strata = ground.with_strata(&read_strata(name)?);
+    with_strata.map_err(|reason| ExportError::Ground { path: name.clone(), reason })
 }
 
 /// Reads at most `limit` bytes of a file, so that endless ones end too; the decoder then reports that it is too large.

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use bevy_burrow::lattice::ONE;
 use bevy_burrow::surface::SeamReport;
-use bevy_burrow::terrain::{Memory, ScenarioCounts, World};
-use bevy_burrow::volume::MaterialCounts;
+use bevy_burrow::terrain::{Memory, Receipt, ScenarioCounts, World};
+use bevy_burrow::volume::{MaterialCounts, Refused};
 use serde::Serialize;
 
 use crate::play::Played;
@@ -18,7 +18,9 @@ pub struct Report {
     /// Hash of the ground and every edited sample, in hexadecimal.
     pub hash: String,
     pub world: WorldFigures,
-    pub edits: EditFigures,
+    /// What each edit did, in order.
+    pub edits: Vec<EditFigures>,
+    pub totals: Totals,
     /// How often each of the paper's five scenarios occurred.
     pub scenarios: ScenarioCounts,
     /// Edited regions.
@@ -48,22 +50,35 @@ pub struct WorldFigures {
     pub heights: [f64; 2],
 }
 
-#[derive(Debug, Serialize)]
+/// Voxels by material id.
+type ByMaterial = BTreeMap<u8, u64>;
+
+#[derive(Debug, Default, Serialize)]
 pub struct EditFigures {
-    /// Accepted edits.
-    pub applied: usize,
-    /// Rejected edits, with their line numbers.
-    pub rejected: Vec<RejectedEdit>,
-    /// Voxels dug away, filled and repainted, by material.
-    pub removed: BTreeMap<u8, u64>,
-    pub added: BTreeMap<u8, u64>,
-    pub painted: BTreeMap<u8, u64>,
+    /// The line in the file of edits.
+    pub line: usize,
+    /// Why the edit was rejected, if it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejected: Option<String>,
+    /// Voxels dug away, filled and repainted.
+    pub removed: ByMaterial,
+    pub added: ByMaterial,
+    pub painted: ByMaterial,
+    /// Voxels that rules kept as they were.
+    pub refused: ByMaterial,
 }
 
-#[derive(Debug, Serialize)]
-pub struct RejectedEdit {
-    pub line: usize,
-    pub reason: String,
+/// All edits together.
+#[derive(Debug, Default, Serialize)]
+pub struct Totals {
+    /// Accepted edits.
+    pub applied: usize,
+    /// Rejected edits.
+    pub rejected: usize,
+    pub removed: ByMaterial,
+    pub added: ByMaterial,
+    pub painted: ByMaterial,
+    pub refused: ByMaterial,
 }
 
 #[derive(Debug, Serialize)]
@@ -127,6 +142,7 @@ impl Report {
         for (_, receipt) in &played.receipts {
             scenarios.count(receipt);
         }
+        let edits: Vec<_> = played.receipts.iter().map(EditFigures::new).collect();
         let (memory, grid) = (world.memory(), world.grid());
         let (low, high) = world.ground().height_range();
         Self {
@@ -137,7 +153,8 @@ impl Report {
                 chunk_size: grid.size(),
                 heights: [low, high].map(|height| f64::from(height) / f64::from(ONE)),
             },
-            edits: EditFigures::new(played),
+            totals: Totals::new(&edits),
+            edits,
             scenarios,
             fields: world.fields().map(|(_, fields)| fields.len()).sum(),
             chunks: world.drawn_chunks().count(),
@@ -154,8 +171,8 @@ impl Report {
 /// The summary that the command prints.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { edits, scenarios, seams, timings, .. } = self;
-        writeln!(f, "edits      {} applied, {} rejected", edits.applied, edits.rejected.len())?;
+        let Self { totals, scenarios, seams, timings, .. } = self;
+        writeln!(f, "edits      {} applied, {} rejected", totals.applied, totals.rejected)?;
         let ScenarioCounts { created, changed, extended, merged, split } = scenarios;
         writeln!(
             f,
@@ -175,29 +192,42 @@ impl fmt::Display for Report {
 }
 
 impl EditFigures {
-    fn new(played: &Played) -> Self {
-        let mut rejected = Vec::new();
-        let (mut removed, mut added, mut painted) =
-            (MaterialCounts::default(), MaterialCounts::default(), MaterialCounts::default());
-        for (line, receipt) in &played.receipts {
-            match &receipt.outcome {
-                Ok(applied) => {
-                    removed.add(&applied.removed);
-                    added.add(&applied.added);
-                    painted.add(&applied.painted);
-                }
-                Err(reason) => rejected.push(RejectedEdit { line: *line, reason: reason.to_string() }),
-            }
-        }
+    fn new((line, receipt): &(usize, Receipt)) -> Self {
         let by_material =
-            |tally: &MaterialCounts| tally.iter().map(|(material, voxels)| (material.0, voxels)).collect();
-        Self {
-            applied: played.receipts.len() - rejected.len(),
-            rejected,
-            removed: by_material(&removed),
-            added: by_material(&added),
-            painted: by_material(&painted),
+            |counts: &MaterialCounts| counts.iter().map(|(material, voxels)| (material.0, voxels)).collect();
+        match &receipt.outcome {
+            Ok(applied) => {
+                let Refused { protected, unbreakable, too_hard, slowed } = &applied.refused;
+                let mut refused = MaterialCounts::default();
+                [protected, unbreakable, too_hard, slowed].into_iter().for_each(|counts| refused.add(counts));
+                Self {
+                    line: *line,
+                    rejected: None,
+                    removed: by_material(&applied.removed),
+                    added: by_material(&applied.added),
+                    painted: by_material(&applied.painted),
+                    refused: by_material(&refused),
+                }
+            }
+            Err(reason) => Self { line: *line, rejected: Some(reason.to_string()), ..Self::default() },
         }
+    }
+}
+
+impl Totals {
+    fn new(edits: &[EditFigures]) -> Self {
+        let rejected = edits.iter().filter(|edit| edit.rejected.is_some()).count();
+        let mut totals = Self { applied: edits.len() - rejected, rejected, ..Self::default() };
+        let add = |sum: &mut ByMaterial, own: &ByMaterial| {
+            own.iter().for_each(|(&material, voxels)| *sum.entry(material).or_default() += voxels);
+        };
+        for edit in edits {
+            add(&mut totals.removed, &edit.removed);
+            add(&mut totals.added, &edit.added);
+            add(&mut totals.painted, &edit.painted);
+            add(&mut totals.refused, &edit.refused);
+        }
+        totals
     }
 }
 

@@ -148,7 +148,7 @@ fn every_edge_of_the_mesh_joins_two_triangles() {
         assert_eq!(mesh.loose_edges(40.0, 33.0), Vec::<[[f64; 3]; 2]>::new(), "chunk size {chunk_size}");
         assert_eq!(report["seams"]["flawless"], true);
         assert_eq!(report["seams"]["triangles"], mesh.triangles.len());
-        assert_eq!(report["edits"]["applied"], 7);
+        assert_eq!(report["totals"]["applied"], 7);
         let groups = |kind: &str| mesh.groups.iter().filter(|name| name.starts_with(kind)).count();
         assert_eq!(report["chunks"], groups("chunk_"));
         assert!(groups("tile_") > 0 && mesh.groups.iter().any(|name| name == "tile_0_0"));
@@ -195,7 +195,7 @@ fn hash_and_samples_depend_on_neither_chunks_nor_batches() {
         let edits = temp.put("edits.jsonl", format!("{DIG}\n{}", DIG.replace("9,30,9", "12,30,11")));
         let report =
             temp.run(&edits, &["--chunk-size", chunk_size, "--batch", batch]).expect("a good script");
-        (report["hash"].clone(), report["bricks"].clone(), report["edits"]["removed"].clone())
+        (report["hash"].clone(), report["bricks"].clone(), report["totals"]["removed"].clone())
     });
     assert!(hashes[0] == hashes[1] && hashes[1] == hashes[2], "{hashes:?}");
 }
@@ -207,8 +207,97 @@ fn an_edit_outside_the_world_is_reported_with_its_line() {
     let outside = DIG.replace("9,30,9", "-500,30,9");
     let report =
         temp.run(&temp.put("edits.jsonl", format!("{DIG}\n\n{outside}\n")), &[]).expect("a good script");
-    let rejected = serde_json::json!([{ "line": 3, "reason": "the brush lies outside the world" }]);
-    assert_eq!((&report["edits"]["applied"], &report["edits"]["rejected"]), (&1.into(), &rejected));
+    assert_eq!(report["totals"]["applied"], 1);
+    assert_eq!(report["edits"][0]["line"], 1);
+    assert_eq!(report["edits"][1]["line"], 3);
+    assert_eq!(report["edits"][1]["rejected"], "the brush lies outside the world");
+}
+
+/// Voxels by material in a report.
+fn voxels(counts: &Value) -> HashMap<u64, u64> {
+    let counts = counts.as_object().expect("an object of materials");
+    counts
+        .iter()
+        .map(|(id, voxels)| (id.parse().expect("an id"), voxels.as_u64().expect("a number")))
+        .collect()
+}
+
+#[test]
+fn each_line_yields_what_the_probes_say() {
+    let temp = TempFolder::new();
+    temp.put_hills();
+    // Boxes that end between lattice points: every point inside turns to air.
+    let dig = |center: [i32; 3]| {
+        format!(r#"{{"shape":"box","center":{center:?},"half":[3.5,6.5,3.5],"op":"dig","power":60}}"#)
+    };
+    let centers = [[10, 24, 10], [25, 20, 20], [30, 8, 9]];
+    let edits = temp.put("edits.jsonl", centers.map(dig).join("\n"));
+    let around = |[x, y, z]: [i32; 3]| {
+        let points = (-3..=3).flat_map(move |dx| {
+            (-6..=6).flat_map(move |dy| (-3..=3).map(move |dz| [x + dx, y + dy, z + dz]))
+        });
+        points.collect::<Vec<_>>()
+    };
+    let lines: Vec<String> =
+        centers.into_iter().flat_map(around).map(|point| format!("{point:?}\n")).collect();
+    let probe = temp.put("probe.jsonl", lines.concat());
+    let rules = temp.put("rules.json", r#"{"unbreakable":[6],"hardness":{"12":200}}"#);
+    for strata in ["alpine", "desert", "mine"] {
+        let more = [
+            "--strata",
+            strata,
+            "--probe",
+            probe.to_str().expect("a path"),
+            "--rules",
+            rules.to_str().expect("a path"),
+        ];
+        let report = temp.run(&edits, &more).expect("a good script");
+        let probes = fs::read(temp.path("out/probes.json")).expect("probes");
+        let probes: Vec<Value> = serde_json::from_slice(&probes).expect("valid JSON");
+        assert_eq!(probes.len(), lines.len());
+        for (edit, probes) in
+            report["edits"].as_array().expect("a list").iter().zip(probes.chunks(7 * 13 * 7))
+        {
+            let mut expected = [HashMap::new(), HashMap::new()];
+            for probe in probes.iter().filter(|probe| probe["solid"] == true) {
+                let material = probe["material"].as_u64().expect("an id");
+                *expected[usize::from(material == 6 || material == 12)].entry(material).or_default() += 1;
+            }
+            assert_eq!([&edit["removed"], &edit["refused"]].map(voxels), expected, "{strata}");
+        }
+        assert!(voxels(&report["totals"]["removed"]).len() > 2);
+    }
+}
+
+#[test]
+fn strata_come_from_a_file_too() {
+    let temp = TempFolder::new();
+    temp.put_hills();
+    let edits = temp.put("edits.jsonl", DIG);
+    let strata = r#"{"strata":[{"material":9,"depth":[null,2]},{"material":4,"body":{"pocket":{"scale":8,"share":0.5}}}]}"#;
+    let strata = temp.put("strata.json", strata);
+    let report = temp.run(&edits, &["--strata", strata.to_str().expect("a path")]).expect("good strata");
+    let mut removed: Vec<_> = voxels(&report["totals"]["removed"]).into_keys().collect();
+    removed.sort_unstable();
+    assert_eq!(removed, [0, 4, 9]);
+    for (content, reason) in [
+        ("{", "EOF while parsing"),
+        (r#"{"strata":[{"material":255}]}"#, "the material of stratum 0 is 255"),
+        (r#"{"strata":[{"metal":2}]}"#, "unknown field `metal`"),
+    ] {
+        let bad = temp.put("strata.json", content);
+        let (code, error) =
+            temp.run(&edits, &["--strata", bad.to_str().expect("a path")]).expect_err(content);
+        assert!(code == 2 && error.contains(reason), "{error}");
+    }
+    for (option, name, reason) in [
+        ("--strata", "moon", "neither a file nor one of the presets"),
+        ("--rules", "moon", "No such file"),
+        ("--probe", edits.to_str().expect("a path"), "invalid type: map"),
+    ] {
+        let (code, error) = temp.run(&edits, &[option, name]).expect_err(option);
+        assert!(code == 2 && error.contains(reason), "{error}");
+    }
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub(crate) use strata::MaterialLookup;
 #[cfg(all(test, feature = "cuda"))]
 pub(crate) use strata::{BED, FILL, POCKET, VEIN};
 pub use strata::{
-    Bedding, MAX_COLUMN_CONDITIONS, MAX_STRATA, Span, Strata, Stratum, StratumBody, StratumBounds,
+    Bedding, Interval, MAX_COLUMN_CONDITIONS, MAX_STRATA, Strata, Stratum, StratumBody, StratumBounds,
 };
 #[cfg(feature = "cuda")]
 pub(crate) use strata::{BeddingRecord, StratumRecord};

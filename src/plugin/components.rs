@@ -152,7 +152,7 @@ impl From<&volume::Field> for Field {
 pub struct MaterialColors(pub Vec<LinearRgba>);
 
 impl Default for MaterialColors {
-    /// Rock, grass, sand, snow, clay, concrete, coal, gold.
+    /// Rock, grass, sand, snow, clay, concrete, coal, gold, soil, sandstone, shale, gravel, iron, copper.
     fn default() -> Self {
         let colors = [
             (0.36, 0.33, 0.30),
@@ -163,6 +163,12 @@ impl Default for MaterialColors {
             (0.62, 0.62, 0.64),
             (0.11, 0.11, 0.12),
             (0.83, 0.62, 0.17),
+            (0.30, 0.21, 0.14),
+            (0.68, 0.50, 0.33),
+            (0.34, 0.33, 0.35),
+            (0.48, 0.46, 0.43),
+            (0.50, 0.26, 0.18),
+            (0.27, 0.55, 0.44),
         ];
         Self(colors.map(|(r, g, b)| LinearRgba::from(Color::srgb(r, g, b))).to_vec())
     }

@@ -5,7 +5,7 @@ use bevy_burrow::brush::shapes::Cuboid;
 use std::sync::Arc;
 
 use bevy_burrow::ground::{
-    Bedding, GreyImage, Ground, ImageLimits, ImageScale, MaterialControl, MaterialRule, Span, Strata,
+    Bedding, GreyImage, Ground, ImageLimits, ImageScale, Interval, MaterialControl, MaterialRule, Strata,
     Stratum, StratumBounds,
 };
 use bevy_burrow::lattice::LatticeBox;
@@ -65,7 +65,7 @@ pub fn random_strata(rng: &mut Rng, [low, high]: [f32; 2]) -> Strata {
         let mut ends = [(); 2].map(|()| between(rng, low, high));
         ends.sort_by(f32::total_cmp);
         let [from, to] = ends.map(|end| (rng.u8(..3) > 0).then_some(end));
-        Span { from, to }
+        Interval { from, to }
     };
     let scale = |rng: &mut Rng| 8 << rng.u32(..4);
     let stratum = |rng: &mut Rng, material: MaterialId| {
@@ -91,8 +91,8 @@ pub fn random_strata(rng: &mut Rng, [low, high]: [f32; 2]) -> Strata {
         };
         Stratum {
             depth: span(rng, -3.0, 30.0),
-            height: if rng.bool() { span(rng, low, high) } else { Span::ALL },
-            slope: if rng.u8(..3) == 0 { span(rng, 0.0, 1.5) } else { Span::ALL },
+            height: if rng.bool() { span(rng, low, high) } else { Interval::ALL },
+            slope: if rng.u8(..3) == 0 { span(rng, 0.0, 1.5) } else { Interval::ALL },
             rough: if rng.bool() { between(rng, 0.0, 5.0) } else { 0.0 },
             rough_scale: scale(rng),
             bounds,

@@ -10,8 +10,6 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SeamReport;
 use bevy_burrow::terrain::Memory;
 
-use crate::world::veins;
-
 /// The results of all brushes so far.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct EditLog {
@@ -44,9 +42,7 @@ impl Plugin for EditLogPlugin {
 }
 
 fn log_receipts(mut receipts: MessageReader<BrushApplied>, mut edit_log: ResMut<EditLog>) {
-    // Veins are part of the landscape.
-    for BrushApplied { receipt, .. } in receipts.read().filter(|answer| answer.receipt.tag != veins::VEIN_TAG)
-    {
+    for BrushApplied { receipt, .. } in receipts.read() {
         edit_log.scenarios.count(receipt);
         match &receipt.outcome {
             Ok(applied) => {

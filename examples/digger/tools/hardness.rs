@@ -6,7 +6,7 @@ use bevy_burrow::volume::MaterialCounts;
 
 use crate::tools::inventory::FIRST_PLAYER_TAG;
 use crate::ui::hud::Hint;
-use crate::world::landscape::{self, COAL, CONCRETE, GOLD, ROCK};
+use crate::world::landscape::{self, COAL, CONCRETE, GOLD, ROCK, SANDSTONE, SHALE};
 
 /// Below this height, nothing breaks.
 const BEDROCK: i32 = -32;
@@ -14,6 +14,8 @@ const BEDROCK: i32 = -32;
 /// A pickaxe breaks all but concrete and gold at once, a drill all but gold, and a bomb everything.
 pub fn rules() -> DiggingRules {
     DiggingRules::default()
+        .with_hardness(SHALE, 60)
+        .with_hardness(SANDSTONE, 80)
         .with_hardness(ROCK, 90)
         .with_hardness(COAL, 110)
         .with_hardness(CONCRETE, 180)

@@ -1,4 +1,4 @@
-//! The heads-up display: crosshair, tools, materials, time of day, hints and what was just dug.
+//! The heads-up display: crosshair, tools, materials, time of day, hints, what was just dug, and what lies below.
 
 use std::collections::VecDeque;
 
@@ -47,6 +47,7 @@ impl Plugin for HudPlugin {
                 show_time,
                 show_hints,
                 show_finds,
+                show_core_sample,
                 show_keys.run_if(resource_changed::<Settings>.or_else(resource_changed::<Labels>)),
             )
                 .after(BurrowSystems::Propagate),
@@ -56,6 +57,10 @@ impl Plugin for HudPlugin {
 
 #[derive(Component)]
 struct Hud;
+
+/// What lies below the crosshair, by depth.
+#[derive(Component)]
+struct CoreSample;
 
 #[derive(Component)]
 struct Crosshair;
@@ -103,6 +108,8 @@ fn spawn_hud(mut commands: Commands, images: Res<Images>) {
         };
         let colors = (BackgroundColor(WHITE), BorderColor::all(Color::srgba(0.0, 0.0, 0.0, 0.6)));
         hud.spawn((widgets::centered(), children![(Crosshair, dot, colors)]));
+        let left = Node { left: px(16), top: px(12), ..absolute() };
+        hud.spawn((left, children![(CoreSample, text("", 14.0, WHITE))]));
         let corner = Node { right: px(16), top: px(12), ..absolute() };
         hud.spawn((corner, children![(TimeOfDay, text("", 17.0, WHITE))]));
         let top =
@@ -212,6 +219,30 @@ fn show_hud(
     // The display would shine through the plugin's panel.
     let is_shown = shown.0 && *state.get() == GameState::Playing && !*is_detached && !panel.is_open;
     hud.set_if_neq(if is_shown { Visibility::Inherited } else { Visibility::Hidden });
+}
+
+/// Metres down to which the core sample reaches.
+const CORE_DEPTH: i32 = 24;
+
+/// Names what lies straight below the crosshair, from the surface down.
+fn show_core_sample(
+    hand: Res<Hand>,
+    terrains: Query<&Terrain>,
+    mut core: Single<&mut Text, With<CoreSample>>,
+) {
+    let lines = hand.aim.zip(terrains.iter().next()).map(|(aim, terrain)| {
+        let world = terrain.world();
+        let top = aim.point.floor().as_ivec3();
+        let is_solid = |depth: &i32| world.samples().is_solid(top - IVec3::Y * depth);
+        let solid = (0..CORE_DEPTH).filter(is_solid);
+        let mut layers: Vec<(i32, MaterialId)> =
+            solid.map(|depth| (depth, world.samples().material(top - IVec3::Y * depth))).collect();
+        layers.dedup_by_key(|layer| layer.1);
+        let lines =
+            layers.iter().map(|(depth, material)| format!("{depth:>3} m  {}", landscape::name(*material)));
+        lines.collect::<Vec<_>>().join("\n")
+    });
+    core.set_if_neq(Text::new(lines.unwrap_or_default()));
 }
 
 fn show_tool(

@@ -10,13 +10,12 @@ use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
-use bevy_burrow::ground::OVERLAY_DEPTH;
-use bevy_burrow::lattice::ONE;
 use bevy_burrow::physics::EdgeWalls;
 use bevy_burrow::prelude::*;
 
 use crate::film::places::Places;
 use crate::tools::hardness;
+use crate::world::strata::strata;
 
 pub const ROCK: MaterialId = MaterialId(0);
 pub const GRASS: MaterialId = MaterialId(1);
@@ -26,9 +25,12 @@ pub const CLAY: MaterialId = MaterialId(4);
 pub const CONCRETE: MaterialId = MaterialId(5);
 pub const COAL: MaterialId = MaterialId(6);
 pub const GOLD: MaterialId = MaterialId(7);
+pub const SOIL: MaterialId = MaterialId(8);
+pub const SANDSTONE: MaterialId = MaterialId(9);
+pub const SHALE: MaterialId = MaterialId(10);
 
 /// The materials and their names, in the order of their ids and of the default `MaterialColors`.
-pub const MATERIALS: [(MaterialId, &str); 8] = [
+pub const MATERIALS: [(MaterialId, &str); 11] = [
     (ROCK, "rock"),
     (GRASS, "turf"),
     (SAND, "sand"),
@@ -37,6 +39,9 @@ pub const MATERIALS: [(MaterialId, &str); 8] = [
     (CONCRETE, "concrete"),
     (COAL, "coal"),
     (GOLD, "gold"),
+    (SOIL, "soil"),
+    (SANDSTONE, "sandstone"),
+    (SHALE, "shale"),
 ];
 
 /// The name of a material.
@@ -99,24 +104,9 @@ struct LoadingHeightmap(Handle<HeightmapImage>);
 #[derive(Resource)]
 struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>);
 
-/// How the ground is drawn. What one sees is what one digs: turf, sand and snow are drawn as deep as the ground has
-/// them, with rock below, and ore only where `veins.rs` has put it.
-fn look() -> GroundLook {
-    let mut look = GroundLook::default();
-    for overlay in [SAND, SNOW] {
-        if let Some(layer) = look.layers.get_mut(usize::from(overlay.0)) {
-            layer.kind = GroundLayerKind::Body;
-        }
-    }
-    let GroundStrata { soil, subsoil, seam, vein, .. } = &mut look.strata;
-    soil.1 = OVERLAY_DEPTH as f32 / ONE as f32;
-    (subsoil.1, seam.1, vein.1) = (0.0, 0.0, 0.0);
-    look
-}
-
 /// Spawns the terrain's entity with its look before there is a terrain, so that the textures are made meanwhile.
 fn load_heightmap(mut commands: Commands, assets: Res<AssetServer>) {
-    commands.spawn((Name::new("Jacksboro fault"), look()));
+    commands.spawn((Name::new("Jacksboro fault"), GroundLook::default()));
     commands.insert_resource(LoadingHeightmap(assets.load(HEIGHTMAP_ASSET)));
 }
 
@@ -134,7 +124,7 @@ fn start_generation(
 
 fn generate(heightmap: &GreyImage) -> Result<(Arc<Ground>, Terrain, Places), String> {
     let ground = Ground::from_image(heightmap, &SCALE)
-        .and_then(|ground| ground.with_materials(&vegetation()))
+        .and_then(|ground| ground.with_strata(&strata()))
         .map_err(|error| error.to_string())?;
     let places = Places::find(&ground)?;
     let ground = Arc::new(ground);
@@ -168,27 +158,6 @@ fn despawn_on_new_game(
     for entity in &entities {
         commands.entity(entity).despawn();
     }
-}
-
-/// Grass on gentle slopes, rock on steep ones, snow on the tops and sand in the valley.
-fn vegetation() -> MaterialControl {
-    let everywhere = MaterialRule::default();
-    let snow = MaterialRule {
-        overlay: SNOW,
-        height: (92.0, f64::INFINITY),
-        height_fade: 12.0,
-        slope: (0.0, 1.0),
-        slope_fade: 0.6,
-    };
-    let sand = MaterialRule {
-        overlay: SAND,
-        height: (f64::NEG_INFINITY, 7.0),
-        height_fade: 4.0,
-        slope: (0.0, 0.35),
-        slope_fade: 0.3,
-    };
-    let grass = MaterialRule { overlay: GRASS, slope: (0.0, 0.95), slope_fade: 0.5, ..everywhere };
-    MaterialControl::Rules { base: ROCK, rules: vec![snow, sand, grass] }
 }
 
 fn spawn_terrain(

@@ -6,4 +6,4 @@ pub mod landscape;
 pub mod light;
 pub mod particles;
 pub mod sky;
-pub mod veins;
+pub mod strata;

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{MAX_COLUMN_CONDITIONS, MAX_STRATA, Span, Strata, Stratum, StratumBody, StratumBounds};
+use super::{Interval, MAX_COLUMN_CONDITIONS, MAX_STRATA, Strata, Stratum, StratumBody, StratumBounds};
 use crate::ground::GroundError;
 
 /// Most voxels by which noise or folds move anything.
@@ -56,13 +56,13 @@ impl Strata {
 impl Stratum {
     /// Does it ask anything of a column?
     pub(super) fn has_column_condition(&self) -> bool {
-        self.slope != Span::ALL || self.bounds != StratumBounds::World
+        self.slope != Interval::ALL || self.bounds != StratumBounds::World
     }
 
     fn check(&self, index: usize) -> Result<(), GroundError> {
         let name = |parameter: &str| format!("{parameter} of stratum {index}");
         self.material.check(name("the material"))?;
-        let span = |parameter: &str, span: Span, most: f32, allowed: &'static str| {
+        let span = |parameter: &str, span: Interval, most: f32, allowed: &'static str| {
             for end in [span.from, span.to].into_iter().flatten() {
                 check(end.abs() <= most, name(parameter), end, allowed)?;
             }
@@ -117,9 +117,15 @@ mod tests {
         let nan = f32::NAN;
         for (strata, message) in [
             (of(Stratum::fill(MaterialId::GROUND)), "the material of stratum 1 is 255: it must be 0 to 254"),
-            (of(Stratum { depth: Span::between(3.0, 2.0), ..fill.clone() }), "the depth of stratum 1 is 3"),
-            (of(Stratum { height: Span::above(nan), ..fill.clone() }), "the height of stratum 1 is NaN"),
-            (of(Stratum { slope: Span::below(1e9), ..fill.clone() }), "the slope of stratum 1 is 1000000000"),
+            (
+                of(Stratum { depth: Interval::between(3.0, 2.0), ..fill.clone() }),
+                "the depth of stratum 1 is 3",
+            ),
+            (of(Stratum { height: Interval::above(nan), ..fill.clone() }), "the height of stratum 1 is NaN"),
+            (
+                of(Stratum { slope: Interval::below(1e9), ..fill.clone() }),
+                "the slope of stratum 1 is 1000000000",
+            ),
             (of(Stratum { rough: -1.0, ..fill.clone() }), "the roughness of stratum 1 is -1"),
             (of(Stratum { rough_scale: 12, ..fill }), "the scale of the roughness of stratum 1 is 12"),
             (of(Stratum::bed(ORE, nan, 1.0)), "the lower face of stratum 1 is NaN"),
@@ -139,7 +145,7 @@ mod tests {
             ),
             (
                 Strata {
-                    strata: vec![Stratum { slope: Span::below(1.0), ..Stratum::fill(ORE) }; 17],
+                    strata: vec![Stratum { slope: Interval::below(1.0), ..Stratum::fill(ORE) }; 17],
                     ..Strata::default()
                 },
                 "the number of strata with a slope or bounds is 17: it must be at most 16",

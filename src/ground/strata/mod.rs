@@ -53,8 +53,8 @@ pub const MAX_COLUMN_CONDITIONS: usize = 16;
 /// let strata = Strata {
 ///     seed: 7,
 ///     strata: vec![
-///         Stratum { depth: Span::below(3.0), ..Stratum::fill(soil) },
-///         Stratum { depth: Span::above(5.0), ..Stratum::pocket(iron, 16, 0.02) },
+///         Stratum { depth: Interval::below(3.0), ..Stratum::fill(soil) },
+///         Stratum { depth: Interval::above(5.0), ..Stratum::pocket(iron, 16, 0.02) },
 ///         Stratum { rough: 0.5, ..Stratum::bed(coal, -20.0, 2.0) },
 ///     ],
 ///     ..Strata::default()
@@ -72,6 +72,18 @@ pub struct Strata {
     pub bedding: Bedding,
     /// The bodies, topmost first: at most [`MAX_STRATA`], and [`MAX_COLUMN_CONDITIONS`] with a slope or bounds.
     pub strata: Vec<Stratum>,
+}
+
+impl Strata {
+    /// Bytes of memory that it takes, pictures included.
+    fn bytes(&self) -> usize {
+        let picture = |stratum: &Stratum| match &stratum.bounds {
+            StratumBounds::Image(image) => size_of::<super::GreyImage>() + size_of_val(image.samples()),
+            _ => 0,
+        };
+        let pictures: usize = self.strata.iter().map(picture).sum();
+        size_of::<Self>() + self.strata.capacity() * size_of::<Stratum>() + pictures
+    }
 }
 
 /// How beds lie in space: level, tilted, folded.
@@ -102,11 +114,11 @@ pub struct Stratum {
     /// Its shape.
     pub body: StratumBody,
     /// The depth below the pristine surface, in voxels. Voxels above the surface are at depth 0.
-    pub depth: Span,
+    pub depth: Interval,
     /// The height, in voxels.
-    pub height: Span,
+    pub height: Interval,
     /// The slope of the pristine surface above, as rise over run: 0 is level, 1 is 45 degrees.
-    pub slope: Span,
+    pub slope: Interval,
     /// Voxels by which noise moves the ends of depth, height and bed up and down, 0 to 127.
     pub rough: f32,
     /// How wide that noise is in voxels: a power of two from 8 to 1024.
@@ -123,9 +135,9 @@ impl Default for Stratum {
         Self {
             material: MaterialId(0),
             body: StratumBody::Fill,
-            depth: Span::ALL,
-            height: Span::ALL,
-            slope: Span::ALL,
+            depth: Interval::ALL,
+            height: Interval::ALL,
+            slope: Interval::ALL,
             rough: 0.0,
             rough_scale: 32,
             seed: 0,
@@ -207,17 +219,17 @@ pub enum StratumBounds {
     Image(Arc<super::GreyImage>),
 }
 
-/// Numbers from one on and below another; either end may be open. In JSON `[from, to]`, `null` for an open end.
+/// The numbers from one on and below another; either end may be open. In JSON `[from, to]`, `null` for an open end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "(Option<f32>, Option<f32>)", into = "(Option<f32>, Option<f32>)")]
-pub struct Span {
+pub struct Interval {
     /// The first number, included.
     pub from: Option<f32>,
     /// Where it ends, not included.
     pub to: Option<f32>,
 }
 
-impl Span {
+impl Interval {
     /// All numbers.
     pub const ALL: Self = Self { from: None, to: None };
 
@@ -237,14 +249,14 @@ impl Span {
     }
 }
 
-impl From<(Option<f32>, Option<f32>)> for Span {
+impl From<(Option<f32>, Option<f32>)> for Interval {
     fn from((from, to): (Option<f32>, Option<f32>)) -> Self {
         Self { from, to }
     }
 }
 
-impl From<Span> for (Option<f32>, Option<f32>) {
-    fn from(Span { from, to }: Span) -> Self {
+impl From<Interval> for (Option<f32>, Option<f32>) {
+    fn from(Interval { from, to }: Interval) -> Self {
         (from, to)
     }
 }

@@ -22,7 +22,11 @@ pub(crate) struct Below {
 
 impl Below {
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Self>() + size_of_val(self.tops.as_slice())
+        let own = match &self.own {
+            OwnMaterials::Strata { given, records } => given.bytes() + records.bytes(),
+            OwnMaterials::Function { function, .. } => size_of_val(&**function),
+        };
+        own + size_of_val(self.tops.as_slice())
     }
 }
 

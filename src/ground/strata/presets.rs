@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{Bedding, Span, Strata, Stratum};
+use super::{Bedding, Interval, Strata, Stratum};
 use crate::ground::material::MaterialId;
 
 const ROCK: MaterialId = MaterialId(0);
@@ -33,16 +33,17 @@ impl Strata {
     /// of rock, sandstone and shale with a seam of coal and veins of gold. Materials are those of the default
     /// `GroundLook`.
     pub fn alpine() -> Self {
-        let gentle = Span::below(0.95);
-        let skin = |material, slope| Stratum { depth: Span::below(1.0), slope, ..Stratum::fill(material) };
+        let gentle = Interval::below(0.95);
+        let skin =
+            |material, slope| Stratum { depth: Interval::below(1.0), slope, ..Stratum::fill(material) };
         let snow = Stratum {
-            height: Span::above(92.0),
-            depth: Span::below(1.5),
+            height: Interval::above(92.0),
+            depth: Interval::below(1.5),
             rough: 6.0,
-            ..skin(SNOW, Span::below(1.2))
+            ..skin(SNOW, Interval::below(1.2))
         };
         let soil = |material, depth| Stratum {
-            depth: Span::below(depth),
+            depth: Interval::below(depth),
             slope: gentle,
             rough: 0.5,
             rough_scale: 16,
@@ -56,9 +57,13 @@ impl Strata {
                 skin(GRASS, gentle),
                 soil(SOIL, 2.6),
                 soil(CLAY, 4.4),
-                Stratum { depth: Span::below(1.5), slope: Span::between(0.95, 1.3), ..Stratum::fill(GRAVEL) },
-                Stratum { depth: Span::above(6.0), ..Stratum::vein(GOLD, 32, 0.006) },
-                Stratum { rough: 0.4, depth: Span::above(4.0), ..Stratum::beds(COAL, 15.0, 1.6, 40.0) },
+                Stratum {
+                    depth: Interval::below(1.5),
+                    slope: Interval::between(0.95, 1.3),
+                    ..Stratum::fill(GRAVEL)
+                },
+                Stratum { depth: Interval::above(6.0), ..Stratum::vein(GOLD, 32, 0.006) },
+                Stratum { rough: 0.4, depth: Interval::above(4.0), ..Stratum::beds(COAL, 15.0, 1.6, 40.0) },
                 Stratum { rough: 1.5, ..Stratum::beds(SANDSTONE, 4.0, 9.0, 40.0) },
                 Stratum { rough: 1.5, ..Stratum::beds(SHALE, 22.0, 8.0, 40.0) },
             ],
@@ -69,7 +74,7 @@ impl Strata {
     /// coal far below.
     pub fn desert() -> Self {
         let sand = |slope, depth| Stratum {
-            depth: Span::below(depth),
+            depth: Interval::below(depth),
             slope,
             rough: 1.5,
             rough_scale: 64,
@@ -79,9 +84,9 @@ impl Strata {
             seed: 2,
             bedding: Bedding { dip: Vec2::new(-0.03, 0.02), fold: 2.0, scale: 256 },
             strata: vec![
-                sand(Span::below(0.35), 5.0),
-                sand(Span::between(0.35, 0.8), 1.5),
-                Stratum { depth: Span::above(3.0), ..Stratum::pocket(GRAVEL, 16, 0.015) },
+                sand(Interval::below(0.35), 5.0),
+                sand(Interval::between(0.35, 0.8), 1.5),
+                Stratum { depth: Interval::above(3.0), ..Stratum::pocket(GRAVEL, 16, 0.015) },
                 Stratum { rough: 0.3, ..Stratum::beds(COAL, -30.0, 1.2, 60.0) },
                 Stratum { rough: 0.5, ..Stratum::beds(CLAY, 0.0, 2.0, 12.0) },
                 Stratum { rough: 0.5, ..Stratum::beds(SHALE, 6.0, 1.5, 24.0) },
@@ -93,14 +98,14 @@ impl Strata {
     /// A mine: turf, soil and clay over rock with seams and pockets of coal, pockets of iron and copper, and gold in veins
     /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface.
     pub fn mine() -> Self {
-        let deep = |from| Span::between(from, 160.0);
+        let deep = |from| Interval::between(from, 160.0);
         Self {
             seed: 3,
             bedding: Bedding { dip: Vec2::new(0.15, -0.08), fold: 5.0, scale: 64 },
             strata: vec![
-                Stratum { depth: Span::below(1.0), slope: Span::below(1.0), ..Stratum::fill(GRASS) },
-                Stratum { depth: Span::below(2.2), rough: 0.4, rough_scale: 16, ..Stratum::fill(SOIL) },
-                Stratum { depth: Span::below(3.6), rough: 0.6, rough_scale: 16, ..Stratum::fill(CLAY) },
+                Stratum { depth: Interval::below(1.0), slope: Interval::below(1.0), ..Stratum::fill(GRASS) },
+                Stratum { depth: Interval::below(2.2), rough: 0.4, rough_scale: 16, ..Stratum::fill(SOIL) },
+                Stratum { depth: Interval::below(3.6), rough: 0.6, rough_scale: 16, ..Stratum::fill(CLAY) },
                 Stratum { depth: deep(6.0), ..Stratum::vein(GOLD, 16, 0.010) },
                 Stratum { depth: deep(30.0), ..Stratum::pocket(GOLD, 16, 0.008) },
                 Stratum { depth: deep(4.0), ..Stratum::pocket(COAL, 16, 0.020) },
@@ -109,7 +114,7 @@ impl Strata {
                 Stratum { depth: deep(8.0), ..Stratum::vein(COPPER, 32, 0.010) },
                 Stratum { depth: deep(8.0), ..Stratum::pocket(COPPER, 16, 0.008) },
                 Stratum { rough: 1.0, ..Stratum::beds(SHALE, 18.0, 6.0, 32.0) },
-                Stratum { depth: Span::above(100.0), ..Stratum::fill(SANDSTONE) },
+                Stratum { depth: Interval::above(100.0), ..Stratum::fill(SANDSTONE) },
                 Stratum::fill(ROCK),
             ],
         }

@@ -1,7 +1,7 @@
 //! Strata as integers, and which of them hold a voxel. `kernels/strata.cuh` computes the same.
 
 use super::value_noise::{ValueNoise, both_within, exceeded_by};
-use super::{Span, Strata, Stratum, StratumBody, StratumBounds};
+use super::{Interval, Strata, Stratum, StratumBody, StratumBounds};
 use crate::ground::world::Ground;
 use crate::lattice::hash::{hash_words, mix};
 use crate::lattice::{Column, LatticeBox, ONE};
@@ -78,7 +78,7 @@ fn fixed(voxels: f32) -> i32 {
     (f64::from(voxels) * f64::from(ONE)).round() as i32
 }
 
-fn ends(span: Span) -> [i32; 2] {
+fn ends(span: Interval) -> [i32; 2] {
     [span.from.map_or(i32::MIN, fixed), span.to.map_or(i32::MAX, fixed)]
 }
 
@@ -152,13 +152,13 @@ impl BeddingRecord {
 
 impl ColumnCondition {
     fn new(stratum: &Stratum) -> Option<Self> {
-        let Span { from, to } = stratum.slope;
+        let Interval { from, to } = stratum.slope;
         let square = |slope: f32| {
             let steps = (f64::from(slope.max(0.0)) * f64::from(2 * ONE)).round() as u64;
             steps * steps
         };
         let slope =
-            (stratum.slope != Span::ALL).then(|| [from.map_or(0, square), to.map_or(u64::MAX, square)]);
+            (stratum.slope != Interval::ALL).then(|| [from.map_or(0, square), to.map_or(u64::MAX, square)]);
         stratum.has_column_condition().then(|| Self { slope, bounds: stratum.bounds.clone() })
     }
 
@@ -215,6 +215,12 @@ impl StrataRecords {
         let of_columns = conditions.iter().map(|own| own.as_ref().map_or(0, |own| hash_words(own.words())));
         let hash = hash_words(words.chain(of_columns));
         Self { strata, bedding, conditions, hash }
+    }
+
+    /// Bytes of memory that it takes.
+    pub fn bytes(&self) -> usize {
+        let conditions = self.conditions.capacity() * size_of::<Option<ColumnCondition>>();
+        size_of::<Self>() + self.strata.capacity() * size_of::<StratumRecord>() + conditions
     }
 
     /// Does a stratum hold the voxel? By definition, without what is known of a brick: [`BrickStrata`](super::BrickStrata)
