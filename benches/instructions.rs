@@ -31,7 +31,7 @@ fn counted_workload(work: &mut dyn FnMut()) {
 /// A name, and what to do.
 type Workload = (&'static str, fn());
 
-const WORKLOADS: [Workload; 12] = [
+const WORKLOADS: [Workload; 13] = [
     ("dense-caves", || dense(Field::Caves)),
     ("dense-chunk-i16", dense_chunk),
     ("dense-empty", || dense(Field::Empty)),
@@ -39,6 +39,7 @@ const WORKLOADS: [Workload; 12] = [
     ("dense-terrain", || dense(Field::Terrain)),
     ("dig-radius-4-dug", || dig(Digging::Dug)),
     ("dig-radius-4-fresh", || dig(Digging::Fresh)),
+    ("dig-radius-4-deep", || dig(Digging::Deep)),
     ("dig-radius-4-mine", || dig(Digging::Mine)),
     ("dig-radius-4-mine-deep", || dig(Digging::DeepMine)),
     ("dig-radius-16", dig_wide),
@@ -122,6 +123,8 @@ enum Digging {
     Fresh,
     /// Next to earlier spheres, half a radius away.
     Dug,
+    /// Untouched ground, 20 voxels below the surface.
+    Deep,
     /// Untouched ground with strata.
     Mine,
     /// The same, 20 voxels below the surface, where the ores are.
@@ -142,7 +145,7 @@ fn dig(ground: Digging) {
     let (first, second) = (spheres(&terrain, 4.0, 0.0, 24), spheres(&terrain, 4.0, 3.0, 24));
     match ground {
         Digging::Fresh | Digging::Mine => counted_workload(&mut || one_by_one(&mut terrain, &first)),
-        Digging::DeepMine => {
+        Digging::Deep | Digging::DeepMine => {
             let deeper = |brush: &Brush| brush.transformed(Quat::IDENTITY, Vec3::NEG_Y * 20.0, 1.0);
             let deep: Vec<_> = first.iter().map(deeper).collect();
             counted_workload(&mut || one_by_one(&mut terrain, &deep));

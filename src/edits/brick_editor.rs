@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use super::delta::{Counts, EditDelta};
 use super::effect::DraftedBrick;
-use crate::ground::{MaterialId, MaterialLookup};
+use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::volume::layers::{self, Layers, offset, ones};
-use crate::volume::{Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, solid_layers};
+use crate::volume::{
+    Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, resolve, solid_layers,
+};
 
 /// A brick that edits change one after the other.
 pub(super) struct BrickEditor<'a> {
@@ -21,8 +23,6 @@ pub(super) struct BrickEditor<'a> {
     pub heights: [[i32; 8]; 8],
     /// Samples that changed.
     changed: Layers,
-    /// The ground's own materials in and around the brick.
-    pub own: MaterialLookup<'a>,
 }
 
 /// Samples of a layer that changed: a bit each, as in [`Layers`].
@@ -39,8 +39,7 @@ impl<'a> BrickEditor<'a> {
     /// A brick as it is.
     pub fn new(view: SampleView<'a>, pos: BrickPos) -> Self {
         let heights = view.ground().heights::<8>(Column::of(pos.origin()));
-        let own = MaterialLookup::new(view.ground());
-        Self { view, pos, base: view.brick(pos), brick: None, heights, changed: layers::NONE, own }
+        Self { view, pos, base: view.brick(pos), brick: None, heights, changed: layers::NONE }
     }
 
     /// The brick as it is now; `None` while all samples are pristine.
@@ -120,9 +119,9 @@ impl<'a> BrickEditor<'a> {
 
     /// Counts voxels of a layer by the materials that they have now.
     fn count_by_material(&mut self, outcome: VoxelOutcome, y: usize, voxels: u64, counts: &mut Counts<'_>) {
-        let (low, single) = (self.pos.origin(), self.view.ground().single_material());
-        self.brick();
-        let Some(brick) = &self.brick else { return };
+        let (ground, low) = (self.view.ground(), self.pos.origin());
+        let single = ground.single_material();
+        let brick = &*self.brick();
         if brick.material_bytes() == 0
             && let Some(material) = single
         {
@@ -132,7 +131,7 @@ impl<'a> BrickEditor<'a> {
             let index = y * 64 + bit;
             match (brick.material_at(index), single) {
                 (MaterialId::GROUND, Some(material)) => material,
-                (stored, _) => self.own.resolve(low + offset(index), stored),
+                (stored, _) => resolve(ground, low + offset(index), stored),
             }
         });
         for_runs(materials, |material, voxels| counts.add(outcome, material, voxels));

@@ -8,7 +8,7 @@ use crate::brush::{BAND, DEPTH, Kind};
 use crate::ground::MaterialId;
 use crate::lattice::{LatticeBox, ONE};
 use crate::volume::layers::{Layers, of_row, offset, ones};
-use crate::volume::{Sample, VoxelOutcome, row};
+use crate::volume::{Sample, VoxelOutcome, resolve, row};
 
 impl BrickEditor<'_> {
     /// Applies an operation to some samples; returns those that changed.
@@ -98,9 +98,9 @@ impl BrickEditor<'_> {
             if before >= 0 || !is_pristine && material == old {
                 continue;
             }
-            let [new, old] = [material, old].map(|stored| self.own.resolve(low + offset(index), stored));
-            if new != old {
-                counts.add(VoxelOutcome::Painted, new, 1);
+            let (point, ground) = (low + offset(index), self.view.ground());
+            if resolve(ground, point, material) != resolve(ground, point, old) {
+                counts.add(VoxelOutcome::Painted, resolve(ground, point, material), 1);
             }
             if is_pristine {
                 samples[x] = Sample::edited(before).distance().unwrap_or_default() as i16;

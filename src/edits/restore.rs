@@ -1,10 +1,10 @@
 //! One state of a brick in place of another, as undo and redo put them.
 
 use super::effect::EditEffect;
-use crate::ground::{Ground, MaterialId, MaterialLookup};
+use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, LatticeBox};
 use crate::volume::layers::{self, Layers, offset};
-use crate::volume::{Brick, MaterialCounts, pristine_layers};
+use crate::volume::{Brick, MaterialCounts, pristine_layers, resolve};
 
 /// Counts the voxels that change when a brick is put in place of another; `None` stands for a pristine one. Returns the box
 /// around samples that differ.
@@ -18,10 +18,9 @@ pub(crate) fn count_replaced(
     let changed = layers::bounds(&differ, pos.origin())?;
     let solid = |brick: Option<&Brick>| brick.map_or_else(|| pristine_layers(ground, pos), |b| *b.solid());
     let (was, is) = (solid(before), solid(after));
-    let own = MaterialLookup::new(ground);
     let material = |brick: Option<&Brick>, index| {
         let stored = brick.map_or(MaterialId::GROUND, |brick| brick.material_at(index));
-        own.resolve(pos.origin() + offset(index), stored)
+        resolve(ground, pos.origin() + offset(index), stored)
     };
     let count = |counts: &mut MaterialCounts, voxels: Layers, brick| {
         counts

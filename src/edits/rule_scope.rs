@@ -5,7 +5,6 @@ use glam::IVec3;
 
 use super::prepared_edit::PreparedEdit;
 use crate::brush::Stencil;
-use crate::ground::MaterialLookup;
 use crate::lattice::{BRICK, BrickPos, LatticeBox, ONE};
 use crate::volume::{DiggingRules, SampleView, VoxelOutcome};
 
@@ -63,7 +62,6 @@ impl<'a> BrickRules<'a> {
     pub fn judge(
         &self,
         view: &SampleView,
-        own: &MaterialLookup,
         at: IVec3,
         power: u8,
         around: &Stencil,
@@ -80,7 +78,7 @@ impl<'a> BrickRules<'a> {
         let (width, depth) = (view.ground().width(), view.ground().depth());
         let is_inside = |at: IVec3| (0..=width).contains(&at.x) && (0..=depth).contains(&at.z);
         let solid_faces = || around.solid_faces().filter(|&way| is_inside(at + way));
-        let pace = |at: IVec3| self.rules.pace(own.resolve(at, view.stored_material(at)), at.y, power);
+        let pace = |at: IVec3| self.rules.pace(view.material(at), at.y, power);
         let holds = |way: IVec3| if self.is_protected(at + way) { (0, None) } else { pace(at + way) };
         let (part, outcome) = if before < 0 {
             pace(at)

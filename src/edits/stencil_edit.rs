@@ -11,7 +11,7 @@ use super::rule_scope::BrickRules;
 use crate::brush::{BAND, Kind, Stencil};
 use crate::ground::MaterialId;
 use crate::lattice::LatticeBox;
-use crate::volume::{Layers, Sample, SampleView, VoxelOutcome};
+use crate::volume::{Layers, Sample, SampleView, VoxelOutcome, resolve};
 
 impl BrickEditor<'_> {
     /// Applies an edit that sculpts, or one that rules restrict, to some samples; returns those that changed.
@@ -59,18 +59,12 @@ impl BrickEditor<'_> {
                 };
                 let mut after = Sample::edited(proposed);
                 if let Some(rules) = rules {
-                    let (allowed, outcome) = rules.judge(
-                        &self.view,
-                        &self.own,
-                        point,
-                        edit.power,
-                        &around.around(local),
-                        proposed,
-                    );
+                    let (allowed, outcome) =
+                        rules.judge(&self.view, point, edit.power, &around.around(local), proposed);
                     let is_refused = (proposed < 0) != (before < 0) && (allowed < 0) == (before < 0);
                     if let Some(outcome) = outcome.filter(|_| is_refused) {
                         let own = if before < 0 { self.view.stored_material(point) } else { new() };
-                        counts.add(outcome, self.own.resolve(point, own), 1);
+                        counts.add(outcome, resolve(self.view.ground(), point, own), 1);
                     }
                     after = Sample::edited(allowed);
                     if after == Sample::edited(before) {
@@ -107,12 +101,12 @@ impl BrickEditor<'_> {
         around: &PaddedBrick,
         counts: &mut Counts<'_>,
     ) -> bool {
-        let old = self.view.stored_material(point);
+        let (ground, old) = (self.view.ground(), self.view.stored_material(point));
         let is_pristine = !self.view.is_edited(point);
         if !is_pristine && material == old {
             return false;
         }
-        let [own, new] = [old, material].map(|stored| self.own.resolve(point, stored));
+        let (own, new) = (resolve(ground, point, old), resolve(ground, point, material));
         let outcome = rules.and_then(|own_rules| {
             match (own_rules.is_protected(point), own_rules.rules.is_unbreakable(own)) {
                 (true, _) => Some(VoxelOutcome::Protected),

@@ -52,8 +52,12 @@ impl Extent {
 
     /// Place in a row-major array of the world's column nearest to `column`.
     pub(super) fn index(self, column: Column) -> usize {
-        let Column { x, z } = self.clamp(column);
-        z as usize * self.row_len() + x as usize
+        self.inner_index(self.clamp(column))
+    }
+
+    /// The same of a column that lies in the world.
+    pub(super) fn inner_index(self, Column { x, z }: Column) -> usize {
+        (z * (self.width + 1) + x) as usize
     }
 
     /// An array over the world whose rows are filled in parallel by `fill(z, row)`. Of several errors that of the

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::extent::Extent;
 use super::material::{ColumnMaterial, MaterialId};
-use super::strata::{Below, MaterialLookup};
+use super::strata::Below;
 use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, ONE};
 
@@ -144,6 +144,12 @@ impl Ground {
         self.heights[self.extent.index(column)]
     }
 
+    /// The place of a column of the world in arrays over it, and its height; of a column beyond the rim, those of some other.
+    pub(super) fn inner_height(&self, column: Column) -> (usize, i32) {
+        let index = self.extent.inner_index(column);
+        (index, self.heights.get(index).copied().unwrap_or_default())
+    }
+
     /// Heights of `N` x `N` columns from `low` on, rows along x: what [`Self::height`] gives for each.
     pub(crate) fn heights<const N: usize>(&self, low: Column) -> [[i32; N]; N] {
         let last = low.offset(N as i32 - 1, N as i32 - 1);
@@ -268,20 +274,13 @@ impl Ground {
         }
     }
 
-    /// Material of a pristine voxel: of the first stratum that holds it; else, down to
-    /// [`OVERLAY_DEPTH`](super::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least half
-    /// (`blend >= 128`); else the column's base.
-    pub fn material(&self, point: IVec3) -> MaterialId {
-        MaterialLookup::new(self).at(point)
-    }
-
     /// What the column of a voxel gives it.
     pub(super) fn material_of_column(&self, point: IVec3) -> MaterialId {
         self.column_material(Column::of(point)).at_distance(self.distance(point))
     }
 
     /// The world's column nearest to a point's.
-    pub(super) fn nearest_column(&self, point: IVec3) -> Column {
+    pub(crate) fn nearest_column(&self, point: IVec3) -> Column {
         self.extent.clamp(Column::of(point))
     }
 

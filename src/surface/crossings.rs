@@ -115,7 +115,7 @@ impl Site<'_, '_> {
             (MaterialId::GROUND, None) => {
                 let mut solid = self.low + IVec3::new(place.x, y, place.z);
                 solid[AXIS] += i32::from(!is_lower);
-                let own = self.stack.own_material(solid);
+                let own = self.stack.voxel_mix(solid);
                 own.unwrap_or_else(|| self.own_materials::<AXIS>(corner, self.low.y + y, step))
             }
             _ => MaterialMix::pure(stored),

@@ -10,7 +10,7 @@ use super::mask::WINDOW;
 use super::mesh::MaterialMix;
 use super::pristine::PristineStack;
 use super::vertex::WorldView;
-use crate::ground::{Ground, MaterialLookup};
+use crate::ground::Ground;
 use crate::lattice::Column;
 
 /// A stack of bricks, all with the same x and z, and the columns around it.
@@ -31,8 +31,8 @@ pub(super) struct Stack<'a> {
     mixes: [Option<[MaterialMix; 2]>; 81],
     /// The material of all columns of the world, if they have only one.
     single: Option<MaterialMix>,
-    /// The ground's own materials, if they differ from voxel to voxel.
-    own: Option<MaterialLookup<'a>>,
+    /// Does the ground's material differ from voxel to voxel?
+    has_own_materials: bool,
 }
 
 impl<'a> Stack<'a> {
@@ -50,7 +50,7 @@ impl<'a> Stack<'a> {
             normals: [None; 81],
             mixes: [None; 81],
             single: ground.single_material().map(MaterialMix::pure),
-            own: ground.has_own_materials().then(|| MaterialLookup::new(ground)),
+            has_own_materials: ground.has_own_materials(),
         }
     }
 
@@ -89,8 +89,8 @@ impl<'a> Stack<'a> {
     }
 
     /// The ground's own material at a lattice point, if it differs from voxel to voxel.
-    pub fn own_material(&self, point: IVec3) -> Option<MaterialMix> {
-        self.own.as_ref().map(|own| MaterialMix::pure(own.at(point)))
+    pub fn voxel_mix(&self, point: IVec3) -> Option<MaterialMix> {
+        self.has_own_materials.then(|| MaterialMix::pure(self.ground.material(point)))
     }
 
     /// The tile's normal over a corner.

@@ -22,4 +22,5 @@ pub(crate) use field::Absorbed;
 pub use field::{Field, FieldId, Fields, Scenario};
 pub use layers::Layers;
 pub use rules::{DiggingRules, Refused, RulesError};
+pub(crate) use view::resolve;
 pub use view::{Bricks, SampleView};

@@ -6,7 +6,7 @@ use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::{Brick, Sample};
-use crate::ground::{Ground, MaterialId, MaterialLookup};
+use crate::ground::{Ground, MaterialId};
 use crate::lattice::{BrickPos, LatticeBox};
 
 /// Bricks by position; a missing brick is all pristine.
@@ -128,11 +128,16 @@ impl<'a> SampleView<'a> {
 
     /// The material at a lattice point, the ground's own if it was never changed.
     pub fn material(&self, point: IVec3) -> MaterialId {
-        MaterialLookup::new(self.ground).resolve(point, self.stored_material(point))
+        resolve(self.ground, point, self.stored_material(point))
     }
 
     /// Solid lattice points of a box, counted one by one.
     pub fn solid_count(&self, samples: LatticeBox) -> u64 {
         samples.points().filter(|&point| self.is_solid(point)).count() as u64
     }
+}
+
+/// The material that a stored id stands for at a lattice point.
+pub(crate) fn resolve(ground: &Ground, point: IVec3, stored: MaterialId) -> MaterialId {
+    if stored == MaterialId::GROUND { ground.material(point) } else { stored }
 }

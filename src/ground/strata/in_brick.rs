@@ -1,31 +1,97 @@
-//! Strata in one brick: which of them may be in it at all, and their noise at the corners of its cells.
+//! The strata in one brick, and the bricks that a thread asked for last.
+//!
+//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks, many of them several
+//! times. So a brick first finds out which strata may be in it at all, hashes the corners of their noise once, and keeps
+//! what it found for each column and voxel.
+
+use std::cell::RefCell;
 
 use glam::{IVec2, IVec3};
 
-use super::records::{BED, BeddingRecord, ColumnCondition, FILL, POCKET, StrataRecords, StratumRecord, VEIN};
-use super::value_noise::{Corners, FlatCorners};
+use super::StrataRecords;
+use super::records::{BED, BeddingRecord, FILL, POCKET, StratumRecord, VEIN};
+use super::value_noise::{Corners, FlatCorners, ValueNoise};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
 
-/// The strata of a brick, ready for any of its voxels.
-pub(crate) struct BrickStrata<'g> {
-    ground: &'g Ground,
-    pos: BrickPos,
-    heights: [[i32; 8]; 8],
-    bedding: &'g BeddingRecord,
-    /// The bedding's noise, if there are beds.
+/// Bricks that a thread keeps along each axis.
+const KEPT: i32 = 4;
+
+thread_local! {
+    static BRICKS: RefCell<Vec<BrickStrata>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A voxel of the ground, with the column of the world that is nearest.
+#[derive(Clone, Copy)]
+pub(super) struct Voxel {
+    pub column: Column,
+    pub y: i32,
+    /// How deep it lies in 1/256 voxel: 0 to 255 for the highest solid voxel of its column, and 0 above it.
+    pub depth: i32,
+}
+
+/// The material that strata give a voxel; [`MaterialId::GROUND`] if no stratum holds it.
+pub(super) fn material(ground: &Ground, records: &StrataRecords, voxel: Voxel) -> Option<MaterialId> {
+    let pos = BrickPos::of(voxel.column.at(voxel.y));
+    let IVec3 { x, y, z } = pos.0 & (KEPT - 1);
+    BRICKS.with_borrow_mut(|bricks| {
+        let place = ((y * KEPT + z) * KEPT + x) as usize;
+        if bricks.is_empty() {
+            bricks.resize_with((KEPT * KEPT * KEPT) as usize, BrickStrata::default);
+        }
+        let brick = bricks.get_mut(place)?;
+        if brick.key != (records.id, pos.0) {
+            brick.fill(ground, records, pos);
+        }
+        Some(brick.material(ground, records, voxel))
+    })
+}
+
+/// The strata of a brick.
+#[derive(Default)]
+struct BrickStrata {
+    /// Which strata, by their [id](StrataRecords::id), and which brick. No strata have id 0.
+    key: (u64, IVec3),
+    /// The bedding's noise at the corners of its cell.
     folds: FlatCorners,
-    /// Those that may hold a voxel of the brick, topmost first.
-    near: Vec<Near<'g>>,
+    /// The strata that may hold a voxel of the brick, topmost first.
+    near: Vec<Near>,
+    /// The columns for which `conditions` are known.
+    known_columns: u64,
+    /// The conditions of strata that a column fulfils: a bit each.
+    conditions: Conditions,
+    /// The voxels for which `materials` are known: bit `z * 8 + x` of layer y.
+    known: [u64; 8],
+    materials: Materials,
+}
+
+/// One word for each column; only those that are known count.
+struct Conditions([u32; 64]);
+
+/// One material for each voxel; only those that are known count.
+struct Materials([MaterialId; 512]);
+
+impl Default for Conditions {
+    fn default() -> Self {
+        Self([0; 64])
+    }
+}
+
+impl Default for Materials {
+    fn default() -> Self {
+        Self([MaterialId(0); 512])
+    }
 }
 
 /// A stratum that may hold voxels of a brick.
-struct Near<'g> {
-    record: &'g StratumRecord,
-    condition: Option<&'g ColumnCondition>,
+struct Near {
+    /// Its number.
+    number: usize,
     /// It holds them all.
     is_whole: bool,
+    /// The depths at which it may be, in 1/256 voxel, the second not included: noise included.
+    depth: [i32; 2],
     roughness: FlatCorners,
     noises: [Corners; 2],
 }
@@ -46,112 +112,139 @@ fn lies([low, high]: [i32; 2], by: i32, [from, to]: [i32; 2]) -> Option<bool> {
     }
 }
 
-impl<'g> BrickStrata<'g> {
-    pub fn new(ground: &'g Ground, records: &'g StrataRecords, pos: BrickPos) -> Self {
+impl BrickStrata {
+    /// Begins anew, with another brick.
+    fn fill(&mut self, ground: &Ground, records: &StrataRecords, pos: BrickPos) {
         let low = pos.origin();
-        let heights = ground.heights::<8>(Column::of(low));
-        // A column beyond the rim is like the nearest on it, and in the same cell of all noise as what is left of the brick.
-        let start = ground.nearest_column(low);
-        let (start, place) = (IVec3::new(start.x, low.y, start.z), IVec2::new(start.x, start.z));
-        let [lowest, highest] = bounds(heights.as_flattened().iter().copied());
-        let own_heights = [low.y * ONE, (low.y + BRICK - 1) * ONE];
-        let depths = [(lowest - own_heights[1]).max(1), (highest - own_heights[0]).max(1)];
-        let bedding = &records.bedding;
-        let has_beds = records.strata.iter().any(|record| record.body == BED);
-        let folds = if has_beds { bedding.noise().flat_corners(place) } else { [0; 4] };
-        let mut own = Self { ground, pos, heights, bedding, folds, near: Vec::new() };
-        for (record, condition) in records.strata.iter().zip(&records.conditions) {
+        self.key = (records.id, pos.0);
+        let column_heights = ground.heights::<8>(Column::of(low));
+        (self.known_columns, self.known) = (0, [0; 8]);
+        self.near.clear();
+        let (start, place) = (low, IVec2::new(low.x, low.z));
+        let [lowest, highest] = bounds(column_heights.as_flattened().iter().copied());
+        let ys = [low.y, low.y + BRICK - 1];
+        let heights = ys.map(|y| y * ONE);
+        let depths = [lowest - heights[1], highest - heights[0]].map(|distance| (distance - 1).max(0));
+        self.folds = if records.has_beds { records.bedding.noise().flat_corners(place) } else { [0; 4] };
+        for (number, record) in records.strata.iter().enumerate() {
             let rough = record.rough;
-            let ys = [low.y, low.y + BRICK - 1];
-            let known = [
-                lies(depths, rough, record.depth),
-                lies(own_heights, rough, record.height),
-                lies(ys, 0, record.ys),
-            ];
+            let is_deep = lies(depths, rough, record.depth);
+            if is_deep == Some(false) {
+                continue;
+            }
+            let known = [is_deep, lies(heights, rough, record.height), lies(ys, 0, record.ys)];
             if known.contains(&Some(false)) {
                 continue;
             }
             let mut noises = [[0; 8]; 2];
             let is_possible = match record.body {
-                BED => own.may_hold_bed(record, own_heights),
+                BED => self.may_hold_bed(records, record, heights),
                 POCKET => {
-                    noises[0] = record.noises()[0].corners(start);
+                    noises[0] = record.noise().corners(start);
                     noises[0].iter().any(|&corner| corner > record.limit)
                 }
-                VEIN => noises.iter_mut().zip(record.noises()).all(|(corners, noise)| {
-                    *corners = noise.corners(start);
-                    let [least, greatest] = bounds(*corners);
-                    least < record.limit && greatest > -record.limit
-                }),
+                VEIN => {
+                    noises.iter_mut().zip([record.noise(), record.second_noise()]).all(|(corners, noise)| {
+                        *corners = noise.corners(start);
+                        let [least, greatest] = bounds(*corners);
+                        least < record.limit && greatest > -record.limit
+                    })
+                }
                 _ => true,
             };
             if !is_possible {
                 continue;
             }
-            let is_whole = record.body == FILL && condition.is_none() && known == [Some(true); 3];
+            let is_whole = record.body == FILL && record.condition == 0 && known == [Some(true); 3];
             let roughness = if rough == 0 { [0; 4] } else { record.roughness().flat_corners(place) };
-            own.near.push(Near { record, condition: condition.as_ref(), is_whole, roughness, noises });
+            let [from, to] = record.depth;
+            let depth = [from.saturating_sub(rough), to.saturating_add(rough)];
+            self.near.push(Near { number, is_whole, depth, roughness, noises });
             if is_whole {
                 break;
             }
         }
-        own
     }
 
     /// May a bed be in the brick, whose samples have heights in this range?
-    fn may_hold_bed(&self, record: &StratumRecord, [low, high]: [i32; 2]) -> bool {
-        let start = self.ground.nearest_column(self.pos.origin());
+    fn may_hold_bed(&self, records: &StrataRecords, record: &StratumRecord, [low, high]: [i32; 2]) -> bool {
+        let start = Column::of(BrickPos(self.key.1).origin());
+        let bedding = &records.bedding;
         let corners = [(0, 0), (7, 0), (0, 7), (7, 7)].map(|(x, z)| start.offset(x, z));
-        let dip = BeddingRecord { fold: 0, ..*self.bedding };
-        let lifts = corners.map(|corner| dip.lift(corner, 0));
-        let (fold, rough) = (i64::from(self.bedding.fold), i64::from(record.rough));
-        let [least, greatest] = bounds(self.folds).map(|noise| (fold * i64::from(noise)) >> 15);
-        let first = i64::from(low) + lifts.iter().min().unwrap_or(&0) + least - rough;
-        let last = i64::from(high) + lifts.iter().max().unwrap_or(&0) + greatest + rough;
+        let dips = corners.map(|corner| bedding.dip_at(corner));
+        let [least, greatest] = bounds(self.folds).map(|noise| i64::from(bedding.fold_at(noise)));
+        let rough = i64::from(record.rough);
+        let first = i64::from(low) + dips.iter().min().unwrap_or(&0) + least - rough;
+        let last = i64::from(high) + dips.iter().max().unwrap_or(&0) + greatest + rough;
         let [from, thickness, every] = record.bed.map(i64::from);
         let above = first - from;
         let above = if every > 0 { above.rem_euclid(every) } else { above };
         let end = above + last - first;
-        if every > 0 { above < thickness || end >= every } else { above < thickness && end >= 0 }
+        above < thickness && end >= 0 || every > 0 && end >= every
     }
 
-    pub fn pos(&self) -> BrickPos {
-        self.pos
+    /// The material of a voxel of the brick; [`MaterialId::GROUND`] if no stratum holds it.
+    #[inline]
+    fn material(&mut self, ground: &Ground, records: &StrataRecords, voxel: Voxel) -> MaterialId {
+        let index = BrickPos::index(voxel.column.at(voxel.y));
+        let (layer, bit) = (index >> 6, 1 << (index & 63));
+        if self.known[layer] & bit == 0 {
+            self.known[layer] |= bit;
+            self.materials.0[index] = self.look_up(ground, records, voxel);
+        }
+        self.materials.0[index]
     }
 
-    /// The material of a voxel of the brick, if a stratum holds it.
-    pub fn material(&self, point: IVec3) -> Option<MaterialId> {
-        let [x, _, z] = (point & (BRICK - 1)).as_usizevec3().to_array();
-        let height = point.y * ONE;
-        let depth = (self.heights[z][x] - height).max(1);
-        let column = self.ground.nearest_column(point);
-        let found = self.near.iter().find(|near| near.is_whole || self.holds(near, point.y, column, depth));
-        found.map(|near| MaterialId(near.record.material as u8))
+    fn look_up(&mut self, ground: &Ground, records: &StrataRecords, voxel: Voxel) -> MaterialId {
+        for at in 0..self.near.len() {
+            let near = &self.near[at];
+            if voxel.depth < near.depth[0] || voxel.depth >= near.depth[1] {
+                continue;
+            }
+            let record = &records.strata[near.number];
+            if near.is_whole
+                || self.holds(near, record, &records.bedding, voxel)
+                    && (record.condition == 0
+                        || self.conditions_of(ground, records, voxel.column) & record.condition != 0)
+            {
+                return MaterialId(record.material as u8);
+            }
+        }
+        MaterialId::GROUND
     }
 
-    fn holds(&self, near: &Near, y: i32, column: Column, depth: i32) -> bool {
-        let Near { record, condition, roughness, noises, .. } = near;
-        let (place, at) = (IVec2::new(column.x, column.z), IVec3::new(column.x, y, column.z));
-        let moved = match record.rough {
-            0 => 0,
-            rough => (rough * record.roughness().flat_within(roughness, place)) >> 15,
-        };
+    /// The conditions that a column fulfils.
+    fn conditions_of(&mut self, ground: &Ground, records: &StrataRecords, column: Column) -> u32 {
+        let number = ((column.z & 7) * 8 + (column.x & 7)) as usize;
+        if self.known_columns >> number & 1 == 0 {
+            self.known_columns |= 1 << number;
+            self.conditions.0[number] = records.conditions_of(ground, column);
+        }
+        self.conditions.0[number]
+    }
+
+    /// Does a stratum near the brick hold a voxel, if its conditions on the column are met?
+    fn holds(&self, near: &Near, record: &StratumRecord, bedding: &BeddingRecord, voxel: Voxel) -> bool {
+        let Voxel { column, y, depth } = voxel;
+        let Near { roughness, noises, .. } = near;
+        let (place, point) = (IVec2::new(column.x, column.z), column.at(y));
+        let flat = |noise: ValueNoise, corners| noise.flat_within(corners, place);
+        let moved = if record.rough == 0 { 0 } else { record.moved(flat(record.roughness(), roughness)) };
         let (height, [low, high]) = (y * ONE + moved, record.ys);
         (record.depth[0]..record.depth[1]).contains(&(depth + moved))
             && (record.height[0]..record.height[1]).contains(&height)
             && (low..high).contains(&y)
             && match record.body {
                 BED => {
-                    let noise = self.bedding.noise().flat_within(&self.folds, place);
-                    record.is_in_bed(i64::from(height) + self.bedding.lift(column, noise))
+                    let fold = bedding.fold_at(flat(bedding.noise(), &self.folds));
+                    record.is_in_bed(i64::from(height) + bedding.dip_at(column) + i64::from(fold))
                 }
                 VEIN => {
-                    let mut both = record.noises().into_iter().zip(noises);
-                    both.all(|(noise, corners)| noise.within(corners, at).abs() < record.limit)
+                    record.noise().within(&noises[0], point).abs() < record.limit
+                        && record.second_noise().within(&noises[1], point).abs() < record.limit
                 }
-                POCKET => record.noises()[0].within(&noises[0], at) > record.limit,
+                POCKET => record.noise().within(&noises[0], point) > record.limit,
                 _ => true,
             }
-            && condition.is_none_or(|condition| condition.admits(self.ground, column))
     }
 }

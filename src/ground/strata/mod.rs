@@ -9,7 +9,6 @@
 
 mod check;
 mod in_brick;
-mod lookup;
 mod of_ground;
 mod presets;
 mod records;
@@ -25,8 +24,6 @@ use serde::{Deserialize, Serialize};
 use super::material::MaterialId;
 use crate::lattice::LatticeBox;
 
-pub(crate) use in_brick::BrickStrata;
-pub(crate) use lookup::MaterialLookup;
 pub(crate) use of_ground::Below;
 pub(crate) use records::StrataRecords;
 #[cfg(all(test, feature = "cuda"))]
@@ -113,7 +110,8 @@ pub struct Stratum {
     pub material: MaterialId,
     /// Its shape.
     pub body: StratumBody,
-    /// The depth below the pristine surface, in voxels. Voxels above the surface are at depth 0.
+    /// The depth below the pristine surface, in voxels: from 0 on and below 1 for the highest solid voxel of a column, below 2
+    /// for the next. Voxels above the surface are at depth 0.
     pub depth: Interval,
     /// The height, in voxels.
     pub height: Interval,
@@ -261,8 +259,8 @@ impl From<Interval> for (Option<f32>, Option<f32>) {
     }
 }
 
-/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep below the pristine
-/// surface, in 1/256 voxel and at least 1; `None` for what the column has.
+/// A game's own function in place of [`Strata`]: the material at a lattice point that lies so deep, in 1/256 voxel; `None` for
+/// what the column has.
 pub(crate) type MaterialFn = dyn Fn(IVec3, i32) -> Option<MaterialId> + Send + Sync;
 
 /// What a ground has instead of its columns' materials.

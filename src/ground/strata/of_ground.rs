@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::IVec3;
 use rayon::prelude::*;
 
-use super::{BrickStrata, MaterialFn, MaterialLookup, OwnMaterials, Strata, StrataRecords};
+use super::in_brick::{self, Voxel};
+use super::{OwnMaterials, Strata, StrataRecords};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::ground::{ColumnMaterial, GroundError};
 use crate::lattice::hash::hash_words;
-use crate::lattice::{BrickPos, Column, ceil};
+use crate::lattice::{Column, LIMIT, ONE, ceil};
 
 /// What a ground has beside the materials of its columns.
 #[derive(Clone, PartialEq)]
@@ -45,8 +46,8 @@ impl Ground {
         self.with_below(OwnMaterials::Strata { given: Arc::new(strata.clone()), records })
     }
 
-    /// The same ground with a function of the game's own in place of [`Strata`]: given a lattice point, and how far it lies
-    /// below the pristine surface in 1/256 voxel, at least 1, it returns the material there, or `None` (or
+    /// The same ground with a function of the game's own in place of [`Strata`]: given a lattice point and its depth in 1/256 voxel, as
+    /// [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None` (or
     /// [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
     ///
     /// It must always give the same for the same point, or worlds would depend on timing. `id` stands for it in
@@ -86,14 +87,7 @@ impl Ground {
 
     /// Is its material a function that only the CPU can ask?
     pub fn has_material_fn(&self) -> bool {
-        self.material_fn().is_some()
-    }
-
-    pub(super) fn material_fn(&self) -> Option<&MaterialFn> {
-        match &self.below()?.own {
-            OwnMaterials::Function { function, .. } => Some(&**function),
-            OwnMaterials::Strata { .. } => None,
-        }
+        self.below().is_some_and(|below| matches!(below.own, OwnMaterials::Function { .. }))
     }
 
     fn with_below(self, own: OwnMaterials) -> Result<Self, GroundError> {
@@ -105,8 +99,9 @@ impl Ground {
         if self.below().is_none() {
             return Ok(self);
         }
-        let tops = self.tops()?;
-        Ok(self.map_below(|below| Below { tops, ..below }))
+        let bare = self.map_below(|below| Below { tops: Vec::new(), ..below });
+        let tops = bare.tops()?;
+        Ok(bare.map_below(|below| Below { tops, ..below }))
     }
 
     /// The material of the highest solid voxel of each column.
@@ -114,17 +109,37 @@ impl Ground {
         let extent = self.extent();
         let mut tops: Vec<MaterialId> = extent.fill_rows(|_, _| Ok(()))?;
         tops.par_chunks_mut(extent.row_len() * 8).enumerate().for_each(|(band, rows)| {
-            let materials = MaterialLookup::new(self);
             for low in (0..extent.row_len()).step_by(8) {
                 for (z, row) in rows.chunks_mut(extent.row_len()).enumerate() {
                     for (x, top) in row.iter_mut().enumerate().skip(low).take(8) {
                         let column = Column::new(x as i32, (band * 8 + z) as i32);
-                        *top = materials.at(column.at(ceil(self.height(column)) - 1));
+                        *top = self.material(column.at(ceil(self.height(column)) - 1));
                     }
                 }
             }
         });
         Ok(tops)
+    }
+
+    /// Material of a pristine voxel: of the first stratum that holds it; else, down to
+    /// [`OVERLAY_DEPTH`](crate::ground::OVERLAY_DEPTH) below the surface, the column's overlay if it covers at least half
+    /// (`blend >= 128`); else the column's base.
+    pub fn material(&self, point: IVec3) -> MaterialId {
+        let Some(below) = self.below() else { return self.material_of_column(point) };
+        let (column, y) = (self.nearest_column(point), point.y.clamp(-HIGHEST, HIGHEST));
+        let (index, height) = self.inner_height(column);
+        let depth = height - y * ONE - 1;
+        if (0..ONE).contains(&depth)
+            && let Some(&top) = below.tops.get(index)
+        {
+            return top;
+        }
+        let voxel = Voxel { column, y, depth: depth.max(0) };
+        let found = match &below.own {
+            OwnMaterials::Strata { records, .. } => in_brick::material(self, records, voxel),
+            OwnMaterials::Function { function, .. } => function(column.at(y), voxel.depth),
+        };
+        found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| self.material_of_column(point))
     }
 
     /// What the undug surface shows over a column: the material of its highest solid voxel where the ground has strata,
@@ -148,21 +163,7 @@ impl Ground {
             OwnMaterials::Function { id, .. } => hash_words([2, *id]),
         })
     }
-
-    /// The conditions of strata that a column fulfils: a bit each.
-    #[cfg(feature = "cuda")]
-    pub(crate) fn column_conditions(&self, column: Column) -> u32 {
-        let Some(records) = self.strata_records() else { return 0 };
-        let column = self.extent().clamp(column);
-        let of = |(record, condition): (&super::StratumRecord, &Option<super::records::ColumnCondition>)| {
-            let is_met = condition.as_ref().is_some_and(|condition| condition.admits(self, column));
-            if is_met { record.condition } else { 0 }
-        };
-        records.strata.iter().zip(&records.conditions).map(of).sum()
-    }
-
-    /// The strata of a brick, if the ground has any.
-    pub(crate) fn brick_strata(&self, pos: BrickPos) -> Option<BrickStrata<'_>> {
-        self.strata_records().map(|records| BrickStrata::new(self, records, pos))
-    }
 }
+
+/// Points farther up or down, where no edit reaches, count as if they were here.
+const HIGHEST: i32 = 4 * LIMIT;

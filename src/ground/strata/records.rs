@@ -5,6 +5,8 @@ use super::{Interval, Strata, Stratum, StratumBody, StratumBounds};
 use crate::ground::world::Ground;
 use crate::lattice::hash::{hash_words, mix};
 use crate::lattice::{Column, LatticeBox, ONE};
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use bytemuck::{Pod, Zeroable};
 
 /// Shapes, as numbers.
@@ -23,7 +25,7 @@ const ROUGH: u32 = 0x7F4A_7C15;
 pub(crate) struct StratumRecord {
     pub material: u32,
     pub body: u32,
-    /// The bit of its condition in [`Ground::column_conditions`]; 0 without one.
+    /// The bit of its condition in [`StrataRecords::conditions_of`]; 0 without one.
     pub condition: u32,
     pub seed: u32,
     /// The width of the body's noise in voxels, as a power of two.
@@ -66,9 +68,14 @@ pub(super) struct ColumnCondition {
 /// The strata of a ground, ready to be asked.
 #[derive(Debug)]
 pub(crate) struct StrataRecords {
+    /// A number that no other strata of the program have.
+    pub id: u64,
+    /// Is any of them a bed?
+    pub has_beds: bool,
     pub strata: Vec<StratumRecord>,
     pub bedding: BeddingRecord,
-    pub(super) conditions: Vec<Option<ColumnCondition>>,
+    /// What strata ask of columns, by the bits of [`StratumRecord::condition`].
+    conditions: Vec<ColumnCondition>,
     /// Hash of all of it.
     pub hash: u64,
 }
@@ -118,14 +125,24 @@ impl StratumRecord {
         }
     }
 
-    /// The noises of veins and pockets.
-    pub(super) fn noises(&self) -> [ValueNoise; 2] {
-        [self.seed, self.seed ^ SECOND].map(|seed| ValueNoise { seed, scale: self.scale })
+    /// The noise of veins and pockets.
+    pub(super) fn noise(&self) -> ValueNoise {
+        ValueNoise { seed: self.seed, scale: self.scale }
+    }
+
+    /// The second noise of veins.
+    pub(super) fn second_noise(&self) -> ValueNoise {
+        ValueNoise { seed: self.seed ^ SECOND, scale: self.scale }
     }
 
     /// The noise that moves ends.
     pub(super) fn roughness(&self) -> ValueNoise {
         ValueNoise { seed: self.seed ^ ROUGH, scale: self.rough_scale }
+    }
+
+    /// By how much ends are moved where that noise is this, in 1/256 voxel.
+    pub(super) fn moved(&self, noise: i32) -> i32 {
+        (self.rough * noise) >> 15
     }
 
     /// Is a height, in 1/256 voxel as the bedding has it, in a bed?
@@ -142,11 +159,15 @@ impl BeddingRecord {
         ValueNoise { seed: self.seed, scale: self.scale }
     }
 
-    /// By how much a column is lifted in the bedding, in 1/256 voxel, where the noise is this.
-    pub(super) fn lift(&self, column: Column, noise: i32) -> i64 {
+    /// By how much the tilt lifts a column in the bedding, in 1/256 voxel.
+    pub(super) fn dip_at(&self, column: Column) -> i64 {
         let [x, z] = self.dip.map(i64::from);
-        let dip = (x * i64::from(column.x) + z * i64::from(column.z)) >> 8;
-        dip + i64::from((self.fold * noise) >> 15)
+        (x * i64::from(column.x) + z * i64::from(column.z)) >> 8
+    }
+
+    /// The same by folds, where the noise is this.
+    pub(super) fn fold_at(&self, noise: i32) -> i32 {
+        (self.fold * noise) >> 15
     }
 }
 
@@ -205,26 +226,39 @@ impl StrataRecords {
             scale: scale.trailing_zeros(),
             seed: mix(given.seed.into()) as u32,
         };
-        let conditions: Vec<_> = given.strata.iter().map(ColumnCondition::new).collect();
-        let conditioned = strata.iter_mut().zip(&conditions).filter(|(_, condition)| condition.is_some());
-        conditioned.zip(0..).for_each(|((record, _), bit)| record.condition = 1 << bit);
+        let mut conditions = Vec::new();
+        for (record, stratum) in strata.iter_mut().zip(&given.strata) {
+            if let Some(condition) = ColumnCondition::new(stratum) {
+                record.condition = 1 << conditions.len();
+                conditions.push(condition);
+            }
+        }
         let numbers = bytemuck::cast_slice::<_, u32>(&strata)
             .iter()
             .chain(bytemuck::cast_slice(std::slice::from_ref(&bedding)));
         let words = numbers.map(|&number| u64::from(number));
-        let of_columns = conditions.iter().map(|own| own.as_ref().map_or(0, |own| hash_words(own.words())));
+        let of_columns = conditions.iter().map(|own| hash_words(own.words()));
         let hash = hash_words(words.chain(of_columns));
-        Self { strata, bedding, conditions, hash }
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        let id = LAST.fetch_add(1, Ordering::Relaxed) + 1;
+        let has_beds = strata.iter().any(|record| record.body == BED);
+        Self { id, has_beds, strata, bedding, conditions, hash }
+    }
+
+    /// The conditions that a column of the world fulfils: a bit each.
+    pub fn conditions_of(&self, ground: &Ground, column: Column) -> u32 {
+        let is_met = |(bit, own): (u32, &ColumnCondition)| u32::from(own.admits(ground, column)) << bit;
+        (0..).zip(&self.conditions).map(is_met).sum()
     }
 
     /// Bytes of memory that it takes.
     pub fn bytes(&self) -> usize {
-        let conditions = self.conditions.capacity() * size_of::<Option<ColumnCondition>>();
+        let conditions = self.conditions.capacity() * size_of::<ColumnCondition>();
         size_of::<Self>() + self.strata.capacity() * size_of::<StratumRecord>() + conditions
     }
 
-    /// Does a stratum hold the voxel? By definition, without what is known of a brick: [`BrickStrata`](super::BrickStrata)
-    /// gives the same.
+    /// Does a stratum hold the voxel? By definition, without what is known of a brick: `in_brick` gives the
+    /// same.
     #[cfg(test)]
     pub fn holds(&self, number: usize, ground: &Ground, point: glam::IVec3) -> bool {
         use glam::{IVec2, IVec3};
@@ -232,18 +266,18 @@ impl StrataRecords {
         let place = IVec2::new(column.x, column.z);
         let at = IVec3::new(column.x, point.y, column.z);
         let height = point.y * ONE;
-        let depth = (ground.height(column) - height).max(1);
+        let depth = (ground.height(column) - height - 1).max(0);
         let flat = |noise: ValueNoise| noise.flat_within(&noise.flat_corners(place), place);
-        let moved = (record.rough * flat(record.roughness())) >> 15;
-        let noise = record.noises().map(|noise| noise.at(at));
+        let moved = record.moved(flat(record.roughness()));
+        let noise = [record.noise(), record.second_noise()].map(|noise| noise.at(at));
+        let fold = self.bedding.fold_at(flat(self.bedding.noise()));
         (record.depth[0]..record.depth[1]).contains(&(depth + moved))
             && (record.height[0]..record.height[1]).contains(&(height + moved))
             && (record.ys[0]..record.ys[1]).contains(&point.y)
-            && self.conditions[number].as_ref().is_none_or(|condition| condition.admits(ground, column))
+            && (record.condition == 0 || self.conditions_of(ground, column) & record.condition != 0)
             && match record.body {
-                BED => record.is_in_bed(
-                    i64::from(height + moved) + self.bedding.lift(column, flat(self.bedding.noise())),
-                ),
+                BED => record
+                    .is_in_bed(i64::from(height + moved) + self.bedding.dip_at(column) + i64::from(fold)),
                 VEIN => noise.iter().all(|noise| noise.abs() < record.limit),
                 POCKET => noise[0] > record.limit,
                 _ => true,

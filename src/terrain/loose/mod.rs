@@ -23,7 +23,6 @@ use glam::IVec3;
 
 use super::world::World;
 use crate::edits::{DraftedBrick, EditDelta, Overlay, take_out};
-use crate::ground::MaterialLookup;
 use crate::lattice::{BrickPos, Column, LatticeBox};
 use crate::surface::SurfaceMesh;
 use crate::volume::layers::{self, Layers, NONE};
@@ -225,7 +224,6 @@ fn air_around(solid: &Solid, pieces: &Samples) -> Samples {
 fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) -> LoosePiece {
     let mut runs: Vec<Run> = Vec::new();
     let (mut voxels, mut materials) = (0, MaterialCounts::default());
-    let own = MaterialLookup::new(samples.ground());
     for (pos, layers) in search::bricks(piece) {
         runs.extend(
             layers::indices(layers).map(|index| Run { start: pos.origin() + layers::offset(index), len: 1 }),
@@ -242,8 +240,7 @@ fn describe(samples: SampleView, piece: &Component, settings: &LooseSettings) ->
     for run in &runs {
         let end = run.start + IVec3::X * (run.len as i32 - 1);
         LatticeBox::include(&mut bounds, LatticeBox { min: run.start, max: end });
-        let voxels = (0..run.len as i32).map(|x| run.start + IVec3::X * x);
-        materials.count_each(voxels.map(|voxel| own.resolve(voxel, samples.stored_material(voxel))));
+        materials.count_each((0..run.len as i32).map(|x| samples.material(run.start + IVec3::X * x)));
     }
     let bounds = bounds.unwrap_or(LatticeBox::point(IVec3::ZERO));
     LoosePiece { fate: settings.fate(voxels), bounds, voxels, materials, runs: runs.into(), mesh: None }

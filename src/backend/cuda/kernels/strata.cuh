@@ -60,7 +60,7 @@ __device__ inline i64 bedding_lift(const StrataTable& table, i32 x, i32 z) {
 // Whether a stratum holds a voxel of the world.
 __device__ inline bool holds(const StrataTable& table, const StratumRecord& stratum, const Voxel& voxel) {
     const u32 SECOND = 0x9e3779b9u, ROUGH = 0x7f4a7c15u;
-    i32 x = voxel.x, y = voxel.y, z = voxel.z, height = y * ONE, depth = largest(voxel.height - height, 1);
+    i32 x = voxel.x, y = voxel.y, z = voxel.z, height = y * ONE, depth = largest(voxel.height - height - 1, 0);
     if (stratum.condition != 0 && !(voxel.column >> 16 & stratum.condition)) return false;
     i32 moved = stratum.rough == 0 ? 0
                                    : stratum.rough * flat_noise(stratum.seed ^ ROUGH, stratum.rough_scale, x, 0, z) >> 15;

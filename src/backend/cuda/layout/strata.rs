@@ -36,7 +36,9 @@ pub(super) fn column_word(ground: &Ground, column: Column) -> u32 {
     let material: ColumnMaterial = ground.column_material(column);
     let [base, overlay, skin] = [material.base, material.overlay, material.skin()].map(|id| u32::from(id.0));
     match ground.strata_records() {
-        Some(_) => base | skin << 8 | ground.column_conditions(column) << 16,
+        Some(records) => {
+            base | skin << 8 | records.conditions_of(ground, ground.nearest_column(column.at(0))) << 16
+        }
         None => base | overlay << 8 | u32::from(material.blend) << 16,
     }
 }
