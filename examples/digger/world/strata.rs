@@ -4,7 +4,7 @@
 use bevy::math::Vec2;
 use bevy_burrow::prelude::*;
 
-use crate::world::landscape::{CLAY, COAL, GOLD, GRASS, SAND, SANDSTONE, SHALE, SNOW, SOIL};
+use crate::world::landscape::{CLAY, COAL, GOLD, GRASS, ROCK, SAND, SANDSTONE, SHALE, SNOW, SOIL};
 
 /// The steepest slope with turf and soil on it.
 const SOIL_SLOPE: f32 = 0.95;
@@ -27,6 +27,8 @@ pub fn strata() -> Strata {
             cover(GRASS, 1.0, SOIL_SLOPE),
             Stratum { rough_scale: 16, ..rough(0.5, cover(SOIL, 2.6, SOIL_SLOPE)) },
             Stratum { rough_scale: 16, ..rough(0.8, cover(CLAY, 4.2, SOIL_SLOPE)) },
+            // Weather leaves a crust, which hides the beds of natural faces in patches.
+            Stratum { depth: Interval::below(1.3), ..Stratum::pocket(ROCK, 64, 0.55) },
             from(5.0, Stratum::vein(GOLD, 16, 0.010)),
             from(3.5, Stratum::pocket(COAL, 16, 0.012)),
             rough(0.5, from(3.0, Stratum::beds(COAL, 12.0, 1.5, 30.0))),

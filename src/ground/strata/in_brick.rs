@@ -90,6 +90,8 @@ struct Near {
     number: usize,
     /// It holds them all.
     is_whole: bool,
+    /// Its ranges hold all of them, so only its body decides.
+    is_inside: bool,
     /// The depths at which it may be, in 1/256 voxel, the second not included: noise included.
     depth: [i32; 2],
     roughness: FlatCorners,
@@ -120,7 +122,7 @@ impl BrickStrata {
         let column_heights = ground.heights::<8>(Column::of(low));
         (self.known_columns, self.known) = (0, [0; 8]);
         self.near.clear();
-        let (start, place) = (low, IVec2::new(low.x, low.z));
+        let place = IVec2::new(low.x, low.z);
         let [lowest, highest] = bounds(column_heights.as_flattened().iter().copied());
         let ys = [low.y, low.y + BRICK - 1];
         let heights = ys.map(|y| y * ONE);
@@ -140,13 +142,13 @@ impl BrickStrata {
             let is_possible = match record.body {
                 BED => self.may_hold_bed(records, record, heights),
                 POCKET => {
-                    noises[0] = record.noise().corners(start);
-                    noises[0].iter().any(|&corner| corner > record.limit)
+                    noises[0] = record.noise().corners(low);
+                    record.noise().bounds_within(&noises[0], low, low + 7)[1] > record.limit
                 }
                 VEIN => {
                     noises.iter_mut().zip([record.noise(), record.second_noise()]).all(|(corners, noise)| {
-                        *corners = noise.corners(start);
-                        let [least, greatest] = bounds(*corners);
+                        *corners = noise.corners(low);
+                        let [least, greatest] = noise.bounds_within(corners, low, low + 7);
                         least < record.limit && greatest > -record.limit
                     })
                 }
@@ -155,11 +157,13 @@ impl BrickStrata {
             if !is_possible {
                 continue;
             }
-            let is_whole = record.body == FILL && record.condition == 0 && known == [Some(true); 3];
-            let roughness = if rough == 0 { [0; 4] } else { record.roughness().flat_corners(place) };
+            let is_inside = known == [Some(true); 3];
+            let is_whole = is_inside && record.body == FILL && record.condition == 0;
+            let needs_roughness = rough != 0 && (!is_inside || record.body == BED);
+            let roughness = if needs_roughness { record.roughness().flat_corners(place) } else { [0; 4] };
             let [from, to] = record.depth;
             let depth = [from.saturating_sub(rough), to.saturating_add(rough)];
-            self.near.push(Near { number, is_whole, depth, roughness, noises });
+            self.near.push(Near { number, is_whole, is_inside, depth, roughness, noises });
             if is_whole {
                 break;
             }
@@ -229,15 +233,21 @@ impl BrickStrata {
         let Near { roughness, noises, .. } = near;
         let (place, point) = (IVec2::new(column.x, column.z), column.at(y));
         let flat = |noise: ValueNoise, corners| noise.flat_within(corners, place);
-        let moved = if record.rough == 0 { 0 } else { record.moved(flat(record.roughness(), roughness)) };
-        let (height, [low, high]) = (y * ONE + moved, record.ys);
-        (record.depth[0]..record.depth[1]).contains(&(depth + moved))
-            && (record.height[0]..record.height[1]).contains(&height)
-            && (low..high).contains(&y)
+        let moved = || match record.rough {
+            0 => 0,
+            _ => record.moved(flat(record.roughness(), roughness)),
+        };
+        let is_in_ranges = near.is_inside || {
+            let moved = moved();
+            (record.depth[0]..record.depth[1]).contains(&(depth + moved))
+                && (record.height[0]..record.height[1]).contains(&(y * ONE + moved))
+                && (record.ys[0]..record.ys[1]).contains(&y)
+        };
+        is_in_ranges
             && match record.body {
                 BED => {
                     let fold = bedding.fold_at(flat(bedding.noise(), &self.folds));
-                    record.is_in_bed(i64::from(height) + bedding.dip_at(column) + i64::from(fold))
+                    record.is_in_bed(i64::from(y * ONE + moved() + fold) + bedding.dip_at(column))
                 }
                 VEIN => {
                     record.noise().within(&noises[0], point).abs() < record.limit

@@ -62,6 +62,8 @@ impl Strata {
                     slope: Interval::between(0.95, 1.3),
                     ..Stratum::fill(GRAVEL)
                 },
+                // Weather leaves a crust, which hides the beds of natural faces in patches.
+                Stratum { depth: Interval::below(1.3), ..Stratum::pocket(ROCK, 64, 0.5) },
                 Stratum { depth: Interval::above(6.0), ..Stratum::vein(GOLD, 32, 0.006) },
                 Stratum { rough: 0.4, depth: Interval::above(4.0), ..Stratum::beds(COAL, 15.0, 1.6, 40.0) },
                 Stratum { rough: 1.5, ..Stratum::beds(SANDSTONE, 4.0, 9.0, 40.0) },

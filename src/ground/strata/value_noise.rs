@@ -48,6 +48,26 @@ impl ValueNoise {
         lerp(low, high, y)
     }
 
+    /// Least and greatest noise at the points from `low` to `high`, which lie in the cell that has these corners; or a
+    /// little beyond.
+    pub fn bounds_within(self, corners: &Corners, low: IVec3, high: IVec3) -> [i32; 2] {
+        // Along each axis noise is linear in the blend, so both are at corners of the box, but for rounding.
+        const ROUNDING: i32 = 4;
+        let [x, y, z] = [0, 1, 2].map(|axis| [low[axis], high[axis]].map(|at| self.blend(at)));
+        let [a, b, c, d, e, f, g, h] = *corners;
+        let mut bounds = [i32::MAX, i32::MIN];
+        for x in x {
+            let lines = [lerp(a, b, x), lerp(c, d, x), lerp(e, f, x), lerp(g, h, x)];
+            for z in z {
+                let [under, over] = [lerp(lines[0], lines[1], z), lerp(lines[2], lines[3], z)];
+                for noise in y.map(|y| lerp(under, over, y)) {
+                    bounds = [bounds[0].min(noise), bounds[1].max(noise)];
+                }
+            }
+        }
+        [bounds[0] - ROUNDING, bounds[1] + ROUNDING]
+    }
+
     /// The corners of the cell around a place in the plane (x, z).
     pub fn flat_corners(self, place: IVec2) -> FlatCorners {
         let IVec2 { x, y: z } = place >> self.scale;
@@ -133,6 +153,16 @@ mod tests {
             prop_assert!((-32_768..=32_767).contains(&least) && greatest <= 32_767);
             let flat = noise.flat_within(&noise.flat_corners(point.truncate()), point.truncate());
             prop_assert!((-32_768..=32_767).contains(&flat));
+        }
+
+        #[test]
+        fn bounds_hold_all_noise_of_a_brick(seed: u32, x in -99i32..99, y in -99i32..99, z in -99i32..99, scale in 3u32..=10) {
+            let (noise, low) = (ValueNoise { seed, scale }, IVec3::new(x, y, z) * 8);
+            let [least, greatest] = noise.bounds_within(&noise.corners(low), low, low + 7);
+            for index in 0..512 {
+                let own = noise.at(low + IVec3::new(index & 7, index >> 6, index >> 3 & 7));
+                prop_assert!((least..=greatest).contains(&own), "{own} is not in {least}..={greatest}");
+            }
         }
 
         #[test]
