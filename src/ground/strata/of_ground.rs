@@ -73,6 +73,7 @@ impl Ground {
     }
 
     /// The strata as numbers.
+    #[cfg(any(test, feature = "cuda"))]
     pub(crate) fn strata_records(&self) -> Option<&StrataRecords> {
         match &self.below()?.own {
             OwnMaterials::Strata { records, .. } => Some(records),
