@@ -273,7 +273,7 @@ fn each_line_yields_what_the_probes_say() {
 fn strata_come_from_a_file_too() {
     let temp = TempFolder::new();
     temp.put_hills();
-    let edits = temp.put("edits.jsonl", DIG);
+    let edits = temp.put("edits.jsonl", DIG.replace("\"radius\":4", "\"radius\":9"));
     let strata = r#"{"strata":[{"material":9,"depth":[null,2]},{"material":4,"body":{"pocket":{"scale":8,"share":0.5}}}]}"#;
     let strata = temp.put("strata.json", strata);
     let report = temp.run(&edits, &["--strata", strata.to_str().expect("a path")]).expect("good strata");
