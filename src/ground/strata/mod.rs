@@ -58,7 +58,7 @@ pub const MAX_COLUMN_CONDITIONS: usize = 16;
 /// };
 /// let ground = Ground::flat(64, 64, 10.0)?.with_strata(&strata)?;
 /// assert_eq!(ground.material(IVec3::new(5, 8, 5)), soil);
-/// # Ok::<(), GroundError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
