@@ -144,7 +144,8 @@ impl Ground {
         self.heights[self.extent.index(column)]
     }
 
-    /// The place of a column of the world in arrays over it, and its height; of a column beyond the rim, those of some other.
+    /// The place of a column of the world in arrays over it, and its height; of a column beyond the rim, those of some
+    /// other.
     pub(super) fn inner_height(&self, column: Column) -> (usize, i32) {
         let index = self.extent.inner_index(column);
         (index, self.heights.get(index).copied().unwrap_or_default())

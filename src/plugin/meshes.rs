@@ -217,8 +217,8 @@ impl Origin {
         };
         let mix = vertex.materials;
         // Strata of the ground's are drawn as they are, without those of the look.
-        let is_plain = ground.strata().is_none() && !ground.has_material_fn();
-        let own = is_plain && mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
+        let own = !ground.has_own_materials()
+            && mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
         Self { depth, cover: cover.clamp(0, 255) as u8, own: if own { 255 } else { 0 } }
     }
 

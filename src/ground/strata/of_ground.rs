@@ -46,9 +46,9 @@ impl Ground {
         self.with_below(OwnMaterials::Strata { given: Arc::new(strata.clone()), records })
     }
 
-    /// The same ground with a function of the game's own in place of [`Strata`]: given a lattice point and its depth in 1/256 voxel, as
-    /// [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None` (or
-    /// [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
+    /// The same ground with a function of the game's own in place of [`Strata`]: given a lattice point and its depth in
+    /// 1/256 voxel, as [`Stratum::depth`](super::Stratum::depth) counts it, it returns the material there, or `None`
+    /// (or [`MaterialId::GROUND`]) for what the column has. For a point beyond the rim it is asked at the nearest column.
     ///
     /// It must always give the same for the same point, or worlds would depend on timing. `id` stands for it in
     /// [`Self::hash`]: give another one to every function. The graphics card can't run it, so such worlds are edited and

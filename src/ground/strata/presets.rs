@@ -98,7 +98,8 @@ impl Strata {
     }
 
     /// A mine: turf, soil and clay over rock with seams and pockets of coal, pockets of iron and copper, and gold in veins
-    /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface.
+    /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface. Iron (12) and copper (13) have default
+    /// colours, but the default `GroundLook` has no textures for them: it shows its last layer, gravel.
     pub fn mine() -> Self {
         let deep = |from| Interval::between(from, 160.0);
         Self {

@@ -1,13 +1,14 @@
 //! Strata as integers, and which of them hold a voxel. `kernels/strata.cuh` computes the same.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytemuck::{Pod, Zeroable};
+
 use super::value_noise::{ValueNoise, both_within, exceeded_by};
 use super::{Interval, Strata, Stratum, StratumBody, StratumBounds};
 use crate::ground::world::Ground;
 use crate::lattice::hash::{hash_words, mix};
 use crate::lattice::{Column, LatticeBox, ONE};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-use bytemuck::{Pod, Zeroable};
 
 /// Shapes, as numbers.
 pub(crate) const FILL: u32 = 0;
