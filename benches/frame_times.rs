@@ -4,8 +4,9 @@
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
 //! dug ground without digging. Colliders are made near a body that moves along, and balls lie about there. A frame is
 //! timed from its start until the graphics card has drawn it, so unlike in a game, frames never overlap. The plugin's
-//! time on the main thread is the one that it reports. Finally, parts of the frame are left out to show where the
-//! time goes.
+//! time on the main thread is the one that it reports. Finally, the walk is drawn with a plain `StandardMaterial` on the same
+//! meshes in place of the `GroundLook`, and with nothing in sight, with shadows and without: the last lines say how many
+//! times the plain material's part of the frame the look takes.
 
 #[path = "../examples/shared/offscreen.rs"]
 mod offscreen;
@@ -14,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use avian3d::prelude::*;
 use bevy::camera::RenderTarget;
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
 use bevy::render::render_resource::{PollType, TextureFormat};
@@ -34,8 +36,13 @@ const BRUSH: Duration = Duration::from_millis(50);
 const BALL_EVERY: usize = 20;
 const BALLS: usize = 100;
 
-/// Number of frames with a part left out.
-const PARTIAL: usize = 240;
+/// Rounds in which materials are compared, and frames of each material in a round, of which the first ones don't count.
+const ROUNDS: usize = 3;
+const FRAMES_OF_ROUND: usize = 90;
+const FIRST_FRAMES: usize = 5;
+
+/// The longest a material is drawn in a round, for software renderers.
+const ROUND: Duration = Duration::from_secs(5);
 
 /// Frames before timing begins.
 const WARM_UP: usize = 120;
@@ -83,8 +90,7 @@ fn main() {
         let [p50, p99] = [0, 1].map(|at| medians[0][at] / medians[1][at]);
         println!("{backend:?}: digging over nothing to do: p50 {p50:.2}, p99 {p99:.2}");
         if backend == Backend::Cpu {
-            walk.leave_out("no shadows", Walk::drop_shadows);
-            walk.leave_out("no shadows, and nothing in sight", Walk::look_away);
+            walk.compare_materials(frames.min(FRAMES_OF_ROUND));
         }
     }
 }
@@ -103,6 +109,8 @@ struct Walk {
     camera: Entity,
     path: Vec<Vec3>,
     balls: Vec<Entity>,
+    /// Is the camera so far up that nothing is in sight?
+    is_far: bool,
     /// When the next brush is due.
     next_brush: Instant,
 }
@@ -124,7 +132,8 @@ impl Walk {
         let film = world.resource_mut::<Assets<Image>>().add(film);
         let fog =
             DistanceFog { falloff: FogFalloff::from_visibility_squared(900.0), ..DistanceFog::default() };
-        let camera = (Camera3d::default(), RenderTarget::from(film), fog, Transform::default());
+        // What hills cover is not shaded, as in the digger.
+        let camera = (Camera3d::default(), DepthPrepass, RenderTarget::from(film), fog, Transform::default());
         let camera = world.spawn((camera, ColliderSource { radius: 48.0 })).id();
         let shadows =
             CascadeShadowConfigBuilder { num_cascades: 3, maximum_distance: 150.0, ..default() }.build();
@@ -135,7 +144,8 @@ impl Walk {
         ));
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         world.spawn((terrain, GroundLook::default()));
-        let mut walk = Self { app, camera, path, balls: Vec::new(), next_brush: Instant::now() };
+        let mut walk =
+            Self { app, camera, path, balls: Vec::new(), is_far: false, next_brush: Instant::now() };
         // The ground is ready when its textures are generated and its tiles are shown.
         let start = Instant::now();
         while !walk.is_shown() {
@@ -152,23 +162,58 @@ impl Walk {
         is_painted && tiles.iter(world).count() > 0
     }
 
-    /// Times frames with one more part left out.
-    fn leave_out(&mut self, what: &str, change: fn(&mut Self)) {
-        change(self);
-        let took = (0..PARTIAL).map(|number| self.frame(number, false));
-        report(&format!("    {what}: frames"), took.collect());
+    /// Compares the look with a plain material, round by round, and prints medians of the rounds.
+    fn compare_materials(&mut self, frames: usize) {
+        for has_shadows in [true, false] {
+            self.set_shadows(has_shadows);
+            let shadows = if has_shadows { "shadows" } else { "no shadows" };
+            let mut rounds = [[0.0; ROUNDS]; 3];
+            for round in 0..ROUNDS {
+                for (part, medians) in rounds.iter_mut().enumerate() {
+                    self.set_look(part == 0);
+                    self.is_far = part == 2;
+                    let start = Instant::now();
+                    let is_in_time = |&number: &usize| number < 2 * FIRST_FRAMES || start.elapsed() < ROUND;
+                    let mut took: Vec<_> = (0..FIRST_FRAMES + frames)
+                        .take_while(is_in_time)
+                        .map(|number| self.frame(number, false))
+                        .collect();
+                    took.drain(..FIRST_FRAMES);
+                    took.sort_unstable();
+                    medians[round] = took[took.len() / 2].as_secs_f64() * 1e6;
+                }
+            }
+            let [look, plain, nothing] = rounds.map(|mut medians| {
+                medians.sort_unstable_by(f64::total_cmp);
+                medians[ROUNDS / 2]
+            });
+            println!(
+                "{shadows}: look {look:.0}, plain {plain:.0}, nothing in sight {nothing:.0}; \
+                 look over plain, both less nothing: {:.2}",
+                (look - nothing) / (plain - nothing)
+            );
+        }
+        self.is_far = false;
     }
 
-    fn drop_shadows(&mut self) {
+    /// Gives the terrain its look, or a plain material in place of it.
+    fn set_look(&mut self, has_look: bool) {
         let world = self.app.world_mut();
-        world
-            .query::<&mut DirectionalLight>()
-            .iter_mut(world)
-            .for_each(|mut sun| sun.shadow_maps_enabled = false);
+        let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
+        let plain = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
+        let mut terrain = world.entity_mut(terrain);
+        if has_look {
+            terrain.remove::<MeshMaterial3d<StandardMaterial>>().insert(GroundLook::default());
+        } else {
+            // On the same meshes: without the look they would get colours.
+            terrain.remove::<GroundLook>().insert((MeshMaterial3d(plain), SlimVertices));
+        }
     }
 
-    fn look_away(&mut self) {
-        self.path.iter_mut().for_each(|place| place.y += 1e5);
+    fn set_shadows(&mut self, has_shadows: bool) {
+        let world = self.app.world_mut();
+        let mut suns = world.query::<&mut DirectionalLight>();
+        suns.iter_mut(world).for_each(|mut sun| sun.shadow_maps_enabled = has_shadows);
     }
 
     fn figures(&self) -> BurrowFigures {
@@ -178,8 +223,8 @@ impl Walk {
     /// Draws one frame and returns its time.
     fn frame(&mut self, number: usize, is_digging: bool) -> Duration {
         let start = Instant::now();
-        let at = self.path[number % self.path.len()];
-        let ahead = self.path[(number + 90) % self.path.len()];
+        let up = if self.is_far { 1e5 } else { 0.0 } * Vec3::Y;
+        let [at, ahead] = [number, number + 90].map(|number| self.path[number % self.path.len()] + up);
         let world = self.app.world_mut();
         if let Some(mut camera) = world.get_mut::<Transform>(self.camera) {
             *camera = Transform::from_translation(at + Vec3::Y * 6.0).looking_at(ahead, Vec3::Y);
@@ -210,7 +255,8 @@ fn ground() -> Ground {
     let bytes = std::fs::read(path).expect("the shipped elevation model can be read");
     let image = GreyImage::decode_png(&bytes, &ImageLimits::default()).expect("a grey PNG");
     let scale = ImageScale { voxels_per_sample: 3, low: 0.0, high: 150.0, detail: None };
-    Ground::from_image(&image, &scale).expect("valid ground")
+    let ground = Ground::from_image(&image, &scale).expect("valid ground");
+    ground.with_strata(&Strata::alpine()).expect("valid strata")
 }
 
 /// The position of the walk in each frame: a wide loop at 9 m/s on the ground.

@@ -345,7 +345,7 @@ pub mod prelude {
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
         Field, GroundPiece, HeightmapImage, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Redo,
-        TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile, Undo,
+        SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile, Undo,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,
@@ -353,8 +353,8 @@ pub mod prelude {
     };
     #[cfg(feature = "render")]
     pub use crate::view::{
-        GroundArrays, GroundLayer, GroundLayerImages, GroundLayerKind, GroundLoading, GroundLook,
-        GroundMaterial, GroundQuality, GroundStrata, GroundTextures, TerrainMaterialPlugin,
+        GroundArrays, GroundLayer, GroundLayerImages, GroundLoading, GroundLook, GroundMaterial,
+        GroundQuality, GroundTextures, TerrainMaterialPlugin,
     };
     pub use crate::volume::{DiggingRules, Refused, Scenario};
 }

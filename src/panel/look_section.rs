@@ -15,11 +15,9 @@ pub fn show(ui: &mut Ui, look: &mut GroundLook) {
         }
         slider(ui, "Variety", &mut look.variety, 0.0..=1.0, percent)
             .on_hover_text("How much tints differ from place to place");
-        let slope = "Rise over run at which grass and snow begin to give way, and at which none is left";
-        let (begin, end) = &mut look.cliffs;
-        slider(ui, "Cliff", begin, 0.0..=4.0, |slider| slider.fixed_decimals(2)).on_hover_text(slope);
-        slider(ui, "Bare", end, 0.0..=4.0, |slider| slider.fixed_decimals(2)).on_hover_text(slope);
-        slider(ui, "Beds", &mut look.strata.height, 0.5..=64.0, |slider| metres(slider).logarithmic(true))
-            .on_hover_text("How high strata are, from one to the same again");
+        let far = "Metres from the camera at which textures begin to grow, and from where on they are six times as large";
+        let (begin, end) = &mut look.distance;
+        slider(ui, "Near", begin, 1.0..=500.0, |slider| metres(slider).logarithmic(true)).on_hover_text(far);
+        slider(ui, "Far", end, 1.0..=500.0, |slider| metres(slider).logarithmic(true)).on_hover_text(far);
     });
 }

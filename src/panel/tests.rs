@@ -223,14 +223,14 @@ fn looks_are_set_where_there_is_one() {
     assert!(!screen.places.0.contains_key("Look"));
     screen.controls.look = Some(GroundLook::default());
     screen.frame(Vec::new());
-    for name in ["Look", "Plain", "Variety", "Beds"] {
+    for name in ["Look", "Plain", "Variety", "Far"] {
         let at = screen.middle(name);
         screen.click(at);
         screen.frame(Vec::new());
     }
-    let GroundLook { quality, variety, strata, .. } = screen.controls.look.expect("it is there");
+    let GroundLook { quality, variety, distance, .. } = screen.controls.look.expect("it is there");
     assert_eq!(quality, crate::view::GroundQuality::Low);
-    assert!((0.4..0.6).contains(&variety) && (4.0..8.0).contains(&strata.height), "{variety} {strata:?}");
+    assert!((0.4..0.6).contains(&variety) && (15.0..35.0).contains(&distance.1), "{variety} {distance:?}");
 }
 
 #[test]

@@ -11,12 +11,12 @@ use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
 use super::figures::{TaskTimes, start_measuring, stop_measuring};
 use super::load::Loading;
-use super::meshes::BuiltMesh;
+use super::meshes::{BuiltMesh, VertexExtras};
 use super::processor::{BuiltSurface, SurfaceBuilder};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
-    LoosePieceFound, MaterialColors, SurfaceProcessors, free_later,
+    LoosePieceFound, MaterialColors, SlimVertices, SurfaceProcessors, free_later,
 };
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
@@ -25,7 +25,7 @@ use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &TerrainEntities, Option<&MaterialColors>),
+        (Entity, &mut Terrain, &TerrainEntities, Option<&MaterialColors>, Has<SlimVertices>),
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -36,20 +36,21 @@ pub(super) fn begin_transactions(
     mut counter: ResMut<TaskCounter>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain, entities, colors) in &mut terrains {
+    for (entity, mut terrain, entities, colors, is_slim) in &mut terrains {
         // The game moved a terrain here while a task of another entity ran for it.
         if terrain.waits_for_plugin() {
             terrain.abandon();
         }
         // Changes that the game made itself are shown first.
-        if terrain.queued() == 0 || !entities.show(terrain.world()) {
+        if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.is_slim != is_slim {
             continue;
         }
         let transaction = terrain.begin_for(true);
         send_history(entity, &mut terrain, &mut moved);
         let Some(transaction) = transaction else { continue };
         let engine = terrain.engine().unwrap_or(&engine).clone();
-        let mut builder = SurfaceBuilder::new((entity, &terrain), colors, assets.is_some(), &processors);
+        let extras = VertexExtras::of(colors, is_slim);
+        let mut builder = SurfaceBuilder::new((entity, &terrain), extras, assets.is_some(), &processors);
         builder.revision += 1;
         let task = InFlight::transaction(counter.next(), entity, transaction, engine, builder);
         commands.entity(entity).try_insert(task);

@@ -142,9 +142,17 @@ impl From<&volume::Field> for Field {
     }
 }
 
+/// The meshes of this terrain have vertices of 32 bytes: positions, normals, materials; no colours and no depth in the ground,
+/// which take 20 more. A `GroundLook` brings it and takes it away again; insert it for materials of your own that need neither.
+///
+/// A terrain that gets or loses it loads anew, and its former tiles and chunks stay until then.
+#[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Component, Default)]
+pub struct SlimVertices;
+
 /// The colour of each material id, for the vertex colours of a terrain's meshes; insert it on the terrain's entity. Ids past
-/// its end have the last colour. Materials that sample textures by id, like `GroundMaterial`, ignore it. If it is empty,
-/// meshes have no vertex colours, which saves 16 bytes a vertex.
+/// its end have the last colour. If it is empty, or there are [`SlimVertices`], meshes have no vertex colours, which saves 16
+/// bytes a vertex.
 ///
 /// Only meshes that are built after a change have the new colours, and after its removal none.
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]

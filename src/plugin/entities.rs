@@ -17,6 +17,8 @@ pub struct TerrainEntities {
     pub(super) shown: Version,
     /// Metres along the side of the voxels that they were built for.
     pub(super) voxel_size: f32,
+    /// Were they built with [`SlimVertices`](super::SlimVertices)?
+    pub(super) is_slim: bool,
     drawn: HashMap<Drawn, Entity>,
     fields: HashMap<FieldId, Entity>,
     /// Was [`TerrainReady`] triggered?
@@ -24,10 +26,11 @@ pub struct TerrainEntities {
 }
 
 impl TerrainEntities {
-    pub(super) fn new(shown: Version, voxel_size: f32) -> Self {
+    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool) -> Self {
         Self {
             shown,
             voxel_size,
+            is_slim,
             drawn: HashMap::default(),
             fields: HashMap::default(),
             is_ready_sent: false,

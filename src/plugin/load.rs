@@ -10,10 +10,11 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
+use super::meshes::VertexExtras;
 use super::processor::{BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};
 use super::threads::{ThreadTask, Threads};
-use super::{BurrowSettings, ChunkCreated, MaterialColors, SurfaceProcessors};
+use super::{BurrowSettings, ChunkCreated, MaterialColors, SlimVertices, SurfaceProcessors};
 use crate::lattice::ChunkPos;
 use crate::terrain::{Drawn, Terrain, World};
 
@@ -21,6 +22,7 @@ use crate::terrain::{Drawn, Terrain, World};
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
+    is_slim: bool,
     task: Option<ThreadTask<Vec<BuiltSurface>>>,
     waiting: Vec<BuiltSurface>,
     ready: HashMap<Drawn, Loaded>,
@@ -134,24 +136,51 @@ pub(super) fn remove_with_terrain(
     commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight)>();
 }
 
+/// A terrain that gets slim vertices need not wait for others.
+pub(super) fn drop_other_vertices(
+    new: On<Insert, SlimVertices>,
+    mut commands: Commands,
+    loading: Query<&Loading>,
+) {
+    if loading.get(new.entity).is_ok_and(|loading| !loading.is_slim) {
+        commands.entity(new.entity).try_remove::<Loading>();
+    }
+}
+
+/// Nor one that loses them.
+pub(super) fn drop_slim_vertices(
+    gone: On<Remove, SlimVertices>,
+    mut commands: Commands,
+    loading: Query<&Loading>,
+) {
+    if loading.get(gone.entity).is_ok_and(|loading| loading.is_slim) {
+        commands.entity(gone.entity).try_remove::<Loading>();
+    }
+}
+
 /// Starts the task of each terrain that is new, or whose world the game changed itself: then only the changed surfaces are
 /// built.
 pub(super) fn start_loading(
     mut commands: Commands,
-    mut terrains: Query<(Entity, &mut Terrain, Option<&MaterialColors>, Option<&TerrainEntities>), Idle>,
+    mut terrains: Query<
+        (Entity, &mut Terrain, Option<&MaterialColors>, Has<SlimVertices>, Option<&TerrainEntities>),
+        Idle,
+    >,
     assets: Option<Res<Assets<Mesh>>>,
     processors: Res<SurfaceProcessors>,
     settings: Res<BurrowSettings>,
     mut counter: ResMut<TaskCounter>,
 ) {
-    for (entity, mut terrain, colors, entities) in &mut terrains {
-        if entities.is_some_and(|entities| entities.show(terrain.world())) {
+    for (entity, mut terrain, colors, is_slim, entities) in &mut terrains {
+        let entities_of_kind = entities.filter(|entities| entities.is_slim == is_slim);
+        if entities_of_kind.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
-        let builder = SurfaceBuilder::new((entity, &terrain), colors, assets.is_some(), &processors);
+        let extras = VertexExtras::of(colors, is_slim);
+        let builder = SurfaceBuilder::new((entity, &terrain), extras, assets.is_some(), &processors);
         // For the game this is no change.
         let model = terrain.bypass_change_detection();
-        let unseen = entities.and_then(|entities| model.take_unseen(entities.shown));
+        let unseen = entities_of_kind.and_then(|entities| model.take_unseen(entities.shown));
         // If more has changed than a frame may swap, the terrain is loaded anew over several frames.
         if let Some(unseen) = unseen.filter(|unseen| unseen.len() <= settings.swaps_per_frame) {
             let task = InFlight::unseen(counter.next(), model, unseen, builder);
@@ -164,7 +193,7 @@ pub(super) fn start_loading(
             let world = Arc::clone(&world);
             ThreadTask::start(Threads::Background, move || build_world(&world, &builder))
         });
-        let loading = Loading { world, task, waiting: Vec::new(), ready: HashMap::default() };
+        let loading = Loading { world, is_slim, task, waiting: Vec::new(), ready: HashMap::default() };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -248,7 +277,7 @@ fn show(
     loading: &mut Loading,
 ) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
-    let mut entities = TerrainEntities::new(world.version(), voxel_size);
+    let mut entities = TerrainEntities::new(world.version(), voxel_size, loading.is_slim);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
     for drawn in world.grid().tiles().map(Drawn::Tile).chain(chunks.into_iter().map(Drawn::Chunk)) {

@@ -11,12 +11,14 @@ use bevy::mesh::{
 };
 
 use super::MaterialColors;
-use crate::ground::{ColumnMaterial, Ground, OVERLAY_DEPTH};
+use super::palettes::{Arranged, Palettes};
+use crate::ground::{ColumnMaterial, Ground};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
 
-/// Up to four material ids of a vertex, for materials that look them up.
+/// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have the same ids in the
+/// same order, so a shader may take those of any corner and blend the weights alone.
 pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialIds", 0x6275_7272_6f77_0001, VertexFormat::Uint8x4);
 
@@ -24,30 +26,43 @@ pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
 pub const ATTRIBUTE_MATERIAL_WEIGHTS: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowMaterialWeights", 0x6275_7272_6f77_0002, VertexFormat::Unorm8x4);
 
-/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it.
+/// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not on
+/// terrains with [`SlimVertices`](super::SlimVertices).
 pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
     MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
-
-/// What the ground over or under a vertex was like before anyone dug: how much the overlay of its column covers, and
-/// whether (1) or not (0) the vertex's materials are the ground's own. The other two are 0.
-pub const ATTRIBUTE_GROUND_COVER: MeshVertexAttribute =
-    MeshVertexAttribute::new("Vertex_BurrowGroundCover", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
 
 /// A mesh ready to be swapped in, with its bounds; `None` where nothing is to be drawn.
 pub(crate) type BuiltMesh = Option<(Mesh, Aabb)>;
 
-/// Builds Bevy meshes from surfaces, with the colours and the undug ground of a terrain.
+/// What the vertices of a terrain's meshes have beside positions, normals and materials.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct VertexExtras {
+    /// The depth in the ground.
+    pub has_depth: bool,
+    /// The colours of materials, blended; none if it is empty.
+    pub colors: Vec<LinearRgba>,
+}
+
+impl VertexExtras {
+    /// Those of a terrain with these components.
+    pub(crate) fn of(colors: Option<&MaterialColors>, is_slim: bool) -> Self {
+        if is_slim {
+            return Self::default();
+        }
+        Self { has_depth: true, colors: colors.map_or(Vec::new(), |colors| colors.0.clone()) }
+    }
+}
+
+/// Builds Bevy meshes from surfaces of a terrain.
 #[derive(Clone)]
 pub(crate) struct MeshBuilder {
-    colors: MaterialColors,
+    extras: VertexExtras,
     ground: Arc<Ground>,
 }
 
 impl MeshBuilder {
-    /// Without `colors`, meshes have no vertex colours.
-    pub(crate) fn new(world: &World, colors: Option<&MaterialColors>) -> Self {
-        let colors = colors.cloned().unwrap_or(MaterialColors(Vec::new()));
-        Self { colors, ground: world.shared_ground() }
+    pub(crate) fn new(world: &World, extras: VertexExtras) -> Self {
+        Self { extras, ground: world.shared_ground() }
     }
 
     /// Builds the Bevy mesh of a surface whose positions count from this point, in the task.
@@ -92,11 +107,10 @@ struct Arrays<'a> {
     mesh_builder: &'a MeshBuilder,
     positions: Vec<[f32; 3]>,
     normals: Vec<[f32; 3]>,
-    ids: Vec<[u8; 4]>,
-    weights: Vec<[u8; 4]>,
+    materials: Palettes,
+    /// Empty without depths.
     depths: Vec<f32>,
-    covers: Vec<[u8; 4]>,
-    /// Empty if there are no colours to blend.
+    /// Empty without colours.
     colors: Vec<[f32; 4]>,
     /// The materials that were blended last, and their colour.
     blended: (MaterialMix, [f32; 4]),
@@ -104,29 +118,26 @@ struct Arrays<'a> {
 
 impl<'a> Arrays<'a> {
     fn with_capacity(vertices: usize, mesh_builder: &'a MeshBuilder) -> Self {
-        let blended = (MaterialMix::default(), blend(MaterialMix::default(), &mesh_builder.colors));
+        let VertexExtras { has_depth, colors } = &mesh_builder.extras;
+        let room = |is_there: bool| if is_there { vertices } else { 0 };
         Self {
             mesh_builder,
             positions: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(vertices),
-            ids: Vec::with_capacity(vertices),
-            weights: Vec::with_capacity(vertices),
-            depths: Vec::with_capacity(vertices),
-            covers: Vec::with_capacity(vertices),
-            colors: Vec::with_capacity(if mesh_builder.colors.0.is_empty() { 0 } else { vertices }),
-            blended,
+            materials: Palettes::with_capacity(vertices),
+            depths: Vec::with_capacity(room(*has_depth)),
+            colors: Vec::with_capacity(room(!colors.is_empty())),
+            blended: (MaterialMix::default(), blend(MaterialMix::default(), colors)),
         }
     }
 
     /// Appends vertices whose positions count from some point.
     fn push(&mut self, vertices: &[Vertex], origin: IVec3) {
-        let ground = &*self.mesh_builder.ground;
         self.positions.extend(vertices.iter().map(Vertex::position_f32));
         self.normals.extend(vertices.iter().map(|vertex| vertex.normal.to_array()));
-        for vertex in vertices {
-            let Origin { depth, cover, own } = Origin::of(ground, origin * SNAP, vertex);
-            self.depths.push(depth);
-            self.covers.push([cover, own, 0, 0]);
+        if self.mesh_builder.extras.has_depth {
+            let depth = |vertex: &Vertex| depth(&self.mesh_builder.ground, origin * SNAP + vertex.position);
+            self.depths.extend(vertices.iter().map(depth));
         }
         vertices.iter().for_each(|vertex| self.push_mix(vertex.materials));
     }
@@ -137,101 +148,76 @@ impl<'a> Arrays<'a> {
             let y = height * (SNAP / ONE);
             self.positions.push([x as f32, y as f32 / SNAP as f32, z as f32]);
             self.normals.push(normal.to_array());
-            self.covers.push([Origin::own_cover(material) as u8, u8::MAX, 0, 0]);
             self.push_mix(MaterialMix::column(material));
         }
-        // They lie on the undug surface.
-        self.depths.resize(self.positions.len(), 0.0);
+        if self.mesh_builder.extras.has_depth {
+            // They lie on the undug surface.
+            self.depths.resize(self.positions.len(), 0.0);
+        }
     }
 
     fn push_mix(&mut self, mix: MaterialMix) {
-        self.ids.push(mix.ids);
-        self.weights.push(mix.weights);
-        if !self.mesh_builder.colors.0.is_empty() {
+        self.materials.push(mix);
+        let colors = &self.mesh_builder.extras.colors;
+        if !colors.is_empty() {
             if self.blended.0 != mix {
-                self.blended = (mix, blend(mix, &self.mesh_builder.colors));
+                self.blended = (mix, blend(mix, colors));
             }
             self.colors.push(self.blended.1);
         }
     }
 
-    fn finish(self, indices: &surface::Indices) -> BuiltMesh {
+    fn finish(mut self, indices: &surface::Indices) -> BuiltMesh {
         let first = Vec3::from(*self.positions.first()?);
         let corners =
             |(min, max): (Vec3, Vec3), at: &[f32; 3]| (min.min(Vec3::from(*at)), max.max(Vec3::from(*at)));
         let (min, max) = self.positions.iter().fold((first, first), corners);
+        let Arranged { ids, weights, copies, indices } = self.materials.arrange(indices);
+        copy(&mut self.positions, &copies);
+        copy(&mut self.normals, &copies);
+        copy(&mut self.depths, &copies);
+        copy(&mut self.colors, &copies);
         let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, self.positions)
             .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, self.normals)
-            .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(self.ids))
-            .with_inserted_attribute(
-                ATTRIBUTE_MATERIAL_WEIGHTS,
-                VertexAttributeValues::Unorm8x4(self.weights),
-            )
-            .with_inserted_attribute(ATTRIBUTE_GROUND_DEPTH, self.depths)
-            .with_inserted_attribute(ATTRIBUTE_GROUND_COVER, VertexAttributeValues::Unorm8x4(self.covers))
+            .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
+            .with_inserted_attribute(ATTRIBUTE_MATERIAL_WEIGHTS, VertexAttributeValues::Unorm8x4(weights))
             .with_inserted_indices(match indices {
-                surface::Indices::U16(list) => Indices::U16(list.clone()),
-                surface::Indices::U32(list) => Indices::U32(list.clone()),
+                surface::Indices::U16(list) => Indices::U16(list),
+                surface::Indices::U32(list) => Indices::U32(list),
             });
-        if !self.mesh_builder.colors.0.is_empty() {
+        if self.mesh_builder.extras.has_depth {
+            mesh.insert_attribute(ATTRIBUTE_GROUND_DEPTH, self.depths);
+        }
+        if !self.mesh_builder.extras.colors.is_empty() {
             mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, self.colors);
         }
         Some((mesh, Aabb::from_min_max(min, max)))
     }
 }
 
-/// Where a vertex lies in the undug ground. It depends only on the position and materials of the vertex, so both sides of a
-/// seam get the same bits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Origin {
-    /// Voxels below the pristine surface; above it less than 0.
-    depth: f32,
-    /// How much the column's overlay covers.
-    cover: u8,
-    /// 255 if the materials are the ground's own, 0 if others were built or painted.
-    own: u8,
+/// Appends copies of some values; nothing if there are no values.
+fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
+    let copies: Vec<T> = of.iter().filter_map(|&at| values.get(at as usize).copied()).collect();
+    values.extend(copies);
 }
 
-impl Origin {
-    /// The origin of a vertex of a mesh whose own origin is given in 1/4096 voxel.
-    fn of(ground: &Ground, origin: IVec3, vertex: &Vertex) -> Self {
-        let place = origin + vertex.position;
-        let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-        // A vertex lies on an edge of the lattice, so only one of these is not 0.
-        let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
-        let next = column.offset(i32::from(x > 0), i32::from(z > 0));
-        let step = i64::from(x.max(z));
-        let between = |low: i32, high: i32| {
-            i64::from(low) * i64::from(SNAP) + (i64::from(high) - i64::from(low)) * step
-        };
-        let height = between(ground.height(column), ground.height(next));
-        let depth = height - i64::from(place.y) * i64::from(ONE);
-        let depth = depth as f32 / (SNAP * ONE) as f32;
-        let materials = [column, next].map(|column| ground.column_material(column));
-        let [here, there] = materials.map(Self::own_cover);
-        let cover = between(here, there) / i64::from(SNAP);
-        let is_skin = depth <= OVERLAY_DEPTH as f32 / ONE as f32;
-        let is_own = |id: u8| {
-            materials.iter().any(|material| material.base.0 == id || (is_skin && material.overlay.0 == id))
-        };
-        let mix = vertex.materials;
-        // Strata of the ground's are drawn as they are, without those of the look.
-        let own = !ground.has_own_materials()
-            && mix.ids.iter().zip(mix.weights).all(|(&id, weight)| weight == 0 || is_own(id));
-        Self { depth, cover: cover.clamp(0, 255) as u8, own: if own { 255 } else { 0 } }
-    }
-
-    /// How much a column's overlay covers: nothing if it is the same as the base.
-    fn own_cover(material: ColumnMaterial) -> i32 {
-        i32::from(if material.base == material.overlay { 0 } else { material.blend })
-    }
+/// How many voxels a vertex, in 1/4096 voxel of the terrain, lies below the pristine surface; above it less than 0. It depends
+/// on the position alone, so both sides of a seam get the same bits.
+fn depth(ground: &Ground, place: IVec3) -> f32 {
+    let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
+    // A vertex lies on an edge of the lattice, so only one of these is not 0.
+    let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
+    let next = column.offset(i32::from(x > 0), i32::from(z > 0));
+    let [here, there] = [column, next].map(|column| i64::from(ground.height(column)));
+    let height = here * i64::from(SNAP) + (there - here) * i64::from(x.max(z));
+    (height - i64::from(place.y) * i64::from(ONE)) as f32 / (SNAP * ONE) as f32
 }
 
 /// The mixed colour of a vertex.
-fn blend(mix: MaterialMix, colors: &MaterialColors) -> [f32; 4] {
+fn blend(mix: MaterialMix, colors: &[LinearRgba]) -> [f32; 4] {
     let color = |id: u8| {
-        let known = colors.0.get(usize::from(id)).or(colors.0.last());
+        let known = colors.get(usize::from(id)).or(colors.last());
         known.copied().unwrap_or(LinearRgba::WHITE).to_f32_array()
     };
     let mut sum = [0.0; 4];
@@ -282,12 +268,11 @@ mod tests {
         );
         let mut deepest: f32 = 0.0;
         for (is_tile, origin, vertex) in drawn(terrain.world()) {
-            let found = Origin::of(terrain.world().ground(), origin, &vertex);
+            let found = depth(terrain.world().ground(), origin + vertex.position);
             let y = (origin.y + vertex.position.y) as f32 / SNAP as f32;
-            assert_eq!(found.depth, 10.5 - y);
-            assert_eq!((found.cover, found.own), (255, 255));
-            assert!(!is_tile || found.depth == 0.0);
-            deepest = deepest.max(found.depth);
+            assert_eq!(found, 10.5 - y);
+            assert!(!is_tile || found == 0.0);
+            deepest = deepest.max(found);
         }
         assert!((6.0..7.0).contains(&deepest), "{deepest}");
     }
@@ -298,56 +283,29 @@ mod tests {
         let ground = Ground::from_noise(64, 64, &noise).unwrap();
         let place = Vec3::new(31.0, ground.height(Column::new(31, 30)) as f32 / ONE as f32, 30.0);
         let terrain = dug(ground, &[Brush::dig(Shape::sphere(place, 7.0))]);
-        let bits = |origin: Origin| (origin.depth.to_bits(), origin.cover, origin.own);
         let vertices = drawn(terrain.world());
         let of = |wanted: bool| {
             vertices.iter().filter(move |(is_tile, ..)| *is_tile == wanted).map(|(_, origin, vertex)| {
-                let found = Origin::of(terrain.world().ground(), *origin, vertex);
-                ((*origin + vertex.position).to_array(), found)
+                let place = *origin + vertex.position;
+                (place.to_array(), depth(terrain.world().ground(), place))
             })
         };
-        let tiles: std::collections::BTreeMap<[i32; 3], Origin> = of(true).collect();
+        let tiles: std::collections::BTreeMap<[i32; 3], f32> = of(true).collect();
         let shared: Vec<_> =
             of(false).filter_map(|(at, own)| tiles.get(&at).map(|other| (own, *other))).collect();
         assert!(shared.len() > 30, "only {} shared vertices", shared.len());
         for (own, other) in shared {
-            assert_eq!(bits(own), bits(other));
-            assert!(own.depth.abs() < 1.0 / 64.0, "{own:?} is on the surface");
+            assert_eq!(own.to_bits(), other.to_bits());
+            assert!(own.abs() < 1.0 / 64.0, "{own} is on the surface");
         }
     }
 
     #[test]
     fn colours_are_blended_by_weight() {
-        let colors = MaterialColors(vec![LinearRgba::RED, LinearRgba::GREEN]);
+        let colors = [LinearRgba::RED, LinearRgba::GREEN];
         let mix = MaterialMix { ids: [0, 9, 0, 0], weights: [51, 204, 0, 0] };
         for (found, expected) in blend(mix, &colors).into_iter().zip([0.2, 0.8, 0.0, 1.0]) {
             assert!((found - expected).abs() < 1e-6, "{found} is not {expected}");
-        }
-    }
-
-    #[test]
-    fn covers_are_blended_along_an_edge() {
-        let mask = GreyImage::from_samples(65, 65, (0..65 * 65).map(|index| index % 2 * u16::MAX).collect());
-        let checkers =
-            MaterialControl::Blend { mask: mask.unwrap(), base: MaterialId(0), overlay: MaterialId(1) };
-        let ground = Ground::flat(64, 64, 8.0).unwrap().with_materials(&checkers).unwrap();
-        let cover = |x: i32, z: i32| {
-            let place = IVec3::new(10 * SNAP + x, 8 * SNAP, 10 * SNAP + z);
-            let materials = MaterialMix::pure(MaterialId(0));
-            Origin::of(&ground, IVec3::ZERO, &Vertex { position: place, normal: Vec3::Y, materials }).cover
-        };
-        assert_eq!([cover(0, 0), cover(SNAP, 0), cover(0, SNAP)], [0, 255, 255]);
-        assert_eq!([cover(SNAP / 4, 0), cover(0, SNAP / 4), cover(SNAP + SNAP / 4, 0)], [63, 63, 191]);
-    }
-
-    #[test]
-    fn what_was_painted_is_not_the_grounds_own() {
-        let spot = Shape::sphere(Vec3::new(32.0, 10.0, 32.0), 4.0);
-        let terrain = dug(Ground::flat(64, 64, 10.5).unwrap(), &[Brush::paint(spot, MaterialId(5))]);
-        for (_, origin, vertex) in drawn(terrain.world()) {
-            let found = Origin::of(terrain.world().ground(), origin, &vertex);
-            let is_painted = vertex.materials.ids[0] == 5;
-            assert_eq!(found.own, if is_painted { 0 } else { 255 });
         }
     }
 
@@ -369,7 +327,8 @@ mod tests {
             let ground = Ground::from_noise(70, 60, &noise).unwrap().with_materials(&control).unwrap();
             let settings = TerrainSettings { chunk_size, ..TerrainSettings::default() };
             let mut terrain = Terrain::new(ground, &settings).unwrap();
-            let builders = [None, Some(&colors)].map(|colors| MeshBuilder::new(terrain.world(), colors));
+            let builders = [true, false]
+                .map(|is_slim| MeshBuilder::new(terrain.world(), VertexExtras::of(Some(&colors), is_slim)));
             let mut compared = 0;
             for i in 0..9 {
                 let place = Vec3::new((i * 23 % 71) as f32, (i * 7 % 12) as f32, (i * 31 % 61) as f32);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 
 use super::MaterialColors;
-use super::meshes::MeshBuilder;
+use super::meshes::{MeshBuilder, VertexExtras};
 use crate::brush::Brush;
 use crate::terrain::{HistoryReceipt, LoosePiece, Receipt, Terrain};
 
@@ -103,7 +103,7 @@ impl LoosePieceFound {
         if let Some(mesh) = &self.mesh {
             return Some(Mesh::clone(mesh));
         }
-        self.build(&MeshBuilder::new(terrain.world(), Some(colors)))
+        self.build(&MeshBuilder::new(terrain.world(), VertexExtras::of(Some(colors), false)))
     }
 
     fn build(&self, mesh_builder: &MeshBuilder) -> Option<Mesh> {

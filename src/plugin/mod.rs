@@ -29,6 +29,7 @@ mod heightmap;
 mod load;
 mod meshes;
 mod messages;
+mod palettes;
 mod processor;
 mod propagate;
 mod query;
@@ -38,7 +39,7 @@ mod task;
 mod threads;
 mod times;
 
-pub use components::{Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, Tile};
+pub use components::{Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, SlimVertices, Tile};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};
 pub use figures::BurrowFigures;
@@ -46,7 +47,7 @@ pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
 pub use meshes::{
-    ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
+    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
 };
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
@@ -136,6 +137,8 @@ impl Plugin for TerrainPlugin {
             .add_observer(collect::enable_loose_search)
             .add_observer(collect::disable_loose_search)
             .add_observer(load::remove_with_terrain)
+            .add_observer(load::drop_other_vertices)
+            .add_observer(load::drop_slim_vertices)
             .configure_sets(
                 Update,
                 (

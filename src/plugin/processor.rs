@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::meshes::{BuiltMesh, MeshBuilder};
-use super::{MaterialColors, ShownSurface};
+use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
+use super::ShownSurface;
 use crate::lattice::{ChunkGrid, ItemCost, parallel_map_into};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, SurfaceDraft, Terrain};
@@ -152,7 +152,7 @@ impl SurfaceBuilder {
     /// A builder for the terrain's world as it is now.
     pub fn new(
         (entity, terrain): (Entity, &Terrain),
-        colors: Option<&MaterialColors>,
+        extras: VertexExtras,
         has_meshes: bool,
         processors: &SurfaceProcessors,
     ) -> Self {
@@ -162,7 +162,7 @@ impl SurfaceBuilder {
             voxel_size: terrain.voxel_size(),
             grid: world.grid(),
             revision: world.revision(),
-            mesh_builder: has_meshes.then(|| MeshBuilder::new(world, colors)),
+            mesh_builder: has_meshes.then(|| MeshBuilder::new(world, extras)),
             processors: processors.clone(),
         }
     }

@@ -7,7 +7,7 @@
 //! # use bevy::prelude::*;
 //! # use bevy_burrow::prelude::*;
 //! # fn setup(mut commands: Commands, terrain: Terrain) {
-//! commands.spawn((terrain, GroundLook { quality: GroundQuality::Low, cliffs: (0.8, 1.4), ..default() }));
+//! commands.spawn((terrain, GroundLook { quality: GroundQuality::Low, variety: 0.3, ..default() }));
 //! # }
 //! fn loading(loading: Res<GroundLoading>) {
 //!     if let Some(failure) = loading.failure() {
@@ -39,8 +39,7 @@ pub mod ground;
 mod material;
 
 pub use ground::{
-    GroundArrays, GroundArraysError, GroundLayer, GroundLayerImages, GroundLayerKind, GroundLoading,
-    GroundLook, GroundMaterial, GroundPlugin, GroundQuality, GroundStrata, GroundTextures,
-    GroundTexturesError,
+    GroundArrays, GroundArraysError, GroundLayer, GroundLayerImages, GroundLoading, GroundLook,
+    GroundMaterial, GroundPlugin, GroundQuality, GroundTextures, GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;

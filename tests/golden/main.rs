@@ -29,6 +29,7 @@ mod sameness;
 #[path = "../../examples/shared/shaders.rs"]
 mod shaders;
 mod studio;
+mod truth;
 mod tunnel;
 mod ways;
 
@@ -50,6 +51,7 @@ fn ground_looks_as_approved() {
     own_textures::shoot(&mut studio, &mut album);
     return_of_ground::shoot(&mut studio, &mut album);
     pieces::shoot(&mut studio, &mut album);
+    truth::shoot(&mut studio, &mut album);
     album.close();
 }
 

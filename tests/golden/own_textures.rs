@@ -10,7 +10,7 @@ use crate::landscape::hills;
 use crate::studio::Studio;
 
 /// The number of layers that the default look names.
-const LAYERS: usize = 14;
+const LAYERS: usize = 16;
 
 /// Textures of a single colour, with all mip levels.
 fn plain(studio: &mut Studio, texel: [u8; 4]) -> GroundTextures {
@@ -23,7 +23,7 @@ fn plain(studio: &mut Studio, texel: [u8; 4]) -> GroundTextures {
 }
 
 /// Draws the ground with these textures from now on.
-fn set_textures(studio: &mut Studio, textures: GroundTextures) {
+pub fn set_textures(studio: &mut Studio, textures: GroundTextures) {
     studio.app.world_mut().insert_resource(textures);
     studio.app.update();
     studio.until("textures", |app| app.world().resource::<GroundLoading>().is_ready());

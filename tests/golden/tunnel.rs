@@ -9,9 +9,8 @@ use crate::studio::Studio;
 /// Digs a cutting, and from it a gallery into the ground; returns its mouth, bend and end.
 pub fn dig(studio: &mut Studio) -> [Vec3; 3] {
     let noise = NoiseHeights { seed: 3, scale: 90.0, amplitude: 10.0, octaves: 4, ..default() };
-    let skin = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
     let ground = Ground::from_noise(128, 128, &noise)
-        .and_then(|ground| ground.with_materials(&MaterialControl::Uniform(skin)))
+        .and_then(|ground| ground.with_strata(&Strata::mine()))
         .expect("valid ground");
     studio.terrain(ground, GroundLook::default());
     let top = studio.height(64.0, 30.0);

@@ -188,3 +188,42 @@ fn vertex_colours_are_those_of_the_terrain() {
         .collect();
     assert!(!colors.is_empty() && colors.iter().all(|&color| color == red.to_f32_array()));
 }
+
+/// Bytes a vertex of each mesh that is shown takes.
+fn vertex_bytes(stage: &mut Stage) -> Vec<u64> {
+    let world = stage.app.world_mut();
+    let mut drawn = world.query_filtered::<&Mesh3d, Or<(With<Tile>, With<Chunk>)>>();
+    let handles: Vec<_> = drawn.iter(world).map(|mesh| mesh.0.clone()).collect();
+    let meshes = world.resource::<Assets<Mesh>>();
+    handles.iter().map(|handle| meshes.get(handle).expect("it is shown").get_vertex_size()).collect()
+}
+
+#[test]
+fn a_look_brings_slim_vertices_and_takes_them_away() {
+    let look = bevy_burrow::view::GroundPlugin;
+    let mut stage =
+        Stage::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, look));
+    let terrain = stage.show(level(1.0));
+    let all_have = |stage: &mut Stage, bytes: u64, when: &str| {
+        stage.send(dig(30.0, 8.0, 30.0, 4.0));
+        stage.settle();
+        stage.assert_whole(terrain, when);
+        let found = vertex_bytes(stage);
+        assert!(found.len() > 1 && found.iter().all(|&own| own == bytes), "{when}: {found:?}");
+    };
+    all_have(&mut stage, 52, "before");
+    stage.app.world_mut().entity_mut(terrain).insert(GroundLook::default());
+    all_have(&mut stage, 32, "with a look");
+    // One look in place of another one changes nothing.
+    stage.app.world_mut().entity_mut(terrain).remove::<GroundLook>().insert(GroundLook::default());
+    all_have(&mut stage, 32, "with another look");
+    stage.app.world_mut().entity_mut(terrain).remove::<GroundLook>();
+    all_have(&mut stage, 52, "after");
+    // While it loads.
+    stage.app.world_mut().entity_mut(terrain).insert(SlimVertices);
+    stage.frame();
+    stage.app.world_mut().entity_mut(terrain).remove::<SlimVertices>();
+    stage.frame();
+    stage.app.world_mut().entity_mut(terrain).insert(SlimVertices);
+    all_have(&mut stage, 32, "after changes of mind");
+}

@@ -278,8 +278,8 @@ mod tests {
             [albedo[last], albedo[last + 1], albedo[last + 2]]
         };
         // The last two are the same rocks from above.
-        let means: Vec<_> = RECIPES[..12].iter().map(mean).collect();
-        let from_above = [(9, 12), (10, 13)].map(|(wall, floor)| (means[wall], mean(&RECIPES[floor])));
+        let means: Vec<_> = RECIPES[..14].iter().map(mean).collect();
+        let from_above = [(9, 14), (10, 15)].map(|(wall, floor)| (means[wall], mean(&RECIPES[floor])));
         for (wall, floor) in from_above {
             assert!(wall.iter().zip(floor).all(|(a, b)| a.abs_diff(b) < 10), "{wall:?} is not {floor:?}");
         }

@@ -243,10 +243,10 @@ mod tests {
         let terrain = Entity::PLACEHOLDER;
         let look = GroundLook::default();
         let find = |counts| ArrayMismatch::find(counts, [(terrain, &look)].into_iter());
-        assert_eq!(find([14, 12]), Some(ArrayMismatch::Unequal { albedo: 14, relief: 12 }));
-        // Twelve layers, and two that are seen from above.
-        assert_eq!(find([13, 13]), Some(ArrayMismatch::TooFew { layers: 13, terrain, named: 14 }));
-        assert_eq!(find([14, 14]), None);
+        assert_eq!(find([16, 14]), Some(ArrayMismatch::Unequal { albedo: 16, relief: 14 }));
+        // Fourteen layers, and two that are seen from above.
+        assert_eq!(find([15, 15]), Some(ArrayMismatch::TooFew { layers: 15, terrain, named: 16 }));
+        assert_eq!(find([16, 16]), None);
         assert_eq!(find([20, 20]), None);
     }
 }

@@ -29,8 +29,8 @@ struct Layer {
     per_metre: f32,
     relief: f32,
     metallic: f32,
-    // 0 body, 1 skin, 2 strata.
-    kind: f32,
+    // 1 if the texture is cut into pieces, so that it does not repeat.
+    pieces: f32,
 }
 
 struct Tint {
@@ -43,30 +43,12 @@ struct Ground {
     place: mat4x4<f32>,
     layers: array<Layer, 16>,
     tints: array<Tint, 16>,
-    soil_layer: f32,
-    subsoil_layer: f32,
-    soil_depth: f32,
-    subsoil_depth: f32,
-    beds: vec4<f32>,
-    bed_height: f32,
-    bend: f32,
-    seam_layer: f32,
-    seam_thickness: f32,
-    seam_depth: f32,
-    vein_layer: f32,
-    vein_thickness: f32,
-    vein_depth: f32,
-    // Cosines of the slopes on which no skin is left, and where it begins to give way.
-    bare: f32,
-    skinned: f32,
     near: f32,
     far: f32,
     variety: f32,
-    quality: f32,
-    // Metres of a voxel.
-    voxel: f32,
     layer_count: f32,
     is_piece: u32,
+    voxel: f32,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(100) var<uniform> ground: Ground;
@@ -84,64 +66,29 @@ struct Vertex {
 #ifdef GROUND_ATTRIBUTES
     @location(8) ids: vec4<u32>,
     @location(9) weights: vec4<f32>,
-    @location(10) depth: f32,
-    @location(11) cover: vec4<f32>,
 #endif
 }
 
 struct Varying {
-    @builtin(position) position: vec4<f32>,
+    @invariant @builtin(position) position: vec4<f32>,
     @location(0) world_position: vec4<f32>,
     @location(1) world_normal: vec3<f32>,
     @location(2) @interpolate(flat) instance_index: u32,
 #ifdef VISIBILITY_RANGE_DITHER
     @location(3) @interpolate(flat) visibility_range_dither: i32,
 #endif
+    // By how much the tint and the brightness of this place differ from the layer's.
+    @location(4) mood: vec2<f32>,
 #ifdef GROUND_ATTRIBUTES
-    // Depth in metres, cover, own.
-    @location(4) origin: vec3<f32>,
-    // The weight of each layer.
-    @location(5) weights_0: vec4<f32>,
-    @location(6) weights_1: vec4<f32>,
-    @location(7) weights_2: vec4<f32>,
-    @location(8) weights_3: vec4<f32>,
+    // Up to four layers, the same at all corners of a triangle, and the weight of each.
+    @location(5) @interpolate(flat) layers: vec4<u32>,
+    @location(6) weights: vec4<f32>,
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
     @location(9) previous_world_position: vec4<f32>,
 #endif
 #endif
-}
-
-// The weight of each of sixteen layers. No arrays: with an index that is known only at run time, they live in memory.
-struct Mass {
-    a: vec4<f32>,
-    b: vec4<f32>,
-    c: vec4<f32>,
-    d: vec4<f32>,
-}
-
-// `weight` at `layer` of four layers from `first` on.
-fn at_layer(layer: u32, first: u32, weight: f32) -> vec4<f32> {
-    return select(vec4(0.0), vec4(weight), vec4(layer) == vec4(first, first + 1u, first + 2u, first + 3u));
-}
-
-fn put(mass: Mass, layer: u32, weight: f32) -> Mass {
-    return Mass(
-        mass.a + at_layer(layer, 0u, weight),
-        mass.b + at_layer(layer, 4u, weight),
-        mass.c + at_layer(layer, 8u, weight),
-        mass.d + at_layer(layer, 12u, weight),
-    );
-}
-
-fn kinds_from(first: u32) -> vec4<f32> {
-    return vec4(
-        ground.layers[first].kind,
-        ground.layers[first + 1u].kind,
-        ground.layers[first + 2u].kind,
-        ground.layers[first + 3u].kind,
-    );
 }
 
 // From world space to metres of the terrain, as it was when the mesh was part of it.
@@ -157,6 +104,11 @@ fn place_from_world(instance_index: u32) -> mat4x4<f32> {
     return ground.place * local_from_world;
 }
 
+// Noise in space, about -1 to 1, four kinds of it.
+fn noise_at(place: vec3<f32>, metres: f32) -> vec4<f32> {
+    return textureSampleLevel(noise_texture, noise_sampler, place / metres, 0.0) * 2.0 - 1.0;
+}
+
 @vertex
 fn vertex(in: Vertex) -> Varying {
     var out: Varying;
@@ -169,19 +121,14 @@ fn vertex(in: Vertex) -> Varying {
     out.visibility_range_dither =
         mesh_functions::get_visibility_range_dither_level(in.instance_index, world_from_local[3]);
 #endif
+    // This noise changes little from one vertex to the next.
+    let place = (place_from_world(in.instance_index) * out.world_position).xyz;
+    let broad = noise_at(place, 150.0);
+    let fine = noise_at(place, 27.0);
+    out.mood = vec2(clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0), fine.z) * ground.variety;
 #ifdef GROUND_ATTRIBUTES
-    out.origin = vec3(in.depth * ground.voxel, in.cover.xy);
-    // Ids can't be blended between vertices; weights of layers can.
-    let ids = min(in.ids, vec4(u32(ground.layer_count) - 1u));
-    var mass = Mass(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
-    mass = put(mass, ids.x, in.weights.x);
-    mass = put(mass, ids.y, in.weights.y);
-    mass = put(mass, ids.z, in.weights.z);
-    mass = put(mass, ids.w, in.weights.w);
-    out.weights_0 = mass.a;
-    out.weights_1 = mass.b;
-    out.weights_2 = mass.c;
-    out.weights_3 = mass.d;
+    out.layers = min(in.ids, vec4(u32(ground.layer_count) - 1u));
+    out.weights = in.weights;
 #endif
 #ifdef PREPASS_PIPELINE
 #ifdef MOTION_VECTOR_PREPASS
@@ -192,8 +139,14 @@ fn vertex(in: Vertex) -> Varying {
     return out;
 }
 
-// How much coarser colours are far away.
+// How much coarser colours are far away, and how rough the ground is there.
 const FAR_BLUR: f32 = 3.0;
+const FAR_ROUGHNESS: f32 = 0.92;
+
+// Sides from which textures are laid on: along x, y, z.
+const X: u32 = 0u;
+const Y: u32 = 1u;
+const Z: u32 = 2u;
 
 // A place on the ground, as far as textures care.
 struct Site {
@@ -202,27 +155,59 @@ struct Site {
     dx: vec3<f32>,
     dy: vec3<f32>,
     normal: vec3<f32>,
-    // Weights of the sides from which textures are laid on: along x, y, z.
-    sides: vec3<f32>,
+    // The side that the ground faces most, the next one, and how much that one shows: 0 to 0.5.
+    side: u32,
+    next_side: u32,
+    next_weight: f32,
     // 0 near, 1 far.
     far: f32,
 }
 
-// What textures say, weighted: colour and height; occlusion and roughness; by how much the normal leans.
+// What textures say: colour and height; occlusion and roughness; by how much the normal leans.
 struct Texels {
     color: vec4<f32>,
     finish: vec2<f32>,
     lean: vec3<f32>,
 }
 
+fn mix_texels(a: Texels, b: Texels, share: f32) -> Texels {
+    return Texels(mix(a.color, b.color, share), mix(a.finish, b.finish, share), mix(a.lean, b.lean, share));
+}
+
+// How a direction runs in the texture of a side: upright on walls, v runs down.
+fn on_side(v: vec3<f32>, side: u32) -> vec2<f32> {
+    return select(select(vec2(v.x, -v.y), v.xz, side == Y), vec2(v.z, -v.y), side == X);
+}
+
+// The other way round.
+fn off_side(v: vec2<f32>, side: u32) -> vec3<f32> {
+    return select(select(vec3(v.x, -v.y, 0.0), vec3(v.x, 0.0, v.y), side == Y), vec3(0.0, -v.y, v.x), side == X);
+}
+
+// The sides from which the ground at a place shows textures.
+fn face(site: ptr<function, Site>) {
+    var sides = (*site).normal * (*site).normal;
+    sides = sides * sides;
+    sides = sides * sides;
+    let is_y = sides.y >= max(sides.x, sides.z);
+    let is_x = !is_y && sides.x >= sides.z;
+    let first = max(max(sides.x, sides.y), sides.z);
+    let last = min(min(sides.x, sides.y), sides.z);
+    let next = sides.x + sides.y + sides.z - first - last;
+    (*site).side = select(select(Z, X, is_x), Y, is_y);
+    // The side that is neither the first nor the last one.
+    let is_next_x = !is_x && sides.x > select(sides.y, sides.z, is_y);
+    let is_next_y = !is_y && !is_next_x && select(sides.x, sides.z, is_x) <= sides.y;
+    (*site).next_side = select(select(Z, X, is_next_x), Y, is_next_y);
+    // Less what the last one has, so that none comes or goes with a jump.
+    let share = (next - last) / max(first + next - 2.0 * last, 0.00001);
+    (*site).next_weight = max(share - 0.12, 0.0) / 0.76;
+}
+
 // What one side of one layer says.
 struct Pair {
     albedo: vec4<f32>,
     relief: vec4<f32>,
-}
-
-fn is_fine() -> bool {
-    return ground.quality > 0.5;
 }
 
 // A layer's colour and height.
@@ -274,8 +259,9 @@ fn fetch_pieces(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair
     var weights = vec3(-rest * sign, upper - part.y * sign, upper - part.x * sign);
     // Narrow borders: what is mixed loses contrast, and most pixels need one piece only.
     weights = weights * weights;
-    weights = weights * weights * weights;
-    weights = max(weights / (weights.x + weights.y + weights.z) - 0.07, vec3(0.0));
+    weights = weights * weights;
+    weights = weights * weights;
+    weights = max(weights / (weights.x + weights.y + weights.z) - 0.1, vec3(0.0));
     weights /= weights.x + weights.y + weights.z;
     var sum = Pair(vec4(0.0), vec4(0.0));
     for (var i = 0; i < 3; i++) {
@@ -288,283 +274,106 @@ fn fetch_pieces(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>) -> Pair
     return sum;
 }
 
-// A layer laid on from one side. One that is bedded is not turned, far away, on walls: its beds stay level.
-fn fetch_side(layer: i32, uv: vec2<f32>, dx: vec2<f32>, dy: vec2<f32>, far: f32, is_level: bool) -> Pair {
-    var sum = Pair(vec4(0.0), vec4(0.0));
-    if far < 1.0 {
-        if is_fine() {
-            sum = add(sum, fetch_pieces(layer, uv, dx, dy), 1.0 - far);
-        } else {
-            sum = add(sum, fetch(layer, uv, dx, dy), 1.0 - far);
-        }
-    }
-    if far > 0.0 {
-        // Six times as large, and turned, so that it does not repeat along with the near one.
-        let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_level);
-        let turn = mat2x2<f32>(way.x, way.y, -way.y, way.x);
-        let scale = turn * (1.0 / 6.0);
-        let at = scale * uv;
-        let at_dx = scale * dx;
-        let at_dy = scale * dy;
-        // Colours from coarser levels: joints six times as large as they are would be seen as what they are.
-        let large = Pair(
-            albedo_at(layer, at, FAR_BLUR * at_dx, FAR_BLUR * at_dy),
-            relief_at(layer, at, at_dx, at_dy),
-        );
-        // The relief is turned back; far away it is half of it.
-        let lean = (large.relief.xy - 0.5) * turn * 0.6 + 0.5;
-        sum = add(sum, Pair(large.albedo, vec4(lean, large.relief.zw)), far);
-    }
-    return sum;
-}
-
-// The sine of the slope and not its tangent: up to 45 degrees, and not up to walls that turn away from lamp and eye.
-fn lean_of(relief: vec4<f32>) -> vec2<f32> {
-    return relief.xy * 2.0 - 1.0;
-}
-
-// A layer from all sides that show.
-fn layer_at(layer: u32, site: Site) -> Texels {
+// A layer near the camera, laid on from one side.
+fn near_side(layer: u32, side: u32, site: Site) -> Texels {
     let settings = ground.layers[layer];
-    // What shows from above and below, if that is another one: then this one is bedded.
+    let uv = on_side(site.place, side) * settings.per_metre;
+    let dx = on_side(site.dx, side) * settings.per_metre;
+    let dy = on_side(site.dy, side) * settings.per_metre;
+    let texture = texture_of(layer, side);
+    var pair: Pair;
+#ifdef GROUND_FINE
+    if settings.pieces > 0.5 {
+        pair = fetch_pieces(texture, uv, dx, dy);
+    } else {
+        pair = fetch(texture, uv, dx, dy);
+    }
+#else
+    pair = fetch(texture, uv, dx, dy);
+#endif
+    // The sine of the slope and not its tangent: up to 45 degrees, and not up to walls that turn away from lamp and eye.
+    let lean = (pair.relief.xy * 2.0 - 1.0) * settings.relief;
+    return Texels(pair.albedo, pair.relief.zw, off_side(lean, side));
+}
+
+// A layer far from the camera, laid on from one side: its colours alone, six times as large.
+fn far_side(layer: u32, side: u32, site: Site) -> vec4<f32> {
+    let scale = ground.layers[layer].per_metre / 6.0;
+    // Turned, so that large and small do not lie alike; but bedded rock keeps its beds level.
+    let way = select(vec2(0.8, 0.6), vec2(1.0, 0.0), is_bedded(layer) && side != Y);
+    let turn = mat2x2<f32>(way.x, way.y, -way.y, way.x);
+    // From coarser levels: joints six times as large as they are would be seen as what they are.
+    let size = f32(textureDimensions(albedo_texture).x) * scale * FAR_BLUR;
+    let level = 0.5 * log2(max(dot(site.dx, site.dx), dot(site.dy, site.dy))) + log2(size);
+    return textureSampleLevel(albedo_texture, noise_sampler, turn * on_side(site.place, side) * scale, texture_of(layer, side), level);
+}
+
+// Another texture shows from above: the layer's own has beds.
+fn is_bedded(layer: u32) -> bool {
     let top = ground.tints[layer].top;
-    let is_bedded = top >= 0.0 && top < f32(textureNumLayers(albedo_texture));
-    let place = site.place * settings.per_metre;
-    let dx = site.dx * settings.per_metre;
-    let dy = site.dy * settings.per_metre;
-    var texels = Texels(vec4(0.0), vec2(0.0), vec3(0.0));
-    for (var side = 0; side < 3; side++) {
-        let is_x = side == 0;
-        let is_y = side == 1;
-        let weight = select(select(site.sides.z, site.sides.y, is_y), site.sides.x, is_x);
-        if weight > 0.0 {
-            // Upright on walls: v runs down.
-            let uv = select(select(vec2(place.x, -place.y), place.xz, is_y), vec2(place.z, -place.y), is_x);
-            let uv_dx = select(select(vec2(dx.x, -dx.y), dx.xz, is_y), vec2(dx.z, -dx.y), is_x);
-            let uv_dy = select(select(vec2(dy.x, -dy.y), dy.xz, is_y), vec2(dy.z, -dy.y), is_x);
-            let texture = select(i32(layer), i32(top), is_y && is_bedded);
-            let pair = fetch_side(texture, uv, uv_dx, uv_dy, site.far, is_bedded && !is_y);
-            let lean = lean_of(pair.relief);
-            texels.color += pair.albedo * weight;
-            texels.finish += pair.relief.zw * weight;
-            let up = select(vec3(lean.x, -lean.y, 0.0), vec3(lean.x, 0.0, lean.y), is_y);
-            texels.lean += select(up, vec3(0.0, -lean.y, lean.x), is_x) * weight;
+    return top >= 0.0 && top < f32(textureNumLayers(albedo_texture));
+}
+
+fn texture_of(layer: u32, side: u32) -> i32 {
+    return select(i32(layer), i32(ground.tints[layer].top), side == Y && is_bedded(layer));
+}
+
+// A layer from the sides that show.
+fn layer_at(layer: u32, site: Site) -> Texels {
+    var texels: Texels;
+    if site.far < 1.0 {
+        texels = near_side(layer, site.side, site);
+        if site.next_weight > 0.0 {
+            texels = mix_texels(texels, near_side(layer, site.next_side, site), site.next_weight);
         }
+    }
+    if site.far > 0.0 {
+        var color = far_side(layer, site.side, site);
+        if site.next_weight > 0.0 {
+            color = mix(color, far_side(layer, site.next_side, site), site.next_weight);
+        }
+        texels = mix_texels(texels, Texels(color, vec2(1.0, FAR_ROUGHNESS), vec3(0.0)), site.far);
     }
     texels.color = vec4(texels.color.rgb * ground.tints[layer].color, texels.color.a);
-    texels.lean *= settings.relief;
     return texels;
 }
 
-// Noise in space, about -1 to 1, four kinds of it.
-fn noise_at(place: vec3<f32>, metres: f32) -> vec4<f32> {
-    return textureSampleLevel(noise_texture, noise_sampler, place / metres, 0.0) * 2.0 - 1.0;
-}
-
-// The strongest layers, and how strong; the last weight is that of the first one that is left out.
+// The two strongest layers of a place, and the share of the second one, 0 to 0.5.
 struct Choice {
-    layers: vec3<u32>,
-    weights: vec4<f32>,
+    layers: vec2<u32>,
+    share: f32,
 }
 
-fn offer(choice: Choice, layer: u32, weight: f32) -> Choice {
-    let w = choice.weights;
-    let l = choice.layers;
-    if weight <= w.w {
-        return choice;
-    }
-    let above = vec3(weight) > w.xyz;
-    let weights = vec4(
-        select(w.x, weight, above.x),
-        select(select(w.y, weight, above.y), w.x, above.x),
-        select(select(w.z, weight, above.z), w.y, above.y),
-        select(weight, w.z, above.z),
-    );
-    let layers = vec3(
-        select(l.x, layer, above.x),
-        select(select(l.y, layer, above.y), l.x, above.x),
-        select(select(l.z, layer, above.z), l.y, above.y),
-    );
-    return Choice(layers, weights);
-}
-
-fn offer_four(choice: Choice, first: u32, weights: vec4<f32>) -> Choice {
-    var best = offer(choice, first, weights.x);
-    best = offer(best, first + 1u, weights.y);
-    best = offer(best, first + 2u, weights.z);
-    return offer(best, first + 3u, weights.w);
-}
-
+// Noise moves the borders between layers, but not beyond the next vertex.
+fn choose(in: Varying, place: vec3<f32>) -> Choice {
 #ifdef GROUND_ATTRIBUTES
-// A place on the ground, as far as strata care.
-struct Depth {
-    // Metres below the surface that was there before anyone dug; the same where borders between strata are ragged.
-    sunk: f32,
-    ragged: f32,
-    // Noise there, in space: over the land, over a few steps, and within one, which is 0 on the surface itself.
-    broad: vec4<f32>,
-    fine: vec4<f32>,
-    grit: vec4<f32>,
-}
-
-fn depth_at(site: Site, sunk: f32, broad: vec4<f32>, fine: vec4<f32>) -> Depth {
-    // Borders between strata are ragged, but not at the surface itself.
-    var ragged = sunk;
-    var grit = vec4(0.0);
-    if sunk > 0.0 {
-        let inside = min(1.4 * sunk, 1.0);
-        grit = noise_at(site.place, 5.0) * inside;
-        ragged = max(sunk + 0.7 * grit.x + (0.35 * fine.x + 0.5 * broad.x) * inside, 0.0);
+    let layers = in.layers;
+    var weights = in.weights;
+    if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
+        let patches = clamp(1.0 + 1.5 * noise_at(place, 4.5), vec4(0.15), vec4(2.0));
+        // By the layer's number: its place in the list may be another one in the next mesh.
+        weights *= vec4(patches[layers.x & 3u], patches[layers.y & 3u], patches[layers.z & 3u], patches[layers.w & 3u]);
     }
-    return Depth(sunk, ragged, broad, fine, grit);
-}
-
-// What is left of four layers when the strata have taken what is theirs: of skins, where these are `bare`, and all of the
-// ground's own that stands for strata.
-fn less_strata(weights: vec4<f32>, kinds: vec4<f32>, own: f32, bare: f32) -> vec4<f32> {
-    return weights * (1.0 - select(step(vec4(0.5), kinds) * bare, vec4(own), kinds > vec4(1.5)));
-}
-
-// Soil and subsoil, of all that the strata fill: what lies under a skin, and what is the ground's own body.
-fn soils(depth: Depth, under_skin: f32, body: f32, all: f32, cover: f32) -> vec2<f32> {
-    let covered = max(cover, under_skin / all);
-    let soil_depth = ground.soil_depth * covered * (1.0 + 0.5 * depth.broad.y);
-    let in_soil = 1.0 - smoothstep(0.75 * soil_depth, soil_depth + 0.02, depth.ragged);
-    // Bare rock has no soil on its face.
-    let below = smoothstep(0.02, 0.30, depth.ragged);
-    let soil = in_soil * (under_skin + body * below);
-    let subsoil_depth = soil_depth + ground.subsoil_depth * covered * (1.0 + 0.5 * depth.broad.w);
-    let in_subsoil = (1.0 - in_soil) * (1.0 - smoothstep(0.85 * subsoil_depth, subsoil_depth + 0.05, depth.ragged));
-    let subsoil = step(0.001, ground.subsoil_depth) * in_subsoil * all * below;
-    return vec2(soil, subsoil);
-}
-
-// Where between two repetitions of the beds a place is, from 0 to 1. Beds dip, roll and bend.
-fn within_beds(site: Site, depth: Depth) -> f32 {
-    let flat_place = site.place.xz;
-    let roll = 0.012 * dot(flat_place, vec2(0.8, -0.6))
-        + sin(0.013 * flat_place.x + 1.6 * sin(0.009 * flat_place.y));
-    let up = site.place.y + ground.bend * (roll + 0.7 * depth.broad.z + 0.16 * depth.fine.z);
-    return fract(up / ground.bed_height);
-}
-
-// What of the rock is the seam, which lies in the beds.
-fn seam_in(rock: f32, depth: Depth, within: f32) -> f32 {
-    let off = abs(within - 0.61) * ground.bed_height + 0.15 * depth.fine.x + 0.12 * depth.grit.y;
-    return rock * step(0.001, ground.seam_thickness) * smoothstep(0.8, 1.0, depth.sunk / max(ground.seam_depth, 0.01))
-        * (1.0 - smoothstep(0.30, 0.52, off / max(ground.seam_thickness, 0.001)));
-}
-
-// What of the rock is a vein. Veins are where two kinds of noise cross 0 together: threads in space. They thin out, so that
-// heights of the textures draw their outline.
-fn vein_in(rock: f32, depth: Depth) -> f32 {
-    let thread = length(depth.fine.yw + 0.25 * depth.broad.yw + 0.05 * depth.grit.zw);
-    let width = 0.22 * ground.vein_thickness * smoothstep(-0.1, 0.25, depth.broad.x);
-    return rock * step(0.001, ground.vein_thickness) * smoothstep(0.8, 1.0, depth.sunk / max(ground.vein_depth, 0.01))
-        * (1.0 - smoothstep(0.25, 1.0, thread / max(width, 0.001)));
-}
-
-// Lays rock in four beds, each as thick as noise has it: borders stray from the quarters by up to 0.36 of one.
-fn lay_beds(mass: Mass, rock: f32, depth: Depth, within: f32) -> Mass {
-    let bed = within * 4.0;
-    let quarter = floor(bed);
-    let broad = depth.broad;
-    let borders = clamp(0.8 * vec4(broad.x, broad.w, broad.y, -broad.x), vec4(-0.36), vec4(0.36));
-    let odd = quarter == 1.0 || quarter == 3.0;
-    let below_it = select(select(borders.w, borders.x, odd), select(borders.y, borders.z, odd), quarter >= 2.0);
-    let above_it = select(select(borders.x, borders.y, odd), select(borders.z, borders.w, odd), quarter >= 2.0);
-    let part = bed - quarter;
-    // The nearest border, and the bed below it.
-    let is_low = part < 0.5;
-    let off = select(part - 1.0 - above_it, part - below_it, is_low);
-    let number = u32(quarter + select(4.0, 3.0, is_low)) % 4u;
-    let here = ground.beds[number];
-    let next = ground.beds[(number + 1u) % 4u];
-    let soft = min(0.02 * ground.bed_height, 0.5);
-    let passed = smoothstep(-soft, soft, 0.25 * ground.bed_height * off + 0.7 * soft * depth.grit.x);
-    // Weather leaves a crust, which hides the beds of natural faces in patches.
-    let spread = smoothstep(-0.03, 0.22, 0.8 * broad.y + 0.5 * depth.fine.x);
-    let crust = rock * spread * (1.0 - smoothstep(0.4, 1.6, depth.sunk));
-    let rest = rock - crust;
-    var laid = put(mass, u32(ground.beds.x), crust);
-    laid = put(laid, u32(here), rest * (1.0 - passed));
-    return put(laid, u32(next), rest * passed);
-}
-
-// Puts rock with its seam and veins where it lies.
-fn lay_rock(mass: Mass, rock: f32, site: Site, depth: Depth) -> Mass {
-    let within = within_beds(site, depth);
-    let seam = seam_in(rock, depth, within);
-    let beside_seam = rock - seam;
-    let vein = vein_in(beside_seam, depth);
-    var laid = put(mass, u32(ground.seam_layer), seam);
-    laid = put(laid, u32(ground.vein_layer), vein);
-    return lay_beds(laid, beside_seam - vein, depth, within);
-}
-
-// What vertices say, and below the surface what lies there.
-fn ground_at(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Mass {
-    let given = Mass(in.weights_0, in.weights_1, in.weights_2, in.weights_3);
-    let own = in.origin.z;
-    let cover = in.origin.y;
-    let depth = depth_at(site, max(in.origin.x, 0.0), broad, fine);
-    let steep = 1.0 - smoothstep(ground.bare, ground.skinned, site.normal.y + 0.08 * fine.y);
-    let bare = own * max(steep, smoothstep(0.10, 0.40, depth.ragged));
-    let kinds = Mass(kinds_from(0u), kinds_from(4u), kinds_from(8u), kinds_from(12u));
-    var mass = Mass(
-        less_strata(given.a, kinds.a, own, bare),
-        less_strata(given.b, kinds.b, own, bare),
-        less_strata(given.c, kinds.c, own, bare),
-        less_strata(given.d, kinds.d, own, bare),
-    );
-    // What the strata fill: under turf, and where the ground itself shows.
-    let taken = given.a + given.b + given.c + given.d - (mass.a + mass.b + mass.c + mass.d);
-    let all = dot(taken, vec4(1.0));
-    if all > 0.001 {
-        let body = own * (
-            dot(given.a, step(vec4(1.5), kinds.a)) + dot(given.b, step(vec4(1.5), kinds.b))
-            + dot(given.c, step(vec4(1.5), kinds.c)) + dot(given.d, step(vec4(1.5), kinds.d)));
-        let soil = soils(depth, max(all - body, 0.0), body, all, cover);
-        mass = put(mass, u32(ground.soil_layer), soil.x);
-        mass = put(mass, u32(ground.subsoil_layer), soil.y);
-        let rock = max(all - soil.x - soil.y, 0.0);
-        if rock > 0.0 {
-            mass = lay_rock(mass, rock, site, depth);
-        }
-    }
-    return mass;
-}
-#endif
-
-// Where layers meet, they do so in patches, and not along the lattice.
-fn in_patches(mass: Mass, site: Site) -> Mass {
-    let most = max(max(mass.a, mass.b), max(mass.c, mass.d));
-    if max(max(most.x, most.y), max(most.z, most.w)) < 0.985 {
-        let patches = clamp(1.0 + 1.5 * noise_at(site.place, 4.5), vec4(0.15), vec4(2.0));
-        return Mass(mass.a * patches, mass.b * patches, mass.c * patches, mass.d * patches);
-    }
-    return mass;
-}
-
-// The layers that show in a place.
-fn choose(in: Varying, site: Site, broad: vec4<f32>, fine: vec4<f32>) -> Choice {
-#ifdef GROUND_ATTRIBUTES
-    let mass = in_patches(ground_at(in, site, broad, fine), site);
+    // The winner and the loser of each half.
+    let is_left = weights.xz >= weights.yw;
+    let won = max(weights.xz, weights.yw);
+    let lost = min(weights.xz, weights.yw);
+    let winners = select(layers.yw, layers.xz, is_left);
+    let losers = select(layers.xz, layers.yw, is_left);
+    // The second one is the other half's winner, or the loser of the winner's own half.
+    let is_first = won.x >= won.y;
+    let rival = min(won.x, won.y);
+    let mate = select(lost.y, lost.x, is_first);
+    let is_rival = rival >= mate;
+    let second = max(rival, mate);
+    let third = max(min(rival, mate), select(lost.x, lost.y, is_first));
+    let best = select(winners.y, winners.x, is_first);
+    let next = select(select(losers.y, losers.x, is_first), select(winners.x, winners.y, is_first), is_rival);
+    // Less what the third one has, so that none comes or goes with a jump.
+    return Choice(vec2(best, next), (second - third) / max(won.x + won.y - rival + second - 2.0 * third, 0.00001));
 #else
-    let mass = in_patches(Mass(vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0), vec4(0.0), vec4(0.0)), site);
+    return Choice(vec2(0u), 0.0);
 #endif
-    var best = Choice(vec3(0u), vec4(0.0));
-    best = offer_four(best, 0u, mass.a);
-    best = offer_four(best, 4u, mass.b);
-    best = offer_four(best, 8u, mass.c);
-    best = offer_four(best, 12u, mass.d);
-    // Less what the first one that is left out has, so that none comes or goes with a jump.
-    let left_out = select(best.weights.z, best.weights.w, is_fine());
-    best.weights = max(best.weights - left_out, vec4(0.0));
-    // Where all are alike, little is left of any: the first one counts as whole, or the place would be black.
-    best.weights.x = max(best.weights.x, 0.00001);
-    best.weights /= best.weights.x;
-    return best;
 }
 
 // A normal bent towards the eye, where relief turns away from it more than the ground does: what can be seen is not turned
@@ -605,53 +414,35 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     site.dx = dpdx(site.place);
     site.dy = dpdy(site.place);
     site.normal = normalize(turn * in.world_normal);
-    var sides = site.normal * site.normal;
-    sides = sides * sides;
-    sides = sides * sides;
-    // The weakest side is left out, but where all are alike.
-    sides = max(sides - 0.995 * min(sides.x, min(sides.y, sides.z)), vec3(0.0));
-    sides = max(sides / (sides.x + sides.y + sides.z) - 0.06, vec3(0.0));
-    site.sides = sides / (sides.x + sides.y + sides.z);
-    let distance = length(view.world_position - in.world_position.xyz);
-    site.far = smoothstep(ground.near, ground.far, distance);
+    face(&site);
+    site.far = smoothstep(ground.near, ground.far, length(view.world_position - in.world_position.xyz));
 
-    let broad = noise_at(site.place, 150.0);
-    let fine = noise_at(site.place, 27.0);
-    let choice = choose(in, site, broad, fine);
-
-    // What stands high covers what lies low.
-    var sum = Texels(vec4(0.0), vec2(0.0), vec3(0.0));
-    var metallic = 0.0;
-    var total = 0.0001;
-    for (var i = 0; i < 3; i++) {
-        let weight = select(select(choice.weights.z, choice.weights.y, i == 1), choice.weights.x, i == 0);
-        if weight > 0.01 {
-            let layer = select(select(choice.layers.z, choice.layers.y, i == 1), choice.layers.x, i == 0);
-            let texels = layer_at(layer, site);
-            var score = weight * (0.3 + texels.color.a);
-            score *= score * score;
-            sum.color += texels.color * score;
-            sum.finish += texels.finish * score;
-            sum.lean += texels.lean * score;
-            metallic += ground.layers[layer].metallic * score;
-            total += score;
-        }
+    let choice = choose(in, site.place);
+    let best = choice.layers.x;
+    let next = choice.layers.y;
+    var texels = layer_at(best, site);
+    var metallic = ground.layers[best].metallic;
+    // A height is at most 1.3 / 0.3 times the other one: what is weaker than its third power does not show.
+    if choice.share > 0.012 {
+        let other = layer_at(next, site);
+        // What stands high covers what lies low.
+        let scores = vec2(1.0 - choice.share, choice.share) * (vec2(texels.color.a, other.color.a) + 0.3);
+        let cubes = scores * scores * scores;
+        let share = cubes.y / (cubes.x + cubes.y);
+        texels = mix_texels(texels, other, share);
+        metallic = mix(metallic, ground.layers[next].metallic, share);
     }
-    var color = sum.color.rgb / total;
-    let finish = sum.finish / total;
-    var lean = sum.lean / total;
-    metallic /= total;
+    var color = texels.color.rgb;
     // No two places have quite the same tint.
-    let mood = clamp(0.9 * broad.y + 0.55 * fine.w, -1.0, 1.0) * ground.variety;
-    color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(mood, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-mood, 0.0));
-    color *= 1.0 + (0.16 + 0.3 * site.far) * ground.variety * fine.z;
+    color *= mix(vec3(1.0), vec3(1.32, 1.16, 0.90), max(in.mood.x, 0.0)) * mix(vec3(1.0), vec3(0.66, 0.76, 0.78), max(-in.mood.x, 0.0));
+    color *= 1.0 + (0.16 + 0.3 * site.far) * in.mood.y;
 
     pbr_input.material.base_color = vec4(pbr_input.material.base_color.rgb * color, 1.0);
-    pbr_input.material.perceptual_roughness = clamp(finish.y, 0.089, 1.0);
+    pbr_input.material.perceptual_roughness = clamp(texels.finish.y, 0.089, 1.0);
     pbr_input.material.metallic = metallic;
-    pbr_input.diffuse_occlusion *= finish.x;
-    pbr_input.specular_occlusion *= finish.x;
-    lean -= dot(lean, site.normal) * site.normal;
+    pbr_input.diffuse_occlusion *= texels.finish.x;
+    pbr_input.specular_occlusion *= texels.finish.x;
+    let lean = texels.lean - dot(texels.lean, site.normal) * site.normal;
     pbr_input.N = facing(normalize(normalize(site.normal + lean) * turn), normalize(in.world_normal), pbr_input.V);
     apply_decals(&pbr_input);
 

@@ -2,10 +2,12 @@
 
 use bevy::prelude::*;
 
+use crate::plugin::SlimVertices;
+
 /// Most layers of a ground; ids from the last one on share it.
 pub const MAX_LAYERS: usize = 16;
 
-/// The look of a terrain's ground. Put it on the terrain's entity instead of a material, and
+/// The look of a terrain's ground, whose meshes then have [`SlimVertices`]. Put it on the terrain's entity instead of a material, and
 /// [`GroundPlugin`](super::GroundPlugin) creates and updates its [`GroundMaterial`](super::GroundMaterial).
 ///
 /// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures: [`GroundTextures`](super::GroundTextures).
@@ -20,13 +22,10 @@ pub const MAX_LAYERS: usize = 16;
 /// ```
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Default)]
+#[require(SlimVertices)]
 pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,
-    /// The strata below the surface, which show where it is dug.
-    pub strata: GroundStrata,
-    /// The slopes (rise over run) at which skins such as grass and snow begin to disappear, and at which they are gone.
-    pub cliffs: (f32, f32),
     /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it.
     pub distance: (f32, f32),
     /// The variation of tints from place to place, 0 to 1.
@@ -47,71 +46,16 @@ pub struct GroundLayer {
     pub metallic: f32,
     /// Its colours are multiplied by this.
     pub tint: LinearRgba,
-    /// How it continues below the surface, where the ground was not built.
-    pub kind: GroundLayerKind,
+    /// Whether its texture is cut into pieces near the camera, so that its repetition does not show: up to three times the
+    /// fetches. Not for textures with a pattern, such as bricks.
+    pub has_pieces: bool,
     /// The texture layer for floors and ceilings, if it differs: bedded rock shows its laminae on walls only.
     pub top: Option<u8>,
 }
 
 impl Default for GroundLayer {
     fn default() -> Self {
-        Self {
-            metres: 4.0,
-            relief: 1.0,
-            metallic: 0.0,
-            tint: LinearRgba::WHITE,
-            kind: GroundLayerKind::Body,
-            top: None,
-        }
-    }
-}
-
-/// How a layer continues below the surface.
-#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[reflect(Default)]
-pub enum GroundLayerKind {
-    /// The same all the way down.
-    #[default]
-    Body,
-    /// Only on the surface, like grass. Below, and on cliffs, the [`GroundStrata`] show.
-    Skin,
-    /// Replaced by the [`GroundStrata`].
-    Strata,
-}
-
-/// The strata from the surface down. Layers are given by number.
-#[derive(Reflect, Clone, Debug, PartialEq)]
-#[reflect(Default)]
-pub struct GroundStrata {
-    /// The layer under grass, and how deep it reaches in metres.
-    pub soil: (u8, f32),
-    /// The layer below the soil, and how thick it is in metres.
-    pub subsoil: (u8, f32),
-    /// The beds of rock below: four layers of about equal thickness that repeat. The first one also appears as a crust on
-    /// natural faces.
-    pub beds: [u8; 4],
-    /// The height in metres after which the beds repeat.
-    pub height: f32,
-    /// The amplitude by which beds are bent, in metres.
-    pub bend: f32,
-    /// A thin seam within the beds: its layer, its thickness in metres (0 for none), and the depth in metres where it begins.
-    pub seam: (u8, f32, f32),
-    /// Veins in the rock: their layer, their thickness (0 none, 1 most), and the depth in metres where they begin.
-    pub vein: (u8, f32, f32),
-}
-
-impl Default for GroundStrata {
-    /// Soil over clay over rock, sandstone and shale, with a seam of coal and veins of gold.
-    fn default() -> Self {
-        Self {
-            soil: (8, 1.3),
-            subsoil: (4, 1.6),
-            beds: [0, 9, 0, 10],
-            height: 26.0,
-            bend: 5.0,
-            seam: (6, 1.1, 4.0),
-            vein: (7, 0.5, 6.0),
-        }
+        Self { metres: 4.0, relief: 1.0, metallic: 0.0, tint: LinearRgba::WHITE, has_pieces: true, top: None }
     }
 }
 
@@ -130,28 +74,27 @@ pub enum GroundQuality {
 impl Default for GroundLook {
     /// The look for [`GroundTextures::Baked`](super::GroundTextures::Baked).
     fn default() -> Self {
-        let layer = |metres, relief, kind| GroundLayer { metres, relief, kind, ..default() };
-        let body = |metres| layer(metres, 1.0, GroundLayerKind::Body);
-        let bedded = |metres, top| GroundLayer { top: Some(top), ..body(metres) };
-        let gold = GroundLayer { metallic: 0.35, ..body(2.5) };
+        let layer = |metres, relief| GroundLayer { metres, relief, ..default() };
+        let bedded = |metres, top| GroundLayer { top: Some(top), ..layer(metres, 1.0) };
+        let ore = |metres, metallic| GroundLayer { metallic, ..layer(metres, 1.0) };
         Self {
             layers: vec![
-                layer(6.0, 1.0, GroundLayerKind::Strata),
-                layer(3.0, 0.8, GroundLayerKind::Skin),
-                layer(4.0, 1.0, GroundLayerKind::Skin),
-                layer(6.0, 1.0, GroundLayerKind::Skin),
-                body(4.0),
-                body(4.0),
-                body(2.5),
-                gold,
-                body(3.0),
-                bedded(5.0, 12),
-                bedded(4.0, 13),
-                body(2.5),
+                layer(6.0, 1.0),
+                layer(3.0, 0.8),
+                layer(4.0, 1.0),
+                layer(6.0, 1.0),
+                layer(4.0, 1.0),
+                GroundLayer { has_pieces: false, ..layer(4.0, 1.0) },
+                layer(2.5, 1.0),
+                ore(2.5, 0.35),
+                layer(3.0, 1.0),
+                bedded(5.0, 14),
+                bedded(4.0, 15),
+                layer(2.5, 1.0),
+                ore(2.5, 0.2),
+                ore(2.5, 0.25),
             ],
-            strata: GroundStrata::default(),
-            cliffs: (0.9, 1.5),
-            distance: (35.0, 80.0),
+            distance: (48.0, 64.0),
             variety: 0.5,
             quality: GroundQuality::High,
         }

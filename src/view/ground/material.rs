@@ -12,10 +12,8 @@ use bevy::render::render_resource::{
 };
 use bevy::shader::{ShaderDefVal, ShaderRef};
 
-use super::look::{GroundLayer, GroundLayerKind, GroundLook, GroundQuality, MAX_LAYERS};
-use crate::plugin::{
-    ATTRIBUTE_GROUND_COVER, ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
-};
+use super::look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
+use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 
 /// The material of terrains with a [`GroundLook`]: Bevy's `StandardMaterial`, whose colour, roughness and relief come from
 /// layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do there.
@@ -38,22 +36,27 @@ pub struct GroundExtension {
     #[sampler(104)]
     pub relief: Option<Handle<Image>>,
     /// Four kinds of noise in space.
-    #[texture(105, dimension = "3d")]
-    #[sampler(106)]
+    #[texture(105, dimension = "3d", visibility(vertex, fragment))]
+    #[sampler(106, visibility(vertex, fragment))]
     pub(super) noise: Option<Handle<Image>>,
     /// Whether albedo and relief are read with the sampler of the noise, which is not anisotropic.
     pub(super) without_anisotropy: bool,
+    pub(super) quality: GroundQuality,
 }
 
 /// The part of a [`GroundExtension`] that selects its pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GroundKey {
     without_anisotropy: bool,
+    is_fine: bool,
 }
 
 impl From<&GroundExtension> for GroundKey {
     fn from(extension: &GroundExtension) -> Self {
-        Self { without_anisotropy: extension.without_anisotropy }
+        Self {
+            without_anisotropy: extension.without_anisotropy,
+            is_fine: extension.quality == GroundQuality::High,
+        }
     }
 }
 
@@ -63,8 +66,8 @@ pub(super) struct LayerUniform {
     per_metre: f32,
     relief: f32,
     metallic: f32,
-    /// 0 body, 1 skin, 2 strata.
-    kind: f32,
+    /// 1 if the texture is cut into pieces.
+    pieces: f32,
 }
 
 /// A layer's colours, as `ground.wgsl` has them.
@@ -82,81 +85,38 @@ pub(super) struct GroundUniform {
     pub place: Mat4,
     layers: [LayerUniform; MAX_LAYERS],
     tints: [TintUniform; MAX_LAYERS],
-    /// Layers of soil and subsoil, how deep each reaches.
-    soil_layer: f32,
-    subsoil_layer: f32,
-    soil_depth: f32,
-    subsoil_depth: f32,
-    /// Layers of the beds.
-    beds: Vec4,
-    bed_height: f32,
-    bend: f32,
-    seam_layer: f32,
-    seam_thickness: f32,
-    seam_depth: f32,
-    vein_layer: f32,
-    vein_thickness: f32,
-    vein_depth: f32,
-    /// Cosines of the slopes on which no skin is left, and where it begins to give way.
-    bare: f32,
-    skinned: f32,
     near: f32,
     far: f32,
     variety: f32,
-    /// 1 for the finest.
-    quality: f32,
-    /// Metres of a voxel.
-    voxel: f32,
     layer_count: f32,
     /// 1 for pieces, which move by themselves.
     is_piece: u32,
+    /// Metres of a voxel; only for pieces made later.
+    voxel: f32,
 }
 
 impl GroundUniform {
     pub(super) fn new(look: &GroundLook, place: &GlobalTransform) -> Self {
-        let strata = &look.strata;
         let count = look.layers.len().clamp(1, MAX_LAYERS);
-        let number = |layer: u8| f32::from(layer).min(count as f32 - 1.0);
-        let cosine = |slope: f32| 1.0 / (slope * slope + 1.0).sqrt();
         let (scale, rotation, translation) = place.to_scale_rotation_translation();
         let layer = |at: usize| look.layers.get(at).cloned().unwrap_or_default();
         Self {
             place: Mat4::from_rotation_translation(rotation, translation).inverse(),
             layers: std::array::from_fn(|at| {
-                let GroundLayer { metres, relief, metallic, kind, .. } = layer(at);
-                let kind = match kind {
-                    GroundLayerKind::Body => 0.0,
-                    GroundLayerKind::Skin => 1.0,
-                    GroundLayerKind::Strata => 2.0,
-                };
-                LayerUniform { per_metre: 1.0 / metres.max(0.01), relief, metallic, kind }
+                let GroundLayer { metres, relief, metallic, has_pieces, .. } = layer(at);
+                let pieces = if has_pieces { 1.0 } else { 0.0 };
+                LayerUniform { per_metre: 1.0 / metres.max(0.01), relief, metallic, pieces }
             }),
             tints: std::array::from_fn(|at| {
                 let GroundLayer { tint, top, .. } = layer(at);
                 TintUniform { color: tint.to_vec3(), top: top.map_or(-1.0, f32::from) }
             }),
-            soil_layer: number(strata.soil.0),
-            subsoil_layer: number(strata.subsoil.0),
-            soil_depth: strata.soil.1,
-            subsoil_depth: strata.subsoil.1,
-            beds: Vec4::from_array(strata.beds.map(number)),
-            bed_height: strata.height.max(0.1),
-            bend: strata.bend,
-            seam_layer: number(strata.seam.0),
-            seam_thickness: strata.seam.1,
-            seam_depth: strata.seam.2,
-            vein_layer: number(strata.vein.0),
-            vein_thickness: strata.vein.1,
-            vein_depth: strata.vein.2,
-            bare: cosine(look.cliffs.1),
-            skinned: cosine(look.cliffs.0).max(cosine(look.cliffs.1) + 0.001),
             near: look.distance.0,
             far: look.distance.1.max(look.distance.0 + 0.1),
             variety: look.variety,
-            quality: if look.quality == GroundQuality::High { 1.0 } else { 0.0 },
-            voxel: scale.y,
             layer_count: count as f32,
             is_piece: 0,
+            voxel: scale.y,
         }
     }
 
@@ -204,12 +164,7 @@ impl MaterialExtension for GroundExtension {
             Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
             Mesh::ATTRIBUTE_NORMAL.at_shader_location(1),
         ];
-        let own = [
-            ATTRIBUTE_MATERIAL_IDS,
-            ATTRIBUTE_MATERIAL_WEIGHTS,
-            ATTRIBUTE_GROUND_DEPTH,
-            ATTRIBUTE_GROUND_COVER,
-        ];
+        let own = [ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS];
         if own.iter().all(|attribute| layout.0.contains(attribute.id)) {
             attributes.extend(
                 own.iter().zip(8..).map(|(attribute, location)| attribute.at_shader_location(location)),
@@ -220,10 +175,10 @@ impl MaterialExtension for GroundExtension {
                 fragment.shader_defs.push(definition);
             }
         }
-        if key.bind_group_data.without_anisotropy
-            && let Some(fragment) = &mut descriptor.fragment
-        {
-            fragment.shader_defs.push("WITHOUT_ANISOTROPY".into());
+        if let Some(fragment) = &mut descriptor.fragment {
+            let GroundKey { without_anisotropy, is_fine } = key.bind_group_data;
+            let definitions = [(without_anisotropy, "WITHOUT_ANISOTROPY"), (is_fine, "GROUND_FINE")];
+            fragment.shader_defs.extend(definitions.iter().filter(|own| own.0).map(|own| own.1.into()));
         }
         descriptor.vertex.buffers = vec![layout.0.get_layout(&attributes)?];
         Ok(())

@@ -1,4 +1,4 @@
-//! The look of the ground: layers of texture, chosen by material, slope, and depth below the pristine surface.
+//! The look of the ground: layers of texture, chosen by material.
 //!
 //! | part | content |
 //! | --- | --- |
@@ -9,10 +9,10 @@
 //!
 //! # How layers meet
 //!
-//! A triangle's three vertices may have different materials. Ids can't be blended, so the vertex shader spreads each
-//! vertex's ids and weights over sixteen channels, one for each layer, and what is blended are these: linear along any
-//! edge, whichever triangle one comes from. A pixel then samples its strongest layers, less the weight of the first one
-//! that is left out, so that none comes or goes with a jump. Which of two is on top is decided by their heights.
+//! The corners of a triangle list the same materials, each with a weight that is blended between them: linear along any edge,
+//! whichever triangle one comes from. A pixel samples its two strongest layers, less the weight of the third one, so that none
+//! comes or goes with a jump. Which of the two is on top is decided by their heights. So what shows is always what a vertex of
+//! the triangle has, and a border strays from the middle between two vertices by less than half their distance.
 
 mod bake;
 mod fit;
@@ -27,7 +27,7 @@ mod stage;
 mod textures;
 
 pub use fit::GroundTexturesError;
-pub use look::{GroundLayer, GroundLayerKind, GroundLook, GroundQuality, GroundStrata, MAX_LAYERS};
+pub use look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
 pub use material::{GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
@@ -36,7 +36,7 @@ use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::{MaterialPlugin, PbrPlugin};
 use bevy::prelude::*;
 
-use crate::plugin::{BurrowSystems, GroundPiece, propagate_to_ground, remove_inherited};
+use crate::plugin::{BurrowSystems, GroundPiece, SlimVertices, propagate_to_ground, remove_inherited};
 use crate::terrain::Terrain;
 use material::GroundUniform;
 
@@ -47,7 +47,7 @@ pub struct GroundPlugin;
 
 impl Plugin for GroundPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<GroundTextures>().init_resource::<GroundLoading>();
+        app.init_resource::<GroundTextures>().init_resource::<GroundLoading>().add_observer(thicken_vertices);
         if !app.is_plugin_added::<PbrPlugin>() {
             return;
         }
@@ -123,11 +123,17 @@ fn add_materials(
             relief: Some(textures.relief.clone()),
             noise: Some(textures.noise.clone()),
             without_anisotropy: textures.without_anisotropy,
+            quality: look.quality,
         };
         let base = current.map_or(base, |current| current.base.clone());
         let own = materials.add(GroundMaterial { base, extension });
         commands.entity(entity).try_insert((OwnMaterial(own.id()), MeshMaterial3d(own)));
     }
+}
+
+/// A terrain without a look has colours again.
+fn thicken_vertices(gone: On<Remove, GroundLook>, mut commands: Commands) {
+    commands.entity(gone.entity).try_remove::<SlimVertices>();
 }
 
 /// Takes the material of a terrain that has lost its look, and has no other one by now.
@@ -157,6 +163,7 @@ fn follow(
     for (look, place, material) in &looks {
         if let Some(mut material) = materials.get_mut(&material.0) {
             material.extension.uniform = GroundUniform::new(look, place);
+            material.extension.quality = look.quality;
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The layers that the project paints itself, from noise alone: rock, grass, sand, snow, clay, concrete, coal, gold, soil,
-//! sandstone, shale and gravel.
+//! sandstone, shale, gravel, iron and copper.
 
 use super::noise::{cells, chance, gradient, octaves, ridges, smooth};
 
@@ -39,7 +39,7 @@ pub(super) struct Scatter {
 }
 
 /// All layers, in the order of the default material ids.
-pub(super) const RECIPES: [Recipe; 14] = [
+pub(super) const RECIPES: [Recipe; 16] = [
     Recipe { name: "rock", relief: 0.45, metres: 6.0, paint: rock, scatter: None },
     Recipe {
         name: "grass",
@@ -62,6 +62,8 @@ pub(super) const RECIPES: [Recipe; 14] = [
     Recipe { name: "sandstone", relief: 0.28, metres: 5.0, paint: sandstone, scatter: None },
     Recipe { name: "shale", relief: 0.26, metres: 4.0, paint: shale, scatter: None },
     Recipe { name: "gravel", relief: 0.16, metres: 2.5, paint: gravel, scatter: None },
+    Recipe { name: "iron", relief: 0.14, metres: 2.5, paint: iron, scatter: None },
+    Recipe { name: "copper", relief: 0.12, metres: 2.5, paint: copper, scatter: None },
     // What bedded layers show from above; no materials of their own.
     Recipe { name: "sandstone from above", relief: 0.22, metres: 5.0, paint: sandstone_top, scatter: None },
     Recipe { name: "shale from above", relief: 0.18, metres: 4.0, paint: shale_top, scatter: None },
@@ -207,6 +209,32 @@ fn gold(u: f32, v: f32) -> Point {
         mix([0.66, 0.44, 0.10], [0.98, 0.80, 0.34], (0.5 + 0.6 * octaves(u, v, 24, 3, 89)).clamp(0.0, 1.0));
     let height = (0.26 * tilt * (0.5 + 0.5 * edge) + 0.6 * metal).clamp(0.0, 1.0);
     Point { color: mix(lit(stone, 0.85 + 0.15 * edge), shine, metal), height, roughness: 0.75 - 0.40 * metal }
+}
+
+/// Rust-red lumps in dark stone, with a dull shine where they broke.
+fn iron(u: f32, v: f32) -> Point {
+    let (tilt, edge, name) = facets(u, v, 9, 121);
+    let lump = cells(u + 0.02 * octaves(u, v, 9, 3, 125), v, 11, 126);
+    let ore = 1.0 - smooth(0.22, 0.42, lump.nearest);
+    let stone = mix([0.20, 0.185, 0.18], [0.34, 0.315, 0.30], 0.5 * name + 0.4 * tilt);
+    let rust =
+        mix([0.33, 0.15, 0.09], [0.62, 0.33, 0.20], (0.5 + 0.6 * octaves(u, v, 22, 3, 127)).clamp(0.0, 1.0));
+    let height = (0.34 * tilt * (0.5 + 0.5 * edge) + 0.5 * ore).clamp(0.0, 1.0);
+    Point { color: mix(lit(stone, 0.8 + 0.2 * edge), rust, ore), height, roughness: 0.80 - 0.22 * ore * name }
+}
+
+/// Green crusts and threads of bright metal in pale stone.
+fn copper(u: f32, v: f32) -> Point {
+    let (tilt, edge, name) = facets(u, v, 7, 131);
+    let (wu, wv) = (u + 0.06 * octaves(u, v, 5, 4, 135), v + 0.06 * octaves(u, v, 5, 4, 136));
+    let crust = smooth(-0.05, 0.30, octaves(wu, wv, 5, 4, 137));
+    let thread = smooth(0.90, 0.97, ridges(wu, wv, 5, 2, 138));
+    let stone = mix([0.34, 0.31, 0.28], [0.50, 0.46, 0.42], 0.5 * name + 0.3 * tilt);
+    let green =
+        mix([0.13, 0.34, 0.27], [0.36, 0.63, 0.52], (0.5 + 0.6 * octaves(u, v, 26, 3, 139)).clamp(0.0, 1.0));
+    let color = mix(mix(lit(stone, 0.85 + 0.15 * edge), green, 0.9 * crust), [0.80, 0.44, 0.26], thread);
+    let height = (0.30 * tilt * (0.5 + 0.5 * edge) + 0.25 * crust + 0.4 * thread).clamp(0.0, 1.0);
+    Point { color, height, roughness: 0.82 - 0.35 * thread }
 }
 
 /// Crumbs, pebbles, and rootlets.

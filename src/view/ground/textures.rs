@@ -19,8 +19,8 @@ use crate::plugin::{ThreadTask, Threads};
 #[non_exhaustive]
 pub enum GroundTextures {
     /// The project's own, painted from noise in a task when the first [`GroundLook`](super::GroundLook) comes:
-    /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel;
-    /// 12 and 13 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top).
+    /// 0 rock, 1 grass, 2 sand, 3 snow, 4 clay, 5 concrete, 6 coal, 7 gold, 8 soil, 9 sandstone, 10 shale, 11 gravel,
+    /// 12 iron, 13 copper; 14 and 15 are 9 and 10 as they look from above, see [`GroundLayer::top`](super::GroundLayer::top).
     /// The same bytes on every machine. They stay when the last look goes, so that the next one need not wait for them.
     Baked {
         /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
