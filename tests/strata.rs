@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bevy_burrow::ground::{Ground, Strata};
 use bevy_burrow::lattice::{Column, LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
-use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::surface::{SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Drawn, World};
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
@@ -246,4 +246,101 @@ fn every_vertex_shows_what_a_dig_there_yields() {
         assert!(report.is_flawless(), "world {index}: {report}");
     }
     assert!(tiles > 50_000 && chunks > 10_000, "{tiles} {chunks}");
+}
+
+/// Points of a triangle, as weights of its corners: all over it, none on an edge.
+fn points_of(triangle: &[Vertex; 3]) -> Vec<Vec3> {
+    let [a, b, c] = triangle.map(|vertex| vertex.position.as_vec3() / SNAP as f32);
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let steps = (longest * 3.0).ceil().clamp(4.0, 40.0) as i32;
+    let rows = (0..steps).flat_map(|i| (0..steps - i).map(move |j| (i, j)));
+    rows.map(|(i, j)| {
+        let [u, v] = [i, j].map(|at| (at as f32 + 1.0 / 3.0) / steps as f32);
+        Vec3::new(u, v, 1.0 - u - v)
+    })
+    .collect()
+}
+
+/// The material with the most weight at a point of a triangle, as shaders find it.
+fn shown(triangle: &[Vertex; 3], weights: Vec3) -> MaterialId {
+    let mut sums = [0.0; 256];
+    for (vertex, share) in triangle.iter().zip(weights.to_array()) {
+        for (&id, &weight) in vertex.materials.ids.iter().zip(&vertex.materials.weights) {
+            sums[usize::from(id)] += f32::from(weight) * share;
+        }
+    }
+    let strongest = (0..=255).max_by(|&a: &u8, &b| sums[usize::from(a)].total_cmp(&sums[usize::from(b)]));
+    MaterialId(strongest.unwrap_or_default())
+}
+
+/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if it is more than
+/// 2 voxels.
+fn error_at(world: &World, at: Vec3, shown: MaterialId) -> Option<f32> {
+    let (mut nearest, mut own) = (f32::MAX, f32::MAX);
+    let middle = at.floor().as_ivec3();
+    for point in (LatticeBox { min: middle - 2, max: middle + 3 }).points() {
+        let point_in_world = Column::of(point);
+        let (width, depth) = (world.ground().width(), world.ground().depth());
+        let is_inside = (0..=width).contains(&point_in_world.x) && (0..=depth).contains(&point_in_world.z);
+        if is_inside && world.samples().is_solid(point) {
+            let distance = at.distance(point.as_vec3());
+            nearest = nearest.min(distance);
+            if material(world, point) == shown {
+                own = own.min(distance);
+            }
+        }
+    }
+    (own - nearest <= 2.0).then_some(own - nearest)
+}
+
+/// A random ground with cliffs and strata, dug in some places.
+fn dug_cliffs(index: u64) -> Terrain {
+    let rng = &mut Rng::with_seed(index);
+    let (steep, tread) = ([3.0, 9.0, 25.0][index as usize % 3], rng.i32(1..6));
+    let bumps: Vec<f64> = (0..41 * 41).map(|_| f64::from(rng.f32())).collect();
+    let height = |x: i32, z: i32| {
+        let terraces = f64::from((x + z / 2) / (3 * tread)) * steep;
+        let h = terraces + bumps[(z * 41 + x) as usize] * if index % 2 == 0 { 1.0 } else { steep };
+        if index % 5 == 0 { h.round() } else { h }
+    };
+    let ground = Ground::from_fn(40, 40, height).expect("finite heights");
+    let (low, high) = ground.height_range();
+    let strata = random_strata(rng, [low as f32 / 256.0 - 5.0, high as f32 / 256.0 + 2.0]);
+    let ground = Arc::new(ground.with_strata(&strata).expect("valid strata"));
+    let mut terrain = terrain(&ground, [8, 25, 32][rng.usize(..3)]);
+    let brushes: Vec<Brush> = (0..8).map(|_| random_brush(rng, &ground)).collect();
+    terrain.apply(brushes.into_iter().map(|brush| Brush::dig(brush.shape)));
+    terrain
+}
+
+#[test]
+fn every_point_shows_what_a_dig_there_yields() {
+    let (mut points, mut misses, mut worst) = ([0; 2], Vec::new(), 0.0f32);
+    let mut histogram = [0; 22];
+    for index in 0..worlds::world_count(24) {
+        let terrain = dug_cliffs(index);
+        let world = terrain.world();
+        for (drawn, mesh) in world.drawn() {
+            let origin = world.origin(drawn).as_vec3();
+            for triangle in mesh.triangles() {
+                let corners = triangle.map(|vertex| vertex.position.as_vec3() / SNAP as f32 + origin);
+                for weights in points_of(&triangle) {
+                    let at = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+                    let shown = shown(&triangle, weights);
+                    points[usize::from(matches!(drawn, Drawn::Chunk(_)))] += 1;
+                    let error = error_at(world, at, shown);
+                    worst = worst.max(error.unwrap_or(2.0));
+                    histogram[(error.unwrap_or(2.1) * 10.0) as usize] += 1;
+                    if error.is_none_or(|error| error > 1.0) {
+                        misses.push((index, drawn, at, shown, error));
+                    }
+                }
+            }
+        }
+        let report = world.check_seams();
+        assert!(report.is_flawless(), "world {index}: {report}");
+    }
+    println!("{points:?} points, worst {worst}, {histogram:?}");
+    assert!(misses.is_empty(), "{} of {points:?} points, {:?}", misses.len(), &misses[..misses.len().min(9)]);
+    assert!(points.iter().all(|&count| count > 100_000), "{points:?}");
 }

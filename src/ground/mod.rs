@@ -46,6 +46,7 @@ pub use strata::{
 };
 #[cfg(feature = "cuda")]
 pub(crate) use strata::{BeddingRecord, StratumRecord};
+pub(crate) use strata::{SteepCells, is_banded};
 pub use world::Ground;
 
 /// Most cells along one side of a world.

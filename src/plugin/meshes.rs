@@ -198,7 +198,8 @@ impl Origin {
     fn of(ground: &Ground, origin: IVec3, vertex: &Vertex) -> Self {
         let place = origin + vertex.position;
         let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-        // A vertex lies on an edge of the lattice, so only one of these is not 0.
+        // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are
+        // the same.
         let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
         let next = column.offset(i32::from(x > 0), i32::from(z > 0));
         let step = i64::from(x.max(z));

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::world::{Drawn, World};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP, TilePos};
-use crate::surface::{MaskView, SurfaceMesh};
+use crate::surface::{MaskView, SurfaceMesh, tile};
 use crate::volume::{Field, layers::ones};
 
 impl World {
@@ -24,14 +24,15 @@ impl World {
         cells.filter(move |cell| (low.x..=high.x).contains(&cell.x) && (low.z..=high.z).contains(&cell.z))
     }
 
-    /// The triangles of a tile's rings (rule 3), in voxels of the terrain.
+    /// The triangles of a tile's rings (rule 3) and steep cells, in voxels of the terrain.
     pub fn ring_triangles(&self, tile: TilePos) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-        let rings = self.rings.get(&tile).filter(|_| self.grid.has_tile(tile));
+        let has_tile = self.grid.has_tile(tile);
+        let rings = has_tile.then(|| self.tile_rings(tile, &tile::borders(&self.view(), tile)));
         let (low, high) = self.grid.tile_cells(tile);
         let width = (high.x - low.x + 1).max(1) as u32;
         let columns = width * (high.z - low.z + 1).max(0) as u32;
         rings.into_iter().flat_map(move |rings| {
-            let place = move |&index: &u32| match index.checked_sub(columns) {
+            let place = |index: u32| match index.checked_sub(columns) {
                 None => {
                     let column = low.offset((index % width) as i32, (index / width) as i32);
                     let height = self.ground.height(column) as f32 / ONE as f32;
@@ -43,7 +44,8 @@ impl World {
                     (own + low.at(0) * SNAP).as_vec3() / SNAP as f32
                 }
             };
-            rings.fans().chunks_exact(3).map(move |fan| [place(&fan[0]), place(&fan[1]), place(&fan[2])])
+            let fans = rings.fans().chunks_exact(3).map(|fan| [0, 1, 2].map(|corner| place(fan[corner])));
+            fans.collect::<Vec<_>>()
         })
     }
 
@@ -134,7 +136,6 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, NoiseHeights};
-    use crate::surface::tile;
     use crate::terrain::{Terrain, TerrainSettings};
 
     fn dug() -> Terrain {

@@ -69,7 +69,7 @@ impl World {
     pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
         match drawn {
             Drawn::Tile(tile) if self.grid.has_tile(tile) => {
-                let rings = |_: &Borders| self.rings.get(&tile).cloned().unwrap_or_default();
+                let rings = |borders: &Borders| self.tile_rings(tile, borders);
                 SurfaceDraft::Tile(TileUpdate::new(self, &self.view(), tile, rings))
             }
             Drawn::Tile(_) => SurfaceDraft::Nothing,

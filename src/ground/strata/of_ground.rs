@@ -6,7 +6,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 
 use super::in_brick::{self, Voxel};
-use super::{OwnMaterials, Strata, StrataRecords};
+use super::{OwnMaterials, SteepCells, Strata, StrataRecords};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::ground::{ColumnMaterial, GroundError};
@@ -19,6 +19,8 @@ pub(crate) struct Below {
     own: OwnMaterials,
     /// The material of the highest solid voxel of each column, row-major: what the undug surface shows.
     tops: Vec<MaterialId>,
+    /// Cells whose tops do not show all of their face.
+    steep: SteepCells,
 }
 
 impl Below {
@@ -27,7 +29,7 @@ impl Below {
             OwnMaterials::Strata { given, records } => given.bytes() + records.bytes(),
             OwnMaterials::Function { function, .. } => size_of_val(&**function),
         };
-        own + size_of_val(self.tops.as_slice())
+        own + size_of_val(self.tops.as_slice()) + self.steep.bytes()
     }
 }
 
@@ -35,7 +37,7 @@ impl Ground {
     /// The same ground with strata. Voxels that no stratum holds keep what [`Self::with_materials`] gave them, before or
     /// after.
     ///
-    /// Nothing is stored for a voxel, and one byte for a column. Counts for [`Self::hash`].
+    /// Nothing is stored for a voxel, one byte for a column, and where cells are steep one bit for a cell. Counts for [`Self::hash`].
     ///
     /// # Errors
     /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
@@ -92,7 +94,8 @@ impl Ground {
     }
 
     fn with_below(self, own: OwnMaterials) -> Result<Self, GroundError> {
-        self.replace_below(Below { own, tops: Vec::new() }).with_new_tops()
+        let steep = SteepCells::new(&self)?;
+        self.replace_below(Below { own, tops: Vec::new(), steep }).with_new_tops()
     }
 
     /// The same ground, with its surface as its materials are now.
@@ -155,6 +158,12 @@ impl Ground {
     /// The tops of some columns, one after the other, if there are strata.
     pub(in crate::ground) fn tops_of(&self, columns: std::ops::Range<usize>) -> Option<&[MaterialId]> {
         self.below().map(|below| &below.tops[columns])
+    }
+
+    /// The cells whose tops do not show all of their face; `None` if there are none, as on any ground whose materials are
+    /// those of its columns.
+    pub(crate) fn steep_cells(&self) -> Option<&SteepCells> {
+        self.below().map(|below| &below.steep).filter(|steep| !steep.is_empty())
     }
 
     /// The word for strata in the hash.

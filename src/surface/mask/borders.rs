@@ -1,4 +1,4 @@
-//! The border of the mask: which cells beside it stay heightmap.
+//! The border of the mask: which cells beside it stay heightmap. Steep cells can be added to them.
 
 use std::ops::Range;
 
@@ -57,7 +57,7 @@ impl MaskView<'_> {
     }
 }
 
-/// For each cell of a rectangle: is it in the mask, and which of its sides border on a cell that is?
+/// For each cell of a rectangle: is it in the mask, which of its sides border on a cell that is, and is it steep?
 #[derive(Clone, Debug)]
 pub struct Borders {
     low: Column,
@@ -75,7 +75,7 @@ struct Patch {
     own: u64,
     /// Those with a neighbour in the mask, in the order of [`Borders::SIDES`].
     sides: [u64; 4],
-    /// All of these.
+    /// All of these, and steep cells.
     touched: u64,
 }
 
@@ -100,14 +100,24 @@ impl Borders {
     /// [`Column::corners`] runs.
     pub const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
+    /// The same with steep cells: those of each 8x8 cells, (x, z) in units of 8 cells, as bits `z * 8 + x`.
+    pub fn with_steep(mut self, steep: impl Fn((i32, i32)) -> u64) -> Self {
+        for (row, z) in self.patches.chunks_mut(self.across.max(1)).zip(self.first.1..) {
+            for (patch, x) in row.iter_mut().zip(self.first.0..) {
+                patch.touched |= steep((x, z));
+            }
+        }
+        self
+    }
+
     fn patch(&self, (x, z): (i32, i32)) -> Option<&Patch> {
         let x = usize::try_from(x - self.first.0).ok().filter(|&x| x < self.across)?;
         let z = usize::try_from(z - self.first.1).ok()?;
         self.patches.get(z * self.across + x)
     }
 
-    /// The cells of 8x8 that lie in the rectangle, are not in the mask and border on it: row by row, each with a bit for
-    /// every side where it does. `(z, x)` in units of 8 cells.
+    /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or are steep: row by row, each with
+    /// a bit for every side where it borders. `(z, x)` in units of 8 cells.
     pub fn bordering(&self, (z, x): (i32, i32)) -> impl Iterator<Item = (Column, u8)> {
         let (low, high) = (self.low, self.high);
         let patch = self.patch((x, z)).copied().unwrap_or_default();
@@ -124,8 +134,8 @@ impl Borders {
         std::iter::from_fn(next).filter(move |&(cell, _)| is_inside(cell))
     }
 
-    /// The runs of cells with this z, in order, that neither are in the mask nor border on it: of the rectangle's rows,
-    /// by x.
+    /// The runs of cells with this z, in order, that neither are in the mask nor border on it nor are steep: of the
+    /// rectangle's rows, by x.
     pub fn whole(&self, z: i32) -> impl Iterator<Item = Range<i32>> {
         // Where the next cell is that is whole, or is not.
         let next = move |mut x: i32, is_whole: bool| {
@@ -165,7 +175,11 @@ mod tests {
         let view = MaskView::new(&mask);
         for (low, high) in [((0, 0), (8, 8)), ((-3, -2), (11, 13)), ((3, 5), (5, 7)), ((7, 7), (30, 9))] {
             let (low, high) = (Column::new(low.0, low.1), Column::new(high.0, high.1));
-            let borders = view.borders(low, high);
+            let steep = |(x, z): (i32, i32)| if (x, z) == (1, 0) { 0x8000_0100_0000_0208 } else { 0 };
+            let is_steep = |cell: Column| {
+                steep((cell.x >> 3, cell.z >> 3)) >> ((cell.z & 7) * 8 + (cell.x & 7)) & 1 == 1
+            };
+            let borders = view.borders(low, high).with_steep(steep);
             let mut flags = std::collections::BTreeMap::new();
             for patch in (-1..2).flat_map(|z| (-1..5).map(move |x| (z, x))) {
                 let before = flags.len();
@@ -183,10 +197,11 @@ mod tests {
                         .map(|(side, (dx, dz))| u8::from(mask.contains(cell.offset(dx, dz))) << side)
                         .sum::<u8>();
                     let is_own = mask.contains(cell);
-                    let found = flags.remove(&(z, x)).unwrap_or_default();
-                    assert_eq!(found, if is_own { 0 } else { expected }, "{cell:?}");
+                    let found = flags.remove(&(z, x));
+                    let is_drawn = !is_own && (expected != 0 || is_steep(cell));
+                    assert_eq!(found, is_drawn.then_some(expected), "{cell:?}");
                     let is_whole = whole.iter().any(|run| run.contains(&x));
-                    assert_eq!(is_whole, !is_own && expected == 0, "{cell:?}");
+                    assert_eq!(is_whole, !is_own && !is_drawn, "{cell:?}");
                 }
             }
             assert!(flags.is_empty(), "cells outside: {flags:?}");
