@@ -144,6 +144,7 @@ fn refused_voxels_are_those_of_the_strata_that_resist() {
 
 #[test]
 fn strata_change_no_solid_ground_and_store_nothing() {
+    let mut tiles = [0; 2];
     for index in 0..worlds::world_count(24) {
         let rng = &mut Rng::with_seed(index);
         let (ground, chunk_size) = ground_with_strata(&mut rng.clone(), index);
@@ -170,8 +171,19 @@ fn strata_change_no_solid_ground_and_store_nothing() {
         assert!(bricks(&with) == bricks(&without), "world {index}");
         let faces =
             |mesh: SurfaceMesh| (mesh.vertices.iter().map(|v| v.position).collect::<Vec<_>>(), mesh.indices);
+        // Cliffs between columns have more vertices.
+        let height = |column| with.world().ground().height(column);
+        let top = |column: Column| (height(column) + 255).div_euclid(256);
         for tile in with.world().grid().tiles() {
-            assert!(faces(with.world().tile_mesh(tile)) == faces(without.world().tile_mesh(tile)));
+            let (low, high) = with.world().grid().tile_cells(tile);
+            let mut cells = (low.z..high.z).flat_map(|z| (low.x..high.x).map(move |x| Column::new(x, z)));
+            let is_steep = cells.any(|cell| {
+                let [a, b, c, d] = cell.corners().map(top);
+                [(a, b), (b, c), (c, d), (d, a), (a, c)].iter().any(|(from, to)| from.abs_diff(*to) > 1)
+            });
+            let [with, without] = [&with, &without].map(|terrain| faces(terrain.world().tile_mesh(tile)));
+            assert!(with == without || is_steep, "{tile:?} of world {index}");
+            tiles[usize::from(with != without)] += 1;
         }
         for chunk in with.world().drawn_chunks() {
             assert!(faces(with.world().chunk_mesh(chunk)) == faces(without.world().chunk_mesh(chunk)));
@@ -184,6 +196,7 @@ fn strata_change_no_solid_ground_and_store_nothing() {
         with.apply::<Brush>([]);
         assert_eq!(with.world().hash(), hash);
     }
+    assert!(tiles.iter().all(|&count| count > 20), "{tiles:?}");
 }
 
 #[test]
@@ -215,14 +228,14 @@ fn check_vertices(world: &World, mesh: &SurfaceMesh, origin: IVec3) -> usize {
     for vertex in &vertices {
         let place = origin * SNAP + vertex.position;
         let low = place.map(|at| at.div_euclid(SNAP));
-        let axis = (0..3).find(|&axis| place[axis].rem_euclid(SNAP) != 0);
-        let mut solid = low;
-        match axis {
+        // To the other end of the edge, or of the cell's diagonal.
+        let step = place.map(|at| i32::from(at.rem_euclid(SNAP) != 0));
+        let solid = match world.samples().is_solid(low) {
             // On a lattice point lies only the undug surface, over the highest solid voxel.
-            None => solid.y -= 1,
-            Some(axis) if !world.samples().is_solid(low) => solid[axis] += 1,
-            Some(_) => {}
-        }
+            _ if step == IVec3::ZERO => low - IVec3::Y,
+            true => low,
+            false => low + step,
+        };
         let expected = material(world, solid);
         let mix = vertex.materials;
         assert_eq!((mix.ids, mix.weights), ([expected.0, 0, 0, 0], [255, 0, 0, 0]), "at {place} by {solid}");
@@ -273,24 +286,17 @@ fn shown(triangle: &[Vertex; 3], weights: Vec3) -> MaterialId {
     MaterialId(strongest.unwrap_or_default())
 }
 
-/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if it is more than
-/// 2 voxels.
+/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if there is none
+/// within 2 voxels.
 fn error_at(world: &World, at: Vec3, shown: MaterialId) -> Option<f32> {
-    let (mut nearest, mut own) = (f32::MAX, f32::MAX);
     let middle = at.floor().as_ivec3();
-    for point in (LatticeBox { min: middle - 2, max: middle + 3 }).points() {
-        let point_in_world = Column::of(point);
-        let (width, depth) = (world.ground().width(), world.ground().depth());
-        let is_inside = (0..=width).contains(&point_in_world.x) && (0..=depth).contains(&point_in_world.z);
-        if is_inside && world.samples().is_solid(point) {
-            let distance = at.distance(point.as_vec3());
-            nearest = nearest.min(distance);
-            if material(world, point) == shown {
-                own = own.min(distance);
-            }
-        }
-    }
-    (own - nearest <= 2.0).then_some(own - nearest)
+    let last = IVec3::new(world.ground().width(), middle.y + 3, world.ground().depth());
+    let near = LatticeBox { min: (middle - 2).max(IVec3::Y * (middle.y - 2)), max: (middle + 3).min(last) };
+    let solid = near.points().filter(|&point| world.samples().is_solid(point));
+    let mut solid: Vec<(f32, IVec3)> = solid.map(|point| (at.distance(point.as_vec3()), point)).collect();
+    solid.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let (own, _) = solid.iter().find(|&&(_, point)| material(world, point) == shown)?;
+    Some(own - solid[0].0)
 }
 
 /// A random ground with cliffs and strata, dug in some places.
@@ -313,11 +319,13 @@ fn dug_cliffs(index: u64) -> Terrain {
     terrain
 }
 
+/// The border between two materials that are drawn is at most half a voxel off, so what is shown may be a voxel farther away
+/// than what is nearest. Where heights are whole numbers, the surface lies a voxel above the highest solid points, which adds
+/// 0.083 at most.
 #[test]
 fn every_point_shows_what_a_dig_there_yields() {
-    let (mut points, mut misses, mut worst) = ([0; 2], Vec::new(), 0.0f32);
-    let mut histogram = [0; 22];
-    for index in 0..worlds::world_count(24) {
+    let (mut points, mut far, mut misses) = ([0; 2], 0, Vec::new());
+    for index in 0..worlds::world_count(12) {
         let terrain = dug_cliffs(index);
         let world = terrain.world();
         for (drawn, mesh) in world.drawn() {
@@ -329,9 +337,8 @@ fn every_point_shows_what_a_dig_there_yields() {
                     let shown = shown(&triangle, weights);
                     points[usize::from(matches!(drawn, Drawn::Chunk(_)))] += 1;
                     let error = error_at(world, at, shown);
-                    worst = worst.max(error.unwrap_or(2.0));
-                    histogram[(error.unwrap_or(2.1) * 10.0) as usize] += 1;
-                    if error.is_none_or(|error| error > 1.0) {
+                    far += u32::from(error.is_none_or(|error| error > 0.5));
+                    if error.is_none_or(|error| error > 1.084) {
                         misses.push((index, drawn, at, shown, error));
                     }
                 }
@@ -340,7 +347,8 @@ fn every_point_shows_what_a_dig_there_yields() {
         let report = world.check_seams();
         assert!(report.is_flawless(), "world {index}: {report}");
     }
-    println!("{points:?} points, worst {worst}, {histogram:?}");
+    println!("{points:?} points, {far} of them farther than half a voxel");
     assert!(misses.is_empty(), "{} of {points:?} points, {:?}", misses.len(), &misses[..misses.len().min(9)]);
-    assert!(points.iter().all(|&count| count > 100_000), "{points:?}");
+    assert!(points.iter().all(|&count| count > 500_000), "{points:?}");
+    assert!(far < points.iter().sum::<u32>() / 2000, "{far} of {points:?}");
 }

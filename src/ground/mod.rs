@@ -39,6 +39,7 @@ pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
 pub use rules::MaterialRule;
+pub(crate) use strata::is_banded;
 #[cfg(all(test, feature = "cuda"))]
 pub(crate) use strata::{BED, FILL, POCKET, VEIN};
 pub use strata::{
@@ -46,7 +47,6 @@ pub use strata::{
 };
 #[cfg(feature = "cuda")]
 pub(crate) use strata::{BeddingRecord, StratumRecord};
-pub(crate) use strata::{SteepCells, is_banded};
 pub use world::Ground;
 
 /// Most cells along one side of a world.
