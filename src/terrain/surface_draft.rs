@@ -46,6 +46,13 @@ impl TileUpdate {
         self.indices.get_or_init(|| tile::indices(self.grid, self.tile, &self.borders, &self.rings))
     }
 
+    /// The rings that the world keeps: none of a tile that does not border on the mask, as its steep cells depend on the
+    /// ground only.
+    pub(super) fn kept_rings(&self) -> Arc<Rings> {
+        let is_kept = self.ground.steep_cells().is_none() || self.borders.has_bordering();
+        if is_kept { Arc::clone(&self.rings) } else { Arc::default() }
+    }
+
     /// The tile's whole mesh, its columns included.
     pub fn mesh(&self) -> SurfaceMesh {
         let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
@@ -145,6 +152,7 @@ mod tests {
             }
             for (&tile, rings) in &world.rings {
                 let view = world.view();
+                assert!(!rings.is_empty());
                 assert!(**rings == Rings::new(&view, tile, &tile::borders(&view, tile)), "{tile:?}");
             }
         }

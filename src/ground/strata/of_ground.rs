@@ -18,9 +18,9 @@ use crate::lattice::{Column, LIMIT, ONE, ceil};
 pub(crate) struct Below {
     own: OwnMaterials,
     /// The material of the highest solid voxel of each column, row-major: what the undug surface shows.
-    tops: Vec<MaterialId>,
-    /// Cells whose tops do not show all of their face.
-    steep: SteepCells,
+    tops: Box<[MaterialId]>,
+    /// Cells whose tops do not show all of their face, if there are any.
+    steep: Option<Box<SteepCells>>,
 }
 
 impl Below {
@@ -29,7 +29,7 @@ impl Below {
             OwnMaterials::Strata { given, records } => given.bytes() + records.bytes(),
             OwnMaterials::Function { function, .. } => size_of_val(&**function),
         };
-        own + size_of_val(self.tops.as_slice()) + self.steep.bytes()
+        own + size_of_val(&*self.tops) + self.steep.as_ref().map_or(0, |steep| steep.bytes())
     }
 }
 
@@ -94,8 +94,8 @@ impl Ground {
     }
 
     fn with_below(self, own: OwnMaterials) -> Result<Self, GroundError> {
-        let steep = SteepCells::new(&self)?;
-        self.replace_below(Below { own, tops: Vec::new(), steep }).with_new_tops()
+        let steep = SteepCells::new(&self)?.map(Box::new);
+        self.replace_below(Below { own, tops: Box::default(), steep }).with_new_tops()
     }
 
     /// The same ground, with its surface as its materials are now.
@@ -103,8 +103,8 @@ impl Ground {
         if self.below().is_none() {
             return Ok(self);
         }
-        let bare = self.map_below(|below| Below { tops: Vec::new(), ..below });
-        let tops = bare.tops()?;
+        let bare = self.map_below(|below| Below { tops: Box::default(), ..below });
+        let tops = bare.tops()?.into_boxed_slice();
         Ok(bare.map_below(|below| Below { tops, ..below }))
     }
 
@@ -163,7 +163,7 @@ impl Ground {
     /// The cells whose tops do not show all of their face; `None` if there are none, as on any ground whose materials are
     /// those of its columns.
     pub(crate) fn steep_cells(&self) -> Option<&SteepCells> {
-        self.below().map(|below| &below.steep).filter(|steep| !steep.is_empty())
+        self.below()?.steep.as_deref()
     }
 
     /// The word for strata in the hash.

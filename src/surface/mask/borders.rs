@@ -134,6 +134,16 @@ impl Borders {
         std::iter::from_fn(next).filter(move |&(cell, _)| is_inside(cell))
     }
 
+    /// Does any cell border on the mask?
+    pub fn has_bordering(&self) -> bool {
+        let mut places =
+            (self.first.1..).flat_map(|z| (self.first.0..).take(self.across).map(move |x| (z, x)));
+        self.patches.iter().any(|patch| {
+            let at = places.next().filter(|_| patch.sides != [0; 4]);
+            at.is_some_and(|at| self.bordering(at).any(|(_, flags)| flags != 0))
+        })
+    }
+
     /// The runs of cells with this z, in order, that neither are in the mask nor border on it nor are steep: of the
     /// rectangle's rows, by x.
     pub fn whole(&self, z: i32) -> impl Iterator<Item = Range<i32>> {
@@ -187,6 +197,7 @@ mod tests {
                 let cells: Vec<_> = borders.bordering(patch).map(|(cell, _)| (cell.z, cell.x)).collect();
                 assert!(cells.is_sorted() && cells.len() == flags.len() - before, "{patch:?}");
             }
+            assert_eq!(borders.has_bordering(), flags.values().any(|&flags| flags != 0));
             for z in low.z..high.z {
                 let whole: Vec<_> = borders.whole(z).collect();
                 assert!(whole.windows(2).all(|pair| pair[0].end < pair[1].start), "{whole:?}");
