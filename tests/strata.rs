@@ -306,8 +306,8 @@ fn dug_cliffs(index: u64) -> Terrain {
     let bumps: Vec<f64> = (0..41 * 41).map(|_| f64::from(rng.f32())).collect();
     let height = |x: i32, z: i32| {
         let terraces = f64::from((x + z / 2) / (3 * tread)) * steep;
-        let h = terraces + bumps[(z * 41 + x) as usize] * if index % 2 == 0 { 1.0 } else { steep };
-        if index % 5 == 0 { h.round() } else { h }
+        let h = terraces + bumps[(z * 41 + x) as usize] * if index.is_multiple_of(2) { 1.0 } else { steep };
+        if index.is_multiple_of(5) { h.round() } else { h }
     };
     let ground = Ground::from_fn(40, 40, height).expect("finite heights");
     let (low, high) = ground.height_range();
