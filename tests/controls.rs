@@ -175,28 +175,29 @@ impl<'a> ReferenceMesher<'a> {
     }
 
     fn heightmap_cell(&mut self, cell: Column) {
-        let [a, b, c, d] = cell.corners();
+        let ([a, b, c, d], is_steep) = (cell.corners(), self.is_steep(cell));
         let sides = [(a, b, (-1, 0)), (b, c, (0, 1)), (c, d, (1, 0)), (d, a, (0, -1))];
         let [ab, bc, cd, da] = sides.map(|(from, to, (dx, dz))| {
             let beside = cell.offset(dx, dz);
             let bent = self.fault != Fault::StraightRing
                 && self.view.grid.has_cell(beside)
-                && self.is_volumetric(beside);
+                && (self.is_volumetric(beside) || self.is_steep(beside));
             let mut line = vec![self.height_vertex(from)];
-            if bent || self.is_banded(from, to) {
+            if bent || is_steep {
                 line.extend(self.chain(from, to));
             }
             line.push(self.height_vertex(to));
             line
         });
         let mut diagonal = vec![self.height_vertex(a)];
-        if self.is_banded(a, c) {
+        if is_steep {
             diagonal.extend(self.diagonal(a, c));
         }
         diagonal.push(self.height_vertex(c));
         let back = diagonal.iter().rev().copied().collect();
-        for (columns, lines) in [([a, b, c], [ab, bc, back]), ([c, d, a], [cd, da, diagonal])] {
-            if (0..3).any(|i| self.is_banded(columns[i], columns[(i + 1) % 3])) {
+        for lines in [[ab, bc, back], [cd, da, diagonal]] {
+            let is_level = lines.iter().all(|line| line[0].position.y == lines[0][0].position.y);
+            if is_steep && !is_level {
                 self.bands(&lines);
             } else {
                 self.ring_triangle(&lines[0], &lines[1]);
@@ -204,12 +205,23 @@ impl<'a> ReferenceMesher<'a> {
         }
     }
 
-    /// With strata: do two lattice levels or more separate the heights of two columns?
-    fn is_banded(&self, from: Column, to: Column) -> bool {
-        let ground = self.view.ground();
-        let levels = sheet([from, to].map(|column| ground.height(column)));
-        let is_between = |y: &i32| [from, to].iter().filter(|at| y * ONE < ground.height(**at)).count() == 1;
-        ground.strata().is_some() && levels.filter(is_between).count() >= 2
+    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, while the solid
+    /// ends of all such edges and the voxels below its corners are of several materials?
+    fn is_steep(&self, cell: Column) -> bool {
+        let (ground, [a, b, c, d]) = (self.view.ground(), cell.corners());
+        let is_solid = |point: &IVec3| point.y * ONE < ground.height(Column::of(*point));
+        let crossed = |(from, to): (Column, Column)| -> Vec<IVec3> {
+            let levels = sheet([from, to].map(|column| ground.height(column)));
+            let edges = levels.map(|y| [from.at(y), to.at(y)]);
+            let crossed = edges.filter(|edge| edge.iter().filter(|end| is_solid(end)).count() == 1);
+            crossed.map(|[p, q]| if is_solid(&p) { p } else { q }).collect()
+        };
+        let lines = [(a, b), (b, c), (c, d), (d, a), (a, c)].map(crossed);
+        let tops = [a, b, c, d].map(|column| column.at((ground.height(column) - 1).div_euclid(ONE)));
+        let mut voxels = lines.iter().flatten().chain(&tops);
+        ground.strata().is_some()
+            && lines.iter().any(|line| line.len() >= 2)
+            && voxels.any(|&voxel| ground.material(voxel) != ground.material(tops[0]))
     }
 
     /// The vertices on a cell's diagonal.

@@ -39,7 +39,6 @@ pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
 pub use rules::MaterialRule;
-pub(crate) use strata::is_banded;
 #[cfg(all(test, feature = "cuda"))]
 pub(crate) use strata::{BED, FILL, POCKET, VEIN};
 pub use strata::{

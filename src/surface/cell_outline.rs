@@ -1,8 +1,8 @@
 //! The triangles that a tile draws for a cell, by the lines around it.
 //!
-//! A cell is two triangles, a-b-c and c-d-a. Sides that border on the mask are lines of several vertices, over which
-//! rule 3 fans. On a ground with materials of its own, so are banded sides and diagonals. Such triangles
-//! are cut into bands, one for each lattice level, so a cliff shows the beds between the tops of its columns:
+//! A cell is two triangles, a-b-c and c-d-a. Sides that border on the mask or on a steep cell are lines of several vertices,
+//! over which rule 3 fans. All lines of a steep cell are, its diagonal too, and its triangles are cut into bands, one for each
+//! lattice level, so a cliff shows the beds between the tops of its columns:
 //!
 //! ```text
 //!        high          The long side goes from the lowest corner to the highest, the other
@@ -14,21 +14,20 @@
 //!   low
 //! ```
 //!
-//! Whether a line is banded depends only on its two columns. Cells and tiles that share a side agree on it, so nothing opens.
+//! Two cells that share a side agree on its vertices, across the borders of tiles too, so nothing opens.
 
 use glam::IVec3;
 
-use super::mask::sheet;
+use super::mask::{Borders, sheet};
 use super::vertex::DIAGONAL;
-use crate::ground::{Ground, is_banded};
+use crate::ground::Ground;
 use crate::lattice::{Column, ONE};
 
 /// The lines of a cell that stays heightmap, between its corners a, b, c, d. `T` is a vertex.
 pub(crate) struct CellOutline<T> {
     /// Sides a-b, b-c, c-d and d-a, and the diagonal a-c.
     lines: [Vec<T>; 5],
-    /// Are the triangles a-b-c and c-d-a cut into bands?
-    has_bands: [bool; 2],
+    is_steep: bool,
     /// All lines around a triangle.
     around: Vec<T>,
 }
@@ -36,43 +35,37 @@ pub(crate) struct CellOutline<T> {
 impl<T: Copy> CellOutline<T> {
     pub fn with_capacity(vertices: usize) -> Self {
         let lines = [(); 5].map(|()| Vec::with_capacity(vertices));
-        Self { lines, has_bands: [false; 2], around: Vec::new() }
+        Self { lines, is_steep: false, around: Vec::new() }
     }
 
-    /// Makes it that of a cell, given a bit for each side that borders on the mask, the vertices at its corners, and those
-    /// of crossed lattice edges, as lower end and axis.
+    /// Makes it that of a cell, given its [flags](super::mask::Borders), the vertices at its corners, and those of crossed
+    /// lattice edges, as lower end and axis.
     pub fn trace(
         &mut self,
         ground: &Ground,
         cell: Column,
-        bordered: u8,
+        flags: u8,
         corner: impl Fn(Column) -> T,
         mut crossing: impl FnMut(IVec3, usize) -> T,
     ) {
         let [a, b, c, d] = cell.corners();
         let ends = [(a, b), (b, c), (c, d), (d, a), (a, c)];
-        let mut banded = [false; 5];
-        if ground.steep_cells().is_some() {
-            let height = |column| ground.height(column);
-            banded = ends.map(|(from, to)| is_banded(height(from), height(to)));
-        }
         for (number, (line, (from, to))) in self.lines.iter_mut().zip(ends).enumerate() {
             line.clear();
             line.push(corner(from));
-            if banded[number] || bordered >> number & 1 == 1 {
+            if flags >> number & 1 == 1 {
                 line.extend(chain(ground, from, to).map(|(p, axis)| crossing(p, axis)));
             }
             line.push(corner(to));
         }
-        let [ab, bc, cd, da, ac] = banded;
-        self.has_bands = [ab | bc | ac, cd | da | ac];
+        self.is_steep = flags == Borders::STEEP;
     }
 
     /// The cell's triangles; `height` of a vertex is exact.
     pub fn triangles<H: PartialOrd>(&mut self, height: impl Fn(T) -> H, mut emit: impl FnMut([T; 3])) {
         let [ab, bc, cd, da, ac] = &self.lines;
         for (half, [first, second]) in [[ab, bc], [cd, da]].into_iter().enumerate() {
-            if !self.has_bands[half] {
+            if !self.is_steep {
                 fan(first, second, &mut emit);
                 continue;
             }

@@ -57,14 +57,11 @@ fn column_count(low: Column, high: Column) -> u32 {
     along(low.x, high.x) * along(low.z, high.z)
 }
 
-/// Which of a tile's cells are in the mask, border on it, or are steep.
+/// Which of a tile's cells are in the mask or steep, or border on such cells.
 pub fn borders(world: &WorldView, tile: TilePos) -> Borders {
     let (low, high) = world.grid.tile_cells(tile);
-    let borders = world.mask.borders(low, high);
-    match world.samples.ground().steep_cells() {
-        Some(steep) => borders.with_steep(|word| steep.word(word)),
-        None => borders,
-    }
+    let steep = world.samples.ground().steep_cells();
+    world.mask.borders(low, high, |word| steep.map_or(0, |steep| steep.word(word)))
 }
 
 /// The triangles outside the mask: two for each whole cell, row by row, then the rings, steep cells included.
@@ -90,8 +87,8 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     indices
 }
 
-/// The rings of one tile: triangles of cells that border on the mask, and of steep cells, and the vertices they have
-/// there.
+/// The rings of one tile: triangles of steep cells and of those that border on them or on the mask, and the vertices they
+/// have there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rings {
     vertices: Vec<Vertex>,
@@ -237,7 +234,7 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Draws a cell's two triangles, with vertices on the sides where it borders on the mask or is banded.
+    /// Draws a cell's two triangles, with vertices on the lines that its flags name.
     fn cell(&mut self, cell: Column, flags: u8) {
         let (ground, low, base, rings) = (self.ground, self.low, self.base, &mut self.rings);
         let width = (self.high.x - low.x + 1) as u32;

@@ -46,11 +46,9 @@ impl TileUpdate {
         self.indices.get_or_init(|| tile::indices(self.grid, self.tile, &self.borders, &self.rings))
     }
 
-    /// The rings that the world keeps: none of a tile that does not border on the mask, as its steep cells depend on the
-    /// ground only.
+    /// The rings that the world keeps: none of a tile far from the mask, as steep cells depend on the ground only.
     pub(super) fn kept_rings(&self) -> Arc<Rings> {
-        let is_kept = self.ground.steep_cells().is_none() || self.borders.has_bordering();
-        if is_kept { Arc::clone(&self.rings) } else { Arc::default() }
+        if self.borders.is_near_mask() { Arc::clone(&self.rings) } else { Arc::default() }
     }
 
     /// The tile's whole mesh, its columns included.

@@ -48,17 +48,19 @@ pub(super) fn for_triangles(
 fn heightmap_triangles(view: &WorldView, cell: Column, found: &mut impl FnMut(Triangle)) {
     let ground = view.ground();
     let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
-    let bordered = Borders::SIDES.map(|(dx, dz)| view.mask.contains(cell.offset(dx, dz)));
-    let is_steep = ground.steep_cells().is_some_and(|steep| steep.contains(cell));
-    if bordered == [false; 4] && !is_steep {
+    let is_steep = |cell| ground.steep_cells().is_some_and(|steep| steep.contains(cell));
+    let bends = |(dx, dz)| view.mask.contains(cell.offset(dx, dz)) || is_steep(cell.offset(dx, dz));
+    let bordering =
+        (0..).zip(Borders::SIDES).fold(0, |flags, (side, step)| flags | u8::from(bends(step)) << side);
+    let flags = if is_steep(cell) { Borders::STEEP } else { bordering };
+    if flags == 0 {
         let [a, b, c, d] = cell.corners().map(corner);
         found([a, b, c]);
         found([c, d, a]);
         return;
     }
-    let bordered = (0..).zip(bordered).fold(0, |flags, (side, is)| flags | u8::from(is) << side);
     let mut outline = CellOutline::with_capacity(0);
-    outline.trace(ground, cell, bordered, corner, |p, axis| {
+    outline.trace(ground, cell, flags, corner, |p, axis| {
         position(view, p, axis, IVec3::ZERO).as_dvec3() / f64::from(SNAP)
     });
     outline.triangles(|vertex| vertex.y, found);

@@ -31,7 +31,7 @@ pub(crate) use records::StrataRecords;
 pub(crate) use records::{BED, FILL, POCKET, VEIN};
 #[cfg(feature = "cuda")]
 pub(crate) use records::{BeddingRecord, StratumRecord};
-pub(crate) use steep::{SteepCells, is_banded};
+pub(crate) use steep::SteepCells;
 
 /// Most strata of a ground.
 pub const MAX_STRATA: usize = 32;

@@ -19,7 +19,7 @@ pub(crate) struct Below {
     own: OwnMaterials,
     /// The material of the highest solid voxel of each column, row-major: what the undug surface shows.
     tops: Box<[MaterialId]>,
-    /// Cells whose tops do not show all of their face, if there are any.
+    /// Cells whose tops do not show all materials of their face, if there are any.
     steep: Option<Box<SteepCells>>,
 }
 
@@ -37,7 +37,8 @@ impl Ground {
     /// The same ground with strata. Voxels that no stratum holds keep what [`Self::with_materials`] gave them, before or
     /// after.
     ///
-    /// Nothing is stored for a voxel, one byte for a column, and where cells are steep one bit for a cell. Counts for [`Self::hash`].
+    /// Nothing is stored for a voxel, one byte for a column, and one bit for a cell if any is steep. Counts for
+    /// [`Self::hash`].
     ///
     /// # Errors
     /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
@@ -94,8 +95,7 @@ impl Ground {
     }
 
     fn with_below(self, own: OwnMaterials) -> Result<Self, GroundError> {
-        let steep = SteepCells::new(&self)?.map(Box::new);
-        self.replace_below(Below { own, tops: Box::default(), steep }).with_new_tops()
+        self.replace_below(Below { own, tops: Box::default(), steep: None }).with_new_tops()
     }
 
     /// The same ground, with its surface as its materials are now.
@@ -103,9 +103,11 @@ impl Ground {
         if self.below().is_none() {
             return Ok(self);
         }
-        let bare = self.map_below(|below| Below { tops: Box::default(), ..below });
+        let bare = self.map_below(|below| Below { tops: Box::default(), steep: None, ..below });
         let tops = bare.tops()?.into_boxed_slice();
-        Ok(bare.map_below(|below| Below { tops, ..below }))
+        let ground = bare.map_below(|below| Below { tops, ..below });
+        let steep = SteepCells::new(&ground)?.map(Box::new);
+        Ok(ground.map_below(|below| Below { steep, ..below }))
     }
 
     /// The material of the highest solid voxel of each column.
@@ -160,8 +162,8 @@ impl Ground {
         self.below().map(|below| &below.tops[columns])
     }
 
-    /// The cells whose tops do not show all of their face; `None` if there are none, as on any ground whose materials are
-    /// those of its columns.
+    /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose materials
+    /// are those of its columns.
     pub(crate) fn steep_cells(&self) -> Option<&SteepCells> {
         self.below()?.steep.as_deref()
     }
