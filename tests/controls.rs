@@ -175,22 +175,106 @@ impl<'a> ReferenceMesher<'a> {
     }
 
     fn heightmap_cell(&mut self, cell: Column) {
-        let [a, b, c, d] = cell.corners();
+        let ([a, b, c, d], is_steep) = (cell.corners(), self.is_steep(cell));
         let sides = [(a, b, (-1, 0)), (b, c, (0, 1)), (c, d, (1, 0)), (d, a, (0, -1))];
         let [ab, bc, cd, da] = sides.map(|(from, to, (dx, dz))| {
             let beside = cell.offset(dx, dz);
             let bent = self.fault != Fault::StraightRing
                 && self.view.grid.has_cell(beside)
-                && self.is_volumetric(beside);
+                && (self.is_volumetric(beside) || self.is_steep(beside));
             let mut line = vec![self.height_vertex(from)];
-            if bent {
+            if bent || is_steep {
                 line.extend(self.chain(from, to));
             }
             line.push(self.height_vertex(to));
             line
         });
-        self.ring_triangle(&ab, &bc);
-        self.ring_triangle(&cd, &da);
+        let mut diagonal = vec![self.height_vertex(a)];
+        if is_steep {
+            diagonal.extend(self.diagonal(a, c));
+        }
+        diagonal.push(self.height_vertex(c));
+        let back = diagonal.iter().rev().copied().collect();
+        for lines in [[ab, bc, back], [cd, da, diagonal]] {
+            let is_level = lines.iter().all(|line| line[0].position.y == lines[0][0].position.y);
+            if is_steep && !is_level {
+                self.bands(&lines);
+            } else {
+                self.ring_triangle(&lines[0], &lines[1]);
+            }
+        }
+    }
+
+    /// With strata: do two lattice levels or more separate the heights of two neighbouring columns of a cell, while the solid
+    /// ends of all such edges and the voxels below its corners are of several materials?
+    fn is_steep(&self, cell: Column) -> bool {
+        let (ground, [a, b, c, d]) = (self.view.ground(), cell.corners());
+        let is_solid = |point: &IVec3| point.y * ONE < ground.height(Column::of(*point));
+        let crossed = |(from, to): (Column, Column)| -> Vec<IVec3> {
+            let levels = sheet([from, to].map(|column| ground.height(column)));
+            let edges = levels.map(|y| [from.at(y), to.at(y)]);
+            let crossed = edges.filter(|edge| edge.iter().filter(|end| is_solid(end)).count() == 1);
+            crossed.map(|[p, q]| if is_solid(&p) { p } else { q }).collect()
+        };
+        let lines = [(a, b), (b, c), (c, d), (d, a), (a, c)].map(crossed);
+        let tops = [a, b, c, d].map(|column| column.at((ground.height(column) - 1).div_euclid(ONE)));
+        let mut voxels = lines.iter().flatten().chain(&tops);
+        ground.strata().is_some()
+            && lines.iter().any(|line| line.len() >= 2)
+            && voxels.any(|&voxel| ground.material(voxel) != ground.material(tops[0]))
+    }
+
+    /// The vertices on a cell's diagonal.
+    fn diagonal(&self, from: Column, to: Column) -> Vec<Vertex> {
+        let [h0, h1] = [from, to].map(|column| self.view.ground().height(column));
+        let levels = sheet([h0, h1]).filter(|y| (y * ONE < h0) != (y * ONE < h1));
+        let mut vertices: Vec<Vertex> = levels
+            .map(|y| {
+                let share = f64::from((y * ONE - h0).abs()) / f64::from((h1 - h0).abs());
+                let step = ((share * f64::from(SNAP)).round() as i32).clamp(1, SNAP - 1);
+                let position = from.at(y) * SNAP + IVec3::new(step, 0, step);
+                Vertex { position, ..self.height_vertex(from) }
+            })
+            .collect();
+        if h1 < h0 {
+            vertices.reverse();
+        }
+        vertices
+    }
+
+    /// A triangle in bands, by the lines around it. Its vertices in the order of their heights, those of the longest line last
+    /// among equals: each makes a triangle with the last one of its own side and the last one of the other.
+    fn bands(&mut self, lines: &[Vec<Vertex>; 3]) {
+        let height = |corner: &usize| lines[*corner][0].position.y;
+        let low = (0..3).min_by_key(height).expect("three");
+        let high = (0..3).rev().max_by_key(height).expect("three");
+        let mut sides = [Vec::new(), Vec::new()];
+        let mut corner = low;
+        for line in lines.iter().cycle().skip(low).take(3) {
+            // Up to the highest corner, and back down.
+            let side = usize::from((corner + 3 - low) % 3 >= (high + 3 - low) % 3);
+            sides[side].extend_from_slice(&line[1..]);
+            corner = (corner + 1) % 3;
+        }
+        let [mut up, mut down] = sides;
+        let lowest = lines[low][0];
+        down.pop();
+        down.reverse();
+        let highest = up.pop().expect("the highest corner");
+        let is_long_up = (low + 1) % 3 == high;
+        let up = up.into_iter().map(|vertex| (true, vertex));
+        let mut all: Vec<(bool, Vertex)> = up.chain(down.into_iter().map(|vertex| (false, vertex))).collect();
+        // Keeps the order of equals on one side.
+        all.sort_by_key(|&(is_up, vertex)| (vertex.position.y, is_up == is_long_up));
+        let mut last = [lowest; 2];
+        for (is_up, vertex) in all {
+            let triangle = if is_up { [last[0], vertex, last[1]] } else { [vertex, last[1], last[0]] };
+            if last != [lowest; 2] {
+                self.triangles.push(triangle);
+            }
+            last[usize::from(!is_up)] = vertex;
+        }
+        self.triangles.push([last[0], highest, last[1]]);
     }
 
     fn height_vertex(&self, column: Column) -> Vertex {

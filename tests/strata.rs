@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bevy_burrow::ground::{Ground, Strata};
 use bevy_burrow::lattice::{Column, LatticeBox, SNAP};
 use bevy_burrow::prelude::*;
-use bevy_burrow::surface::SurfaceMesh;
+use bevy_burrow::surface::{SurfaceMesh, Vertex};
 use bevy_burrow::terrain::{Drawn, World};
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
@@ -144,6 +144,7 @@ fn refused_voxels_are_those_of_the_strata_that_resist() {
 
 #[test]
 fn strata_change_no_solid_ground_and_store_nothing() {
+    let mut tiles = [0; 2];
     for index in 0..worlds::world_count(24) {
         let rng = &mut Rng::with_seed(index);
         let (ground, chunk_size) = ground_with_strata(&mut rng.clone(), index);
@@ -170,8 +171,19 @@ fn strata_change_no_solid_ground_and_store_nothing() {
         assert!(bricks(&with) == bricks(&without), "world {index}");
         let faces =
             |mesh: SurfaceMesh| (mesh.vertices.iter().map(|v| v.position).collect::<Vec<_>>(), mesh.indices);
+        // Cliffs between columns have more vertices.
+        let height = |column| with.world().ground().height(column);
+        let top = |column: Column| (height(column) + 255).div_euclid(256);
         for tile in with.world().grid().tiles() {
-            assert!(faces(with.world().tile_mesh(tile)) == faces(without.world().tile_mesh(tile)));
+            let (low, high) = with.world().grid().tile_cells(tile);
+            let mut cells = (low.z..high.z).flat_map(|z| (low.x..high.x).map(move |x| Column::new(x, z)));
+            let is_steep = cells.any(|cell| {
+                let [a, b, c, d] = cell.corners().map(top);
+                [(a, b), (b, c), (c, d), (d, a), (a, c)].iter().any(|(from, to)| from.abs_diff(*to) > 1)
+            });
+            let [with, without] = [&with, &without].map(|terrain| faces(terrain.world().tile_mesh(tile)));
+            assert!(with == without || is_steep, "{tile:?} of world {index}");
+            tiles[usize::from(with != without)] += 1;
         }
         for chunk in with.world().drawn_chunks() {
             assert!(faces(with.world().chunk_mesh(chunk)) == faces(without.world().chunk_mesh(chunk)));
@@ -184,6 +196,7 @@ fn strata_change_no_solid_ground_and_store_nothing() {
         with.apply::<Brush>([]);
         assert_eq!(with.world().hash(), hash);
     }
+    assert!(tiles.iter().all(|&count| count > 20), "{tiles:?}");
 }
 
 #[test]
@@ -215,14 +228,14 @@ fn check_vertices(world: &World, mesh: &SurfaceMesh, origin: IVec3) -> usize {
     for vertex in &vertices {
         let place = origin * SNAP + vertex.position;
         let low = place.map(|at| at.div_euclid(SNAP));
-        let axis = (0..3).find(|&axis| place[axis].rem_euclid(SNAP) != 0);
-        let mut solid = low;
-        match axis {
+        // To the other end of the edge, or of the cell's diagonal.
+        let step = place.map(|at| i32::from(at.rem_euclid(SNAP) != 0));
+        let solid = match world.samples().is_solid(low) {
             // On a lattice point lies only the undug surface, over the highest solid voxel.
-            None => solid.y -= 1,
-            Some(axis) if !world.samples().is_solid(low) => solid[axis] += 1,
-            Some(_) => {}
-        }
+            _ if step == IVec3::ZERO => low - IVec3::Y,
+            true => low,
+            false => low + step,
+        };
         let expected = material(world, solid);
         let mix = vertex.materials;
         assert_eq!((mix.ids, mix.weights), ([expected.0, 0, 0, 0], [255, 0, 0, 0]), "at {place} by {solid}");
@@ -246,4 +259,96 @@ fn every_vertex_shows_what_a_dig_there_yields() {
         assert!(report.is_flawless(), "world {index}: {report}");
     }
     assert!(tiles > 50_000 && chunks > 10_000, "{tiles} {chunks}");
+}
+
+/// Points of a triangle, as weights of its corners: all over it, none on an edge.
+fn points_of(triangle: &[Vertex; 3]) -> Vec<Vec3> {
+    let [a, b, c] = triangle.map(|vertex| vertex.position.as_vec3() / SNAP as f32);
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let steps = (longest * 3.0).ceil().clamp(4.0, 40.0) as i32;
+    let rows = (0..steps).flat_map(|i| (0..steps - i).map(move |j| (i, j)));
+    rows.map(|(i, j)| {
+        let [u, v] = [i, j].map(|at| (at as f32 + 1.0 / 3.0) / steps as f32);
+        Vec3::new(u, v, 1.0 - u - v)
+    })
+    .collect()
+}
+
+/// The material with the most weight at a point of a triangle, as shaders find it.
+fn shown(triangle: &[Vertex; 3], weights: Vec3) -> MaterialId {
+    let mut sums = [0.0; 256];
+    for (vertex, share) in triangle.iter().zip(weights.to_array()) {
+        for (&id, &weight) in vertex.materials.ids.iter().zip(&vertex.materials.weights) {
+            sums[usize::from(id)] += f32::from(weight) * share;
+        }
+    }
+    let strongest = (0..=255).max_by(|&a: &u8, &b| sums[usize::from(a)].total_cmp(&sums[usize::from(b)]));
+    MaterialId(strongest.unwrap_or_default())
+}
+
+/// How much farther from a point than the nearest solid voxel is the nearest one of this material; `None` if there is none
+/// within 2 voxels.
+fn error_at(world: &World, at: Vec3, shown: MaterialId) -> Option<f32> {
+    let middle = at.floor().as_ivec3();
+    let last = IVec3::new(world.ground().width(), middle.y + 3, world.ground().depth());
+    let near = LatticeBox { min: (middle - 2).max(IVec3::Y * (middle.y - 2)), max: (middle + 3).min(last) };
+    let solid = near.points().filter(|&point| world.samples().is_solid(point));
+    let mut solid: Vec<(f32, IVec3)> = solid.map(|point| (at.distance(point.as_vec3()), point)).collect();
+    solid.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let (own, _) = solid.iter().find(|&&(_, point)| material(world, point) == shown)?;
+    Some(own - solid[0].0)
+}
+
+/// A random ground with cliffs and strata, dug in some places.
+fn dug_cliffs(index: u64) -> Terrain {
+    let rng = &mut Rng::with_seed(index);
+    let (steep, tread) = ([3.0, 9.0, 25.0][index as usize % 3], rng.i32(1..6));
+    let bumps: Vec<f64> = (0..41 * 41).map(|_| f64::from(rng.f32())).collect();
+    let height = |x: i32, z: i32| {
+        let terraces = f64::from((x + z / 2) / (3 * tread)) * steep;
+        let h = terraces + bumps[(z * 41 + x) as usize] * if index.is_multiple_of(2) { 1.0 } else { steep };
+        if index.is_multiple_of(5) { h.round() } else { h }
+    };
+    let ground = Ground::from_fn(40, 40, height).expect("finite heights");
+    let (low, high) = ground.height_range();
+    let strata = random_strata(rng, [low as f32 / 256.0 - 5.0, high as f32 / 256.0 + 2.0]);
+    let ground = Arc::new(ground.with_strata(&strata).expect("valid strata"));
+    let mut terrain = terrain(&ground, [8, 25, 32][rng.usize(..3)]);
+    let brushes: Vec<Brush> = (0..8).map(|_| random_brush(rng, &ground)).collect();
+    terrain.apply(brushes.into_iter().map(|brush| Brush::dig(brush.shape)));
+    terrain
+}
+
+/// The border between two materials that are drawn is at most half a voxel off, so what is shown may be a voxel farther away
+/// than what is nearest. Where heights are whole numbers, the surface lies a voxel above the highest solid points, which adds
+/// 0.083 at most.
+#[test]
+fn every_point_shows_what_a_dig_there_yields() {
+    let (mut points, mut far, mut misses) = ([0; 2], 0, Vec::new());
+    for index in 0..worlds::world_count(12) {
+        let terrain = dug_cliffs(index);
+        let world = terrain.world();
+        for (drawn, mesh) in world.drawn() {
+            let origin = world.origin(drawn).as_vec3();
+            for triangle in mesh.triangles() {
+                let corners = triangle.map(|vertex| vertex.position.as_vec3() / SNAP as f32 + origin);
+                for weights in points_of(&triangle) {
+                    let at = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+                    let shown = shown(&triangle, weights);
+                    points[usize::from(matches!(drawn, Drawn::Chunk(_)))] += 1;
+                    let error = error_at(world, at, shown);
+                    far += u32::from(error.is_none_or(|error| error > 0.5));
+                    if error.is_none_or(|error| error > 1.084) {
+                        misses.push((index, drawn, at, shown, error));
+                    }
+                }
+            }
+        }
+        let report = world.check_seams();
+        assert!(report.is_flawless(), "world {index}: {report}");
+    }
+    println!("{points:?} points, {far} of them farther than half a voxel");
+    assert!(misses.is_empty(), "{} of {points:?} points, {:?}", misses.len(), &misses[..misses.len().min(9)]);
+    assert!(points.iter().all(|&count| count > 500_000), "{points:?}");
+    assert!(far < points.iter().sum::<u32>() / 2000, "{far} of {points:?}");
 }

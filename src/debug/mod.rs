@@ -14,7 +14,7 @@
 //! | [`chunks`](BurrowDebug::chunks) | chunks that draw something or hold fields, and the borders of tiles on the ground |
 //! | [`fields`](BurrowDebug::fields) | the box of each field, a colour each |
 //! | [`mask`](BurrowDebug::mask) | cells that marching cubes draws, and the line around them |
-//! | [`rings`](BurrowDebug::rings) | triangles of tiles that are fanned over the mask's border |
+//! | [`rings`](BurrowDebug::rings) | triangles of tiles that are fanned over the border of the mask or of steep cells, or are bands of these |
 //! | [`dirty`](BurrowDebug::dirty) | bricks in the boxes of the latest edits, fading |
 //! | [`normals`](BurrowDebug::normals) | normals of vertices: golden of tiles, blue of chunks |
 //! | [`wires`](BurrowDebug::wires) | edges of triangles: golden of tiles, blue of chunks, white what both share |

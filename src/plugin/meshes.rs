@@ -206,7 +206,7 @@ fn copy<T: Copy>(values: &mut Vec<T>, of: &[u32]) {
 /// on the position alone, so both sides of a seam get the same bits.
 fn depth(ground: &Ground, place: IVec3) -> f32 {
     let column = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
-    // A vertex lies on an edge of the lattice, so only one of these is not 0.
+    // A vertex lies on an edge of the lattice, so only one of these is not 0, or on a cell's diagonal, where both are the same.
     let (x, z) = (place.x.rem_euclid(SNAP), place.z.rem_euclid(SNAP));
     let next = column.offset(i32::from(x > 0), i32::from(z > 0));
     let [here, there] = [column, next].map(|column| i64::from(ground.height(column)));

@@ -39,16 +39,16 @@ mod task;
 mod threads;
 mod times;
 
-pub use components::{Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, SlimVertices, Tile};
+pub use components::{
+    Chunk, Field, GroundPiece, GroundPieces, MaterialColors, ShownSurface, SlimVertices, Tile,
+};
 #[cfg(feature = "avian")]
 pub(crate) use entities::{TerrainEntities, trigger_if_alive};
 pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
-pub use meshes::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS,
-};
+pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
     LoosePieceFound, Redo, TargetedBrush, TerrainReady, Undo,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
 use super::ShownSurface;
+use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
 use crate::lattice::{ChunkGrid, ItemCost, parallel_map_into};
 use crate::surface::SurfaceMesh;
 use crate::terrain::{Drawn, SurfaceDraft, Terrain};

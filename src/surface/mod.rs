@@ -10,6 +10,7 @@
 
 pub mod block;
 pub mod cases;
+pub(crate) mod cell_outline;
 mod crossings;
 pub mod indices;
 mod layer_bits;

@@ -3,17 +3,23 @@
 //! A tile's vertices are its columns, in rows along x; digging never moves them. The few vertices that rings need on the
 //! mask's border follow after the columns. A transaction rebuilds only the list of indices: whole cells first, then the
 //! rings, of which it computes those near its edits and copies the others.
+//!
+//! On a ground with materials of its own, steep cells are drawn with the rings, wherever they are: in bands, since their
+//! corners alone do not show the beds between them (`cell_outline`).
 
 use std::cmp::Ordering;
 
 use glam::IVec3;
 
+use super::cell_outline::CellOutline;
 use super::indices::Indices;
-use super::mask::{Borders, sheet};
+use super::mask::Borders;
 use super::mesh::{MaterialMix, SurfaceMesh, Vertex};
 use super::vertex::{WorldView, sheet_vertex};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, Column, ONE, SNAP, TilePos};
+
+pub use super::cell_outline::fan;
 
 /// The whole mesh of a tile, relative to its lowest column at y = 0. Empty where the mask covers all of it, and where the
 /// world has no such tile.
@@ -51,13 +57,14 @@ fn column_count(low: Column, high: Column) -> u32 {
     along(low.x, high.x) * along(low.z, high.z)
 }
 
-/// Which of a tile's cells are in the mask, or border on it.
+/// Which of a tile's cells are in the mask or steep, or border on such cells.
 pub fn borders(world: &WorldView, tile: TilePos) -> Borders {
     let (low, high) = world.grid.tile_cells(tile);
-    world.mask.borders(low, high)
+    let steep = world.samples.ground().steep_cells();
+    world.mask.borders(low, high, |word| steep.map_or(0, |steep| steep.word(word)))
 }
 
-/// The triangles outside the mask: two for each whole cell, row by row, then the rings.
+/// The triangles outside the mask: two for each whole cell, row by row, then the rings, steep cells included.
 pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings) -> Indices {
     let (low, high) = grid.tile_cells(tile);
     let vertices = column_count(low, high) as usize + rings.vertices.len();
@@ -80,7 +87,8 @@ pub fn indices(grid: ChunkGrid, tile: TilePos, borders: &Borders, rings: &Rings)
     indices
 }
 
-/// The rings of one tile: triangles of cells that border on the mask, and the vertices they have there.
+/// The rings of one tile: triangles of steep cells and of those that border on them or on the mask, and the vertices they
+/// have there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rings {
     vertices: Vec<Vertex>,
@@ -146,7 +154,7 @@ impl Rings {
         }
     }
 
-    /// Does no cell of the tile border on the mask?
+    /// Does no cell of the tile border on the mask, and is none steep?
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
     }
@@ -179,16 +187,16 @@ struct Drawing<'a> {
     /// The number of the first vertex after the columns.
     base: u32,
     rings: Rings,
-    /// The four sides of the cell under work, as vertex numbers.
-    sides: [Vec<u32>; 4],
+    /// The lines of the cell under work.
+    outline: CellOutline<Numbered>,
 }
 
 impl<'a> Drawing<'a> {
     fn new(world: &WorldView<'a>, tile: TilePos, borders: &'a Borders) -> Self {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
-        let sides = [(); 4].map(|()| Vec::with_capacity(ROOM));
-        Self { ground, borders, low, high, base, rings: Rings::default(), sides }
+        let outline = CellOutline::with_capacity(ROOM);
+        Self { ground, borders, low, high, base, rings: Rings::default(), outline }
     }
 
     /// The rings, without room for more: they are kept until the next edit nearby.
@@ -226,56 +234,29 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Fans a cell's two triangles over the sides where it borders on the mask.
+    /// Draws a cell's two triangles, with vertices on the lines that its flags name.
     fn cell(&mut self, cell: Column, flags: u8) {
-        let width = (self.high.x - self.low.x + 1) as u32;
-        let number = |column: Column| (column.z - self.low.z) as u32 * width + (column.x - self.low.x) as u32;
-        let (corners, ground) = (cell.corners(), self.ground);
-        let mut sides = std::mem::take(&mut self.sides);
-        for (side, line) in sides.iter_mut().enumerate() {
-            let (from, to) = (corners[side], corners[(side + 1) % 4]);
-            line.clear();
-            line.push(number(from));
-            if flags >> side & 1 == 1 {
-                for (p, axis) in chain(ground, from, to) {
-                    line.push(self.base + self.rings.vertices.len() as u32);
-                    self.rings.vertices.push(sheet_vertex(ground, p, axis, self.low.at(0)));
-                }
-            }
-            line.push(number(to));
-        }
-        let [ab, bc, cd, da] = &sides;
-        fan(ab, bc, |triangle| self.rings.fans.extend_from_slice(&triangle));
-        fan(cd, da, |triangle| self.rings.fans.extend_from_slice(&triangle));
-        self.sides = sides;
+        let (ground, low, base, rings) = (self.ground, self.low, self.base, &mut self.rings);
+        let width = (self.high.x - low.x + 1) as u32;
+        let corner = |column: Column| Numbered {
+            number: (column.z - low.z) as u32 * width + (column.x - low.x) as u32,
+            height: ground.height(column) * (SNAP / ONE),
+        };
+        self.outline.trace(ground, cell, flags, corner, |p, axis| {
+            rings.vertices.push(sheet_vertex(ground, p, axis, low.at(0)));
+            Numbered { number: base + rings.vertices.len() as u32 - 1, height: p.y * SNAP }
+        });
+        let numbers = |triangle: [Numbered; 3]| rings.fans.extend(triangle.map(|vertex| vertex.number));
+        self.outline.triangles(|vertex| vertex.height, numbers);
     }
 }
 
-/// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, in order: one for each
-/// lattice y that separates their heights, as lower end and axis.
-pub(crate) fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = (IVec3, usize)> {
-    let (h_from, h_to) = (ground.height(from), ground.height(to));
-    let axis = if from.x != to.x { 0 } else { 2 };
-    let low = Column::new(from.x.min(to.x), from.z.min(to.z));
-    let rungs = sheet([h_from, h_to]);
-    let (first, last) = (rungs.start, rungs.end - 1);
-    let is_falling = h_to < h_from;
-    rungs
-        .map(move |y| if is_falling { last - (y - first) } else { y })
-        .filter(move |y| (y * ONE < h_from) != (y * ONE < h_to))
-        .map(move |y| (low.at(y), axis))
-}
-
-/// Rule 3: fans a triangle with legs P..R and R..Q, each straight or a polyline; the side Q-P is straight.
-pub fn fan<T: Copy>(first: &[T], second: &[T], mut emit: impl FnMut([T; 3])) {
-    // Q when the second leg is straight; else its first inner vertex, and P fans the rest of it.
-    let apex = second[1];
-    for pair in first.windows(2) {
-        emit([pair[0], pair[1], apex]);
-    }
-    for pair in second[1..].windows(2) {
-        emit([first[0], pair[0], pair[1]]);
-    }
+/// A vertex of a cell's outline.
+#[derive(Clone, Copy)]
+struct Numbered {
+    number: u32,
+    /// In 1/4096 voxel.
+    height: i32,
 }
 
 #[cfg(test)]

@@ -62,7 +62,11 @@ fn extrapolated(grid: ChunkGrid, point: IVec3, own: impl Fn(IVec3) -> i32) -> i3
     if rim == point { own(point) } else { 2 * own(rim) - own(2 * rim - point) }
 }
 
-const UNIT: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];
+/// The number of a cell's diagonal among the axes: from its lowest corner to the opposite one.
+pub(super) const DIAGONAL: usize = 3;
+
+/// Steps along each axis, and along [`DIAGONAL`].
+const UNIT: [IVec3; 4] = [IVec3::X, IVec3::Y, IVec3::Z, IVec3::new(1, 0, 1)];
 
 /// Where the surface crosses the lattice edge from `p` along `axis`, in steps of 1/4096 voxel from `p`.
 ///
@@ -109,6 +113,7 @@ pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> V
 }
 
 /// The vertex where the sheet has no edited sample near, or meets the heightmap: the tile's own normals and materials.
+/// Also on a cell's [`DIAGONAL`].
 pub fn sheet_vertex(ground: &Ground, p: IVec3, axis: usize, origin: IVec3) -> Vertex {
     let q = p + UNIT[axis];
     let step = match axis {
@@ -134,7 +139,9 @@ pub fn height_vertex(ground: &Ground, column: Column, origin: IVec3) -> Vertex {
 
 /// No sample that the gradients at both ends of an edge look at is edited.
 fn is_stencil_pristine(lattice: &impl Lattice, p: IVec3, q: IVec3) -> bool {
-    [p, q].iter().all(|&end| UNIT.iter().all(|&u| !lattice.is_edited(end + u) && !lattice.is_edited(end - u)))
+    [p, q].iter().all(|&end| {
+        UNIT[..DIAGONAL].iter().all(|&u| !lattice.is_edited(end + u) && !lattice.is_edited(end - u))
+    })
 }
 
 /// Does the edge lie in the border of the mask: between a volumetric cell and one that stays heightmap?

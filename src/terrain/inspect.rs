@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use super::world::{Drawn, World};
 use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP, TilePos};
-use crate::surface::{MaskView, SurfaceMesh};
+use crate::surface::{MaskView, SurfaceMesh, tile};
 use crate::volume::{Field, layers::ones};
 
 impl World {
@@ -24,14 +24,15 @@ impl World {
         cells.filter(move |cell| (low.x..=high.x).contains(&cell.x) && (low.z..=high.z).contains(&cell.z))
     }
 
-    /// The triangles of a tile's rings (rule 3), in voxels of the terrain.
+    /// The triangles of a tile's rings (rule 3) and steep cells, in voxels of the terrain.
     pub fn ring_triangles(&self, tile: TilePos) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-        let rings = self.rings.get(&tile).filter(|_| self.grid.has_tile(tile));
+        let has_tile = self.grid.has_tile(tile);
+        let rings = has_tile.then(|| self.tile_rings(tile, &tile::borders(&self.view(), tile)));
         let (low, high) = self.grid.tile_cells(tile);
         let width = (high.x - low.x + 1).max(1) as u32;
         let columns = width * (high.z - low.z + 1).max(0) as u32;
         rings.into_iter().flat_map(move |rings| {
-            let place = move |&index: &u32| match index.checked_sub(columns) {
+            let place = |index: u32| match index.checked_sub(columns) {
                 None => {
                     let column = low.offset((index % width) as i32, (index / width) as i32);
                     let height = self.ground.height(column) as f32 / ONE as f32;
@@ -43,7 +44,8 @@ impl World {
                     (own + low.at(0) * SNAP).as_vec3() / SNAP as f32
                 }
             };
-            rings.fans().chunks_exact(3).map(move |fan| [place(&fan[0]), place(&fan[1]), place(&fan[2])])
+            let fans = rings.fans().chunks_exact(3).map(|fan| [0, 1, 2].map(|corner| place(fan[corner])));
+            fans.collect::<Vec<_>>()
         })
     }
 
@@ -133,13 +135,20 @@ mod tests {
 
     use super::*;
     use crate::brush::{Brush, Shape};
-    use crate::ground::{Ground, NoiseHeights};
-    use crate::surface::tile;
+    use crate::ground::{Ground, NoiseHeights, Strata};
     use crate::terrain::{Terrain, TerrainSettings};
 
     fn dug() -> Terrain {
         let noise = NoiseHeights { amplitude: 14.0, scale: 20.0, ..NoiseHeights::default() };
-        let ground = Ground::from_noise(70, 60, &noise).expect("valid");
+        dug_in(Ground::from_noise(70, 60, &noise).expect("valid"))
+    }
+
+    fn cliffs() -> Ground {
+        let ground = Ground::from_fn(70, 60, |x, z| f64::from((x / 3 + z / 7) % 5 * 11)).expect("valid");
+        ground.with_strata(&Strata::alpine()).expect("valid")
+    }
+
+    fn dug_in(ground: Ground) -> Terrain {
         let mut terrain =
             Terrain::new(ground, &TerrainSettings { chunk_size: 16, voxel_size: 1.0 }).expect("valid");
         let height = |x: f32, z: f32| terrain.world().height(x.into(), z.into()).unwrap_or_default() as f32;
@@ -168,8 +177,15 @@ mod tests {
 
     #[test]
     fn ring_triangles_are_the_last_of_a_tiles_mesh() {
-        let terrain = dug();
-        let world = terrain.world();
+        for terrain in [dug(), dug_in(cliffs())] {
+            let is_steep = terrain.world().ground().steep_cells().is_some();
+            let count = count_ring_triangles(terrain.world());
+            assert!(count > if is_steep { 10_000 } else { 50 }, "{count}");
+        }
+    }
+
+    /// Checks that they are the last of their tile's mesh.
+    fn count_ring_triangles(world: &World) -> usize {
         let mut count = 0;
         for tile in world.grid().tiles() {
             let rings: Vec<[Vec3; 3]> = world.ring_triangles(tile).collect();
@@ -182,9 +198,9 @@ mod tests {
             assert_eq!(rings, all[all.len() - rings.len()..]);
             count += rings.len();
         }
-        assert!(count > 50, "{count}");
         assert_eq!(world.ring_triangles(TilePos { x: 99, z: -5 }).count(), 0);
         assert_eq!(world.ring_triangles(TilePos { x: i32::MAX, z: i32::MIN }).count(), 0);
+        count
     }
 
     #[test]

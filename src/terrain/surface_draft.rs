@@ -46,6 +46,11 @@ impl TileUpdate {
         self.indices.get_or_init(|| tile::indices(self.grid, self.tile, &self.borders, &self.rings))
     }
 
+    /// The rings that the world keeps: none of a tile far from the mask, as steep cells depend on the ground only.
+    pub(super) fn kept_rings(&self) -> Arc<Rings> {
+        if self.borders.is_near_mask() { Arc::clone(&self.rings) } else { Arc::default() }
+    }
+
     /// The tile's whole mesh, its columns included.
     pub fn mesh(&self) -> SurfaceMesh {
         let vertices = tile::vertices(&self.ground, self.grid, self.tile, &self.rings);
@@ -69,7 +74,7 @@ impl World {
     pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
         match drawn {
             Drawn::Tile(tile) if self.grid.has_tile(tile) => {
-                let rings = |_: &Borders| self.rings.get(&tile).cloned().unwrap_or_default();
+                let rings = |borders: &Borders| self.tile_rings(tile, borders);
                 SurfaceDraft::Tile(TileUpdate::new(self, &self.view(), tile, rings))
             }
             Drawn::Tile(_) => SurfaceDraft::Nothing,
@@ -103,20 +108,36 @@ impl SurfaceDraft {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
+    use glam::IVec3;
 
     use super::*;
+    use crate::ground::Strata;
+    use crate::lattice::{Column, ONE};
     use crate::prelude::*;
 
     #[test]
     fn a_draft_makes_the_surface_that_the_world_has() {
-        let noise = NoiseHeights { seed: 5, scale: 20.0, amplitude: 9.0, base: 4.0, ..Default::default() };
-        let ground = Ground::from_noise(70, 60, &noise).expect("valid hills");
+        let ground = |amplitude| {
+            let noise = NoiseHeights { seed: 5, scale: 20.0, amplitude, base: 4.0, ..Default::default() };
+            Ground::from_noise(70, 60, &noise).expect("valid hills")
+        };
+        let cliffs = ground(60.0).with_strata(&Strata::alpine()).expect("valid strata");
+        for ground in [ground(9.0), cliffs] {
+            check_drafts(ground);
+        }
+    }
+
+    fn check_drafts(ground: Ground) {
+        let is_steep = ground.steep_cells().is_some();
         let settings = TerrainSettings { chunk_size: 16, ..Default::default() };
         let mut terrain = Terrain::new(ground, &settings).expect("valid settings");
         for number in 0..12 {
-            let place =
-                Vec3::new((number * 23 % 70) as f32, (number * 7 % 12) as f32, (number * 31 % 60) as f32);
+            let (x, z) = (number * 23 % 70, number * 31 % 60);
+            let y = match is_steep {
+                true => terrain.world().ground().height(Column::new(x, z)) / ONE,
+                false => number * 7 % 12,
+            };
+            let place = IVec3::new(x, y, z).as_vec3();
             terrain.apply([Brush::dig(Shape::sphere(place, 5.0))]);
             if number % 4 == 3 {
                 terrain.undo();
@@ -126,6 +147,11 @@ mod tests {
                 let draft = world.draft(drawn);
                 assert!(*draft.surface() == mesh, "{drawn:?} after {number} digs");
                 assert_eq!(draft.is_empty(), mesh.is_empty());
+            }
+            for (&tile, rings) in &world.rings {
+                let view = world.view();
+                assert!(!rings.is_empty());
+                assert!(**rings == Rings::new(&view, tile, &tile::borders(&view, tile)), "{tile:?}");
             }
         }
         let outside = Drawn::Tile(TilePos { x: 90, z: 0 });

@@ -135,9 +135,14 @@ fn draw_tiles(world: &World, view: &WorldView, touched: &[Patch]) -> Vec<(TilePo
         let tile = touched[0].0;
         let mut patches: Vec<(i32, i32)> = touched.iter().map(|&(_, patch)| patch).collect();
         patches.sort_unstable();
-        let nothing = Rings::default();
-        let old = world.rings.get(&tile).map_or(&nothing, Arc::as_ref);
-        let rings = |borders: &Borders| Arc::new(old.updated(view, tile, borders, &patches));
+        let rings = |borders: &Borders| {
+            Arc::new(match world.rings.get(&tile) {
+                Some(old) => old.updated(view, tile, borders, &patches),
+                // They are kept from now on.
+                None if world.ground.steep_cells().is_some() => Rings::new(view, tile, borders),
+                None => Rings::default().updated(view, tile, borders, &patches),
+            })
+        };
         let update = TileUpdate::new(world, view, tile, rings);
         // Computed here, in the task.
         update.indices();

@@ -72,7 +72,7 @@ impl Transaction {
             news: Vec::new(),
             copy: None,
             surfaces: meshes.chunks.clone(),
-            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, Arc::clone(&update.rings))).collect(),
+            rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
             meshes,
             stages: Stages::default(),
         }

@@ -8,8 +8,8 @@ use super::ray::Triangle;
 use super::world::World;
 use crate::lattice::{BRICK, Column, LatticeBox, ONE, SNAP};
 use crate::surface::cases;
+use crate::surface::cell_outline::CellOutline;
 use crate::surface::mask::{Borders, cell_sheet};
-use crate::surface::tile;
 use crate::surface::vertex::{Lattice, WorldView, position};
 
 /// Calls `found` with the drawn triangles of a cell whose cubes may reach into `low..=high`.
@@ -48,26 +48,22 @@ pub(super) fn for_triangles(
 fn heightmap_triangles(view: &WorldView, cell: Column, found: &mut impl FnMut(Triangle)) {
     let ground = view.ground();
     let corner = |c: Column| DVec3::new(c.x.into(), f64::from(ground.height(c)) / f64::from(ONE), c.z.into());
-    let columns = cell.corners();
-    let bordered = Borders::SIDES.map(|(dx, dz)| view.mask.contains(cell.offset(dx, dz)));
-    if bordered == [false; 4] {
-        let [a, b, c, d] = columns.map(corner);
+    let is_steep = |cell| ground.steep_cells().is_some_and(|steep| steep.contains(cell));
+    let bends = |(dx, dz)| view.mask.contains(cell.offset(dx, dz)) || is_steep(cell.offset(dx, dz));
+    let bordering =
+        (0..).zip(Borders::SIDES).fold(0, |flags, (side, step)| flags | u8::from(bends(step)) << side);
+    let flags = if is_steep(cell) { Borders::STEEP } else { bordering };
+    if flags == 0 {
+        let [a, b, c, d] = cell.corners().map(corner);
         found([a, b, c]);
         found([c, d, a]);
         return;
     }
-    let leg = |side: usize| -> Vec<DVec3> {
-        let (from, to) = (columns[side], columns[(side + 1) % 4]);
-        let mut line = vec![corner(from)];
-        if bordered[side] {
-            let crossing = |(p, axis)| position(view, p, axis, IVec3::ZERO).as_dvec3() / f64::from(SNAP);
-            line.extend(tile::chain(ground, from, to).map(crossing));
-        }
-        line.push(corner(to));
-        line
-    };
-    tile::fan(&leg(0), &leg(1), &mut *found);
-    tile::fan(&leg(2), &leg(3), &mut *found);
+    let mut outline = CellOutline::with_capacity(0);
+    outline.trace(ground, cell, flags, corner, |p, axis| {
+        position(view, p, axis, IVec3::ZERO).as_dvec3() / f64::from(SNAP)
+    });
+    outline.triangles(|vertex| vertex.y, found);
 }
 
 /// Rows of cubes over a cell that may touch an edited sample.

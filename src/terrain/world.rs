@@ -11,6 +11,7 @@ use super::surface::ChunkSurface;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, TilePos, give_back, hash, table_bytes};
 use crate::surface::block;
+use crate::surface::mask::Borders;
 use crate::surface::tile::{self, Rings};
 use crate::surface::vertex::WorldView;
 use crate::surface::{Mask, MaskView, SeamChecker, SeamReport, SurfaceMesh};
@@ -77,7 +78,8 @@ pub struct World {
     pub(super) fields: FxHashMap<ChunkPos, Fields>,
     pub(super) mask: Mask,
     pub(super) surfaces: FxHashMap<ChunkPos, Arc<ChunkSurface>>,
-    /// Of tiles that bordered on the mask when they were last drawn; some may have none.
+    /// Of tiles that bordered on the mask when they were last drawn; some may have none. A tile that is not among them has
+    /// rings only if it has steep cells.
     pub(super) rings: FxHashMap<TilePos, Arc<Rings>>,
     pub(super) uniform: UniformBricks,
     /// With this many kinds, unused ones are removed from the pool.
@@ -208,6 +210,15 @@ impl World {
     #[cfg(feature = "plugin")]
     pub(crate) fn draws(&self, chunk: ChunkPos) -> bool {
         self.surfaces.contains_key(&chunk)
+    }
+
+    /// The rings of a tile as it is drawn now: kept since the last edit nearby, or made from the undug ground.
+    pub(super) fn tile_rings(&self, tile: TilePos, borders: &Borders) -> Arc<Rings> {
+        match self.rings.get(&tile) {
+            Some(rings) => Arc::clone(rings),
+            None if self.ground.steep_cells().is_some() => Arc::new(Rings::new(&self.view(), tile, borders)),
+            None => Arc::default(),
+        }
     }
 
     /// The mesh of a tile, relative to its lowest column at y = 0; empty where the world has no tile.

@@ -116,10 +116,21 @@ struct Counts {
 impl Counts {
     fn count(&mut self, picture: &RgbImage, camera: Transform, world: &terrain::World) {
         for (x, y, texel) in picture.enumerate_pixels() {
-            let direction = direction(camera, x, y).as_dvec3();
-            let Some(hit) = world.raycast(camera.translation.as_dvec3(), direction, 500.0) else { continue };
+            // On an outline, the renderer may see what is just beside the middle of the pixel.
+            let beside = [[0.0, 0.0], [0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [0.0, -0.1]];
+            let cast = |[dx, dy]: [f32; 2]| {
+                let direction = direction(camera, x as f32 + 0.5 + dx, y as f32 + 0.5 + dy);
+                world.raycast(camera.translation.as_dvec3(), direction.as_dvec3(), 500.0)
+            };
+            let hits: Vec<DVec3> = beside.into_iter().filter_map(cast).map(|hit| hit.position).collect();
+            let [place, .., _] = hits[..] else { continue };
+            if hits.len() < beside.len() {
+                continue;
+            }
             self.seen += 1;
-            let there = materials_at(world, hit.position);
+            let is_even = hits.iter().all(|other| other.distance(place) < 1.0);
+            let places = if is_even { &hits[..1] } else { &hits[..] };
+            let there: Vec<usize> = places.iter().flat_map(|&place| materials_at(world, place)).collect();
             if let Some(only) = there.iter().find(|&&material| shows(texel, [material, material])) {
                 self.pure += 1;
                 self.materials |= 1 << only;
@@ -127,18 +138,18 @@ impl Counts {
                 self.mixed += 1;
             } else {
                 self.wrong += 1;
-                self.example = Some(([x, y], hit.position));
+                self.example = Some(([x, y], place));
             }
         }
     }
 }
 
-/// Where the camera looks through a pixel.
-fn direction(camera: Transform, x: u32, y: u32) -> Vec3 {
+/// Where the camera looks through a point of the picture.
+fn direction(camera: Transform, x: f32, y: f32) -> Vec3 {
     let (width, height) = (SIZE.0 as f32, SIZE.1 as f32);
     let half = (PerspectiveProjection::default().fov / 2.0).tan();
-    let across = ((x as f32 + 0.5) / width * 2.0 - 1.0) * half * width / height;
-    let up = (1.0 - (y as f32 + 0.5) / height * 2.0) * half;
+    let across = (x / width * 2.0 - 1.0) * half * width / height;
+    let up = (1.0 - y / height * 2.0) * half;
     camera.rotation * Vec3::new(across, up, -1.0).normalize()
 }
 

@@ -200,9 +200,7 @@ fn vertex_bytes(stage: &mut Stage) -> Vec<u64> {
 
 #[test]
 fn a_look_brings_slim_vertices_and_takes_them_away() {
-    let look = bevy_burrow::view::GroundPlugin;
-    let mut stage =
-        Stage::with((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, look));
+    let mut stage = Stage::drawing();
     let terrain = stage.show(level(1.0));
     let all_have = |stage: &mut Stage, bytes: u64, when: &str| {
         stage.send(dig(30.0, 8.0, 30.0, 4.0));

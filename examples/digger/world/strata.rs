@@ -1,5 +1,5 @@
 //! What the landscape is made of: turf, sand and snow on top, soil and clay below, then folded beds of rock with seams of
-//! coal and veins of gold.
+//! coal and veins of gold. Skins are two or three voxels thick, so that steep slopes do not show in stripes what lies below.
 
 use bevy::math::Vec2;
 use bevy_burrow::prelude::*;
@@ -22,13 +22,13 @@ pub fn strata() -> Strata {
         seed: 11,
         bedding: Bedding { dip: Vec2::new(0.10, -0.06), fold: 6.0, scale: 128 },
         strata: vec![
-            rough(7.0, Stratum { height: Interval::above(94.0), ..cover(SNOW, 1.5, 1.2) }),
-            rough(2.0, Stratum { height: Interval::below(8.0), ..cover(SAND, 1.5, 0.5) }),
-            cover(GRASS, 1.0, SOIL_SLOPE),
-            Stratum { rough_scale: 16, ..rough(0.5, cover(SOIL, 2.6, SOIL_SLOPE)) },
-            Stratum { rough_scale: 16, ..rough(0.8, cover(CLAY, 4.2, SOIL_SLOPE)) },
+            rough(7.0, Stratum { height: Interval::above(94.0), ..cover(SNOW, 3.0, 1.2) }),
+            rough(2.0, Stratum { height: Interval::below(8.0), ..cover(SAND, 3.0, 0.5) }),
+            cover(GRASS, 2.0, SOIL_SLOPE),
+            Stratum { rough_scale: 16, ..rough(0.5, cover(SOIL, 3.6, SOIL_SLOPE)) },
+            Stratum { rough_scale: 16, ..rough(0.8, cover(CLAY, 5.2, SOIL_SLOPE)) },
             // Weather leaves a crust, which hides the beds of natural faces in patches.
-            Stratum { depth: Interval::below(1.3), ..Stratum::pocket(ROCK, 64, 0.55) },
+            Stratum { depth: Interval::below(3.0), ..Stratum::pocket(ROCK, 64, 0.55) },
             from(5.0, Stratum::vein(GOLD, 16, 0.010)),
             from(3.5, Stratum::pocket(COAL, 16, 0.012)),
             rough(0.5, from(3.0, Stratum::beds(COAL, 12.0, 1.5, 30.0))),

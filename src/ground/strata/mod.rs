@@ -12,6 +12,7 @@ mod in_brick;
 mod of_ground;
 mod presets;
 mod records;
+mod steep;
 #[cfg(test)]
 mod tests;
 mod value_noise;
@@ -30,6 +31,7 @@ pub(crate) use records::StrataRecords;
 pub(crate) use records::{BED, FILL, POCKET, VEIN};
 #[cfg(feature = "cuda")]
 pub(crate) use records::{BeddingRecord, StratumRecord};
+pub(crate) use steep::SteepCells;
 
 /// Most strata of a ground.
 pub const MAX_STRATA: usize = 32;

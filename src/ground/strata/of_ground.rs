@@ -6,7 +6,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 
 use super::in_brick::{self, Voxel};
-use super::{OwnMaterials, Strata, StrataRecords};
+use super::{OwnMaterials, SteepCells, Strata, StrataRecords};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::ground::{ColumnMaterial, GroundError};
@@ -18,7 +18,9 @@ use crate::lattice::{Column, LIMIT, ONE, ceil};
 pub(crate) struct Below {
     own: OwnMaterials,
     /// The material of the highest solid voxel of each column, row-major: what the undug surface shows.
-    tops: Vec<MaterialId>,
+    tops: Box<[MaterialId]>,
+    /// Cells whose tops do not show all materials of their face, if there are any.
+    steep: Option<Box<SteepCells>>,
 }
 
 impl Below {
@@ -27,7 +29,7 @@ impl Below {
             OwnMaterials::Strata { given, records } => given.bytes() + records.bytes(),
             OwnMaterials::Function { function, .. } => size_of_val(&**function),
         };
-        own + size_of_val(self.tops.as_slice())
+        own + size_of_val(&*self.tops) + self.steep.as_ref().map_or(0, |steep| steep.bytes())
     }
 }
 
@@ -35,7 +37,8 @@ impl Ground {
     /// The same ground with strata. Voxels that no stratum holds keep what [`Self::with_materials`] gave them, before or
     /// after.
     ///
-    /// Nothing is stored for a voxel, and one byte for a column. Counts for [`Self::hash`].
+    /// Nothing is stored for a voxel, one byte for a column, and one bit for a cell if any is steep. Counts for
+    /// [`Self::hash`].
     ///
     /// # Errors
     /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
@@ -92,7 +95,7 @@ impl Ground {
     }
 
     fn with_below(self, own: OwnMaterials) -> Result<Self, GroundError> {
-        self.replace_below(Below { own, tops: Vec::new() }).with_new_tops()
+        self.replace_below(Below { own, tops: Box::default(), steep: None }).with_new_tops()
     }
 
     /// The same ground, with its surface as its materials are now.
@@ -100,9 +103,11 @@ impl Ground {
         if self.below().is_none() {
             return Ok(self);
         }
-        let bare = self.map_below(|below| Below { tops: Vec::new(), ..below });
-        let tops = bare.tops()?;
-        Ok(bare.map_below(|below| Below { tops, ..below }))
+        let bare = self.map_below(|below| Below { tops: Box::default(), steep: None, ..below });
+        let tops = bare.tops()?.into_boxed_slice();
+        let ground = bare.map_below(|below| Below { tops, ..below });
+        let steep = SteepCells::new(&ground)?.map(Box::new);
+        Ok(ground.map_below(|below| Below { steep, ..below }))
     }
 
     /// The material of the highest solid voxel of each column.
@@ -155,6 +160,12 @@ impl Ground {
     /// The tops of some columns, one after the other, if there are strata.
     pub(in crate::ground) fn tops_of(&self, columns: std::ops::Range<usize>) -> Option<&[MaterialId]> {
         self.below().map(|below| &below.tops[columns])
+    }
+
+    /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose materials
+    /// are those of its columns.
+    pub(crate) fn steep_cells(&self) -> Option<&SteepCells> {
+        self.below()?.steep.as_deref()
     }
 
     /// The word for strata in the hash.

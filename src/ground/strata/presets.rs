@@ -32,13 +32,16 @@ impl Strata {
     /// Mountains: turf over soil and clay on gentle slopes, gravel on steeper ones, snow on the heights; below, folded beds
     /// of rock, sandstone and shale with a seam of coal and veins of gold. Materials are those of the default
     /// `GroundLook`.
+    ///
+    /// Turf is 2 voxels thick; snow, gravel and the crust of rock faces are 3, so that slopes up to 60 degrees do not show what
+    /// lies below in stripes. Rock faces show their beds between patches of crust.
     pub fn alpine() -> Self {
         let gentle = Interval::below(0.95);
         let skin =
-            |material, slope| Stratum { depth: Interval::below(1.0), slope, ..Stratum::fill(material) };
+            |material, slope| Stratum { depth: Interval::below(2.0), slope, ..Stratum::fill(material) };
         let snow = Stratum {
             height: Interval::above(92.0),
-            depth: Interval::below(1.5),
+            depth: Interval::below(3.0),
             rough: 6.0,
             ..skin(SNOW, Interval::below(1.2))
         };
@@ -55,15 +58,15 @@ impl Strata {
             strata: vec![
                 snow,
                 skin(GRASS, gentle),
-                soil(SOIL, 2.6),
-                soil(CLAY, 4.4),
+                soil(SOIL, 3.6),
+                soil(CLAY, 5.4),
                 Stratum {
-                    depth: Interval::below(1.5),
+                    depth: Interval::below(3.0),
                     slope: Interval::between(0.95, 1.3),
                     ..Stratum::fill(GRAVEL)
                 },
                 // Weather leaves a crust, which hides the beds of natural faces in patches.
-                Stratum { depth: Interval::below(1.3), ..Stratum::pocket(ROCK, 64, 0.5) },
+                Stratum { depth: Interval::below(3.0), ..Stratum::pocket(ROCK, 64, 0.5) },
                 Stratum { depth: Interval::above(6.0), ..Stratum::vein(GOLD, 32, 0.006) },
                 Stratum { rough: 0.4, depth: Interval::above(4.0), ..Stratum::beds(COAL, 15.0, 1.6, 40.0) },
                 Stratum { rough: 1.5, ..Stratum::beds(SANDSTONE, 4.0, 9.0, 40.0) },
@@ -73,7 +76,7 @@ impl Strata {
     }
 
     /// Dunes over banded sandstone: loose sand, gravel in the hollows, beds of sandstone, clay and shale, and a seam of
-    /// coal far below.
+    /// coal far below. Slopes too steep for sand show their beds in bands.
     pub fn desert() -> Self {
         let sand = |slope, depth| Stratum {
             depth: Interval::below(depth),
@@ -100,15 +103,18 @@ impl Strata {
     /// A mine: turf, soil and clay over rock with seams and pockets of coal, pockets of iron and copper, and gold in veins
     /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface. Iron (12) and copper (13) have default
     /// colours, but the default `GroundLook` has no textures for them: it shows its last layer, gravel.
+    ///
+    /// Turf is 2 voxels thick and soil reaches down to 3 or more, so that slopes up to 60 degrees do not show what lies below in
+    /// stripes.
     pub fn mine() -> Self {
         let deep = |from| Interval::between(from, 160.0);
         Self {
             seed: 3,
             bedding: Bedding { dip: Vec2::new(0.15, -0.08), fold: 5.0, scale: 64 },
             strata: vec![
-                Stratum { depth: Interval::below(1.0), slope: Interval::below(1.0), ..Stratum::fill(GRASS) },
-                Stratum { depth: Interval::below(2.2), rough: 0.4, rough_scale: 16, ..Stratum::fill(SOIL) },
-                Stratum { depth: Interval::below(3.6), rough: 0.6, rough_scale: 16, ..Stratum::fill(CLAY) },
+                Stratum { depth: Interval::below(2.0), slope: Interval::below(1.0), ..Stratum::fill(GRASS) },
+                Stratum { depth: Interval::below(3.4), rough: 0.4, rough_scale: 16, ..Stratum::fill(SOIL) },
+                Stratum { depth: Interval::below(4.8), rough: 0.6, rough_scale: 16, ..Stratum::fill(CLAY) },
                 Stratum { depth: deep(6.0), ..Stratum::vein(GOLD, 16, 0.010) },
                 Stratum { depth: deep(30.0), ..Stratum::pocket(GOLD, 16, 0.008) },
                 Stratum { depth: deep(4.0), ..Stratum::pocket(COAL, 16, 0.020) },

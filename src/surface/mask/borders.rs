@@ -1,4 +1,4 @@
-//! The border of the mask: which cells beside it stay heightmap.
+//! The border of the mask and of steep cells: which cells beside them stay heightmap.
 
 use std::ops::Range;
 
@@ -9,20 +9,22 @@ use crate::lattice::{ChunkGrid, Column};
 pub(crate) const WINDOW: i32 = 10;
 
 impl MaskView<'_> {
-    /// Looks at every cell from `low` up to and without `high`, and at those beside them.
-    pub fn borders(&self, low: Column, high: Column) -> Borders {
+    /// Looks at every cell from `low` up to and without `high`, and at those beside them. `steep` has the steep ones of 8x8
+    /// cells, (x, z) in units of 8 cells, as bits `z * 8 + x`.
+    pub fn borders(&self, low: Column, high: Column, steep: impl Fn((i32, i32)) -> u64) -> Borders {
         let (first, last) = ((low.x >> 3, low.z >> 3), ((high.x - 1) >> 3, (high.z - 1) >> 3));
         // With those around them, each looked up once.
-        let row = |z: i32| (first.0 - 1..=last.0 + 1).map(move |x| self.word((x, z)));
-        let words: Vec<u64> = (first.1 - 1..=last.1 + 1).flat_map(row).collect();
-        let rows: Vec<&[u64]> = words.chunks((last.0 - first.0 + 3).max(1) as usize).collect();
+        let places = (first.1 - 1..=last.1 + 1).flat_map(|z| (first.0 - 1..=last.0 + 1).map(move |x| (x, z)));
+        let words: Vec<Word> = places.map(|at| Word { own: self.word(at), steep: steep(at) }).collect();
+        let rows: Vec<&[Word]> = words.chunks((last.0 - first.0 + 3).max(1) as usize).collect();
         let across = (last.0 - first.0 + 1).max(0) as usize;
         let mut patches = Vec::with_capacity(across * rows.len());
         for rows in rows.windows(3) {
             let around = |at: usize| [0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx]));
             patches.extend((0..across).map(|at| Patch::new(&around(at))));
         }
-        Borders { low, high, first, across, patches }
+        let is_near_mask = words.iter().any(|word| word.own != 0);
+        Borders { low, high, first, across, patches, is_near_mask }
     }
 
     /// Lattice edges along x, y and z between a cell of the mask and one that stays heightmap, in and around the word
@@ -57,7 +59,7 @@ impl MaskView<'_> {
     }
 }
 
-/// For each cell of a rectangle: is it in the mask, and which of its sides border on a cell that is?
+/// For each cell of a rectangle: is it in the mask, is it steep, and which of its sides border on a cell that is either?
 #[derive(Clone, Debug)]
 pub struct Borders {
     low: Column,
@@ -66,6 +68,15 @@ pub struct Borders {
     first: (i32, i32),
     across: usize,
     patches: Vec<Patch>,
+    is_near_mask: bool,
+}
+
+/// 8x8 cells: bit `z * 8 + x`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Word {
+    /// Those in the mask.
+    own: u64,
+    steep: u64,
 }
 
 /// 8x8 cells: bit `z * 8 + x`.
@@ -73,25 +84,28 @@ pub struct Borders {
 struct Patch {
     /// Those in the mask.
     own: u64,
-    /// Those with a neighbour in the mask, in the order of [`Borders::SIDES`].
-    sides: [u64; 4],
+    /// Those with a neighbour that is in the mask or steep, in the order of [`Borders::SIDES`]; then the steep ones.
+    lines: [u64; 5],
     /// All of these.
     touched: u64,
 }
 
 impl Patch {
-    /// By the words of the mask around them: `[dz + 1][dx + 1]`.
-    fn new(words: &[[u64; 3]; 3]) -> Self {
+    /// By the words around them: `[dz + 1][dx + 1]`.
+    fn new(words: &[[Word; 3]; 3]) -> Self {
         const FIRST: u64 = 0x0101_0101_0101_0101;
-        let own = words[1][1];
-        // Each cell's neighbour moved to where the cell is.
-        let sides = [
-            (own & !(FIRST << 7)) << 1 | words[1][0] >> 7 & FIRST,
-            own >> 8 | words[2][1] << 56,
-            (own & !FIRST) >> 1 | (words[1][2] & FIRST) << 7,
-            own << 8 | words[0][1] >> 56,
+        let Word { own, steep } = words[1][1];
+        let words = words.map(|row| row.map(|word| word.own | word.steep));
+        let center = words[1][1];
+        // Each cell's neighbour moved to where the cell is; a steep cell has vertices on all its sides.
+        let lines = [
+            (center & !(FIRST << 7)) << 1 | words[1][0] >> 7 & FIRST | steep,
+            center >> 8 | words[2][1] << 56 | steep,
+            (center & !FIRST) >> 1 | (words[1][2] & FIRST) << 7 | steep,
+            center << 8 | words[0][1] >> 56 | steep,
+            steep,
         ];
-        Self { own, sides, touched: sides.iter().fold(own, |any, side| any | side) }
+        Self { own, lines, touched: lines.iter().fold(own, |any, line| any | line) }
     }
 }
 
@@ -100,14 +114,17 @@ impl Borders {
     /// [`Column::corners`] runs.
     pub const SIDES: [(i32, i32); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 
+    /// The flags of a steep cell: its diagonal's after those of its sides.
+    pub const STEEP: u8 = 0b1_1111;
+
     fn patch(&self, (x, z): (i32, i32)) -> Option<&Patch> {
         let x = usize::try_from(x - self.first.0).ok().filter(|&x| x < self.across)?;
         let z = usize::try_from(z - self.first.1).ok()?;
         self.patches.get(z * self.across + x)
     }
 
-    /// The cells of 8x8 that lie in the rectangle, are not in the mask and border on it: row by row, each with a bit for
-    /// every side where it does. `(z, x)` in units of 8 cells.
+    /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or on a steep cell or are steep: row
+    /// by row, each with a bit for every side where it borders, or with [`Self::STEEP`]. `(z, x)` in units of 8 cells.
     pub fn bordering(&self, (z, x): (i32, i32)) -> impl Iterator<Item = (Column, u8)> {
         let (low, high) = (self.low, self.high);
         let patch = self.patch((x, z)).copied().unwrap_or_default();
@@ -115,7 +132,7 @@ impl Borders {
         let next = move || {
             let bit = cells.trailing_zeros();
             cells &= cells.wrapping_sub(1);
-            let flags = (0..).zip(patch.sides).map(|(side, cells)| ((cells >> bit & 1) as u8) << side);
+            let flags = (0..).zip(patch.lines).map(|(line, cells)| ((cells >> bit & 1) as u8) << line);
             (bit < 64)
                 .then(|| (Column::new(x * 8 + (bit & 7) as i32, z * 8 + (bit >> 3) as i32), flags.sum()))
         };
@@ -124,8 +141,13 @@ impl Borders {
         std::iter::from_fn(next).filter(move |&(cell, _)| is_inside(cell))
     }
 
-    /// The runs of cells with this z, in order, that neither are in the mask nor border on it: of the rectangle's rows,
-    /// by x.
+    /// Is a cell of the mask among those looked at, or near them?
+    pub fn is_near_mask(&self) -> bool {
+        self.is_near_mask
+    }
+
+    /// The runs of cells with this z, in order, that neither are in the mask or steep nor border on such cells: of the
+    /// rectangle's rows, by x.
     pub fn whole(&self, z: i32) -> impl Iterator<Item = Range<i32>> {
         // Where the next cell is that is whole, or is not.
         let next = move |mut x: i32, is_whole: bool| {
@@ -163,9 +185,19 @@ mod tests {
             mask.insert_word(word, cells);
         }
         let view = MaskView::new(&mask);
+        assert!(
+            !MaskView::new(&Mask::default())
+                .borders(Column::new(0, 0), Column::new(9, 9), |_| 1)
+                .is_near_mask()
+        );
         for (low, high) in [((0, 0), (8, 8)), ((-3, -2), (11, 13)), ((3, 5), (5, 7)), ((7, 7), (30, 9))] {
             let (low, high) = (Column::new(low.0, low.1), Column::new(high.0, high.1));
-            let borders = view.borders(low, high);
+            let steep = |(x, z): (i32, i32)| if (x, z) == (1, 0) { 0x8000_0100_0000_0208 } else { 0 };
+            let is_steep = |cell: Column| {
+                steep((cell.x >> 3, cell.z >> 3)) >> ((cell.z & 7) * 8 + (cell.x & 7)) & 1 == 1
+            };
+            let borders = view.borders(low, high, steep);
+            assert!(borders.is_near_mask());
             let mut flags = std::collections::BTreeMap::new();
             for patch in (-1..2).flat_map(|z| (-1..5).map(move |x| (z, x))) {
                 let before = flags.len();
@@ -179,14 +211,16 @@ mod tests {
                 for x in low.x..high.x {
                     let cell = Column::new(x, z);
                     let sides = (0..).zip(Borders::SIDES);
-                    let expected = sides
-                        .map(|(side, (dx, dz))| u8::from(mask.contains(cell.offset(dx, dz))) << side)
-                        .sum::<u8>();
+                    let bends = |cell| mask.contains(cell) || is_steep(cell);
+                    let bordering =
+                        sides.map(|(side, (dx, dz))| u8::from(bends(cell.offset(dx, dz))) << side);
+                    let expected = if is_steep(cell) { Borders::STEEP } else { bordering.sum() };
                     let is_own = mask.contains(cell);
-                    let found = flags.remove(&(z, x)).unwrap_or_default();
-                    assert_eq!(found, if is_own { 0 } else { expected }, "{cell:?}");
+                    let found = flags.remove(&(z, x));
+                    let is_drawn = !is_own && expected != 0;
+                    assert_eq!(found, is_drawn.then_some(expected), "{cell:?}");
                     let is_whole = whole.iter().any(|run| run.contains(&x));
-                    assert_eq!(is_whole, !is_own && expected == 0, "{cell:?}");
+                    assert_eq!(is_whole, !is_own && !is_drawn, "{cell:?}");
                 }
             }
             assert!(flags.is_empty(), "cells outside: {flags:?}");
