@@ -48,17 +48,21 @@ impl<T: Copy> CellOutline<T> {
         corner: impl Fn(Column) -> T,
         mut crossing: impl FnMut(IVec3, usize) -> T,
     ) {
-        let [a, b, c, d] = cell.corners();
-        let ends = [(a, b), (b, c), (c, d), (d, a), (a, c)];
-        for (number, (line, (from, to))) in self.lines.iter_mut().zip(ends).enumerate() {
-            line.clear();
-            line.push(corner(from));
-            if flags >> number & 1 == 1 {
-                line.extend(chain(ground, from, to).map(|(p, axis)| crossing(p, axis)));
-            }
-            line.push(corner(to));
-        }
+        const ENDS: [(usize, usize); 5] = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)];
+        let columns = cell.corners();
+        let corners = columns.map(corner);
         self.is_steep = flags == Borders::STEEP;
+        // Only steep cells need the diagonal.
+        let lines = if self.is_steep { 5 } else { 4 };
+        for (number, (line, (from, to))) in self.lines.iter_mut().zip(ENDS).take(lines).enumerate() {
+            line.clear();
+            line.push(corners[from]);
+            if flags >> number & 1 == 1 {
+                let crossings = chain(ground, columns[from], columns[to]);
+                line.extend(crossings.map(|(p, axis)| crossing(p, axis)));
+            }
+            line.push(corners[to]);
+        }
     }
 
     /// The cell's triangles; `height` of a vertex is exact.
@@ -124,7 +128,7 @@ fn bands<T: Copy, H: PartialOrd>(
 }
 
 /// The lattice edges whose crossings lie strictly between two neighbouring heightmap vertices, in order: one for each
-/// lattice y that separates their heights, as lower end and axis. Also between the ends of a cell's [`DIAGONAL`].
+/// lattice y that separates their heights, as lower end and axis. Also between the ends of a cell's diagonal.
 fn chain(ground: &Ground, from: Column, to: Column) -> impl Iterator<Item = (IVec3, usize)> {
     let (h_from, h_to) = (ground.height(from), ground.height(to));
     let axis = match (from.x != to.x, from.z != to.z) {

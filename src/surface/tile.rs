@@ -246,7 +246,9 @@ impl<'a> Drawing<'a> {
             rings.vertices.push(sheet_vertex(ground, p, axis, low.at(0)));
             Numbered { number: base + rings.vertices.len() as u32 - 1, height: p.y * SNAP }
         });
-        let numbers = |triangle: [Numbered; 3]| rings.fans.extend(triangle.map(|vertex| vertex.number));
+        let numbers = |triangle: [Numbered; 3]| {
+            rings.fans.extend_from_slice(&triangle.map(|vertex| vertex.number));
+        };
         self.outline.triangles(|vertex| vertex.height, numbers);
     }
 }

@@ -113,7 +113,7 @@ pub fn vertex(lattice: &impl Lattice, p: IVec3, axis: usize, origin: IVec3) -> V
 }
 
 /// The vertex where the sheet has no edited sample near, or meets the heightmap: the tile's own normals and materials.
-/// Also on a cell's [`DIAGONAL`].
+/// Also on a cell's diagonal.
 pub fn sheet_vertex(ground: &Ground, p: IVec3, axis: usize, origin: IVec3) -> Vertex {
     let q = p + UNIT[axis];
     let step = match axis {

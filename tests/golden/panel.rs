@@ -63,7 +63,7 @@ fn photograph(studio: &mut Studio, album: &mut Album, name: &str, widgets: &[&st
 /// Mean FLIP above which a widget counts as different.
 const WIDGET: f32 = 0.05;
 
-const SETTINGS: [&str; 6] = ["Of a material", "Bedrock", "Found after digs", "Variety", "Beds", "History"];
+const SETTINGS: [&str; 6] = ["Of a material", "Bedrock", "Found after digs", "Variety", "Far", "History"];
 
 const FIGURES: [&str; 12] = [
     "Undo",

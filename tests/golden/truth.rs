@@ -109,8 +109,8 @@ struct Counts {
     wrong: usize,
     /// A bit for each material that shows.
     materials: u32,
-    /// A wrong pixel, and where it is in the ground.
-    example: Option<([u32; 2], DVec3)>,
+    /// A wrong pixel, where it is in the ground, its colour, and the materials that are there.
+    example: Option<([u32; 2], DVec3, [u8; 3], Vec<usize>)>,
 }
 
 impl Counts {
@@ -138,7 +138,7 @@ impl Counts {
                 self.mixed += 1;
             } else {
                 self.wrong += 1;
-                self.example = Some(([x, y], place));
+                self.example = Some(([x, y], place, texel.0, there));
             }
         }
     }
@@ -170,11 +170,11 @@ fn materials_at(world: &terrain::World, place: DVec3) -> Vec<usize> {
     materials
 }
 
-/// Whether a pixel shows these two materials, mixed in any way.
+/// Whether a pixel shows these two materials, mixed in any way, and at most a tenth of others.
 fn shows(texel: &Rgb<u8>, materials: [usize; 2]) -> bool {
     let linear = |[r, g, b]: [u8; 3]| LinearRgba::from(Srgba::rgb_u8(r, g, b)).to_vec3();
     let (shown, from, to) = (linear(texel.0), linear(COLORS[materials[0]]), linear(COLORS[materials[1]]));
     let along = to - from;
     let share = if along == Vec3::ZERO { 0.0 } else { (shown - from).dot(along) / along.length_squared() };
-    shown.distance(from + along * share.clamp(0.0, 1.0)) < 0.03
+    shown.distance(from + along * share.clamp(0.0, 1.0)) < 0.1
 }

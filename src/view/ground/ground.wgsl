@@ -344,13 +344,13 @@ struct Choice {
     share: f32,
 }
 
-// Noise moves the borders between layers, but not beyond the next vertex.
+// Noise moves the borders between layers: together with heights by less than half the way to the next vertex.
 fn choose(in: Varying, place: vec3<f32>) -> Choice {
 #ifdef GROUND_ATTRIBUTES
     let layers = in.layers;
     var weights = in.weights;
     if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
-        let patches = clamp(1.0 + 1.5 * noise_at(place, 4.5), vec4(0.15), vec4(2.0));
+        let patches = clamp(1.0 + noise_at(place, 4.5), vec4(0.5), vec4(1.5));
         // By the layer's number: its place in the list may be another one in the next mesh.
         weights *= vec4(patches[layers.x & 3u], patches[layers.y & 3u], patches[layers.z & 3u], patches[layers.w & 3u]);
     }
@@ -422,11 +422,11 @@ fn fragment(in: Varying, @builtin(front_facing) is_front: bool) -> FragmentOutpu
     let next = choice.layers.y;
     var texels = layer_at(best, site);
     var metallic = ground.layers[best].metallic;
-    // A height is at most 1.3 / 0.3 times the other one: what is weaker than its third power does not show.
-    if choice.share > 0.012 {
+    // A height counts at most three times as much as another one: what is much weaker does not show.
+    if choice.share > 0.05 {
         let other = layer_at(next, site);
         // What stands high covers what lies low.
-        let scores = vec2(1.0 - choice.share, choice.share) * (vec2(texels.color.a, other.color.a) + 0.3);
+        let scores = vec2(1.0 - choice.share, choice.share) * (vec2(texels.color.a, other.color.a) + 0.5);
         let cubes = scores * scores * scores;
         let share = cubes.y / (cubes.x + cubes.y);
         texels = mix_texels(texels, other, share);
