@@ -46,9 +46,10 @@ impl TileUpdate {
         self.indices.get_or_init(|| tile::indices(self.grid, self.tile, &self.borders, &self.rings))
     }
 
-    /// The rings that the world keeps: none of a tile far from the mask, as steep cells depend on the ground only.
+    /// The rings that the world keeps: none of a tile that does not border on the mask, as steep cells depend on the
+    /// ground only.
     pub(super) fn kept_rings(&self) -> Arc<Rings> {
-        if self.borders.is_near_mask() { Arc::clone(&self.rings) } else { Arc::default() }
+        if self.borders.has_bordering() { Arc::clone(&self.rings) } else { Arc::default() }
     }
 
     /// The tile's whole mesh, its columns included.

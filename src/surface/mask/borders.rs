@@ -23,8 +23,7 @@ impl MaskView<'_> {
             let around = |at: usize| [0, 1, 2].map(|dz| [0, 1, 2].map(|dx| rows[dz][at + dx]));
             patches.extend((0..across).map(|at| Patch::new(&around(at))));
         }
-        let is_near_mask = words.iter().any(|word| word.own != 0);
-        Borders { low, high, first, across, patches, is_near_mask }
+        Borders { low, high, first, across, patches }
     }
 
     /// Lattice edges along x, y and z between a cell of the mask and one that stays heightmap, in and around the word
@@ -68,7 +67,6 @@ pub struct Borders {
     first: (i32, i32),
     across: usize,
     patches: Vec<Patch>,
-    is_near_mask: bool,
 }
 
 /// 8x8 cells: bit `z * 8 + x`.
@@ -88,25 +86,34 @@ struct Patch {
     lines: [u64; 5],
     /// All of these.
     touched: u64,
+    /// Those with a neighbour in the mask, but not in it themselves.
+    at_mask: u64,
 }
 
 impl Patch {
     /// By the words around them: `[dz + 1][dx + 1]`.
     fn new(words: &[[Word; 3]; 3]) -> Self {
-        const FIRST: u64 = 0x0101_0101_0101_0101;
         let Word { own, steep } = words[1][1];
-        let words = words.map(|row| row.map(|word| word.own | word.steep));
-        let center = words[1][1];
-        // Each cell's neighbour moved to where the cell is; a steep cell has vertices on all its sides.
-        let lines = [
-            (center & !(FIRST << 7)) << 1 | words[1][0] >> 7 & FIRST | steep,
-            center >> 8 | words[2][1] << 56 | steep,
-            (center & !FIRST) >> 1 | (words[1][2] & FIRST) << 7 | steep,
-            center << 8 | words[0][1] >> 56 | steep,
-            steep,
-        ];
-        Self { own, lines, touched: lines.iter().fold(own, |any, line| any | line) }
+        let [west, south, east, north] = beside(&words.map(|row| row.map(|word| word.own | word.steep)));
+        // A steep cell has vertices on all its lines.
+        let lines = [west, south, east, north, 0].map(|line| line | steep);
+        let touched = lines.iter().fold(own, |any, line| any | line);
+        let at_mask =
+            beside(&words.map(|row| row.map(|word| word.own))).iter().fold(0, |any, side| any | side);
+        Self { own, lines, touched, at_mask: at_mask & !own }
     }
+}
+
+/// Each cell's neighbour moved to where the cell is, in the order of [`Borders::SIDES`].
+fn beside(words: &[[u64; 3]; 3]) -> [u64; 4] {
+    const FIRST: u64 = 0x0101_0101_0101_0101;
+    let own = words[1][1];
+    [
+        (own & !(FIRST << 7)) << 1 | words[1][0] >> 7 & FIRST,
+        own >> 8 | words[2][1] << 56,
+        (own & !FIRST) >> 1 | (words[1][2] & FIRST) << 7,
+        own << 8 | words[0][1] >> 56,
+    ]
 }
 
 impl Borders {
@@ -126,24 +133,30 @@ impl Borders {
     /// The cells of 8x8 that lie in the rectangle, are not in the mask, and border on it or on a steep cell or are steep: row
     /// by row, each with a bit for every side where it borders, or with [`Self::STEEP`]. `(z, x)` in units of 8 cells.
     pub fn bordering(&self, (z, x): (i32, i32)) -> impl Iterator<Item = (Column, u8)> {
-        let (low, high) = (self.low, self.high);
         let patch = self.patch((x, z)).copied().unwrap_or_default();
-        let mut cells = patch.touched & !patch.own;
-        let next = move || {
-            let bit = cells.trailing_zeros();
-            cells &= cells.wrapping_sub(1);
+        self.cells(patch.touched & !patch.own, (z, x)).map(move |(bit, cell)| {
             let flags = (0..).zip(patch.lines).map(|(line, cells)| ((cells >> bit & 1) as u8) << line);
-            (bit < 64)
-                .then(|| (Column::new(x * 8 + (bit & 7) as i32, z * 8 + (bit >> 3) as i32), flags.sum()))
+            (cell, flags.sum())
+        })
+    }
+
+    /// Those of 8x8 cells that lie in the rectangle, with their bits. `(z, x)` in units of 8 cells.
+    fn cells(&self, mut bits: u64, (z, x): (i32, i32)) -> impl Iterator<Item = (u32, Column)> {
+        let (low, high) = (self.low, self.high);
+        let next = move || {
+            let bit = bits.trailing_zeros();
+            bits &= bits.wrapping_sub(1);
+            (bit < 64).then(|| (bit, Column::new(x * 8 + (bit & 7) as i32, z * 8 + (bit >> 3) as i32)))
         };
         let is_inside =
             move |cell: Column| (low.x..high.x).contains(&cell.x) && (low.z..high.z).contains(&cell.z);
-        std::iter::from_fn(next).filter(move |&(cell, _)| is_inside(cell))
+        std::iter::from_fn(next).filter(move |&(_, cell)| is_inside(cell))
     }
 
-    /// Is a cell of the mask among those looked at, or near them?
-    pub fn is_near_mask(&self) -> bool {
-        self.is_near_mask
+    /// Does any cell border on the mask?
+    pub fn has_bordering(&self) -> bool {
+        let places = (self.first.1..).flat_map(|z| (self.first.0..).take(self.across).map(move |x| (z, x)));
+        self.patches.iter().zip(places).any(|(patch, at)| self.cells(patch.at_mask, at).next().is_some())
     }
 
     /// The runs of cells with this z, in order, that neither are in the mask or steep nor border on such cells: of the
@@ -185,11 +198,6 @@ mod tests {
             mask.insert_word(word, cells);
         }
         let view = MaskView::new(&mask);
-        assert!(
-            !MaskView::new(&Mask::default())
-                .borders(Column::new(0, 0), Column::new(9, 9), |_| 1)
-                .is_near_mask()
-        );
         for (low, high) in [((0, 0), (8, 8)), ((-3, -2), (11, 13)), ((3, 5), (5, 7)), ((7, 7), (30, 9))] {
             let (low, high) = (Column::new(low.0, low.1), Column::new(high.0, high.1));
             let steep = |(x, z): (i32, i32)| if (x, z) == (1, 0) { 0x8000_0100_0000_0208 } else { 0 };
@@ -197,7 +205,7 @@ mod tests {
                 steep((cell.x >> 3, cell.z >> 3)) >> ((cell.z & 7) * 8 + (cell.x & 7)) & 1 == 1
             };
             let borders = view.borders(low, high, steep);
-            assert!(borders.is_near_mask());
+            let mut has_bordering = false;
             let mut flags = std::collections::BTreeMap::new();
             for patch in (-1..2).flat_map(|z| (-1..5).map(move |x| (z, x))) {
                 let before = flags.len();
@@ -214,6 +222,9 @@ mod tests {
                     let bends = |cell| mask.contains(cell) || is_steep(cell);
                     let bordering =
                         sides.map(|(side, (dx, dz))| u8::from(bends(cell.offset(dx, dz))) << side);
+                    let is_at_mask =
+                        Borders::SIDES.iter().any(|(dx, dz)| mask.contains(cell.offset(*dx, *dz)));
+                    has_bordering |= is_at_mask && !mask.contains(cell);
                     let expected = if is_steep(cell) { Borders::STEEP } else { bordering.sum() };
                     let is_own = mask.contains(cell);
                     let found = flags.remove(&(z, x));
@@ -223,6 +234,7 @@ mod tests {
                     assert_eq!(is_whole, !is_own && !is_drawn, "{cell:?}");
                 }
             }
+            assert_eq!(borders.has_bordering(), has_bordering);
             assert!(flags.is_empty(), "cells outside: {flags:?}");
         }
     }
