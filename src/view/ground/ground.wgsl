@@ -350,7 +350,7 @@ fn choose(in: Varying, place: vec3<f32>) -> Choice {
     let layers = in.layers;
     var weights = in.weights;
     if max(max(weights.x, weights.y), max(weights.z, weights.w)) < 0.999 {
-        let patches = clamp(1.0 + noise_at(place, 4.5), vec4(0.5), vec4(1.5));
+        let patches = clamp(1.0 + noise_at(place, 4.5), vec4(0.7), vec4(1.3));
         // By the layer's number: its place in the list may be another one in the next mesh.
         weights *= vec4(patches[layers.x & 3u], patches[layers.y & 3u], patches[layers.z & 3u], patches[layers.w & 3u]);
     }
