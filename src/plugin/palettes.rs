@@ -90,13 +90,13 @@ impl Palettes {
 
     /// Has all corners of each triangle list the same materials.
     pub fn arrange(mut self, indices: &Indices) -> Arranged {
-        let (mut copies, mut indices) = (Vec::new(), indices.clone());
-        if self.all.len() <= 4 {
+        let (copies, indices) = if self.all.len() <= 4 {
             let list = self.all.list();
             self.mixes.iter_mut().for_each(|mix| *mix = in_order(*mix, list));
+            (Vec::new(), indices.clone())
         } else {
-            (copies, indices) = self.group(&indices);
-        }
+            self.group(indices)
+        };
         Arranged {
             ids: self.mixes.iter().map(|mix| mix.ids).collect(),
             weights: self.mixes.iter().map(|mix| mix.weights).collect(),

@@ -101,8 +101,7 @@ impl Strata {
     }
 
     /// A mine: turf, soil and clay over rock with seams and pockets of coal, pockets of iron and copper, and gold in veins
-    /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface. Iron (12) and copper (13) have default
-    /// colours, but the default `GroundLook` has no textures for them: it shows its last layer, gravel.
+    /// and, deeper down, in pockets. There is ore from 3 to 160 voxels below the surface.
     ///
     /// Turf is 2 voxels thick and soil reaches down to 3 or more, so that slopes up to 60 degrees do not show what lies below in
     /// stripes.

@@ -26,7 +26,8 @@ pub const MAX_LAYERS: usize = 16;
 pub struct GroundLook {
     /// The layers, by number; [`MAX_LAYERS`] at most.
     pub layers: Vec<GroundLayer>,
-    /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it.
+    /// Distances from the camera in metres: up to the first, textures have their own scale; beyond the second, six times it,
+    /// and colours alone.
     pub distance: (f32, f32),
     /// The variation of tints from place to place, 0 to 1.
     pub variety: f32,
@@ -59,14 +60,14 @@ impl Default for GroundLayer {
     }
 }
 
-/// The texture fetches per pixel. Each layer is projected from every side that the surface faces: one on level ground, two on
-/// most slopes.
+/// The texture fetches per pixel. A pixel shows its two strongest layers, each projected from the two sides that the surface
+/// faces most: one on level ground.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default)]
 pub enum GroundQuality {
-    /// The two strongest layers, repeating: for weak machines and software renderers.
+    /// Layers repeat: for weak machines and software renderers.
     Low,
-    /// The three strongest layers, without repetition.
+    /// Layers do not repeat near the camera.
     #[default]
     High,
 }
