@@ -60,6 +60,16 @@ impl Canvas {
         );
     }
 
+    /// A filled rectangle.
+    pub fn rectangle(&mut self, min: Vec2, max: Vec2, fill: &str) {
+        let (low, size) = (self.place(Vec2::new(min.x, max.y)), (max - min) * self.scale);
+        let _ = writeln!(
+            self.body,
+            r#"<rect x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="{fill}"/>"#,
+            low.x, low.y, size.x, size.y
+        );
+    }
+
     /// A dot of `radius` pixels.
     pub fn dot(&mut self, at: Vec2, radius: f32, fill: &str, border: &str) {
         let at = self.place(at);
