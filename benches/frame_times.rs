@@ -1,4 +1,5 @@
-//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`.
+//! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT]`;
+//! with 0 seconds materials alone are compared.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the
@@ -47,11 +48,23 @@ const ROUND: Duration = Duration::from_secs(5);
 /// Frames before timing begins.
 const WARM_UP: usize = 120;
 
+/// What is drawn to compare materials.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Look(GroundQuality),
+    Plain,
+    /// The plain material, with nothing in sight.
+    Nothing,
+}
+
+const PARTS: [Part; 4] =
+    [Part::Look(GroundQuality::High), Part::Look(GroundQuality::Low), Part::Plain, Part::Nothing];
+
 fn main() {
     // Cargo passes `--bench`.
     let given: Vec<u32> = std::env::args().skip(1).filter_map(|arg| arg.parse().ok()).collect();
     let [seconds, width, height] = [(0, 10), (1, 1280), (2, 720)]
-        .map(|(at, default)| given.get(at).copied().unwrap_or(default).clamp(1, 8192));
+        .map(|(at, default)| given.get(at).copied().unwrap_or(default).min(8192));
     let mut backends = vec![Backend::Cpu];
     if let EngineState::Cuda(name) = Engine::new(Backend::Cuda).wait(Duration::from_secs(30)) {
         println!("CUDA: {name}");
@@ -59,6 +72,10 @@ fn main() {
     }
     let frames = seconds as usize * 60;
     println!("{width} x {height}, {seconds} s each; us");
+    if frames == 0 {
+        Walk::new(Backend::Cpu, (width, height)).compare_materials(FRAMES_OF_ROUND);
+        return;
+    }
     for backend in backends {
         let mut walk = Walk::new(backend, (width, height));
         for _ in 0..WARM_UP {
@@ -117,6 +134,7 @@ struct Walk {
 
 impl Walk {
     fn new(backend: Backend, (width, height): (u32, u32)) -> Self {
+        let (width, height) = (width.max(1), height.max(1));
         let engine = Engine::new(backend);
         engine.wait(Duration::from_secs(30));
         let renderer = offscreen::find_renderer().expect("a graphics adapter");
@@ -162,18 +180,18 @@ impl Walk {
         is_painted && tiles.iter(world).count() > 0
     }
 
-    /// Compares the look with a plain material, round by round, and prints medians of the rounds.
+    /// Compares the look, in each quality, with a plain material, round by round, and prints medians of the rounds.
     fn compare_materials(&mut self, frames: usize) {
         for has_shadows in [true, false] {
             self.set_shadows(has_shadows);
             let shadows = if has_shadows { "shadows" } else { "no shadows" };
-            let mut rounds = [[0.0; ROUNDS]; 3];
+            let mut rounds = [[0.0; ROUNDS]; PARTS.len()];
             for round in 0..ROUNDS {
                 for (part, medians) in rounds.iter_mut().enumerate() {
-                    self.set_look(part == 0);
-                    self.is_far = part == 2;
+                    self.set_material(PARTS[part]);
+                    self.is_far = PARTS[part] == Part::Nothing;
                     let start = Instant::now();
-                    let is_in_time = |&number: &usize| number < 2 * FIRST_FRAMES || start.elapsed() < ROUND;
+                    let is_in_time = |&number: &usize| number < FIRST_FRAMES + 3 || start.elapsed() < ROUND;
                     let mut took: Vec<_> = (0..FIRST_FRAMES + frames)
                         .take_while(is_in_time)
                         .map(|number| self.frame(number, false))
@@ -183,30 +201,34 @@ impl Walk {
                     medians[round] = took[took.len() / 2].as_secs_f64() * 1e6;
                 }
             }
-            let [look, plain, nothing] = rounds.map(|mut medians| {
+            let [high, low, plain, nothing] = rounds.map(|mut medians| {
                 medians.sort_unstable_by(f64::total_cmp);
                 medians[ROUNDS / 2]
             });
+            let [high_ratio, low_ratio] = [high, low].map(|look| (look - nothing) / (plain - nothing));
             println!(
-                "{shadows}: look {look:.0}, plain {plain:.0}, nothing in sight {nothing:.0}; \
-                 look over plain, both less nothing: {:.2}",
-                (look - nothing) / (plain - nothing)
+                "{shadows}: look {high:.0}, of low quality {low:.0}, plain {plain:.0}, nothing in sight {nothing:.0}; \
+                 over plain, all less nothing: look {high_ratio:.2}, of low quality {low_ratio:.2}"
             );
         }
         self.is_far = false;
     }
 
     /// Gives the terrain its look, or a plain material in place of it.
-    fn set_look(&mut self, has_look: bool) {
+    fn set_material(&mut self, part: Part) {
         let world = self.app.world_mut();
         let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
         let plain = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
         let mut terrain = world.entity_mut(terrain);
-        if has_look {
-            terrain.remove::<MeshMaterial3d<StandardMaterial>>().insert(GroundLook::default());
-        } else {
+        match part {
+            Part::Look(quality) => {
+                let look = GroundLook { quality, ..default() };
+                terrain.remove::<MeshMaterial3d<StandardMaterial>>().insert(look);
+            }
             // On the same meshes: without the look they would get colours.
-            terrain.remove::<GroundLook>().insert((MeshMaterial3d(plain), SlimVertices));
+            Part::Plain | Part::Nothing => {
+                terrain.remove::<GroundLook>().insert((MeshMaterial3d(plain), SlimVertices));
+            }
         }
     }
 

@@ -318,6 +318,7 @@ pub mod dense;
 mod edits;
 pub mod ground;
 pub mod lattice;
+pub mod levels;
 #[cfg(feature = "egui")]
 pub mod panel;
 #[cfg(feature = "avian")]

@@ -1,0 +1,219 @@
+//! Which cut an eye needs: by the size of cells and errors on the screen.
+
+use glam::Vec3;
+
+use super::{Cut, LevelGrid, Node};
+
+/// How much larger all limits get each time there would be too many nodes.
+const GROWTH: f32 = 1.2;
+
+/// The most often they grow: by then they are so large that only nodes around an eye are split.
+const MOST_GROWTHS: u32 = 60;
+
+/// Somebody who looks at the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// Where, in voxels.
+    pub position: Vec3,
+    /// Voxels a second.
+    pub velocity: Vec3,
+    /// Pixels that one voxel covers one voxel away: the height of the picture over twice the tangent of half the angle of view.
+    pub pixels: f32,
+}
+
+/// What a choice must know of a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodeFacts {
+    /// Its lowest and its highest point, in voxels.
+    pub heights: [f32; 2],
+    /// How far it is from the finer surface, in voxels.
+    pub error: f32,
+    /// Was anything dug or built there?
+    pub has_edits: bool,
+}
+
+/// Limits by which nodes are split. Each is a size on the screen in pixels.
+///
+/// A node is split if its cells are larger than `cell_pixels` and its error larger than `error_pixels`; or if it has edits and its
+/// cells are larger than `edited_pixels`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// The least size of cells, 12 unless set otherwise.
+    pub cell_pixels: f32,
+    /// The greatest error, 2 unless set otherwise.
+    pub error_pixels: f32,
+    /// The greatest size of cells in nodes with edits, 4 unless set otherwise.
+    pub edited_pixels: f32,
+    /// A node that was split stays so until it is below this share of the limits, 0.7 unless set otherwise. So nothing changes
+    /// back and forth while somebody moves to and fro.
+    pub stay: f32,
+    /// Eyes are also thought to be where they will be in so many seconds; 0.5 unless set otherwise.
+    pub look_ahead: f32,
+    /// Voxels; what is farther from all eyes is not split. 8,192 unless set otherwise.
+    pub view_distance: f32,
+    /// The most nodes, about 2,400 unless set otherwise: beyond them, all limits grow.
+    pub most_nodes: usize,
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Self {
+            cell_pixels: 12.0,
+            error_pixels: 2.0,
+            edited_pixels: 4.0,
+            stay: 0.7,
+            look_ahead: 0.5,
+            view_distance: 8192.0,
+            most_nodes: 2400,
+        }
+    }
+}
+
+impl Choice {
+    /// The cut that these eyes need, all together, wherever they look: turning changes nothing. `before` is the one that they
+    /// had.
+    pub fn cut(&self, before: &Cut, eyes: &[Eye], facts: impl Fn(Node) -> NodeFacts) -> Cut {
+        let grid = before.grid();
+        let with_limits = |growth: f32| {
+            Cut::new(grid, |node| {
+                let share = if before.is_split(node) { self.stay } else { 1.0 };
+                self.is_split(grid, node, facts(node), eyes, [share, growth])
+            })
+        };
+        let mut cut = with_limits(1.0);
+        for times in 1..=MOST_GROWTHS {
+            if cut.nodes().count() <= self.most_nodes {
+                break;
+            }
+            cut = with_limits(GROWTH.powi(times as i32));
+        }
+        cut
+    }
+
+    /// Is a node so near and so large on the screen that it should be split? Limits are taken for this share of them, times their
+    /// growth.
+    fn is_split(
+        &self,
+        grid: LevelGrid,
+        node: Node,
+        facts: NodeFacts,
+        eyes: &[Eye],
+        [share, growth]: [f32; 2],
+    ) -> bool {
+        let limit = share * growth;
+        let (low, high) = grid.columns(node);
+        let low = Vec3::new(low.x as f32, facts.heights[0], low.z as f32);
+        let high = Vec3::new(high.x as f32, facts.heights[1], high.z as f32);
+        let stride = node.stride() as f32;
+        let has_edits = facts.has_edits;
+        eyes.iter().any(|eye| {
+            let places = [eye.position, eye.position + eye.velocity * self.look_ahead];
+            let distance = |place: Vec3| place.distance(place.clamp(low, high.max(low)));
+            let distance = places.map(distance).into_iter().fold(f32::INFINITY, f32::min);
+            // One voxel away it is large enough in any case.
+            let pixels = eye.pixels / distance.max(1.0);
+            let is_rough = stride * pixels > self.cell_pixels * limit
+                && facts.error * pixels > self.error_pixels * limit;
+            let is_edited = has_edits && stride * pixels > self.edited_pixels * limit;
+            distance * share <= self.view_distance && (is_rough || is_edited)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::cut::tests::{assert_is_cut, dice};
+    use super::*;
+    use crate::lattice::ChunkGrid;
+
+    /// Pixels of a picture 1,440 high at 45 degrees.
+    const PIXELS: f32 = 1738.0;
+
+    /// 16 x 16 km of mountains: errors as a surface of fractal noise has them.
+    fn mountains(node: Node) -> NodeFacts {
+        let rough = 0.05 + (dice(node, 3) >> 11) as f32 / (1u64 << 53) as f32 * 0.4;
+        NodeFacts { heights: [0.0, 300.0], error: rough * node.stride() as f32, has_edits: false }
+    }
+
+    fn eye(x: f32, z: f32) -> Eye {
+        Eye { position: Vec3::new(x, 302.0, z), velocity: Vec3::ZERO, pixels: PIXELS }
+    }
+
+    fn world() -> LevelGrid {
+        LevelGrid::new(ChunkGrid::new(32, 16_384, 16_384), 6)
+    }
+
+    #[test]
+    fn nodes_grow_little_with_the_view() {
+        let coarsest = Cut::coarsest(world());
+        let counts = [512.0, 1024.0, 2048.0, 4096.0, 8192.0, 16_384.0].map(|view_distance| {
+            let choice = Choice { view_distance, ..Choice::default() };
+            let cut = choice.cut(&coarsest, &[eye(8000.0, 8100.0)], mountains);
+            cut.nodes().count()
+        });
+        assert!(counts.iter().all(|&count| count <= 2400), "{counts:?}");
+        assert!(counts.windows(2).all(|pair| pair[1] <= pair[0] + 350), "{counts:?}");
+        assert!(counts[4] > counts[0], "{counts:?}");
+    }
+
+    #[test]
+    fn limits_grow_until_there_are_few_enough_nodes() {
+        let rough = |node| NodeFacts { error: 1e6, ..mountains(node) };
+        for most_nodes in [400, 1200] {
+            let choice = Choice { most_nodes, cell_pixels: 1.0, ..Choice::default() };
+            let eyes = [eye(4000.0, 4000.0), eye(12_000.0, 9000.0)];
+            let cut = choice.cut(&Cut::coarsest(world()), &eyes, rough);
+            let count = cut.nodes().count();
+            assert!(count <= most_nodes && count > most_nodes / 3, "{count} of {most_nodes}");
+        }
+    }
+
+    #[test]
+    fn the_ground_below_an_eye_is_drawn_in_full() {
+        let cut = Choice::default().cut(&Cut::coarsest(world()), &[eye(5000.0, 9000.0)], mountains);
+        assert_is_cut(&cut);
+        let tile = world().chunks().tile_of_cell(crate::lattice::Column::new(5000, 9000));
+        assert_eq!(cut.node_at(tile).map(|node| node.level), Some(0));
+    }
+
+    proptest! {
+        #[test]
+        fn who_moves_to_and_fro_soon_sees_no_change(x in 200f32..16_000.0, z in 200f32..16_000.0, step in -8f32..8.0) {
+            let choice = Choice { most_nodes: usize::MAX, ..Choice::default() };
+            let mut cut = choice.cut(&Cut::coarsest(world()), &[eye(x, z)], mountains);
+            let mut changes = 0;
+            for at in [x + step, x].repeat(4) {
+                let next = choice.cut(&cut, &[eye(at, z)], mountains);
+                prop_assert!(cut.split_nodes().all(|node| next.is_split(node)));
+                changes = if next == cut { 0 } else { changes + 1 };
+                cut = next;
+            }
+            prop_assert_eq!(changes, 0);
+        }
+
+        #[test]
+        fn several_eyes_see_what_each_would(places in prop::collection::vec((200f32..16_000.0, 200f32..16_000.0), 1..4)) {
+            let choice = Choice { most_nodes: usize::MAX, ..Choice::default() };
+            let coarsest = Cut::coarsest(world());
+            let eyes: Vec<Eye> = places.iter().map(|&(x, z)| eye(x, z)).collect();
+            let all = choice.cut(&coarsest, &eyes, mountains);
+            for own in eyes {
+                let cut = choice.cut(&coarsest, &[own], mountains);
+                prop_assert!(cut.split_nodes().all(|node| all.is_split(node)));
+            }
+        }
+    }
+
+    #[test]
+    fn edits_are_seen_from_farther_away() {
+        let flat = |has_edits| move |_| NodeFacts { has_edits, ..NodeFacts::default() };
+        let coarsest = Cut::coarsest(world());
+        let count = |has_edits| {
+            Choice::default().cut(&coarsest, &[eye(8000.0, 8000.0)], flat(has_edits)).nodes().count()
+        };
+        assert_eq!(count(false), coarsest.nodes().count());
+        assert!(count(true) > count(false));
+    }
+}
