@@ -15,7 +15,7 @@ use super::cell_outline::CellOutline;
 use super::indices::Indices;
 use super::mask::Borders;
 use super::mesh::{MaterialMix, SurfaceMesh, Vertex};
-use super::vertex::{WorldView, sheet_vertex};
+use super::vertex::{DIAGONAL, WorldView, sheet_vertex};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, Column, ONE, SNAP, TilePos};
 
@@ -189,6 +189,17 @@ struct Drawing<'a> {
     rings: Rings,
     /// The lines of the cell under work.
     outline: CellOutline<Numbered>,
+    /// Sides of the patch's cells that have vertices, along x and along z.
+    sides: [[Option<Side>; 81]; 2],
+}
+
+/// The vertices of a cell's side, which two cells of a patch share: numbered one after the other, up or down.
+#[derive(Clone, Copy)]
+struct Side {
+    /// The number of the first one.
+    number: u32,
+    /// And the level that it lies on.
+    y: i32,
 }
 
 impl<'a> Drawing<'a> {
@@ -196,7 +207,7 @@ impl<'a> Drawing<'a> {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
         let outline = CellOutline::with_capacity(ROOM);
-        Self { ground, borders, low, high, base, rings: Rings::default(), outline }
+        Self { ground, borders, low, high, base, rings: Rings::default(), outline, sides: [[None; 81]; 2] }
     }
 
     /// The rings, without room for more: they are kept until the next edit nearby.
@@ -223,6 +234,7 @@ impl<'a> Drawing<'a> {
 
     /// Draws the rings of 8x8 cells.
     fn patch(&mut self, at: (i32, i32)) {
+        self.sides = [[None; 81]; 2];
         self.borders.bordering(at).for_each(|(cell, flags)| self.cell(cell, flags));
         self.close(at);
     }
@@ -236,15 +248,28 @@ impl<'a> Drawing<'a> {
 
     /// Draws a cell's two triangles, with vertices on the lines that its flags name.
     fn cell(&mut self, cell: Column, flags: u8) {
-        let (ground, low, base, rings) = (self.ground, self.low, self.base, &mut self.rings);
+        let (ground, low, base) = (self.ground, self.low, self.base);
+        let (rings, sides) = (&mut self.rings, &mut self.sides);
         let width = (self.high.x - low.x + 1) as u32;
         let corner = |column: Column| Numbered {
             number: (column.z - low.z) as u32 * width + (column.x - low.x) as u32,
             height: ground.height(column) * (SNAP / ONE),
         };
+        let start = Column::new(cell.x & !7, cell.z & !7);
         self.outline.trace(ground, cell, flags, corner, |p, axis| {
-            rings.vertices.push(sheet_vertex(ground, p, axis, low.at(0)));
-            Numbered { number: base + rings.vertices.len() as u32 - 1, height: p.y * SNAP }
+            let next = base + rings.vertices.len() as u32;
+            let number = match axis {
+                DIAGONAL => next,
+                _ => {
+                    let side = &mut sides[axis / 2][((p.z - start.z) * 9 + p.x - start.x) as usize];
+                    let first = side.get_or_insert(Side { number: next, y: p.y });
+                    first.number + first.y.abs_diff(p.y)
+                }
+            };
+            if number == next {
+                rings.vertices.push(sheet_vertex(ground, p, axis, low.at(0)));
+            }
+            Numbered { number, height: p.y * SNAP }
         });
         let numbers = |triangle: [Numbered; 3]| {
             rings.fans.extend_from_slice(&triangle.map(|vertex| vertex.number));
