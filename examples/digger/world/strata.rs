@@ -28,7 +28,7 @@ pub fn strata() -> Strata {
             Stratum { rough_scale: 16, ..rough(0.5, cover(SOIL, 3.6, SOIL_SLOPE)) },
             Stratum { rough_scale: 16, ..rough(0.8, cover(CLAY, 5.2, SOIL_SLOPE)) },
             // Weather leaves a crust, which hides the beds of natural faces in patches.
-            Stratum { depth: Interval::below(3.0), ..Stratum::pocket(ROCK, 64, 0.55) },
+            Stratum { depth: Interval::below(3.0), ..Stratum::pocket(ROCK, 64, 0.3) },
             from(5.0, Stratum::vein(GOLD, 16, 0.010)),
             from(3.5, Stratum::pocket(COAL, 16, 0.012)),
             rough(0.5, from(3.0, Stratum::beds(COAL, 12.0, 1.5, 30.0))),
