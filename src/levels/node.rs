@@ -109,7 +109,7 @@ impl LevelGrid {
     /// The nodes of the coarsest level, row by row.
     pub fn roots(self) -> impl Iterator<Item = Node> {
         let (x, z) = self.grid.tile_counts();
-        let [across, down] = [x, z].map(|tiles| (tiles - 1 >> self.top) + 1);
+        let [across, down] = [x, z].map(|tiles| ((tiles - 1) >> self.top) + 1);
         let level = self.top;
         (0..down).flat_map(move |z| (0..across).map(move |x| Node { level, x, z }))
     }

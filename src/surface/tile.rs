@@ -189,8 +189,9 @@ struct Drawing<'a> {
     rings: Rings,
     /// The lines of the cell under work.
     outline: CellOutline<Numbered>,
-    /// Sides of the patch's cells that have vertices, along x and along z.
-    sides: [[Option<Side>; 81]; 2],
+    /// Sides of the patch's cells that have vertices: 81 along x and as many along z. Empty where no cell is steep: there, only
+    /// the mask's border has vertices, and each side of it but once.
+    sides: Vec<Option<Side>>,
 }
 
 /// The vertices of a cell's side, which two cells of a patch share: numbered one after the other, up or down.
@@ -207,7 +208,8 @@ impl<'a> Drawing<'a> {
         let (low, high) = world.grid.tile_cells(tile);
         let (base, ground) = (column_count(low, high), world.samples.ground());
         let outline = CellOutline::with_capacity(ROOM);
-        Self { ground, borders, low, high, base, rings: Rings::default(), outline, sides: [[None; 81]; 2] }
+        let sides = if ground.steep_cells().is_some() { vec![None; 2 * 81] } else { Vec::new() };
+        Self { ground, borders, low, high, base, rings: Rings::default(), outline, sides }
     }
 
     /// The rings, without room for more: they are kept until the next edit nearby.
@@ -234,8 +236,11 @@ impl<'a> Drawing<'a> {
 
     /// Draws the rings of 8x8 cells.
     fn patch(&mut self, at: (i32, i32)) {
-        self.sides = [[None; 81]; 2];
+        let before = self.rings.vertices.len();
         self.borders.bordering(at).for_each(|(cell, flags)| self.cell(cell, flags));
+        if self.rings.vertices.len() != before {
+            self.sides.fill(None);
+        }
         self.close(at);
     }
 
@@ -260,8 +265,9 @@ impl<'a> Drawing<'a> {
             let next = base + rings.vertices.len() as u32;
             let number = match axis {
                 DIAGONAL => next,
+                _ if sides.is_empty() => next,
                 _ => {
-                    let side = &mut sides[axis / 2][((p.z - start.z) * 9 + p.x - start.x) as usize];
+                    let side = &mut sides[axis / 2 * 81 + ((p.z - start.z) * 9 + p.x - start.x) as usize];
                     let first = side.get_or_insert(Side { number: next, y: p.y });
                     first.number + first.y.abs_diff(p.y)
                 }
