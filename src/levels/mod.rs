@@ -2,7 +2,7 @@
 //!
 //! A world is a quadtree of [`Node`]s. A node of level 0 is a tile; one of level L covers as many cells, each 2^L voxels wide.
 //! A [`Cut`] is what is drawn: nodes that cover the world once, where those that share an edge differ by at most one level.
-//! [`Choice`] says which cut an eye needs, and [`Cut::steps_to`] leads from one cut to another without ever leaving
+//! [`Choice`] says which cut an eye needs, and [`Cut::step_to`] leads from one cut to another without ever leaving
 //! that rule.
 //!
 //! Nothing here knows heights or meshes: how rough a node is, it is told.
