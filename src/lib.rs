@@ -345,8 +345,9 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowPlugins, BurrowSettings, BurrowSystems, Chunk,
-        Field, GroundPiece, HeightmapImage, HistoryMoved, LooseGround, LoosePieceFound, MaterialColors, Redo,
-        SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains, Tile, Undo,
+        Field, GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
+        MaterialColors, Redo, ShownLevels, SlimVertices, TargetedBrush, TerrainHit, TerrainReady, Terrains,
+        Tile, Undo,
     };
     pub use crate::terrain::{
         Applied, History, HistoryReceipt, HistoryRejection, HistoryStep, LoosePiece, LooseSettings,

@@ -1,5 +1,6 @@
 //! Draws the views as children of the terrains and keeps them up to date.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use bevy::asset::AssetEventSystems;
@@ -12,7 +13,7 @@ use super::views::{self, Dirty, Place};
 use super::{BurrowDebug, DebugView};
 use crate::lattice::BrickPos;
 use crate::plugin::{BrushApplied, BurrowSystems, HistoryMoved};
-use crate::terrain::{Terrain, Version};
+use crate::terrain::{DrawnCut, Terrain, Version};
 
 /// The shortest time between two drawings of a view while the world changes.
 const PERIOD: Duration = Duration::from_millis(100);
@@ -99,6 +100,8 @@ fn note_dirty(
 #[derive(Clone, PartialEq)]
 struct Key {
     version: Version,
+    /// For the view of levels.
+    cut: Option<Arc<DrawnCut>>,
     focus: IVec3,
     settings: BurrowDebug,
     /// Counts frames in which bricks fade, for the dirty view.
@@ -153,6 +156,7 @@ fn draw(
             let fading = if view == DebugView::Dirty { *frames } else { 0 };
             let key = Key {
                 version: terrain.world().version(),
+                cut: terrain.drawn_cut().filter(|_| view == DebugView::Levels).cloned(),
                 focus: steps.as_ivec3(),
                 settings: debug.clone(),
                 fading,
@@ -174,7 +178,7 @@ fn draw(
             let mut out = LineBuffer::new(debug.most_lines);
             views::draw(
                 view,
-                terrain.world(),
+                terrain,
                 place,
                 if view == DebugView::Dirty { &fresh } else { &[] },
                 &mut out,

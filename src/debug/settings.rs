@@ -20,6 +20,8 @@ pub struct BurrowDebug {
     pub normals: bool,
     /// Edges of triangles, and which of them tiles and chunks share.
     pub wires: bool,
+    /// Edges of triangles, coloured by level of detail.
+    pub levels: bool,
     /// The place around which is drawn, in world space; `None` for where the camera looks at the ground.
     pub focus: Option<Vec3>,
     /// How far views reach, in metres; normals and wires reach [`near`](Self::near).
@@ -43,6 +45,7 @@ impl Default for BurrowDebug {
             dirty: false,
             normals: false,
             wires: false,
+            levels: false,
             focus: None,
             radius: 96.0,
             near: 20.0,
@@ -64,12 +67,21 @@ pub enum DebugView {
     Dirty,
     Normals,
     Wires,
+    Levels,
 }
 
 impl DebugView {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Chunks, Self::Fields, Self::Mask, Self::Rings, Self::Dirty, Self::Normals, Self::Wires];
+    pub const ALL: [Self; 8] = [
+        Self::Chunks,
+        Self::Fields,
+        Self::Mask,
+        Self::Rings,
+        Self::Dirty,
+        Self::Normals,
+        Self::Wires,
+        Self::Levels,
+    ];
 
     /// In plain words.
     pub fn name(self) -> &'static str {
@@ -81,6 +93,7 @@ impl DebugView {
             Self::Dirty => "Dirty bricks",
             Self::Normals => "Normals",
             Self::Wires => "Seam wires",
+            Self::Levels => "Levels of detail",
         }
     }
 }
@@ -96,6 +109,7 @@ impl BurrowDebug {
             DebugView::Dirty => self.dirty,
             DebugView::Normals => self.normals,
             DebugView::Wires => self.wires,
+            DebugView::Levels => self.levels,
         }
     }
 
@@ -109,6 +123,7 @@ impl BurrowDebug {
             DebugView::Dirty => &mut self.dirty,
             DebugView::Normals => &mut self.normals,
             DebugView::Wires => &mut self.wires,
+            DebugView::Levels => &mut self.levels,
         }
     }
 }

@@ -4,9 +4,10 @@ use bevy::prelude::*;
 
 use super::DebugView;
 use super::lines::LineBuffer;
-use super::wires::{SeamWires, around};
-use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE};
-use crate::terrain::{Drawn, World};
+use super::wires::{SeamWires, around, edges_of, voxels};
+use crate::lattice::{BrickPos, ChunkPos, Column, LatticeBox, ONE, SNAP};
+use crate::levels::{Cut, Node};
+use crate::terrain::{Drawn, Terrain, World};
 
 const CHUNK: LinearRgba = LinearRgba::rgb(0.08, 0.60, 1.0);
 const TILE: LinearRgba = LinearRgba::rgb(0.85, 0.85, 0.9);
@@ -36,7 +37,8 @@ pub struct Place {
 }
 
 /// Draws a view.
-pub fn draw(view: DebugView, world: &World, place: Place, dirty: &[Dirty], out: &mut LineBuffer) {
+pub fn draw(view: DebugView, terrain: &Terrain, place: Place, dirty: &[Dirty], out: &mut LineBuffer) {
+    let world = terrain.world();
     let Some(bounds) = around(place.focus, place.radius) else { return };
     match view {
         DebugView::Chunks => chunks(world, place, bounds, out),
@@ -46,6 +48,36 @@ pub fn draw(view: DebugView, world: &World, place: Place, dirty: &[Dirty], out: 
         DebugView::Dirty => bricks(dirty, bounds, out),
         DebugView::Normals => normals(world, place, out),
         DebugView::Wires => SeamWires::around(world, place.focus, place.near).draw(out),
+        DebugView::Levels => match terrain.drawn_cut() {
+            Some(drawn) => levels(world, drawn.cut(), place, out),
+            None => levels(world, &Cut::coarsest(world.level_grid(0)), place, out),
+        },
+    }
+}
+
+/// The edges of the nodes within the radius, the nearest nodes first, should there not be room for all.
+fn levels(world: &World, cut: &Cut, place: Place, out: &mut LineBuffer) {
+    let distance = |node: Node| {
+        let (low, high) = cut.grid().columns(node);
+        let [low, high] = [low, high].map(|column| Vec2::new(column.x as f32, column.z as f32));
+        place.focus.xz().distance(place.focus.xz().clamp(low, high.max(low)))
+    };
+    let near = cut.nodes().map(|node| (distance(node), node));
+    let mut near: Vec<(f32, Node)> = near.filter(|(distance, _)| *distance <= place.radius).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    out.width(1.5);
+    for (_, node) in near {
+        if out.is_full() {
+            return;
+        }
+        let color = LinearRgba::from(Oklcha::sequential_dispersed(u32::from(node.level)));
+        let mut edges: Vec<_> =
+            edges_of(&world.node_mesh(cut, node), cut.grid().columns(node).0.at(0) * SNAP).collect();
+        edges.sort_unstable_by_key(|edge| edge.map(|end| end.to_array()));
+        edges.dedup();
+        for [from, to] in edges {
+            out.line(voxels(from) + Vec3::Y * LIFT, voxels(to) + Vec3::Y * LIFT, color);
+        }
     }
 }
 
@@ -183,7 +215,7 @@ mod tests {
     use super::*;
     use crate::brush::{Brush, Shape};
     use crate::ground::{Ground, NoiseHeights};
-    use crate::terrain::{Terrain, TerrainSettings};
+    use crate::terrain::TerrainSettings;
 
     fn hills(side: u32) -> Terrain {
         let noise = NoiseHeights { amplitude: 14.0, scale: 20.0, ..NoiseHeights::default() };
@@ -201,7 +233,7 @@ mod tests {
     fn count(view: DebugView, terrain: &Terrain, place: Place, most: usize) -> usize {
         let bricks = terrain.world().bricks().map(|(brick, _)| (brick, 0.5)).collect::<Vec<_>>();
         let mut out = LineBuffer::new(most);
-        draw(view, terrain.world(), place, &bricks, &mut out);
+        draw(view, terrain, place, &bricks, &mut out);
         out.finish().iter().map(|layer| layer.lines.len()).sum()
     }
 

@@ -78,13 +78,13 @@ pub fn around(place: Vec3, radius: f32) -> Option<LatticeBox> {
 }
 
 /// The edges of a mesh that is placed at `origin`, in 1/4096 voxel.
-fn edges_of(mesh: &SurfaceMesh, origin: IVec3) -> impl Iterator<Item = Edge> {
+pub(super) fn edges_of(mesh: &SurfaceMesh, origin: IVec3) -> impl Iterator<Item = Edge> {
     mesh.triangles().flat_map(move |triangle| {
         let [a, b, c] = triangle.map(|vertex| origin + vertex.position);
         [[a, b], [b, c], [c, a]].map(|[a, b]| if a.to_array() <= b.to_array() { [a, b] } else { [b, a] })
     })
 }
 
-fn voxels(place: IVec3) -> Vec3 {
+pub(super) fn voxels(place: IVec3) -> Vec3 {
     (place.as_dvec3() / f64::from(SNAP)).as_vec3()
 }

@@ -14,6 +14,14 @@ pub struct Step {
 }
 
 impl Step {
+    /// Sorts its nodes, each of which it lists once then.
+    fn sort(&mut self) {
+        for list in [&mut self.gone, &mut self.new, &mut self.touched] {
+            list.sort_unstable();
+            list.dedup();
+        }
+    }
+
     /// Meshes that it makes.
     pub fn mesh_count(&self) -> usize {
         self.new.len() + self.touched.len()
@@ -46,6 +54,19 @@ impl Cut {
             step = longer;
         }
         (!step.new.is_empty()).then_some(step)
+    }
+
+    /// All that differs in another cut of the same quadtree.
+    pub fn changes_to(&self, other: &Self) -> Step {
+        let mut step = Step {
+            gone: self.nodes().filter(|&node| !other.contains(node)).collect(),
+            new: other.nodes().filter(|&node| !self.contains(node)).collect(),
+            touched: Vec::new(),
+        };
+        let touching = step.new.iter().flat_map(|&node| other.touching(node));
+        step.touched = touching.filter(|&near| self.contains(near)).collect();
+        step.sort();
+        step
     }
 
     /// The next node to be split, or to be merged.
@@ -97,10 +118,7 @@ impl Cut {
             }
             step.touched.extend(self.touching(node).into_iter().filter(|&near| before.contains(near)));
         }
-        for list in [&mut step.gone, &mut step.new, &mut step.touched] {
-            list.sort_unstable();
-            list.dedup();
-        }
+        step.sort();
         step
     }
 }
@@ -138,6 +156,7 @@ mod tests {
                     before.contains(*node) && step.new.iter().chain(&step.gone).any(|&other| node.touches(other))
                 };
                 prop_assert_eq!(&step.touched, &sorted(&mut cut.nodes().filter(is_touched)));
+                prop_assert_eq!(&step, &before.changes_to(&cut));
                 before = cut.clone();
             }
             prop_assert_eq!(cut, target);

@@ -10,7 +10,7 @@ use super::theme::{ACCENT, BAD, BLUE, BRIGHT, FAINT, GOOD, PARTS};
 use super::widgets::{button, bytes, choice, count, figure, figure_in, section, share, slider, time};
 use super::{look_section, plot, rules_section};
 use crate::backend::{Choice, EngineState, Stage};
-use crate::plugin::{BurrowFigures, BurrowSettings, Times};
+use crate::plugin::{BurrowFigures, BurrowSettings, ShownLevels, Times};
 use crate::terrain::{History, Terrain};
 
 /// A terrain in the list.
@@ -119,6 +119,10 @@ fn terrain(ui: &mut Ui, panel: &mut BurrowPanel, terrains: &[TerrainLine], chose
     figure(ui, "Size", format!("{} x {} m", metres(grid.width()), metres(grid.depth())));
     figure(ui, "Voxel, chunk", format!("{voxel} m, {} voxels", grid.size()));
     figure(ui, "Revision", count(line.terrain.world().revision() as usize));
+    if let Some(drawn) = line.terrain.drawn_cut() {
+        let nodes = ShownLevels::of(drawn.cut(), 0).nodes;
+        figure(ui, "Squares by level", nodes.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
+    }
 }
 
 fn live(ui: &mut Ui, figures: &BurrowFigures, survey: &Survey) {

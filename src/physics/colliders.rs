@@ -10,7 +10,6 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::PhysicsFigures;
-use super::columns::column;
 use super::ground::{GroundBody, GroundCollider, GroundContact};
 use super::near::Neighbourhood;
 use super::shape::GroundShape;
@@ -71,7 +70,7 @@ impl SurfaceProcessor for GroundColliders {
     /// tile's collider, so the chunk that fills the hole must get its own in the same commit.
     fn wants(&self, part: &Part) -> bool {
         let near = self.0.near.read().unwrap_or_else(PoisonError::into_inner);
-        let tile = column(part.drawn);
+        let tile = part.drawn.tile();
         let has_shape = |drawn| self.has_shape(part.terrain, drawn);
         let stays = || has_shape(part.drawn) || has_shape(Drawn::Tile(tile));
         near.distance((part.terrain, tile)).is_some_and(|distance| distance <= 0.0 || stays())

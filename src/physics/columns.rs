@@ -13,17 +13,9 @@ use crate::terrain::Drawn;
 /// A column of chunks of a terrain's entity.
 pub(super) type ColumnKey = (Entity, TilePos);
 
-/// The column of a tile or chunk.
-pub(super) fn column(drawn: Drawn) -> TilePos {
-    match drawn {
-        Drawn::Tile(tile) => tile,
-        Drawn::Chunk(chunk) => chunk.tile(),
-    }
-}
-
-/// Which tile or chunk an entity is.
+/// Which tile or chunk an entity is; none if it is a coarser tile.
 fn drawn(tile: Option<&Tile>, chunk: Option<&Chunk>) -> Option<Drawn> {
-    let tile = tile.map(|&tile| Drawn::Tile(tile.into()));
+    let tile = tile.filter(|tile| tile.level == 0).map(|&tile| Drawn::Tile(tile.into()));
     tile.or_else(|| chunk.map(|&chunk| Drawn::Chunk(chunk.into())))
 }
 
@@ -102,7 +94,7 @@ impl Columns {
         for part in std::mem::take(&mut self.changed_parts) {
             let found = parts.get(part).ok().and_then(|(.., parent, tile, chunk)| {
                 let drawn = drawn(tile, chunk)?;
-                Some(((parent.parent(), column(drawn)), drawn))
+                Some(((parent.parent(), drawn.tile()), drawn))
             });
             let (before, now) = (self.column_of.get(&part).copied(), found.map(|(column, _)| column));
             touched.extend(before.into_iter().chain(now));

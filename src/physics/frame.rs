@@ -32,17 +32,19 @@ pub(super) struct TerrainFrame<'a> {
     pub size: f32,
     /// Whether its tiles and chunks show its current world.
     pub is_shown: bool,
+    entities: Option<&'a TerrainEntities>,
 }
 
 impl<'a> TerrainFrame<'a> {
     pub fn new(
         terrain: Entity,
         model: &'a Terrain,
-        entities: Option<&TerrainEntities>,
+        entities: Option<&'a TerrainEntities>,
         place: &GlobalTransform,
     ) -> Self {
         let is_shown = entities.is_some_and(|entities| entities.show(model.world()));
-        Self { terrain, model, inverse: place.affine().inverse(), size: voxel_size(place), is_shown }
+        let inverse = place.affine().inverse();
+        Self { terrain, model, inverse, size: voxel_size(place), is_shown, entities }
     }
 
     /// The distance from a place to a column along x or z, whichever is larger, in voxels.
@@ -91,8 +93,11 @@ impl<'a> TerrainFrame<'a> {
         let tiles = tiles.into_iter().flat_map(|(first, last)| {
             (first.z..=last.z).flat_map(move |z| (first.x..=last.x).map(move |x| TilePos { x, z }))
         });
-        // A column without a tile is loading, or the game despawned it.
-        tiles.filter(move |&tile| !columns.is_ready((self.terrain, tile)).unwrap_or(self.is_shown))
+        // A column without a tile is loading, has coarser ground drawn over it and no source near, or the game despawned it.
+        let lacks = |tile| self.entities.is_some_and(|entities| entities.lack(tile));
+        let is_ready =
+            move |tile| !lacks(tile) && columns.is_ready((self.terrain, tile)).unwrap_or(self.is_shown);
+        tiles.filter(move |&tile| !is_ready(tile))
     }
 
     /// Whether its lowest point comes near or below the ground somewhere on its way.

@@ -138,6 +138,11 @@ impl Neighbourhood {
         self.0.get(&terrain)?.columns.get(&column).copied()
     }
 
+    /// The columns within a chunk's width of the discs over a terrain.
+    pub fn tiles(&self, terrain: Entity) -> impl Iterator<Item = TilePos> {
+        self.0.get(&terrain).into_iter().flat_map(|area| area.columns.keys().copied())
+    }
+
     /// Whether both share the same areas.
     pub fn is(&self, other: &Self) -> bool {
         let is_in_other =

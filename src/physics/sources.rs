@@ -9,6 +9,7 @@ use super::colliders::GroundColliders;
 use super::near::{Neighbourhood, ahead, stops, voxel_size};
 use super::solids::{Extent, Solids};
 use super::{HeldByGround, PhysicsFigures};
+use crate::plugin::{LevelsOfDetail, WantedTiles};
 use crate::terrain::Terrain;
 
 /// How far ahead of a moving source colliders are made, in seconds.
@@ -42,15 +43,16 @@ impl Default for ColliderSource {
 pub(super) fn find_near(
     colliders: Res<GroundColliders>,
     places: TransformHelper,
-    terrains: Query<(Entity, &Terrain)>,
+    terrains: Query<(Entity, &Terrain, Has<LevelsOfDetail>)>,
     sources: Query<(Entity, &ColliderSource, Option<&LinearVelocity>, Option<&HeldByGround>, Extent)>,
     solids: Solids,
     mut known: Local<Neighbourhood>,
+    mut wanted: ResMut<WantedTiles>,
     mut figures: ResMut<PhysicsFigures>,
 ) {
     let start = Instant::now();
     let mut near = Neighbourhood::default();
-    for (terrain, model) in &terrains {
+    for (terrain, model, _) in &terrains {
         let Ok(place) = places.compute_global_transform(terrain) else { continue };
         let (inverse, size) = (place.affine().inverse(), voxel_size(&place));
         let grid = model.world().grid();
@@ -73,6 +75,8 @@ pub(super) fn find_near(
     }
     if !near.is(&known) {
         colliders.set_near(near.clone());
+        let with_levels = terrains.iter().filter(|(.., has_levels)| *has_levels);
+        wanted.0 = with_levels.map(|(terrain, ..)| (terrain, near.tiles(terrain).collect())).collect();
         *known = near;
     }
     figures.main_thread += start.elapsed();

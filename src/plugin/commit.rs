@@ -10,9 +10,10 @@ use super::collect::send_history;
 use super::diagnostics::measure_commit;
 use super::entities::{TerrainEntities, apply_actions, is_empty, trigger_if_alive};
 use super::figures::{TaskTimes, start_measuring, stop_measuring};
+use super::levels::{LevelState, ShownLevels, WantedTiles};
 use super::load::Loading;
 use super::meshes::{BuiltMesh, VertexExtras};
-use super::processor::{BuiltSurface, SurfaceBuilder};
+use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{Change, InFlight, TaskCounter, TaskOutput};
 use super::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, ChunkChanged, ChunkCreated, HistoryMoved,
@@ -25,7 +26,14 @@ use crate::terrain::{Drawn, FieldNews, Rejection, Terrain, World as Ground};
 pub(super) fn begin_transactions(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, &TerrainEntities, Option<&MaterialColors>, Has<SlimVertices>),
+        (
+            Entity,
+            &mut Terrain,
+            &TerrainEntities,
+            Option<&MaterialColors>,
+            Has<SlimVertices>,
+            Option<&mut LevelState>,
+        ),
         (Without<Loading>, Without<InFlight>),
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -36,13 +44,16 @@ pub(super) fn begin_transactions(
     mut counter: ResMut<TaskCounter>,
 ) {
     let start = Instant::now();
-    for (entity, mut terrain, entities, colors, is_slim) in &mut terrains {
+    for (entity, mut terrain, entities, colors, is_slim, levels) in &mut terrains {
         // The game moved a terrain here while a task of another entity ran for it.
         if terrain.waits_for_plugin() {
             terrain.abandon();
         }
         // Changes that the game made itself are shown first.
         if terrain.queued() == 0 || !entities.show(terrain.world()) || entities.is_slim != is_slim {
+            continue;
+        }
+        if levels.is_some_and(|mut levels| levels.count_edit()) {
             continue;
         }
         let transaction = terrain.begin_for(true);
@@ -64,6 +75,7 @@ pub(super) struct Display<'w, 's> {
     commands: Commands<'w, 's>,
     assets: Option<ResMut<'w, Assets<Mesh>>>,
     meshes: Query<'w, 's, &'static Mesh3d>,
+    wanted: Res<'w, WantedTiles>,
     figures: ResMut<'w, BurrowFigures>,
     diagnostics: Diagnostics<'w, 's>,
 }
@@ -79,13 +91,19 @@ pub(super) struct CommitMessages<'w> {
 /// Commits what is done: each transaction whole, as many as the frame's budget of swaps allows, and at least one.
 pub(super) fn commit_transactions(
     settings: Res<BurrowSettings>,
-    mut terrains: Query<(Entity, &mut Terrain, &mut TerrainEntities, &mut InFlight)>,
+    mut terrains: Query<(
+        Entity,
+        &mut Terrain,
+        &mut TerrainEntities,
+        &mut InFlight,
+        Option<(&mut LevelState, &mut ShownLevels)>,
+    )>,
     mut display: Display,
     mut messages: CommitMessages,
 ) {
     // The oldest first: a task that had to wait for the budget is next.
     let mut done: Vec<(u64, Entity)> = Vec::new();
-    for (entity, _, _, mut task) in &mut terrains {
+    for (entity, _, _, mut task, _) in &mut terrains {
         if task.is_done() {
             done.push((task.number, entity));
         }
@@ -98,9 +116,9 @@ pub(super) fn commit_transactions(
     start_measuring(&mut display.commands);
     let mut swapped = 0;
     for (_, entity) in done {
-        let Ok((_, terrain, entities, mut task)) = terrains.get_mut(entity) else { continue };
+        let Ok((_, terrain, entities, mut task, levels)) = terrains.get_mut(entity) else { continue };
         let swaps = match &task.done {
-            Some(Ok(output)) => output.surfaces.len(),
+            Some(Ok(output)) => output.swaps(),
             _ => 0,
         };
         if swapped > 0 && swapped + swaps > settings.swaps_per_frame {
@@ -109,7 +127,7 @@ pub(super) fn commit_transactions(
         let Some(output) = task.done.take() else { continue };
         let ticket = task.ticket;
         display.commands.entity(entity).try_remove::<InFlight>();
-        if commit((entity, ticket), terrain, entities, output.ok(), &mut display, &mut messages) {
+        if commit((entity, ticket), terrain, entities, levels, output.ok(), &mut display, &mut messages) {
             swapped += swaps;
         }
     }
@@ -122,12 +140,13 @@ fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,
     mut entities: Mut<TerrainEntities>,
+    levels: Option<(Mut<LevelState>, Mut<ShownLevels>)>,
     output: Option<TaskOutput>,
     display: &mut Display,
     messages: &mut CommitMessages,
 ) -> bool {
     let start = Instant::now();
-    let Some(TaskOutput { change, surfaces, pieces, times }) =
+    let Some(TaskOutput { change, surfaces, nodes, pieces, times }) =
         output.or_else(|| output_of_panicked(&mut terrain, ticket))
     else {
         return false;
@@ -138,6 +157,7 @@ fn commit(
             if is_shown {
                 entities.shown = unseen.version();
                 display.show((entity, terrain.world()), &mut entities, surfaces, unseen.fields(), true);
+                display.show_nodes((entity, terrain.world()), &mut entities, nodes);
                 // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
                 entities.trigger_ready(&mut display.commands, entity);
                 display.figures.main_thread += start.elapsed();
@@ -146,10 +166,25 @@ fn commit(
         }
         Change::Transaction(commit) if ticket.is_some_and(|ticket| terrain.waits_for(ticket)) => *commit,
         Change::Transaction(commit) => {
-            free_later((commit, surfaces));
+            free_later((commit, surfaces, nodes));
             return false;
         }
     };
+    if commit.is_cut() {
+        let changed = nodes.len();
+        if terrain.bypass_change_detection().commit_shown(commit).is_err() {
+            return false;
+        }
+        display.show_nodes((entity, terrain.world()), &mut entities, nodes);
+        if let (Some((mut state, mut shown)), Some(drawn)) = (levels, terrain.drawn_cut()) {
+            shown.set_if_neq(ShownLevels::of(drawn.cut(), state.count(changed)));
+            if state.is_settled {
+                entities.trigger_ready(&mut display.commands, entity);
+            }
+        }
+        display.figures.main_thread += start.elapsed();
+        return true;
+    }
     let fields = commit.field_news().to_vec();
     let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
     if !waste.is_empty() {
@@ -160,6 +195,7 @@ fn commit(
     entities.shown = terrain.world().version();
     let triangles = surfaces.iter().map(BuiltSurface::triangles).sum();
     display.show((entity, terrain.world()), &mut entities, surfaces, &fields, is_step);
+    display.show_nodes((entity, terrain.world()), &mut entities, nodes);
     if receipts.iter().any(|receipt| receipt.outcome == Err(Rejection::Panicked)) {
         warn_once!("a brush was rejected because applying it panicked; this is a bug, please report it");
     }
@@ -183,7 +219,8 @@ fn output_of_panicked(terrain: &mut Mut<Terrain>, ticket: Option<u64>) -> Option
         return None;
     };
     let change = Change::Transaction(Box::new(rejected));
-    Some(TaskOutput { change, surfaces: Vec::new(), pieces: Vec::new(), times: TaskTimes::default() })
+    let (surfaces, nodes, pieces) = (Vec::new(), Vec::new(), Vec::new());
+    Some(TaskOutput { change, surfaces, nodes, pieces, times: TaskTimes::default() })
 }
 
 impl Display<'_, '_> {
@@ -222,15 +259,18 @@ impl Display<'_, '_> {
         let is_new = child.is_none();
         let is_gone = match drawn {
             Drawn::Chunk(chunk) => is_empty(world, chunk),
-            Drawn::Tile(_) => false,
+            // It has an entity while it is drawn, or wanted.
+            Drawn::Tile(_) => built.as_ref().is_some_and(|built| !built.is_drawn),
         };
         if is_new && (is_gone || built.as_ref().is_some_and(|built| built.shown.is_empty)) {
             return;
         }
         let child = child.unwrap_or_else(|| entities.spawn(commands, entity, world, drawn));
         let has_changed = built.is_some();
-        if let Some(BuiltSurface { mesh, shown, actions, .. }) = built {
-            if let Some(assets) = &mut self.assets {
+        if let Some(BuiltSurface { mesh, shown, actions, is_drawn, .. }) = built {
+            if let Some(assets) = &mut self.assets
+                && is_drawn
+            {
                 swap(commands, assets, child, self.meshes.get(child).ok(), mesh);
                 self.figures.swaps += 1;
             }
@@ -240,6 +280,48 @@ impl Display<'_, '_> {
             Drawn::Chunk(_) if is_new => trigger_if_alive(commands, ChunkCreated { entity: child }),
             Drawn::Chunk(_) if has_changed => trigger_if_alive(commands, ChunkChanged { entity: child }),
             _ => {}
+        }
+    }
+}
+
+impl Display<'_, '_> {
+    /// Shows nodes as they are drawn from now on.
+    fn show_nodes(
+        &mut self,
+        (entity, world): (Entity, &Ground),
+        entities: &mut TerrainEntities,
+        nodes: Vec<BuiltNode>,
+    ) {
+        for BuiltNode { node, mesh, shown, hidden } in nodes {
+            for drawn in hidden {
+                self.hide_part(entity, entities, drawn);
+            }
+            for built in shown {
+                self.show_part((entity, world), entities, built.drawn, Some(built));
+            }
+            let commands = &mut self.commands;
+            let Some(mesh) = mesh else {
+                entities.despawn_node(commands, node);
+                continue;
+            };
+            let child = entities.node(commands, entity, world, node);
+            if let Some(assets) = &mut self.assets {
+                swap(commands, assets, child, self.meshes.get(child).ok(), mesh);
+                self.figures.swaps += 1;
+            }
+        }
+    }
+
+    /// Draws a tile or chunk no more. A tile that nothing else needs has no entity any more.
+    fn hide_part(&mut self, terrain: Entity, entities: &mut TerrainEntities, drawn: Drawn) {
+        let Some(child) = entities.get(&mut self.commands, drawn) else { return };
+        match drawn {
+            Drawn::Tile(tile) if !self.wanted.has(terrain, tile) => {
+                entities.despawn_tile(&mut self.commands, tile);
+            }
+            _ => {
+                self.commands.entity(child).try_remove::<Mesh3d>();
+            }
         }
     }
 }

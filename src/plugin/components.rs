@@ -4,6 +4,7 @@ use bevy::ecs::component::{Component, Mutable, StorageType};
 use bevy::prelude::*;
 
 use crate::lattice::{ChunkPos, TilePos};
+use crate::levels::Node;
 use crate::terrain::Terrain;
 use crate::volume;
 
@@ -14,6 +15,9 @@ impl Component for Terrain {
 }
 
 /// A tile of the heightmap: child of its [`Terrain`]. Has a `Mesh3d` while some of its cells are not dug.
+///
+/// On terrains with [`LevelsOfDetail`](super::LevelsOfDetail) it may be a square of 2^`level` tiles along each side, which one
+/// mesh draws with all that was dug and built there. One of level 0 without a mesh is not drawn: it is there for its collider.
 ///
 /// It inherits the terrain's material, `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver`: insert them on the terrain.
 /// Leave tiles out of saved scenes: a scene of the whole world would restore them without their terrain, which is not
@@ -26,10 +30,12 @@ pub struct Tile {
     pub x: i32,
     /// Chunks along +z.
     pub z: i32,
+    /// Its level of detail; always 0 without [`LevelsOfDetail`](super::LevelsOfDetail).
+    pub level: u8,
 }
 
 /// A chunk that digging touched: child of its [`Terrain`]. Has a `Mesh3d` if it draws something, even if it has no field
-/// itself. It inherits components, and is left out of saved scenes, like a [`Tile`].
+/// itself; on terrains with [`LevelsOfDetail`](super::LevelsOfDetail) while it is drawn at level 0. It inherits components, and is left out of saved scenes, like a [`Tile`].
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -114,7 +120,14 @@ pub struct GroundPieces(Vec<Entity>);
 
 impl From<TilePos> for Tile {
     fn from(tile: TilePos) -> Self {
-        Self { x: tile.x, z: tile.z }
+        Self { x: tile.x, z: tile.z, level: 0 }
+    }
+}
+
+impl From<Node> for Tile {
+    fn from(node: Node) -> Self {
+        let TilePos { x, z } = node.tile();
+        Self { x, z, level: node.level }
     }
 }
 
@@ -125,7 +138,8 @@ impl From<ChunkPos> for Chunk {
 }
 
 impl From<Tile> for TilePos {
-    fn from(Tile { x, z }: Tile) -> Self {
+    /// Its lowest tile.
+    fn from(Tile { x, z, .. }: Tile) -> Self {
         Self { x, z }
     }
 }

@@ -1,14 +1,16 @@
 //! The entities below a terrain.
 
 use bevy::ecs::entity::EntityHashSet;
-use bevy::platform::collections::HashMap;
+use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
+use super::processor::node_origin;
 use super::{
     Chunk, CommitAction, Field, FieldChanged, FieldCreated, FieldMerged, ShownSurface, TerrainReady, Tile,
 };
-use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, FieldNews, Version, World};
+use crate::lattice::{ChunkPos, TilePos};
+use crate::levels::Node;
+use crate::terrain::{Drawn, FieldNews, Terrain, Version, World};
 use crate::volume::{self, FieldId};
 
 /// The entities below a terrain, and the world that they show. A terrain has this component once it has loaded.
@@ -19,20 +21,29 @@ pub struct TerrainEntities {
     pub(super) voxel_size: f32,
     /// Were they built with [`SlimVertices`](super::SlimVertices)?
     pub(super) is_slim: bool,
+    /// Were they built with [`LevelsOfDetail`](super::LevelsOfDetail)?
+    pub(super) has_levels: bool,
     drawn: HashMap<Drawn, Entity>,
+    /// Nodes of level 1 and above.
+    nodes: HashMap<Node, Entity>,
     fields: HashMap<FieldId, Entity>,
+    /// Tiles that have an entity whether they are drawn or not.
+    kept: HashSet<TilePos>,
     /// Was [`TerrainReady`] triggered?
     is_ready_sent: bool,
 }
 
 impl TerrainEntities {
-    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool) -> Self {
+    pub(super) fn new(shown: Version, voxel_size: f32, is_slim: bool, has_levels: bool) -> Self {
         Self {
             shown,
             voxel_size,
             is_slim,
+            has_levels,
             drawn: HashMap::default(),
+            nodes: HashMap::default(),
             fields: HashMap::default(),
+            kept: HashSet::default(),
             is_ready_sent: false,
         }
     }
@@ -53,7 +64,7 @@ impl TerrainEntities {
     /// Despawns tiles and chunks; fields lie below these. The last of the terrain's children goes first: Bevy looks for
     /// each from the end of their list, and moves up what is behind it.
     pub(super) fn despawn(&self, commands: &mut Commands, children: Option<&Children>) {
-        let mut own: EntityHashSet = self.drawn.values().copied().collect();
+        let mut own: EntityHashSet = self.drawn.values().chain(self.nodes.values()).copied().collect();
         for child in children.into_iter().flat_map(|children| children.iter().rev()) {
             if own.remove(&child) {
                 commands.entity(child).try_despawn();
@@ -83,6 +94,88 @@ impl TerrainEntities {
         };
         self.drawn.insert(drawn, child);
         child
+    }
+
+    /// Might a body over this tile fall through, as the tile has no entity yet that could have a collider?
+    #[cfg(feature = "avian")]
+    pub(crate) fn lack(&self, tile: TilePos) -> bool {
+        self.has_levels && !self.drawn.contains_key(&Drawn::Tile(tile))
+    }
+
+    /// The entity with the mesh of a node, which is spawned if there is none. One of level 0 is its tile's.
+    pub(super) fn node(
+        &mut self,
+        commands: &mut Commands,
+        terrain: Entity,
+        world: &World,
+        node: Node,
+    ) -> Entity {
+        if node.level == 0 {
+            let drawn = Drawn::Tile(node.tile());
+            let tile = self.get(commands, drawn);
+            return tile.unwrap_or_else(|| self.spawn_shown_tile(commands, terrain, world, node.tile()));
+        }
+        let old = self.nodes.get(&node).copied().filter(|&child| commands.get_entity(child).is_ok());
+        old.unwrap_or_else(|| {
+            let place = Transform::from_translation(node_origin(world.grid(), node).as_vec3());
+            let child = spawn_below(commands, terrain, (Tile::from(node), place));
+            self.nodes.insert(node, child);
+            child
+        })
+    }
+
+    /// Spawns the entity of a tile whose own surface is not drawn.
+    fn spawn_shown_tile(
+        &mut self,
+        commands: &mut Commands,
+        terrain: Entity,
+        world: &World,
+        tile: TilePos,
+    ) -> Entity {
+        let child = self.spawn(commands, terrain, world, Drawn::Tile(tile));
+        let shown = ShownSurface { revision: world.revision(), is_empty: false };
+        commands.entity(child).try_insert(shown);
+        child
+    }
+
+    /// Despawns the entity of a node of level 1 or above, if it has one.
+    pub(super) fn despawn_node(&mut self, commands: &mut Commands, node: Node) {
+        if let Some(child) = self.nodes.remove(&node) {
+            commands.entity(child).try_despawn();
+        }
+    }
+
+    /// Despawns the entity of a tile, if it has one.
+    pub(super) fn despawn_tile(&mut self, commands: &mut Commands, tile: TilePos) {
+        if let Some(child) = self.drawn.remove(&Drawn::Tile(tile)) {
+            commands.entity(child).try_despawn();
+        }
+    }
+
+    /// Gives these tiles an entity, and takes it from others that are not drawn.
+    pub(super) fn keep_tiles(
+        &mut self,
+        commands: &mut Commands,
+        entity: Entity,
+        terrain: &Terrain,
+        wanted: &HashSet<TilePos>,
+    ) {
+        let Some(cut) = terrain.drawn_cut().map(|drawn| drawn.cut()) else { return };
+        let (kept, gone) = (&self.kept, |tile: &&TilePos| !wanted.contains(*tile));
+        let is_drawn = |tile: TilePos| cut.contains(Node::over(tile, 0));
+        let gone: Vec<TilePos> = kept.iter().filter(gone).copied().collect();
+        for tile in gone {
+            self.kept.remove(&tile);
+            if !is_drawn(tile) {
+                self.despawn_tile(commands, tile);
+            }
+        }
+        for &tile in wanted {
+            self.kept.insert(tile);
+            if !self.drawn.contains_key(&Drawn::Tile(tile)) {
+                self.spawn_shown_tile(commands, entity, terrain.world(), tile);
+            }
+        }
     }
 
     /// Spawns the entity of a field below its chunk, which must have one.

@@ -10,22 +10,36 @@ use bevy::prelude::*;
 use rayon::prelude::*;
 
 use super::entities::{TerrainEntities, apply_actions, trigger_if_alive};
-use super::meshes::VertexExtras;
-use super::processor::{BuiltSurface, SurfaceBuilder};
+use super::levels::{KnownNodes, LevelState, LevelsOfDetail, ShownLevels};
+use super::meshes::{BuiltMesh, VertexExtras};
+use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::task::{InFlight, TaskCounter};
 use super::threads::{ThreadTask, Threads};
 use super::{BurrowSettings, ChunkCreated, MaterialColors, SlimVertices, SurfaceProcessors};
 use crate::lattice::ChunkPos;
-use crate::terrain::{Drawn, Terrain, World};
+use crate::levels::Cut;
+use crate::terrain::{Drawn, DrawnCut, Terrain, World};
 
 /// Surfaces of one snapshot that are built, and passed to the renderer, until all can be shown.
 #[derive(Component)]
 pub(super) struct Loading {
     world: Arc<World>,
     is_slim: bool,
-    task: Option<ThreadTask<Vec<BuiltSurface>>>,
+    has_levels: bool,
+    task: Option<ThreadTask<BuiltWorld>>,
     waiting: Vec<BuiltSurface>,
     ready: HashMap<Drawn, Loaded>,
+    levels: Option<BuiltLevels>,
+}
+
+/// Everything that is built of a world.
+type BuiltWorld = (Vec<BuiltSurface>, Option<BuiltLevels>);
+
+/// The coarsest nodes of a world with levels of detail.
+struct BuiltLevels {
+    drawn: DrawnCut,
+    nodes: Vec<BuiltNode>,
+    known: Arc<KnownNodes>,
 }
 
 impl Loading {
@@ -133,7 +147,7 @@ pub(super) fn remove_with_terrain(
     if let Ok((entities, children)) = terrains.get(gone.entity) {
         entities.despawn(&mut commands, children);
     }
-    commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight)>();
+    commands.entity(gone.entity).try_remove::<(TerrainEntities, Loading, InFlight, LevelState)>();
 }
 
 /// A terrain that gets slim vertices need not wait for others.
@@ -163,7 +177,14 @@ pub(super) fn drop_slim_vertices(
 pub(super) fn start_loading(
     mut commands: Commands,
     mut terrains: Query<
-        (Entity, &mut Terrain, Option<&MaterialColors>, Has<SlimVertices>, Option<&TerrainEntities>),
+        (
+            Entity,
+            &mut Terrain,
+            Option<&MaterialColors>,
+            Has<SlimVertices>,
+            Has<LevelsOfDetail>,
+            Option<&TerrainEntities>,
+        ),
         Idle,
     >,
     assets: Option<Res<Assets<Mesh>>>,
@@ -171,8 +192,10 @@ pub(super) fn start_loading(
     settings: Res<BurrowSettings>,
     mut counter: ResMut<TaskCounter>,
 ) {
-    for (entity, mut terrain, colors, is_slim, entities) in &mut terrains {
-        let entities_of_kind = entities.filter(|entities| entities.is_slim == is_slim);
+    for (entity, mut terrain, colors, is_slim, has_levels, entities) in &mut terrains {
+        let is_same_kind =
+            |entities: &&TerrainEntities| (entities.is_slim, entities.has_levels) == (is_slim, has_levels);
+        let entities_of_kind = entities.filter(is_same_kind);
         if entities_of_kind.is_some_and(|entities| entities.show(terrain.world())) {
             continue;
         }
@@ -189,11 +212,15 @@ pub(super) fn start_loading(
         }
         model.watch();
         let world = model.snapshot();
-        let task = (!builder.is_idle()).then(|| {
+        let task = (!builder.is_idle() || has_levels).then(|| {
             let world = Arc::clone(&world);
-            ThreadTask::start(Threads::Background, move || build_world(&world, &builder))
+            ThreadTask::start(Threads::Background, move || match has_levels {
+                true => build_levels(&world, &builder),
+                false => (build_world(&world, &builder), None),
+            })
         });
-        let loading = Loading { world, is_slim, task, waiting: Vec::new(), ready: HashMap::default() };
+        let (waiting, ready) = (Vec::new(), HashMap::default());
+        let loading = Loading { world, is_slim, has_levels, task, waiting, ready, levels: None };
         commands.entity(entity).try_insert(loading);
     }
 }
@@ -230,7 +257,20 @@ fn build_world(world: &World, builder: &SurfaceBuilder) -> Vec<BuiltSurface> {
     let _span = info_span!("burrow_load").entered();
     let chunks = world.drawn_chunks().map(Drawn::Chunk);
     let all: Vec<Drawn> = world.grid().tiles().map(Drawn::Tile).chain(chunks).collect();
-    all.par_iter().map(|&drawn| builder.build(drawn, false, || world.draft(drawn))).collect()
+    all.par_iter().map(|&drawn| builder.build((drawn, true), false, || world.draft(drawn))).collect()
+}
+
+/// Builds the coarsest nodes of a world, and what processors make of its edited chunks.
+fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
+    let _span = info_span!("burrow_load").entered();
+    let known = Arc::new(KnownNodes::default());
+    let cut = Cut::coarsest(world.level_grid(u8::MAX));
+    known.learn(world, &cut.nodes().collect::<Vec<_>>());
+    let (drawn, updates) = world.draw_cut(cut);
+    let chunks: Vec<Drawn> = world.drawn_chunks().map(Drawn::Chunk).collect();
+    let build = |&drawn: &Drawn| builder.build((drawn, false), false, || world.draft(drawn));
+    let chunks = chunks.par_iter().map(build).collect();
+    (chunks, Some(BuiltLevels { drawn, nodes: builder.build_nodes(updates), known }))
 }
 
 /// Passes meshes to the renderer within each frame's budget, and shows all of them once none waits. Former tiles and chunks
@@ -239,13 +279,13 @@ pub(super) fn finish_loading(
     mut commands: Commands,
     settings: Res<BurrowSettings>,
     mut assets: Option<ResMut<Assets<Mesh>>>,
-    mut terrains: Query<(Entity, &Terrain, &mut Loading, Option<&TerrainEntities>, Option<&Children>)>,
+    mut terrains: Query<(Entity, &mut Terrain, &mut Loading, Option<&TerrainEntities>, Option<&Children>)>,
 ) {
     let mut budget = if assets.is_some() { settings.loads_per_frame.max(1) } else { usize::MAX };
-    for (entity, terrain, mut loading, old, children) in &mut terrains {
+    for (entity, mut terrain, mut loading, old, children) in &mut terrains {
         if let Some(task) = &mut loading.task {
             let Some(parts) = task.finish() else { continue };
-            (loading.task, loading.waiting) = (None, parts);
+            (loading.task, (loading.waiting, loading.levels)) = (None, parts);
         }
         let rest = loading.waiting.len().saturating_sub(budget);
         budget -= loading.waiting.len() - rest;
@@ -261,10 +301,30 @@ pub(super) fn finish_loading(
         if let Some(old) = old {
             old.despawn(&mut commands, children);
         }
+        let levels = loading.levels.take();
         let mut entities = show(&mut commands, (entity, terrain.voxel_size()), &mut loading);
-        // Changes that the game made meanwhile are shown next.
-        if entities.show(terrain.world()) {
-            entities.trigger_ready(&mut commands, entity);
+        let model = terrain.bypass_change_detection();
+        match levels {
+            Some(BuiltLevels { drawn, nodes, known }) => {
+                show_nodes(
+                    &mut commands,
+                    (entity, &loading.world),
+                    &mut entities,
+                    assets.as_deref_mut(),
+                    nodes,
+                );
+                let shown = ShownLevels::of(drawn.cut(), drawn.cut().nodes().count());
+                commands.entity(entity).try_insert((LevelState::new(known), shown));
+                model.draw_from_now_on(Some(Arc::new(drawn)));
+            }
+            None => {
+                commands.entity(entity).try_remove::<LevelState>();
+                model.draw_from_now_on(None);
+                // Changes that the game made meanwhile are shown next.
+                if entities.show(model.world()) {
+                    entities.trigger_ready(&mut commands, entity);
+                }
+            }
         }
         commands.entity(entity).try_insert(entities).try_remove::<Loading>();
     }
@@ -277,10 +337,13 @@ fn show(
     loading: &mut Loading,
 ) -> TerrainEntities {
     let world = Arc::clone(&loading.world);
-    let mut entities = TerrainEntities::new(world.version(), voxel_size, loading.is_slim);
+    let (version, has_levels) = (world.version(), loading.has_levels);
+    let mut entities = TerrainEntities::new(version, voxel_size, loading.is_slim, has_levels);
     let with_fields = world.fields().map(|(chunk, _)| chunk);
     let chunks: BTreeSet<ChunkPos> = with_fields.chain(world.drawn_chunks()).collect();
-    for drawn in world.grid().tiles().map(Drawn::Tile).chain(chunks.into_iter().map(Drawn::Chunk)) {
+    // With levels, tiles come as they are drawn.
+    let tiles = (!has_levels).then(|| world.grid().tiles().map(Drawn::Tile)).into_iter().flatten();
+    for drawn in tiles.chain(chunks.into_iter().map(Drawn::Chunk)) {
         let child = entities.spawn(commands, terrain, &world, drawn);
         if let Some(Loaded { mesh, built }) = loading.ready.remove(&drawn) {
             if let Some((handle, bounds)) = mesh {
@@ -298,6 +361,32 @@ fn show(
         }
     }
     entities
+}
+
+/// Shows the coarsest nodes of a world that has loaded.
+fn show_nodes(
+    commands: &mut Commands,
+    (terrain, world): (Entity, &World),
+    entities: &mut TerrainEntities,
+    mut assets: Option<&mut Assets<Mesh>>,
+    nodes: Vec<BuiltNode>,
+) {
+    let mut add = |mesh: BuiltMesh| {
+        let (mesh, bounds) = mesh?;
+        Some((Mesh3d(assets.as_mut()?.add(mesh)), bounds, NoAutoAabb))
+    };
+    for BuiltNode { node, mesh, shown, .. } in nodes {
+        if let Some(mesh) = mesh {
+            let child = entities.node(commands, terrain, world, node);
+            add(mesh).into_iter().for_each(|mesh| drop(commands.entity(child).try_insert(mesh)));
+        }
+        for BuiltSurface { drawn, mesh, shown, actions, .. } in shown {
+            let child = entities.get(commands, drawn);
+            let child = child.unwrap_or_else(|| entities.spawn(commands, terrain, world, drawn));
+            add(mesh).into_iter().for_each(|mesh| drop(commands.entity(child).try_insert(mesh)));
+            apply_actions(commands, child, shown, actions);
+        }
+    }
 }
 
 /// Do both sides of seams keep the same bits there? They do if the terrain is not rotated, its scale is a power of two, and

@@ -26,6 +26,7 @@ mod engine;
 mod entities;
 mod figures;
 mod heightmap;
+mod levels;
 mod load;
 mod meshes;
 mod messages;
@@ -48,6 +49,8 @@ pub use figures::BurrowFigures;
 pub use heightmap::{
     HeightmapError, HeightmapImage, HeightmapLoader, HeightmapPlugin, HeightmapSettings, RawHeightmap,
 };
+pub(crate) use levels::WantedTiles;
+pub use levels::{LevelsOfDetail, ShownLevels};
 pub use meshes::{ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS};
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
@@ -121,6 +124,8 @@ impl Plugin for TerrainPlugin {
             .init_resource::<BurrowEngine>()
             .init_resource::<task::TaskCounter>()
             .init_resource::<SurfaceProcessors>()
+            .init_resource::<levels::Eyes>()
+            .init_resource::<WantedTiles>()
             .add_message::<Brush>()
             .add_message::<TargetedBrush>()
             .add_message::<BrushApplied>()
@@ -160,12 +165,15 @@ impl Plugin for TerrainPlugin {
                         load::start_loading,
                         load::place_terrains,
                         load::finish_loading,
+                        levels::keep_wanted_tiles,
                     )
                         .chain()
                         .in_set(BurrowSystems::Load),
                     (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
                     commit::commit_transactions.in_set(BurrowSystems::Commit),
-                    commit::begin_transactions.in_set(BurrowSystems::Begin),
+                    (levels::find_eyes, commit::begin_transactions, levels::begin_level_changes)
+                        .chain()
+                        .in_set(BurrowSystems::Begin),
                     diagnostics::measure_frame.after(BurrowSystems::Begin),
                 ),
             );

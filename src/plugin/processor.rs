@@ -8,9 +8,10 @@ use bevy::prelude::*;
 
 use super::ShownSurface;
 use super::meshes::{BuiltMesh, MeshBuilder, VertexExtras};
-use crate::lattice::{ChunkGrid, ItemCost, parallel_map_into};
+use crate::lattice::{ChunkGrid, ItemCost, TilePos, parallel_map_into};
+use crate::levels::Node;
 use crate::surface::SurfaceMesh;
-use crate::terrain::{Drawn, SurfaceDraft, Terrain};
+use crate::terrain::{Drawn, DrawnCut, NodeUpdate, SurfaceDraft, Terrain};
 
 /// A tile or chunk whose surface is built.
 #[derive(Clone, Copy, Debug)]
@@ -125,6 +126,26 @@ pub(super) struct BuiltSurface {
     pub mesh: BuiltMesh,
     pub shown: ShownSurface,
     pub actions: Vec<CommitAction>,
+    /// Is it drawn? Otherwise a coarser node, or one mesh for all of its node, is drawn in its place.
+    pub is_drawn: bool,
+}
+
+/// What a node is drawn with from now on.
+pub(super) struct BuiltNode {
+    pub node: Node,
+    /// Its own mesh; `None` if it is drawn by its tile and chunks, or not at all.
+    pub mesh: Option<BuiltMesh>,
+    /// Tile and chunks that are drawn from now on.
+    pub shown: Vec<BuiltSurface>,
+    /// Tile and chunks that are drawn no more.
+    pub hidden: Vec<Drawn>,
+}
+
+impl BuiltNode {
+    /// Meshes that are swapped for it.
+    pub fn swaps(&self) -> usize {
+        usize::from(self.mesh.is_some()) + self.shown.len()
+    }
 }
 
 impl BuiltSurface {
@@ -133,6 +154,12 @@ impl BuiltSurface {
         let indices = self.mesh.as_ref().and_then(|(mesh, _)| mesh.indices());
         indices.map_or(0, |indices| indices.len() / 3)
     }
+}
+
+/// The lattice point that positions of a node's mesh count from.
+pub(super) fn node_origin(grid: ChunkGrid, node: Node) -> IVec3 {
+    let TilePos { x, z } = node.tile();
+    IVec3::new(x * grid.size(), 0, z * grid.size())
 }
 
 /// Builds meshes and extra data for the surfaces of one terrain, in a task.
@@ -172,16 +199,41 @@ impl SurfaceBuilder {
         self.mesh_builder.is_none() && self.processors.is_empty()
     }
 
-    /// Builds everything for these surfaces; many are built in parallel.
-    pub fn build_all(&self, drafts: Vec<(Drawn, SurfaceDraft)>) -> Vec<BuiltSurface> {
+    /// Builds everything for these surfaces; many are built in parallel. Where a cut is drawn, those that it does not show get no
+    /// meshes.
+    pub fn build_all(
+        &self,
+        drafts: Vec<(Drawn, SurfaceDraft)>,
+        drawn_cut: Option<&DrawnCut>,
+    ) -> Vec<BuiltSurface> {
         parallel_map_into(drafts, ItemCost::Surface, |(drawn, draft)| {
-            self.build(drawn, draft.is_empty(), || draft)
+            let is_drawn = drawn_cut.is_none_or(|cut| cut.shows_parts(drawn.tile()));
+            self.build((drawn, is_drawn), draft.is_empty(), || draft)
         })
     }
 
-    /// Builds everything for one surface. `draft` is called only if something is built from it; otherwise `is_empty` says
-    /// whether the surface is known to have no triangles.
-    pub fn build(&self, drawn: Drawn, is_empty: bool, draft: impl FnOnce() -> SurfaceDraft) -> BuiltSurface {
+    /// Builds what these nodes are drawn with, in parallel.
+    pub fn build_nodes(&self, updates: Vec<NodeUpdate>) -> Vec<BuiltNode> {
+        parallel_map_into(updates, ItemCost::Surface, |update| {
+            let NodeUpdate { node, mesh, shown, hidden } = update;
+            let origin = node_origin(self.grid, node);
+            let build = |mesh: Arc<SurfaceMesh>| {
+                self.mesh_builder.as_ref().and_then(|builder| builder.build_whole(origin, &mesh))
+            };
+            let shown = shown.into_iter();
+            let shown = shown.map(|(drawn, draft)| self.build((drawn, true), draft.is_empty(), || draft));
+            BuiltNode { node, mesh: mesh.map(build), shown: shown.collect(), hidden }
+        })
+    }
+
+    /// Builds everything for one surface; no mesh if it is not drawn. `draft` is called only if something is built from it;
+    /// otherwise `is_empty` says whether the surface is known to have no triangles.
+    pub fn build(
+        &self,
+        (drawn, is_drawn): (Drawn, bool),
+        is_empty: bool,
+        draft: impl FnOnce() -> SurfaceDraft,
+    ) -> BuiltSurface {
         let part = &Part::new(self.terrain, self.voxel_size, self.grid, self.revision, drawn);
         let wants =
             |processor: &&Arc<dyn SurfaceProcessor>| guarded(|| processor.wants(part)).unwrap_or(false);
@@ -191,13 +243,15 @@ impl SurfaceBuilder {
             mesh: None,
             shown: ShownSurface { revision: self.revision, is_empty },
             actions: Vec::new(),
+            is_drawn,
         };
-        if self.mesh_builder.is_none() && processors.is_empty() {
+        let mesh_builder = self.mesh_builder.as_ref().filter(|_| is_drawn);
+        if mesh_builder.is_none() && processors.is_empty() {
             return built;
         }
         let draft = draft();
         built.shown.is_empty = draft.is_empty();
-        built.mesh = self.mesh_builder.as_ref().and_then(|builder| builder.build(part.origin, &draft));
+        built.mesh = mesh_builder.and_then(|builder| builder.build(part.origin, &draft));
         if !processors.is_empty() {
             let surface = &draft.surface();
             let build = |processor: &Arc<dyn SurfaceProcessor>| guarded(|| processor.build(part, surface));

@@ -1,12 +1,14 @@
 //! The task that a terrain waits for: it runs a transaction, and builds the surfaces that the next commit shows.
 
+use std::sync::Arc;
+
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use super::LoosePieceFound;
 use super::collect::pieces;
 use super::figures::TaskTimes;
-use super::processor::{BuiltSurface, SurfaceBuilder};
+use super::processor::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use super::threads::{ThreadTask, Threads};
 use crate::backend::Engine;
 use crate::terrain::{Commit, Drawn, SurfaceDraft, Terrain, Transaction, Unseen};
@@ -30,8 +32,17 @@ pub(super) struct TaskPanicked;
 pub(super) struct TaskOutput {
     pub change: Change,
     pub surfaces: Vec<BuiltSurface>,
+    /// Nodes that are drawn otherwise, where a cut is drawn.
+    pub nodes: Vec<BuiltNode>,
     pub pieces: Vec<LoosePieceFound>,
     pub times: TaskTimes,
+}
+
+impl TaskOutput {
+    /// Meshes that are swapped for it.
+    pub fn swaps(&self) -> usize {
+        self.surfaces.len() + self.nodes.iter().map(BuiltNode::swaps).sum::<usize>()
+    }
 }
 
 /// What changed the ground.
@@ -62,29 +73,36 @@ impl InFlight {
             let edit = start.elapsed();
             // Taken out of the commit, so that they are dropped here and not on the main thread.
             let updates = std::mem::take(&mut commit.meshes);
+            let drawn_cut = commit.drawn_cut().cloned();
             let tiles = updates.tiles.into_iter();
             let tiles = tiles.map(|(tile, update)| (Drawn::Tile(tile), SurfaceDraft::Tile(update)));
             let chunks = updates.chunks.into_iter();
             let chunks = chunks.map(|(at, chunk)| (Drawn::Chunk(at), SurfaceDraft::Chunk(chunk)));
             let _span = info_span!("burrow_mesh").entered();
-            let surfaces = builder.build_all(tiles.chain(chunks).collect());
+            let surfaces = builder.build_all(tiles.chain(chunks).collect(), drawn_cut.as_deref());
+            let nodes = builder.build_nodes(updates.nodes);
             let mut pieces: Vec<LoosePieceFound> = pieces(terrain, commit.receipts()).collect();
             if let Some(mesh_builder) = &builder.mesh_builder {
                 pieces.iter_mut().for_each(|piece| piece.build_mesh(mesh_builder));
             }
             let total = start.elapsed();
             let times = TaskTimes { edit, mesh: total - edit, total };
-            TaskOutput { change: Change::Transaction(Box::new(commit)), surfaces, pieces, times }
+            TaskOutput { change: Change::Transaction(Box::new(commit)), surfaces, nodes, pieces, times }
         })
     }
 
     /// Builds the surfaces that the game changed itself.
     pub fn unseen(number: u64, terrain: &Terrain, unseen: Unseen, builder: SurfaceBuilder) -> Self {
         let drafts = unseen.drawn().map(|drawn| (drawn, terrain.world().draft(drawn))).collect();
+        // Nodes are made from all of the world.
+        let cut = terrain.drawn_cut().map(|cut| (terrain.snapshot(), Arc::clone(cut)));
         Self::start(number, None, move || {
-            let surfaces = info_span!("burrow_mesh").in_scope(|| builder.build_all(drafts));
+            let _span = info_span!("burrow_mesh").entered();
+            let surfaces = builder.build_all(drafts, cut.as_ref().map(|(_, cut)| cut.as_ref()));
+            let nodes = cut.map(|(world, cut)| world.redraw_tiles(&cut, unseen.drawn().map(Drawn::tile)));
+            let nodes = builder.build_nodes(nodes.unwrap_or_default());
             let (change, times) = (Change::Unseen(unseen), TaskTimes::default());
-            TaskOutput { change, surfaces, pieces: Vec::new(), times }
+            TaskOutput { change, surfaces, nodes, pieces: Vec::new(), times }
         })
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::field_log::FieldNews;
 use super::history::{HistoryReceipt, UndoDelta};
+use super::levels::DrawnCut;
 use super::receipt::Receipt;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
@@ -29,6 +30,10 @@ pub struct Commit {
     pub(super) news: Vec<(ChunkPos, FieldNews)>,
     pub(super) surfaces: Vec<(ChunkPos, Arc<ChunkSurface>)>,
     pub(super) rings: Vec<(TilePos, Arc<Rings>)>,
+    /// What is drawn then, if that changes.
+    pub(super) drawn_cut: Option<Arc<DrawnCut>>,
+    /// Does it change only what is drawn?
+    pub(super) is_cut: bool,
     /// The world that this changes, if it is held elsewhere too.
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
@@ -66,6 +71,16 @@ impl Commit {
     /// What happens to fields when this is committed, by chunk.
     pub fn field_news(&self) -> &[(ChunkPos, FieldNews)] {
         &self.news
+    }
+
+    /// What is drawn once this is committed, if a cut is drawn.
+    pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
+        self.drawn_cut.as_ref()
+    }
+
+    /// Does it change only what is drawn?
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
     }
 
     /// The receipts of its edits.

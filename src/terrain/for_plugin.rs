@@ -1,7 +1,10 @@
 //! The plugin's interface to a terrain, beside the public one.
 
+use std::sync::Arc;
+
 use super::commit::Commit;
 use super::history::{DeferredDrop, HistoryStep};
+use super::levels::DrawnCut;
 use super::model::{StaleCommit, Terrain};
 use super::queue::{Request, Submission};
 use super::receipt::Receipt;
@@ -30,7 +33,7 @@ impl Terrain {
     fn submissions_in_flight(&self) -> impl Iterator<Item = &Submission> {
         self.in_flight.iter().flat_map(|waiting| match &waiting.work {
             Work::Edits(submissions) => &submissions[..],
-            Work::Step(..) => &[],
+            Work::Step(..) | Work::Cut(_) => &[],
         })
     }
 
@@ -38,7 +41,7 @@ impl Terrain {
     pub(crate) fn unanswered_steps(&self) -> impl Iterator<Item = HistoryStep> {
         let in_flight = self.in_flight.iter().filter_map(|waiting| match waiting.work {
             Work::Step(step, _) => Some(step),
-            Work::Edits(_) => None,
+            Work::Edits(_) | Work::Cut(_) => None,
         });
         let queued = self.queue.iter().filter_map(|request| match request {
             Request::Step(step) => Some(*step),
@@ -64,7 +67,7 @@ impl Terrain {
     pub(crate) fn rejected(&self, ticket: u64) -> Option<Commit> {
         let waiting = self.in_flight.as_ref().filter(|waiting| waiting.ticket == ticket)?;
         let work = waiting.work.clone();
-        Some(Transaction { ticket, world: self.snapshot(), work, engine: None }.rejected())
+        Some(Transaction { ticket, world: self.snapshot(), work, engine: None, drawn_cut: None }.rejected())
     }
 
     /// Is the transaction of this ticket under way?
@@ -75,6 +78,11 @@ impl Terrain {
     /// Forgets what is not shown yet; the plugin has to show all of the world again.
     pub(crate) fn forget_unseen(&mut self) {
         self.unseen = None;
+    }
+
+    /// Draws a cut from now on, or all of the world in full; the plugin shows it.
+    pub(crate) fn draw_from_now_on(&mut self, drawn: Option<Arc<DrawnCut>>) {
+        self.drawn_cut = drawn;
     }
 
     /// Commits a transaction of the plugin's, which shows it by itself. The caller may drop what is no longer needed elsewhere.

@@ -24,6 +24,8 @@ mod for_plugin;
 mod groups;
 mod history;
 mod inspect;
+mod level_meshes;
+mod levels;
 mod loose;
 mod model;
 #[cfg(test)]
@@ -51,6 +53,7 @@ mod world;
 pub use commit::Commit;
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use levels::{ChooseCut, DrawnCut, NodeUpdate};
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use model::{StaleCommit, Terrain};
 pub use query::{RayHit, Span};

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::commit::Commit;
 use super::history::{DeferredDrop, HistoryReceipt, UndoStack};
+use super::levels::DrawnCut;
 use super::loose::LooseSettings;
 use super::queue::{Queue, Request, Taken};
 use super::receipt::Receipt;
@@ -61,6 +62,7 @@ pub struct Terrain {
     pub(super) loose: Option<LooseSettings>,
     pub(super) undo_stack: UndoStack,
     pub(super) step_receipts: VecDeque<HistoryReceipt>,
+    pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// What the game committed since the plugin last showed the world; `None` while the plugin does not show it.
     #[cfg(feature = "plugin")]
     pub(super) unseen: Option<Unseen>,
@@ -107,6 +109,7 @@ impl Terrain {
             loose: None,
             undo_stack: UndoStack::new(UNDO_BUDGET),
             step_receipts: VecDeque::new(),
+            drawn_cut: None,
             #[cfg(feature = "plugin")]
             unseen: None,
         })
@@ -204,9 +207,19 @@ impl Terrain {
                 },
             }
         };
+        Some(self.start(work, estimate, is_plugins))
+    }
+
+    /// Makes a transaction of work that is not queued, unless one is under way.
+    pub(super) fn begin_work(&mut self, work: Work, is_plugins: bool) -> Option<Transaction> {
+        (!self.is_busy()).then(|| self.start(work, 0, is_plugins))
+    }
+
+    fn start(&mut self, work: Work, estimate: u64, is_plugins: bool) -> Transaction {
         let ticket = unique();
         self.in_flight = Some(InFlight { ticket, work: work.clone(), estimate, is_plugins });
-        Some(Transaction { ticket, world: self.snapshot(), work, engine: self.engine.clone() })
+        let (engine, drawn_cut) = (self.engine.clone(), self.drawn_cut.clone());
+        Transaction { ticket, world: self.snapshot(), work, engine, drawn_cut }
     }
 
     /// Makes a transaction's result the world, all at once, and returns the receipts in order of submission.
@@ -230,6 +243,13 @@ impl Terrain {
         mut commit: Commit,
     ) -> Result<(Vec<Receipt>, DeferredDrop), StaleCommit> {
         let done = self.in_flight.take_if(|waiting| waiting.ticket == commit.ticket).ok_or(StaleCommit)?;
+        if let Some(drawn) = commit.drawn_cut.take() {
+            self.drawn_cut = Some(drawn);
+        }
+        // The world stays as it is.
+        if let Work::Cut(_) = done.work {
+            return Ok(Default::default());
+        }
         let mut copy = commit.copy.take();
         if Arc::get_mut(&mut self.world).is_none()
             && let Some(copy) = copy.take_if(|copy| copy.version() == self.world.version())
@@ -245,6 +265,7 @@ impl Terrain {
             match &done.work {
                 Work::Edits(_) => self.undo_stack.record(replaced, &mut dropped),
                 Work::Step(step, used) => self.undo_stack.record_step(*step, used, replaced, &mut dropped),
+                Work::Cut(_) => {}
             }
         }
         Ok((installed.receipts, dropped))
@@ -266,6 +287,8 @@ impl Terrain {
         match lost.work {
             Work::Edits(submissions) => self.queue.put_back(submissions.iter().cloned().map(Request::Edit)),
             Work::Step(step, _) => self.queue.put_back(std::iter::once(Request::Step(step))),
+            // It was not queued either.
+            Work::Cut(_) => {}
         }
     }
 
@@ -275,6 +298,7 @@ impl Terrain {
         let in_flight = self.in_flight.iter().all(|waiting| match &waiting.work {
             Work::Edits(submissions) => submissions.iter().all(|submission| submission.misses(bounds)),
             Work::Step(_, target) => target.bounds.is_none_or(|own| own.intersection(bounds).is_none()),
+            Work::Cut(_) => true,
         });
         let mut queued = self.queue.iter();
         in_flight

@@ -5,15 +5,16 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::by_brick::ByBrick;
+use super::by_brick::{ByBrick, is_same_stack};
 use super::dirty::dirty_blocks;
+use super::levels::{DrawnCut, NodeUpdate, redraw_changed};
 use super::stages::Stages;
 use super::surface::{ChunkSurface, Fresh, Key};
 use super::surface_draft::TileUpdate;
 use super::tiles::TileWork;
 use super::world::World;
 use crate::backend::Compute;
-use crate::lattice::{ChunkPos, ItemCost, TilePos, order_of_places, side_by_side};
+use crate::lattice::{ChunkPos, Column, ItemCost, LatticeBox, TilePos, order_of_places, side_by_side};
 use crate::surface::Mask;
 use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
@@ -26,6 +27,11 @@ pub struct MeshUpdates {
     pub tiles: Vec<(TilePos, TileUpdate)>,
     /// Chunks whose surface changed.
     pub chunks: Vec<(ChunkPos, Arc<ChunkSurface>)>,
+    /// Nodes that are drawn otherwise than before, where a [cut](super::DrawnCut) is drawn. Tiles and chunks that change are
+    /// listed above, whether they are drawn or not.
+    pub nodes: Vec<NodeUpdate>,
+    /// What is drawn then, if that changes.
+    pub(super) drawn_cut: Option<Arc<DrawnCut>>,
 }
 
 /// Every mesh that these cells change, and `newer` words of the mask.
@@ -35,6 +41,7 @@ pub(super) fn updates(
     backend: &dyn Compute,
     dirty: &ByBrick,
     newer: &Mask,
+    drawn: Option<&DrawnCut>,
     stages: &mut Stages,
 ) -> MeshUpdates {
     let Stages { meshing, assembly, ring, .. } = stages;
@@ -56,7 +63,23 @@ pub(super) fn updates(
     };
     let (tiles, took) = tiles.finish();
     *ring += took;
-    MeshUpdates { tiles, chunks }
+    let mut meshes = MeshUpdates { tiles, chunks, ..MeshUpdates::default() };
+    if let Some(drawn) = drawn {
+        let (after, nodes) =
+            Stages::time(meshing, || redraw_changed(world, view, drawn, &meshes, &areas(dirty)));
+        (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
+    }
+    meshes
+}
+
+/// The columns of dirty cells: the lowest and the highest of each stack of bricks.
+fn areas(dirty: &ByBrick) -> Vec<(Column, Column)> {
+    dirty.collect(|stacks, found| {
+        for stack in stacks.chunk_by(is_same_stack) {
+            let cells = stack.iter().map(|own| own.cells).reduce(LatticeBox::union);
+            found.extend(cells.map(|cells| (Column::of(cells.min), Column::of(cells.max))));
+        }
+    })
 }
 
 /// Has blocks meshed and puts their parts among those of their chunks that stay; leaves out chunks where nothing changed.

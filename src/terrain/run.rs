@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use super::commit::Commit;
 use super::history::{HistoryReceipt, HistoryRejection};
+use super::levels::{self, ChooseCut};
 use super::queue::Submission;
 use super::receipt::{Receipt, Rejection};
 use super::redraw::MeshUpdates;
@@ -60,11 +61,13 @@ impl Transaction {
         let run = || match &self.work {
             Work::Edits(submissions) => groups::edit(self, submissions, backend),
             Work::Step(step, target) => restore::step(self, *step, target, backend),
+            Work::Cut(choose) => self.cut(choose.as_ref()),
         };
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
         let commit = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // Terrain and transaction hold the world. If others do too, the commit changes a copy, which is made here.
-        let (is_shared, mut stages) = (Arc::strong_count(&self.world) > 2, commit.stages);
+        let is_shared = Arc::strong_count(&self.world) > 2 && !matches!(self.work, Work::Cut(_));
+        let mut stages = commit.stages;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
         let copy = Stages::time(&mut stages.whole, copy);
         Commit { copy, stages, ..commit }
@@ -82,7 +85,18 @@ impl Transaction {
                     .is_shared(usize::try_from(bricks.fold(0, u64::saturating_add)).unwrap_or(usize::MAX))
             }
             Work::Step(_, target) => ItemCost::Lookup.is_shared(target.change.bricks.len()),
+            Work::Cut(_) => true,
         }
+    }
+
+    /// Computes the commit that leads to another cut.
+    fn cut(&self, choose: &ChooseCut) -> Commit {
+        let mut meshes = MeshUpdates::default();
+        if let Some(drawn) = &self.drawn_cut {
+            let (after, nodes) = levels::change_cut(&self.world, drawn, choose);
+            (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
+        }
+        self.commit(Vec::new(), self.world.sample_hash, meshes)
     }
 
     /// Computes the commit of a transaction that panicked. Runs it once more, because the panic may not have come from an edit,
@@ -141,6 +155,7 @@ impl Transaction {
                 let outcome = Err(HistoryRejection::Panicked);
                 Commit { step: Some(HistoryReceipt { step: *step, outcome }), ..commit }
             }
+            Work::Cut(_) => commit,
         }
     }
 }

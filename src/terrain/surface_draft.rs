@@ -1,12 +1,9 @@
 //! The input for the surface of one tile or chunk, without the rest of the world.
 
-#[cfg(any(feature = "plugin", test))]
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-#[cfg(any(feature = "plugin", test))]
 use super::surface::ChunkSurface;
-#[cfg(any(feature = "plugin", test))]
 use super::world::Drawn;
 use super::world::World;
 use crate::ground::Ground;
@@ -61,7 +58,7 @@ impl TileUpdate {
 
 /// All that the surface of one tile or chunk is made from, to make it on another thread. Unlike a snapshot it does not hold
 /// the world, so the next commit has nothing to copy.
-#[cfg(any(feature = "plugin", test))]
+#[derive(Clone)]
 pub(crate) enum SurfaceDraft {
     Nothing,
     /// A tile; its columns can be made in other forms from the ground.
@@ -69,7 +66,6 @@ pub(crate) enum SurfaceDraft {
     Chunk(Arc<ChunkSurface>),
 }
 
-#[cfg(any(feature = "plugin", test))]
 impl World {
     /// What the surface of a tile or chunk is made from, as it is now.
     pub(crate) fn draft(&self, drawn: Drawn) -> SurfaceDraft {
@@ -86,9 +82,9 @@ impl World {
     }
 }
 
-#[cfg(any(feature = "plugin", test))]
 impl SurfaceDraft {
     /// Is nothing drawn?
+    #[cfg(any(feature = "plugin", test))]
     pub fn is_empty(&self) -> bool {
         match self {
             Self::Nothing => true,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::commit::Commit;
 use super::history::{HistoryStep, UndoDelta};
+use super::levels::{ChooseCut, DrawnCut};
 use super::queue::Submission;
 use super::redraw::MeshUpdates;
 use super::stages::Stages;
@@ -17,6 +18,8 @@ pub(super) enum Work {
     Edits(Arc<[Submission]>),
     /// A step, and what it puts in place.
     Step(HistoryStep, Arc<UndoDelta>),
+    /// Another cut is drawn.
+    Cut(Arc<ChooseCut>),
 }
 
 /// Edits on their way, or a step through history, with the snapshot that they apply to. A clone gives the same commit; a
@@ -28,6 +31,8 @@ pub struct Transaction {
     pub(super) work: Work,
     /// Without one, the processor.
     pub(super) engine: Option<Engine>,
+    /// What is drawn; `None` where all of the world is drawn in full.
+    pub(super) drawn_cut: Option<Arc<DrawnCut>>,
 }
 
 impl fmt::Debug for Transaction {
@@ -46,11 +51,11 @@ impl Transaction {
         self.ticket
     }
 
-    /// How many edits it holds; a step through history holds none.
+    /// How many edits it holds; steps through history and changes of the cut hold none.
     pub fn len(&self) -> usize {
         match &self.work {
             Work::Edits(submissions) => submissions.len(),
-            Work::Step(..) => 0,
+            Work::Step(..) | Work::Cut(_) => 0,
         }
     }
 
@@ -71,6 +76,8 @@ impl Transaction {
             step: None,
             news: Vec::new(),
             copy: None,
+            drawn_cut: meshes.drawn_cut.clone(),
+            is_cut: matches!(self.work, Work::Cut(_)),
             surfaces: meshes.chunks.clone(),
             rings: meshes.tiles.iter().map(|(tile, update)| (*tile, update.kept_rings())).collect(),
             meshes,

@@ -29,6 +29,16 @@ pub enum Drawn {
     Chunk(ChunkPos),
 }
 
+impl Drawn {
+    /// The tile, or that over which the chunk lies.
+    pub fn tile(self) -> TilePos {
+        match self {
+            Self::Tile(tile) => tile,
+            Self::Chunk(chunk) => chunk.tile(),
+        }
+    }
+}
+
 /// Bytes that a world takes, Bevy's meshes not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Memory {

@@ -9,6 +9,7 @@ mod entities;
 mod heightmaps;
 mod history;
 mod holes;
+mod levels;
 mod loading;
 mod loose;
 #[cfg(feature = "render")]

@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use bevy::mesh::VertexAttributeValues;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
+use bevy_burrow::surface::SurfaceMesh;
 
 use crate::stage::Stage;
 
 /// How well the triangles of a terrain close.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Shown {
     /// Triangles, including those that rounding makes degenerate.
     pub triangles: usize,
@@ -109,7 +110,11 @@ impl Stage {
         let shown = self.shown(terrain);
         assert!(shown.is_closed(), "{when}: {shown:?}");
         let world = self.terrain(terrain).world();
-        let triangles: usize = world.drawn().map(|(_, mesh)| mesh.indices.len() / 3).sum();
+        let triangles = |mesh: SurfaceMesh| mesh.indices.len() / 3;
+        let triangles: usize = match self.terrain(terrain).drawn_cut() {
+            Some(drawn) => world.drawn_in(drawn.cut()).map(|(_, mesh)| triangles(mesh)).sum(),
+            None => world.drawn().map(|(_, mesh)| triangles(mesh)).sum(),
+        };
         assert_eq!(shown.triangles, triangles, "{when}: the frame does not show the committed world");
     }
 }

@@ -1,0 +1,309 @@
+//! What is drawn of a world with levels of detail, and how a commit changes it.
+//!
+//! A node of a coarser level has a mesh of its own. One of level 0 is drawn by its tile and chunks, as without levels, or
+//! where the seam towards a coarser node needs it, by one mesh that holds all of them.
+
+use std::borrow::Cow;
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::IVec3;
+use rustc_hash::FxHashSet;
+
+use super::model::Terrain;
+use super::redraw::MeshUpdates;
+use super::surface_draft::{SurfaceDraft, TileUpdate};
+use super::transaction::{Transaction, Work};
+use super::world::{Drawn, World};
+use crate::lattice::{ChunkPos, Column, ItemCost, ONE, TilePos, parallel_map};
+use crate::levels::{Cut, LevelGrid, Node};
+use crate::surface::SurfaceMesh;
+use crate::surface::level::LevelView;
+use crate::surface::vertex::WorldView;
+
+/// What is drawn of a world: the nodes of a cut.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DrawnCut {
+    cut: Cut,
+    /// Nodes of level 0 that are drawn as one mesh.
+    joined: FxHashSet<TilePos>,
+}
+
+impl DrawnCut {
+    /// Its nodes.
+    pub fn cut(&self) -> &Cut {
+        &self.cut
+    }
+
+    /// Are a tile and its chunks drawn as they are, each with a mesh of its own?
+    pub fn shows_parts(&self, tile: TilePos) -> bool {
+        self.cut.contains(Node::over(tile, 0)) && !self.joined.contains(&tile)
+    }
+}
+
+/// What a node is drawn with after a commit.
+#[derive(Clone)]
+pub struct NodeUpdate {
+    /// The node.
+    pub node: Node,
+    /// Its own mesh, relative to its lowest column at y = 0; `None` if it is drawn by its tile and chunks, or not at all.
+    pub mesh: Option<Arc<SurfaceMesh>>,
+    /// Tile and chunks that are drawn from now on.
+    pub(crate) shown: Vec<(Drawn, SurfaceDraft)>,
+    /// Tile and chunks that may have been drawn, and are no more.
+    pub hidden: Vec<Drawn>,
+}
+
+impl NodeUpdate {
+    /// The tile and chunks that are drawn from now on, with their surfaces.
+    pub fn shown(&self) -> impl Iterator<Item = (Drawn, Cow<'_, SurfaceMesh>)> {
+        self.shown.iter().map(|(drawn, draft)| (*drawn, draft.surface()))
+    }
+}
+
+impl fmt::Debug for NodeUpdate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("NodeUpdate")
+            .field("node", &self.node)
+            .field("has_mesh", &self.mesh.is_some())
+            .field("shown", &self.shown.len())
+            .field("hidden", &self.hidden)
+            .finish()
+    }
+}
+
+/// Says which cut comes next, given the world and the cut that is drawn; called in the transaction.
+pub type ChooseCut = dyn Fn(&World, &Cut) -> Cut + Send + Sync;
+
+impl Terrain {
+    /// What is drawn; `None` if all of the world is drawn in full.
+    pub fn drawn_cut(&self) -> Option<&Arc<DrawnCut>> {
+        self.drawn_cut.as_ref()
+    }
+
+    /// Draws the nodes of a cut from now on, or with `None` all of the world in full. Everything has to be drawn anew:
+    /// [`World::draw_cut`] makes the meshes. A transaction under way is given up, and its work queued again.
+    pub fn set_drawn_cut(&mut self, drawn: Option<Arc<DrawnCut>>) {
+        self.abandon();
+        self.drawn_cut = drawn;
+    }
+
+    /// Makes a transaction without edits that leads to another cut; its commit's [`nodes`](MeshUpdates::nodes) are what has to
+    /// be drawn. `None` while another transaction is under way, and where all of the world is drawn in full.
+    #[must_use = "the terrain waits for the commit of its transaction"]
+    pub fn begin_cut(&mut self, choose: Arc<ChooseCut>) -> Option<Transaction> {
+        self.begin_cut_for(choose, false)
+    }
+
+    pub(crate) fn begin_cut_for(&mut self, choose: Arc<ChooseCut>, is_plugins: bool) -> Option<Transaction> {
+        self.drawn_cut.as_ref()?;
+        self.begin_work(Work::Cut(choose), is_plugins)
+    }
+}
+
+impl World {
+    /// A cut as it is drawn, and all meshes for it.
+    pub fn draw_cut(&self, cut: Cut) -> (DrawnCut, Vec<NodeUpdate>) {
+        let mut nodes: Vec<Node> = cut.nodes().collect();
+        nodes.sort_unstable();
+        let before = DrawnCut { cut: Cut::coarsest(cut.grid()), joined: FxHashSet::default() };
+        let state = State::committed(self);
+        let updates = state.updates(&cut, &nodes, |_| false);
+        (before.after(cut, &updates), updates)
+    }
+
+    /// All nodes with edits, of all levels.
+    pub fn edited_nodes(&self, grid: LevelGrid) -> FxHashSet<Node> {
+        let mut nodes = FxHashSet::default();
+        for &(x, z) in self.stacks.keys() {
+            // Samples of a brick may belong to two tiles, along x and z each.
+            for (x, z) in [(0, 0), (7, 0), (0, 7), (7, 7)].map(|(dx, dz)| (x * 8 + dx, z * 8 + dz)) {
+                let tile = self.grid.chunk_of(IVec3::new(x, 0, z)).tile();
+                for level in 0..=grid.top() {
+                    if !nodes.insert(Node::over(tile, level)) {
+                        break;
+                    }
+                }
+            }
+        }
+        nodes
+    }
+
+    /// The nodes that show some of these tiles, or border on them, drawn anew.
+    #[cfg(feature = "plugin")]
+    pub(crate) fn redraw_tiles(
+        &self,
+        drawn: &DrawnCut,
+        tiles: impl Iterator<Item = TilePos>,
+    ) -> Vec<NodeUpdate> {
+        let size = self.grid.size();
+        let areas = tiles.map(|tile| (Column::new(tile.x * size, tile.z * size), size));
+        let areas = areas.map(|(low, size)| (low, low.offset(size, size)));
+        // What the display shows of them is not known.
+        redraw(&State::committed(self), drawn, areas, |_| false).1
+    }
+}
+
+/// Nodes that are drawn anew, and what is drawn with them.
+pub(crate) type NodeChanges = (Arc<DrawnCut>, Vec<NodeUpdate>);
+
+/// What leads from one cut to another: the nodes that are gone, those that are new, and those that touch them.
+pub(super) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) -> NodeChanges {
+    let cut = choose(world, &drawn.cut);
+    let state = State::committed(world);
+    let step = drawn.cut.changes_to(&cut);
+    let mut nodes = step.new;
+    nodes.extend(step.touched);
+    // Those that touch it may be drawn by their parts before and after.
+    let shows = |tile| drawn.shows_parts(tile);
+    let mut updates = state.updates(&cut, &nodes, shows);
+    let gone = step.gone.into_iter().map(|node| NodeUpdate {
+        node,
+        mesh: None,
+        shown: Vec::new(),
+        hidden: if node.level == 0 { state.parts_over(node.tile()) } else { Vec::new() },
+    });
+    let gone: Vec<NodeUpdate> = gone.collect();
+    updates.splice(0..0, gone);
+    (Arc::new(drawn.after(cut, &updates)), updates)
+}
+
+/// The nodes that show a change of these bricks' cells, drawn as they are in the view of a running transaction.
+pub(super) fn redraw_changed(
+    world: &World,
+    view: &WorldView,
+    drawn: &DrawnCut,
+    meshes: &MeshUpdates,
+    changed: &[(Column, Column)],
+) -> NodeChanges {
+    let state = State { world, view: *view, meshes: Some(meshes) };
+    redraw(&state, drawn, changed.iter().copied(), |tile| drawn.shows_parts(tile))
+}
+
+fn redraw(
+    state: &State,
+    drawn: &DrawnCut,
+    areas: impl Iterator<Item = (Column, Column)>,
+    shows_parts: impl Fn(TilePos) -> bool + Sync,
+) -> NodeChanges {
+    let mut nodes: Vec<Node> =
+        areas.flat_map(|(low, high)| state.world.nodes_near(&drawn.cut, low, high)).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let updates = state.updates(&drawn.cut, &nodes, shows_parts);
+    (Arc::new(drawn.after(drawn.cut.clone(), &updates)), updates)
+}
+
+impl DrawnCut {
+    /// What is drawn once these updates are, of a cut.
+    fn after(&self, cut: Cut, updates: &[NodeUpdate]) -> Self {
+        let mut joined = self.joined.clone();
+        for update in updates.iter().filter(|update| update.node.level == 0) {
+            if update.mesh.is_some() {
+                joined.insert(update.node.tile());
+            } else {
+                joined.remove(&update.node.tile());
+            }
+        }
+        Self { cut, joined }
+    }
+}
+
+/// A world as it is drawn: as committed, or with what a running transaction changes.
+struct State<'a> {
+    world: &'a World,
+    view: WorldView<'a>,
+    meshes: Option<&'a MeshUpdates>,
+}
+
+impl<'a> State<'a> {
+    fn committed(world: &'a World) -> Self {
+        Self { world, view: world.view(), meshes: None }
+    }
+
+    /// What these nodes of a cut are drawn with. Nodes of level 0 that were and are drawn by their parts are left out, as parts
+    /// that change have updates of their own.
+    fn updates(
+        &self,
+        cut: &Cut,
+        nodes: &[Node],
+        shows_parts: impl Fn(TilePos) -> bool + Sync,
+    ) -> Vec<NodeUpdate> {
+        let view = self.level_view(cut);
+        let updates = parallel_map(nodes, ItemCost::Surface, |&node| {
+            let is_plain = node.level == 0 && view.is_plain(node);
+            let tile = node.tile();
+            if is_plain && shows_parts(tile) {
+                return None;
+            }
+            let parts = if node.level == 0 { self.parts_over(tile) } else { Vec::new() };
+            if !is_plain {
+                let mesh = Some(Arc::new(view.mesh(node)));
+                return Some(NodeUpdate { node, mesh, shown: Vec::new(), hidden: parts });
+            }
+            let shown = parts.into_iter().map(|drawn| (drawn, self.draft(drawn))).collect();
+            Some(NodeUpdate { node, mesh: None, shown, hidden: Vec::new() })
+        });
+        updates.into_iter().flatten().collect()
+    }
+
+    fn level_view<'b>(&'b self, cut: &'b Cut) -> LevelView<'b> {
+        self.world.level_view(self.view, cut)
+    }
+
+    /// The tile and all chunks over it that draw something.
+    fn parts_over(&self, tile: TilePos) -> Vec<Drawn> {
+        let size = self.world.grid.size();
+        let mut chunks: Vec<ChunkPos> = Vec::new();
+        let rows = self.world.rows_over(tile).unwrap_or(0..0);
+        if !rows.is_empty() {
+            let ys = rows.start.div_euclid(size)..=(rows.end - 1).div_euclid(size);
+            let places = ys.map(|y| ChunkPos { x: tile.x, y, z: tile.z });
+            chunks.extend(places.filter(|chunk| self.world.surfaces.contains_key(chunk)));
+        }
+        let new = self.meshes.into_iter().flat_map(|meshes| &meshes.chunks);
+        chunks.extend(new.map(|(chunk, _)| *chunk).filter(|chunk| chunk.tile() == tile));
+        chunks.sort_unstable();
+        chunks.dedup();
+        std::iter::once(Drawn::Tile(tile)).chain(chunks.into_iter().map(Drawn::Chunk)).collect()
+    }
+
+    /// What a tile or chunk is made from.
+    fn draft(&self, drawn: Drawn) -> SurfaceDraft {
+        let Some(meshes) = self.meshes else { return self.world.draft(drawn) };
+        match drawn {
+            Drawn::Tile(tile) => {
+                let new = meshes.tiles.iter().find(|(other, _)| *other == tile);
+                let old = || {
+                    TileUpdate::new(self.world, &self.view, tile, |borders| {
+                        self.world.tile_rings(tile, borders)
+                    })
+                };
+                SurfaceDraft::Tile(new.map_or_else(old, |(_, update)| update.clone()))
+            }
+            Drawn::Chunk(chunk) => match meshes.chunks.iter().find(|(other, _)| *other == chunk) {
+                Some((_, surface)) => SurfaceDraft::Chunk(Arc::clone(surface)),
+                None => self.world.draft(drawn),
+            },
+        }
+    }
+}
+
+impl World {
+    /// Lattice y of all cubes that chunks over a tile may draw; `None` where nothing near was edited.
+    fn rows_over(&self, tile: TilePos) -> Option<Range<i32>> {
+        let (low, high) = self.grid.tile_cells(tile);
+        // Edits one brick further may put cells of the tile into the mask.
+        let places = (low.z - 1 >> 3..=high.z + 1 >> 3)
+            .flat_map(|z| (low.x - 1 >> 3..=high.x + 1 >> 3).map(move |x| (x, z)));
+        let rows = |stack: &Vec<i32>| Some((*stack.first()? * 8 - 2, *stack.last()? * 8 + 10));
+        let wider = |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1));
+        let edited = places.filter_map(|place| self.stacks.get(&place).and_then(rows)).reduce(wider)?;
+        // Cells of the mask draw their sheet, however high it is.
+        let columns = (low.z..=high.z).flat_map(|z| (low.x..=high.x).map(move |x| Column::new(x, z)));
+        let heights = columns.map(|column| self.ground.height(column).div_euclid(ONE));
+        let (first, last) = heights.fold(edited, |rows, y| wider(rows, (y - 2, y + 2)));
+        Some(first..last + 1)
+    }
+}
