@@ -24,6 +24,7 @@ mod for_plugin;
 mod groups;
 mod history;
 mod inspect;
+mod level_meshes;
 mod loose;
 mod model;
 #[cfg(test)]
@@ -51,6 +52,7 @@ mod world;
 pub use commit::Commit;
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use level_meshes::GroundFacts;
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use model::{StaleCommit, Terrain};
 pub use query::{RayHit, Span};
