@@ -6,7 +6,7 @@ use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::Vec3;
 
-use crate::worlds::{any_random_brush, random_ground, random_rules};
+use crate::worlds::{any_random_brush, random_ground_of_size, random_rules};
 
 /// Runs a check on each of some random worlds, on all threads.
 pub fn for_worlds(count: u64, check: impl Fn(u64, &Terrain, &Cut) + Sync) {
@@ -27,13 +27,14 @@ pub fn for_worlds(count: u64, check: impl Fn(u64, &Terrain, &Cut) + Sync) {
 /// A random world of several tiles, edited anywhere and where nodes meet, and a cut of it.
 pub fn random_world(index: u64) -> (Terrain, Cut) {
     let mut rng = Rng::with_seed(index ^ 0x1e_7e15);
-    // Chunk sizes 8, 25 and 32; each ground of `worlds`, from flat to steep, rounded or not, some with strata.
-    let kind = index / 3 * 4 + index % 3;
-    let (ground, chunk_size) = random_ground(&mut rng, kind);
+    // Seldom multiples of a stride. Five levels take more than 16 tiles.
+    let (chunk_size, sides) = [(8, 9..=150), (25, 20..=130), (32, 30..=140)][rng.usize(0..3)].clone();
+    let [width, depth] = [(); 2].map(|()| rng.u32(sides.clone()));
+    let ground = random_ground_of_size(&mut rng, index, width, depth);
     let mut terrain =
         Terrain::new(ground, &TerrainSettings { chunk_size, ..Default::default() }).expect("valid settings");
     let grid = terrain.world().level_grid(5);
-    let cut = Cut::random(grid, rng.u64(..), rng.u64(20..90));
+    let cut = Cut::random(grid, rng.u64(..), rng.u64(10..85));
     if index % 7 == 6 {
         let rules = random_rules(&mut rng, terrain.world().ground());
         terrain.set_rules(rules).expect("valid rules");
@@ -48,9 +49,9 @@ pub fn random_world(index: u64) -> (Terrain, Cut) {
 /// Edits of all kinds, anywhere, over faces and corners of nodes, and at the rim.
 pub fn random_brushes(rng: &mut Rng, terrain: &Terrain, cut: &Cut) -> Vec<Brush> {
     let ground = terrain.world().ground();
-    let count = rng.u32(0..4);
+    let count = rng.u32(0..5);
     let mut brushes: Vec<Brush> = (0..count).map(|_| any_random_brush(rng, ground)).collect();
-    for _ in 0..rng.u32(0..4) {
+    for _ in 0..rng.u32(0..6) {
         brushes.push(seam_brush(rng, ground, cut));
     }
     brushes
