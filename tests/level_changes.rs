@@ -163,10 +163,13 @@ fn after_each_commit_what_is_drawn_is_closed_and_as_if_made_from_scratch() {
             let drawn = terrain.drawn_cut().expect("a cut is drawn");
             display.assert_is(&Display::from_scratch(terrain.world(), drawn.cut()), &what);
             display.assert_is_closed(terrain.world(), drawn.cut(), &what);
-            joined += display.0.keys().filter(|key| matches!(key, Key::Node(node) if node.level == 0)).count();
+            joined +=
+                display.0.keys().filter(|key| matches!(key, Key::Node(node) if node.level == 0)).count();
         }
     }
-    println!("{edits} edits, {changes} changes of levels; {joined} tiles drawn as one mesh with their chunks");
+    println!(
+        "{edits} edits, {changes} changes of levels; {joined} tiles drawn as one mesh with their chunks"
+    );
     assert!(edits > 0 && changes > 0);
 }
 

@@ -176,13 +176,7 @@ fn draw(
             }
             let fresh = fresh_bricks(&dirty, entity, &debug, now);
             let mut out = LineBuffer::new(debug.most_lines);
-            views::draw(
-                view,
-                terrain,
-                place,
-                if view == DebugView::Dirty { &fresh } else { &[] },
-                &mut out,
-            );
+            views::draw(view, terrain, place, if view == DebugView::Dirty { &fresh } else { &[] }, &mut out);
             own.into_iter().for_each(|old| commands.entity(old).try_despawn());
             let layers = out.finish();
             drawn.insert((entity, view), Drawing { key, since: now, layers: layers.len() });

@@ -34,6 +34,11 @@ impl Cut {
         cut
     }
 
+    /// A cut for tests and experiments, in which each node is split with a chance of `percent`; equal for equal seeds.
+    pub fn random(grid: LevelGrid, seed: u64, percent: u64) -> Self {
+        Self::new(grid, |node| (dice(node, seed) >> 7) % 100 < percent)
+    }
+
     /// Splits a node, and before it those that must be split; adds the children of each to `made`.
     fn require(&mut self, node: Node, made: &mut Vec<Node>) {
         let mut wanted = vec![node];
@@ -128,6 +133,13 @@ impl Cut {
     }
 }
 
+/// A number that looks random, by a node and a seed.
+pub(super) fn dice(node: Node, seed: u64) -> u64 {
+    let words = [node.level.into(), node.x, node.z].map(|word: i32| u64::from(word.cast_unsigned()));
+    let add = |hash: u64, word: u64| (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+    words.into_iter().fold(seed, add)
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use proptest::prelude::*;
@@ -135,16 +147,8 @@ pub(super) mod tests {
     use super::*;
     use crate::lattice::ChunkGrid;
 
-    /// A number that looks random, by a node and a seed.
-    pub fn dice(node: Node, seed: u64) -> u64 {
-        let words = [node.level.into(), node.x, node.z].map(|word: i32| u64::from(word.cast_unsigned()));
-        words
-            .into_iter()
-            .fold(seed, |hash, word| (hash ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29))
-    }
-
     pub fn random_cut(grid: LevelGrid, seed: u64, percent: u64) -> Cut {
-        Cut::new(grid, |node| (dice(node, seed) >> 7) % 100 < percent)
+        Cut::random(grid, seed, percent)
     }
 
     /// Every tile is drawn by one node, and no neighbour over an edge is more than one level away.

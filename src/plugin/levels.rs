@@ -18,7 +18,7 @@ use super::task::{InFlight, TaskCounter};
 use super::{BurrowEngine, BurrowFigures, MaterialColors, SlimVertices, SurfaceProcessors};
 use crate::lattice::TilePos;
 use crate::levels::{Choice, Cut, Eye, LevelGrid, Node, NodeFacts};
-use crate::terrain::{ChooseCut, Terrain, Version, World as Ground};
+use crate::terrain::{ChooseCut, GroundFacts, Terrain, Version, World as Ground};
 
 /// Draws far ground coarsely: insert it on a terrain's entity, and worlds may be many kilometres wide.
 ///
@@ -121,7 +121,7 @@ impl WantedTiles {
 /// drawn once.
 #[derive(Default)]
 pub(super) struct KnownNodes {
-    facts: RwLock<FxHashMap<Node, NodeFacts>>,
+    facts: RwLock<FxHashMap<Node, GroundFacts>>,
     /// Nodes with edits, at one version of the world.
     edited: RwLock<Option<(Version, Arc<FxHashSet<Node>>)>>,
     /// Nodes that were still to change when the last cut was chosen.
@@ -130,14 +130,15 @@ pub(super) struct KnownNodes {
 
 impl KnownNodes {
     /// Finds the facts of these nodes where they are not known yet.
-    pub(super) fn learn(&self, world: &Ground, nodes: &[Node]) {
+    pub(super) fn learn(&self, world: &Ground, grid: LevelGrid, nodes: &[Node]) {
         let is_new = |node: &&Node| !self.read().contains_key(node);
         let new: Vec<Node> = nodes.iter().filter(is_new).copied().collect();
-        let found: Vec<_> = new.into_par_iter().map(|node| (node, world.node_facts(node))).collect();
+        let facts = |node| (node, GroundFacts::new(world.ground(), grid, node));
+        let found: Vec<_> = new.into_par_iter().map(facts).collect();
         self.facts.write().unwrap_or_else(PoisonError::into_inner).extend(found);
     }
 
-    fn read(&self) -> std::sync::RwLockReadGuard<'_, FxHashMap<Node, NodeFacts>> {
+    fn read(&self) -> std::sync::RwLockReadGuard<'_, FxHashMap<Node, GroundFacts>> {
         self.facts.read().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -161,9 +162,10 @@ impl KnownNodes {
             let facts = self.read();
             choice.cut(cut, eyes, |node| {
                 let known = facts.get(&node).copied();
-                known.map_or(NodeFacts::default(), |facts| NodeFacts {
+                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
+                    heights,
+                    error,
                     has_edits: edited.contains(&node),
-                    ..facts
                 })
             })
         };
@@ -178,7 +180,7 @@ impl KnownNodes {
         };
         let mut next = cut.clone();
         let step = next.step_to(&target, most, nearest).unwrap_or_default();
-        self.learn(world, &step.new);
+        self.learn(world, cut.grid(), &step.new);
         let changed = next.nodes().filter(|&node| !target.contains(node)).count();
         self.waiting.store(changed.max(step.new.len()), Ordering::Relaxed);
         next

@@ -265,7 +265,7 @@ fn build_levels(world: &World, builder: &SurfaceBuilder) -> BuiltWorld {
     let _span = info_span!("burrow_load").entered();
     let known = Arc::new(KnownNodes::default());
     let cut = Cut::coarsest(world.level_grid(u8::MAX));
-    known.learn(world, &cut.nodes().collect::<Vec<_>>());
+    known.learn(world, cut.grid(), &cut.nodes().collect::<Vec<_>>());
     let (drawn, updates) = world.draw_cut(cut);
     let chunks: Vec<Drawn> = world.drawn_chunks().map(Drawn::Chunk).collect();
     let build = |&drawn: &Drawn| builder.build((drawn, false), false, || world.draft(drawn));

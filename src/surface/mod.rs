@@ -6,6 +6,7 @@
 //! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk; [`plain`] is the same by the book.
 //! - [`tile`]: the heightmap's triangles outside the mask, rings included (rule 3).
 //! - [`mesh`]: vertex and index buffers, local to a chunk or tile; [`indices`] has 16 or 32 bits each.
+//! - [`level`]: the nodes of a quadtree cut, coarser ones included (rules 7 to 9).
 //! - [`seams`]: the validator: is everything drawn together closed?
 
 pub mod block;

@@ -82,10 +82,17 @@ pub fn crossing(lattice: &impl Lattice, p: IVec3, axis: usize) -> i32 {
 
 /// The crossing between densities `dp` and `dq`, in steps from the first.
 pub(super) fn linear(dp: i32, dq: i32) -> i32 {
+    linear_over(dp, dq, 1)
+}
+
+/// The same between points that are `length` voxels apart.
+#[inline(always)]
+pub(super) fn linear_over(dp: i32, dq: i32, length: i32) -> i32 {
     let (dp, dq) = (i64::from(dp).abs(), i64::from(dq).abs());
     let sum = (dp + dq).max(1);
-    let steps = (2 * i64::from(SNAP) * dp + sum) / (2 * sum);
-    (steps as i32).clamp(1, SNAP - 1)
+    let end = SNAP * length;
+    let steps = (2 * i64::from(end) * dp + sum) / (2 * sum);
+    (steps as i32).clamp(1, end - 1)
 }
 
 /// The position of the crossing on the edge from `p` along `axis`, in 1/4096 voxel from lattice point `origin`.
@@ -169,7 +176,13 @@ fn gradient(lattice: &impl Lattice, p: IVec3) -> Vec3 {
 
 /// Linear between `a` and `b`, of unit length; only + - * / sqrt, each in a fixed order, so all machines agree.
 pub(super) fn lerp_normal(a: Vec3, b: Vec3, step: i32) -> Vec3 {
-    let t = step as f32 / SNAP as f32;
+    lerp_normal_over(a, b, step, 1)
+}
+
+/// The same between points that are `length` voxels apart.
+#[inline(always)]
+pub(super) fn lerp_normal_over(a: Vec3, b: Vec3, step: i32, length: i32) -> Vec3 {
+    let t = step as f32 / (SNAP * length) as f32;
     let [x, y, z] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
     let length = (x * x + y * y + z * z).sqrt();
     if length > 0.0 { Vec3::new(x / length, y / length, z / length) } else { Vec3::Y }
@@ -183,7 +196,7 @@ pub(super) fn between(low: i32, high: i32, step: i32) -> i32 {
 /// Materials at a crossing where the ground shows its own. With strata, that of the solid end: what a dig there yields.
 /// Otherwise those of both columns, blended as the tile does: the overlay within its depth below the pristine surface, the
 /// base below.
-fn own_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
+pub(super) fn own_materials(ground: &Ground, [p, q]: [IVec3; 2], step: i32, solid: IVec3) -> MaterialMix {
     if ground.has_own_materials() {
         return MaterialMix::pure(ground.material(solid));
     }

@@ -16,10 +16,10 @@ use super::redraw::MeshUpdates;
 use super::surface_draft::{SurfaceDraft, TileUpdate};
 use super::transaction::{Transaction, Work};
 use super::world::{Drawn, World};
-use crate::lattice::{ChunkPos, Column, ItemCost, ONE, TilePos, parallel_map};
+use crate::lattice::{BrickPos, ChunkPos, Column, ItemCost, ONE, TilePos, parallel_map};
 use crate::levels::{Cut, LevelGrid, Node};
 use crate::surface::SurfaceMesh;
-use crate::surface::level::LevelView;
+use crate::surface::level::{self, LevelView, Stacks};
 use crate::surface::vertex::WorldView;
 
 /// What is drawn of a world: the nodes of a cut.
@@ -169,15 +169,18 @@ pub(super) fn change_cut(world: &World, drawn: &DrawnCut, choose: &ChooseCut) ->
     (Arc::new(drawn.after(cut, &updates)), updates)
 }
 
-/// The nodes that show a change of these bricks' cells, drawn as they are in the view of a running transaction.
+/// The nodes that show changed cells over these columns, drawn as they are in the view of a running transaction, which changes
+/// these bricks.
 pub(super) fn redraw_changed(
     world: &World,
     view: &WorldView,
     drawn: &DrawnCut,
     meshes: &MeshUpdates,
+    bricks: &[BrickPos],
     changed: &[(Column, Column)],
 ) -> NodeChanges {
-    let state = State { world, view: *view, meshes: Some(meshes) };
+    let stacks = world.edited_stacks().over(bricks);
+    let state = State { world, view: *view, stacks, meshes: Some(meshes) };
     redraw(&state, drawn, changed.iter().copied(), |tile| drawn.shows_parts(tile))
 }
 
@@ -188,7 +191,7 @@ fn redraw(
     shows_parts: impl Fn(TilePos) -> bool + Sync,
 ) -> NodeChanges {
     let mut nodes: Vec<Node> =
-        areas.flat_map(|(low, high)| state.world.nodes_near(&drawn.cut, low, high)).collect();
+        areas.flat_map(|(low, high)| level::nodes_near(&drawn.cut, low, high)).collect();
     nodes.sort_unstable();
     nodes.dedup();
     let updates = state.updates(&drawn.cut, &nodes, shows_parts);
@@ -214,12 +217,13 @@ impl DrawnCut {
 struct State<'a> {
     world: &'a World,
     view: WorldView<'a>,
+    stacks: Stacks<'a>,
     meshes: Option<&'a MeshUpdates>,
 }
 
 impl<'a> State<'a> {
     fn committed(world: &'a World) -> Self {
-        Self { world, view: world.view(), meshes: None }
+        Self { world, view: world.view(), stacks: world.edited_stacks(), meshes: None }
     }
 
     /// What these nodes of a cut are drawn with. Nodes of level 0 that were and are drawn by their parts are left out, as parts
@@ -230,26 +234,22 @@ impl<'a> State<'a> {
         nodes: &[Node],
         shows_parts: impl Fn(TilePos) -> bool + Sync,
     ) -> Vec<NodeUpdate> {
-        let view = self.level_view(cut);
+        let view = LevelView::new(self.view, cut, self.stacks);
         let updates = parallel_map(nodes, ItemCost::Surface, |&node| {
-            let is_plain = node.level == 0 && view.is_plain(node);
+            let is_plain = level::is_plain(&view, node);
             let tile = node.tile();
             if is_plain && shows_parts(tile) {
                 return None;
             }
             let parts = if node.level == 0 { self.parts_over(tile) } else { Vec::new() };
             if !is_plain {
-                let mesh = Some(Arc::new(view.mesh(node)));
+                let mesh = Some(Arc::new(level::node_mesh(&view, node)));
                 return Some(NodeUpdate { node, mesh, shown: Vec::new(), hidden: parts });
             }
             let shown = parts.into_iter().map(|drawn| (drawn, self.draft(drawn))).collect();
             Some(NodeUpdate { node, mesh: None, shown, hidden: Vec::new() })
         });
         updates.into_iter().flatten().collect()
-    }
-
-    fn level_view<'b>(&'b self, cut: &'b Cut) -> LevelView<'b> {
-        self.world.level_view(self.view, cut)
     }
 
     /// The tile and all chunks over it that draw something.

@@ -53,6 +53,7 @@ mod world;
 pub use commit::Commit;
 pub use field_log::FieldNews;
 pub use history::{History, HistoryReceipt, HistoryRejection, HistoryStep, Restored};
+pub use level_meshes::GroundFacts;
 pub use levels::{ChooseCut, DrawnCut, NodeUpdate};
 pub use loose::{LoosePiece, LooseSettings, PieceFate, Run};
 pub use model::{StaleCommit, Terrain};

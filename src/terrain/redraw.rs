@@ -14,7 +14,9 @@ use super::surface_draft::TileUpdate;
 use super::tiles::TileWork;
 use super::world::World;
 use crate::backend::Compute;
-use crate::lattice::{ChunkPos, Column, ItemCost, LatticeBox, TilePos, order_of_places, side_by_side};
+use crate::lattice::{
+    BrickPos, ChunkPos, Column, ItemCost, LatticeBox, TilePos, order_of_places, side_by_side,
+};
 use crate::surface::Mask;
 use crate::surface::block::Block;
 use crate::surface::meshed_blocks::MeshedBlocks;
@@ -34,14 +36,14 @@ pub struct MeshUpdates {
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
 }
 
-/// Every mesh that these cells change, and `newer` words of the mask.
+/// Every mesh that these cells change, and `newer` words of the mask. With what is drawn comes which bricks change.
 pub(super) fn updates(
     world: &World,
     view: &WorldView,
     backend: &dyn Compute,
     dirty: &ByBrick,
     newer: &Mask,
-    drawn: Option<&DrawnCut>,
+    drawn: Option<(&DrawnCut, Vec<BrickPos>)>,
     stages: &mut Stages,
 ) -> MeshUpdates {
     let Stages { meshing, assembly, ring, .. } = stages;
@@ -64,9 +66,9 @@ pub(super) fn updates(
     let (tiles, took) = tiles.finish();
     *ring += took;
     let mut meshes = MeshUpdates { tiles, chunks, ..MeshUpdates::default() };
-    if let Some(drawn) = drawn {
+    if let Some((drawn, bricks)) = drawn {
         let (after, nodes) =
-            Stages::time(meshing, || redraw_changed(world, view, drawn, &meshes, &areas(dirty)));
+            Stages::time(meshing, || redraw_changed(world, view, drawn, &meshes, &bricks, &areas(dirty)));
         (meshes.drawn_cut, meshes.nodes) = (Some(after), nodes);
     }
     meshes

@@ -50,8 +50,9 @@ pub(super) fn step(
     let dirty = Stages::time(&mut stages.meshing, || {
         dirty_cells(world.grid, &changed, |&(pos, own)| (pos, own, false))
     });
-    let meshes =
-        redraw::updates(world, &view, backend, &dirty, &mask, transaction.drawn_cut.as_deref(), &mut stages);
+    let positions = || bricks.iter().map(|(pos, _)| *pos).collect();
+    let drawn = transaction.drawn_cut.as_deref().map(|drawn| (drawn, positions()));
+    let meshes = redraw::updates(world, &view, backend, &dirty, &mask, drawn, &mut stages);
 
     let nothing = Fields::default();
     let news = change.fields.iter().flat_map(|(chunk, after)| {

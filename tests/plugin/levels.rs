@@ -75,7 +75,11 @@ fn no_frame_of_a_flight_with_digging_shows_a_hole() {
     let (mut cuts, mut hash, mut last) = (0, stage.hash(terrain), shown_levels(&stage, terrain).clone());
     for frame in 0..FRAMES {
         let turn = frame as f32 / 400.0;
-        let at = Vec3::new(160.0 + 150.0 * turn.cos(), 60.0 + 30.0 * (turn * 3.0).sin(), 135.0 + 120.0 * turn.sin());
+        let at = Vec3::new(
+            160.0 + 150.0 * turn.cos(),
+            60.0 + 30.0 * (turn * 3.0).sin(),
+            135.0 + 120.0 * turn.sin(),
+        );
         stage.app.world_mut().get_mut::<Transform>(camera).expect("the camera").translation = at;
         if rng.u32(0..6) == 0 {
             let (x, z) = (rng.f32() * 320.0, rng.f32() * 270.0);

@@ -47,15 +47,28 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
 /// A random ground, from flat to steep, and the chunk size of its world. In every third one, materials vary by column; every
 /// fifth one has strata.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
-    let (ground, chunk_size) = random_ground_without_strata(rng, index);
+    let chunk_size = CHUNK_SIZES[(index % 4) as usize];
+    // Sizes that are no multiples of the chunk size: the last chunks are cut at the rim.
+    let side = |rng: &mut Rng| match chunk_size {
+        8 => rng.u32(12..=26),
+        25 | 32 => rng.u32(chunk_size..=chunk_size + 36),
+        _ => rng.u32(104..=116),
+    };
+    let (width, depth) = (side(rng), side(rng));
+    (random_ground_of_size(rng, index, width, depth), chunk_size)
+}
+
+/// The same with so many cells along x and along z.
+pub fn random_ground_of_size(rng: &mut Rng, index: u64, width: u32, depth: u32) -> Ground {
+    let ground = random_ground_without_strata(rng, index, width, depth);
     if index % 5 != 4 {
-        return (ground, chunk_size);
+        return ground;
     }
     let (low, high) = ground.height_range();
     // From numbers of its own, so that the rest of the world is the same as without strata.
     let strata =
         random_strata(&mut Rng::with_seed(index), [low as f32 / 256.0 - 30.0, high as f32 / 256.0 + 3.0]);
-    (ground.with_strata(&strata).expect("valid strata"), chunk_size)
+    ground.with_strata(&strata).expect("valid strata")
 }
 
 /// Strata of all shapes with all kinds of conditions, between these heights.
@@ -106,10 +119,10 @@ pub fn random_strata(rng: &mut Rng, [low, high]: [f32; 2]) -> Strata {
     Strata { seed: rng.u32(..), bedding, strata }
 }
 
-fn random_ground_without_strata(rng: &mut Rng, index: u64) -> (Ground, u32) {
-    let (ground, chunk_size) = random_heights(rng, index);
+fn random_ground_without_strata(rng: &mut Rng, index: u64, width: u32, depth: u32) -> Ground {
+    let ground = random_heights(rng, width, depth);
     if !index.is_multiple_of(3) {
-        return (ground, chunk_size);
+        return ground;
     }
     let (low, high) = ground.height_range();
     let share = |part: f64| (f64::from(low) + f64::from(high - low) * part) / 256.0;
@@ -121,21 +134,13 @@ fn random_ground_without_strata(rng: &mut Rng, index: u64) -> (Ground, u32) {
     };
     let rules = vec![rule(1, 0.7, 1.0, 2.0), rule(2, 0.3, 0.5, 5.0), rule(3, 0.0, 0.1, 30.0)];
     let control = MaterialControl::Rules { base: MaterialId(index as u8 % 5), rules };
-    (ground.with_materials(&control).expect("valid rules"), chunk_size)
+    ground.with_materials(&control).expect("valid rules")
 }
 
-fn random_heights(rng: &mut Rng, index: u64) -> (Ground, u32) {
-    let chunk_size = CHUNK_SIZES[(index % 4) as usize];
-    // Sizes that are no multiples of the chunk size: the last chunks are cut at the rim.
-    let side = |rng: &mut Rng| match chunk_size {
-        8 => rng.u32(12..=26),
-        25 | 32 => rng.u32(chunk_size..=chunk_size + 36),
-        _ => rng.u32(104..=116),
-    };
-    let (width, depth) = (side(rng), side(rng));
+fn random_heights(rng: &mut Rng, width: u32, depth: u32) -> Ground {
     if rng.u32(0..5) == 0 {
         let relief = [60.0, 300.0, 1500.0][rng.usize(0..3)];
-        return (steep_real_ground(width, depth, rng.i32(0..400), rng.i32(0..340), relief), chunk_size);
+        return steep_real_ground(width, depth, rng.i32(0..400), rng.i32(0..340), relief);
     }
     let noise = [0.0, 0.5, 3.0, 12.0, 30.0][rng.usize(0..5)];
     let slope_x = [-2.0, -0.3, 0.0, 1.0][rng.usize(0..4)];
@@ -148,7 +153,7 @@ fn random_heights(rng: &mut Rng, index: u64) -> (Ground, u32) {
             + slope_z * f64::from(z);
         if rounding == 0.0 { h } else { (h / rounding).round() * rounding }
     };
-    (Ground::from_fn(width, depth, height).expect("finite heights"), chunk_size)
+    Ground::from_fn(width, depth, height).expect("finite heights")
 }
 
 /// The centre of a brush below the ground (dig) or above it (add), which cuts into the surface or leaves a gap to it.

@@ -1,0 +1,103 @@
+//! A node's mesh under construction: columns first, then further vertices, each place once.
+
+use glam::IVec3;
+use rustc_hash::FxHashMap;
+
+use crate::ground::Ground;
+use crate::lattice::{Column, ONE, SNAP};
+use crate::surface::{Indices, MaterialMix, SurfaceMesh, Vertex};
+
+/// A vertex by its number.
+pub(super) type Number = u32;
+
+/// Vertices and triangles of a node.
+pub(super) struct Builder {
+    /// Along x and along z, where columns are drawn: the last one may lie nearer, at the rim.
+    columns: [Vec<i32>; 2],
+    stride: i32,
+    vertices: Vec<Vertex>,
+    indices: Vec<Number>,
+    places: FxHashMap<IVec3, Number>,
+}
+
+impl Builder {
+    /// With the columns of a node whose cells have this stride.
+    pub fn new(ground: &Ground, low: Column, high: Column, stride: i32) -> Self {
+        let along =
+            |low: i32, high: i32| (low..high).step_by(stride as usize).chain([high]).collect::<Vec<i32>>();
+        let columns = [along(low.x, high.x), along(low.z, high.z)];
+        let [xs, zs] = &columns;
+        let mut vertices = Vec::with_capacity(xs.len() * zs.len() + 4 * (xs.len() + zs.len()));
+        for &z in zs {
+            vertices.extend(xs.iter().map(|&x| {
+                let column = Column::new(x, z);
+                let y = ground.height(column) * (SNAP / ONE);
+                Vertex {
+                    position: IVec3::new((x - low.x) * SNAP, y, (z - low.z) * SNAP),
+                    normal: ground.normal(column),
+                    materials: MaterialMix::column(ground.surface_material(column)),
+                }
+            }));
+        }
+        let indices = Vec::with_capacity((xs.len() - 1) * (zs.len() - 1) * 6);
+        Self { columns, stride, vertices, indices, places: FxHashMap::default() }
+    }
+
+    /// How many columns there are along x and along z.
+    pub fn column_counts(&self) -> [usize; 2] {
+        [self.columns[0].len(), self.columns[1].len()]
+    }
+
+    /// The number of the column at these places along x and z.
+    pub fn column(&self, [x, z]: [usize; 2]) -> Number {
+        (z * self.columns[0].len() + x) as Number
+    }
+
+    /// The number of a column that the node has; `None` of others.
+    pub fn column_at(&self, column: Column) -> Option<Number> {
+        let at = |columns: &[i32], at: i32| {
+            let last = columns.len() - 1;
+            let place = usize::try_from((at - columns[0]).div_euclid(self.stride)).ok()?;
+            let place = if at == columns[last] { last } else { place };
+            (columns.get(place) == Some(&at)).then_some(place)
+        };
+        Some(self.column([at(&self.columns[0], column.x)?, at(&self.columns[1], column.z)?]))
+    }
+
+    /// Replaces the vertex over a column.
+    pub fn set_column(&mut self, number: Number, vertex: Vertex) {
+        self.vertices[number as usize] = vertex;
+    }
+
+    /// The number of a vertex; one at the same place has the same one.
+    pub fn number(&mut self, vertex: Vertex) -> Number {
+        let low = Column::new(self.columns[0][0], self.columns[1][0]);
+        if (vertex.position.x | vertex.position.z) & (SNAP - 1) == 0
+            && let Some(number) =
+                self.column_at(low.offset(vertex.position.x / SNAP, vertex.position.z / SNAP))
+            && self.vertices[number as usize].is_same(&vertex)
+        {
+            return number;
+        }
+        *self.places.entry(vertex.position).or_insert_with(|| {
+            self.vertices.push(vertex);
+            self.vertices.len() as Number - 1
+        })
+    }
+
+    /// The position of a vertex.
+    pub fn position(&self, number: Number) -> IVec3 {
+        self.vertices[number as usize].position
+    }
+
+    /// Adds a triangle, unless two of its corners are the same vertex.
+    pub fn emit(&mut self, [a, b, c]: [Number; 3]) {
+        if a != b && b != c && c != a {
+            self.indices.extend_from_slice(&[a, b, c]);
+        }
+    }
+
+    pub fn finish(self) -> SurfaceMesh {
+        SurfaceMesh { indices: Indices::new(self.vertices.len(), self.indices), vertices: self.vertices }
+    }
+}

@@ -1,0 +1,121 @@
+//! The world in levels: meshes of the nodes of a cut, and what a choice of cuts must know of them.
+
+use super::world::World;
+use crate::ground::Ground;
+use crate::lattice::{Column, ONE};
+use crate::levels::{Cut, LevelGrid, Node, NodeFacts};
+use crate::surface::level::{self, LevelView, Stacks};
+use crate::surface::{SeamChecker, SeamReport, SurfaceMesh};
+
+/// Nodes are this many voxels wide at most: so far, 1/4096 of a voxel is exact in `f32`.
+const WIDEST: i32 = 4096;
+
+/// What of a node's [`NodeFacts`] depends on the ground alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GroundFacts {
+    /// Its lowest and its highest point, in voxels.
+    pub heights: [f32; 2],
+    /// How far its heightmap is from the heights at half its stride, in voxels; 0 at level 0.
+    pub error: f32,
+}
+
+impl GroundFacts {
+    /// Those of a node.
+    pub fn new(ground: &Ground, grid: LevelGrid, node: Node) -> Self {
+        if !grid.has(node) {
+            return Self::default();
+        }
+        let ((low, high), stride) = (grid.columns(node), node.stride());
+        let half = (stride / 2).max(1);
+        let (mut lowest, mut highest) = (i32::MAX, i32::MIN);
+        let mut height = |x: i32, z: i32| {
+            let height = ground.height(Column::new(x, z));
+            (lowest, highest) = (lowest.min(height), highest.max(height));
+            height
+        };
+        // Twice the greatest distance.
+        let mut error = 0;
+        for z in (low.z..high.z).step_by(stride as usize) {
+            for x in (low.x..high.x).step_by(stride as usize) {
+                let corners = [(0, 0), (0, stride), (stride, stride), (stride, 0)];
+                let [a, b, c, d] = corners.map(|(dx, dz)| height(x + dx, z + dz));
+                if half == stride {
+                    continue;
+                }
+                let middles =
+                    [(a, b, (0, half)), (b, c, (half, stride)), (c, d, (stride, half)), (d, a, (half, 0))];
+                for (from, to, (dx, dz)) in middles.into_iter().chain([(a, c, (half, half))]) {
+                    error = error.max((from + to).abs_diff(2 * height(x + dx, z + dz)));
+                }
+            }
+        }
+        let voxels = |height: i32| height as f32 / ONE as f32;
+        Self { heights: [voxels(lowest), voxels(highest)], error: error as f32 / (2 * ONE) as f32 }
+    }
+}
+
+impl World {
+    /// The quadtree over the world's tiles, with levels up to `top`; fewer where one node would cover the world or be wider than
+    /// 4,096 voxels.
+    pub fn level_grid(&self, top: u8) -> LevelGrid {
+        let widest = (0..=top).take_while(|&level| i64::from(self.grid.size()) << level <= i64::from(WIDEST));
+        LevelGrid::new(self.grid, widest.last().unwrap_or_default())
+    }
+
+    /// Where edits are.
+    pub(super) fn edited_stacks(&self) -> Stacks<'_> {
+        Stacks::new(&self.stacks)
+    }
+
+    /// The world as a cut draws it.
+    pub(crate) fn level_view<'a>(&'a self, cut: &'a Cut) -> LevelView<'a> {
+        LevelView::new(self.view(), cut, self.edited_stacks())
+    }
+
+    /// Is the cut one of this world's tiles?
+    fn has_cut(&self, cut: &Cut) -> bool {
+        cut.grid().chunks() == self.grid
+    }
+
+    /// The mesh of a node of a cut, relative to its lowest column at y = 0. What it draws depends on the nodes of the cut that
+    /// touch it. Empty where the world has no such node, or if the cut is of a world of another size.
+    pub fn node_mesh(&self, cut: &Cut, node: Node) -> SurfaceMesh {
+        if self.has_cut(cut) { level::node_mesh(&self.level_view(cut), node) } else { SurfaceMesh::default() }
+    }
+
+    /// Is a node of level 0 drawn by [its tile](Self::tile_mesh) and [the chunks](Self::chunk_mesh) below it as they are?
+    pub fn is_plain(&self, cut: &Cut, node: Node) -> bool {
+        self.has_cut(cut) && level::is_plain(&self.level_view(cut), node)
+    }
+
+    /// Everything that a cut draws: its nodes in order, each with its mesh.
+    pub fn drawn_in<'a>(&'a self, cut: &'a Cut) -> impl Iterator<Item = (Node, SurfaceMesh)> + 'a {
+        let mut nodes: Vec<Node> = cut.nodes().collect();
+        nodes.sort_unstable();
+        nodes.into_iter().map(|node| (node, self.node_mesh(cut, node)))
+    }
+
+    /// Checks that everything that a cut draws is one closed surface. Visits each triangle of the cut.
+    ///
+    /// Where four nodes meet whose levels go fine, coarse, fine, coarse, an edge may serve four triangles. Triangles without area
+    /// may lie in the planes between levels.
+    pub fn check_seams_in(&self, cut: &Cut) -> SeamReport {
+        let mut checker = SeamChecker::default();
+        for (node, mesh) in self.drawn_in(cut) {
+            checker.add(&mesh, cut.grid().columns(node).0.at(0));
+        }
+        checker.check(self.grid)
+    }
+
+    /// What a choice must know of a node.
+    pub fn node_facts(&self, grid: LevelGrid, node: Node) -> NodeFacts {
+        let GroundFacts { heights, error } = GroundFacts::new(&self.ground, grid, node);
+        NodeFacts { heights, error, has_edits: self.has_edits(grid, node) }
+    }
+
+    /// Was anything dug or built in a node?
+    pub fn has_edits(&self, grid: LevelGrid, node: Node) -> bool {
+        let (low, high) = grid.columns(node);
+        grid.has(node) && self.edited_stacks().has_any(low, high)
+    }
+}
