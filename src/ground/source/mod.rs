@@ -4,6 +4,8 @@ mod function;
 mod image;
 mod inset;
 mod noise;
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 

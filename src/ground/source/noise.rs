@@ -35,7 +35,7 @@ impl HeightSource for NoiseSource {
 
     fn bounds(&self) -> (i32, i32) {
         let NoiseHeights { amplitude, base, .. } = self.heights;
-        (rounded(base - amplitude.abs()), rounded(base + amplitude.abs()))
+        (rounded(base - amplitude.abs()) - 1, rounded(base + amplitude.abs()) + 1)
     }
 
     fn fill_heights(&self, grid: ColumnGrid, heights: &mut [i32]) {
