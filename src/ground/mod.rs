@@ -64,7 +64,7 @@ pub const MAX_SIZE: u32 = 16_384;
 
 /// Most cells along one side of a world with a [`HeightSource`]: the same as brushes [reach](crate::lattice::REACH).
 ///
-/// With an eye to space for twice as many: positions in 1/4096 voxel, counted from the world's origin, fit 32 bits up to
-/// 524,287 voxels. A [`Brush`](crate::brush::Brush) says where it is in `f32`, which at the far end of such a world tells
-/// places 1/64 to 1/32 voxel apart, instead of 1/256.
+/// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
+/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536 voxels from the origin,
+/// and to 1/64 voxel at the far end of such a world.
 pub const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();
