@@ -143,7 +143,7 @@ impl Edit {
 
     /// A box around every sample that the edit may change: the shape, its roughness and [`BAND`] (rule 6).
     ///
-    /// At the rim of the lattice the box reaches beyond [`LIMIT`](crate::lattice::LIMIT) by at most some thousand
+    /// At the rim of the lattice the box reaches beyond its [limits](super#limits) by at most some thousand
     /// voxels; the world cuts it.
     pub fn reach(&self) -> LatticeBox {
         // Two more units for the rounding of the distance.

@@ -41,7 +41,7 @@ pub enum BrushError {
         what: &'static str,
         /// The coordinate.
         value: f32,
-        /// The largest coordinate: [`LIMIT`](crate::lattice::LIMIT).
+        /// The largest coordinate along that axis: [`LIMIT`](crate::lattice::LIMIT), or [`REACH`](crate::lattice::REACH).
         most: f32,
     },
     /// The axis of a cylinder or cone is too short to have a direction.

@@ -58,6 +58,7 @@ fn wild() -> impl Strategy<Value = f32> {
         Just(0.0),
         Just(1.0),
         Just(32_768.0),
+        Just(262_144.0),
         Just(1024.0),
     ]
 }
@@ -381,7 +382,7 @@ fn wild_integer() -> impl Strategy<Value = i32> {
 // Whether integers make a shape, by the room's table of limits; `None` where that takes more than a line.
 
 fn is_in_world(at: [i32; 3]) -> bool {
-    at.iter().all(|v| v.unsigned_abs() <= 32_768 * 256)
+    at.iter().zip([262_144, 32_768, 262_144]).all(|(v, most)| v.unsigned_abs() <= most * 256)
 }
 
 /// Box and volume, of sides and a volume in voxels. What lies on the limit to the last bit is not judged.

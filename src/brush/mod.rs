@@ -27,7 +27,8 @@
 //!
 //! | what | least | most |
 //! | --- | --- | --- |
-//! | coordinates | -[`LIMIT`] | [`LIMIT`] |
+//! | coordinates along x and z | -[`REACH`] | [`REACH`] |
+//! | coordinates along y, heights | -[`LIMIT`] | [`LIMIT`] |
 //! | radius, half side | 1/4 voxel | |
 //! | axis of a cylinder or cone | 1/4 voxel | |
 //! | side of the box around the shape | | 1024 voxels |
@@ -83,6 +84,7 @@
 //! ```
 //!
 //! [`LIMIT`]: crate::lattice::LIMIT
+//! [`REACH`]: crate::lattice::REACH
 
 mod blend;
 mod edit;

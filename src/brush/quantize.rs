@@ -3,7 +3,7 @@
 use glam::{IVec3, Quat, Vec3};
 
 use super::BrushError;
-use crate::lattice::{LIMIT, ONE};
+use crate::lattice::{LIMIT, ONE, REACH};
 
 /// Least radius, half side and axis.
 const LEAST: i32 = ONE / 4;
@@ -74,15 +74,18 @@ fn finite(what: &'static str, value: f32) -> Result<f32, BrushError> {
     if value.is_finite() { Ok(value) } else { Err(BrushError::NotFinite { what, value }) }
 }
 
-/// Rounds a length of at most a few times [`LIMIT`] voxels.
+/// The largest coordinate along each axis, in voxels.
+const MOST: [i32; 3] = [REACH, LIMIT, REACH];
+
+/// Rounds a length of at most a few times [`REACH`] voxels.
 fn round(length: f32) -> i32 {
     (length * ONE as f32).round_ties_even() as i32
 }
 
 pub(super) fn point(what: &'static str, at: Vec3) -> Result<[i32; 3], BrushError> {
-    for value in at.to_array() {
-        if finite(what, value)?.abs() > LIMIT as f32 {
-            return Err(BrushError::OutOfRange { what, value, most: LIMIT as f32 });
+    for (value, most) in at.to_array().into_iter().zip(MOST) {
+        if finite(what, value)?.abs() > most as f32 {
+            return Err(BrushError::OutOfRange { what, value, most: most as f32 });
         }
     }
     Ok(at.to_array().map(round))
@@ -93,8 +96,8 @@ pub(super) fn restored_point(at: [i32; 3]) -> Vec3 {
 }
 
 pub(super) fn check_point(what: &'static str, at: [i32; 3]) -> Result<(), BrushError> {
-    match at.into_iter().find(|v| v.unsigned_abs() > (LIMIT * ONE) as u32) {
-        Some(v) => Err(BrushError::OutOfRange { what, value: voxels(v), most: LIMIT as f32 }),
+    match at.into_iter().zip(MOST).find(|(v, most)| v.unsigned_abs() > (most * ONE) as u32) {
+        Some((v, most)) => Err(BrushError::OutOfRange { what, value: voxels(v), most: most as f32 }),
         None => Ok(()),
     }
 }

@@ -65,12 +65,12 @@ impl QuantizedOperation {
                 check_point("point", *point)?;
                 check_direction("normal", *normal)
             }
-            Self::Level { height } => check_point("height", [*height, 0, 0]),
+            Self::Level { height } => check_point("height", [0, *height, 0]),
             Self::Raise { amount: by } | Self::Lower { amount: by } => amount(voxels(*by)).map(drop),
             Self::Stamp { stamp } => stamp.check(),
             Self::Terrace { step, base } => {
                 in_range("step", voxels(*step), STEP.0, STEP.1)?;
-                check_point("base", [*base, 0, 0])
+                check_point("base", [0, *base, 0])
             }
             _ => Ok(()),
         }

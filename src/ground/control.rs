@@ -5,6 +5,7 @@ use super::grey_image::{GreyImage, LinePosition};
 use super::material::{ColumnMaterial, MaterialId};
 use super::rules::{MaterialRule, apply};
 use super::world::{Ground, Materials};
+use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, ONE};
 
 /// Decides the materials of every column. Images are stretched over the world, their first sample at column (0, 0),
@@ -69,6 +70,72 @@ impl MaterialControl {
     }
 }
 
+impl MaterialControl {
+    /// What a column of a ground is made of.
+    pub(super) fn at(&self, ground: &Ground, column: Column) -> ColumnMaterial {
+        self.of_column(ground, column, || (ground.height(column), ground.slope(column)))
+    }
+
+    /// The same, where height and slope may be asked for.
+    pub(super) fn of_column(
+        &self,
+        ground: &Ground,
+        column: Column,
+        height_and_slope: impl FnOnce() -> (i32, f64),
+    ) -> ColumnMaterial {
+        match self {
+            Self::Uniform(material) => *material,
+            Self::Rules { base, rules } => {
+                let (height, slope) = height_and_slope();
+                apply(*base, rules, f64::from(height) / f64::from(ONE), slope)
+            }
+            Self::Blend { mask, base, overlay } => {
+                let grey = ground.stretched(mask, column).grey();
+                let blend = (grey / 65_535.0 * 255.0).round() as u8;
+                ColumnMaterial { base: *base, overlay: *overlay, blend }
+            }
+            Self::Ids { map, base } => {
+                let overlay = id(ground.stretched(map, column).nearest());
+                ColumnMaterial { base: *base, overlay, blend: 255 }
+            }
+        }
+    }
+
+    /// Hash of all of it, for grounds that do not hash what it makes.
+    pub(super) fn hash(&self) -> u64 {
+        let of_image = |image: &GreyImage| {
+            let size = [image.width(), image.height()].map(u64::from);
+            hash_words(size.into_iter().chain(image.samples().iter().map(|&sample| u64::from(sample))))
+        };
+        match self {
+            Self::Uniform(material) => hash_words([1, material.word()]),
+            Self::Rules { base, rules } => {
+                let words = rules.iter().flat_map(|rule| {
+                    let numbers = [rule.height.0, rule.height.1, rule.height_fade]
+                        .into_iter()
+                        .chain([rule.slope.0, rule.slope.1, rule.slope_fade]);
+                    [u64::from(rule.overlay.0)].into_iter().chain(numbers.map(f64::to_bits))
+                });
+                hash_words([2, base.0.into()].into_iter().chain(words))
+            }
+            Self::Blend { mask, base, overlay } => {
+                hash_words([3, base.0.into(), overlay.0.into(), of_image(mask)])
+            }
+            Self::Ids { map, base } => hash_words([4, base.0.into(), of_image(map)]),
+        }
+    }
+
+    /// Bytes of memory that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        let own = match self {
+            Self::Uniform(_) => 0,
+            Self::Rules { rules, .. } => size_of_val(rules.as_slice()),
+            Self::Blend { mask: image, .. } | Self::Ids { map: image, .. } => size_of_val(image.samples()),
+        };
+        size_of::<Self>() + own
+    }
+}
+
 /// The id in a sample of a map.
 fn id(sample: u16) -> MaterialId {
     let [id, _] = sample.to_be_bytes();
@@ -85,42 +152,21 @@ impl Ground {
         control.check()?;
         let materials = match control {
             MaterialControl::Uniform(material) => Materials::Uniform(*material),
-            MaterialControl::Rules { base, rules } => self.material_columns(|column| {
-                let height = f64::from(self.height(column)) / f64::from(ONE);
-                apply(*base, rules, height, self.slope(column))
-            })?,
-            MaterialControl::Blend { mask, base, overlay } => self.material_columns(|column| {
-                let grey = self.stretched(mask, column).grey();
-                let blend = (grey / 65_535.0 * 255.0).round() as u8;
-                ColumnMaterial { base: *base, overlay: *overlay, blend }
-            })?,
-            MaterialControl::Ids { map, base } => self.material_columns(|column| {
-                let overlay = id(self.stretched(map, column).nearest());
-                ColumnMaterial { base: *base, overlay, blend: 255 }
-            })?,
+            _ if self.source().is_some() => Materials::OnDemand(Some(Box::new(control.clone()))),
+            _ => Materials::from_columns(self.extent().fill_rows(|z, row| {
+                for (x, place) in (0..).zip(row) {
+                    *place = control.at(&self, Column::new(x, z));
+                }
+                Ok(())
+            })?),
         };
         self.replace_materials(materials).with_new_tops()
     }
 
-    /// Materials of each column on its own.
-    fn material_columns(
-        &self,
-        material: impl Fn(Column) -> ColumnMaterial + Sync,
-    ) -> Result<Materials, GroundError> {
-        let columns = self.extent().fill_rows(|z, row| {
-            for (x, place) in (0..).zip(row) {
-                *place = material(Column::new(x, z));
-            }
-            Ok(())
-        })?;
-        Ok(Materials::from_columns(columns))
-    }
-
     /// Where a column of the world lies on an image stretched over it.
     pub(super) fn stretched<'a>(&self, image: &'a GreyImage, column: Column) -> ImagePoint<'a> {
-        // Columns and samples are at most 16384 each, so their product fits.
         let along = |column: i32, cells: i32, samples: u32| {
-            LinePosition::new(column.unsigned_abs() * (samples - 1), cells.unsigned_abs())
+            LinePosition::of_long(u64::from(column.unsigned_abs()) * u64::from(samples - 1), cells.unsigned_abs())
         };
         ImagePoint {
             image,

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use thiserror::Error;
 
-use super::MAX_SIZE;
+use super::{MAX_SIZE, MAX_SOURCE_SIZE};
 use crate::lattice::LIMIT;
 
 /// Why ground cannot be made from what was given.
@@ -14,6 +14,16 @@ pub enum GroundError {
     /// The world would be empty or too large.
     #[error("a world of {width} x {depth} cells cannot be made: each side must be 1 to {MAX_SIZE} cells")]
     Size {
+        /// Cells along x.
+        width: u32,
+        /// Cells along z.
+        depth: u32,
+    },
+    /// A world with a source would be empty or too large.
+    #[error(
+        "a world of {width} x {depth} cells with a source cannot be made: each side must be 1 to {MAX_SOURCE_SIZE} cells"
+    )]
+    SourceSize {
         /// Cells along x.
         width: u32,
         /// Cells along z.

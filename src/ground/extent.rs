@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::MAX_SIZE;
+use super::{MAX_SIZE, MAX_SOURCE_SIZE};
 use super::error::GroundError;
 use crate::lattice::Column;
 
@@ -16,13 +16,18 @@ pub(super) struct Extent {
 impl Extent {
     /// The columns of a world of `width` x `depth` cells, each 1 to [`MAX_SIZE`].
     pub(super) fn new(width: u32, depth: u32) -> Result<Self, GroundError> {
-        let allowed = 1..=MAX_SIZE;
-        match (i32::try_from(width), i32::try_from(depth)) {
-            (Ok(w), Ok(d)) if allowed.contains(&width) && allowed.contains(&depth) => {
-                Ok(Self { width: w, depth: d })
-            }
-            _ => Err(GroundError::Size { width, depth }),
-        }
+        Self::within(MAX_SIZE, width, depth).ok_or(GroundError::Size { width, depth })
+    }
+
+    /// The same with a source: each 1 to [`MAX_SOURCE_SIZE`].
+    pub(super) fn of_source(width: u32, depth: u32) -> Result<Self, GroundError> {
+        Self::within(MAX_SOURCE_SIZE, width, depth).ok_or(GroundError::SourceSize { width, depth })
+    }
+
+    fn within(most: u32, width: u32, depth: u32) -> Option<Self> {
+        let allowed = 1..=most;
+        let is_right = allowed.contains(&width) && allowed.contains(&depth);
+        is_right.then_some(Self { width: width as i32, depth: depth as i32 })
     }
 
     /// Cells along x.
@@ -55,9 +60,9 @@ impl Extent {
         self.inner_index(self.clamp(column))
     }
 
-    /// The same of a column that lies in the world.
+    /// The same of a column that lies in the world; of any other, some number.
     pub(super) fn inner_index(self, Column { x, z }: Column) -> usize {
-        (z * (self.width + 1) + x) as usize
+        (z as usize).wrapping_mul(self.row_len()).wrapping_add(x as usize)
     }
 
     /// An array over the world whose rows are filled in parallel by `fill(z, row)`. Of several errors that of the

@@ -59,11 +59,11 @@ impl Default for Detail {
 
 impl Detail {
     /// The noise in voxels over the column (x, z), from checked parameters.
-    fn noise(self) -> Result<impl Fn(i32, i32) -> f64 + Sync, GroundError> {
+    fn noise(self) -> Result<DetailNoise, GroundError> {
         let Self { amplitude, scale, octaves, seed } = self;
         let noise =
             NoiseHeights { seed, octaves, scale, amplitude, ..NoiseHeights::default() }.generator()?;
-        Ok(move |x, z| amplitude * noise(x, z))
+        Ok(Box::new(move |x, z| amplitude * noise(x, z)))
     }
 }
 
@@ -77,7 +77,28 @@ impl Ground {
     /// - [`GroundError::Height`] where a spline or the detail leaves the lattice's limit.
     /// - [`GroundError::Memory`] if the machine has too little.
     pub fn from_image(image: &GreyImage, scale: &ImageScale) -> Result<Self, GroundError> {
-        let &ImageScale { voxels_per_sample, low, high, detail } = scale;
+        let detail = scale.check(image)?;
+        let (width, height, step) = (image.width(), image.height(), scale.voxels_per_sample);
+        let extent = Extent::new((width - 1) * step, (height - 1) * step)?;
+        let heights = extent.fill_rows(|z, row| {
+            let mut line = scale.line(image, [0, extent.width()], row.len());
+            line.go_to(z);
+            fill_row(z, row, |x| {
+                let smooth = line.height(x);
+                detail.as_ref().map_or(smooth, |detail| smooth + detail(x, z))
+            })
+        })?;
+        Ok(Self::new(extent, heights))
+    }
+}
+
+/// The noise of details in voxels over the column (x, z).
+pub(super) type DetailNoise = Box<dyn Fn(i32, i32) -> f64 + Send + Sync>;
+
+impl ImageScale {
+    /// Checks the parameters, and that the image spans a cell; returns the noise of its details.
+    pub(super) fn check(&self, image: &GreyImage) -> Result<Option<DetailNoise>, GroundError> {
+        let &Self { voxels_per_sample, low, high, detail } = self;
         let (width, height) = (image.width(), image.height());
         if width < 2 || height < 2 {
             return Err(GroundError::ImageTooSmall { width, height });
@@ -92,20 +113,62 @@ impl Ground {
         }
         check_voxels("height of grey 0", low)?;
         check_voxels("height of full grey", high)?;
-        let detail = detail.map(Detail::noise).transpose()?;
-        let extent = Extent::new((width - 1) * voxels_per_sample, (height - 1) * voxels_per_sample)?;
+        detail.map(Detail::noise).transpose()
+    }
 
-        let voxels = |x, z| low + (high - low) * f64::from(image.grey(x, z)) / 65_535.0;
-        let heights = extent.fill_rows(|z, row| {
-            let across = LinePosition::new(z.unsigned_abs(), voxels_per_sample);
-            let line: Vec<f64> = (0..width).map(|x| across.interpolate(height, |z| voxels(x, z))).collect();
-            fill_row(z, row, |x| {
-                let along = LinePosition::new(x.unsigned_abs(), voxels_per_sample);
-                let smooth = along.interpolate(width, |x| line[x as usize]);
-                detail.as_ref().map_or(smooth, |detail| smooth + detail(x, z))
-            })
-        })?;
-        Ok(Self::new(extent, heights))
+    /// Height of a sample in voxels.
+    pub(super) fn voxels(&self, grey: u16) -> f64 {
+        self.low + (self.high - self.low) * f64::from(grey) / 65_535.0
+    }
+
+    /// Heights along lines of constant z, for this many columns between two ends along x, both in the image.
+    pub(super) fn line<'a>(&'a self, image: &'a GreyImage, ends: [i32; 2], columns: usize) -> ImageLine<'a> {
+        let [first, last] = ends.map(|x| LinePosition::new(x.unsigned_abs(), self.voxels_per_sample).sample);
+        // The samples of all splines between the ends, those at the image's border included.
+        let samples = first.saturating_sub(1).min(image.width() - 2)..(last + 3).min(image.width());
+        // Worth it if the columns have at least a sample in four of their own.
+        let is_dense = samples.len() <= 4 * columns;
+        ImageLine {
+            image,
+            scale: self,
+            across: LinePosition { sample: 0, fraction: 0.0 },
+            first: samples.start,
+            values: vec![0.0; if is_dense { samples.len() } else { 0 }],
+        }
+    }
+}
+
+/// Heights of an image along a line of constant z, not rounded.
+pub(super) struct ImageLine<'a> {
+    image: &'a GreyImage,
+    scale: &'a ImageScale,
+    across: LinePosition,
+    /// The first sample along x of `values`.
+    first: u32,
+    /// Heights of the line at samples along x; none where they are computed when they are needed.
+    values: Vec<f64>,
+}
+
+impl ImageLine<'_> {
+    /// Goes to the line at z.
+    pub(super) fn go_to(&mut self, z: i32) {
+        self.across = LinePosition::new(z.unsigned_abs(), self.scale.voxels_per_sample);
+        let mut values = std::mem::take(&mut self.values);
+        (self.first..).zip(&mut values).for_each(|(x, value)| *value = self.at_sample(x));
+        self.values = values;
+    }
+
+    /// The height over the column at x, in voxels.
+    pub(super) fn height(&self, x: i32) -> f64 {
+        let along = LinePosition::new(x.unsigned_abs(), self.scale.voxels_per_sample);
+        along.interpolate(self.image.width(), |x| {
+            let known = x.checked_sub(self.first).and_then(|at| self.values.get(at as usize));
+            known.copied().unwrap_or_else(|| self.at_sample(x))
+        })
+    }
+
+    fn at_sample(&self, x: u32) -> f64 {
+        self.across.interpolate(self.image.height(), |z| self.scale.voxels(self.image.grey(x, z)))
     }
 }
 

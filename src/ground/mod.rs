@@ -8,6 +8,7 @@
 //! | a number, a function, a list | [`Ground::flat`], [`Ground::from_fn`], [`Ground::from_heights`] |
 //! | a grey PNG or RAW image | [`GreyImage::decode_png`], [`GreyImage::decode_raw`], then [`Ground::from_image`] |
 //! | noise | [`Ground::from_noise`] |
+//! | anything of these and more, computed where it is needed | a [`HeightSource`], then [`Ground::from_source`] |
 //! | materials by slope, height or image | [`Ground::with_materials`] |
 //! | strata and ore below the surface | [`Ground::with_strata`], [`Ground::with_material_fn`] |
 //!
@@ -15,6 +16,7 @@
 //! multiplications, divisions and square roots in a fixed order, then rounded to integers. [`Ground::hash`] sums it up.
 //! All input is checked, and invalid input is refused with an error that names the value.
 
+mod columns;
 mod control;
 mod error;
 mod extent;
@@ -24,8 +26,13 @@ mod material;
 mod noise_heights;
 #[cfg(feature = "cuda")]
 mod noise_terms;
+mod on_demand;
+#[allow(dead_code)] // What levels of detail are drawn from.
+mod page;
+mod pages;
 mod png;
 mod rules;
+mod source;
 mod sources;
 mod strata;
 mod world;
@@ -38,7 +45,10 @@ pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
+#[allow(unused_imports)]
+pub(crate) use page::GroundPage;
 pub use rules::MaterialRule;
+pub use source::{ColumnGrid, FunctionSource, HeightSource, ImageSource, InsetSource, NoiseSource};
 #[cfg(all(test, feature = "cuda"))]
 pub(crate) use strata::{BED, FILL, POCKET, VEIN};
 pub use strata::{
@@ -47,6 +57,14 @@ pub use strata::{
 #[cfg(feature = "cuda")]
 pub(crate) use strata::{BeddingRecord, StratumRecord};
 pub use world::Ground;
+pub(crate) use world::RowBuffer;
 
-/// Most cells along one side of a world.
+/// Most cells along one side of a world whose heights are kept in memory.
 pub const MAX_SIZE: u32 = 16_384;
+
+/// Most cells along one side of a world with a [`HeightSource`]: the same as brushes [reach](crate::lattice::REACH).
+///
+/// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
+/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536 voxels from the origin,
+/// and to 1/64 voxel at the far end of such a world.
+pub const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();

@@ -6,8 +6,11 @@ use std::ops::Range;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
+use super::control::MaterialControl;
 use super::extent::Extent;
 use super::material::{ColumnMaterial, MaterialId};
+use super::pages::Pages;
+use super::source::HeightSource;
 use super::strata::Below;
 use crate::lattice::hash::hash_words;
 use crate::lattice::{Column, ONE};
@@ -16,21 +19,37 @@ use crate::lattice::{Column, ONE};
 ///
 /// Immutable. Heights are in 1/256 voxel ([`ONE`] per voxel) and at most [`LIMIT`](crate::lattice::LIMIT) voxels from
 /// zero. A column beyond the rim is like the nearest one on the rim, so every question has an answer.
-#[derive(PartialEq)]
 pub struct Ground {
     extent: Extent,
+    /// One for each column, row-major; none of a ground with a source.
     heights: Vec<i32>,
     materials: Materials,
     below: Option<Below>,
     height_range: (i32, i32),
     hash: u64,
+    /// The source of heights, and what was computed of it.
+    pages: Option<Box<Pages>>,
+}
+
+/// Of sources, and of what they are made of, only their ids are compared.
+impl PartialEq for Ground {
+    fn eq(&self, other: &Self) -> bool {
+        let source = |ground: &Self| ground.source().map(HeightSource::id);
+        self.extent == other.extent
+            && source(self) == source(other)
+            && self.heights == other.heights
+            && self.materials == other.materials
+            && self.below == other.below
+    }
 }
 
 /// The materials of all columns: one for all, or one for each where they differ.
-#[derive(PartialEq, Eq)]
+#[derive(PartialEq)]
 pub(super) enum Materials {
     Uniform(ColumnMaterial),
     Columns(Vec<ColumnMaterial>),
+    /// Of a ground with a source: computed when it is asked for. Without a control they are the source's.
+    OnDemand(Option<Box<MaterialControl>>),
 }
 
 impl Materials {
@@ -46,26 +65,44 @@ impl Materials {
         match self {
             Self::Uniform(material) => *material,
             Self::Columns(materials) => materials[index],
+            Self::OnDemand(_) => ColumnMaterial::default(),
         }
     }
 
-    /// Those of some columns, one after the other.
-    fn of(&self, indices: Range<usize>) -> impl Iterator<Item = ColumnMaterial> {
+    /// Those of some columns, one after the other; where they are computed on demand, these here.
+    fn of<'a>(
+        &'a self,
+        indices: Range<usize>,
+        on_demand: &'a [ColumnMaterial],
+    ) -> impl Iterator<Item = ColumnMaterial> {
+        let none = std::iter::repeat_n(ColumnMaterial::default(), 0);
         let (all, columns): (_, &[ColumnMaterial]) = match self {
+            _ if !on_demand.is_empty() => (none, on_demand),
             Self::Uniform(material) => (std::iter::repeat_n(*material, indices.len()), &[]),
-            Self::Columns(columns) => (std::iter::repeat_n(ColumnMaterial::default(), 0), &columns[indices]),
+            Self::Columns(columns) => (none, &columns[indices]),
+            Self::OnDemand(_) => (none, &[]),
         };
         all.chain(columns.iter().copied())
     }
 }
 
+/// What [`Ground::row`] computes; kept by the caller, so that it is allocated once for many rows.
+#[derive(Default)]
+pub(crate) struct RowBuffer {
+    pub(super) normals: Vec<Vec3>,
+    /// Of grounds with a source.
+    pub(super) heights: Vec<i32>,
+    /// Of grounds with a source, unless all columns are alike.
+    pub(super) materials: Vec<ColumnMaterial>,
+}
+
 /// Change of height along one axis around a column.
 #[derive(Clone, Copy)]
-struct Rise {
+pub(super) struct Rise {
     /// Height gained, in 1/256 voxel.
-    rise: i32,
+    pub rise: i32,
     /// Over how many voxels: 2, at the rim 1.
-    run: i32,
+    pub run: i32,
 }
 
 impl Ground {
@@ -80,8 +117,51 @@ impl Ground {
             below: None,
             height_range,
             hash: 0,
+            pages: None,
         }
         .hashed()
+    }
+
+    /// The ground whose heights a source gives.
+    pub(super) fn of_pages(extent: Extent, pages: Pages) -> Self {
+        let materials = match pages.source.has_materials() {
+            true => Materials::OnDemand(None),
+            false => Materials::Uniform(ColumnMaterial::default()),
+        };
+        Self {
+            extent,
+            heights: Vec::new(),
+            materials,
+            below: None,
+            height_range: pages.bounds,
+            hash: 0,
+            pages: Some(Box::new(pages)),
+        }
+        .hashed()
+    }
+
+    /// The source, if its heights are computed on demand.
+    pub(super) fn source(&self) -> Option<&dyn HeightSource> {
+        self.pages().map(|pages| &*pages.source)
+    }
+
+    /// What was computed of the source.
+    pub(super) fn pages(&self) -> Option<&Pages> {
+        self.pages.as_deref()
+    }
+
+    /// The same ground, none of whose pages are computed, and which keeps so many bytes of them.
+    pub(super) fn with_empty_pages(mut self, budget: Option<usize>) -> Self {
+        let column_bytes = self.on_demand_column_bytes();
+        self.pages = self.pages.map(|pages| {
+            let budget = budget.unwrap_or(pages.budget());
+            Box::new(pages.emptied(column_bytes, budget))
+        });
+        self
+    }
+
+    pub(super) fn materials(&self) -> &Materials {
+        &self.materials
     }
 
     /// The same heights with other materials; `Columns` hold one for each column.
@@ -107,6 +187,10 @@ impl Ground {
 
     /// The ground with its hash up to date. Rows are hashed in parallel, then their hashes in order.
     fn hashed(mut self) -> Self {
+        if self.pages.is_some() {
+            self.hash = self.hash_on_demand();
+            return self.with_empty_pages(None);
+        }
         let row_len = self.extent.row_len();
         let rows: Vec<u64> = self
             .heights
@@ -141,18 +225,27 @@ impl Ground {
 
     /// Height of a column in 1/256 voxel; beyond the rim, that of the nearest rim column.
     pub fn height(&self, column: Column) -> i32 {
-        self.heights[self.extent.index(column)]
+        match self.heights.get(self.extent.index(column)) {
+            Some(&height) => height,
+            None => self.height_on_demand(column),
+        }
     }
 
     /// The place of a column of the world in arrays over it, and its height; of a column beyond the rim, those of some
     /// other.
     pub(super) fn inner_height(&self, column: Column) -> (usize, i32) {
         let index = self.extent.inner_index(column);
-        (index, self.heights.get(index).copied().unwrap_or_default())
+        match self.heights.get(index) {
+            Some(&height) => (index, height),
+            None => (index, self.height_on_demand(column)),
+        }
     }
 
     /// Heights of `N` x `N` columns from `low` on, rows along x: what [`Self::height`] gives for each.
     pub(crate) fn heights<const N: usize>(&self, low: Column) -> [[i32; N]; N] {
+        if self.heights.is_empty() {
+            return self.heights_on_demand(low);
+        }
         let last = low.offset(N as i32 - 1, N as i32 - 1);
         if self.extent.clamp(low) != low || self.extent.clamp(last) != last {
             let height = |x: usize, z: usize| self.height(low.offset(x as i32, z as i32));
@@ -184,7 +277,7 @@ impl Ground {
         is_inner.then(|| Self::normal_of([rise(x), rise(z)]))
     }
 
-    fn normal_of(rises: [Rise; 2]) -> Vec3 {
+    pub(super) fn normal_of(rises: [Rise; 2]) -> Vec3 {
         let slope = |along: Rise| along.rise as f32 / (along.run * ONE) as f32;
         let [x, z] = rises.map(slope);
         let length = (x * x + z * z + 1.0).sqrt();
@@ -192,57 +285,72 @@ impl Ground {
     }
 
     /// Columns of a row that all lie in the world, from one on: their heights, normals and materials, which are what
-    /// [`Self::height`], [`Self::normal`] and [`Self::surface_material`] give for each. Normals go into a list of the caller's.
+    /// [`Self::height`], [`Self::normal`] and [`Self::surface_material`] give for each. What is computed goes into a buffer of
+    /// the caller's.
     /// Of columns beyond the rim, none.
     pub(crate) fn row<'a>(
         &'a self,
         low: Column,
         count: usize,
-        normals: &'a mut Vec<Vec3>,
+        buffer: &'a mut RowBuffer,
     ) -> impl Iterator<Item = (i32, Vec3, ColumnMaterial)> {
         let is_inside = self.extent.clamp(low) == low && count <= (self.width() - low.x) as usize + 1;
         let count = if is_inside { count } else { 0 };
-        normals.clear();
+        let RowBuffer { normals, heights, materials } = buffer;
+        (normals.clear(), heights.clear(), materials.clear());
         let row = |z: i32| {
             let start = self.extent.index(Column::new(low.x, z));
             start..start + count
         };
         let z = self.extent.clamp(low).z;
-        let (north, south) = ((z - 1).max(0), (z + 1).min(self.depth()));
-        let [own, before, after] = [z, north, south].map(|z| &self.heights[row(z)]);
-        // All but those at the rim have a neighbour on either side.
-        let ends_at_rim = count > 0 && low.x + count as i32 > self.width();
-        let inner = usize::from(low.x == 0)..count.saturating_sub(ends_at_rim.into());
-        let rim = |at: usize| self.normal(low.offset(at as i32, 0));
-        normals.extend((0..inner.start.min(count)).map(rim));
-        if inner.start < inner.end {
-            let start = self.extent.index(low) + inner.start;
-            let (west, east) = (&self.heights[start - 1..], &self.heights[start + 1..]);
-            let along_x = west.iter().zip(east).map(|(west, east)| Rise { rise: east - west, run: 2 });
-            let along_z = before[inner.clone()].iter().zip(&after[inner.clone()]);
-            let along_z = along_z.map(|(before, after)| Rise { rise: after - before, run: south - north });
-            normals.extend(along_x.zip(along_z).map(|(x, z)| Self::normal_of([x, z])));
-        }
-        normals.extend((normals.len()..count).map(rim));
+        let own = if self.pages.is_some() {
+            self.fill_row(low, count, normals, heights, materials);
+            heights
+        } else {
+            let (north, south) = ((z - 1).max(0), (z + 1).min(self.depth()));
+            let [own, before, after] = [z, north, south].map(|z| &self.heights[row(z)]);
+            // All but those at the rim have a neighbour on either side.
+            let ends_at_rim = count > 0 && low.x + count as i32 > self.width();
+            let inner = usize::from(low.x == 0)..count.saturating_sub(ends_at_rim.into());
+            let rim = |at: usize| self.normal(low.offset(at as i32, 0));
+            normals.extend((0..inner.start.min(count)).map(rim));
+            if inner.start < inner.end {
+                let start = self.extent.index(low) + inner.start;
+                let (west, east) = (&self.heights[start - 1..], &self.heights[start + 1..]);
+                let along_x = west.iter().zip(east).map(|(west, east)| Rise { rise: east - west, run: 2 });
+                let along_z = before[inner.clone()].iter().zip(&after[inner.clone()]);
+                let along_z = along_z.map(|(before, after)| Rise { rise: after - before, run: south - north });
+                normals.extend(along_x.zip(along_z).map(|(x, z)| Self::normal_of([x, z])));
+            }
+            normals.extend((normals.len()..count).map(rim));
+            own
+        };
         let tops = self.tops_of(row(z)).unwrap_or_default();
         let of_columns = if tops.is_empty() { row(z) } else { 0..0 };
         let tops = tops.iter().map(|&top| ColumnMaterial::solid(top));
         own.iter()
             .zip(normals.iter())
-            .zip(tops.chain(self.materials.of(of_columns)))
+            .zip(tops.chain(self.materials.of(of_columns, materials)))
             .map(|((&height, &normal), material)| (height, normal, material))
     }
 
     /// Steepness of the surface over a column as rise over run, from the same differences as [`Self::normal`]: 0 is
     /// level, 1 is 45 degrees.
     pub fn slope(&self, column: Column) -> f64 {
+        Self::slope_of(self.rises(column))
+    }
+
+    pub(super) fn slope_of(rises: [Rise; 2]) -> f64 {
         let slope = |along: Rise| f64::from(along.rise) / f64::from(along.run * ONE);
-        let [x, z] = self.rises(column).map(slope);
+        let [x, z] = rises.map(slope);
         (x * x + z * z).sqrt()
     }
 
     /// Change of height around a column along x and along z.
     fn rises(&self, column: Column) -> [Rise; 2] {
+        if let Some(pages) = &self.pages {
+            return self.rises_on_demand(pages, column);
+        }
         let Column { x, z } = self.extent.clamp(column);
         let (west, east) = ((x - 1).max(0), (x + 1).min(self.width()));
         let (north, south) = ((z - 1).max(0), (z + 1).min(self.depth()));
@@ -260,7 +368,10 @@ impl Ground {
 
     /// Materials of a column; beyond the rim, those of the nearest rim column.
     pub fn column_material(&self, column: Column) -> ColumnMaterial {
-        self.materials.get(self.extent.index(column))
+        match &self.materials {
+            Materials::OnDemand(control) => self.material_on_demand(control.as_deref(), column),
+            resident => resident.get(self.extent.index(column)),
+        }
     }
 
     /// What all ground is made of, if it is the same from every surface down.
@@ -287,29 +398,37 @@ impl Ground {
 
     /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
     pub(super) fn squared_slope(&self, column: Column) -> u64 {
+        Self::squared_slope_of(self.rises(column))
+    }
+
+    pub(super) fn squared_slope_of(rises: [Rise; 2]) -> u64 {
         let steps = |along: Rise| i64::from(along.rise * 2 / along.run).unsigned_abs();
-        let [x, z] = self.rises(column).map(steps);
+        let [x, z] = rises.map(steps);
         x * x + z * z
     }
 
-    /// Lowest and highest height of the world, in 1/256 voxel.
+    /// Lowest and highest height of the world, in 1/256 voxel; with a source, the bounds that it promised.
     pub fn height_range(&self) -> (i32, i32) {
         self.height_range
     }
 
-    /// Hash of the dimensions, heights and materials: equal for equal worlds, on every machine.
+    /// Hash of the dimensions, heights and materials: equal for equal worlds, on every machine. The heights and materials of a
+    /// [source](Self::from_source) are hashed by its [id](HeightSource::id), so it differs from the hash of the same heights in
+    /// memory.
     pub fn hash(&self) -> u64 {
         self.hash
     }
 
-    /// Bytes of memory that the ground takes.
+    /// Bytes of memory that the ground takes; with a source, those of the pages that it keeps now, and of the source.
     pub fn bytes(&self) -> usize {
         let materials = match &self.materials {
             Materials::Uniform(_) => 0,
             Materials::Columns(materials) => size_of_val(materials.as_slice()),
+            Materials::OnDemand(control) => control.as_ref().map_or(0, |control| control.bytes()),
         };
+        let pages = self.pages.as_ref().map_or(0, |pages| size_of::<Pages>() + pages.bytes());
         let below = self.below.as_ref().map_or(0, Below::bytes);
-        size_of::<Self>() + size_of_val(self.heights.as_slice()) + materials + below
+        size_of::<Self>() + size_of_val(self.heights.as_slice()) + materials + below + pages
     }
 }
 
@@ -374,7 +493,7 @@ mod tests {
                         let normal = ground.normal(column).to_array().map(f32::to_bits);
                         (ground.height(column), normal, ground.column_material(column))
                     });
-                    let mut normals = vec![Vec3::ONE; 3];
+                    let mut normals = RowBuffer { normals: vec![Vec3::ONE; 3], ..RowBuffer::default() };
                     let found = ground.row(low, count, &mut normals);
                     let found = found.map(|(height, normal, material)| {
                         (height, normal.to_array().map(f32::to_bits), material)

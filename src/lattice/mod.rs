@@ -33,8 +33,11 @@ pub const ONE: i32 = 256;
 /// Fixed-point units per voxel of drawn positions: vertices lie on multiples of 1/4096 voxel (rule 4).
 pub const SNAP: i32 = 4096;
 
-/// Lattice coordinates, heights included, stay within this many voxels of the origin.
+/// Heights, and other vertical lattice coordinates, stay within this many voxels of the origin.
 pub const LIMIT: i32 = 1 << 15;
+
+/// Horizontal lattice coordinates stay within this many voxels of the origin.
+pub const REACH: i32 = 1 << 18;
 
 /// Samples along one side of a brick.
 pub const BRICK: i32 = 8;

@@ -12,7 +12,7 @@ use bevy::mesh::{
 
 use super::MaterialColors;
 use super::palettes::{Arranged, Palettes};
-use crate::ground::{ColumnMaterial, Ground};
+use crate::ground::{ColumnMaterial, Ground, RowBuffer};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex};
 use crate::terrain::{SurfaceDraft, TileUpdate, World};
@@ -93,9 +93,9 @@ impl MeshBuilder {
         let (width, rings) = ((high.x - low.x + 1).max(0) as usize, draft.rings.vertices());
         let columns = width * (high.z - low.z + 1).max(0) as usize;
         let mut arrays = Arrays::with_capacity(columns + rings.len(), self);
-        let mut normals = Vec::with_capacity(width);
+        let mut buffer = RowBuffer::default();
         for z in low.z..=high.z {
-            arrays.push_columns(z - low.z, draft.ground.row(Column::new(low.x, z), width, &mut normals));
+            arrays.push_columns(z - low.z, draft.ground.row(Column::new(low.x, z), width, &mut buffer));
         }
         arrays.push(rings, origin);
         arrays.finish(draft.indices())

@@ -16,7 +16,7 @@ use super::indices::Indices;
 use super::mask::Borders;
 use super::mesh::{MaterialMix, SurfaceMesh, Vertex};
 use super::vertex::{DIAGONAL, WorldView, sheet_vertex};
-use crate::ground::Ground;
+use crate::ground::{Ground, RowBuffer};
 use crate::lattice::{ChunkGrid, Column, ONE, SNAP, TilePos};
 
 pub use super::cell_outline::fan;
@@ -36,11 +36,11 @@ pub fn mesh(world: &WorldView, tile: TilePos) -> SurfaceMesh {
 /// The vertices of a tile: those of its columns, x fastest, then those of its rings.
 pub fn vertices(ground: &Ground, grid: ChunkGrid, tile: TilePos, rings: &Rings) -> Vec<Vertex> {
     let (low, high) = grid.tile_cells(tile);
-    let (columns, mut normals) = (column_count(low, high) as usize, Vec::new());
+    let (columns, mut buffer) = (column_count(low, high) as usize, RowBuffer::default());
     let mut vertices = Vec::with_capacity(columns + rings.vertices.len());
     let width = columns / (high.z - low.z + 1).max(1) as usize;
     for z in low.z..=high.z {
-        let row = ground.row(Column::new(low.x, z), width, &mut normals);
+        let row = ground.row(Column::new(low.x, z), width, &mut buffer);
         vertices.extend((0..).zip(row).map(|(x, (height, normal, material))| Vertex {
             position: IVec3::new(x * SNAP, height * (SNAP / ONE), (z - low.z) * SNAP),
             normal,

@@ -6,7 +6,7 @@ use super::ray::{NEAR, Ray, Triangle};
 use super::triangles::for_triangles;
 use super::world::World;
 use crate::ground::MaterialId;
-use crate::lattice::{Column, LIMIT, LatticeBox};
+use crate::lattice::{Column, LIMIT, LatticeBox, REACH};
 
 /// Where a ray meets the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,7 +163,7 @@ impl World {
     /// Whether all samples around the place are solid. Faster than [`is_solid`](Self::is_solid), which is also true nearer to
     /// the surface.
     pub fn is_buried(&self, place: DVec3) -> bool {
-        let limit = DVec3::splat(f64::from(LIMIT));
+        let limit = DVec3::splat(f64::from(LIMIT)).with_x(f64::from(REACH)).with_z(f64::from(REACH));
         let cell = place.clamp(-limit, limit).floor().as_ivec3();
         let samples = self.samples();
         let mut corners = LatticeBox { min: cell, max: cell + 1 }.points();
@@ -182,7 +182,7 @@ impl World {
     /// The material of the solid lattice point nearest to a place on the surface.
     pub fn material_under(&self, place: DVec3) -> MaterialId {
         let samples = self.samples();
-        let far = DVec3::splat(2.0 * f64::from(LIMIT));
+        let far = DVec3::splat(2.0 * f64::from(REACH));
         let place = place.clamp(-far, far);
         // The corners of the cell around it; of all cells around it, where it lies between them.
         let (low, high) = ((place - NEAR).ceil().as_ivec3() - 1, (place + NEAR).floor().as_ivec3() + 1);

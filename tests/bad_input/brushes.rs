@@ -32,6 +32,8 @@ pub fn number() -> impl Strategy<Value = f32> {
         limit,
         -limit,
         limit + 0.01,
+        8.0 * limit,
+        8.0 * limit + 0.1,
         1024.0,
         1024.1,
         16_777_216.0,

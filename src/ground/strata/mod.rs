@@ -32,6 +32,7 @@ pub(crate) use records::{BED, FILL, POCKET, VEIN};
 #[cfg(feature = "cuda")]
 pub(crate) use records::{BeddingRecord, StratumRecord};
 pub(crate) use steep::SteepCells;
+pub(in crate::ground) use steep::steep_word;
 
 /// Most strata of a ground.
 pub const MAX_STRATA: usize = 32;

@@ -6,6 +6,8 @@ use glam::IVec3;
 use rayon::prelude::*;
 
 use super::in_brick::{self, Voxel};
+use super::records::LoneVoxel;
+use super::steep::Steep;
 use super::{OwnMaterials, SteepCells, Strata, StrataRecords};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
@@ -37,8 +39,8 @@ impl Ground {
     /// The same ground with strata. Voxels that no stratum holds keep what [`Self::with_materials`] gave them, before or
     /// after.
     ///
-    /// Nothing is stored for a voxel, one byte for a column, and one bit for a cell if any is steep. Counts for
-    /// [`Self::hash`].
+    /// Nothing is stored for a voxel, one byte for a column, and one bit for a cell if any is steep; with a
+    /// [source](Self::from_source), only for columns and cells of the pages it keeps. Counts for [`Self::hash`].
     ///
     /// # Errors
     /// [`GroundError::Parameter`] names the stratum by its number, and the value; [`GroundError::Memory`] if the machine
@@ -104,6 +106,9 @@ impl Ground {
             return Ok(self);
         }
         let bare = self.map_below(|below| Below { tops: Box::default(), steep: None, ..below });
+        if bare.pages().is_some() {
+            return Ok(bare);
+        }
         let tops = bare.tops()?.into_boxed_slice();
         let ground = bare.map_below(|below| Below { tops, ..below });
         let steep = SteepCells::new(&ground)?.map(Box::new);
@@ -119,7 +124,7 @@ impl Ground {
                 for (z, row) in rows.chunks_mut(extent.row_len()).enumerate() {
                     for (x, top) in row.iter_mut().enumerate().skip(low).take(8) {
                         let column = Column::new(x as i32, (band * 8 + z) as i32);
-                        *top = self.material(column.at(ceil(self.height(column)) - 1));
+                        *top = self.computed_top(column);
                     }
                 }
             }
@@ -152,20 +157,49 @@ impl Ground {
     /// otherwise the column's own, base and overlay blended.
     pub fn surface_material(&self, column: Column) -> ColumnMaterial {
         match self.below() {
-            Some(below) => ColumnMaterial::solid(below.tops[self.extent().index(column)]),
+            Some(below) => match below.tops.get(self.extent().index(column)) {
+                Some(&top) => ColumnMaterial::solid(top),
+                None => ColumnMaterial::solid(self.top_on_demand(column)),
+            },
             None => self.column_material(column),
         }
     }
 
     /// The tops of some columns, one after the other, if there are strata.
     pub(in crate::ground) fn tops_of(&self, columns: std::ops::Range<usize>) -> Option<&[MaterialId]> {
-        self.below().map(|below| &below.tops[columns])
+        self.below().filter(|below| !below.tops.is_empty()).map(|below| &below.tops[columns])
+    }
+
+    /// The material of the highest solid voxel of a column of the world, computed anew.
+    pub(in crate::ground) fn computed_top(&self, column: Column) -> MaterialId {
+        self.material(column.at(ceil(self.height(column)) - 1))
+    }
+
+    /// The same of a column whose height and slope are known, without asking for any other.
+    pub(in crate::ground) fn lone_top(
+        &self,
+        (column, height, squared_slope): (Column, i32, u64),
+        of_column: ColumnMaterial,
+    ) -> MaterialId {
+        let y = ceil(height) - 1;
+        let depth = height - y * ONE - 1;
+        let found = self.below().and_then(|below| match &below.own {
+            OwnMaterials::Strata { records, .. } => {
+                let lone = LoneVoxel { column, y, depth, squared_slope };
+                records.strata.iter().find(|record| records.holds(record, self, lone)).map(|record| MaterialId(record.material as u8))
+            }
+            OwnMaterials::Function { function, .. } => function(column.at(y), depth),
+        });
+        found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| of_column.at_distance(-depth - 1))
     }
 
     /// The cells whose tops do not show all materials of their face; `None` if there are none, as on any ground whose materials
     /// are those of its columns.
-    pub(crate) fn steep_cells(&self) -> Option<&SteepCells> {
-        self.below()?.steep.as_deref()
+    pub(crate) fn steep_cells(&self) -> Option<Steep<'_>> {
+        match &self.below()?.steep {
+            Some(cells) => Some(Steep::Resident(cells)),
+            None => self.pages().map(|_| Steep::OnDemand(self)),
+        }
     }
 
     /// The word for strata in the hash.

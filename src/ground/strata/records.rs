@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::{Pod, Zeroable};
+use glam::IVec2;
 
 use super::value_noise::{ValueNoise, both_within, exceeded_by};
 use super::{Interval, Strata, Stratum, StratumBody, StratumBounds};
@@ -186,6 +187,11 @@ impl ColumnCondition {
 
     /// May the stratum be in this column of the world?
     pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
+        self.admits_slope(ground, column, || ground.squared_slope(column))
+    }
+
+    /// The same, given the square of its slope.
+    fn admits_slope(&self, ground: &Ground, column: Column, squared_slope: impl FnOnce() -> u64) -> bool {
         let is_inside = match &self.bounds {
             StratumBounds::World => true,
             StratumBounds::Box(LatticeBox { min, max }) => {
@@ -193,7 +199,7 @@ impl ColumnCondition {
             }
             StratumBounds::Image(image) => ground.stretched(image, column).grey() >= 32_768.0,
         };
-        is_inside && self.slope.is_none_or(|[from, to]| (from..to).contains(&ground.squared_slope(column)))
+        is_inside && self.slope.is_none_or(|[from, to]| (from..to).contains(&squared_slope()))
     }
 
     fn words(&self) -> Vec<u64> {
@@ -258,30 +264,43 @@ impl StrataRecords {
         size_of::<Self>() + self.strata.capacity() * size_of::<StratumRecord>() + conditions
     }
 
-    /// Does a stratum hold the voxel? By definition, without what is known of a brick: `in_brick` gives the
-    /// same.
-    #[cfg(test)]
-    pub fn holds(&self, number: usize, ground: &Ground, point: glam::IVec3) -> bool {
-        use glam::{IVec2, IVec3};
-        let (record, column) = (&self.strata[number], ground.nearest_column(point));
-        let place = IVec2::new(column.x, column.z);
-        let at = IVec3::new(column.x, point.y, column.z);
-        let height = point.y * ONE;
-        let depth = (ground.height(column) - height - 1).max(0);
+    /// Does a stratum hold the voxel? By definition, without what is known of a brick: `in_brick` gives the same.
+    pub fn holds(&self, record: &StratumRecord, ground: &Ground, voxel: LoneVoxel) -> bool {
+        let LoneVoxel { column, y, depth, squared_slope } = voxel;
+        let (place, at) = (IVec2::new(column.x, column.z), column.at(y));
+        let height = y * ONE;
         let flat = |noise: ValueNoise| noise.flat_within(&noise.flat_corners(place), place);
-        let moved = record.moved(flat(record.roughness()));
-        let noise = [record.noise(), record.second_noise()].map(|noise| noise.at(at));
-        let fold = self.bedding.fold_at(flat(self.bedding.noise()));
+        let moved = if record.rough == 0 { 0 } else { record.moved(flat(record.roughness())) };
+        let is_admitted = || {
+            let own = self.conditions.get(record.condition.trailing_zeros() as usize);
+            own.is_none_or(|own| own.admits_slope(ground, column, || squared_slope))
+        };
         (record.depth[0]..record.depth[1]).contains(&(depth + moved))
             && (record.height[0]..record.height[1]).contains(&(height + moved))
-            && (record.ys[0]..record.ys[1]).contains(&point.y)
-            && (record.condition == 0 || self.conditions_of(ground, column) & record.condition != 0)
+            && (record.ys[0]..record.ys[1]).contains(&y)
+            && is_admitted()
             && match record.body {
-                BED => record
-                    .is_in_bed(i64::from(height + moved) + self.bedding.dip_at(column) + i64::from(fold)),
-                VEIN => noise.iter().all(|noise| noise.abs() < record.limit),
-                POCKET => noise[0] > record.limit,
+                BED => {
+                    let fold = self.bedding.fold_at(flat(self.bedding.noise()));
+                    record.is_in_bed(i64::from(height + moved) + self.bedding.dip_at(column) + i64::from(fold))
+                }
+                VEIN => {
+                    let is_within = |noise: ValueNoise| noise.at(at).abs() < record.limit;
+                    is_within(record.noise()) && is_within(record.second_noise())
+                }
+                POCKET => record.noise().at(at) > record.limit,
                 _ => true,
             }
     }
+}
+
+/// A voxel in a column of the world, with all that strata ask of its place.
+#[derive(Clone, Copy)]
+pub(crate) struct LoneVoxel {
+    pub column: Column,
+    pub y: i32,
+    /// As strata count it, in 1/256 voxel: 0 above the surface.
+    pub depth: i32,
+    /// As [`Ground::squared_slope`] gives it.
+    pub squared_slope: u64,
 }

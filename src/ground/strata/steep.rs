@@ -44,18 +44,35 @@ impl SteepCells {
         place.and_then(|(x, z)| self.words.get(z * self.across + x)).copied().unwrap_or_default()
     }
 
-    /// Is this cell steep?
-    pub fn contains(&self, cell: Column) -> bool {
-        self.word((cell.x >> 3, cell.z >> 3)) >> ((cell.z & 7) << 3 | cell.x & 7) & 1 == 1
-    }
-
     pub(super) fn bytes(&self) -> usize {
         size_of::<Self>() + size_of_val(self.words.as_slice())
     }
 }
 
+/// Which cells of a ground are steep, in memory or computed on demand.
+#[derive(Clone, Copy)]
+pub(crate) enum Steep<'a> {
+    Resident(&'a SteepCells),
+    OnDemand(&'a Ground),
+}
+
+impl Steep<'_> {
+    /// The steep ones of the 8x8 cells from (8 x, 8 z) on; there are none beyond the rim.
+    pub fn word(self, (x, z): (i32, i32)) -> u64 {
+        match self {
+            Self::Resident(cells) => cells.word((x, z)),
+            Self::OnDemand(ground) => ground.steep_word_on_demand(Column::new(x.saturating_mul(8), z.saturating_mul(8))),
+        }
+    }
+
+    /// Is this cell steep?
+    pub fn contains(self, cell: Column) -> bool {
+        self.word((cell.x >> 3, cell.z >> 3)) >> ((cell.z & 7) << 3 | cell.x & 7) & 1 == 1
+    }
+}
+
 /// The steep ones of the 8x8 cells from `low` on that lie in the world.
-fn steep_word(ground: &Ground, low: Column) -> u64 {
+pub(in crate::ground) fn steep_word(ground: &Ground, low: Column) -> u64 {
     // The lowest air of each column.
     let levels = ground.heights::<9>(low).map(|row| row.map(ceil));
     let is_steep = |at: Column| {

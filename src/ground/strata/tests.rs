@@ -3,6 +3,7 @@
 use fastrand::Rng;
 use glam::IVec3;
 
+use super::records::LoneVoxel;
 use super::*;
 use crate::ground::{ColumnMaterial, GreyImage, Ground, MaterialControl, NoiseHeights};
 use crate::lattice::{Column, ONE};
@@ -33,7 +34,14 @@ fn bricks_hold_what_the_definition_says() {
         let records = ground.strata_records().unwrap();
         let low = IVec3::new(rng.i32(-12..40), rng.i32(-30..24), rng.i32(-12..40));
         for point in (LatticeBox { min: low, max: low + 12 }).points() {
-            let holding = (0..strata.strata.len()).find(|&number| records.holds(number, &ground, point));
+            let column = ground.nearest_column(point);
+            let voxel = LoneVoxel {
+                column,
+                y: point.y,
+                depth: (ground.height(column) - point.y * ONE - 1).max(0),
+                squared_slope: ground.squared_slope(column),
+            };
+            let holding = records.strata.iter().position(|record| records.holds(record, &ground, voxel));
             let expected = match holding {
                 Some(number) => strata.strata[number].material,
                 None => ground.column_material(Column::of(point)).at_distance(ground.distance(point)),
