@@ -24,6 +24,11 @@
 //! Vertices of neighbouring parts are not welded. `report.json` has the hash, scenarios, counts, bytes, seams and
 //! timings, and for each line of the edits the voxels by material: `removed`, `added`, `painted`, `refused`.
 //!
+//! With `--eye X Y Z`, in voxels, the mesh is what would be drawn from there with levels of detail, on a picture
+//! `--screen-height` pixels high with an angle of view of 45 degrees; with `--random-cut SEED` any squares that may be
+//! drawn together. Then `mesh.obj` has a group for each square, `node_X_Z_level_L`, `report.json` has nodes and triangles by
+//! level in `levels`, and `seams` is the report of what was written.
+//!
 //! | exit code | when |
 //! | --- | --- |
 //! | 0 | all files were written; edits that lie outside the world are named in the report |
@@ -34,6 +39,7 @@
 
 #[path = "../shared/brush_lines.rs"]
 mod brush_lines;
+mod levels;
 mod obj;
 #[path = "../shared/output.rs"]
 mod output;
@@ -58,6 +64,7 @@ use clap::Parser;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use levels::Levels;
 use report::{Report, milliseconds};
 use staging::Staging;
 
@@ -89,6 +96,15 @@ struct Args {
     /// Cells along a chunk's side, 8 to 128
     #[arg(long, value_name = "N", default_value_t = 32)]
     chunk_size: u32,
+    /// Export what would be drawn from here, in voxels, with levels of detail
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    eye: Vec<f32>,
+    /// Pixels of the picture's height, for an angle of view of 45 degrees
+    #[arg(long, value_name = "PIXELS", default_value_t = 1440, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    screen_height: u32,
+    /// Export a random cut of the quadtree
+    #[arg(long, value_name = "SEED", conflicts_with = "eye")]
+    random_cut: Option<u64>,
     /// Edits in one transaction; the result is the same, only the timings differ
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     batch: u32,
@@ -154,11 +170,12 @@ fn export(args: &Args) -> Result<Report, ExportError> {
     let load_ms = milliseconds(start);
 
     let played = play::play(&mut terrain, &edits, args.batch as usize);
-    let mut report = Report::new(terrain.world(), &played);
+    let levels = Levels::new(args, terrain.world());
+    let mut report = Report::new(terrain.world(), &played, levels.as_ref());
     report.timings.load_ms = load_ms;
 
     let probes = probes.map(|points| probes::answer(terrain.world().ground(), &points));
-    write(args, terrain.world(), &mut report, probes.as_deref())
+    write(args, terrain.world(), levels.as_ref(), &mut report, probes.as_deref())
         .map_err(|reason| ExportError::Write { path: args.out.clone(), reason })?;
     Ok(report)
 }
@@ -166,12 +183,16 @@ fn export(args: &Args) -> Result<Report, ExportError> {
 fn write(
     args: &Args,
     world: &World,
+    levels: Option<&Levels>,
     report: &mut Report,
     probes: Option<&[probes::Probe]>,
 ) -> io::Result<()> {
     let start = Instant::now();
     let mut staging = Staging::new(&args.out)?;
-    report.bytes.mesh_obj = staging.write("mesh.obj", |out| obj::write(world, out))?;
+    report.bytes.mesh_obj = staging.write("mesh.obj", |out| match levels {
+        Some(levels) => obj::write_levels(levels, out),
+        None => obj::write(world, out),
+    })?;
     report.timings.write_ms = milliseconds(start);
     staging.write("report.json", |out| write_json(out, report))?;
     if let Some(probes) = probes {

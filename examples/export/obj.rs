@@ -7,17 +7,29 @@ use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{Drawn, World};
 use glam::{I64Vec3, IVec3};
 
+use crate::levels::Levels;
+
 /// Writes all tiles and chunks of a world, one group each, and returns the number of bytes.
 pub fn write(world: &World, out: &mut impl Write) -> io::Result<u64> {
-    let mut obj = ObjWriter { out, text: String::new(), vertices: 0, bytes: 0 };
-    obj.text.push_str(
-        "# bevy_burrow: y is up, one unit is one voxel, triangles are counter-clockwise from the air\n",
-    );
-    for (drawn, mesh) in world.drawn().filter(|(_, mesh)| !mesh.is_empty()) {
-        obj.group(drawn, &mesh, world.origin(drawn))?;
+    let mut obj = ObjWriter::new(out);
+    for (drawn, mesh) in world.drawn() {
+        let name = match drawn {
+            Drawn::Tile(tile) => format!("tile_{}_{}", tile.x, tile.z),
+            Drawn::Chunk(chunk) => format!("chunk_{}_{}_{}", chunk.x, chunk.y, chunk.z),
+        };
+        obj.group(&name, &mesh, world.origin(drawn))?;
     }
-    obj.flush()?;
-    Ok(obj.bytes)
+    obj.finish()
+}
+
+/// Writes all nodes of a cut, one group each, and returns the number of bytes.
+pub fn write_levels(levels: &Levels, out: &mut impl Write) -> io::Result<u64> {
+    let mut obj = ObjWriter::new(out);
+    for (node, mesh) in &levels.nodes {
+        let name = format!("node_{}_{}_level_{}", node.x, node.z, node.level);
+        obj.group(&name, mesh, levels.cut.grid().columns(*node).0.at(0))?;
+    }
+    obj.finish()
 }
 
 struct ObjWriter<'a, W> {
@@ -29,12 +41,19 @@ struct ObjWriter<'a, W> {
     bytes: u64,
 }
 
-impl<W: Write> ObjWriter<'_, W> {
-    fn group(&mut self, drawn: Drawn, mesh: &SurfaceMesh, origin: IVec3) -> io::Result<()> {
-        self.text += &match drawn {
-            Drawn::Tile(tile) => format!("g tile_{}_{}\n", tile.x, tile.z),
-            Drawn::Chunk(chunk) => format!("g chunk_{}_{}_{}\n", chunk.x, chunk.y, chunk.z),
-        };
+impl<'a, W: Write> ObjWriter<'a, W> {
+    fn new(out: &'a mut W) -> Self {
+        let text =
+            "# bevy_burrow: y is up, one unit is one voxel, triangles are counter-clockwise from the air\n";
+        Self { out, text: text.into(), vertices: 0, bytes: 0 }
+    }
+
+    /// Writes a mesh; nothing if it is empty.
+    fn group(&mut self, name: &str, mesh: &SurfaceMesh, origin: IVec3) -> io::Result<()> {
+        if mesh.is_empty() {
+            return Ok(());
+        }
+        self.text += &format!("g {name}\n");
         // A tile still contains the vertices of ground that was dug away; only those in use are written.
         let mut numbers = vec![0; mesh.vertices.len()];
         let origin = origin.as_i64vec3() * i64::from(SNAP);
@@ -51,6 +70,11 @@ impl<W: Write> ObjWriter<'_, W> {
             self.text += &format!("f {a} {b} {c}\n");
         }
         self.flush()
+    }
+
+    fn finish(mut self) -> io::Result<u64> {
+        self.flush()?;
+        Ok(self.bytes)
     }
 
     fn vertex(&mut self, steps: I64Vec3) {

@@ -10,6 +10,7 @@ use bevy_burrow::terrain::{Memory, Receipt, ScenarioCounts, World};
 use bevy_burrow::volume::{MaterialCounts, Refused};
 use serde::Serialize;
 
+use crate::levels::{LevelFigures, Levels};
 use crate::play::Played;
 
 /// The content of `report.json`. Everything except `timings` is the same on every machine for the same input.
@@ -35,6 +36,9 @@ pub struct Report {
     pub volumetric_cells: usize,
     pub bytes: ByteFigures,
     pub seams: SeamFigures,
+    /// What is drawn at each level, if levels of detail were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub levels: Option<Vec<LevelFigures>>,
     pub timings: Timings,
 }
 
@@ -132,10 +136,11 @@ pub struct Timings {
 
 impl Report {
     /// Computes the report of a world. The length of `mesh.obj` and the other timings are filled in later.
-    pub fn new(world: &World, played: &Played) -> Self {
+    pub fn new(world: &World, played: &Played, levels: Option<&Levels>) -> Self {
         let mut timings = Timings::transactions(played);
         let start = Instant::now();
-        let seams = SeamFigures::from(world.check_seams());
+        let seams =
+            SeamFigures::from(levels.map_or_else(|| world.check_seams(), |own| own.check_seams(world)));
         timings.check_ms = milliseconds(start);
 
         let mut scenarios = ScenarioCounts::default();
@@ -163,6 +168,7 @@ impl Report {
             volumetric_cells: world.mask().len(),
             bytes: ByteFigures { world: memory, edits: memory.edits(), mesh_obj: 0 },
             seams,
+            levels: levels.map(Levels::figures),
             timings,
         }
     }

@@ -412,6 +412,45 @@ fn files_get_their_names_together_or_not_at_all() {
 }
 
 #[test]
+fn what_an_eye_sees_is_closed_and_coarser_far_away() {
+    let folder = TempFolder::new();
+    folder.put_hills();
+    let edits = folder.put("edits.jsonl", DIG);
+    let full = folder.run(&edits, &[]).expect("a valid command");
+    assert!(full.get("levels").is_none());
+    let more = ["--chunk-size", "8", "--eye", "4", "40", "4", "--screen-height", "40"];
+    let report = folder.run(&edits, &more).expect("a valid command");
+    let levels = report["levels"].as_array().expect("levels");
+    let of =
+        |name: &str| levels.iter().map(|level| level[name].as_u64().expect("a number")).collect::<Vec<_>>();
+    assert!(of("nodes").iter().filter(|&&count| count > 0).count() > 1, "{levels:?}");
+    assert_eq!(of("triangles").iter().sum::<u64>(), report["seams"]["triangles"].as_u64().expect("a number"));
+    assert_eq!((&report["hash"], &report["seams"]["closed"]), (&full["hash"], &Value::Bool(true)));
+    let mesh = folder.mesh();
+    assert_eq!(mesh.groups.len() as u64, of("nodes").iter().sum::<u64>());
+    assert!(mesh.groups.iter().any(|name| name.ends_with("level_0")), "{:?}", mesh.groups);
+    assert!(mesh.loose_edges(40.0, 33.0).is_empty());
+}
+
+#[test]
+fn random_cuts_are_closed() {
+    let folder = TempFolder::new();
+    folder.put_hills();
+    let edits = folder.put("edits.jsonl", DIG);
+    let mut seen = std::collections::BTreeSet::new();
+    for seed in ["1", "2", "3", "4"] {
+        let report =
+            folder.run(&edits, &["--chunk-size", "8", "--random-cut", seed]).expect("a valid command");
+        assert_eq!(report["seams"]["closed"], Value::Bool(true), "{seed}");
+        seen.insert(report["levels"].to_string());
+        assert!(folder.mesh().loose_edges(40.0, 33.0).is_empty(), "{seed}");
+    }
+    assert!(seen.len() > 1, "all cuts are alike");
+    let both = folder.run(&edits, &["--random-cut", "1", "--eye", "1", "2", "3"]);
+    assert_eq!(both.expect_err("which one?").0, 2);
+}
+
+#[test]
 fn positions_are_written_exactly() {
     for (steps, text) in
         [(0, "0"), (4096, "1"), (-4096, "-1"), (1, "0.000244140625"), (-1, "-0.000244140625"), (6144, "1.5")]

@@ -378,12 +378,16 @@ fn show_nodes(
     for BuiltNode { node, mesh, shown, .. } in nodes {
         if let Some(mesh) = mesh {
             let child = entities.node(commands, terrain, world, node);
-            add(mesh).into_iter().for_each(|mesh| drop(commands.entity(child).try_insert(mesh)));
+            if let Some(mesh) = add(mesh) {
+                commands.entity(child).try_insert(mesh);
+            }
         }
         for BuiltSurface { drawn, mesh, shown, actions, .. } in shown {
             let child = entities.get(commands, drawn);
             let child = child.unwrap_or_else(|| entities.spawn(commands, terrain, world, drawn));
-            add(mesh).into_iter().for_each(|mesh| drop(commands.entity(child).try_insert(mesh)));
+            if let Some(mesh) = add(mesh) {
+                commands.entity(child).try_insert(mesh);
+            }
             apply_actions(commands, child, shown, actions);
         }
     }
