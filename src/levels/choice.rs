@@ -124,7 +124,8 @@ impl Choice {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::cut::tests::{assert_is_cut, dice};
+    use super::super::cut::dice;
+    use super::super::cut::tests::assert_is_cut;
     use super::*;
     use crate::lattice::ChunkGrid;
 

@@ -144,7 +144,6 @@ pub(super) fn dice(node: Node, seed: u64) -> u64 {
 pub(super) mod tests {
     use proptest::prelude::*;
 
-    pub use super::dice;
     use super::*;
     use crate::lattice::ChunkGrid;
 

@@ -110,7 +110,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::LevelGrid;
-    use super::super::cut::tests::{assert_is_cut, dice, random_cut};
+    use super::super::cut::dice;
+    use super::super::cut::tests::{assert_is_cut, random_cut};
     use super::*;
     use crate::lattice::ChunkGrid;
 

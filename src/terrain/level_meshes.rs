@@ -42,7 +42,8 @@ impl GroundFacts {
                 if half == stride {
                     continue;
                 }
-                let middles = [(a, b, (0, half)), (b, c, (half, stride)), (c, d, (stride, half)), (d, a, (half, 0))];
+                let middles =
+                    [(a, b, (0, half)), (b, c, (half, stride)), (c, d, (stride, half)), (d, a, (half, 0))];
                 for (from, to, (dx, dz)) in middles.into_iter().chain([(a, c, (half, half))]) {
                     error = error.max((from + to).abs_diff(2 * height(x + dx, z + dz)));
                 }

@@ -77,7 +77,12 @@ pub fn check(world: &World, cut: &Cut, drawings: &Drawings) -> Counts {
                 let bits = |vertex: Vertex| vertex.normal.to_array().map(|part| (part + 0.0).to_bits());
                 if bits(other) != bits(vertex) {
                     if counts.normal_jumps == 0 {
-                        println!("normals {} and {} at {}", other.normal, vertex.normal, place.as_dvec3() / 4096.0);
+                        println!(
+                            "normals {} and {} at {}",
+                            other.normal,
+                            vertex.normal,
+                            place.as_dvec3() / 4096.0
+                        );
                     }
                     counts.normal_jumps += 1;
                 }

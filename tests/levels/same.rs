@@ -40,13 +40,20 @@ fn when_a_node_splits_only_nodes_that_touch_it_change() {
             let is_same = is_same(mesh, now);
             let shared = cut.touching(*other).contains(&node);
             assert!(shared || is_same, "world {index}: {other:?} changed though {node:?} does not touch it");
-            let [size, low] = [node, *other].map(|node| cut.grid().columns(node)).map(|(low, high)| [low, high]);
+            let [size, low] =
+                [node, *other].map(|node| cut.grid().columns(node)).map(|(low, high)| [low, high]);
             let overlap = |a: [i32; 2], b: [i32; 2]| a[1].min(b[1]) - a[0].max(b[0]);
             let along = [
                 overlap([size[0].x, size[1].x], [low[0].x, low[1].x]),
                 overlap([size[0].z, size[1].z], [low[0].z, low[1].z]),
             ];
-            let kind = if !shared { 0 } else if along == [0, 0] { 1 } else { 2 };
+            let kind = if !shared {
+                0
+            } else if along == [0, 0] {
+                1
+            } else {
+                2
+            };
             counts.lock().expect("no panic")[kind][usize::from(!is_same)] += 1;
         }
     });

@@ -3,9 +3,9 @@
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
+use crate::ground::Ground;
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{Indices, MaterialMix, SurfaceMesh, Vertex};
-use crate::ground::Ground;
 
 /// A vertex by its number.
 pub(super) type Number = u32;
@@ -23,9 +23,8 @@ pub(super) struct Builder {
 impl Builder {
     /// With the columns of a node whose cells have this stride.
     pub fn new(ground: &Ground, low: Column, high: Column, stride: i32) -> Self {
-        let along = |low: i32, high: i32| {
-            (low..high).step_by(stride as usize).chain([high]).collect::<Vec<i32>>()
-        };
+        let along =
+            |low: i32, high: i32| (low..high).step_by(stride as usize).chain([high]).collect::<Vec<i32>>();
         let columns = [along(low.x, high.x), along(low.z, high.z)];
         let [xs, zs] = &columns;
         let mut vertices = Vec::with_capacity(xs.len() * zs.len() + 4 * (xs.len() + zs.len()));

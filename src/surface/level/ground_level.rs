@@ -88,13 +88,15 @@ fn blocks(view: &LevelView, world: &WorldView, tile: TilePos) -> Vec<Block> {
     for brick in near.positions() {
         bricks.extend(LatticeBox { min: brick.0 - 1, max: brick.0 }.points().map(BrickPos));
     }
-    for (x, z) in (low.x >> 3..=(high.x - 1) >> 3).flat_map(|x| (low.z >> 3..=(high.z - 1) >> 3).map(move |z| (x, z)))
+    for (x, z) in
+        (low.x >> 3..=(high.x - 1) >> 3).flat_map(|x| (low.z >> 3..=(high.z - 1) >> 3).map(move |z| (x, z)))
     {
         let mut cells = world.mask.word((x, z));
         while cells != 0 {
             let bit = cells.trailing_zeros() as i32;
             cells &= cells - 1;
-            let sheet = cell_sheet(world.samples.ground(), Column::new(x * 8 + (bit & 7), z * 8 + (bit >> 3)));
+            let sheet =
+                cell_sheet(world.samples.ground(), Column::new(x * 8 + (bit & 7), z * 8 + (bit >> 3)));
             bricks.extend((sheet.start >> 3..=(sheet.end - 1) >> 3).map(|y| BrickPos(IVec3::new(x, y, z))));
         }
     }

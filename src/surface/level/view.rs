@@ -64,7 +64,10 @@ impl<'a> LevelView<'a> {
     /// The level of the node that draws a cell; `None` outside the world.
     pub(super) fn level_at(&self, cell: Column) -> Option<u8> {
         let grid = self.world.grid;
-        grid.has_cell(cell).then(|| self.cut.node_at(grid.tile_of_cell(cell))).flatten().map(|node| node.level)
+        grid.has_cell(cell)
+            .then(|| self.cut.node_at(grid.tile_of_cell(cell)))
+            .flatten()
+            .map(|node| node.level)
     }
 
     /// Lattice y of the lowest points of the cubes of this stride that the pristine surface crosses over some columns; they end

@@ -24,8 +24,7 @@ impl<'a> Volumetric<'a> {
         let (stride, last) = (node.stride(), view.last());
         // A cell beside the node may be promoted by an interval twice its width.
         let by = 2 * stride;
-        let clamp =
-            |column: Column| Column::new(column.x.clamp(0, last.x), column.z.clamp(0, last.z));
+        let clamp = |column: Column| Column::new(column.x.clamp(0, last.x), column.z.clamp(0, last.z));
         let around = [clamp(low.offset(-by, -by)), clamp(high.offset(by, by))];
         let near = NearBricks::new(&view.world.samples, &view.stacks, around, (stride / 2).max(1), last);
         Self { view: *view, near, known: FxHashMap::default() }
@@ -66,7 +65,10 @@ impl<'a> Volumetric<'a> {
     }
 
     fn is_promoted_itself(&self, cell: Cell) -> bool {
-        SIDES.into_iter().filter_map(|side| self.interval(cell, side)).any(|at| self.is_interval_disturbed(at))
+        SIDES
+            .into_iter()
+            .filter_map(|side| self.interval(cell, side))
+            .any(|at| self.is_interval_disturbed(at))
     }
 
     /// The interval at a cell's side, if cells across it are of another level.

@@ -46,13 +46,10 @@ impl Drawing<'_> {
         let at = |drawing: &Self, number: Number| drawing.builder.position(number)[along];
         let (mut i, mut j) = (0, 0);
         while i + 1 < low.len() || j + 1 < high.len() {
-            let is_low = i + 1 < low.len()
-                && (j + 1 == high.len() || at(self, low[i + 1]) <= at(self, high[j + 1]));
-            let mut triangle = if is_low {
-                [high[j], low[i + 1], low[i]]
-            } else {
-                [high[j], high[j + 1], low[i]]
-            };
+            let is_low =
+                i + 1 < low.len() && (j + 1 == high.len() || at(self, low[i + 1]) <= at(self, high[j + 1]));
+            let mut triangle =
+                if is_low { [high[j], low[i + 1], low[i]] } else { [high[j], high[j + 1], low[i]] };
             (i, j) = if is_low { (i + 1, j) } else { (i, j + 1) };
             // Triangles are wound for a plane across z; on one across x the axes turn the other way.
             if interval.axis == 0 {
@@ -94,9 +91,8 @@ impl Drawing<'_> {
         let (coarse, mut segments) = (interval.coarse(), Vec::new());
         let steps = || (0..coarse).step_by(stride as usize);
         for (along, up) in steps().flat_map(|along| steps().map(move |up| (along, up))) {
-            let corner = |dx: i32, dy: i32| {
-                interval.point(interval.start + along + dx * stride, y + up + dy * stride)
-            };
+            let corner =
+                |dx: i32, dy: i32| interval.point(interval.start + along + dx * stride, y + up + dy * stride);
             self.square([corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], &mut segments);
         }
         segments
@@ -111,9 +107,8 @@ impl Drawing<'_> {
         for i in enters {
             // From the edge where solid ends to that where it begins.
             let leaves = (i..i + 4).find(|&j| is_ambiguous || !solid[(j + 1) % 4]).unwrap_or(i) % 4;
-            let [from, to] = [leaves, (i + 3) % 4].map(|edge| {
-                self.wall_number(Edge::between(corners[edge], corners[(edge + 1) % 4]))
-            });
+            let [from, to] = [leaves, (i + 3) % 4]
+                .map(|edge| self.wall_number(Edge::between(corners[edge], corners[(edge + 1) % 4])));
             segments.push((from, to));
         }
     }
@@ -129,9 +124,8 @@ impl Drawing<'_> {
     /// On an edge of a square, alike from both squares that have it: the last fine crossing joins the coarse one, others pair up.
     fn link(&mut self, [low, middle, high]: [IVec3; 3], links: &mut Vec<Segment>) {
         let mut crossings = |line: &[IVec3]| -> Vec<Number> {
-            let crossed = line.windows(2).filter(|ends| {
-                self.view.is_solid(ends[0]) != self.view.is_solid(ends[1])
-            });
+            let crossed =
+                line.windows(2).filter(|ends| self.view.is_solid(ends[0]) != self.view.is_solid(ends[1]));
             let edges: Vec<Edge> = crossed.map(|ends| Edge::between(ends[0], ends[1])).collect();
             edges.into_iter().map(|edge| self.wall_number(edge)).collect()
         };
