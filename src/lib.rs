@@ -229,8 +229,8 @@
 //! # Rooms
 //!
 //! From the ground up; a lower one never imports a higher one, and only `plugin` and above know Bevy:
-//! [`lattice`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`, `physics`,
-//! `panel`, `debug`. Beside them stands [`dense`], which meshes plain arrays and serves no terrain.
+//! [`lattice`], [`levels`], [`ground`], [`brush`], [`volume`], `edits`, [`surface`], [`backend`], [`terrain`], `plugin`, `view`,
+//! `physics`, `panel`, `debug`. Beside them stands [`dense`], which meshes plain arrays and serves no terrain.
 //!
 //! # How the seam closes
 //!
@@ -245,6 +245,9 @@
 //!    [`sheet`](surface::mask::sheet) gives it.
 //! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
 //!    [`Edit::reach`](brush::Edit::reach).
+//!
+//! Three more close what lies between [levels of detail](levels): a coarse cell fans over the line of its finer neighbours, a
+//! coarse vertex of an edit is a vertex of the finest level, and what lies beyond the rim is the rim's ([`surface::level`]).
 //!
 //! What was not chosen, and why: *snapping* border vertices to the nearest point of the other surface tears on steep
 //! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep caves

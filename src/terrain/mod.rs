@@ -24,6 +24,8 @@ mod for_plugin;
 mod groups;
 mod history;
 mod inspect;
+#[cfg(test)]
+mod level_laws;
 mod level_meshes;
 mod levels;
 mod loose;

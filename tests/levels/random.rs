@@ -28,7 +28,7 @@ pub fn for_worlds(count: u64, check: impl Fn(u64, &Terrain, &Cut) + Sync) {
 pub fn random_world(index: u64) -> (Terrain, Cut) {
     let mut rng = Rng::with_seed(index ^ 0x1e_7e15);
     // Seldom multiples of a stride. Five levels take more than 16 tiles.
-    let (chunk_size, sides) = [(8, 9..=150), (25, 20..=130), (32, 30..=140)][rng.usize(0..3)].clone();
+    let (chunk_size, sides) = [(8, 30..=150), (25, 30..=140), (32, 40..=150)][rng.usize(0..3)].clone();
     let [width, depth] = [(); 2].map(|()| rng.u32(sides.clone()));
     let ground = random_ground_of_size(&mut rng, index, width, depth);
     let mut terrain =

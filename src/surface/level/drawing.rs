@@ -243,10 +243,20 @@ impl<'a> Drawing<'a> {
             return number;
         }
         let (view, origin) = (self.view, self.low.at(0));
-        let vertex = edge.vertex(&view, origin, || self.is_on_border(edge));
+        let is_between_levels = self.is_between_levels(edge);
+        let vertex = edge.vertex(&view, origin, is_between_levels, || self.is_on_border(edge));
         let number = self.builder.number(vertex);
         self.edges.insert(edge, number);
         number
+    }
+
+    /// Are there nodes of different levels beside an edge?
+    fn is_between_levels(&self, edge: Edge) -> bool {
+        let drawn = edge.drawn(&self.view);
+        let is_inside = |low: i32, high: i32, at: i32| low < at && at < high;
+        let is_inner = (edge.axis == 0 || is_inside(self.low.x, self.high.x, drawn.p.x))
+            && (edge.axis == 2 || is_inside(self.low.z, self.high.z, drawn.p.z));
+        !is_inner && self.view.is_between_levels(drawn.p, edge.axis)
     }
 
     /// Does an edge of this level lie between a volumetric cell and one that stays heightmap?

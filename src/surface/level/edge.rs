@@ -94,7 +94,7 @@ impl Edge {
     }
 
     /// Rule 9: the edge as it is drawn.
-    fn drawn(self, view: &LevelView) -> Self {
+    pub fn drawn(self, view: &LevelView) -> Self {
         if view.has(Fault::OverTheRim) {
             return self;
         }
@@ -102,13 +102,19 @@ impl Edge {
         Self { p, length: (q - p)[self.axis], ..self }
     }
 
-    /// The vertex of an edge with a crossing, relative to `origin`. `is_on_border` says if it lies on the border of the mask of
-    /// its level.
-    pub fn vertex(self, view: &LevelView, origin: IVec3, is_on_border: impl FnOnce() -> bool) -> Vertex {
+    /// The vertex of an edge with a crossing, relative to `origin`. `is_between_levels` says if there are nodes of different levels
+    /// beside it, `is_on_border` if it lies on the border of the mask of its level.
+    pub fn vertex(
+        self,
+        view: &LevelView,
+        origin: IVec3,
+        is_between_levels: bool,
+        is_on_border: impl FnOnce() -> bool,
+    ) -> Vertex {
         let last = self.descended(view);
         let drawn = last.drawn(view);
         if last.is_pristine(view) {
-            if view.is_between_levels(drawn.p, drawn.axis) {
+            if is_between_levels {
                 return last.shortest(view, origin);
             }
             if last.length > 1 || is_on_border() {
@@ -178,6 +184,9 @@ impl Edge {
 
     /// Where levels meet: the vertex of a pristine edge, or that of the shortest of its parts which have one at the same place.
     fn shortest(mut self, view: &LevelView, origin: IVec3) -> Vertex {
+        if view.has(Fault::OwnVertices) {
+            return self.drawn(view).sheet_vertex(view.ground(), origin);
+        }
         if self.axis == 1 {
             return shared_height_vertex(view, Column::of(view.drawn(self.p)), origin);
         }

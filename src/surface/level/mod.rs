@@ -50,6 +50,8 @@ pub(crate) enum Fault {
     NodePromotion,
     /// Walls are drawn twice from the front and once from behind; closed all the same.
     ThreeCoats,
+    /// Where levels meet, each edge has its own vertex, even where another one lies at the same place.
+    OwnVertices,
     /// Rule 9: cells that reach over the rim are left out.
     WholeCells,
     /// Rule 9: only the heightmap's vertices are drawn at the rim.
@@ -88,4 +90,34 @@ pub(crate) fn nodes_near(cut: &Cut, low: Column, high: Column) -> Vec<Node> {
     }
     found.sort_unstable();
     found
+}
+
+/// A lattice edge that a node above level 0 has a vertex on, for tests.
+#[cfg(test)]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EdgeVertex {
+    /// The edge's lower end, axis and length.
+    pub edge: (glam::IVec3, usize, i32),
+    /// In 1/4096 voxel.
+    pub place: glam::IVec3,
+    pub is_pristine: bool,
+    /// The half that it descends to lies level and is pristine.
+    pub is_half_level: bool,
+}
+
+/// The vertices of a node above level 0 that lie on lattice edges.
+#[cfg(test)]
+pub(crate) fn edge_vertices(view: &LevelView, node: Node) -> Vec<EdgeVertex> {
+    let mut drawing = drawing::Drawing::new(view, node);
+    drawing.draw();
+    let of = |(&edge, &number): (&edge::Edge, &builder::Number)| {
+        let half = edge.half(view);
+        EdgeVertex {
+            edge: (edge.p, edge.axis, edge.length),
+            place: drawing.builder.position(number) + drawing.origin() * crate::lattice::SNAP,
+            is_pristine: edge.is_pristine(view),
+            is_half_level: edge.length > 1 && half.axis != 1 && half.is_pristine(view),
+        }
+    };
+    drawing.edges.iter().map(of).collect()
 }
