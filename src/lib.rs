@@ -341,7 +341,7 @@ mod worlds;
 pub mod prelude {
     pub use crate::brush::{Blend, Brush, BrushError, Edit, Operation, Roughness, Shape, Stamp};
     pub use crate::ground::{
-        Bedding, ColumnMaterial, Detail, GreyImage, Ground, ImageLimits, ImageScale, Interval,
+        Bedding, ColumnMaterial, Detail, GreyImage, Ground, HeightSource, ImageLimits, ImageScale, Interval,
         MaterialControl, MaterialId, MaterialRule, NoiseHeights, NoiseKind, Strata, Stratum, StratumBody,
         StratumBounds,
     };

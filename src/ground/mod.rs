@@ -27,7 +27,6 @@ mod noise_heights;
 #[cfg(feature = "cuda")]
 mod noise_terms;
 mod on_demand;
-#[allow(dead_code)] // What levels of detail are drawn from.
 mod page;
 mod pages;
 mod png;
@@ -45,7 +44,6 @@ pub use material::{ColumnMaterial, MaterialId, OVERLAY_DEPTH};
 pub use noise_heights::{MAX_OCTAVES, MAX_SCALE, NoiseHeights, NoiseKind};
 #[cfg(feature = "cuda")]
 pub(crate) use noise_terms::{NoiseNumbers, NoiseTerms};
-#[allow(unused_imports)]
 pub(crate) use page::GroundPage;
 pub use rules::MaterialRule;
 pub use source::{ColumnGrid, FunctionSource, HeightSource, ImageSource, InsetSource, NoiseSource};

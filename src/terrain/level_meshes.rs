@@ -2,7 +2,7 @@
 
 use super::world::World;
 use crate::ground::Ground;
-use crate::lattice::{Column, ONE};
+use crate::lattice::ONE;
 use crate::levels::{Cut, LevelGrid, Node, NodeFacts};
 use crate::surface::level::{self, LevelView, Stacks};
 use crate::surface::{SeamChecker, SeamReport, SurfaceMesh};
@@ -27,24 +27,22 @@ impl GroundFacts {
         }
         let ((low, high), stride) = (grid.columns(node), node.stride());
         let half = (stride / 2).max(1);
-        let (mut lowest, mut highest) = (i32::MAX, i32::MIN);
-        let mut height = |x: i32, z: i32| {
-            let height = ground.height(Column::new(x, z));
-            (lowest, highest) = (lowest.min(height), highest.max(height));
-            height
-        };
+        let cells = [high.x - low.x, high.z - low.z].map(|width| (width + stride - 1) / stride);
+        let [across, down] = cells.map(|cells| (cells * (stride / half)) as usize + 1);
+        let heights = ground.page_heights(low, half, [across, down]);
+        let (lowest, highest) =
+            heights.iter().fold((i32::MAX, i32::MIN), |(low, high), &h| (low.min(h), high.max(h)));
+        let height = |x: usize, z: usize| heights[z * across + x];
         // Twice the greatest distance.
         let mut error = 0;
-        for z in (low.z..high.z).step_by(stride as usize) {
-            for x in (low.x..high.x).step_by(stride as usize) {
-                let corners = [(0, 0), (0, stride), (stride, stride), (stride, 0)];
-                let [a, b, c, d] = corners.map(|(dx, dz)| height(x + dx, z + dz));
-                if half == stride {
-                    continue;
-                }
+        if half < stride {
+            for (z, x) in
+                (0..down - 1).step_by(2).flat_map(|z| (0..across - 1).step_by(2).map(move |x| (z, x)))
+            {
+                let [a, b, c, d] = [(0, 0), (0, 2), (2, 2), (2, 0)].map(|(dx, dz)| height(x + dx, z + dz));
                 let middles =
-                    [(a, b, (0, half)), (b, c, (half, stride)), (c, d, (stride, half)), (d, a, (half, 0))];
-                for (from, to, (dx, dz)) in middles.into_iter().chain([(a, c, (half, half))]) {
+                    [(a, b, (0, 1)), (b, c, (1, 2)), (c, d, (2, 1)), (d, a, (1, 0)), (a, c, (1, 1))];
+                for (from, to, (dx, dz)) in middles {
                     error = error.max((from + to).abs_diff(2 * height(x + dx, z + dz)));
                 }
             }

@@ -3,7 +3,7 @@
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 
-use crate::ground::Ground;
+use crate::ground::{Ground, GroundPage};
 use crate::lattice::{Column, ONE, SNAP};
 use crate::surface::{Indices, MaterialMix, SurfaceMesh, Vertex};
 
@@ -20,6 +20,16 @@ pub(super) struct Builder {
     places: FxHashMap<IVec3, Number>,
 }
 
+/// The vertex of a page's column with this number, relative to the column `low` at y = 0.
+pub(super) fn page_vertex(page: &GroundPage, number: usize, column: Column, low: Column) -> Vertex {
+    let y = page.heights[number] * (SNAP / ONE);
+    Vertex {
+        position: IVec3::new((column.x - low.x) * SNAP, y, (column.z - low.z) * SNAP),
+        normal: page.normals[number],
+        materials: MaterialMix::column(page.materials[number]),
+    }
+}
+
 impl Builder {
     /// With the columns of a node whose cells have this stride.
     pub fn new(ground: &Ground, low: Column, high: Column, stride: i32) -> Self {
@@ -28,17 +38,9 @@ impl Builder {
         let columns = [along(low.x, high.x), along(low.z, high.z)];
         let [xs, zs] = &columns;
         let mut vertices = Vec::with_capacity(xs.len() * zs.len() + 4 * (xs.len() + zs.len()));
-        for &z in zs {
-            vertices.extend(xs.iter().map(|&x| {
-                let column = Column::new(x, z);
-                let y = ground.height(column) * (SNAP / ONE);
-                Vertex {
-                    position: IVec3::new((x - low.x) * SNAP, y, (z - low.z) * SNAP),
-                    normal: ground.normal(column),
-                    materials: MaterialMix::column(ground.surface_material(column)),
-                }
-            }));
-        }
+        let page = ground.page(low, stride, [xs.len(), zs.len()]);
+        let places = zs.iter().flat_map(|&z| xs.iter().map(move |&x| Column::new(x, z)));
+        vertices.extend(places.enumerate().map(|(at, column)| page_vertex(&page, at, column, low)));
         let indices = Vec::with_capacity((xs.len() - 1) * (zs.len() - 1) * 6);
         Self { columns, stride, vertices, indices, places: FxHashMap::default() }
     }

@@ -5,7 +5,7 @@ use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::Fault;
-use super::builder::{Builder, Number};
+use super::builder::{Builder, Number, page_vertex};
 use super::edge::{Edge, shared_height_vertex};
 use super::sides::{Cell, Interval, SIDES};
 use super::view::LevelView;
@@ -14,7 +14,7 @@ use crate::lattice::{Column, ONE};
 use crate::levels::Node;
 use crate::surface::tile::fan;
 use crate::surface::vertex::height_vertex;
-use crate::surface::{SurfaceMesh, cases};
+use crate::surface::{SurfaceMesh, Vertex, cases};
 
 /// The mesh of a node whose level is 1 at least, relative to its lowest column at y = 0.
 pub(super) fn mesh(view: &LevelView, node: Node) -> SurfaceMesh {
@@ -38,6 +38,8 @@ pub(super) struct Drawing<'a> {
     /// The edited samples of its lattice by their columns, those in its cells' corners only.
     edited: FxHashMap<Column, Vec<i32>>,
     pub builder: Builder,
+    /// The heightmap's vertices between the columns of sides towards finer nodes, where nothing was edited.
+    between: FxHashMap<Column, Vertex>,
     /// The vertices of lattice edges.
     pub edges: FxHashMap<Edge, Number>,
 }
@@ -62,10 +64,12 @@ impl<'a> Drawing<'a> {
             has_bricks: view.stacks.has_any(low, high),
             edited: FxHashMap::default(),
             builder: Builder::new(view.ground(), low, high, stride),
+            between: FxHashMap::default(),
             edges: FxHashMap::default(),
         };
         drawing.gather();
         drawing.share_columns();
+        drawing.ask_between();
         drawing
     }
 
@@ -98,6 +102,30 @@ impl<'a> Drawing<'a> {
                     let vertex = shared_height_vertex(&self.view, column, self.low.at(0));
                     self.builder.set_column(self.builder.column([x, z]), vertex);
                 }
+            }
+        }
+    }
+
+    /// Asks the ground at once for the columns between those of sides towards finer nodes.
+    fn ask_between(&mut self) {
+        if self.has_bricks {
+            return;
+        }
+        let (low, [across, down]) = (self.low, self.builder.column_counts());
+        for (side, &(dx, dz)) in SIDES.iter().enumerate() {
+            let Some(finer) = self.beside[side].filter(|&other| other < self.stride) else { continue };
+            let first = Column::new(
+                if dx > 0 { self.high.x } else { low.x },
+                if dz > 0 { self.high.z } else { low.z },
+            );
+            let fine = |columns: usize| (columns - 1) * (self.stride / finer) as usize + 1;
+            let (count, step) =
+                if dx != 0 { ([1, fine(down)], (0, finer)) } else { ([fine(across), 1], (finer, 0)) };
+            let page = self.view.ground().page(first, finer, count);
+            for number in 0..count[0] * count[1] {
+                let column = first.offset(step.0 * number as i32, step.1 * number as i32);
+                let column = Column::of(self.view.drawn(column.at(0)));
+                self.between.insert(column, page_vertex(&page, number, column, low));
             }
         }
     }
@@ -291,7 +319,8 @@ impl<'a> Drawing<'a> {
         let vertex = if self.has_bricks {
             shared_height_vertex(&self.view, column, origin)
         } else {
-            height_vertex(self.view.ground(), column, origin)
+            let between = self.between.get(&column).copied();
+            between.unwrap_or_else(|| height_vertex(self.view.ground(), column, origin))
         };
         self.builder.number(vertex)
     }

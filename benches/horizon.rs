@@ -1,0 +1,259 @@
+//! Levels of detail by their figures, without drawing: `cargo bench --bench horizon [-- KILOMETRES]`.
+//!
+//! A world of 16 x 16 km (or so many) whose mountains are computed on demand, seen by an eye on a summit at 1440 lines and 45
+//! degrees. Printed are nodes and triangles for views of 0.5 to 16 km; how long the coarsest nodes and the whole cut take;
+//! what a node costs in a task, from noise and from an image; what a flight at 100 m/s with 20 digs a second needs; and the
+//! bytes that the ground and the meshes take, as a card gets them.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bevy_burrow::ground::{GreyImage, Ground, ImageScale, ImageSource, NoiseSource};
+use bevy_burrow::levels::{Choice, Cut, Eye, Node, NodeFacts};
+use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::{ChooseCut, GroundFacts, NodeUpdate, World};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Pixels of a picture 1440 high at 45 degrees.
+const PIXELS: f32 = 1738.0;
+
+/// Bytes of a vertex as a game with a look has them, and of an index.
+const VERTEX: usize = 32;
+
+fn mountains() -> NoiseHeights {
+    NoiseHeights { seed: 7, kind: NoiseKind::Ridged, octaves: 7, scale: 1400.0, amplitude: 420.0, base: 0.0 }
+}
+
+/// Facts of nodes, found once.
+#[derive(Default)]
+struct Known(RefCell<HashMap<Node, GroundFacts>>);
+
+impl Known {
+    fn learn(&self, world: &World, cut: &Cut) {
+        let nodes: Vec<Node> = cut.nodes().filter(|node| !self.0.borrow().contains_key(node)).collect();
+        let facts = |node: Node| (node, GroundFacts::new(world.ground(), cut.grid(), node));
+        let found: Vec<_> = nodes.into_par_iter().map(facts).collect();
+        self.0.borrow_mut().extend(found);
+    }
+
+    /// The cut that an eye needs, level by level from the coarsest, as the plugin reaches it.
+    fn cut(&self, world: &World, choice: &Choice, mut cut: Cut, eye: Eye) -> Cut {
+        loop {
+            self.learn(world, &cut);
+            let next = choice.cut(&cut, &[eye], |node| {
+                let known = self.0.borrow().get(&node).copied();
+                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
+                    heights,
+                    error,
+                    has_edits: world.has_edits(cut.grid(), node),
+                })
+            });
+            if next == cut {
+                return cut;
+            }
+            cut = next;
+        }
+    }
+}
+
+fn main() {
+    let given = std::env::args().skip(1).find_map(|arg| arg.parse().ok());
+    let side = given.unwrap_or(16u32).clamp(1, 128) * 1024;
+    let source = NoiseSource::new(&mountains()).expect("valid noise");
+    let ground = Arc::new(Ground::from_source(side, side, source).expect("a valid size"));
+    let terrain = || Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");
+    let middle = side as f32 / 2.0 + 137.0;
+    let summit = summit(terrain().world(), middle);
+    println!("{side} x {side} cells; eye at {summit}, {} threads", rayon::current_num_threads());
+    views(terrain().world(), summit);
+    load(terrain(), summit);
+    nodes(terrain().world(), summit);
+    flight(terrain(), summit);
+}
+
+/// The highest of some places around the middle, 2 m above the ground.
+fn summit(world: &World, middle: f32) -> Vec3 {
+    let steps = (-20..=20).flat_map(|z| (-20..=20).map(move |x| (x, z)));
+    let places = steps.map(|(x, z)| (middle + x as f32 * 50.0, middle + z as f32 * 50.0));
+    let places = places.map(|(x, z)| {
+        let height = world.height(x.into(), z.into()).unwrap_or_default();
+        Vec3::new(x, height as f32 + 2.0, z)
+    });
+    places.max_by(|a, b| a.y.total_cmp(&b.y)).unwrap_or_default()
+}
+
+fn eye(position: Vec3) -> Eye {
+    Eye { position, velocity: Vec3::ZERO, pixels: PIXELS }
+}
+
+fn views(world: &World, summit: Vec3) {
+    println!("\n| view, km | nodes | triangles, millions | nodes by level |\n| --- | --- | --- | --- |");
+    let known = Known::default();
+    for view in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
+        let choice = Choice { view_distance: view * 1000.0, ..Choice::default() };
+        let coarsest = Cut::coarsest(world.level_grid(u8::MAX));
+        let cut = known.cut(world, &choice, coarsest, eye(summit));
+        let nodes: Vec<Node> = cut.nodes().collect();
+        let triangles: usize =
+            nodes.par_iter().map(|&node| world.node_mesh(&cut, node).indices.len() / 3).sum();
+        let mut levels = vec![0; usize::from(cut.grid().top()) + 1];
+        nodes.iter().for_each(|node| levels[usize::from(node.level)] += 1);
+        println!("| {view} | {} | {:.3} | {levels:?} |", nodes.len(), triangles as f64 / 1e6);
+    }
+}
+
+/// Bytes of meshes as a card gets them.
+fn bytes(nodes: &[NodeUpdate]) -> usize {
+    let of = |mesh: &bevy_burrow::surface::SurfaceMesh| {
+        let index = if mesh.vertices.len() < 1 << 16 { 2 } else { 4 };
+        mesh.vertices.len() * VERTEX + mesh.indices.len() * index
+    };
+    let parts = |update: &NodeUpdate| update.shown().map(|(_, mesh)| of(&mesh)).sum::<usize>();
+    nodes.iter().map(|update| update.mesh.as_deref().map_or(0, of) + parts(update)).sum()
+}
+
+fn load(terrain: Terrain, summit: Vec3) {
+    let world = terrain.world();
+    let start = Instant::now();
+    let coarsest = Cut::coarsest(world.level_grid(u8::MAX));
+    let (_, first) = world.draw_cut(coarsest.clone());
+    let first_took = start.elapsed();
+    let known = Known::default();
+    let cut = known.cut(world, &Choice::default(), coarsest, eye(summit));
+    let chosen = start.elapsed();
+    let (drawn, all) = world.draw_cut(cut);
+    let took = start.elapsed();
+    let area = (drawn.cut().grid().chunks().width() as f64 / 1000.0).powi(2);
+    let view = area.min(std::f64::consts::PI * 8.0 * 8.0);
+    let (meshes, ground) = (bytes(&all), world.memory().total());
+    println!(
+        "\nload: {} coarsest nodes in {first_took:.1?}, all {} known in {chosen:.1?}, drawn in {took:.1?}",
+        first.len(),
+        all.len()
+    );
+    println!(
+        "memory: meshes {:.1} MB, the model {:.1} MB; {:.3} MB a km2 of a view of 8 km",
+        meshes as f64 / 1e6,
+        ground as f64 / 1e6,
+        (meshes + ground) as f64 / 1e6 / view
+    );
+}
+
+/// What a node takes in a task: its facts and its mesh, one thread.
+fn nodes(world: &World, summit: Vec3) {
+    let image = {
+        let samples = (0..2048u32 * 2048).map(|at| {
+            let (x, z) = (at % 2048, at / 2048);
+            let wave = (x as f64 * 0.013).sin() * (z as f64 * 0.017).cos() * 0.4 + 0.5;
+            (wave * 60_000.0) as u16 + ((x * 7 + z * 13) % 97) as u16
+        });
+        GreyImage::from_samples(2048, 2048, samples.collect()).expect("a valid image")
+    };
+    let scale = ImageScale { voxels_per_sample: 8, low: 0.0, high: 500.0, detail: None };
+    let source = ImageSource::new(image, &scale).expect("valid");
+    let [width, depth] = source.size().map(|cells| cells as u32);
+    let ground = Ground::from_source(width, depth, source).expect("a valid size");
+    let image = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+    println!("\n| a node, ms | level 0 | 1 | 2 | 3 | 4 | 5 |\n| --- | --- | --- | --- | --- | --- | --- |");
+    for (name, world) in [("noise", world), ("image", image.world())] {
+        let grid = world.level_grid(u8::MAX);
+        let times = (0..6u8).map(|level| {
+            // Each node is new, so no page of it was computed before.
+            let cut = Cut::new(grid, |node| node.level > level);
+            let (x, z) = ((summit.x / 32.0) as i32 >> level, (summit.z / 32.0) as i32 >> level);
+            let mut times: Vec<Duration> = (0..24)
+                .map(|at| Node {
+                    level,
+                    x: (x + at % 6 * 3) % ((1 << 9) >> level),
+                    z: (z + at / 6 * 3) % ((1 << 9) >> level),
+                })
+                .filter(|&node| grid.has(node))
+                .map(|node| {
+                    let start = Instant::now();
+                    let (facts, mesh) =
+                        (GroundFacts::new(world.ground(), grid, node), world.node_mesh(&cut, node));
+                    std::hint::black_box((facts, mesh));
+                    start.elapsed()
+                })
+                .collect();
+            times.sort_unstable();
+            format!("{:.2}", times[times.len() / 2].as_secs_f64() * 1e3)
+        });
+        println!("| {name} | {} |", times.collect::<Vec<_>>().join(" | "));
+    }
+}
+
+/// A minute at 100 m/s, 60 frames a second, one change of levels or transaction a frame.
+fn flight(mut terrain: Terrain, summit: Vec3) {
+    const FRAMES: usize = 3600;
+    let known = Arc::new(std::sync::Mutex::new(HashMap::<Node, GroundFacts>::new()));
+    let coarsest = Cut::coarsest(terrain.world().level_grid(u8::MAX));
+    let start = Known::default().cut(terrain.world(), &Choice::default(), coarsest, eye(summit));
+    let (drawn, _) = terrain.world().draw_cut(start);
+    terrain.set_drawn_cut(Some(Arc::new(drawn)));
+    let (mut made, mut digs, mut cuts, mut most_nodes) = (0, Vec::new(), Vec::new(), 0);
+    let begin = Instant::now();
+    let mut memory = Vec::new();
+    for frame in 0..FRAMES {
+        let seconds = frame as f32 / 60.0;
+        let turn = seconds / 16.0;
+        let at = summit + Vec3::new(turn.sin() * 1600.0, 60.0, (1.0 - turn.cos()) * 1600.0);
+        let velocity = Vec3::new(turn.cos(), 0.0, turn.sin()) * 100.0;
+        if frame % 3 == 0 {
+            let height = terrain.world().height(at.x.into(), at.z.into()).unwrap_or_default() as f32;
+            terrain.submit(&Brush::dig(Shape::sphere(Vec3::new(at.x, height, at.z), 3.0)));
+            let transaction = terrain.begin().expect("a dig waits");
+            let start = Instant::now();
+            let commit = transaction.run();
+            digs.push(start.elapsed());
+            terrain.commit(commit).expect("the one under way");
+            continue;
+        }
+        let known = Arc::clone(&known);
+        let choose: Arc<ChooseCut> = Arc::new(move |world, cut| {
+            let mut known = known.lock().expect("not poisoned");
+            let new: Vec<Node> = cut.nodes().filter(|node| !known.contains_key(node)).collect();
+            let facts = |node: Node| (node, GroundFacts::new(world.ground(), cut.grid(), node));
+            known.extend(new.into_par_iter().map(facts).collect::<Vec<_>>());
+            let eyes = [Eye { position: at, velocity, pixels: PIXELS }];
+            let target = Choice::default().cut(cut, &eyes, |node| {
+                let known = known.get(&node).copied();
+                known.map_or(NodeFacts::default(), |GroundFacts { heights, error }| NodeFacts {
+                    heights,
+                    error,
+                    has_edits: world.has_edits(cut.grid(), node),
+                })
+            });
+            let mut next = cut.clone();
+            next.step_to(&target, 16, |node| u64::from(node.level));
+            next
+        });
+        let start = Instant::now();
+        let commit = terrain.begin_cut(choose).expect("a cut is drawn").run();
+        cuts.push(start.elapsed());
+        made += commit.meshes.nodes.iter().filter(|update| update.mesh.is_some()).count();
+        most_nodes = most_nodes.max(commit.drawn_cut().map_or(0, |drawn| drawn.cut().nodes().count()));
+        terrain.commit(commit).expect("the one under way");
+        if frame % 600 == 1 {
+            memory.push(terrain.memory().total() - terrain.memory().edits());
+        }
+    }
+    let took = begin.elapsed();
+    for times in [&mut digs, &mut cuts] {
+        times.sort_unstable();
+    }
+    let at = |times: &[Duration], share: f64| times[((times.len() - 1) as f64 * share) as usize];
+    println!(
+        "\nflight of {} s in {took:.1?}: {made} nodes made, at most {most_nodes} drawn; a change of levels p50 {:.2?}, p99 {:.2?}; \
+         a dig p50 {:.2?}, p99 {:.2?}",
+        FRAMES / 60,
+        at(&cuts, 0.5),
+        at(&cuts, 0.99),
+        at(&digs, 0.5),
+        at(&digs, 0.99),
+    );
+    println!("bytes of the ground over the flight: {memory:?}");
+}
