@@ -244,6 +244,11 @@ impl Ground {
     /// Change of height around a column along x and along z.
     fn rises(&self, column: Column) -> [Rise; 2] {
         let Column { x, z } = self.extent.clamp(column);
+        if (1..self.width()).contains(&x) && (1..self.depth()).contains(&z) {
+            let (at, row) = (self.extent.inner_index(Column::new(x, z)), self.extent.row_len());
+            let rise = |step: usize| Rise { rise: self.heights[at + step] - self.heights[at - step], run: 2 };
+            return [rise(1), rise(row)];
+        }
         let (west, east) = ((x - 1).max(0), (x + 1).min(self.width()));
         let (north, south) = ((z - 1).max(0), (z + 1).min(self.depth()));
         [

@@ -46,8 +46,9 @@ impl Crossings {
         origin: IVec3,
         out: &mut Vec<Vertex>,
     ) {
-        let mut site =
-            Site { samples, stack, materials: StoredMaterials::new(around), low, base: low - origin };
+        let materials = StoredMaterials::new(around);
+        let own = stack.has_own_materials().then(|| [MaterialId::GROUND; VOXELS]);
+        let mut site = Site { samples, stack, materials, own, low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
         site.make::<0>(x, out);
@@ -56,11 +57,20 @@ impl Crossings {
     }
 }
 
+/// Corners of a layer.
+const CORNERS: usize = PLACES.len();
+
+/// Voxels at the corners of a block's cells.
+const VOXELS: usize = 9 * CORNERS;
+
 /// What the vertices of a block are made from.
 struct Site<'a, 'b> {
     samples: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
+    /// The materials of pristine voxels at the ends of edges, layer by layer of corners, if they differ from voxel to voxel.
+    /// [`MaterialId::GROUND`] for those that nobody asked for: several edges end at the same voxel.
+    own: Option<[MaterialId; VOXELS]>,
     /// The brick's lowest sample.
     low: IVec3,
     /// The same, from where positions count.
@@ -112,12 +122,18 @@ impl Site<'_, '_> {
         };
         let materials = match (stored, self.stack.single_mix()) {
             (MaterialId::GROUND, Some(mix)) => mix,
-            (MaterialId::GROUND, None) => {
-                let mut solid = self.low + IVec3::new(place.x, y, place.z);
-                solid[AXIS] += i32::from(!is_lower);
-                let own = self.stack.voxel_mix(solid);
-                own.unwrap_or_else(|| self.own_materials::<AXIS>(corner, self.low.y + y, step))
-            }
+            (MaterialId::GROUND, None) => match &mut self.own {
+                Some(known) => {
+                    let (solid, y) = solid_end::<AXIS>(edge, is_lower);
+                    let own = &mut known[y * CORNERS + solid];
+                    if *own == MaterialId::GROUND {
+                        let place = &PLACES[solid];
+                        *own = self.stack.voxel(self.low + IVec3::new(place.x, y as i32, place.z));
+                    }
+                    MaterialMix::pure(*own)
+                }
+                None => self.own_materials::<AXIS>(corner, self.low.y + y, step),
+            },
             _ => MaterialMix::pure(stored),
         };
         Vertex { position, normal, materials }
@@ -229,6 +245,12 @@ fn linear_steps(p: i32x4, q: i32x4) -> i32x4 {
     i32x4::new(steps).max(i32x4::splat(1)).min(i32x4::splat(SNAP - 1))
 }
 
+/// The solid end of an edge: corner and layer.
+fn solid_end<const AXIS: usize>(edge: Edge, is_lower: bool) -> (usize, usize) {
+    let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
+    (corner, usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower))
+}
+
 /// The stored materials around a block's corners.
 struct StoredMaterials<'a> {
     bricks: CornerBricks<'a>,
@@ -245,8 +267,7 @@ impl<'a> StoredMaterials<'a> {
 
     /// What is stored at the solid end of an edge.
     fn at<const AXIS: usize>(&self, edge: Edge, is_lower: bool) -> MaterialId {
-        let corner = usize::from(edge.corner) + if is_lower { 0 } else { NEXT_CORNER[AXIS] };
-        let y = usize::from(edge.y) + usize::from(AXIS == 1 && !is_lower);
+        let (corner, y) = solid_end::<AXIS>(edge, is_lower);
         let place = &PLACES[corner];
         let brick = self.bricks.0[y / 8][place.brick];
         brick.map_or(MaterialId::GROUND, |brick| brick.material_at(y % 8 * 64 + place.index))

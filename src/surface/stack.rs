@@ -10,7 +10,7 @@ use super::mask::WINDOW;
 use super::mesh::MaterialMix;
 use super::pristine::PristineStack;
 use super::vertex::WorldView;
-use crate::ground::Ground;
+use crate::ground::{Ground, MaterialId};
 use crate::lattice::Column;
 
 /// A stack of bricks, all with the same x and z, and the columns around it.
@@ -31,8 +31,6 @@ pub(super) struct Stack<'a> {
     mixes: [Option<[MaterialMix; 2]>; 81],
     /// The material of all columns of the world, if they have only one.
     single: Option<MaterialMix>,
-    /// Does the ground's material differ from voxel to voxel?
-    has_own_materials: bool,
 }
 
 impl<'a> Stack<'a> {
@@ -50,7 +48,6 @@ impl<'a> Stack<'a> {
             normals: [None; 81],
             mixes: [None; 81],
             single: ground.single_material().map(MaterialMix::pure),
-            has_own_materials: ground.has_own_materials(),
         }
     }
 
@@ -88,9 +85,14 @@ impl<'a> Stack<'a> {
         self.single
     }
 
-    /// The ground's own material at a lattice point, if it differs from voxel to voxel.
-    pub fn voxel_mix(&self, point: IVec3) -> Option<MaterialMix> {
-        self.has_own_materials.then(|| MaterialMix::pure(self.ground.material(point)))
+    /// Does the ground's material differ from voxel to voxel?
+    pub fn has_own_materials(&self) -> bool {
+        self.ground.has_own_materials()
+    }
+
+    /// The ground's own material at a lattice point.
+    pub fn voxel(&self, point: IVec3) -> MaterialId {
+        self.ground.material(point)
     }
 
     /// The tile's normal over a corner.

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use glam::IVec3;
 use rayon::prelude::*;
 
-use super::in_brick::{self, Voxel};
+use super::in_brick::{self, ones};
 use super::{OwnMaterials, SteepCells, Strata, StrataRecords};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::ground::{ColumnMaterial, GroundError};
 use crate::lattice::hash::hash_words;
-use crate::lattice::{Column, LIMIT, ONE, ceil};
+use crate::lattice::{BrickPos, Column, LIMIT, ONE, ceil};
 
 /// What a ground has beside the materials of its columns.
 #[derive(Clone, PartialEq)]
@@ -140,12 +140,60 @@ impl Ground {
         {
             return top;
         }
-        let voxel = Voxel { column, y, depth: depth.max(0) };
         let found = match &below.own {
-            OwnMaterials::Strata { records, .. } => in_brick::material(self, records, voxel),
-            OwnMaterials::Function { function, .. } => function(column.at(y), voxel.depth),
+            OwnMaterials::Strata { records, .. } => {
+                let (pos, voxel) = (BrickPos::of(column.at(y)), 1 << ((column.z & 7) << 3 | column.x & 7));
+                in_brick::with_brick(self, records, pos, |brick| {
+                    let mut found = MaterialId::GROUND;
+                    brick.for_materials(self, records, y, voxel, |material, _| found = material);
+                    found
+                })
+            }
+            OwnMaterials::Function { function, .. } => function(column.at(y), depth.max(0)),
         };
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| self.material_of_column(point))
+    }
+
+    /// Calls `each` with the materials of pristine voxels, and how many are of each, in one call or several. The voxels are
+    /// bits `z * 8 + x` of layer `y` of a brick.
+    pub(crate) fn for_materials(
+        &self,
+        pos: BrickPos,
+        y: usize,
+        voxels: u64,
+        mut each: impl FnMut(MaterialId, u64),
+    ) {
+        let low = pos.origin() + IVec3::Y * y as i32;
+        // Those asked one by one: what the surface shows, what no stratum holds, and all beyond the rim.
+        let mut rest = voxels;
+        if let Some(Below { own: OwnMaterials::Strata { records, .. }, .. }) = self.below()
+            && [low, low + IVec3::new(7, 0, 7)].iter().all(|&corner| self.is_inside(corner))
+        {
+            in_brick::with_brick(self, records, pos, |brick| {
+                rest = brick.tops(low.y, voxels);
+                brick.for_materials(self, records, low.y, voxels & !rest, |material, held| match material {
+                    MaterialId::GROUND => rest |= held,
+                    _ => each(material, held.count_ones().into()),
+                });
+            });
+        }
+        let (mut last, mut count) = (MaterialId::GROUND, 0);
+        for bit in ones(rest) {
+            let material = self.material(low + IVec3::new((bit & 7) as i32, 0, (bit >> 3) as i32));
+            if material != last && count != 0 {
+                each(last, count);
+                count = 0;
+            }
+            (last, count) = (material, count + 1);
+        }
+        if count != 0 {
+            each(last, count);
+        }
+    }
+
+    /// Does a point lie in a column of the world, and no farther up or down than questions reach?
+    fn is_inside(&self, point: IVec3) -> bool {
+        self.nearest_column(point) == Column::of(point) && point.y.unsigned_abs() <= HIGHEST.unsigned_abs()
     }
 
     /// What the undug surface shows over a column: the material of its highest solid voxel where the ground has strata,

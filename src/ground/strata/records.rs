@@ -71,8 +71,6 @@ pub(super) struct ColumnCondition {
 pub(crate) struct StrataRecords {
     /// A number that no other strata of the program have.
     pub id: u64,
-    /// Is any of them a bed?
-    pub has_beds: bool,
     pub strata: Vec<StratumRecord>,
     pub bedding: BeddingRecord,
     /// What strata ask of columns, by the bits of [`StratumRecord::condition`].
@@ -242,8 +240,7 @@ impl StrataRecords {
         let hash = hash_words(words.chain(of_columns));
         static LAST: AtomicU64 = AtomicU64::new(0);
         let id = LAST.fetch_add(1, Ordering::Relaxed) + 1;
-        let has_beds = strata.iter().any(|record| record.body == BED);
-        Self { id, has_beds, strata, bedding, conditions, hash }
+        Self { id, strata, bedding, conditions, hash }
     }
 
     /// The conditions that a column of the world fulfils: a bit each.
@@ -268,7 +265,7 @@ impl StrataRecords {
         let at = IVec3::new(column.x, point.y, column.z);
         let height = point.y * ONE;
         let depth = (ground.height(column) - height - 1).max(0);
-        let flat = |noise: ValueNoise| noise.flat_within(&noise.flat_corners(place), place);
+        let flat = |noise: ValueNoise| noise.flat_within(noise.flat_corners(place), place);
         let moved = record.moved(flat(record.roughness()));
         let noise = [record.noise(), record.second_noise()].map(|noise| noise.at(at));
         let fold = self.bedding.fold_at(flat(self.bedding.noise()));
