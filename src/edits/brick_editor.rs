@@ -132,7 +132,9 @@ impl<'a> BrickEditor<'a> {
         match single {
             _ if own == 0 => {}
             Some(material) => counts.add(outcome, material, own.count_ones().into()),
-            None => ground.for_materials(pos, y, own, |material, voxels| counts.add(outcome, material, voxels)),
+            None => ground.for_materials(pos, y, own, |material, voxels| {
+                counts.add(outcome, material, voxels.count_ones().into());
+            }),
         }
     }
 

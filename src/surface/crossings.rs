@@ -14,8 +14,9 @@ use super::padded_samples::{AREA, Marked, PaddedSamples};
 use super::stack::Stack;
 use super::vertex::{between, lerp_normal};
 use crate::ground::{MaterialId, OVERLAY_DEPTH};
-use crate::lattice::{ONE, SNAP};
+use crate::lattice::{BrickPos, ONE, SNAP};
 use crate::volume::Brick;
+use crate::volume::layers::ones;
 
 /// Edges taken together.
 const LANES: usize = 4;
@@ -47,7 +48,7 @@ impl Crossings {
         out: &mut Vec<Vertex>,
     ) {
         let materials = StoredMaterials::new(around);
-        let own = stack.has_own_materials().then(|| [MaterialId::GROUND; VOXELS]);
+        let own = stack.has_own_materials().then(|| self.solid_materials(samples, stack, low));
         let mut site = Site { samples, stack, materials, own, low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
@@ -55,22 +56,47 @@ impl Crossings {
         site.make::<1>(y, out);
         site.make::<2>(z, out);
     }
+
+    /// The ground's own materials at the solid ends of all edges. Several edges end at the same voxel, and neighbours are
+    /// asked together.
+    fn solid_materials(&self, samples: &PaddedSamples, stack: &Stack, low: IVec3) -> SolidMaterials {
+        let mut ends = [[0u64; 4]; 9];
+        let mut enter = |(corner, y): (usize, usize)| ends[y][PLACES[corner].brick] |= 1 << PLACES[corner].index;
+        let is_lower = |edge: &Edge| {
+            let at = (usize::from(edge.y) + 1) * AREA + PLACES[usize::from(edge.corner)].padded;
+            samples.all().get(at).is_some_and(|&sample| sample < 0)
+        };
+        let [x, y, z] = &self.lists;
+        x.iter().for_each(|edge| enter(solid_end::<0>(*edge, is_lower(edge))));
+        y.iter().for_each(|edge| enter(solid_end::<1>(*edge, is_lower(edge))));
+        z.iter().for_each(|edge| enter(solid_end::<2>(*edge, is_lower(edge))));
+        let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
+        for (y, (ends, materials)) in ends.iter().zip(&mut materials).enumerate() {
+            for (number, (&ends, materials)) in ends.iter().zip(materials).enumerate() {
+                let step = IVec3::new((number & 1) as i32, (y >> 3) as i32, (number >> 1) as i32);
+                if ends != 0 {
+                    let pos = BrickPos(BrickPos::of(low).0 + step);
+                    stack.ground().for_materials(pos, y & 7, ends, |material, voxels| {
+                        ones(voxels).for_each(|bit| materials[bit] = material);
+                    });
+                }
+            }
+        }
+        materials
+    }
 }
 
-/// Corners of a layer.
-const CORNERS: usize = PLACES.len();
-
-/// Voxels at the corners of a block's cells.
-const VOXELS: usize = 9 * CORNERS;
+/// Materials of the voxels at the corners of a block's cells: for each layer those of four bricks, as bits of
+/// [`Layers`](crate::volume::Layers). Only those at solid ends of edges are filled in.
+type SolidMaterials = [[[MaterialId; 64]; 4]; 9];
 
 /// What the vertices of a block are made from.
 struct Site<'a, 'b> {
     samples: &'a PaddedSamples,
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
-    /// The materials of pristine voxels at the ends of edges, layer by layer of corners, if they differ from voxel to voxel.
-    /// [`MaterialId::GROUND`] for those that nobody asked for: several edges end at the same voxel.
-    own: Option<[MaterialId; VOXELS]>,
+    /// The ground's own materials at solid ends, if they differ from voxel to voxel.
+    own: Option<SolidMaterials>,
     /// The brick's lowest sample.
     low: IVec3,
     /// The same, from where positions count.
@@ -122,15 +148,10 @@ impl Site<'_, '_> {
         };
         let materials = match (stored, self.stack.single_mix()) {
             (MaterialId::GROUND, Some(mix)) => mix,
-            (MaterialId::GROUND, None) => match &mut self.own {
-                Some(known) => {
+            (MaterialId::GROUND, None) => match &self.own {
+                Some(own) => {
                     let (solid, y) = solid_end::<AXIS>(edge, is_lower);
-                    let own = &mut known[y * CORNERS + solid];
-                    if *own == MaterialId::GROUND {
-                        let place = &PLACES[solid];
-                        *own = self.stack.voxel(self.low + IVec3::new(place.x, y as i32, place.z));
-                    }
-                    MaterialMix::pure(*own)
+                    MaterialMix::pure(own[y][PLACES[solid].brick][PLACES[solid].index])
                 }
                 None => self.own_materials::<AXIS>(corner, self.low.y + y, step),
             },

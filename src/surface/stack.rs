@@ -3,14 +3,14 @@
 
 use std::ops::RangeInclusive;
 
-use glam::{IVec3, Vec3};
+use glam::Vec3;
 
 use super::layer_bits::{self, LayerBits, PLACES, SIDE};
 use super::mask::WINDOW;
 use super::mesh::MaterialMix;
 use super::pristine::PristineStack;
 use super::vertex::WorldView;
-use crate::ground::{Ground, MaterialId};
+use crate::ground::Ground;
 use crate::lattice::Column;
 
 /// A stack of bricks, all with the same x and z, and the columns around it.
@@ -90,9 +90,9 @@ impl<'a> Stack<'a> {
         self.ground.has_own_materials()
     }
 
-    /// The ground's own material at a lattice point.
-    pub fn voxel(&self, point: IVec3) -> MaterialId {
-        self.ground.material(point)
+    /// The pristine world.
+    pub fn ground(&self) -> &'a Ground {
+        self.ground
     }
 
     /// The tile's normal over a corner.

@@ -10,7 +10,7 @@ use glam::{IVec2, IVec3};
 
 use super::StrataRecords;
 use super::records::{BED, FILL, POCKET, StratumRecord, VEIN};
-use super::value_noise::Corners;
+use super::value_noise::{Corners, ValueNoise};
 use crate::ground::material::MaterialId;
 use crate::ground::world::Ground;
 use crate::lattice::{BRICK, BrickPos, Column, ONE};
@@ -71,6 +71,38 @@ struct Noises {
     roughness: Corners,
     /// Of beds, the first is the bedding's.
     body: [Corners; 2],
+    /// Eighths of the brick for which `possible` is known: a bit each.
+    known: u8,
+    /// Those in which a vein or pocket may be.
+    possible: u8,
+}
+
+impl Noises {
+    /// May a vein or pocket be in the same eighth of the brick as a voxel?
+    #[inline]
+    fn may_hold(&mut self, record: &StratumRecord, point: IVec3) -> bool {
+        let IVec3 { x, y, z } = point >> 2 & 1;
+        let flag = 1 << (y << 2 | z << 1 | x);
+        if self.known & flag == 0 {
+            self.known |= flag;
+            let low = point & !3;
+            self.possible |= if self.may_reach(record, low, low + 3) { flag } else { 0 };
+        }
+        self.possible & flag != 0
+    }
+
+    /// May a vein or pocket be in a box of the brick?
+    fn may_reach(&self, record: &StratumRecord, low: IVec3, high: IVec3) -> bool {
+        let [first, second] = self.body;
+        let crosses = |noise: ValueNoise, corners| {
+            let [least, greatest] = noise.bounds_within(corners, low, high);
+            least < record.limit && greatest > -record.limit
+        };
+        match record.body {
+            VEIN => crosses(record.noise(), first) && crosses(record.second_noise(), second),
+            _ => record.noise().bounds_within(first, low, high)[1] > record.limit,
+        }
+    }
 }
 
 /// Least and greatest of some numbers.
@@ -179,37 +211,47 @@ impl BrickStrata {
         if is_inside && record.body == FILL && record.condition == 0 {
             return voxels;
         }
-        let rough = record.rough;
-        if !is_inside
-            && (lies([height; 2], rough, record.height) == Some(false) || lies([y; 2], 0, record.ys) == Some(false))
-        {
+        let (rough, ys) = (record.rough, record.ys);
+        let is_level =
+            if (ys[0]..ys[1]).contains(&y) { lies([height; 2], rough, record.height) } else { Some(false) };
+        if is_level == Some(false) {
             return 0;
         }
-        let is_moved = rough != 0 && (!is_inside || record.body == BED);
-        let needs_noise = is_moved || record.body != FILL;
         let low = BrickPos(self.key.1).origin();
         let mut held = 0;
         for column in ones(voxels) {
             let depth = depth(self.heights.as_flattened()[column], y);
-            if !is_inside && lies([depth; 2], rough, record.depth) == Some(false) {
+            let is_deep = if is_inside { Some(true) } else { lies([depth; 2], rough, record.depth) };
+            if is_deep == Some(false)
+                || record.condition != 0 && self.conditions_of(ground, records, column) & record.condition == 0
+            {
                 continue;
             }
-            let point = IVec3::new(low.x + (column & 7) as i32, y, low.z + (column >> 3) as i32);
-            if record.condition != 0 && self.conditions_of(ground, records, column) & record.condition == 0 {
+            let is_sure = is_inside || is_level == Some(true) && is_deep == Some(true);
+            if is_sure && record.body == FILL {
+                held |= 1 << column;
                 continue;
             }
-            if needs_noise && self.ready & flag == 0 {
+            if self.ready & flag == 0 {
                 self.ready |= flag;
                 if !self.prepare(records, number) {
                     self.near &= !flag;
                     return held;
                 }
             }
-            let Noises { roughness, body } = self.noises[number];
+            let noises = &mut self.noises[number];
+            let point = IVec3::new(low.x + (column & 7) as i32, y, low.z + (column >> 3) as i32);
+            if matches!(record.body, VEIN | POCKET) && !noises.may_hold(record, point) {
+                continue;
+            }
+            let Noises { roughness, body, .. } = *noises;
             let place = IVec2::new(point.x, point.z);
-            let moved =
-                if is_moved { record.moved(record.roughness().flat_within(roughness, place)) } else { 0 };
-            let is_in_ranges = is_inside
+            let moved = match rough {
+                0 => 0,
+                _ if is_sure && record.body != BED => 0,
+                _ => record.moved(record.roughness().flat_within(roughness, place)),
+            };
+            let is_in_ranges = is_sure
                 || (record.depth[0]..record.depth[1]).contains(&(depth + moved))
                     && (record.height[0]..record.height[1]).contains(&(height + moved));
             let is_held = is_in_ranges
@@ -239,25 +281,18 @@ impl BrickStrata {
         if record.rough != 0 {
             noises.roughness = record.roughness().flat_corners(place);
         }
-        let [first, second] = &mut noises.body;
-        let is_possible = match record.body {
-            BED => {
-                *first = records.bedding.noise().flat_corners(place);
-                may_hold_bed(records, record, low, *first)
-            }
-            POCKET => {
-                *first = record.noise().corners(low);
-                record.noise().bounds_within(*first, low, low + 7)[1] > record.limit
-            }
-            VEIN => [(first, record.noise()), (second, record.second_noise())].into_iter().all(|(own, noise)| {
-                *own = noise.corners(low);
-                let [least, greatest] = noise.bounds_within(*own, low, low + 7);
-                least < record.limit && greatest > -record.limit
-            }),
-            _ => true,
+        noises.body = match record.body {
+            BED => [records.bedding.noise().flat_corners(place), Corners::ZERO],
+            POCKET => [record.noise().corners(low), Corners::ZERO],
+            VEIN => [record.noise(), record.second_noise()].map(|noise| noise.corners(low)),
+            _ => noises.body,
         };
         self.noises[number] = noises;
-        is_possible
+        match record.body {
+            BED => may_hold_bed(records, record, low, noises.body[0]),
+            POCKET | VEIN => noises.may_reach(record, low, low + (BRICK - 1)),
+            _ => true,
+        }
     }
 
     /// The conditions that a column of the brick fulfils.
@@ -276,8 +311,9 @@ impl BrickStrata {
 fn may_hold_bed(records: &StrataRecords, record: &StratumRecord, low: IVec3, folds: Corners) -> bool {
     let (start, bedding) = (Column::of(low), &records.bedding);
     let dips = [(0, 0), (7, 0), (0, 7), (7, 7)].map(|(x, z)| bedding.dip_at(start.offset(x, z)));
-    let [a, b, c, d, ..] = folds.to_array().map(i32::from);
-    let [least, greatest] = bounds([a, b, c, d]).map(|noise| i64::from(bedding.fold_at(noise)));
+    let place = IVec2::new(low.x, low.z);
+    let folds = bedding.noise().flat_bounds_within(folds, place, place + (BRICK - 1));
+    let [least, greatest] = folds.map(|noise| i64::from(bedding.fold_at(noise)));
     let (rough, heights) = (i64::from(record.rough), [low.y, low.y + BRICK - 1].map(|y| i64::from(y * ONE)));
     let first = heights[0] + dips.iter().min().unwrap_or(&0) + least - rough;
     let last = heights[1] + dips.iter().max().unwrap_or(&0) + greatest + rough;

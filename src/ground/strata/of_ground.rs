@@ -154,8 +154,8 @@ impl Ground {
         found.filter(|&own| own != MaterialId::GROUND).unwrap_or_else(|| self.material_of_column(point))
     }
 
-    /// Calls `each` with the materials of pristine voxels, and how many are of each, in one call or several. The voxels are
-    /// bits `z * 8 + x` of layer `y` of a brick.
+    /// Calls `each` with the materials of pristine voxels, and which are of each, in one call or several. Voxels are bits
+    /// `z * 8 + x` of layer `y` of a brick.
     pub(crate) fn for_materials(
         &self,
         pos: BrickPos,
@@ -173,21 +173,21 @@ impl Ground {
                 rest = brick.tops(low.y, voxels);
                 brick.for_materials(self, records, low.y, voxels & !rest, |material, held| match material {
                     MaterialId::GROUND => rest |= held,
-                    _ => each(material, held.count_ones().into()),
+                    _ => each(material, held),
                 });
             });
         }
-        let (mut last, mut count) = (MaterialId::GROUND, 0);
+        let (mut last, mut run) = (MaterialId::GROUND, 0);
         for bit in ones(rest) {
             let material = self.material(low + IVec3::new((bit & 7) as i32, 0, (bit >> 3) as i32));
-            if material != last && count != 0 {
-                each(last, count);
-                count = 0;
+            if material != last && run != 0 {
+                each(last, run);
+                run = 0;
             }
-            (last, count) = (material, count + 1);
+            (last, run) = (material, run | 1 << bit);
         }
-        if count != 0 {
-            each(last, count);
+        if run != 0 {
+            each(last, run);
         }
     }
 

@@ -26,6 +26,10 @@ pub(super) struct ValueNoise {
 /// The noise at the corners of a cell: x fastest, then z, then y. In the plane, the last four are 0.
 pub(super) type Corners = i16x8;
 
+/// Along each axis noise is linear in the weight, so the least and the greatest of a box are at its corners, but for this much
+/// of rounding.
+const ROUNDING: i32 = 4;
+
 impl ValueNoise {
     /// Noise at a point in space, -32768 to 32767.
     #[cfg(test)]
@@ -54,8 +58,6 @@ impl ValueNoise {
     /// Least and greatest noise at the points from `low` to `high`, which lie in the cell that has these corners; or a
     /// little beyond.
     pub fn bounds_within(self, corners: Corners, low: IVec3, high: IVec3) -> [i32; 2] {
-        // Along each axis noise is linear in the weight, so both are at corners of the box, but for rounding.
-        const ROUNDING: i32 = 4;
         let [x, y, z] = [0, 1, 2].map(|axis| [low[axis], high[axis]].map(|at| self.weights(at)));
         let lines = packed(x.map(|x| blend(corners, x)));
         let planes = packed(z.map(|z| blend(lines, z)));
@@ -79,6 +81,15 @@ impl ValueNoise {
         let [x, z] = place.to_array().map(|at| self.weights(at));
         let lines = blend(corners, x);
         blend(packed([lines; 2]), z).to_array()[0]
+    }
+
+    /// Least and greatest noise at the places from `low` to `high`, which lie in the cell that has these corners; or a
+    /// little beyond.
+    pub fn flat_bounds_within(self, corners: Corners, low: IVec2, high: IVec2) -> [i32; 2] {
+        let ends = [low, IVec2::new(high.x, low.y), IVec2::new(low.x, high.y), high];
+        let noise = ends.map(|place| self.flat_within(corners, place));
+        let (least, greatest) = (noise.into_iter().min(), noise.into_iter().max());
+        [least.unwrap_or_default() - ROUNDING, greatest.unwrap_or_default() + ROUNDING]
     }
 
     /// How much the corners before and after a coordinate weigh, four times over.
@@ -203,6 +214,13 @@ mod tests {
             let [least, greatest] = noise.bounds_within(noise.corners(low), low, low + 7);
             for index in 0..512 {
                 let own = noise.at(low + IVec3::new(index & 7, index >> 6, index >> 3 & 7));
+                prop_assert!((least..=greatest).contains(&own), "{own} is not in {least}..={greatest}");
+            }
+            let (from, to) = (IVec2::new(low.x, low.z), IVec2::new(low.x, low.z) + 7);
+            let corners = noise.flat_corners(from);
+            let [least, greatest] = noise.flat_bounds_within(corners, from, to);
+            for index in 0..64 {
+                let own = noise.flat_within(corners, from + IVec2::new(index & 7, index >> 3));
                 prop_assert!((least..=greatest).contains(&own), "{own} is not in {least}..={greatest}");
             }
         }
