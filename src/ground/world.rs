@@ -242,6 +242,7 @@ impl Ground {
     }
 
     /// Change of height around a column along x and along z.
+    #[inline]
     fn rises(&self, column: Column) -> [Rise; 2] {
         let Column { x, z } = self.extent.clamp(column);
         if (1..self.width()).contains(&x) && (1..self.depth()).contains(&z) {
@@ -292,7 +293,10 @@ impl Ground {
 
     /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
     pub(super) fn squared_slope(&self, column: Column) -> u64 {
-        let steps = |along: Rise| i64::from(along.rise * 2 / along.run).unsigned_abs();
+        let steps = |along: Rise| match along.run {
+            2 => u64::from(along.rise.unsigned_abs()),
+            run => u64::from((along.rise * 2 / run).unsigned_abs()),
+        };
         let [x, z] = self.rises(column).map(steps);
         x * x + z * z
     }

@@ -1,8 +1,8 @@
 //! The strata in one brick, and the bricks that a thread asked for last.
 //!
-//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. So a brick first finds
-//! out which strata may be in it by their ranges, and hashes the corners of a stratum's noise once, when the first voxel
-//! comes that only noise decides.
+//! An edit and the meshes around it ask for the materials of a few hundred voxels in a dozen bricks. Most strata are ruled out
+//! for 4x4x4 voxels at a time, an eighth of a brick: by their ranges when the first voxel of the eighth is asked for, and by
+//! bounds of their noise when one comes that the ranges leave open. The corners of the noise are hashed once for a brick.
 
 use std::cell::RefCell;
 
@@ -51,19 +51,33 @@ pub(super) struct BrickStrata {
     key: (u64, IVec3),
     /// Of the columns, rows along x.
     heights: [[i32; 8]; 8],
-    /// Those that may hold a voxel of the brick.
-    near: u32,
-    /// Those whose ranges hold all voxels of the brick, so only the body and the column decide.
-    inside: u32,
     /// Those whose noise is known.
-    ready: u32,
+    hashed: u32,
     /// By the numbers of strata.
     noises: Vec<Noises>,
+    /// The eighths that are known: a bit each.
+    known_eighths: u8,
+    /// Those with low and high x, the same at high z, and all four at high y.
+    eighths: [Eighth; 8],
     /// The columns for which `conditions` are known.
     known_columns: u64,
     /// The conditions of strata that a column fulfils: a bit each.
     conditions: [[u32; 8]; 8],
 }
+
+/// The strata in an eighth of a brick.
+#[derive(Clone, Copy, Default)]
+struct Eighth {
+    /// Those that may hold a voxel of it.
+    near: u32,
+    /// Those whose ranges hold all its voxels, so only the body and the column decide.
+    inside: u32,
+    /// Those whose bodies were looked for: the ones still near may be in it.
+    bounded: u32,
+}
+
+/// Voxels along the side of an eighth.
+const HALF: i32 = BRICK / 2;
 
 /// The noise of a stratum at the corners of the brick's cells.
 #[derive(Clone, Copy, Default)]
@@ -71,38 +85,6 @@ struct Noises {
     roughness: Corners,
     /// Of beds, the first is the bedding's.
     body: [Corners; 2],
-    /// Eighths of the brick for which `possible` is known: a bit each.
-    known: u8,
-    /// Those in which a vein or pocket may be.
-    possible: u8,
-}
-
-impl Noises {
-    /// May a vein or pocket be in the same eighth of the brick as a voxel?
-    #[inline]
-    fn may_hold(&mut self, record: &StratumRecord, point: IVec3) -> bool {
-        let IVec3 { x, y, z } = point >> 2 & 1;
-        let flag = 1 << (y << 2 | z << 1 | x);
-        if self.known & flag == 0 {
-            self.known |= flag;
-            let low = point & !3;
-            self.possible |= if self.may_reach(record, low, low + 3) { flag } else { 0 };
-        }
-        self.possible & flag != 0
-    }
-
-    /// May a vein or pocket be in a box of the brick?
-    fn may_reach(&self, record: &StratumRecord, low: IVec3, high: IVec3) -> bool {
-        let [first, second] = self.body;
-        let crosses = |noise: ValueNoise, corners| {
-            let [least, greatest] = noise.bounds_within(corners, low, high);
-            least < record.limit && greatest > -record.limit
-        };
-        match record.body {
-            VEIN => crosses(record.noise(), first) && crosses(record.second_noise(), second),
-            _ => record.noise().bounds_within(first, low, high)[1] > record.limit,
-        }
-    }
 }
 
 /// Least and greatest of some numbers.
@@ -131,15 +113,27 @@ fn depth(height: i32, y: i32) -> i32 {
 impl BrickStrata {
     /// Begins anew, with another brick.
     fn fill(&mut self, ground: &Ground, records: &StrataRecords, pos: BrickPos) {
-        let low = pos.origin();
         self.key = (records.id, pos.0);
-        self.heights = ground.heights(Column::of(low));
-        (self.near, self.inside, self.ready, self.known_columns) = (0, 0, 0, 0);
+        self.heights = ground.heights(Column::of(pos.origin()));
+        (self.hashed, self.known_eighths, self.known_columns) = (0, 0, 0);
         self.noises.resize(records.strata.len(), Noises::default());
-        let ys = [low.y, low.y + BRICK - 1];
-        let heights = ys.map(|y| y * ONE);
-        let [lowest, highest] = bounds(self.heights.as_flattened().iter().copied());
-        let depths = [depth(lowest, ys[1]), depth(highest, ys[0])];
+    }
+
+    /// The lowest voxel of an eighth.
+    fn low(&self, eighth: usize) -> IVec3 {
+        let half = |bit: usize| (eighth >> bit & 1) as i32 * HALF;
+        BrickPos(self.key.1).origin() + IVec3::new(half(0), half(2), half(1))
+    }
+
+    /// Finds the strata of an eighth by their ranges.
+    fn fill_eighth(&mut self, records: &StrataRecords, number: usize) {
+        let low = self.low(number).y;
+        let (x, z) = ((number & 1) * 4, (number >> 1 & 1) * 4);
+        let rows = self.heights[z..z + 4].iter();
+        let [lowest, highest] = bounds(rows.flat_map(|row| row[x..x + 4].iter().copied()));
+        let ys = [low, low + HALF - 1];
+        let (depths, heights) = ([depth(lowest, ys[1]), depth(highest, ys[0])], ys.map(|y| y * ONE));
+        let mut eighth = Eighth::default();
         for (number, record) in records.strata.iter().enumerate() {
             let is_deep = lies(depths, record.rough, record.depth);
             if is_deep == Some(false) {
@@ -149,15 +143,17 @@ impl BrickStrata {
             if known.contains(&Some(false)) {
                 continue;
             }
-            self.near |= 1 << number;
+            eighth.near |= 1 << number;
             if known == [Some(true); 3] {
-                self.inside |= 1 << number;
+                eighth.inside |= 1 << number;
                 if record.body == FILL && record.condition == 0 {
                     // It holds what those above it leave.
                     break;
                 }
             }
         }
+        self.known_eighths |= 1 << number;
+        self.eighths[number] = eighth;
     }
 
     /// The voxels of a set that are the highest solid ones of their columns. Sets are bits `z * 8 + x` of the layer at a y.
@@ -179,35 +175,44 @@ impl BrickStrata {
         voxels: u64,
         mut each: impl FnMut(MaterialId, u64),
     ) {
-        let mut left = voxels;
-        for number in ones(self.near.into()) {
-            let record = &records.strata[number];
-            let held = self.held_by(ground, records, (number, record), y, left);
-            if held != 0 {
-                each(MaterialId(record.material as u8), held);
-                left &= !held;
-                if left == 0 {
-                    return;
+        for quarter in 0..4 {
+            let mut left = voxels & 0x0f0f_0f0f << ((quarter & 1) * 4 + (quarter >> 1) * 32);
+            if left == 0 {
+                continue;
+            }
+            let eighth = quarter + (y >> 2 & 1) as usize * 4;
+            if self.known_eighths >> eighth & 1 == 0 {
+                self.fill_eighth(records, eighth);
+            }
+            for number in ones(self.eighths[eighth].near.into()) {
+                let record = &records.strata[number];
+                let held = self.held_by(ground, records, (number, record), (eighth, y), left);
+                if held != 0 {
+                    each(MaterialId(record.material as u8), held);
+                    left &= !held;
+                    if left == 0 {
+                        break;
+                    }
                 }
             }
-        }
-        if left != 0 {
-            each(MaterialId::GROUND, left);
+            if left != 0 {
+                each(MaterialId::GROUND, left);
+            }
         }
     }
 
-    /// Those of a set of voxels that a stratum holds.
+    /// Those of a set of voxels of an eighth that a stratum holds.
     #[inline]
     fn held_by(
         &mut self,
         ground: &Ground,
         records: &StrataRecords,
         (number, record): (usize, &StratumRecord),
-        y: i32,
+        (eighth, y): (usize, i32),
         voxels: u64,
     ) -> u64 {
         let (flag, height) = (1 << number, y * ONE);
-        let is_inside = self.inside & flag != 0;
+        let is_inside = self.eighths[eighth].inside & flag != 0;
         if is_inside && record.body == FILL && record.condition == 0 {
             return voxels;
         }
@@ -232,19 +237,15 @@ impl BrickStrata {
                 held |= 1 << column;
                 continue;
             }
-            if self.ready & flag == 0 {
-                self.ready |= flag;
-                if !self.prepare(records, number) {
-                    self.near &= !flag;
+            if self.eighths[eighth].bounded & flag == 0 {
+                self.eighths[eighth].bounded |= flag;
+                if !self.may_hold(records, number, eighth) {
+                    self.eighths[eighth].near &= !flag;
                     return held;
                 }
             }
-            let noises = &mut self.noises[number];
+            let Noises { roughness, body } = self.noises[number];
             let point = IVec3::new(low.x + (column & 7) as i32, y, low.z + (column >> 3) as i32);
-            if matches!(record.body, VEIN | POCKET) && !noises.may_hold(record, point) {
-                continue;
-            }
-            let Noises { roughness, body, .. } = *noises;
             let place = IVec2::new(point.x, point.z);
             let moved = match rough {
                 0 => 0,
@@ -273,26 +274,43 @@ impl BrickStrata {
         held
     }
 
-    /// Hashes the noise of a stratum; returns whether its body may be in the brick.
-    fn prepare(&mut self, records: &StrataRecords, number: usize) -> bool {
-        let low = BrickPos(self.key.1).origin();
-        let (place, record) = (IVec2::new(low.x, low.z), &records.strata[number]);
-        let mut noises = Noises::default();
-        if record.rough != 0 {
-            noises.roughness = record.roughness().flat_corners(place);
-        }
-        noises.body = match record.body {
-            BED => [records.bedding.noise().flat_corners(place), Corners::ZERO],
-            POCKET => [record.noise().corners(low), Corners::ZERO],
-            VEIN => [record.noise(), record.second_noise()].map(|noise| noise.corners(low)),
-            _ => noises.body,
+    /// May the body of a stratum be in an eighth?
+    fn may_hold(&mut self, records: &StrataRecords, number: usize, eighth: usize) -> bool {
+        let record = &records.strata[number];
+        let Noises { body, .. } = self.noises(records, number);
+        let low = self.low(eighth);
+        let high = low + (HALF - 1);
+        let crosses = |noise: ValueNoise, corners| {
+            let [least, greatest] = noise.bounds_within(corners, low, high);
+            least < record.limit && greatest > -record.limit
         };
-        self.noises[number] = noises;
         match record.body {
-            BED => may_hold_bed(records, record, low, noises.body[0]),
-            POCKET | VEIN => noises.may_reach(record, low, low + (BRICK - 1)),
+            BED => may_hold_bed(records, record, body[0], [low, high]),
+            POCKET => record.noise().bounds_within(body[0], low, high)[1] > record.limit,
+            VEIN => crosses(record.noise(), body[0]) && crosses(record.second_noise(), body[1]),
             _ => true,
         }
+    }
+
+    /// The noise of a stratum, hashed when it is first asked for.
+    fn noises(&mut self, records: &StrataRecords, number: usize) -> Noises {
+        if self.hashed >> number & 1 == 0 {
+            self.hashed |= 1 << number;
+            let low = BrickPos(self.key.1).origin();
+            let (place, record) = (IVec2::new(low.x, low.z), &records.strata[number]);
+            let mut noises = Noises::default();
+            if record.rough != 0 {
+                noises.roughness = record.roughness().flat_corners(place);
+            }
+            match record.body {
+                BED => noises.body[0] = records.bedding.noise().flat_corners(place),
+                POCKET => noises.body[0] = record.noise().corners(low),
+                VEIN => noises.body = [record.noise(), record.second_noise()].map(|noise| noise.corners(low)),
+                _ => {}
+            }
+            self.noises[number] = noises;
+        }
+        self.noises[number]
     }
 
     /// The conditions that a column of the brick fulfils.
@@ -307,16 +325,21 @@ impl BrickStrata {
     }
 }
 
-/// May a bed be in a brick, where the bedding's noise has these corners?
-fn may_hold_bed(records: &StrataRecords, record: &StratumRecord, low: IVec3, folds: Corners) -> bool {
-    let (start, bedding) = (Column::of(low), &records.bedding);
-    let dips = [(0, 0), (7, 0), (0, 7), (7, 7)].map(|(x, z)| bedding.dip_at(start.offset(x, z)));
-    let place = IVec2::new(low.x, low.z);
-    let folds = bedding.noise().flat_bounds_within(folds, place, place + (BRICK - 1));
+/// May a bed be in a box of a brick, where the bedding's noise has these corners?
+fn may_hold_bed(
+    records: &StrataRecords,
+    record: &StratumRecord,
+    folds: Corners,
+    [low, high]: [IVec3; 2],
+) -> bool {
+    let (bedding, rough) = (&records.bedding, i64::from(record.rough));
+    let [from, to] = [low, high].map(|end| IVec2::new(end.x, end.z));
+    let dips = [(from.x, from.y), (to.x, from.y), (from.x, to.y), (to.x, to.y)]
+        .map(|(x, z)| bedding.dip_at(Column::new(x, z)));
+    let folds = bedding.noise().flat_bounds_within(folds, from, to);
     let [least, greatest] = folds.map(|noise| i64::from(bedding.fold_at(noise)));
-    let (rough, heights) = (i64::from(record.rough), [low.y, low.y + BRICK - 1].map(|y| i64::from(y * ONE)));
-    let first = heights[0] + dips.iter().min().unwrap_or(&0) + least - rough;
-    let last = heights[1] + dips.iter().max().unwrap_or(&0) + greatest + rough;
+    let first = i64::from(low.y * ONE) + dips.iter().min().unwrap_or(&0) + least - rough;
+    let last = i64::from(high.y * ONE) + dips.iter().max().unwrap_or(&0) + greatest + rough;
     let [from, thickness, every] = record.bed.map(i64::from);
     let above = first - from;
     let above = if every > 0 { above.rem_euclid(every) } else { above };

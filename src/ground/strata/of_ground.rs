@@ -164,31 +164,25 @@ impl Ground {
         mut each: impl FnMut(MaterialId, u64),
     ) {
         let low = pos.origin() + IVec3::Y * y as i32;
-        // Those asked one by one: what the surface shows, what no stratum holds, and all beyond the rim.
+        // Those asked one by one: what no stratum holds, and all beyond the rim.
         let mut rest = voxels;
-        if let Some(Below { own: OwnMaterials::Strata { records, .. }, .. }) = self.below()
+        if let Some(Below { own: OwnMaterials::Strata { records, .. }, tops, .. }) = self.below()
             && [low, low + IVec3::new(7, 0, 7)].iter().all(|&corner| self.is_inside(corner))
         {
+            let first = self.extent().inner_index(Column::of(low));
             in_brick::with_brick(self, records, pos, |brick| {
-                rest = brick.tops(low.y, voxels);
-                brick.for_materials(self, records, low.y, voxels & !rest, |material, held| match material {
+                let shown = brick.tops(low.y, voxels);
+                let top = |bit: usize| tops.get(first + (bit >> 3) * self.extent().row_len() + (bit & 7));
+                for_runs(shown, |bit| top(bit).copied().unwrap_or_default(), &mut each);
+                rest = 0;
+                brick.for_materials(self, records, low.y, voxels & !shown, |material, held| match material {
                     MaterialId::GROUND => rest |= held,
                     _ => each(material, held),
                 });
             });
         }
-        let (mut last, mut run) = (MaterialId::GROUND, 0);
-        for bit in ones(rest) {
-            let material = self.material(low + IVec3::new((bit & 7) as i32, 0, (bit >> 3) as i32));
-            if material != last && run != 0 {
-                each(last, run);
-                run = 0;
-            }
-            (last, run) = (material, run | 1 << bit);
-        }
-        if run != 0 {
-            each(last, run);
-        }
+        let point = |bit: usize| low + IVec3::new((bit & 7) as i32, 0, (bit >> 3) as i32);
+        for_runs(rest, |bit| self.material(point(bit)), each);
     }
 
     /// Does a point lie in a column of the world, and no farther up or down than questions reach?
@@ -227,3 +221,20 @@ impl Ground {
 
 /// Points farther up or down, where no edit reaches, count as if they were here.
 const HIGHEST: i32 = 4 * LIMIT;
+
+/// Calls `each` with runs of voxels that have the same material.
+#[inline]
+fn for_runs(voxels: u64, material: impl Fn(usize) -> MaterialId, mut each: impl FnMut(MaterialId, u64)) {
+    let (mut last, mut run) = (MaterialId::GROUND, 0);
+    for bit in ones(voxels) {
+        let material = material(bit);
+        if material != last && run != 0 {
+            each(last, run);
+            run = 0;
+        }
+        (last, run) = (material, run | 1 << bit);
+    }
+    if run != 0 {
+        each(last, run);
+    }
+}
