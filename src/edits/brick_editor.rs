@@ -7,9 +7,7 @@ use super::effect::DraftedBrick;
 use crate::ground::MaterialId;
 use crate::lattice::{BrickPos, ChunkGrid, Column, LatticeBox};
 use crate::volume::layers::{self, Layers, offset, ones};
-use crate::volume::{
-    Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, solid_layers,
-};
+use crate::volume::{Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_hash, for_runs, solid_layers};
 
 /// A brick that edits change one after the other.
 pub(super) struct BrickEditor<'a> {
@@ -125,7 +123,9 @@ impl<'a> BrickEditor<'a> {
         let mut own = voxels;
         if brick.material_bytes() != 0 {
             let stored = |bit: &usize| brick.material_at(y * 64 + bit);
-            own = ones(voxels).filter(|bit| stored(bit) == MaterialId::GROUND).fold(0, |own, bit| own | 1 << bit);
+            own = ones(voxels)
+                .filter(|bit| stored(bit) == MaterialId::GROUND)
+                .fold(0, |own, bit| own | 1 << bit);
             let others = ones(voxels & !own).map(|bit| stored(&bit));
             for_runs(others, |material, voxels| counts.add(outcome, material, voxels));
         }

@@ -292,6 +292,7 @@ impl Ground {
     }
 
     /// Square of the surface's steepness over a column of the world, in 1/256 voxel of rise over two voxels of run.
+    #[inline]
     pub(super) fn squared_slope(&self, column: Column) -> u64 {
         let steps = |along: Rise| match along.run {
             2 => u64::from(along.rise.unsigned_abs()),

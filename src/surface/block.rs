@@ -156,14 +156,24 @@ impl Mesher {
         if let Some(columns) = stack.rim() {
             self.samples.extrapolate_beyond(&columns, layers, rows);
         }
-        self.list_edges(&cubes.solid, &drawn, bottom, top);
+        self.list_edges(&cubes.solid, &drawn, bottom, top, stack.has_own_materials());
         self.crossings.make(&self.samples, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
     }
 
-    /// Lists and numbers every lattice edge that a drawn cube's vertex lies on.
-    fn list_edges(&mut self, solid: &[LayerBits; 9], drawn: &[LayerBits; 8], bottom: usize, top: usize) {
+    /// Lists and numbers every lattice edge that a drawn cube's vertex lies on, and finds their solid ends if asked to.
+    fn list_edges(
+        &mut self,
+        solid: &[LayerBits; 9],
+        drawn: &[LayerBits; 8],
+        bottom: usize,
+        top: usize,
+        wants_ends: bool,
+    ) {
         let mut number = 0;
+        if wants_ends {
+            self.crossings.ends = [0; 9];
+        }
         for axis in 0..3 {
             let edges_of_axis = &mut self.crossings.lists[axis];
             edges_of_axis.clear();
@@ -177,6 +187,15 @@ impl Mesher {
                     _ => (level ^ level >> Z) & beside(here | below, X),
                 };
                 number = self.numbers.count(axis, y, edges, number, edges_of_axis);
+                if wants_ends {
+                    let ends = &mut self.crossings.ends;
+                    ends[y] |= edges & level;
+                    match axis {
+                        0 => ends[y] |= (edges & !level) << X,
+                        1 => ends[y + 1] |= edges & !level,
+                        _ => ends[y] |= (edges & !level) << Z,
+                    }
+                }
             }
         }
     }

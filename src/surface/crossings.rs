@@ -7,13 +7,13 @@
 use glam::{IVec3, Vec3};
 use wide::{f32x4, i32x4};
 
-use super::layer_bits::{PLACES, SIDE};
+use super::layer_bits::{self, LayerBits, PLACES, SIDE};
 use super::mesh::{MaterialMix, Vertex};
 use super::neighbours::{CornerBricks, Neighbours};
 use super::padded_samples::{AREA, Marked, PaddedSamples};
 use super::stack::Stack;
 use super::vertex::{between, lerp_normal};
-use crate::ground::{MaterialId, OVERLAY_DEPTH};
+use crate::ground::{Ground, MaterialId, OVERLAY_DEPTH};
 use crate::lattice::{BrickPos, ONE, SNAP};
 use crate::volume::Brick;
 use crate::volume::layers::ones;
@@ -33,6 +33,8 @@ pub(super) struct Edge {
 pub(super) struct Crossings {
     /// Along x, y and z.
     pub lists: [Vec<Edge>; 3],
+    /// Their solid ends, layer by layer; only where the ground's materials differ from voxel to voxel.
+    pub ends: [LayerBits; 9],
 }
 
 impl Crossings {
@@ -48,7 +50,7 @@ impl Crossings {
         out: &mut Vec<Vertex>,
     ) {
         let materials = StoredMaterials::new(around);
-        let own = stack.has_own_materials().then(|| self.solid_materials(samples, stack, low));
+        let own = stack.has_own_materials().then(|| self.solid_materials(stack.ground(), low));
         let mut site = Site { samples, stack, materials, own, low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
@@ -59,25 +61,20 @@ impl Crossings {
 
     /// The ground's own materials at the solid ends of all edges. Several edges end at the same voxel, and neighbours are
     /// asked together.
-    fn solid_materials(&self, samples: &PaddedSamples, stack: &Stack, low: IVec3) -> SolidMaterials {
-        let mut ends = [[0u64; 4]; 9];
-        let mut enter = |(corner, y): (usize, usize)| ends[y][PLACES[corner].brick] |= 1 << PLACES[corner].index;
-        let is_lower = |edge: &Edge| {
-            let at = (usize::from(edge.y) + 1) * AREA + PLACES[usize::from(edge.corner)].padded;
-            samples.all().get(at).is_some_and(|&sample| sample < 0)
-        };
-        let [x, y, z] = &self.lists;
-        x.iter().for_each(|edge| enter(solid_end::<0>(*edge, is_lower(edge))));
-        y.iter().for_each(|edge| enter(solid_end::<1>(*edge, is_lower(edge))));
-        z.iter().for_each(|edge| enter(solid_end::<2>(*edge, is_lower(edge))));
+    fn solid_materials(&self, ground: &Ground, low: IVec3) -> SolidMaterials {
         let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
-        for (y, (ends, materials)) in ends.iter().zip(&mut materials).enumerate() {
-            for (number, (&ends, materials)) in ends.iter().zip(materials).enumerate() {
+        for (y, (&ends, materials)) in self.ends.iter().zip(&mut materials).enumerate() {
+            if ends == 0 {
+                continue;
+            }
+            for (number, (voxels, materials)) in
+                layer_bits::split(ends).into_iter().zip(materials).enumerate()
+            {
                 let step = IVec3::new((number & 1) as i32, (y >> 3) as i32, (number >> 1) as i32);
-                if ends != 0 {
+                if voxels != 0 {
                     let pos = BrickPos(BrickPos::of(low).0 + step);
-                    stack.ground().for_materials(pos, y & 7, ends, |material, voxels| {
-                        ones(voxels).for_each(|bit| materials[bit] = material);
+                    ground.for_materials(pos, y & 7, voxels, |material, held| {
+                        ones(held).for_each(|bit| materials[bit] = material);
                     });
                 }
             }

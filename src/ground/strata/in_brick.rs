@@ -59,10 +59,6 @@ pub(super) struct BrickStrata {
     known_eighths: u8,
     /// Those with low and high x, the same at high z, and all four at high y.
     eighths: [Eighth; 8],
-    /// The columns for which `conditions` are known.
-    known_columns: u64,
-    /// The conditions of strata that a column fulfils: a bit each.
-    conditions: [[u32; 8]; 8],
 }
 
 /// The strata in an eighth of a brick.
@@ -115,7 +111,7 @@ impl BrickStrata {
     fn fill(&mut self, ground: &Ground, records: &StrataRecords, pos: BrickPos) {
         self.key = (records.id, pos.0);
         self.heights = ground.heights(Column::of(pos.origin()));
-        (self.hashed, self.known_eighths, self.known_columns) = (0, 0, 0);
+        (self.hashed, self.known_eighths) = (0, 0);
         self.noises.resize(records.strata.len(), Noises::default());
     }
 
@@ -211,54 +207,78 @@ impl BrickStrata {
         (eighth, y): (usize, i32),
         voxels: u64,
     ) -> u64 {
-        let (flag, height) = (1 << number, y * ONE);
-        let is_inside = self.eighths[eighth].inside & flag != 0;
-        if is_inside && record.body == FILL && record.condition == 0 {
-            return voxels;
-        }
-        let (rough, ys) = (record.rough, record.ys);
-        let is_level =
-            if (ys[0]..ys[1]).contains(&y) { lies([height; 2], rough, record.height) } else { Some(false) };
-        if is_level == Some(false) {
-            return 0;
-        }
-        let low = BrickPos(self.key.1).origin();
-        let mut held = 0;
-        for column in ones(voxels) {
-            let depth = depth(self.heights.as_flattened()[column], y);
-            let is_deep = if is_inside { Some(true) } else { lies([depth; 2], rough, record.depth) };
-            if is_deep == Some(false)
-                || record.condition != 0 && self.conditions_of(ground, records, column) & record.condition == 0
-            {
-                continue;
+        // Those for which ranges decide, and those that they leave to noise.
+        let (mut held, mut open) = (0, voxels);
+        if self.eighths[eighth].inside >> number & 1 == 1 {
+            if record.body == FILL {
+                (held, open) = (voxels, 0);
             }
-            let is_sure = is_inside || is_level == Some(true) && is_deep == Some(true);
-            if is_sure && record.body == FILL {
-                held |= 1 << column;
-                continue;
+        } else {
+            open = 0;
+            let is_level = match (record.ys[0]..record.ys[1]).contains(&y) {
+                true => lies([y * ONE; 2], record.rough, record.height),
+                false => Some(false),
+            };
+            if is_level == Some(false) {
+                return 0;
             }
-            if self.eighths[eighth].bounded & flag == 0 {
-                self.eighths[eighth].bounded |= flag;
-                if !self.may_hold(records, number, eighth) {
-                    self.eighths[eighth].near &= !flag;
-                    return held;
+            let is_sure = record.body == FILL && is_level == Some(true);
+            for column in ones(voxels) {
+                let depth = depth(self.heights.as_flattened()[column], y);
+                match lies([depth; 2], record.rough, record.depth) {
+                    Some(false) => {}
+                    Some(true) if is_sure => held |= 1 << column,
+                    _ => open |= 1 << column,
                 }
             }
-            let Noises { roughness, body } = self.noises[number];
+        }
+        if open != 0 {
+            held |= self.held_by_noise(records, (number, record), (eighth, y), open);
+        }
+        if record.condition != 0 && held != 0 {
+            let low = Column::of(BrickPos(self.key.1).origin());
+            let column = |bit: usize| low.offset((bit & 7) as i32, (bit >> 3) as i32);
+            let is_met = |bit: &usize| records.meets(ground, column(*bit), record.condition);
+            held = ones(held).filter(is_met).fold(0, |held, column| held | 1 << column);
+        }
+        held
+    }
+
+    /// Those of a set of voxels of an eighth that a stratum holds, if its condition on the column is met.
+    #[inline(never)]
+    fn held_by_noise(
+        &mut self,
+        records: &StrataRecords,
+        (number, record): (usize, &StratumRecord),
+        (eighth, y): (usize, i32),
+        voxels: u64,
+    ) -> u64 {
+        let flag = 1 << number;
+        if self.eighths[eighth].bounded & flag == 0 {
+            self.eighths[eighth].bounded |= flag;
+            if !self.may_hold(records, number, eighth) {
+                self.eighths[eighth].near &= !flag;
+                return 0;
+            }
+        }
+        let is_inside = self.eighths[eighth].inside & flag != 0;
+        let Noises { roughness, body } = self.noises[number];
+        let (bedding, low) = (&records.bedding, BrickPos(self.key.1).origin());
+        let is_held = |&column: &usize| {
             let point = IVec3::new(low.x + (column & 7) as i32, y, low.z + (column >> 3) as i32);
             let place = IVec2::new(point.x, point.z);
-            let moved = match rough {
+            let moved = match record.rough {
                 0 => 0,
-                _ if is_sure && record.body != BED => 0,
+                _ if is_inside && record.body != BED => 0,
                 _ => record.moved(record.roughness().flat_within(roughness, place)),
             };
-            let is_in_ranges = is_sure
+            let (depth, height) = (depth(self.heights.as_flattened()[column], y), y * ONE);
+            let is_in_ranges = is_inside
                 || (record.depth[0]..record.depth[1]).contains(&(depth + moved))
                     && (record.height[0]..record.height[1]).contains(&(height + moved));
-            let is_held = is_in_ranges
+            is_in_ranges
                 && match record.body {
                     BED => {
-                        let bedding = &records.bedding;
                         let fold = bedding.fold_at(bedding.noise().flat_within(body[0], place));
                         record.is_in_bed(i64::from(height + moved + fold) + bedding.dip_at(Column::of(point)))
                     }
@@ -268,10 +288,9 @@ impl BrickStrata {
                     }
                     POCKET => record.noise().within(body[0], point) > record.limit,
                     _ => true,
-                };
-            held |= u64::from(is_held) << column;
-        }
-        held
+                }
+        };
+        ones(voxels).filter(is_held).fold(0, |held, column| held | 1 << column)
     }
 
     /// May the body of a stratum be in an eighth?
@@ -311,17 +330,6 @@ impl BrickStrata {
             self.noises[number] = noises;
         }
         self.noises[number]
-    }
-
-    /// The conditions that a column of the brick fulfils.
-    fn conditions_of(&mut self, ground: &Ground, records: &StrataRecords, number: usize) -> u32 {
-        let (x, z) = (number & 7, number >> 3);
-        if self.known_columns >> number & 1 == 0 {
-            self.known_columns |= 1 << number;
-            let low = Column::of(BrickPos(self.key.1).origin());
-            self.conditions[z][x] = records.conditions_of(ground, low.offset(x as i32, z as i32));
-        }
-        self.conditions[z][x]
     }
 }
 

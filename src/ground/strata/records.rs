@@ -26,7 +26,7 @@ const ROUGH: u32 = 0x7F4A_7C15;
 pub(crate) struct StratumRecord {
     pub material: u32,
     pub body: u32,
-    /// The bit of its condition in [`StrataRecords::conditions_of`]; 0 without one.
+    /// The bit of its condition on columns; 0 without one.
     pub condition: u32,
     pub seed: u32,
     /// The width of the body's noise in voxels, as a power of two.
@@ -183,6 +183,7 @@ impl ColumnCondition {
     }
 
     /// May the stratum be in this column of the world?
+    #[inline]
     pub(super) fn admits(&self, ground: &Ground, column: Column) -> bool {
         let is_inside = match &self.bounds {
             StratumBounds::World => true,
@@ -243,7 +244,15 @@ impl StrataRecords {
         Self { id, strata, bedding, conditions, hash }
     }
 
+    /// Does a column of the world fulfil a condition, given by its bit?
+    #[inline]
+    pub fn meets(&self, ground: &Ground, column: Column, condition: u32) -> bool {
+        let own = self.conditions.get(condition.trailing_zeros() as usize);
+        own.is_none_or(|own| own.admits(ground, column))
+    }
+
     /// The conditions that a column of the world fulfils: a bit each.
+    #[cfg(any(test, feature = "cuda"))]
     pub fn conditions_of(&self, ground: &Ground, column: Column) -> u32 {
         let is_met = |(bit, own): (u32, &ColumnCondition)| u32::from(own.admits(ground, column)) << bit;
         (0..).zip(&self.conditions).map(is_met).sum()
