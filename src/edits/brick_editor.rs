@@ -51,6 +51,7 @@ impl<'a> BrickEditor<'a> {
     }
 
     /// The brick, to be changed.
+    #[inline]
     pub fn brick(&mut self) -> &mut Brick {
         let (base, heights, y) = (self.base, &self.heights, self.pos.origin().y);
         self.brick.get_or_insert_with(|| match base {

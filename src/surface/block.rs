@@ -156,24 +156,15 @@ impl Mesher {
         if let Some(columns) = stack.rim() {
             self.samples.extrapolate_beyond(&columns, layers, rows);
         }
-        self.list_edges(&cubes.solid, &drawn, bottom, top, stack.has_own_materials());
+        self.list_edges(&cubes.solid, &drawn, bottom, top);
+        self.crossings.ends = stack.has_own_materials().then(|| solid_ends(&cubes.solid, &drawn));
         self.crossings.make(&self.samples, stack, around, brick.origin(), origin, &mut out.vertices);
         self.triangulate(&cubes.solid, &drawn, bottom, top, &mut out.indices);
     }
 
-    /// Lists and numbers every lattice edge that a drawn cube's vertex lies on, and finds their solid ends if asked to.
-    fn list_edges(
-        &mut self,
-        solid: &[LayerBits; 9],
-        drawn: &[LayerBits; 8],
-        bottom: usize,
-        top: usize,
-        wants_ends: bool,
-    ) {
+    /// Lists and numbers every lattice edge that a drawn cube's vertex lies on.
+    fn list_edges(&mut self, solid: &[LayerBits; 9], drawn: &[LayerBits; 8], bottom: usize, top: usize) {
         let mut number = 0;
-        if wants_ends {
-            self.crossings.ends = [0; 9];
-        }
         for axis in 0..3 {
             let edges_of_axis = &mut self.crossings.lists[axis];
             edges_of_axis.clear();
@@ -187,15 +178,6 @@ impl Mesher {
                     _ => (level ^ level >> Z) & beside(here | below, X),
                 };
                 number = self.numbers.count(axis, y, edges, number, edges_of_axis);
-                if wants_ends {
-                    let ends = &mut self.crossings.ends;
-                    ends[y] |= edges & level;
-                    match axis {
-                        0 => ends[y] |= (edges & !level) << X,
-                        1 => ends[y + 1] |= edges & !level,
-                        _ => ends[y] |= (edges & !level) << Z,
-                    }
-                }
             }
         }
     }
@@ -231,6 +213,24 @@ impl Mesher {
         }
         out.truncate(end);
     }
+}
+
+/// The solid ends of all lattice edges that vertices of drawn cubes lie on: those corners of the cubes that are one edge away
+/// from another corner, of air.
+fn solid_ends(solid: &[LayerBits; 9], drawn: &[LayerBits; 8]) -> [LayerBits; 9] {
+    let mut ends = [0; 9];
+    for (y, &drawn) in drawn.iter().enumerate().filter(|(_, drawn)| **drawn != 0) {
+        let (low, high) = (solid[y], solid[y + 1]);
+        // The solid ends of the cubes' edges in a layer, along one axis.
+        let along = |level: LayerBits, step: u32, across: u32| {
+            let edges = (level ^ level >> step) & beside(drawn, across);
+            level & (edges | edges << step)
+        };
+        let upright = (low ^ high) & beside(beside(drawn, X), Z);
+        ends[y] |= low & upright | along(low, X, Z) | along(low, Z, X);
+        ends[y + 1] |= high & upright | along(high, X, Z) | along(high, Z, X);
+    }
+    ends
 }
 
 fn stack_of(brick: BrickPos) -> (i32, i32) {

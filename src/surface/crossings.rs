@@ -34,7 +34,7 @@ pub(super) struct Crossings {
     /// Along x, y and z.
     pub lists: [Vec<Edge>; 3],
     /// Their solid ends, layer by layer; only where the ground's materials differ from voxel to voxel.
-    pub ends: [LayerBits; 9],
+    pub ends: Option<[LayerBits; 9]>,
 }
 
 impl Crossings {
@@ -50,7 +50,12 @@ impl Crossings {
         out: &mut Vec<Vertex>,
     ) {
         let materials = StoredMaterials::new(around);
-        let own = stack.has_own_materials().then(|| self.solid_materials(stack.ground(), low));
+        let solid;
+        let mut own = None;
+        if let Some(ends) = &self.ends {
+            solid = solid_materials(ends, stack.ground(), low);
+            own = Some(&solid);
+        }
         let mut site = Site { samples, stack, materials, own, low, base: low - origin };
         let [x, y, z] = &self.lists;
         out.reserve(x.len() + y.len() + z.len());
@@ -58,29 +63,26 @@ impl Crossings {
         site.make::<1>(y, out);
         site.make::<2>(z, out);
     }
+}
 
-    /// The ground's own materials at the solid ends of all edges. Several edges end at the same voxel, and neighbours are
-    /// asked together.
-    fn solid_materials(&self, ground: &Ground, low: IVec3) -> SolidMaterials {
-        let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
-        for (y, (&ends, materials)) in self.ends.iter().zip(&mut materials).enumerate() {
-            if ends == 0 {
-                continue;
-            }
-            for (number, (voxels, materials)) in
-                layer_bits::split(ends).into_iter().zip(materials).enumerate()
-            {
-                let step = IVec3::new((number & 1) as i32, (y >> 3) as i32, (number >> 1) as i32);
-                if voxels != 0 {
-                    let pos = BrickPos(BrickPos::of(low).0 + step);
-                    ground.for_materials(pos, y & 7, voxels, |material, held| {
-                        ones(held).for_each(|bit| materials[bit] = material);
-                    });
-                }
+/// The ground's own materials at the solid ends of edges of a block. Several edges end at the same voxel, and neighbours are asked
+/// together.
+fn solid_materials(ends: &[LayerBits; 9], ground: &Ground, low: IVec3) -> SolidMaterials {
+    let mut materials = [[[MaterialId::GROUND; 64]; 4]; 9];
+    let brick = BrickPos::of(low).0;
+    for (y, (&ends, materials)) in
+        ends.iter().zip(&mut materials).enumerate().filter(|(_, (ends, _))| **ends != 0)
+    {
+        for (number, (voxels, materials)) in layer_bits::split(ends).into_iter().zip(materials).enumerate() {
+            let step = IVec3::new((number & 1) as i32, (y >> 3) as i32, (number >> 1) as i32);
+            if voxels != 0 {
+                ground.for_materials(BrickPos(brick + step), y & 7, voxels, |material, held| {
+                    ones(held).for_each(|bit| materials[bit] = material);
+                });
             }
         }
-        materials
     }
+    materials
 }
 
 /// Materials of the voxels at the corners of a block's cells: for each layer those of four bricks, as bits of
@@ -93,7 +95,7 @@ struct Site<'a, 'b> {
     stack: &'a mut Stack<'b>,
     materials: StoredMaterials<'a>,
     /// The ground's own materials at solid ends, if they differ from voxel to voxel.
-    own: Option<SolidMaterials>,
+    own: Option<&'a SolidMaterials>,
     /// The brick's lowest sample.
     low: IVec3,
     /// The same, from where positions count.
@@ -145,7 +147,7 @@ impl Site<'_, '_> {
         };
         let materials = match (stored, self.stack.single_mix()) {
             (MaterialId::GROUND, Some(mix)) => mix,
-            (MaterialId::GROUND, None) => match &self.own {
+            (MaterialId::GROUND, None) => match self.own {
                 Some(own) => {
                     let (solid, y) = solid_end::<AXIS>(edge, is_lower);
                     MaterialMix::pure(own[y][PLACES[solid].brick][PLACES[solid].index])
